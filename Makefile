@@ -1,0 +1,100 @@
+# vpm: every command sets up what it needs, in a fresh clone, with Python >= 3.11, Rust (cargo) and make.
+#
+# Settings, as in `make test PYTEST_ARGS="-k friction"`:
+#   PYTHON       the interpreter that makes .venv            (python3)
+#   DEMO_OUT     the folder that the demo's report goes to   (demo-report)
+#   PYTEST_ARGS  CARGO_ARGS                                  passed on
+
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+.SUFFIXES:
+.PHONY: help demo test test-rust test-python lint lint-rust lint-python bench docs package clean
+
+PYTHON ?= python3
+DEMO_OUT ?= demo-report
+PYTEST_ARGS ?=
+CARGO_ARGS ?=
+
+VENV := .venv
+BIN := $(VENV)/bin
+# All paths are relative, so that the folder of the clone may have any name; this one has to be absolute.
+# With it every command compiles the bindings against the same interpreter, so that cargo builds them once.
+export PYO3_PYTHON = $(CURDIR)/$(BIN)/python
+
+RUST_SOURCES := Cargo.toml $(wildcard Cargo.lock) \
+	$(shell find crates -name '*.rs' -o -name 'Cargo.toml')
+
+help: ## this list
+	@echo 'vpm: the commands (each does all of its own set-up)'
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-9s %s\n", $$1, $$2 }' Makefile
+
+demo: $(VENV)/.installed ## find the hidden effect in a recorded log; the report goes to demo-report/
+	$(BIN)/vpm demo --out "$(DEMO_OUT)"
+
+test: test-rust test-python ## all tests, Rust and Python
+
+test-rust: | $(VENV)/.tools-found
+	cargo test $(CARGO_ARGS)
+
+test-python: $(VENV)/.installed
+	$(BIN)/python -m pytest $(PYTEST_ARGS)
+
+lint: lint-rust lint-python ## formatting, static checks and types, all as errors
+
+lint-rust: $(VENV)/.installed
+	cargo fmt --all --check
+	cargo clippy --workspace --all-targets $(CARGO_ARGS) -- -D warnings
+
+lint-python: $(VENV)/.installed
+	$(BIN)/python -m ruff check .
+	$(BIN)/python -m ruff format --check .
+	$(BIN)/python -m mypy
+	$(BIN)/python -m mypy.stubtest --mypy-config-file pyproject.toml vpm._core
+	$(BIN)/lint-imports
+
+bench: | $(VENV)/.tools-found ## time the core: one result per line, with its spread
+	cargo bench --bench '*' $(CARGO_ARGS)
+
+docs: $(VENV)/.installed ## run every snippet of the documents; build the Rust documentation
+	$(BIN)/python -m pytest tests/test_docs.py $(PYTEST_ARGS)
+	RUSTDOCFLAGS='-D warnings' cargo doc --workspace --no-deps $(CARGO_ARGS)
+
+package: $(VENV)/.installed ## build the wheel and the source distribution into dist/
+	rm -rf dist
+	$(BIN)/python -m maturin build --release --sdist --out dist
+	@ls -l dist
+
+clean: ## remove everything that the commands made
+	rm -rf $(VENV) target dist demo-report .hypothesis .mypy_cache .pytest_cache .ruff_cache .import_linter_cache
+	find python tests -name '__pycache__' -type d -prune -exec rm -rf {} +
+	find python -name '_core*.so' -delete
+
+# ---- set-up ---------------------------------------------------------------------------------------------------------
+
+# What has to be on the machine; one sentence about what is not.
+$(VENV)/.tools-found:
+	@command -v "$(PYTHON)" >/dev/null || { \
+	  echo "vpm needs Python 3.11 or newer, but there is no '$(PYTHON)' here; install it, or name it: make PYTHON=python3.12" >&2; exit 1; }
+	@"$(PYTHON)" -c 'import sys; v = sys.version_info; sys.exit(0 if v >= (3, 11) else "vpm needs Python 3.11 or newer, but %s is %d.%d; name a newer one: make PYTHON=python3.12" % (sys.executable, v[0], v[1]))'
+	@command -v cargo >/dev/null || { \
+	  echo "vpm needs Rust to build its core, but there is no 'cargo' here; install Rust (rustup or your system's package) and try again" >&2; exit 1; }
+	@mkdir -p $(VENV)
+	@touch $@
+
+$(VENV)/.made: | $(VENV)/.tools-found
+	@if "$(PYTHON)" -c 'import ensurepip, venv' 2>/dev/null; then "$(PYTHON)" -m venv $(VENV); \
+	elif "$(PYTHON)" -m virtualenv --version >/dev/null 2>&1; then "$(PYTHON)" -m virtualenv $(VENV); \
+	elif command -v virtualenv >/dev/null; then virtualenv --python "$(PYTHON)" $(VENV); \
+	else echo "vpm keeps its tools in .venv, but this '$(PYTHON)' can make none (no venv, no virtualenv); install your system's python3-venv package and try again" >&2; exit 1; fi
+	@touch $@
+
+# Third-party packages: again only when pyproject.toml changes.
+$(VENV)/.tools: pyproject.toml | $(VENV)/.made
+	$(BIN)/python -m pip install --quiet 'maturin>=1.7,<2'
+	@touch $@
+
+# The compiled core, release build: again when a Rust source changes. Python sources are used where they stand.
+$(VENV)/.installed: pyproject.toml $(RUST_SOURCES) | $(VENV)/.tools
+	@echo 'building the core and installing vpm into $(VENV); the first time this takes a few minutes'
+	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/python -m pip install --quiet --no-build-isolation --editable '.[dev]'
+	@touch $@

@@ -1,0 +1,93 @@
+//! Actuators: the chain from a command to the effort on a joint, each link a file and a rig of its own.
+
+mod dead_zone;
+mod input_delay;
+mod lag;
+mod motor;
+mod saturation;
+
+use serde::Deserialize;
+
+pub use dead_zone::DeadZone;
+pub use input_delay::InputDelay;
+pub use lag::Lag;
+pub use motor::Motor;
+pub use saturation::Saturation;
+
+use crate::effect::Domain;
+use crate::scalar::Scalar;
+
+/// An actuator: delay, dead zone, saturation, lag, motor, in this order; links that are not there pass their input on.
+///
+/// Checked: see each link.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Actuator<P> {
+    /// Name, unique in the model.
+    pub name: String,
+    /// Number of the joint it acts on.
+    pub joint: usize,
+    /// From command to effort.
+    #[serde(rename = "gain")]
+    pub motor: Motor<P>,
+    /// Time between command and effect.
+    #[serde(default = "none")]
+    pub delay: Option<InputDelay<P>>,
+    /// Commands without effect.
+    #[serde(default = "none")]
+    pub dead_zone: Option<DeadZone<P>>,
+    /// Largest command with effect.
+    #[serde(default = "none")]
+    pub saturation: Option<Saturation<P>>,
+    /// Time to follow.
+    #[serde(default = "none")]
+    pub lag: Option<Lag<P>>,
+}
+
+/// A missing link (the derive would ask for `P: Default`).
+fn none<T>() -> Option<T> {
+    None
+}
+
+impl<P> Actuator<P> {
+    /// The same actuator over another number type.
+    pub fn map<T>(&self, f: &mut impl FnMut(&P) -> T) -> Actuator<T> {
+        Actuator {
+            name: self.name.clone(),
+            joint: self.joint,
+            motor: self.motor.map(f),
+            delay: self.delay.as_ref().map(|link| link.map(f)),
+            dead_zone: self.dead_zone.as_ref().map(|link| link.map(f)),
+            saturation: self.saturation.as_ref().map(|link| link.map(f)),
+            lag: self.lag.as_ref().map(|link| link.map(f)),
+        }
+    }
+
+    /// The parameters and where each is defined.
+    pub fn domains(&self) -> Vec<(&P, Domain)> {
+        let mut domains = vec![(&self.motor.gain, Domain::Any)];
+        domains.extend(self.delay.as_ref().map(|link| (&link.time, Domain::NonNegative)));
+        domains.extend(self.dead_zone.as_ref().map(|link| (&link.width, Domain::NonNegative)));
+        domains.extend(self.saturation.as_ref().map(|link| (&link.limit, Domain::Positive)));
+        domains.extend(self.lag.as_ref().map(|link| (&link.time_constant, Domain::Positive)));
+        domains
+    }
+}
+
+impl<S: Scalar> Actuator<S> {
+    /// What enters the lag over the interval that begins at sample `k`: the held command after delay, dead zone and saturation.
+    #[inline]
+    pub fn input(&self, k: usize, time_step: f64, command: impl Fn(usize) -> S) -> S {
+        let mut input = match &self.delay {
+            Some(delay) => delay.held(k, time_step, command),
+            None => command(k),
+        };
+        if let Some(dead_zone) = &self.dead_zone {
+            input = dead_zone.apply(input);
+        }
+        if let Some(saturation) = &self.saturation {
+            input = saturation.apply(input);
+        }
+        input
+    }
+}

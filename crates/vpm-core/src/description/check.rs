@@ -1,0 +1,148 @@
+//! What a description must satisfy before anything is built from it.
+
+use super::{Description, EffectEntry};
+use crate::effect::Domain;
+use crate::error::{Error, Result};
+use crate::sensor::Channel;
+
+/// Every number that refers to something refers to something that exists, and nothing is claimed twice.
+pub(super) fn references(description: &Description) -> Result<()> {
+    if description.parameter_names.len() != description.parameters.len() {
+        return Err(Error::Dimension {
+            what: "parameter_names".to_owned(),
+            expected: description.parameters.len(),
+            found: description.parameter_names.len(),
+            each: "parameter".to_owned(),
+        });
+    }
+    for (what, index) in used_parameters(description) {
+        within(&what, "parameter", index, description.parameters.len())?;
+    }
+    sites(description)?;
+    channels(description)?;
+    unique_claims(description)
+}
+
+/// Length, finiteness and domain of every parameter.
+pub(super) fn parameters(description: &Description, theta: &[f64]) -> Result<()> {
+    if theta.len() != description.n_parameters() {
+        return Err(Error::Dimension {
+            what: "theta".to_owned(),
+            expected: description.n_parameters(),
+            found: theta.len(),
+            each: "parameter of the model".to_owned(),
+        });
+    }
+    for (path, &value) in description.parameter_names.iter().zip(theta) {
+        if !value.is_finite() {
+            return Err(Error::NonFinite { path: path.clone(), value });
+        }
+    }
+    for (index, domain) in domains(description) {
+        let (path, value) = (&description.parameter_names[index], theta[index]);
+        if !domain.contains(value) {
+            return Err(Error::Domain { path: path.clone(), condition: domain.condition(), value });
+        }
+    }
+    Ok(())
+}
+
+fn domains(description: &Description) -> impl Iterator<Item = (usize, Domain)> {
+    let effects = description.effects.iter().flat_map(EffectEntry::domains);
+    let actuators = description.actuators.iter().flat_map(|actuator| actuator.domains());
+    let sensors = description.sensors.iter().flat_map(|sensor| sensor.domains());
+    let controllers = description.controllers.iter().flat_map(|controller| controller.law.domains());
+    effects.chain(actuators).chain(sensors).chain(controllers).map(|(&index, domain)| (index, domain))
+}
+
+/// Every place in the parameter vector that is used, and by what.
+fn used_parameters(description: &Description) -> Vec<(String, usize)> {
+    let mut used = Vec::new();
+    for body in &description.bodies {
+        body.map(&mut |&index| used.push((format!("body `{}`", body.name), index)));
+    }
+    for (number, effect) in description.effects.iter().enumerate() {
+        used.extend(effect.domains().into_iter().map(|(&index, _)| (format!("effect number {number}"), index)));
+    }
+    for actuator in &description.actuators {
+        actuator.map(&mut |&index| used.push((format!("actuator `{}`", actuator.name), index)));
+    }
+    for sensor in &description.sensors {
+        sensor.map(&mut |&index| used.push((format!("sensor `{}`", sensor.name), index)));
+    }
+    for controller in &description.controllers {
+        controller.law.map(&mut |&index| used.push((format!("controller `{}`", controller.name), index)));
+    }
+    used
+}
+
+fn sites(description: &Description) -> Result<()> {
+    let joints = description.n_joints();
+    for (number, effect) in description.effects.iter().enumerate() {
+        match effect {
+            EffectEntry::Joint { joint, .. } => within(&format!("effect number {number}"), "joint", *joint, joints)?,
+            EffectEntry::Payload { body, .. } => within(&format!("effect number {number}"), "body", *body, joints)?,
+        }
+    }
+    for actuator in &description.actuators {
+        within(&format!("actuator `{}`", actuator.name), "joint", actuator.joint, joints)?;
+    }
+    for controller in &description.controllers {
+        let what = format!("controller `{}`", controller.name);
+        within(&what, "actuator", controller.actuator, description.n_actuators())?;
+    }
+    Ok(())
+}
+
+fn channels(description: &Description) -> Result<()> {
+    for sensor in &description.sensors {
+        channel(&format!("sensor `{}`", sensor.name), sensor.channel, description)?;
+    }
+    for controller in &description.controllers {
+        let what = format!("controller `{}`", controller.name);
+        channel(&what, controller.measures, description)?;
+        if !matches!(controller.measures, Channel::Position { .. }) {
+            let message = format!("{what} measures {:?}, but a controller measures a position", controller.measures);
+            return Err(Error::Description { message });
+        }
+    }
+    Ok(())
+}
+
+fn channel(what: &str, channel: Channel, description: &Description) -> Result<()> {
+    match channel {
+        Channel::Position { joint }
+        | Channel::Velocity { joint }
+        | Channel::Acceleration { joint }
+        | Channel::Effort { joint } => within(what, "joint", joint, description.n_joints()),
+        Channel::Command { actuator } | Channel::Force { actuator } => {
+            within(what, "actuator", actuator, description.n_actuators())
+        }
+    }
+}
+
+/// One sensor per channel, one controller per actuator.
+fn unique_claims(description: &Description) -> Result<()> {
+    for (k, second) in description.sensors.iter().enumerate() {
+        if let Some(first) = description.sensors[..k].iter().find(|first| first.channel == second.channel) {
+            return Err(twice(&first.name, &second.name, "measure the same channel"));
+        }
+    }
+    for (k, second) in description.controllers.iter().enumerate() {
+        if let Some(first) = description.controllers[..k].iter().find(|first| first.actuator == second.actuator) {
+            return Err(twice(&first.name, &second.name, "command the same actuator"));
+        }
+    }
+    Ok(())
+}
+
+fn twice(first: &str, second: &str, claim: &str) -> Error {
+    Error::Twice { first: first.to_owned(), second: second.to_owned(), claim: claim.to_owned() }
+}
+
+fn within(what: &str, target: &'static str, index: usize, count: usize) -> Result<()> {
+    if index < count {
+        return Ok(());
+    }
+    Err(Error::Reference { what: what.to_owned(), target, index, count })
+}

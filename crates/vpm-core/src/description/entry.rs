@@ -1,0 +1,93 @@
+//! Entries of a description that say where a law sits: the site beside the law's own fields.
+
+use serde::Deserialize;
+use serde::de::Error as _;
+use serde_json::{Map, Value};
+
+use crate::controller::ControlLaw;
+use crate::effect::{Domain, JointEffect, Payload};
+use crate::sensor::Channel;
+
+/// An effect and its site, written as one flat table with a `type`.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(try_from = "Map<String, Value>")]
+pub enum EffectEntry {
+    /// An effect on a joint.
+    Joint {
+        /// Number of the joint.
+        joint: usize,
+        /// Its law.
+        law: JointEffect<usize>,
+    },
+    /// A payload on a body.
+    Payload {
+        /// Number of the body.
+        body: usize,
+        /// Its mass and place.
+        law: Payload<usize>,
+    },
+}
+
+/// A controller: its law, what it measures and what it commands, written as one flat table with a `type`.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(try_from = "Map<String, Value>")]
+pub struct ControllerEntry {
+    /// Name, unique in the model.
+    pub name: String,
+    /// Number of the actuator that it commands.
+    pub actuator: usize,
+    /// The position that it controls.
+    pub measures: Channel,
+    /// Its law.
+    pub law: ControlLaw<usize>,
+}
+
+impl EffectEntry {
+    /// The parameters and where each is defined.
+    pub fn domains(&self) -> Vec<(&usize, Domain)> {
+        match self {
+            Self::Joint { law, .. } => law.domains(),
+            Self::Payload { law, .. } => law.domains(),
+        }
+    }
+}
+
+/// Takes one field out of a table, so that the rest can be read strictly by the law it belongs to.
+fn take<T: for<'de> Deserialize<'de>>(table: &mut Map<String, Value>, field: &'static str) -> serde_json::Result<T> {
+    serde_json::from_value(table.remove(field).ok_or_else(|| serde_json::Error::missing_field(field))?)
+}
+
+/// Reads what is left of a table, and says in which entry a mistake is.
+fn named<T>(kind: &str, read: impl FnOnce() -> serde_json::Result<T>) -> Result<T, String> {
+    read().map_err(|error| format!("{kind}: {error}"))
+}
+
+impl TryFrom<Map<String, Value>> for EffectEntry {
+    type Error = String;
+
+    fn try_from(mut table: Map<String, Value>) -> Result<Self, String> {
+        let kind = table.get("type").and_then(Value::as_str).unwrap_or("effect without type").to_owned();
+        named(&kind, || {
+            if kind == "payload" {
+                table.remove("type");
+                let body = take(&mut table, "body")?;
+                return Ok(Self::Payload { body, law: serde_json::from_value(Value::Object(table))? });
+            }
+            let joint = take(&mut table, "joint")?;
+            Ok(Self::Joint { joint, law: serde_json::from_value(Value::Object(table))? })
+        })
+    }
+}
+
+impl TryFrom<Map<String, Value>> for ControllerEntry {
+    type Error = String;
+
+    fn try_from(mut table: Map<String, Value>) -> Result<Self, String> {
+        let name = named("controller", || take::<String>(&mut table, "name"))?;
+        named(&format!("controller `{name}`"), || {
+            let actuator = take(&mut table, "actuator")?;
+            let measures = take(&mut table, "measures")?;
+            Ok(Self { name: name.clone(), actuator, measures, law: serde_json::from_value(Value::Object(table))? })
+        })
+    }
+}

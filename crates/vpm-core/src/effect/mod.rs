@@ -1,0 +1,103 @@
+//! Physical effects, one per file: what a real joint or body does beyond the ideal rigid tree.
+//!
+//! An effect is a plain struct over its number type `P`: with `P = usize` it is a description (indices into the flat parameter
+//! vector), with `P: Scalar` it is the law itself, numbers in, effort out. `map` goes from one to the other.
+
+mod asymmetric_friction;
+mod bias_force;
+mod coulomb_friction;
+mod domain;
+mod payload;
+mod spring;
+mod stribeck_friction;
+mod torque_ripple;
+mod viscous_friction;
+
+use serde::Deserialize;
+
+pub use asymmetric_friction::AsymmetricFriction;
+pub use bias_force::BiasForce;
+pub use coulomb_friction::CoulombFriction;
+pub use domain::Domain;
+pub use payload::Payload;
+pub use spring::Spring;
+pub use stribeck_friction::StribeckFriction;
+pub use torque_ripple::TorqueRipple;
+pub use viscous_friction::ViscousFriction;
+
+use crate::scalar::Scalar;
+
+/// Any effect that puts an effort on a joint as a function of its coordinate and velocity.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(tag = "type", rename_all = "snake_case")]
+pub enum JointEffect<P> {
+    /// Resistance proportional to speed.
+    ViscousFriction(ViscousFriction<P>),
+    /// Constant resistance against the motion.
+    CoulombFriction(CoulombFriction<P>),
+    /// Friction that differs between the directions.
+    AsymmetricFriction(AsymmetricFriction<P>),
+    /// Extra friction at low speed.
+    StribeckFriction(StribeckFriction<P>),
+    /// Constant load.
+    BiasForce(BiasForce<P>),
+    /// Linear spring.
+    Spring(Spring<P>),
+    /// Effort periodic in the coordinate.
+    TorqueRipple(TorqueRipple<P>),
+}
+
+impl<P> JointEffect<P> {
+    /// The same effect over another number type.
+    pub fn map<T>(&self, f: &mut impl FnMut(&P) -> T) -> JointEffect<T> {
+        match self {
+            Self::ViscousFriction(law) => JointEffect::ViscousFriction(law.map(f)),
+            Self::CoulombFriction(law) => JointEffect::CoulombFriction(law.map(f)),
+            Self::AsymmetricFriction(law) => JointEffect::AsymmetricFriction(law.map(f)),
+            Self::StribeckFriction(law) => JointEffect::StribeckFriction(law.map(f)),
+            Self::BiasForce(law) => JointEffect::BiasForce(law.map(f)),
+            Self::Spring(law) => JointEffect::Spring(law.map(f)),
+            Self::TorqueRipple(law) => JointEffect::TorqueRipple(law.map(f)),
+        }
+    }
+
+    /// The parameters and where each is defined.
+    pub fn domains(&self) -> Vec<(&P, Domain)> {
+        match self {
+            Self::ViscousFriction(law) => law.domains(),
+            Self::CoulombFriction(law) => law.domains(),
+            Self::AsymmetricFriction(law) => law.domains(),
+            Self::StribeckFriction(law) => law.domains(),
+            Self::BiasForce(law) => law.domains(),
+            Self::Spring(law) => law.domains(),
+            Self::TorqueRipple(law) => law.domains(),
+        }
+    }
+}
+
+impl<S: Scalar> JointEffect<S> {
+    /// Effort on the joint, N or N m, at coordinate `q` (m or rad) and velocity `v` (m/s or rad/s).
+    #[inline]
+    pub fn effort(&self, q: S, v: S) -> S {
+        match self {
+            Self::ViscousFriction(law) => law.effort(v),
+            Self::CoulombFriction(law) => law.effort(v),
+            Self::AsymmetricFriction(law) => law.effort(v),
+            Self::StribeckFriction(law) => law.effort(v),
+            Self::BiasForce(law) => law.effort(),
+            Self::Spring(law) => law.effort(q),
+            Self::TorqueRipple(law) => law.effort(q),
+        }
+    }
+
+    /// Potential energy in J at coordinate `q`: `effort = -d potential/dq` for effects of the coordinate alone, zero for friction.
+    #[inline]
+    pub fn potential(&self, q: S) -> S {
+        match self {
+            Self::BiasForce(law) => law.potential(q),
+            Self::Spring(law) => law.potential(q),
+            Self::TorqueRipple(law) => law.potential(q),
+            Self::ViscousFriction(_) | Self::CoulombFriction(_) | Self::AsymmetricFriction(_) | Self::StribeckFriction(_) => S::zero(),
+        }
+    }
+}

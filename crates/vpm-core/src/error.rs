@@ -1,0 +1,206 @@
+//! What can go wrong, as data: which part, the failing condition, the numbers and the repair, in one sentence each.
+
+/// An input or a computation that has no physical meaning.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A parameter is infinite or not a number.
+    #[error("`{path}` must be a finite number, got {value}; check the value and its unit")]
+    NonFinite {
+        /// Dotted name, for example `carriage.mass`.
+        path: String,
+        /// The value found.
+        value: f64,
+    },
+    /// A body's mass, with its payloads, is zero or negative.
+    #[error(
+        "`{body}.mass` must be positive with all payloads included, got {mass} kg; give every body the mass it moves with"
+    )]
+    Mass {
+        /// Name of the body.
+        body: String,
+        /// Total mass in kg.
+        mass: f64,
+    },
+    /// No distribution of positive mass has this rotational inertia.
+    #[error(
+        "`{body}.inertia` belongs to no real body: its principal moments {moments:?} kg m^2 must be non-negative and \
+         the largest may not exceed the sum of the other two; check signs, units and that it is taken about the centre of mass"
+    )]
+    Inertia {
+        /// Name of the body.
+        body: String,
+        /// Principal moments about the centre of mass in kg m^2, ascending.
+        moments: [f64; 3],
+    },
+    /// A body's parent does not come before the body.
+    #[error(
+        "body `{body}` (number {index}) has parent number {parent}, but a parent must be one of the earlier bodies; \
+         list every parent before its children"
+    )]
+    Parent {
+        /// Name of the body.
+        body: String,
+        /// Its position in the list, from 0.
+        index: usize,
+        /// The parent asked for.
+        parent: usize,
+    },
+    /// A payload sits on a body that does not exist.
+    #[error(
+        "payload number {payload} sits on body number {body}, but the model has {bodies} bodies; use a number below {bodies}"
+    )]
+    PayloadBody {
+        /// Position of the payload in the list, from 0.
+        payload: usize,
+        /// The body asked for.
+        body: usize,
+        /// How many bodies there are.
+        bodies: usize,
+    },
+    /// A joint axis is not a unit vector.
+    #[error(
+        "`{joint}.axis` {axis:?} has length {length}, but must be a unit vector within 0.001; divide it by its length"
+    )]
+    Axis {
+        /// Name of the joint.
+        joint: String,
+        /// The axis found.
+        axis: [f64; 3],
+        /// Its length.
+        length: f64,
+    },
+    /// The rotation of a joint frame is not a rotation matrix.
+    #[error(
+        "`{joint}.rotation` is no rotation: R R^T differs from the identity by {defect} and det R = {determinant}; \
+         give an orthonormal right-handed matrix, row by row"
+    )]
+    Rotation {
+        /// Name of the joint.
+        joint: String,
+        /// Largest entry of |R R^T - 1|.
+        defect: f64,
+        /// Determinant of R, +1 for a rotation.
+        determinant: f64,
+    },
+    /// A joint moves no inertia, so that a force would give it an infinite acceleration.
+    #[error(
+        "joint `{joint}` moves no inertia along its own motion (articulated inertia {inertia:e}), so its acceleration is \
+         undefined; give its body a rotational inertia about the axis or move the centre of mass off the axis"
+    )]
+    SingularJoint {
+        /// Name of the joint.
+        joint: String,
+        /// Articulated inertia along the joint motion, kg or kg m^2.
+        inertia: f64,
+    },
+    /// An array has the wrong length.
+    #[error("{what} must have {expected} entries, got {found}; pass one entry per {each}")]
+    Dimension {
+        /// Which array.
+        what: String,
+        /// Entries needed.
+        expected: usize,
+        /// Entries found.
+        found: usize,
+        /// What one entry stands for.
+        each: String,
+    },
+    /// The model description is not what it should be.
+    #[error("the model description cannot be read: {message}; write it as the model loader does")]
+    Description {
+        /// What the reader says, with the place.
+        message: String,
+    },
+    /// Something in the description points at something that is not there.
+    #[error("{what} refers to {target} number {index}, but there are {count}; use a number below {count}")]
+    Reference {
+        /// What holds the reference, for example ``actuator `drive` ``.
+        what: String,
+        /// What kind of thing it refers to.
+        target: &'static str,
+        /// The number asked for.
+        index: usize,
+        /// How many there are.
+        count: usize,
+    },
+    /// Two parts of a model claim the same place.
+    #[error("`{second}` and `{first}` both {claim}; remove one of them")]
+    Twice {
+        /// The part that came first.
+        first: String,
+        /// The part that came second.
+        second: String,
+        /// What both do.
+        claim: String,
+    },
+    /// A parameter lies where its law is not defined.
+    #[error("`{path}` must {condition}, got {value}; give it another value or remove what it belongs to")]
+    Domain {
+        /// Dotted name, for example `axis.friction.transition_velocity`.
+        path: String,
+        /// The condition, after "must".
+        condition: &'static str,
+        /// The value found.
+        value: f64,
+    },
+    /// No integrator has this name.
+    #[error("there is no integrator `{name}`; use semi_implicit, rk4 or linearly_implicit")]
+    Integrator {
+        /// The name asked for.
+        name: String,
+    },
+    /// A setting of a computation is out of range.
+    #[error("{setting} must {condition}, got {value}; {repair}")]
+    Setting {
+        /// Which setting.
+        setting: &'static str,
+        /// The condition, after "must".
+        condition: String,
+        /// The value found.
+        value: f64,
+        /// What to do.
+        repair: &'static str,
+    },
+    /// An actuator without controller in a closed loop.
+    #[error(
+        "actuator `{actuator}` has no controller, so the loop is not closed; give it one or simulate with measured commands"
+    )]
+    OpenLoop {
+        /// Name of the actuator.
+        actuator: String,
+    },
+    /// A computation left the finite numbers.
+    #[error("{0}")]
+    Diverged(Box<Diverged>),
+    /// The caller asked to stop.
+    #[error("the computation was interrupted; start it again to get its result")]
+    Interrupted,
+}
+
+/// Shorthand for results of this crate.
+pub type Result<T> = std::result::Result<T, Error>;
+
+/// A simulation that left the finite numbers, with what it had computed until then.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error(
+    "{what} is no longer finite at t = {time} s (sample {sample_index}) with {method} in steps of {step} s; {repair}"
+)]
+pub struct Diverged {
+    /// Which quantity, for example ``the velocity of joint `axis` ``.
+    pub what: String,
+    /// Time after the first sample, in s.
+    pub time: f64,
+    /// First sample that is not finite; in a restart, counted in the log.
+    pub sample_index: usize,
+    /// Name of the integrator.
+    pub method: &'static str,
+    /// Step of the integrator in s.
+    pub step: f64,
+    /// What to do.
+    pub repair: &'static str,
+    /// Outputs of the samples before, row by row.
+    pub outputs: Vec<f64>,
+    /// States of the samples before, row by row.
+    pub states: Vec<f64>,
+}

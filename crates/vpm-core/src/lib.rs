@@ -1,0 +1,32 @@
+//! Rigid robot dynamics and its physical effects, written once over a number type that can carry exact derivatives.
+//!
+//! Frames are capital letters and cancel: `X_WB = X_WP * X_PB`. Spatial vectors are `[angular; linear]`. All numbers
+//! are SI. Coordinate `k` is the motion of joint `k`, which carries body `k`; parents come before children.
+
+pub mod actuator;
+pub mod body;
+pub mod controller;
+pub mod data;
+pub mod delay;
+pub mod description;
+pub mod dynamics;
+pub mod effect;
+pub mod error;
+pub mod evaluate;
+pub mod integrator;
+pub mod inverse;
+pub mod joint;
+pub mod model;
+pub mod ode;
+pub mod samples;
+pub mod scalar;
+pub mod sensitivity;
+pub mod sensor;
+pub mod simulate;
+pub mod spatial;
+pub mod system;
+pub mod table;
+pub mod timing;
+
+pub use error::{Error, Result};
+pub use scalar::{Dual, Scalar};

@@ -1,0 +1,16 @@
+//! The one interface between physics and time stepping.
+
+/// An autonomous system of ordinary differential equations `dx/dt = f(x)`; inputs are held constant inside it.
+pub trait Ode<S> {
+    /// Length of x.
+    fn dim(&self) -> usize;
+
+    /// How many second-order coordinates lead the state: `x[0..n]` are coordinates and `x[n..2n]` their rates, `dx[0..n]/dt = x[n..2n]`.
+    fn coordinates(&self) -> usize;
+
+    /// Writes f(x).
+    fn rhs(&mut self, x: &[S], dxdt: &mut [S]);
+
+    /// Writes df/dx, row by row: entry (i, j) at `i * dim + j`.
+    fn jacobian(&mut self, x: &[S], jacobian: &mut [S]);
+}

@@ -1,0 +1,77 @@
+//! Exact derivatives of a whole computation with respect to chosen parameters, a few at a time.
+
+use rayon::prelude::*;
+
+use crate::error::{Error, Result};
+use crate::scalar::{Dual, Scalar, seed};
+
+/// Parameters per pass: the gradient of a number then fills one 256-bit register.
+pub const LANES: usize = 4;
+
+/// Asked now and then whether to stop; true stops the computation with [`Error::Interrupted`].
+pub type Interrupt<'a> = &'a (dyn Fn() -> bool + Sync);
+
+/// Two arrays that a computation fills; what they hold is its own affair.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Pair<S> {
+    /// The first array.
+    pub first: Vec<S>,
+    /// The second array.
+    pub second: Vec<S>,
+}
+
+/// A computation that can run over any number type.
+pub(crate) trait Job: Sync {
+    /// Runs with the parameters `theta`.
+    fn run<S: Scalar>(&self, theta: &[S]) -> Result<Pair<S>>;
+}
+
+/// Values of a job and, for each parameter index in `variables`, the derivative of `quantity` (one number per place of an array of
+/// `count`): place by place, derivative number k at `place * variables.len() + k`.
+pub(crate) fn differentiate<J: Job>(
+    job: &J,
+    theta: &[f64],
+    variables: &[usize],
+    quantity: impl Fn(&Pair<Dual<f64, LANES>>, usize) -> Dual<f64, LANES> + Sync,
+) -> Result<(Pair<f64>, Vec<f64>)> {
+    check_variables(theta, variables)?;
+    if variables.is_empty() {
+        return Ok((job.run(theta)?, Vec::new()));
+    }
+    let pass = |chunk: &[usize]| job.run(&seed::<f64, LANES>(theta, chunk));
+    let passes: Vec<Pair<Dual<f64, LANES>>> = if variables.len() <= LANES {
+        vec![pass(variables)?]
+    } else {
+        variables.par_chunks(LANES).map(pass).collect::<Result<_>>()?
+    };
+    let jacobian = interleave(&passes, variables.len(), quantity);
+    let values = |numbers: &[Dual<f64, LANES>]| numbers.iter().map(|number| number.value).collect();
+    let pair = passes.first().map(|pass| Pair { first: values(&pass.first), second: values(&pass.second) });
+    pair.map(|pair| (pair, jacobian)).ok_or(Error::Interrupted)
+}
+
+fn interleave(
+    passes: &[Pair<Dual<f64, LANES>>],
+    variables: usize,
+    quantity: impl Fn(&Pair<Dual<f64, LANES>>, usize) -> Dual<f64, LANES>,
+) -> Vec<f64> {
+    let places = passes.first().map_or(0, |pass| pass.first.len());
+    let mut jacobian = vec![0.0; places * variables];
+    for (place, row) in jacobian.chunks_exact_mut(variables).enumerate() {
+        for (entries, pass) in row.chunks_mut(LANES).zip(passes) {
+            let gradient = quantity(pass, place).gradient;
+            entries.copy_from_slice(&gradient[..entries.len()]);
+        }
+    }
+    jacobian
+}
+
+fn check_variables(theta: &[f64], variables: &[usize]) -> Result<()> {
+    for &index in variables {
+        if index >= theta.len() {
+            let what = "the list of sensitivities".to_owned();
+            return Err(Error::Reference { what, target: "parameter", index, count: theta.len() });
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,145 @@
+//! Sensors: what a measurement shows of a channel.
+
+use serde::Deserialize;
+
+use crate::delay::SampleDelay;
+use crate::effect::Domain;
+use crate::scalar::Scalar;
+
+/// A quantity of the model that can be recorded.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
+pub enum Channel {
+    /// Coordinate of a joint, m or rad.
+    Position {
+        /// Number of the joint.
+        joint: usize,
+    },
+    /// Velocity of a joint, m/s or rad/s.
+    Velocity {
+        /// Number of the joint.
+        joint: usize,
+    },
+    /// Acceleration of a joint, m/s^2 or rad/s^2.
+    Acceleration {
+        /// Number of the joint.
+        joint: usize,
+    },
+    /// Total effort of the actuators on a joint, N or N m.
+    Effort {
+        /// Number of the joint.
+        joint: usize,
+    },
+    /// Command of an actuator, as applied, in its command unit.
+    Command {
+        /// Number of the actuator.
+        actuator: usize,
+    },
+    /// Effort that an actuator delivers, N or N m.
+    Force {
+        /// Number of the actuator.
+        actuator: usize,
+    },
+}
+
+impl Channel {
+    /// Number of outputs: position, velocity, acceleration, effort of each joint, then command and force of each actuator.
+    pub fn count(joints: usize, actuators: usize) -> usize {
+        4 * joints + 2 * actuators
+    }
+
+    /// Its place among the outputs of a model with this many joints.
+    pub fn column(self, joints: usize) -> usize {
+        match self {
+            Self::Position { joint } => 4 * joint,
+            Self::Velocity { joint } => 4 * joint + 1,
+            Self::Acceleration { joint } => 4 * joint + 2,
+            Self::Effort { joint } => 4 * joint + 3,
+            Self::Command { actuator } => 4 * joints + 2 * actuator,
+            Self::Force { actuator } => 4 * joints + 2 * actuator + 1,
+        }
+    }
+}
+
+/// A sensor on a channel, with what it does to the true value.
+///
+/// Law: `y(t) = gain x(t - delay) + offset`, y in the channel's unit, delay in s; see [`SampleDelay`] for delays between samples.
+/// Source: the linear measurement model, Doebelin 2004, "Measurement Systems", section 3.2. Checked: the gain must not be zero (the
+/// inverse dynamics undo it), the delay not negative.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Sensor<P> {
+    /// Name, unique in the model.
+    pub name: String,
+    /// What it measures.
+    pub channel: Channel,
+    /// Reading per true value (1 if none).
+    #[serde(default = "none")]
+    pub gain: Option<P>,
+    /// Reading at a true value of zero.
+    #[serde(default = "none")]
+    pub offset: Option<P>,
+    /// Age of the reading in s.
+    #[serde(default = "none")]
+    pub delay: Option<P>,
+}
+
+fn none<T>() -> Option<T> {
+    None
+}
+
+impl<P> Sensor<P> {
+    /// The same sensor over another number type.
+    pub fn map<T>(&self, f: &mut impl FnMut(&P) -> T) -> Sensor<T> {
+        Sensor {
+            name: self.name.clone(),
+            channel: self.channel,
+            gain: self.gain.as_ref().map(&mut *f),
+            offset: self.offset.as_ref().map(&mut *f),
+            delay: self.delay.as_ref().map(&mut *f),
+        }
+    }
+
+    /// The parameters and where each is defined.
+    pub fn domains(&self) -> Vec<(&P, Domain)> {
+        let mut domains = Vec::new();
+        domains.extend(self.gain.as_ref().map(|gain| (gain, Domain::NonZero)));
+        domains.extend(self.offset.as_ref().map(|offset| (offset, Domain::Any)));
+        domains.extend(self.delay.as_ref().map(|delay| (delay, Domain::NonNegative)));
+        domains
+    }
+}
+
+impl<S: Scalar> Sensor<S> {
+    /// The reading at sample `k` of a true signal given sample by sample; before the record starts the signal is at its first value.
+    #[inline]
+    pub fn read(&self, k: usize, time_step: f64, truth: impl Fn(usize) -> S) -> S {
+        let arrived = match self.delay {
+            Some(delay) => SampleDelay::new(delay, time_step).delayed(k, truth),
+            None => truth(k),
+        };
+        let scaled = self.gain.map_or(arrived, |gain| gain * arrived);
+        self.offset.map_or(scaled, |offset| scaled + offset)
+    }
+
+    /// The true signal at sample `k` behind readings given sample by sample, of which `last` is the last; past it they hold.
+    #[inline]
+    pub fn undo(&self, k: usize, last: usize, time_step: f64, reading: impl Fn(usize) -> S) -> S {
+        let shifted = self.undo_rate(k, last, time_step, reading);
+        match (self.offset, self.gain) {
+            (Some(offset), Some(gain)) => shifted - offset / gain,
+            (Some(offset), None) => shifted - offset,
+            (None, _) => shifted,
+        }
+    }
+
+    /// As [`Sensor::undo`] for a time derivative of the reading, which no offset touches.
+    #[inline]
+    pub fn undo_rate(&self, k: usize, last: usize, time_step: f64, reading: impl Fn(usize) -> S) -> S {
+        let shifted = match self.delay {
+            Some(delay) => SampleDelay::new(delay, time_step).advanced(k, last, reading),
+            None => reading(k),
+        };
+        self.gain.map_or(shifted, |gain| shifted / gain)
+    }
+}

@@ -1,0 +1,175 @@
+//! Simulation of a whole record: free run on commands, closed loop on references, restarts from many samples.
+
+mod stepper;
+
+pub(crate) use stepper::{Drive, Plan, Stepper};
+
+use crate::description::Description;
+use crate::error::{Diverged, Error, Result};
+use crate::integrator::Method;
+use crate::scalar::Scalar;
+use crate::sensitivity::{Interrupt, Job, Pair, differentiate};
+use crate::table::Table;
+
+/// How time advances.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stepping {
+    /// Time between samples, s.
+    pub time_step: f64,
+    /// Integration steps per sample.
+    pub substeps: usize,
+    /// The integrator.
+    pub method: Method,
+}
+
+impl Stepping {
+    /// Checked settings.
+    pub fn new(time_step: f64, substeps: usize, method: Method) -> Result<Self> {
+        check_time_step(time_step)?;
+        if substeps == 0 {
+            let condition = "be at least 1".to_owned();
+            return Err(Error::Setting { setting: "substeps", condition, value: 0.0, repair: "use 1 to begin with" });
+        }
+        Ok(Self { time_step, substeps, method })
+    }
+
+    /// Length of one integration step, s.
+    pub fn step(&self) -> f64 {
+        self.time_step / self.substeps as f64
+    }
+}
+
+pub(crate) fn check_time_step(time_step: f64) -> Result<()> {
+    if time_step.is_finite() && time_step > 0.0 {
+        return Ok(());
+    }
+    let condition = "be a positive time in s".to_owned();
+    let repair = "take it from the time column of the log";
+    Err(Error::Setting { setting: "time_step", condition, value: time_step, repair })
+}
+
+/// What a simulation gives, each table row by row.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Run {
+    /// Outputs of each sample: position, velocity, acceleration, effort of each joint, command and force of each actuator.
+    pub outputs: Vec<f64>,
+    /// State of each sample.
+    pub states: Vec<f64>,
+    /// Derivative of each output with respect to each requested parameter, of the discrete solution.
+    pub jacobian: Vec<f64>,
+}
+
+/// What all simulations are given.
+#[derive(Clone, Copy)]
+pub struct Setting<'a> {
+    /// The machine.
+    pub description: &'a Description,
+    /// Its parameters.
+    pub theta: &'a [f64],
+    /// How time advances.
+    pub stepping: Stepping,
+    /// Parameters (places in theta) to differentiate by.
+    pub sensitivities: &'a [usize],
+    /// Asked now and then whether to stop.
+    pub interrupt: Interrupt<'a>,
+}
+
+/// Free run: row k of `inputs` (N x actuators, command units) is held from sample k to sample k + 1, from `initial_state`.
+pub fn free_run(setting: Setting<'_>, initial_state: &[f64], inputs: Table<'_>) -> Result<Run> {
+    inputs.expect("inputs", inputs.rows(), setting.description.n_actuators())?;
+    check_state("initial_state", setting.description, initial_state)?;
+    let starts = [0];
+    let plan = Plan { drive: Drive::Commands(inputs), initial: initial_state, starts: &starts, horizon: inputs.rows() };
+    execute(setting, plan)
+}
+
+/// Closed loop: the controllers follow `references`; `disturbances` are added to their commands (both N x actuators).
+pub fn closed_loop(
+    setting: Setting<'_>,
+    initial_state: &[f64],
+    references: Table<'_>,
+    disturbances: Table<'_>,
+) -> Result<Run> {
+    let description = setting.description;
+    let (rows, inputs) = (references.rows(), description.n_actuators());
+    references.expect("references", rows, inputs)?;
+    disturbances.expect("disturbances", rows, inputs)?;
+    check_state("initial_state", description, initial_state)?;
+    for (number, actuator) in description.actuators.iter().enumerate() {
+        if !description.controllers.iter().any(|controller| controller.actuator == number) {
+            return Err(Error::OpenLoop { actuator: actuator.name.clone() });
+        }
+    }
+    let drive = Drive::Loop { references, disturbances };
+    execute(setting, Plan { drive, initial: initial_state, starts: &[0], horizon: rows })
+}
+
+/// Free runs of `horizon` samples from each sample in `starts`, from the row of `initial_states` that belongs to it. Delayed commands
+/// reach back into the record before the start; sensor delays see the start value held.
+pub fn restarts(
+    setting: Setting<'_>,
+    initial_states: Table<'_>,
+    starts: &[usize],
+    horizon: usize,
+    inputs: Table<'_>,
+) -> Result<Run> {
+    let description = setting.description;
+    inputs.expect("inputs", inputs.rows(), description.n_actuators())?;
+    initial_states.expect("initial_states", starts.len(), description.n_states())?;
+    if horizon == 0 || horizon > inputs.rows() {
+        let condition = format!("lie between 1 and the {} samples of the inputs", inputs.rows());
+        let repair = "choose a horizon that fits into the record";
+        return Err(Error::Setting { setting: "horizon", condition, value: horizon as f64, repair });
+    }
+    for &start in starts {
+        if start > inputs.rows() - horizon {
+            let condition = format!("leave {horizon} samples of the {} behind it", inputs.rows());
+            let repair = "drop the last starts or shorten the horizon";
+            return Err(Error::Setting { setting: "a start", condition, value: start as f64, repair });
+        }
+    }
+    let plan = Plan { drive: Drive::Commands(inputs), initial: initial_states.numbers(), starts, horizon };
+    execute(setting, plan)
+}
+
+pub(crate) fn check_state(name: &str, description: &Description, state: &[f64]) -> Result<()> {
+    Table::new(name, state, 1, state.len())?.expect(name, 1, description.n_states())
+}
+
+struct Simulation<'a> {
+    setting: Setting<'a>,
+    plan: Plan<'a>,
+}
+
+impl Job for Simulation<'_> {
+    fn run<S: Scalar>(&self, theta: &[S]) -> Result<Pair<S>> {
+        Stepper::new(&self.setting, &self.plan, theta)?.run(self.setting.interrupt)
+    }
+}
+
+fn execute(setting: Setting<'_>, plan: Plan<'_>) -> Result<Run> {
+    let job = Simulation { setting, plan };
+    let output = |pass: &Pair<_>, place: usize| pass.first[place];
+    let (pair, jacobian) = differentiate(&job, setting.theta, setting.sensitivities, output)?;
+    Ok(Run { outputs: pair.first, states: pair.second, jacobian })
+}
+
+/// What stopped being finite, in the words of the model.
+pub(crate) fn diverged<S: Scalar>(stepper: &Stepper<'_, S>, what: String, row: usize, start: usize) -> Error {
+    let stepping = stepper.stepping();
+    let repair = match stepping.method {
+        Method::LinearlyImplicit => "use more substeps, or check the signs and sizes of the parameters",
+        Method::Rk4 | Method::SemiImplicit => "use more substeps or the integrator linearly_implicit",
+    };
+    let (outputs, states) = stepper.before(row);
+    Error::Diverged(Box::new(Diverged {
+        what,
+        time: (start + row) as f64 * stepping.time_step,
+        sample_index: start + row,
+        method: stepping.method.name(),
+        step: stepping.step(),
+        repair,
+        outputs,
+        states,
+    }))
+}

@@ -1,0 +1,279 @@
+//! The loop over samples: what happens at a sample, and between two.
+
+use super::{Setting, Stepping, diverged};
+use crate::controller::{ControlLaw, ControlMemory};
+use crate::description::Description;
+use crate::error::{Error, Result};
+use crate::integrator::Integrator;
+use crate::ode::Ode;
+use crate::scalar::Scalar;
+use crate::sensitivity::{Interrupt, Pair};
+use crate::sensor::{Channel, Sensor};
+use crate::system::System;
+use crate::table::Table;
+
+/// Integration steps between two questions whether to stop.
+const PATIENCE: usize = 256;
+
+/// Where the commands come from.
+#[derive(Clone, Copy)]
+pub(crate) enum Drive<'a> {
+    /// Given, sample by sample.
+    Commands(Table<'a>),
+    /// From the model's controllers.
+    Loop { references: Table<'a>, disturbances: Table<'a> },
+}
+
+/// Which pieces of the record to simulate.
+#[derive(Clone, Copy)]
+pub(crate) struct Plan<'a> {
+    /// Where the commands come from.
+    pub(crate) drive: Drive<'a>,
+    /// State at each start, one after the other.
+    pub(crate) initial: &'a [f64],
+    /// Sample at which each piece begins.
+    pub(crate) starts: &'a [usize],
+    /// Samples of a piece.
+    pub(crate) horizon: usize,
+}
+
+/// A machine on its way through a piece of the record. All buffers are there before the first step.
+pub(crate) struct Stepper<'a, S> {
+    description: &'a Description,
+    plan: Plan<'a>,
+    stepping: Stepping,
+    system: System<S>,
+    integrator: Integrator<S>,
+    sensors: Vec<Sensor<S>>,
+    /// Law, actuator, measured column of each controller.
+    controllers: Vec<(ControlLaw<S>, usize, usize)>,
+    memories: Vec<ControlMemory<S>>,
+    state: Vec<S>,
+    rate: Vec<S>,
+    /// Commands of the whole record, row by row; given ones from the beginning, a controller's as time goes by.
+    commands: Vec<S>,
+    /// True channels of the piece, row by row.
+    truth: Vec<S>,
+    /// States of the piece, row by row.
+    states: Vec<S>,
+    /// Channels of the piece as the sensors show them, row by row.
+    outputs: Vec<S>,
+}
+
+impl<'a, S: Scalar> Stepper<'a, S> {
+    pub(crate) fn new(setting: &Setting<'a>, plan: &Plan<'a>, theta: &[S]) -> Result<Self> {
+        let description = setting.description;
+        let system = description.system(theta)?;
+        let (dim, rows, zero) = (system.dim(), plan.horizon, S::zero());
+        let commands = match plan.drive {
+            Drive::Commands(inputs) => inputs.numbers().iter().map(|&command| S::from_f64(command)).collect(),
+            Drive::Loop { references, .. } => vec![zero; references.numbers().len()],
+        };
+        let entries = &description.controllers;
+        let law = |law: &ControlLaw<usize>| law.map(&mut |&index| theta[index]);
+        let joints = description.n_joints();
+        Ok(Self {
+            description,
+            plan: *plan,
+            stepping: setting.stepping,
+            integrator: Integrator::new(setting.stepping.method, dim),
+            sensors: description.sensors(theta),
+            controllers: entries.iter().map(|c| (law(&c.law), c.actuator, c.measures.column(joints))).collect(),
+            memories: vec![ControlMemory::default(); entries.len()],
+            system,
+            state: vec![zero; dim],
+            rate: vec![zero; dim],
+            commands,
+            truth: vec![zero; rows * description.n_outputs()],
+            states: vec![zero; rows * dim],
+            outputs: vec![zero; rows * description.n_outputs()],
+        })
+    }
+
+    pub(crate) fn stepping(&self) -> Stepping {
+        self.stepping
+    }
+
+    /// All pieces, one after the other: outputs and states.
+    pub(crate) fn run(mut self, interrupt: Interrupt<'_>) -> Result<Pair<S>> {
+        let (starts, rows) = (self.plan.starts, self.plan.horizon);
+        if let [start] = starts {
+            self.piece(0, *start, interrupt)?;
+            return Ok(Pair { first: self.outputs, second: self.states });
+        }
+        let mut all = Pair {
+            first: Vec::with_capacity(starts.len() * self.outputs.len()),
+            second: Vec::with_capacity(starts.len() * rows * self.state.len()),
+        };
+        for (number, &start) in starts.iter().enumerate() {
+            self.piece(number, start, interrupt)?;
+            all.first.extend_from_slice(&self.outputs);
+            all.second.extend_from_slice(&self.states);
+        }
+        Ok(all)
+    }
+
+    fn piece(&mut self, number: usize, start: usize, interrupt: Interrupt<'_>) -> Result<()> {
+        let often = (PATIENCE / self.stepping.substeps).max(1);
+        self.restart(number);
+        for row in 0..self.plan.horizon {
+            self.sample(row, start)?;
+            if row % often == 0 && interrupt() {
+                return Err(Error::Interrupted);
+            }
+            if row + 1 < self.plan.horizon {
+                self.advance();
+            }
+        }
+        Ok(())
+    }
+
+    /// Puts the machine into the initial state of piece `number`.
+    pub(crate) fn restart(&mut self, number: usize) {
+        let initial = self.plan.initial.iter().skip(number * self.state.len());
+        for (state, &value) in self.state.iter_mut().zip(initial) {
+            *state = S::from_f64(value);
+        }
+        self.memories.fill(ControlMemory::default());
+    }
+
+    /// Everything that happens at a sample: measure, command, hold, evaluate, record. `start` is the piece's place in the record.
+    pub(crate) fn sample(&mut self, row: usize, start: usize) -> Result<()> {
+        let dim = self.state.len();
+        if let Some(place) = self.state.iter().position(|state| !state.is_finite()) {
+            return Err(diverged(self, self.state_name(place), row, start));
+        }
+        self.states[row * dim..(row + 1) * dim].copy_from_slice(&self.state);
+        self.record_motion(row);
+        self.control(row);
+        self.hold(row + start);
+        self.system.rhs(&self.state, &mut self.rate);
+        self.record_efforts(row, start);
+        self.read(row);
+        let width = self.description.n_outputs();
+        if let Some(column) = self.outputs[row * width..(row + 1) * width].iter().position(|out| !out.is_finite()) {
+            return Err(diverged(self, self.output_name(column), row, start));
+        }
+        Ok(())
+    }
+
+    /// Carries the state to the next sample.
+    pub(crate) fn advance(&mut self) {
+        let step = self.stepping.step();
+        for _ in 0..self.stepping.substeps {
+            self.integrator.step(&mut self.system, &mut self.state, step);
+        }
+    }
+
+    fn record_motion(&mut self, row: usize) {
+        let (n, width) = (self.description.n_joints(), self.description.n_outputs());
+        let channels = self.truth[row * width..].chunks_exact_mut(4);
+        for ((channels, &q), &v) in channels.zip(&self.state[..n]).zip(&self.state[n..]) {
+            channels[0] = q;
+            channels[1] = v;
+        }
+    }
+
+    /// Lets the controllers command, if there is a loop to close.
+    fn control(&mut self, row: usize) {
+        let Drive::Loop { references, disturbances } = self.plan.drive else { return };
+        let (time_step, actuators) = (self.stepping.time_step, self.description.n_actuators());
+        for (number, (law, actuator, column)) in self.controllers.iter().enumerate() {
+            let reference = S::from_f64(references.at(row, *actuator));
+            let measured = self.reading(row, *column);
+            let command = law.command(&mut self.memories[number], reference, measured, time_step);
+            self.commands[row * actuators + actuator] = command + disturbances.at(row, *actuator);
+        }
+    }
+
+    /// Holds on each actuator what its command amounts to over the interval that begins at sample `k` of the record.
+    fn hold(&mut self, k: usize) {
+        let Self { system, commands, stepping, description, .. } = self;
+        let actuators = description.n_actuators();
+        for number in 0..actuators {
+            let command = |sample: usize| commands[sample * actuators + number];
+            let input = system.dynamics().actuators[number].input(k, stepping.time_step, command);
+            system.hold(number, input);
+        }
+    }
+
+    fn record_efforts(&mut self, row: usize, start: usize) {
+        let (n, width) = (self.description.n_joints(), self.description.n_outputs());
+        let actuators = self.description.n_actuators();
+        let (of_joints, of_actuators) = self.truth[row * width..(row + 1) * width].split_at_mut(4 * n);
+        let dynamics = self.system.dynamics();
+        let accelerations = &self.rate[n..2 * n];
+        for ((channels, &a), &effort) in of_joints.chunks_exact_mut(4).zip(accelerations).zip(dynamics.efforts()) {
+            channels[2] = a;
+            channels[3] = effort;
+        }
+        let commands = &self.commands[(row + start) * actuators..];
+        for ((channels, &command), &force) in of_actuators.chunks_exact_mut(2).zip(commands).zip(dynamics.forces()) {
+            channels[0] = command;
+            channels[1] = force;
+        }
+    }
+
+    /// Shows the row as the sensors do.
+    fn read(&mut self, row: usize) {
+        let (joints, width) = (self.description.n_joints(), self.description.n_outputs());
+        self.outputs[row * width..(row + 1) * width].copy_from_slice(&self.truth[row * width..(row + 1) * width]);
+        for number in 0..self.sensors.len() {
+            let column = self.sensors[number].channel.column(joints);
+            self.outputs[row * width + column] = self.reading(row, column);
+        }
+    }
+
+    /// What is seen of a channel: its sensor's reading, or the truth where there is no sensor.
+    fn reading(&self, row: usize, column: usize) -> S {
+        let (joints, width) = (self.description.n_joints(), self.description.n_outputs());
+        let truth = |sample: usize| self.truth[sample * width + column];
+        let mut sensors = self.sensors.iter();
+        match sensors.find(|sensor| sensor.channel.column(joints) == column) {
+            Some(sensor) => sensor.read(row, self.stepping.time_step, truth),
+            None => truth(row),
+        }
+    }
+
+    /// Values of the samples before `row`: outputs and states.
+    pub(crate) fn before(&self, row: usize) -> (Vec<f64>, Vec<f64>) {
+        let values = |numbers: &[S], width: usize| numbers[..row * width].iter().map(Scalar::re).collect();
+        (values(&self.outputs, self.description.n_outputs()), values(&self.states, self.state.len()))
+    }
+
+    /// A state in words.
+    fn state_name(&self, place: usize) -> String {
+        let n = self.description.n_joints();
+        let joint = |k: usize| self.description.bodies[k].joint.name.as_str();
+        let name = match place {
+            _ if place < n => format!("position of joint `{}`", joint(place)),
+            _ if place < 2 * n => format!("velocity of joint `{}`", joint(place - n)),
+            _ => {
+                let mut lagging = self.description.actuators.iter().filter(|actuator| actuator.lag.is_some());
+                format!("lag of actuator `{}`", lagging.nth(place - 2 * n).map_or("", |actuator| &actuator.name))
+            }
+        };
+        of_what(&name, self.state[place])
+    }
+
+    /// An output that failed although the state is finite.
+    fn output_name(&self, column: usize) -> String {
+        let n = self.description.n_joints();
+        let name = match self.description.bodies.get(column / 4) {
+            Some(body) if column < Channel::count(n, 0) => {
+                let quantity = ["position", "velocity", "acceleration", "effort"][column % 4];
+                format!("{quantity} of joint `{}`", body.joint.name)
+            }
+            _ => format!("output number {column}"),
+        };
+        of_what(&name, self.truth[column])
+    }
+}
+
+/// The quantity itself, or only its derivative with respect to a parameter.
+fn of_what<S: Scalar>(name: &str, number: S) -> String {
+    if number.re().is_finite() && !number.is_finite() {
+        return format!("the derivative of the {name} with respect to a parameter");
+    }
+    format!("the {name}")
+}

@@ -1,0 +1,20 @@
+//! Poses, twists, wrenches and inertias as different types, so that a twist cannot be added to a wrench.
+//!
+//! A spatial vector is `[angular; linear]`, taken at the origin of the frame whose axes it is written in. Source:
+//! Featherstone 2008, "Rigid Body Dynamics Algorithms", chapter 2.
+
+mod articulated;
+mod inertia;
+mod matrix;
+mod pose;
+mod twist;
+mod vector;
+mod wrench;
+
+pub use articulated::ArticulatedInertia;
+pub use inertia::{SpatialInertia, principal_moments};
+pub use matrix::{Matrix3, Symmetric3};
+pub use pose::Pose;
+pub use twist::Twist;
+pub use vector::Vector3;
+pub use wrench::Wrench;

@@ -1,0 +1,67 @@
+//! Numbers over time: rows of equal length in one slice, as they come from outside.
+
+use crate::error::{Error, Result};
+
+/// A table of numbers, row by row; a row is a sample, a column a channel.
+#[derive(Clone, Copy, Debug)]
+pub struct Table<'a> {
+    numbers: &'a [f64],
+    rows: usize,
+    columns: usize,
+}
+
+impl<'a> Table<'a> {
+    /// A table of `rows` and `columns`, or what is wrong with it: its size, or a number that is not finite.
+    pub fn new(name: &str, numbers: &'a [f64], rows: usize, columns: usize) -> Result<Self> {
+        if rows.checked_mul(columns) != Some(numbers.len()) {
+            let (what, each) = (name.to_owned(), format!("entry of a table of {rows} x {columns}"));
+            return Err(Error::Dimension { what, expected: rows.saturating_mul(columns), found: numbers.len(), each });
+        }
+        if let Some(place) = numbers.iter().position(|number| !number.is_finite()) {
+            let path = format!("{name}[{}, {}]", place / columns, place % columns);
+            return Err(Error::NonFinite { path, value: numbers[place] });
+        }
+        Ok(Self { numbers, rows, columns })
+    }
+
+    /// Number of samples.
+    pub fn rows(&self) -> usize {
+        self.rows
+    }
+
+    /// Number of channels.
+    pub fn columns(&self) -> usize {
+        self.columns
+    }
+
+    /// All numbers, row by row.
+    pub fn numbers(&self) -> &'a [f64] {
+        self.numbers
+    }
+
+    /// The number of a channel at a sample.
+    #[inline]
+    pub fn at(&self, row: usize, column: usize) -> f64 {
+        self.numbers[row * self.columns + column]
+    }
+
+    /// The channels of a sample.
+    #[inline]
+    pub fn row(&self, row: usize) -> &'a [f64] {
+        &self.numbers[row * self.columns..(row + 1) * self.columns]
+    }
+
+    /// Complains unless the table has this shape.
+    pub(crate) fn expect(&self, name: &str, rows: usize, columns: usize) -> Result<()> {
+        let wrong = |axis: &str, expected, found, each: &str| {
+            Err(Error::Dimension { what: format!("the {axis} of {name}"), expected, found, each: each.to_owned() })
+        };
+        if self.rows != rows {
+            return wrong("rows", rows, self.rows, "sample");
+        }
+        if self.columns != columns {
+            return wrong("columns", columns, self.columns, "channel of the model");
+        }
+        Ok(())
+    }
+}

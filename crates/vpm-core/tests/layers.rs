@@ -1,0 +1,96 @@
+//! Modules import downward only, and the recursive algorithms know nothing of each other.
+
+use std::fs;
+use std::io::Result;
+use std::path::{Path, PathBuf};
+
+/// The rigid tree, lowest first: each may import any before it.
+const TREE: [&str; 8] = ["error", "scalar", "spatial", "joint", "body", "model", "data", "dynamics"];
+/// Parts that stand alone, each a rig of its own, and all that they may import besides themselves.
+const ALONE: [(&str, &[&str]); 10] = [
+    ("error", &[]),
+    ("scalar", &[]),
+    ("table", &["error"]),
+    ("delay", &["error", "scalar"]),
+    ("ode", &["error", "scalar"]),
+    ("integrator", &["error", "scalar", "ode"]),
+    ("effect", &["error", "scalar"]),
+    ("actuator", &["error", "scalar", "delay", "effect::Domain"]),
+    ("sensor", &["error", "scalar", "delay", "effect::Domain"]),
+    ("controller", &["error", "scalar", "effect::Domain", "actuator::Saturation"]),
+];
+/// What puts the parts together, lowest first: each may import any part, any tree module and any before it.
+const WHOLE: [&str; 8] =
+    ["sensitivity", "system", "description", "simulate", "inverse", "evaluate", "timing", "samples"];
+const WITNESSES: [&str; 3] = ["aba", "crba", "rnea"];
+
+fn sources(folder: &Path, found: &mut Vec<PathBuf>) -> Result<()> {
+    for entry in fs::read_dir(folder)? {
+        let path = entry?.path();
+        if path.is_dir() {
+            sources(&path, found)?;
+        } else if path.extension().is_some_and(|extension| extension == "rs") {
+            found.push(path);
+        }
+    }
+    Ok(())
+}
+
+/// Code without comments, one string per line.
+fn code(path: &Path) -> Result<Vec<String>> {
+    let text = fs::read_to_string(path)?;
+    Ok(text.lines().map(|line| line.split("//").next().unwrap_or_default().to_owned()).collect())
+}
+
+/// Whether `module` may import `path`, both inside the crate; nothing for a module that no list knows.
+fn allowed(module: &str, path: &str) -> Option<bool> {
+    let within = |part: &str| path.strip_prefix(part).is_some_and(|rest| rest.is_empty() || rest.starts_with("::"));
+    let before = |list: &[&str], end: usize| list.iter().take(end).any(|part| within(part));
+    if within(module) {
+        return Some(true);
+    }
+    if let Some((_, parts)) = ALONE.iter().find(|(name, _)| *name == module) {
+        return Some(before(parts, parts.len()));
+    }
+    if let Some(place) = TREE.iter().position(|name| *name == module) {
+        return Some(before(&TREE, place));
+    }
+    let place = WHOLE.iter().position(|name| *name == module)?;
+    Some(before(&WHOLE, place) || before(&TREE, TREE.len()) || ALONE.iter().any(|(name, _)| within(name)))
+}
+
+#[test]
+fn modules_import_downward_only() -> Result<()> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let (mut files, mut checked) = (Vec::new(), 0);
+    sources(&root, &mut files)?;
+    for file in files {
+        let inside = file.strip_prefix(&root).unwrap_or(&file).with_extension("");
+        let module = inside.iter().next().unwrap_or_default().to_string_lossy().into_owned();
+        if module == "lib" {
+            continue;
+        }
+        for import in code(&file)?.iter().flat_map(|line| line.split("crate::").skip(1)) {
+            let path: String = import.chars().take_while(|&c| c.is_alphanumeric() || "_:".contains(c)).collect();
+            let verdict = allowed(&module, &path);
+            assert!(verdict.is_some(), "{} is in no layer: give `{module}` its place in this test", file.display());
+            assert!(verdict == Some(true), "{} imports crate::{path}", file.display());
+            checked += 1;
+        }
+    }
+    assert!(checked > 60, "only {checked} imports found: the test has gone blind");
+    Ok(())
+}
+
+#[test]
+fn recursive_algorithms_do_not_call_each_other() -> Result<()> {
+    for own in WITNESSES {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("src/dynamics/{own}.rs"));
+        for line in code(&file)? {
+            for other in WITNESSES.into_iter().filter(|other| *other != own) {
+                assert!(!line.contains(other), "{own} mentions {other}: {line}");
+            }
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,81 @@
+//! Arrays between Python and the core.
+
+use numpy::prelude::*;
+use numpy::{AllowTypeChange, PyArray1, PyArray2, PyArray3, PyArrayLikeDyn};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use vpm_core::table::Table;
+
+/// A copy of an array of two dimensions (or of one, as a single row), so that the core can read it without the interpreter lock.
+pub(crate) struct Numbers {
+    name: &'static str,
+    values: Vec<f64>,
+    rows: usize,
+    columns: usize,
+}
+
+impl Numbers {
+    /// One dimension.
+    pub(crate) fn vector(name: &'static str, array: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let (values, shape) = read(name, array)?;
+        match shape[..] {
+            [columns] => Ok(Self { name, values, rows: 1, columns }),
+            _ => Err(wrong_shape(name, "one dimension", &shape)),
+        }
+    }
+
+    /// Two dimensions, (time, channel).
+    pub(crate) fn table(name: &'static str, array: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let (values, shape) = read(name, array)?;
+        match shape[..] {
+            [rows, columns] => Ok(Self { name, values, rows, columns }),
+            _ => Err(wrong_shape(name, "two dimensions, (time, channel)", &shape)),
+        }
+    }
+
+    /// All numbers, row by row.
+    pub(crate) fn values(&self) -> &[f64] {
+        &self.values
+    }
+
+    /// As the core reads it.
+    pub(crate) fn as_table(&self) -> Result<Table<'_>, vpm_core::Error> {
+        Table::new(self.name, &self.values, self.rows, self.columns)
+    }
+
+    /// Number of rows.
+    pub(crate) fn rows(&self) -> usize {
+        self.rows
+    }
+}
+
+fn read(name: &str, array: &Bound<'_, PyAny>) -> PyResult<(Vec<f64>, Vec<usize>)> {
+    let array: PyArrayLikeDyn<'_, f64, AllowTypeChange> = array.extract().map_err(|_| {
+        PyValueError::new_err(format!("`{name}` must be an array of numbers; convert it with numpy.asarray(..., float)"))
+    })?;
+    let view = array.as_array();
+    Ok((view.iter().copied().collect(), view.shape().to_vec()))
+}
+
+fn wrong_shape(name: &str, wanted: &str, shape: &[usize]) -> PyErr {
+    PyValueError::new_err(format!("`{name}` must have {wanted}, got shape {shape:?}; reshape it"))
+}
+
+/// Places in a list that Python may have counted from the end or beyond.
+pub(crate) fn places(name: &str, numbers: &[i64]) -> PyResult<Vec<usize>> {
+    let place = |&number: &i64| {
+        usize::try_from(number)
+            .map_err(|_| PyValueError::new_err(format!("`{name}` must not be negative, got {number}; count from 0")))
+    };
+    numbers.iter().map(place).collect()
+}
+
+/// A table as an array of shape (rows, columns).
+pub(crate) fn matrix(py: Python<'_>, values: Vec<f64>, shape: [usize; 2]) -> PyResult<Bound<'_, PyArray2<f64>>> {
+    PyArray1::from_vec(py, values).reshape(shape)
+}
+
+/// A table of vectors as an array of shape (rows, columns, entries).
+pub(crate) fn cube(py: Python<'_>, values: Vec<f64>, shape: [usize; 3]) -> PyResult<Bound<'_, PyArray3<f64>>> {
+    PyArray1::from_vec(py, values).reshape(shape)
+}

@@ -1,0 +1,19 @@
+//! Python bindings of [`vpm_core`]: the module `vpm._core`.
+//!
+//! Thin on purpose: arrays in and out, errors mapped to exceptions, the interpreter lock released while the core computes.
+
+use pyo3::prelude::*;
+
+mod arrays;
+mod errors;
+mod interrupt;
+mod system;
+
+/// The compiled core of vpm: a machine as one object, arrays in and out.
+#[pymodule]
+mod _core {
+    #[pymodule_export]
+    use crate::errors::Diverged;
+    #[pymodule_export]
+    use crate::system::System;
+}

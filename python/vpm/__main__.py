@@ -1,0 +1,5 @@
+"""``python -m vpm``."""
+
+from vpm.cli import main
+
+main()

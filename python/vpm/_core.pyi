@@ -1,0 +1,155 @@
+"""The compiled core of vpm: a machine as one object, arrays in and out."""
+
+from collections.abc import Sequence
+from typing import final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+class Diverged(ArithmeticError):
+    """A simulation left the finite numbers.
+
+    Attributes
+    ----------
+    sample_index : int
+        First sample that is not finite; in a restart, counted in the log.
+    outputs : ndarray, shape (M, n_outputs)
+        Outputs of the samples before, from the start of the piece.
+    states : ndarray, shape (M, n_states)
+        States of the samples before.
+    """
+
+    sample_index: int
+    outputs: NDArray[np.float64]
+    states: NDArray[np.float64]
+
+@final
+class System:
+    """A machine: rigid tree, effects, actuators, sensors and controllers over a flat parameter vector theta.
+
+    N samples, n joints, m actuators, P parameters, k requested sensitivities; all numbers SI. The state is
+    ``[positions, velocities, one state per actuator with lag]``, the outputs are position, velocity, acceleration
+    and effort of each joint, then command and force of each actuator; a sensor replaces the channel it measures.
+    Every function raises ``ValueError``, in one sentence with the repair, for wrong shapes, numbers that are not
+    finite, and parameters for which a law is not defined. Ctrl-C raises ``KeyboardInterrupt``.
+
+    Parameters
+    ----------
+    description : str
+        JSON; `vpm.Model` writes it.
+    """
+
+    def __new__(cls, description: str) -> System: ...
+    @property
+    def n_joints(self) -> int:
+        """Number of joints n."""
+    @property
+    def n_states(self) -> int:
+        """Length of the state."""
+    @property
+    def n_actuators(self) -> int:
+        """Number of actuators m."""
+    @property
+    def n_inputs(self) -> int:
+        """Number of inputs: one command per actuator."""
+    @property
+    def n_outputs(self) -> int:
+        """Number of output channels: 4 n + 2 m."""
+    @property
+    def n_parameters(self) -> int:
+        """Length P of theta."""
+    def simulate(
+        self,
+        theta: ArrayLike,
+        initial_state: ArrayLike,
+        inputs: ArrayLike,
+        time_step: float,
+        substeps: int,
+        integrator: str,
+        sensitivities: Sequence[int] = ...,
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Free run: row k of ``inputs`` (N, m) is held from sample k to sample k + 1.
+
+        Returns
+        -------
+        outputs : ndarray, shape (N, n_outputs)
+        states : ndarray, shape (N, n_states)
+        jacobian : ndarray, shape (N, n_outputs, k)
+            Exact derivative of the discrete solution by ``theta[sensitivities]``.
+
+        Raises
+        ------
+        Diverged
+            The state is no longer finite.
+        """
+    def simulate_closed_loop(
+        self,
+        theta: ArrayLike,
+        initial_state: ArrayLike,
+        references: ArrayLike,
+        disturbances: ArrayLike,
+        time_step: float,
+        substeps: int,
+        integrator: str,
+        sensitivities: Sequence[int] = ...,
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Closed loop on ``references`` (N, m), with ``disturbances`` (N, m) added to the commands; else as `simulate`."""
+    def restart(
+        self,
+        theta: ArrayLike,
+        initial_states: ArrayLike,
+        starts: Sequence[int] | NDArray[np.int64],
+        horizon: int,
+        inputs: ArrayLike,
+        time_step: float,
+        substeps: int,
+        integrator: str,
+        sensitivities: Sequence[int] = ...,
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Free runs of ``horizon`` samples from each of the S samples ``starts``, row 0 being the start itself.
+
+        Returns
+        -------
+        outputs : ndarray, shape (S, horizon, n_outputs)
+        jacobian : ndarray, shape (S, horizon, n_outputs, k)
+        """
+    def inverse_dynamics(
+        self,
+        theta: ArrayLike,
+        position: ArrayLike,
+        velocity: ArrayLike,
+        acceleration: ArrayLike,
+        inputs: ArrayLike,
+        time_step: float,
+        sensitivities: Sequence[int] = ...,
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Effort that a measured motion (N, n) needs, and effort that the actuators deliver under ``inputs`` (N, m).
+
+        Returns
+        -------
+        required : ndarray, shape (N, n)
+            Effort of the rigid tree minus that of the effects, position sensors undone.
+        applied : ndarray, shape (N, n)
+            Mean over the two sample intervals that meet at the sample.
+        jacobian : ndarray, shape (N, n, k)
+            Derivative of ``required - applied``.
+        """
+    def forward_dynamics(
+        self, theta: ArrayLike, position: ArrayLike, velocity: ArrayLike, effort: ArrayLike
+    ) -> NDArray[np.float64]:
+        """Accelerations (n,) of the rigid tree with its effects under ``effort`` (n,) on the joints."""
+    def mass_matrix(self, theta: ArrayLike, position: ArrayLike) -> NDArray[np.float64]:
+        """Mass matrix (n, n), payloads included."""
+    def energy(self, theta: ArrayLike, position: ArrayLike, velocity: ArrayLike) -> tuple[float, float]:
+        """Kinetic and potential energy in J: of bodies in gravity, and of effects that have a potential."""
+    def time_steps(
+        self,
+        theta: ArrayLike,
+        initial_state: ArrayLike,
+        inputs: ArrayLike,
+        time_step: float,
+        substeps: int,
+        integrator: str,
+        count: int,
+    ) -> NDArray[np.float64]:
+        """Duration (count,) in s of single steps, on the way through ``inputs`` again and again."""

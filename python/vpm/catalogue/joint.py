@@ -1,0 +1,239 @@
+"""Effects that sit at a joint: they act with an effort that depends on its position and velocity.
+
+Smooth friction laws: the sign of the velocity is written tanh(v/vt), so that every law has derivatives; the transition
+velocity vt is far below the speeds of interest. Coulomb, viscous and Stribeck terms: B. Armstrong-Helouvry, P. Dupont
+and C. Canudas de Wit, "A survey of models, analysis tools and compensation methods for the control of machines with
+friction", Automatica 30 (1994).
+"""
+
+from __future__ import annotations
+
+from vpm.catalogue.kinds import ANY, NOT_NEGATIVE, EffectParameter, EffectType, shape, size
+
+#: Transition velocity where none is given: prismatic (m/s), revolute (rad/s).
+_TRANSITION = (1e-3, 1e-2)
+#: Stribeck velocity where none is given: prismatic (m/s), revolute (rad/s).
+_STRIBECK = (1e-2, 1e-1)
+
+
+def _transition(suffix: str) -> EffectParameter:
+    return shape(
+        "transition_velocity",
+        f"friction.{suffix}",
+        "{C}/s",
+        "speed",
+        "speed below which the law bends from one sign to the other",
+        start=_TRANSITION,
+    )
+
+
+VISCOUS_FRICTION = EffectType(
+    name="viscous_friction",
+    site="joint",
+    group="friction",
+    parameters=(
+        size(
+            "viscous",
+            "friction.viscous",
+            "{E} s/{C}",
+            "effort_per_speed",
+            "resistance per speed",
+            physical=NOT_NEGATIVE,
+        ),
+    ),
+    law="tau = -viscous v",
+    sentence="{at} resists motion in proportion to its speed, with {viscous}.",
+    impossible="a negative viscous friction would feed energy into the motion instead of taking it out",
+    confused_with={
+        "coulomb_friction": "motion at one speed alone does not part them; records at several speeds do",
+        "actuator_lag": "both weaken fast motion; steady motion at several speeds shows the friction alone",
+    },
+)
+
+COULOMB_FRICTION = EffectType(
+    name="coulomb_friction",
+    site="joint",
+    group="friction",
+    parameters=(
+        size(
+            "coulomb",
+            "friction.coulomb",
+            "{E}",
+            "effort",
+            "resistance that does not depend on speed",
+            physical=NOT_NEGATIVE,
+        ),
+        _transition("transition_velocity"),
+    ),
+    law="tau = -coulomb tanh(v/transition_velocity)",
+    sentence="{at} resists motion with {coulomb} at any speed, against the direction of motion.",
+    impossible="a negative Coulomb friction would push along the motion and feed energy into it",
+    confused_with={
+        "bias_force": "motion in one direction alone does not part them; motion in both directions does",
+        "viscous_friction": "motion at one speed alone does not part them; records at several speeds do",
+        "stribeck_friction": "they differ only at low speed; slow motion and starts from rest part them",
+        "dead_zone": "they agree wherever command and velocity have the same sign; braking parts them",
+    },
+)
+
+ASYMMETRIC_FRICTION = EffectType(
+    name="asymmetric_friction",
+    site="joint",
+    group="friction",
+    parameters=(
+        size(
+            "coulomb_difference",
+            "friction.coulomb_difference",
+            "{E}",
+            "effort",
+            "Coulomb friction in positive minus in negative direction",
+        ),
+        size(
+            "viscous_difference",
+            "friction.viscous_difference",
+            "{E} s/{C}",
+            "effort_per_speed",
+            "viscous friction in positive minus in negative direction",
+        ),
+        _transition("asymmetric_transition_velocity"),
+    ),
+    law=(
+        "tau = -1/2 coulomb_difference tanh(v/transition_velocity)^2"
+        " - 1/2 viscous_difference v tanh(v/transition_velocity)"
+    ),
+    sentence=(
+        "{at} resists motion differently in its two directions: by {coulomb_difference} at any speed and by"
+        " {viscous_difference} in proportion to speed (positive minus negative direction)."
+    ),
+    impossible="either sign is possible; the friction of each direction as a whole has to stay above zero",
+    confused_with={
+        "bias_force": (
+            "a difference of Coulomb friction and a constant load agree wherever the joint moves; only standstill and"
+            " starts from rest part them"
+        ),
+    },
+    requires="coulomb_friction",
+)
+
+STRIBECK_FRICTION = EffectType(
+    name="stribeck_friction",
+    site="joint",
+    group="friction",
+    parameters=(
+        size(
+            "stribeck",
+            "friction.stribeck",
+            "{E}",
+            "effort",
+            "friction close to rest in excess of the Coulomb friction",
+            physical=NOT_NEGATIVE,
+        ),
+        shape(
+            "stribeck_velocity",
+            "friction.stribeck_velocity",
+            "{C}/s",
+            "speed",
+            "speed at which the excess has fallen to 37 %",
+            start=_STRIBECK,
+        ),
+        _transition("stribeck_transition_velocity"),
+    ),
+    law="tau = -stribeck tanh(v/transition_velocity) exp(-(v/stribeck_velocity)^2)",
+    sentence=(
+        "{at} sticks: close to rest it resists motion with {stribeck} more than in motion, an excess that fades at a"
+        " speed of about {stribeck_velocity}."
+    ),
+    impossible="a negative Stribeck level would mean friction that is lower close to rest than in motion",
+    confused_with={
+        "coulomb_friction": "they differ only at low speed; slow motion and starts from rest part them",
+        "dead_zone": "both hold the joint at rest under small commands; slow reversals under load part them",
+    },
+    requires="coulomb_friction",
+)
+
+BIAS_FORCE = EffectType(
+    name="bias_force",
+    site="joint",
+    group="bias",
+    parameters=(size("force", "bias.force", "{E}", "effort", "load that the drive has to overcome"),),
+    law="tau = -force",
+    sentence="{at} carries a constant load of {force}, in either direction and at rest.",
+    impossible="either sign is possible: it says in which direction the load pulls",
+    confused_with={
+        "coulomb_friction": "motion in one direction alone does not part them; motion in both directions does",
+        "asymmetric_friction": (
+            "a constant load and a difference of Coulomb friction agree wherever the joint moves; only standstill and"
+            " starts from rest part them"
+        ),
+        "payload": "they agree where gravity's lever does not change; other poses or fast motion part them",
+        "spring": "they agree over a short way; motion over a longer way parts them",
+    },
+)
+
+SPRING = EffectType(
+    name="spring",
+    site="joint",
+    group="spring",
+    parameters=(
+        size(
+            "stiffness",
+            "spring.stiffness",
+            "{E}/{C}",
+            "effort_per_coordinate",
+            "restoring effort per way",
+            physical=NOT_NEGATIVE,
+        ),
+        shape(
+            "rest",
+            "spring.rest",
+            "{C}",
+            "coordinate",
+            "position without restoring effort",
+            start=0.0,
+            bounds=ANY,
+        ),
+    ),
+    law="tau = -stiffness (q - rest)",
+    sentence="{at} is pulled back towards {rest} with {stiffness}.",
+    impossible="a negative stiffness would push the joint away from its rest position",
+    confused_with={
+        "bias_force": "they agree over a short way; motion over a longer way parts them",
+        "payload": "near the hanging position gravity acts like a spring; large angles or fast motion part them",
+        "torque_ripple": "they agree over less than a quarter of a period; a longer way parts them",
+    },
+)
+
+TORQUE_RIPPLE = EffectType(
+    name="torque_ripple",
+    site="joint",
+    group="ripple",
+    parameters=(
+        shape(
+            "period",
+            "ripple.period",
+            "{C}",
+            "coordinate",
+            "way after which the ripple repeats; it follows from the machine: pole pitch, screw lead, teeth",
+            start=None,
+        ),
+        size("cosine", "ripple.cosine", "{E}", "effort", "part that is greatest at the zero position"),
+        size("sine", "ripple.sine", "{E}", "effort", "part that is zero at the zero position"),
+    ),
+    law="tau = -(cosine cos(2 pi q/period) + sine sin(2 pi q/period))",
+    sentence="{at} is loaded by a ripple that repeats every {period}, with {cosine} (cosine) and {sine} (sine).",
+    impossible="either sign is possible: the signs say where in the period the ripple is greatest",
+    confused_with={
+        "spring": "they agree over less than a quarter of a period; a longer way parts them",
+        "payload": "gravity on a revolute joint repeats once per turn; a vertical axis or fast motion parts them",
+    },
+)
+
+JOINT_EFFECTS = (
+    VISCOUS_FRICTION,
+    COULOMB_FRICTION,
+    ASYMMETRIC_FRICTION,
+    STRIBECK_FRICTION,
+    BIAS_FORCE,
+    SPRING,
+    TORQUE_RIPPLE,
+)

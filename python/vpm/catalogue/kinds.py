@@ -1,0 +1,212 @@
+"""What the catalogue says about an effect and about each of its parameters."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+from vpm.errors import ModelError, near_match
+
+SiteKind = Literal["joint", "body", "actuator", "sensor"]
+SITE_KINDS: tuple[SiteKind, ...] = ("joint", "body", "actuator", "sensor")
+
+JointKind = Literal["prismatic", "revolute"]
+
+#: What in a record sets the natural size of a parameter; "one" means that the parameter is near 1 by nature.
+Scale = Literal[
+    "effort",
+    "effort_per_speed",
+    "effort_per_coordinate",
+    "coordinate",
+    "speed",
+    "mass",
+    "time",
+    "command",
+    "channel",
+    "one",
+]
+
+Range = tuple[float, float]
+
+#: Least value of what has to be positive: "greater than zero" as a closed bound, far below anything measurable.
+POSITIVE = 1e-9
+
+ANY: Range = (-math.inf, math.inf)
+NOT_NEGATIVE: Range = (0.0, math.inf)
+ABOVE_ZERO: Range = (POSITIVE, math.inf)
+
+
+@dataclass(frozen=True, kw_only=True)
+class EffectParameter:
+    """One parameter of an effect.
+
+    Attributes
+    ----------
+    name : str
+        Short name: the key in a model file and the keyword of ``with_effect``.
+    suffix : str
+        What follows the site in the dotted name: ``friction.viscous`` makes ``axis.friction.viscous``.
+    unit : str
+        Template, for example ``"{E} s/{C}"``.
+    scale : str
+        What in a record sets its natural size, see `Scale`.
+    meaning : str
+        Half a sentence for reference pages.
+    neutral : float or None
+        Value at which the effect is not there (SI); None for a parameter that no value switches off.
+    start : float or (float, float) or None
+        Value when none is given (SI); a pair is for a prismatic and a revolute site; None: it has to be given.
+    physical : (float, float)
+        Range outside which the value contradicts physics (SI, closed).
+    evaluable : (float, float)
+        Range in which the law gives finite numbers (SI, closed); a screening may leave the physical range inside this
+        one, to see that the data prefer an impossible sign.
+    linear : bool
+        The effort that a motion needs is linear in this parameter, the shape parameters being fixed.
+    shape : bool
+        Shapes a law whose size another parameter gives; has no meaning where that size is zero.
+    """
+
+    name: str
+    suffix: str
+    unit: str
+    scale: Scale
+    meaning: str
+    neutral: float | None
+    start: float | tuple[float, float] | None
+    physical: Range
+    evaluable: Range
+    linear: bool
+    shape: bool
+
+    def default(self, kind: JointKind | None = None) -> float | None:
+        """Value when none is given (SI), at a site on a joint of this kind; None if it has to be given.
+
+        Parameters
+        ----------
+        kind : {"prismatic", "revolute"}, optional
+        """
+        if isinstance(self.start, tuple):
+            return self.start[1] if kind == "revolute" else self.start[0]
+        return self.start
+
+
+@dataclass(frozen=True, kw_only=True)
+class EffectType:
+    """One physical effect.
+
+    Attributes
+    ----------
+    name : str
+    site : {"joint", "body", "actuator", "sensor"}
+        Kind of component that it sits at.
+    group : str
+        First part of the suffix of its parameters.
+    parameters : tuple of EffectParameter
+    law : str
+        The law as text.
+    sentence : str
+        For a report; the template knows ``{at}`` and the short names of the parameters, as text with unit.
+    impossible : str
+        What a value outside the physical range would mean.
+    confused_with : mapping of str to str
+        Effects that records may not tell from this one, and what tells them apart.
+    requires : str or None
+        Effect that has to be at the same site before this one is worth looking for: it is a correction of that one.
+    """
+
+    name: str
+    site: SiteKind
+    group: str
+    parameters: tuple[EffectParameter, ...]
+    law: str
+    sentence: str
+    impossible: str
+    confused_with: Mapping[str, str]
+    requires: str | None = None
+
+    @property
+    def title(self) -> str:
+        """Name in words: ``"Coulomb friction"``."""
+        words = self.name.replace("_", " ")
+        return words.replace("coulomb", "Coulomb").replace("stribeck", "Stribeck")
+
+    def parameter(self, name: str) -> EffectParameter:
+        """Parameter by short name.
+
+        Raises
+        ------
+        ModelError
+            The effect has no such parameter; the message names near ones.
+        """
+        for parameter in self.parameters:
+            if parameter.name == name:
+                return parameter
+        repair = near_match(name, (p.name for p in self.parameters), what="its parameters are")
+        raise ModelError(f'the effect {self.name} has no parameter "{name}"; {repair}', where=name)
+
+
+def size(
+    name: str, suffix: str, unit: str, scale: Scale, meaning: str, *, physical: Range = ANY, neutral: float = 0.0
+) -> EffectParameter:
+    """Size of a law that is linear in it and can be evaluated for every number."""
+    return EffectParameter(
+        name=name,
+        suffix=suffix,
+        unit=unit,
+        scale=scale,
+        meaning=meaning,
+        neutral=neutral,
+        start=neutral,
+        physical=physical,
+        evaluable=ANY,
+        linear=True,
+        shape=False,
+    )
+
+
+def shape(
+    name: str,
+    suffix: str,
+    unit: str,
+    scale: Scale,
+    meaning: str,
+    *,
+    start: float | tuple[float, float] | None,
+    bounds: Range = ABOVE_ZERO,
+) -> EffectParameter:
+    """Shape parameter; law and physics have the same range."""
+    return EffectParameter(
+        name=name,
+        suffix=suffix,
+        unit=unit,
+        scale=scale,
+        meaning=meaning,
+        neutral=None,
+        start=start,
+        physical=bounds,
+        evaluable=bounds,
+        linear=False,
+        shape=True,
+    )
+
+
+def nonlinear(
+    name: str, suffix: str, unit: str, scale: Scale, meaning: str, *, neutral: float, physical: Range, evaluable: Range
+) -> EffectParameter:
+    """Size of an effect in which nothing is linear."""
+    return EffectParameter(
+        name=name,
+        suffix=suffix,
+        unit=unit,
+        scale=scale,
+        meaning=meaning,
+        neutral=neutral,
+        start=neutral,
+        physical=physical,
+        evaluable=evaluable,
+        linear=False,
+        shape=False,
+    )

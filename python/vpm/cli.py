@@ -1,0 +1,263 @@
+"""Command line: ``vpm demo | simulate | compare | identify | diagnose | simplify | budget | info``."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.console import Console
+
+from vpm import __version__
+from vpm.errors import VpmError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from vpm.experiment import Experiment
+    from vpm.model import Model
+
+app = typer.Typer(
+    name="vpm",
+    help="Virtual prototype models: simulate a robot, compare it with logs, identify it, and name what is missing.",
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+)
+console = Console(highlight=False, soft_wrap=True)
+errors = Console(stderr=True, highlight=False, soft_wrap=True)
+
+ModelPath = Annotated[Path, typer.Argument(metavar="MODEL", help="Model file (TOML).")]
+Logs = Annotated[list[Path], typer.Argument(metavar="LOG...", help="Measured records (CSV).")]
+OneLog = Annotated[Path, typer.Argument(metavar="LOG", help="Measured record (CSV).")]
+Channels = Annotated[
+    Path | None, typer.Option(help="Channel table (TOML); by default the [channels] table of the model file.")
+]
+Cutoff = Annotated[
+    float | None, typer.Option(help="Cut-off frequency of the motion filter, Hz; by default chosen from the record.")
+]
+Mode = Annotated[
+    str, typer.Option(help="free_run, inverse_dynamics, restarts or closed_loop.", metavar="MODE", show_default=True)
+]
+Integrator = Annotated[str, typer.Option(help="linearly_implicit, rk4 or semi_implicit.")]
+Plot = Annotated[Path | None, typer.Option(help="Write the plot to this file (PNG, SVG or PDF).")]
+Out = Annotated[Path, typer.Option(help="Folder for report.json, report.html and the repaired model.")]
+
+
+def main() -> None:
+    """Run the command line; an error of the input is one sentence and exit code 1, an interruption exit code 130."""
+    try:
+        app()
+    except VpmError as error:
+        errors.print(f"error: {error}", markup=False)
+        sys.exit(1)
+    except KeyboardInterrupt:
+        errors.print("interrupted")
+        sys.exit(130)
+
+
+@app.command(epilog="Example:  vpm info examples/emps/model.toml")
+def info(model: Annotated[Path | None, typer.Argument(metavar="[MODEL]", help="Model file to list.")] = None) -> None:
+    """Version, or the parameters of a model with units and bounds."""
+    if model is None:
+        console.print(f"vpm {__version__}")
+        return
+    from vpm.model import Model
+
+    loaded = Model.load(model)
+    console.print(repr(loaded), markup=False)
+    for p in loaded.parameters.values():
+        spread = "known" if p.uncertainty is None else f"± {p.uncertainty:g}"
+        console.print(f"  {p.name:40s} {p.value:14.6g} {p.unit:10s} {spread:12s} [{p.minimum:g}, {p.maximum:g}]", markup=False)
+
+
+@app.command(epilog="Example:  vpm simulate examples/emps/model.toml log.csv --mode closed_loop --plot run.png")
+def simulate(
+    model: ModelPath,
+    log: OneLog,
+    mode: Mode = "free_run",
+    integrator: Integrator = "linearly_implicit",
+    channels: Channels = None,
+    out: Annotated[Path | None, typer.Option(help="Save the run (NPZ) here.")] = None,
+    plot: Plot = None,
+) -> None:
+    """Simulate a model on the inputs of a log and compare with what was measured."""
+    from vpm.compare import compare as compare_run
+    from vpm.simulate import simulate as simulate_log
+
+    machine, record = _load(model, log, channels)
+    run = simulate_log(machine, record, mode, integrator=integrator)
+    console.print(repr(run), markup=False)
+    console.print(str(compare_run(run, record)), markup=False)
+    if out is not None:
+        run.save(out)
+    _save_plot(run.plot, plot)
+
+
+@app.command(epilog="Example:  vpm compare examples/emps/model.toml log.csv --mode inverse_dynamics")
+def compare(
+    model: ModelPath,
+    log: OneLog,
+    mode: Mode = "inverse_dynamics",
+    channels: Channels = None,
+    cutoff: Cutoff = None,
+    plot: Plot = None,
+) -> None:
+    """Say where a model and a log part: error, fit, correlation, and where the residual lives."""
+    from vpm.compare import compare as compare_run
+    from vpm.simulate import simulate as simulate_log
+
+    machine, record = _load(model, log, channels)
+    comparison = compare_run(simulate_log(machine, record, mode, cutoff=cutoff), record)
+    console.print(str(comparison), markup=False)
+    for channel in comparison.channels:
+        for sentence in channel.where.sentences:
+            console.print(f"  {channel.channel}: {sentence}", markup=False)
+    _save_plot(comparison.plot, plot)
+
+
+@app.command(
+    epilog="Example:  vpm identify examples/emps/model.toml log.csv --free carriage.mass --free axis.friction.viscous"
+)
+def identify(
+    model: ModelPath,
+    logs: Logs,
+    free: Annotated[
+        list[str] | None, typer.Option(help="Dotted parameter name; repeat. Default: all with an uncertainty.")
+    ] = None,
+    mode: Mode = "inverse_dynamics",
+    channels: Channels = None,
+    cutoff: Cutoff = None,
+    out: Annotated[Path | None, typer.Option(help="Write the fitted model (TOML) here.")] = None,
+) -> None:
+    """Fit parameters to one or several logs."""
+    from vpm.identify import identify as fit_logs
+
+    machine, records = _load_all(model, logs, channels)
+    with _progress() as tell:
+        fit = fit_logs(
+            machine, records, free, mode=mode, cutoff=cutoff, progress=lambda n, r: tell(f"evaluation {n}: residual {r:.5g}")
+        )
+    for name, value, std, unit in zip(fit.names, fit.values, fit.std, fit.units, strict=True):
+        console.print(f"  {name:40s} {value:14.6g} ± {std:<10.3g} {unit}", markup=False)
+    for combination in fit.unidentifiable:
+        console.print(f"  not seen by these data: {combination}", markup=False)
+    for name in fit.at_bounds:
+        console.print(f"  {name} rests on a bound: widen it or question the model", markup=False)
+    for channel, (rms, share, unit) in fit.after.items():
+        console.print(f"  residual {channel}: {rms:.4g} {unit}, {100 * share:.2f} % of the signal", markup=False)
+    if out is not None:
+        fit.model.save(out)
+
+
+@app.command(epilog="Example:  vpm diagnose model.toml train.csv --validate test.csv --out report/")
+def diagnose(
+    model: ModelPath,
+    logs: Logs,
+    validate: Annotated[
+        list[Path] | None, typer.Option(help="Record that is never fitted; repeat. Default: 30 % of each log.")
+    ] = None,
+    out: Out = Path("report"),
+    effect: Annotated[list[str] | None, typer.Option(help="Try only these effects; repeat.")] = None,
+    channels: Channels = None,
+    cutoff: Cutoff = None,
+) -> None:
+    """Name the physical effect that a model is missing, with evidence on unseen data."""
+    from vpm.discrepancy import diagnose as find_missing
+    from vpm.report import print_story, write_report
+
+    machine, records = _load_all(model, logs, channels)
+    unseen = [_record(path, machine, channels) for path in validate or []]
+    with _progress() as tell:
+        diagnosis = find_missing(machine, records, unseen or None, effects=effect or None, cutoff=cutoff, tell=tell)
+    print_story(diagnosis, console)
+    for path in write_report(diagnosis, out):
+        console.print(f"wrote {path}", markup=False)
+
+
+@app.command(epilog="Example:  vpm simplify model.toml log.csv --rate 1000 --tolerance 0.05")
+def simplify(
+    model: ModelPath,
+    logs: Logs,
+    rate: Annotated[float, typer.Option(help="Rate of the controller, Hz.")] = 1000.0,
+    tolerance: Annotated[float, typer.Option(help="Largest loss of accuracy, as a share of the signal.")] = 0.02,
+    channels: Channels = None,
+    out: Annotated[Path | None, typer.Option(help="Write the simplified model (TOML) here.")] = None,
+) -> None:
+    """Find the cheapest model that still tells the truth within a tolerance."""
+    from vpm.simplify import simplify as find_cheapest
+
+    machine, records = _load_all(model, logs, channels)
+    with _progress() as tell:
+        ladder = find_cheapest(machine, records, rate=rate, tolerance=tolerance, tell=tell)
+    console.print(str(ladder), markup=False)
+    if out is not None:
+        ladder.model.save(out)
+
+
+@app.command(epilog="Example:  vpm budget examples/emps/model.toml --rate 1000")
+def budget(
+    model: ModelPath,
+    rate: Annotated[float, typer.Option(help="Rate of the controller, Hz.")] = 1000.0,
+    share: Annotated[float, typer.Option(help="Share of the period that a step may take at its 99.9 % quantile.")] = 0.2,
+    steps: Annotated[int, typer.Option(help="Number of steps to time.")] = 1_000_000,
+    integrator: Integrator = "linearly_implicit",
+) -> None:
+    """Time one step of the model against a controller's period; exit code 1 if it does not fit."""
+    from vpm.budget import budget as time_steps
+
+    report = time_steps(_model(model), rate=rate, share=share, steps=steps, integrator=integrator)
+    console.print(str(report), markup=False)
+    if not report.holds:
+        raise typer.Exit(1)
+
+
+@app.command(epilog="Example:  vpm demo --out demo-report")
+def demo(out: Out = Path("demo-report")) -> None:
+    """Find the effect that is hidden in a log that comes with the package."""
+    from vpm.demo import run_demo
+
+    with _progress() as tell:
+        run_demo(out, console, tell)
+
+
+def _model(path: Path) -> Model:
+    from vpm.model import Model
+
+    return Model.load(path)
+
+
+def _record(path: Path, model: Model, channels: Path | None) -> Experiment:
+    from vpm.experiment import Experiment
+
+    return Experiment.load(path, channels=channels, model=model)
+
+
+def _load(model: Path, log: Path, channels: Path | None) -> tuple[Model, Experiment]:
+    machine = _model(model)
+    return machine, _record(log, machine, channels)
+
+
+def _load_all(model: Path, logs: list[Path], channels: Path | None) -> tuple[Model, list[Experiment]]:
+    machine = _model(model)
+    return machine, [_record(log, machine, channels) for log in logs]
+
+
+@contextmanager
+def _progress() -> Iterator[Callable[[str], None]]:
+    """A line that says what is being done; plain text where the output is not a terminal."""
+    if not errors.is_terminal:
+        yield lambda _: None
+        return
+    with errors.status("starting") as status:
+        yield lambda sentence: status.update(sentence)
+
+
+def _save_plot(draw: Callable[[], Figure], path: Path | None) -> None:
+    if path is not None:
+        draw().savefig(path)
+        console.print(f"wrote {path}", markup=False)

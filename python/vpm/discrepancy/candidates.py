@@ -1,0 +1,191 @@
+"""Every effect of the catalogue at every place it can sit, with start values read off the data."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vpm.catalogue import EFFECTS, EffectType
+from vpm.identify import InverseDynamicsProblem
+from vpm.model import Model
+
+Array = NDArray[np.float64]
+
+#: Transition and Stribeck velocities tried, as shares of the largest speed in the data.
+TRANSITION_SHARES = (0.002, 0.01, 0.04)
+STRIBECK_SHARES = (0.08, 0.25, 0.6)
+#: Lags tried, in sampling intervals, and saturation limits, as shares of the largest command.
+LAG_INTERVALS = (1.0, 4.0, 16.0)
+LIMIT_SHARES = (0.95, 0.8)
+#: Number of ripple periods proposed by the periodogram.
+PERIODS = 3
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One effect at one site, to be tried.
+
+    Attributes
+    ----------
+    effect : EffectType
+    site : str
+    starts : tuple of dict
+        Start values by short parameter name; several where the effect has a shape to be searched.
+    bounds : dict
+        Data-driven bounds of shape parameters by short name, within the physical range.
+    neutral : bool
+        Whether the effect does nothing at its start values, so that the current residual still holds.
+    """
+
+    effect: EffectType
+    site: str
+    starts: tuple[Mapping[str, float], ...]
+    bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    neutral: bool = True
+
+    @property
+    def label(self) -> str:
+        """``effect at site``."""
+        return f"{self.effect.name} at {self.site}"
+
+
+@dataclass(frozen=True)
+class Excitation:
+    """How far the data move one joint or actuator."""
+
+    speed: float
+    middle: float
+    travel: float
+    interval: float
+    command: float
+
+
+def candidates(
+    model: Model, data: InverseDynamicsProblem, residual: Array, effects: Sequence[str] | None = None
+) -> tuple[Candidate, ...]:
+    """List what could be missing from ``model``.
+
+    Parameters
+    ----------
+    model : Model
+        Effects that it already has are left out.
+    data : InverseDynamicsProblem
+        Gives speeds, travel and commands for the start values.
+    residual : ndarray
+        Residual of ``model`` on ``data``; periods of a ripple are read from it.
+    effects : sequence of str, optional
+        Restrict the search to these.
+    """
+    present = {(effect.name, effect.at) for effect in model.effects}
+    found = []
+    for effect in EFFECTS.values():
+        if effects is not None and effect.name not in effects:
+            continue
+        for site in model.sites(effect.site):
+            needed = effect.requires is None or (effect.requires, site) in present
+            if (effect.name, site) not in present and needed:
+                found.append(_candidate(effect, site, model, data, residual))
+    return tuple(found)
+
+
+def _candidate(
+    effect: EffectType, site: str, model: Model, data: InverseDynamicsProblem, residual: Array
+) -> Candidate:
+    joint = _joint_of(effect.site, site, model)
+    seen = _excitation(data, model, joint, site if effect.site == "actuator" else None)
+    if effect.name == "coulomb_friction":
+        return Candidate(effect, site, _grid("transition_velocity", TRANSITION_SHARES, seen.speed), _slow(seen))
+    if effect.name == "asymmetric_friction":
+        velocity = _known_transition(model, site, seen)
+        return Candidate(effect, site, ({"transition_velocity": velocity},), _slow(seen))
+    if effect.name == "stribeck_friction":
+        velocity = _known_transition(model, site, seen)
+        starts = tuple({"stribeck_velocity": s * seen.speed, "transition_velocity": velocity} for s in STRIBECK_SHARES)
+        bounds = {"stribeck_velocity": (2.0 * velocity, seen.speed), **_slow(seen)}
+        return Candidate(effect, site, starts, bounds)
+    if effect.name == "torque_ripple":
+        periods = _ripple_periods(data, model, joint, residual)
+        bounds = {"period": (min(periods) / 1.5, max(periods) * 1.5)}
+        return Candidate(effect, site, tuple({"period": p} for p in periods), bounds)
+    if effect.name == "spring":
+        return Candidate(effect, site, ({"rest": seen.middle},), {"rest": _around(seen)})
+    if effect.name == "actuator_lag":
+        starts = tuple({"time_constant": n * seen.interval} for n in LAG_INTERVALS)
+        return Candidate(effect, site, starts, {"time_constant": (0.02 * seen.interval, np.inf)}, neutral=False)
+    if effect.name == "saturation":
+        starts = tuple({"limit": share * seen.command} for share in LIMIT_SHARES)
+        return Candidate(effect, site, starts, {"limit": (0.02 * seen.command, seen.command)}, neutral=False)
+    return Candidate(effect, site, ({},))
+
+
+def _grid(name: str, shares: Sequence[float], size: float) -> tuple[Mapping[str, float], ...]:
+    return tuple({name: share * size} for share in shares)
+
+
+def _slow(seen: Excitation) -> dict[str, tuple[float, float]]:
+    """A transition velocity is a detail of small speeds: between 1/5000 and 1/10 of the largest."""
+    return {"transition_velocity": (2e-4 * seen.speed, 0.1 * seen.speed)}
+
+
+def _around(seen: Excitation) -> tuple[float, float]:
+    return seen.middle - 10.0 * seen.travel, seen.middle + 10.0 * seen.travel
+
+
+def _known_transition(model: Model, site: str, seen: Excitation) -> float:
+    """Transition velocity of the Coulomb friction that is already there, else one hundredth of the speed."""
+    name = f"{site}.friction.transition_velocity"
+    return model.parameters[name].value if name in model.parameters else 0.01 * seen.speed
+
+
+def _joint_of(kind: str, site: str, model: Model) -> int:
+    if kind == "joint":
+        return model.joints.index(site)
+    if kind == "actuator":
+        return model.joints.index(model.joint_of_actuator(site))
+    return 0
+
+
+def _excitation(data: InverseDynamicsProblem, model: Model, joint: int, actuator: str | None) -> Excitation:
+    """Largest speed (99.9 % quantile), middle and half range of the travel, interval and largest command."""
+    position = np.concatenate([m.position[:, joint] for m in data.motions])
+    velocity = np.concatenate([m.velocity[:, joint] for m in data.motions])
+    column = model.actuators.index(actuator) if actuator is not None else 0
+    command = max((float(np.abs(m.inputs[:, column]).max()) for m in data.motions if m.inputs.size), default=1.0)
+    low, high = float(position.min()), float(position.max())
+    return Excitation(
+        max(float(np.quantile(np.abs(velocity), 0.999)), 1e-12),
+        0.5 * (low + high),
+        max(0.5 * (high - low), 1e-12),
+        min(m.dt for m in data.motions),
+        max(command, 1e-12),
+    )
+
+
+def _ripple_periods(data: InverseDynamicsProblem, model: Model, joint: int, residual: Array) -> list[float]:
+    """Periods in position at which the residual is strongest: peaks of its least-squares periodogram.
+
+    Evenly spaced frequencies from two periods per travel up to what the decimated samples resolve; N. Lomb,
+    *Astrophysics and Space Science* 39, 1976.
+    """
+    channel = f"{model.joints[joint]}.effort"
+    blocks = [(i, b) for i, b in enumerate(data.blocks) if b.channel == channel]
+    if not blocks:
+        blocks = [(0, data.blocks[0])]
+    count = len(data.blocks) // len(data.motions)
+    position = np.concatenate([data.state(i // count)[0][:, i % count] for i, _ in blocks])
+    values = np.concatenate([residual[b.samples] for _, b in blocks])
+    thin = max(1, len(values) // 4000)
+    position, values = position[::thin], values[::thin]
+    travel = max(float(np.ptp(position)), 1e-12)
+    step = float(np.median(np.abs(np.diff(position)))) or travel / 1e3
+    highest = min(1.0 / (2.5 * step), 400.0 / travel)
+    frequencies = np.arange(2.0, max(highest * travel, 4.0), 0.25) / travel
+    phase = 2.0 * np.pi * np.outer(frequencies, position - position.mean())
+    centred = values - values.mean()
+    power = (np.cos(phase) @ centred) ** 2 + (np.sin(phase) @ centred) ** 2
+    peaks = [i for i in range(1, len(power) - 1) if power[i] >= power[i - 1] and power[i] > power[i + 1]]
+    best = sorted(peaks or [int(np.argmax(power))], key=lambda i: -power[i])[:PERIODS]
+    return [float(1.0 / frequencies[i]) for i in best]

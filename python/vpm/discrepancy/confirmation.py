@@ -1,0 +1,193 @@
+"""The real test of a short-listed effect: refit the model with it, then predict data that were not in the fit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vpm.discrepancy.screening import Alias, Baseline, Probe, size_is_clear
+from vpm.errors import DivergedError
+from vpm.identify import Estimate, Gain, InverseDynamicsProblem, OutputErrorProblem, estimate, gain, segments
+from vpm.identify.identifiability import ALIAS_SHARE, closest_column, explained_share
+from vpm.model import Model
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Data:
+    """The records of a diagnosis, set up once.
+
+    Attributes
+    ----------
+    training, unseen : InverseDynamicsProblem
+        Effort balance on the records that are fitted and on those that are not.
+    simulation : OutputErrorProblem or None
+        Simulation of the unseen records, the second witness.
+    """
+
+    training: InverseDynamicsProblem
+    unseen: InverseDynamicsProblem
+    simulation: OutputErrorProblem | None
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A fitted model with its residuals on all the data."""
+
+    model: Model
+    free: tuple[str, ...]
+    fit: Estimate
+    unseen: Array
+    simulated: Array | None
+
+    @property
+    def baseline(self) -> Baseline:
+        """As the start of the next round of screening."""
+        return Baseline(self.model, self.free, self.fit.residual, self.fit.jacobian)
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A candidate after refitting.
+
+    Attributes
+    ----------
+    probe : Probe
+    judged : Judged
+        The refitted model and its residuals.
+    parameters : tuple of str
+        The effect's own fitted parameters.
+    held : tuple of Alias
+    training, unseen : Gain
+        Against the model without the effect.
+    simulated : Gain or None
+        The same by simulation of the unseen records; None where they were not simulated.
+    diverged : str
+        Why the simulation of the unseen records stopped, or "".
+    clear : bool
+        Whether the effect's size differs from zero on the training data.
+    """
+
+    probe: Probe
+    judged: Judged
+    parameters: tuple[str, ...]
+    held: tuple[Alias, ...]
+    training: Gain
+    unseen: Gain
+    simulated: Gain | None
+    diverged: str
+    clear: bool
+
+    @property
+    def score(self) -> float:
+        """Unseen gain per fitted number."""
+        return self.unseen.relative / max(1, len(self.parameters))
+
+
+def judge(model: Model, free: tuple[str, ...], data: Data, bounds: dict[str, tuple[float, float]]) -> Judged:
+    """Fit ``free`` on the training records and predict the unseen ones.
+
+    Raises
+    ------
+    DivergedError
+        The fitted model cannot simulate the unseen records.
+    """
+    fit = estimate(model, data.training, free, bounds=bounds)
+    fitted = model.with_parameters(dict(zip(free, map(float, fit.values), strict=True)))
+    unseen, _ = data.unseen.evaluate(fitted, fitted.theta)
+    simulated = None
+    if data.simulation is not None:
+        simulated, _ = data.simulation.evaluate(fitted, fitted.theta)
+    return Judged(fitted, free, fit, unseen, simulated)
+
+
+def confirm(current: Judged, data: Data, probe: Probe) -> Trial:
+    """Refit with the candidate, release what has become visible, and measure the gain on unseen data."""
+    bounds = _bounds(probe)
+    start = probe.model.with_parameters(_inside(probe, bounds))
+    free = (*current.free, *probe.free)
+    fit = estimate(start, data.training, free, bounds=bounds)
+    released, held = _release(start, data, free, fit, probe)
+    if released:
+        start = start.with_parameters(dict(zip(free, map(float, fit.values), strict=True)))
+        free = (*free, *released)
+    diverged = ""
+    try:
+        judged = judge(start, free, data, bounds)
+    except DivergedError as error:
+        diverged = str(error)
+        judged = judge(start, free, Data(data.training, data.unseen, None), bounds)
+    own = free[len(current.free) :]
+    return Trial(
+        probe,
+        judged,
+        own,
+        (*probe.held, *held),
+        gain(current.fit.residual, judged.fit.residual, segments(data.training)),
+        gain(current.unseen, judged.unseen, segments(data.unseen)),
+        _simulated_gain(current, judged, data),
+        diverged,
+        _clear(judged, own),
+    )
+
+
+def _simulated_gain(current: Judged, judged: Judged, data: Data) -> Gain | None:
+    if data.simulation is None or current.simulated is None or judged.simulated is None:
+        return None
+    return gain(current.simulated, judged.simulated, segments(data.simulation))
+
+
+def _bounds(probe: Probe) -> dict[str, tuple[float, float]]:
+    """Data-driven bounds of the candidate's shape by dotted name."""
+    short = _short_names(probe)
+    return {dotted: probe.candidate.bounds[s] for s, dotted in short.items() if s in probe.candidate.bounds}
+
+
+def _short_names(probe: Probe) -> dict[str, str]:
+    for effect in probe.model.effects:
+        if effect.name == probe.candidate.effect.name and effect.at == probe.candidate.site:
+            return dict(effect.parameter_names)
+    return {}
+
+
+def _inside(probe: Probe, bounds: dict[str, tuple[float, float]]) -> dict[str, float]:
+    """Linearised estimates moved into the bounds, as start values."""
+    values = {}
+    for name in probe.free:
+        parameter = probe.model.parameters[name]
+        low, high = bounds.get(name, (parameter.minimum, parameter.maximum))
+        values[name] = float(np.clip(probe.values[name], low, high))
+    return values
+
+
+def _release(
+    model: Model, data: Data, free: tuple[str, ...], fit: Estimate, probe: Probe
+) -> tuple[tuple[str, ...], tuple[Alias, ...]]:
+    """Parameters without influence at zero size (a period, a transition velocity) that have one now."""
+    if not probe.invisible:
+        return (), ()
+    theta = model.theta.copy()
+    theta[[model.index(name) for name in free]] = fit.values
+    _, fresh = data.training.evaluate(model, theta, [model.index(name) for name in probe.invisible])
+    released: list[str] = []
+    held: list[Alias] = []
+    known, names = fit.jacobian, list(free)
+    for name, column in zip(probe.invisible, fresh.T, strict=True):
+        if not np.any(column):
+            continue
+        if explained_share(column, known) > ALIAS_SHARE:
+            held.append(Alias(name, names[closest_column(column, known)]))
+            continue
+        released.append(name)
+        known, names = np.column_stack([known, column]), [*names, name]
+    return tuple(released), tuple(held)
+
+
+def _clear(judged: Judged, own: tuple[str, ...]) -> bool:
+    """Whether the effect's linear parameters (its size) differ from zero together."""
+    size = [n for n in own if judged.model.parameters[n].kind == "linear"] or list(own)
+    index = [judged.free.index(name) for name in size]
+    return size_is_clear(size, judged.fit.values[index], judged.fit.covariance[np.ix_(index, index)])

@@ -1,0 +1,336 @@
+"""Find what a model is missing: recalibrate, look, try the catalogue, and say what the data support."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vpm.catalogue import EFFECTS
+from vpm.compare import compare
+from vpm.discrepancy.confirmation import Data, Judged, judge
+from vpm.discrepancy.diagnosis import (
+    AcceptedEffect,
+    ChannelGap,
+    Diagnosis,
+    EffectParameterEstimate,
+    Picture,
+    Step,
+)
+from vpm.discrepancy.floor import noise_floor
+from vpm.discrepancy.refusal import FALSE_ALARM_LEVEL
+from vpm.discrepancy.search import Accepted, Search, ambiguities, search
+from vpm.discrepancy.structure import Structure, structure
+from vpm.errors import DiagnosisError, DivergedError, near_match
+from vpm.experiment import Experiment
+from vpm.identify import Estimate, InverseDynamicsProblem, OutputErrorProblem, gain, gaps, segments
+from vpm.identify.fit import fit_of
+from vpm.model import Model
+from vpm.simulate import Setup, simulate
+
+Array = NDArray[np.float64]
+
+#: Share of each record that is kept out of the fit when no validation record is given.
+HELD_OUT = 0.3
+#: A residual within this factor of the noise floor has nothing left to explain.
+FLOOR_FACTOR = 1.3
+#: Parameters that move by more of their stated uncertainties than this are reported.
+FAR = 3.0
+
+Tell = Callable[[str], None]
+
+
+def diagnose(
+    model: Model,
+    experiments: Experiment | Sequence[Experiment],
+    validate: Experiment | Sequence[Experiment] | None = None,
+    *,
+    effects: Sequence[str] | None = None,
+    cutoff: float | None = None,
+    setup: Setup | None = None,
+    limit: int = 6,
+    tell: Tell | None = None,
+) -> Diagnosis:
+    """Name the physics that ``model`` is missing, with evidence on data that were not fitted.
+
+    The parameters that the model file calls uncertain are fitted first, for a wrong parameter is not a missing
+    effect. Then every effect of the catalogue is screened at every site by its regressor; the promising ones are
+    refitted together with the model and have to predict unseen records, both as a balance of effort and in
+    simulation. One is accepted at a time, the one with the largest unseen gain per fitted number.
+
+    Parameters
+    ----------
+    model : Model
+        The nominal model. Parameters with an uncertainty may be recalibrated.
+    experiments : Experiment or sequence of Experiment
+        Records to fit: position of every joint and command of every actuator.
+    validate : Experiment or sequence of Experiment, optional
+        Records that are never fitted. Without them the last 30 % of each record is kept out.
+    effects : sequence of str, optional
+        Restrict the catalogue to these names.
+    cutoff : float, optional
+        Cut-off frequency of the motion filter, Hz; chosen from each record if not given.
+    setup : Setup, optional
+        Integrator, substeps and horizon of the simulations.
+    limit : int
+        Most effects to accept.
+    tell : callable, optional
+        Called with a sentence at every step; an exception raised there ends the diagnosis.
+
+    Returns
+    -------
+    Diagnosis
+
+    Raises
+    ------
+    DiagnosisError
+        No record was given or an effect name is unknown.
+    ExperimentError
+        A channel is missing.
+    """
+    began = time.perf_counter()
+    say = tell or (lambda _: None)
+    _check_effects(effects)
+    training, unseen, notes = _records(experiments, validate)
+    data = _data(model, training, unseen, cutoff, setup, notes)
+    say("comparing the nominal model with the data")
+    nominal = _nominal(model, data, notes)
+    say("recalibrating the nominal parameters")
+    free = tuple(p.name for p in model.parameters.values() if p.adjustable)
+    if not free:
+        notes.append("the model file gives no parameter an uncertainty, so none was recalibrated")
+    recalibrated = judge(model, free, data, {})
+    notes.extend(_moved_far(model, recalibrated))
+    found = search(recalibrated, data, effects, limit, say)
+    say("measuring the noise floor")
+    cutoffs = tuple(m.cutoff for m in data.unseen.motions)
+    floor = noise_floor(found.final.model, unseen, cutoffs)
+    left = structure(data.training, data.unseen, found.final.fit.residual, found.final.unseen)
+    gap = _gaps(data, nominal, recalibrated, found.final, floor)
+    verdict, summary = _verdict(data, nominal, recalibrated, found, gap, left)
+    return Diagnosis(
+        verdict,
+        summary,
+        tuple(_accepted_effect(entry, found.final) for entry in found.accepted),
+        gap,
+        found.refused,
+        found.ranking,
+        ambiguities(found.accepted),
+        _where(recalibrated.model, unseen, cutoffs),
+        _steps(data, found),
+        tuple(e.name for e in training),
+        tuple(e.name for e in unseen),
+        tuple(notes),
+        found.final.model,
+        fit_of(found.final.model, data.training, found.final.fit, nominal.fit.residual, [e.name for e in training]),
+        _pictures(data, nominal, recalibrated, found.final),
+        time.perf_counter() - began,
+    )
+
+
+def _check_effects(effects: Sequence[str] | None) -> None:
+    for name in effects or ():
+        if name not in EFFECTS:
+            raise DiagnosisError(f'the catalogue has no effect "{name}"; {near_match(name, EFFECTS)}')
+
+
+def _records(
+    experiments: Experiment | Sequence[Experiment], validate: Experiment | Sequence[Experiment] | None
+) -> tuple[tuple[Experiment, ...], tuple[Experiment, ...], list[str]]:
+    training = (experiments,) if isinstance(experiments, Experiment) else tuple(experiments)
+    if not training:
+        raise DiagnosisError("no record was given; pass at least one experiment")
+    if validate is not None:
+        unseen = (validate,) if isinstance(validate, Experiment) else tuple(validate)
+        if unseen:
+            return training, unseen, []
+    pairs = [e.split(1.0 - HELD_OUT) for e in training]
+    note = f"no validation record was given: the last {100 * HELD_OUT:.0f} % of each record was kept out of the fit"
+    return tuple(p[0] for p in pairs), tuple(p[1] for p in pairs), [note]
+
+
+def _data(
+    model: Model,
+    training: Sequence[Experiment],
+    unseen: Sequence[Experiment],
+    cutoff: float | None,
+    setup: Setup | None,
+    notes: list[str],
+) -> Data:
+    fitted = InverseDynamicsProblem(model, training, cutoff=cutoff)
+    predicted = InverseDynamicsProblem(model, unseen, cutoff=cutoff)
+    for problem in (fitted, predicted):
+        for record, m in zip(problem.experiments, problem.motions, strict=True):
+            notes.append(f"{record.name}: motion filtered at {m.cutoff:.4g} Hz, decimated by {m.decimation}")
+    mode = _simulation_mode(model, unseen)
+    notes.append(f"unseen records simulated in mode {mode}")
+    return Data(fitted, predicted, OutputErrorProblem(model, unseen, mode, setup=setup))
+
+
+def _simulation_mode(model: Model, records: Sequence[Experiment]) -> str:
+    """Closed loop where controllers and references are known, else restarts."""
+    controlled = all(name in model.controlled_actuators for name in model.actuators)
+    known = all(f"{name}.reference" in record for name in model.actuators for record in records)
+    return "closed_loop" if model.actuators and controlled and known else "restarts"
+
+
+def _nominal(model: Model, data: Data, notes: list[str]) -> Judged:
+    """The model as it stands; a nominal model that cannot simulate the records is still compared by effort."""
+    try:
+        return judge(model, (), data, {})
+    except DivergedError as error:
+        notes.append(f"the nominal model could not simulate the unseen records: {error}")
+        return judge(model, (), replace(data, simulation=None), {})
+
+
+def _moved_far(model: Model, recalibrated: Judged) -> list[str]:
+    notes = []
+    for name in recalibrated.free:
+        before, after = model.parameters[name], recalibrated.model.parameters[name]
+        spread = before.uncertainty
+        if spread is not None and 0.0 < spread < np.inf and abs(after.value - before.value) > FAR * spread:
+            notes.append(
+                f"recalibration moved {name} from {before.value:.5g} to {after.value:.5g} {before.unit}, "
+                f"{abs(after.value - before.value) / spread:.1f} times its stated uncertainty"
+            )
+    return notes
+
+
+def _gaps(
+    data: Data, nominal: Judged, recalibrated: Judged, final: Judged, floor: dict[str, float]
+) -> dict[str, ChannelGap]:
+    stages = [gaps(data.unseen, judged.unseen) for judged in (nominal, recalibrated, final)]
+    result = {}
+    for channel, (_, _, unit) in stages[0].items():
+        values = [stage[channel][0] for stage in stages]
+        signal = _signal(data.unseen, channel)
+        result[channel] = ChannelGap(*values, floor.get(channel, np.nan), unit, signal, data.unseen.mode)
+    if data.simulation is not None and nominal.simulated is not None:
+        simulated = [gaps(data.simulation, j.simulated) for j in (nominal, recalibrated, final) if j.simulated is not None]
+        for channel, (_, _, unit) in simulated[0].items():
+            values = [stage[channel][0] for stage in simulated]
+            signal = _signal(data.simulation, channel)
+            key = f"{channel} ({data.simulation.mode})"
+            result[key] = ChannelGap(*values, np.nan, unit, signal, data.simulation.mode)
+    return result
+
+
+def _signal(problem: InverseDynamicsProblem | OutputErrorProblem, channel: str) -> float:
+    mine = [block for block in problem.blocks if block.channel == channel]
+    return float(np.sqrt(np.average([b.scale**2 for b in mine], weights=[b.time.size for b in mine])))
+
+
+def _verdict(
+    data: Data, nominal: Judged, recalibrated: Judged, found: Search, gap: dict[str, ChannelGap], left: Structure
+) -> tuple[str, str]:
+    main = [g for g in gap.values() if g.mode == "inverse_dynamics"]
+    above = max((g.after / g.noise_floor if g.noise_floor > 0.0 else np.inf) for g in main)
+    remaining = left.present and above > FLOOR_FACTOR
+    worst = max(main, key=lambda g: g.recalibrated / g.signal if g.signal else 0.0)
+    numbers = f"{_percent(worst.before, worst)} before, {_percent(worst.recalibrated, worst)} recalibrated"
+    if found.accepted:
+        names = ", then ".join(e.trial.probe.candidate.label for e in found.accepted)
+        rest = " A structured residual above the noise remains." if remaining else ""
+        return (
+            "effect_found",
+            f"Missing: {names}. Error on unseen data: {numbers}, {_percent(worst.after, worst)} after.{rest}",
+        )
+    if remaining:
+        return (
+            "unexplained",
+            f"The residual is structured and {above:.2g} times the noise floor, and no effect of the catalogue explains "
+            f"it. Error on unseen data: {numbers}.",
+        )
+    better = gain(nominal.unseen, recalibrated.unseen, segments(data.unseen))
+    if better.relative > 0.0 and better.score > -float(_normal_quantile()):
+        return (
+            "parameters_only",
+            f"Nothing is missing: other values of the known parameters close the gap. Error on unseen data: {numbers}.",
+        )
+    return "no_disagreement", f"The nominal model agrees with the data. Error on unseen data: {numbers}."
+
+
+def _normal_quantile() -> float:
+    from scipy.special import ndtri
+
+    return float(ndtri(FALSE_ALARM_LEVEL))
+
+
+def _percent(value: float, gap: ChannelGap) -> str:
+    return f"{100.0 * value / gap.signal:.2f} %" if gap.signal > 0.0 else f"{value:.3g} {gap.unit}"
+
+
+def _accepted_effect(entry: Accepted, final: Judged) -> AcceptedEffect:
+    candidate = entry.trial.probe.candidate
+    effect = next(e for e in final.model.effects if (e.name, e.at) == (candidate.effect.name, candidate.site))
+    estimates = []
+    for short, dotted in effect.parameter_names.items():
+        parameter = final.model.parameters[dotted]
+        std = float(final.fit.std[final.free.index(dotted)]) if dotted in final.free else 0.0
+        estimates.append(EffectParameterEstimate(short, dotted, parameter.value, parameter.unit, std))
+    texts = {e.name: f"{e.value:.4g} {e.unit}" for e in estimates}
+    notes = [f"{alias.parameter} held: not told from {alias.partner}" for alias in entry.trial.held]
+    return AcceptedEffect(
+        candidate.effect.name,
+        candidate.site,
+        candidate.effect.sentence.format(at=candidate.site, **texts),
+        tuple(estimates),
+        entry.trial.unseen.relative,
+        entry.trial.unseen.score,
+        (*notes, *(f"predicts the unseen data as well: {rival}" for rival in entry.rivals)),
+    )
+
+
+def _steps(data: Data, found: Search) -> tuple[Step, ...]:
+    labels = [("", ""), *((e.trial.probe.candidate.effect.name, e.trial.probe.candidate.site) for e in found.accepted)]
+    return tuple(
+        _step(data, judged, effect, site) for judged, (effect, site) in zip(found.stages, labels, strict=True)
+    )
+
+
+def _step(data: Data, judged: Judged, effect: str, site: str) -> Step:
+    std: Estimate = judged.fit
+    names = judged.free
+    return Step(
+        effect,
+        site,
+        {name: judged.model.parameters[name].value for name in names},
+        dict(zip(names, map(float, std.std), strict=True)),
+        {name: judged.model.parameters[name].unit for name in names},
+        max(share for _, share, _ in gaps(data.training, std.residual).values()),
+        max(share for _, share, _ in gaps(data.unseen, judged.unseen).values()),
+    )
+
+
+def _where(model: Model, unseen: Sequence[Experiment], cutoffs: Sequence[float]) -> dict[str, tuple[str, ...]]:
+    comparison = compare(simulate(model, unseen[0], "inverse_dynamics", cutoff=cutoffs[0]), unseen[0])
+    return {channel.channel: channel.where.sentences for channel in comparison.channels}
+
+
+def _pictures(data: Data, nominal: Judged, recalibrated: Judged, final: Judged) -> tuple[Picture, ...]:
+    """One for each joint of the first unseen record."""
+    pictures = []
+    problem = data.unseen
+    joints = len(problem.blocks) // len(problem.motions)
+    position, velocity, _ = problem.state(0)
+    _, applied, _ = problem.effort(final.model, final.model.theta, 0)
+    for joint in range(joints):
+        block = problem.blocks[joint]
+        residuals = [j.unseen[block.samples] / block.weight for j in (nominal, recalibrated, final)]
+        unit = final.model.channel_unit(block.channel.replace(".effort", ".position"))
+        pictures.append(
+            Picture(
+                block.channel,
+                block.unit,
+                unit,
+                block.time,
+                position[:, joint],
+                velocity[:, joint],
+                applied[:, joint],
+                *residuals,
+            )
+        )
+    return tuple(pictures)

@@ -1,0 +1,300 @@
+"""The answer of a diagnosis: verdict, effects in the order of acceptance, and everything needed to doubt it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vpm.identify import Fit
+from vpm.model import Model
+from vpm.results import Result, Storable
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Array = NDArray[np.float64]
+
+VERDICTS = ("effect_found", "parameters_only", "no_disagreement", "unexplained")
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class EffectParameterEstimate(Storable):
+    """One parameter of an accepted effect: short name, dotted name, SI value, unit and standard deviation."""
+
+    name: str
+    dotted: str
+    value: float
+    unit: str
+    std: float
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class AcceptedEffect(Storable):
+    """An effect that the data named.
+
+    Attributes
+    ----------
+    name, site : str
+    sentence : str
+        For people.
+    parameters : tuple of EffectParameterEstimate
+        In the final model, after all effects were fitted together.
+    gain : float
+        Share of the unseen residual's mean square that went when it was accepted.
+    score : float
+        That gain in standard deviations between independent blocks.
+    notes : tuple of str
+        What was held, and what it cannot be told from.
+    """
+
+    name: str
+    site: str
+    sentence: str
+    parameters: tuple[EffectParameterEstimate, ...]
+    gain: float
+    score: float
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class RefusedEffect(Storable):
+    """A candidate that was tried and not believed, with the reason."""
+
+    name: str
+    site: str
+    reason: str
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class RankedCandidate(Storable):
+    """A candidate in the order of promise.
+
+    Attributes
+    ----------
+    name, site : str
+    round : int
+        Round of the search, from 1.
+    screened : float
+        Share of the training mean square that its regressor would take away.
+    unseen : float
+        Share of the unseen mean square that it took away after refitting; NaN if it was not refitted.
+    accepted : bool
+    """
+
+    name: str
+    site: str
+    round: int
+    screened: float
+    unseen: float
+    accepted: bool
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class Ambiguity(Storable):
+    """Effects that these data cannot tell from an accepted one, and why."""
+
+    name: str
+    site: str
+    others: tuple[str, ...]
+    reason: str
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class ChannelGap(Storable):
+    """Root mean square gap of one channel on unseen data, at each stage.
+
+    Attributes
+    ----------
+    before, recalibrated, after : float
+        Nominal model, nominal effects with refitted parameters, and with the accepted effects, in ``unit``.
+    noise_floor : float
+        What sensor noise alone leaves; NaN where it was not estimated.
+    unit : str
+    signal : float
+        Root mean square of the measured signal; the gaps over it are the relative errors.
+    mode : str
+        Mode of comparison.
+    """
+
+    before: float
+    recalibrated: float
+    after: float
+    noise_floor: float
+    unit: str
+    signal: float
+    mode: str
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class Step(Storable):
+    """The model after one stage: which effect came in, all fitted values, and the relative error on unseen data."""
+
+    effect: str
+    site: str
+    values: dict[str, float]
+    std: dict[str, float]
+    units: dict[str, str]
+    training_error: float
+    unseen_error: float
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class Picture(Storable):
+    """Samples for the plots: one joint of the first unseen record, at the retained samples.
+
+    Attributes
+    ----------
+    channel, unit : str
+    coordinate_unit : str
+        m or rad.
+    time, position, velocity, measured : ndarray, shape (n,)
+    before, recalibrated, after : ndarray, shape (n,)
+        Residual at each stage.
+    """
+
+    channel: str
+    unit: str
+    coordinate_unit: str
+    time: Array
+    position: Array
+    velocity: Array
+    measured: Array
+    before: Array
+    recalibrated: Array
+    after: Array
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class Diagnosis(Result):
+    """What is missing in a model, as far as the data can say.
+
+    Attributes
+    ----------
+    verdict : {"effect_found", "parameters_only", "no_disagreement", "unexplained"}
+    summary : str
+        The verdict in a sentence or two.
+    effects : tuple of AcceptedEffect
+        In the order of acceptance.
+    gap : dict of str to ChannelGap
+        On unseen data.
+    refused : tuple of RefusedEffect
+    candidates : tuple of RankedCandidate
+    ambiguous_with : tuple of Ambiguity
+    where : dict of str to tuple of str
+        Where the residual lives before any effect was added, by channel.
+    steps : tuple of Step
+        The recalibrated model and the model after each accepted effect.
+    training, unseen : tuple of str
+        Records.
+    notes : tuple of str
+        Choices made on the way: filters, splits, parameters that moved far.
+    model : Model
+        The repaired model.
+    fit : Fit
+        Its last fit.
+    pictures : tuple of Picture
+    seconds : float
+        Time it took.
+    """
+
+    verdict: str
+    summary: str
+    effects: tuple[AcceptedEffect, ...]
+    gap: dict[str, ChannelGap]
+    refused: tuple[RefusedEffect, ...]
+    candidates: tuple[RankedCandidate, ...]
+    ambiguous_with: tuple[Ambiguity, ...]
+    where: dict[str, tuple[str, ...]]
+    steps: tuple[Step, ...]
+    training: tuple[str, ...]
+    unseen: tuple[str, ...]
+    notes: tuple[str, ...]
+    model: Model
+    fit: Fit
+    pictures: tuple[Picture, ...]
+    seconds: float
+
+    def to_dict(self) -> dict[str, object]:
+        """Content of ``report.json``: plain numbers and text, SI; what is not known is null."""
+        effects = [
+            {
+                "name": e.name,
+                "site": e.site,
+                "sentence": e.sentence,
+                "parameters": {
+                    p.name: {"value": p.value, "unit": p.unit, "std": p.std, "path": p.dotted} for p in e.parameters
+                },
+                "gain": e.gain,
+                "score": e.score,
+                "notes": list(e.notes),
+            }
+            for e in self.effects
+        ]
+        document: dict[str, object] = {
+            "verdict": self.verdict,
+            "summary": self.summary,
+            "model": self.model.name,
+            "training": list(self.training),
+            "unseen": list(self.unseen),
+            "effects": effects,
+            "gap": {channel: _gap(gap) for channel, gap in self.gap.items()},
+            "refused": [{"name": r.name, "site": r.site, "reason": r.reason} for r in self.refused],
+            "candidates": [_fields(c) for c in self.candidates],
+            "ambiguous_with": [
+                {"name": a.name, "site": a.site, "with": list(a.others), "reason": a.reason}
+                for a in self.ambiguous_with
+            ],
+            "where": {channel: list(sentences) for channel, sentences in self.where.items()},
+            "steps": [_fields(step) for step in self.steps],
+            "notes": list(self.notes),
+            "seconds": self.seconds,
+        }
+        return document
+
+    def save_json(self, path: Path) -> Path:
+        """Write ``report.json``."""
+        path.write_text(json.dumps(_finite(self.to_dict()), indent=2, allow_nan=False) + "\n", encoding="utf-8")
+        return path
+
+    def _headline(self) -> Mapping[str, object]:
+        names = ", ".join(f"{e.name} at {e.site}" for e in self.effects) or "no effect"
+        return {"verdict": self.verdict, "effects": names, "seconds": self.seconds}
+
+    def _frame_columns(self) -> Mapping[str, object]:
+        fields = ("name", "site", "round", "screened", "unseen", "accepted")
+        return {name: [getattr(c, name) for c in self.candidates] for name in fields}
+
+    def plot(self) -> Figure:
+        """Residual before and after, over time, velocity and position. Needs the extra ``plot``."""
+        from vpm.plot import plot_pictures
+
+        return plot_pictures(self.pictures)
+
+
+def _gap(gap: ChannelGap) -> dict[str, object]:
+    relative = {
+        f"{stage}_relative": getattr(gap, stage) / gap.signal if gap.signal > 0.0 else None
+        for stage in ("before", "recalibrated", "after")
+    }
+    return {**_fields(gap), **relative}
+
+
+def _fields(value: Storable) -> dict[str, object]:
+    return dict(value.to_stored())
+
+
+def _finite(value: object) -> object:
+    """JSON has no word for NaN and infinity: null stands for what is not known."""
+    if isinstance(value, Mapping):
+        return {key: _finite(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(item) for item in value]
+    if isinstance(value, float) and not np.isfinite(value):
+        return None
+    return value

@@ -1,0 +1,151 @@
+"""Why a candidate is not believed, in words with numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from scipy.stats import t as student
+
+from vpm.discrepancy.confirmation import Trial
+from vpm.discrepancy.screening import Probe, impossible_values
+from vpm.identify.statistics import NORMAL_95
+from vpm.model import Model
+
+#: Probability of accepting any effect by chance, shared among all candidates that are tried.
+FALSE_ALARM_LEVEL = 0.01
+#: Drop of the unseen mean square below which an effect is not worth its name.
+LEAST_GAIN = 0.02
+#: Drop of the training mean square below which a candidate is not refitted at all.
+LEAST_SCREENED = 0.005
+
+
+@dataclass(frozen=True)
+class Thresholds:
+    """What an effect has to show.
+
+    Attributes
+    ----------
+    candidates : int
+        Number of candidates tried in the whole diagnosis; the false-alarm level is divided by it (Bonferroni).
+    interval : float
+        Sampling interval of the coarsest record, s; delays and lags below it are part of sampling.
+    """
+
+    candidates: int
+    interval: float
+
+    def score(self, blocks: int) -> float:
+        """Least standard deviations of unseen gain, by Student's t with one degree of freedom less than blocks."""
+        return float(student.isf(FALSE_ALARM_LEVEL / max(1, self.candidates), max(1, blocks - 1)))
+
+
+def refuse_probe(probe: Probe) -> str:
+    """Reason to drop a candidate after screening, or ""."""
+    if not probe.free:
+        if probe.held:
+            partners = ", ".join(dict.fromkeys(alias.partner for alias in probe.held))
+            return f"these data cannot tell it from {partners}"
+        return "it has no influence on these data"
+    if probe.drop < LEAST_SCREENED:
+        return f"it would lower the training error by only {_percent(probe.drop)} of its mean square"
+    outside = impossible_values(probe)
+    if outside:
+        return _impossible(probe, outside[0])
+    return ""
+
+
+def refuse_trial(trial: Trial, thresholds: Thresholds) -> str:
+    """Reason not to accept a refitted candidate, or ""."""
+    checks: tuple[Callable[[Trial, Thresholds], str], ...] = (
+        _too_short,
+        _only_training,
+        _not_clear,
+        _worse_in_simulation,
+        _too_little,
+    )
+    return next((reason for check in checks if (reason := check(trial, thresholds))), "")
+
+
+def _impossible(probe: Probe, name: str) -> str:
+    parameter = probe.model.parameters[name]
+    value = f"{probe.values[name]:.3g} ± {probe.std[name]:.2g} {parameter.unit}"
+    sign = "negative" if probe.values[name] < 0.0 <= parameter.minimum else "outside its physical range"
+    return f"its coefficient {name} comes out {sign} ({value}): {probe.candidate.effect.impossible}"
+
+
+def _too_short(trial: Trial, thresholds: Thresholds) -> str:
+    """A delay or lag below one sampling interval cannot be told from the hold of the sampled command."""
+    model = trial.judged.model
+    for name in trial.parameters:
+        parameter = model.parameters[name]
+        is_time = parameter.unit == "s" and parameter.kind != "shape"
+        if is_time and parameter.value < thresholds.interval:
+            return (
+                f"{name} comes out as {1e3 * parameter.value:.3g} ms, less than the sampling interval of "
+                f"{1e3 * thresholds.interval:.3g} ms: it cannot be told from the sampling itself"
+            )
+    return ""
+
+
+def _only_training(trial: Trial, thresholds: Thresholds) -> str:
+    seen, unseen = trial.training, trial.unseen
+    if unseen.relative >= 0.0:
+        return ""
+    return (
+        f"it helps the training record (residual {_rms(seen.before, seen.after)}) "
+        f"and hurts the unseen one ({_rms(unseen.before, unseen.after)})"
+    )
+
+
+def _not_clear(trial: Trial, thresholds: Thresholds) -> str:
+    if trial.clear:
+        return ""
+    model, fit = trial.judged.model, trial.judged.fit
+    worst = trial.parameters[0]
+    std = float(fit.std[fit.names.index(worst)])
+    value = model.parameters[worst].value
+    low, high = value - NORMAL_95 * std, value + NORMAL_95 * std
+    return f"the 95 % interval of {worst} covers zero ({low:.3g} to {high:.3g} {model.parameters[worst].unit})"
+
+
+def _too_little(trial: Trial, thresholds: Thresholds) -> str:
+    unseen = trial.unseen
+    if unseen.relative < LEAST_GAIN:
+        return (
+            f"it lowers the unseen error by only {_percent(unseen.relative)} of its mean square "
+            f"({_rms(unseen.before, unseen.after)})"
+        )
+    needed = thresholds.score(unseen.blocks)
+    if unseen.score < needed:
+        return (
+            f"its gain on unseen data is {unseen.score:.1f} standard deviations over {unseen.blocks} independent "
+            f"blocks, and {needed:.1f} are needed when {thresholds.candidates} candidates are tried"
+        )
+    return ""
+
+
+def _worse_in_simulation(trial: Trial, thresholds: Thresholds) -> str:
+    if trial.diverged:
+        return f"with it the simulation of the unseen record fails: {trial.diverged}"
+    simulated = trial.simulated
+    if simulated is not None and simulated.relative < -LEAST_GAIN and simulated.score < -2.0:
+        return (
+            "it helps the balance of effort and makes the simulation of the unseen record worse by "
+            f"{_percent(-simulated.relative)} of its mean square"
+        )
+    return ""
+
+
+def parameter_text(model: Model, name: str, std: float) -> str:
+    """``name = value ± std unit``."""
+    parameter = model.parameters[name]
+    return f"{name} = {parameter.value:.5g} ± {std:.2g} {parameter.unit}"
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.2g} %"
+
+
+def _rms(before: float, after: float) -> str:
+    return f"{before:.4g} to {after:.4g}"

@@ -1,0 +1,179 @@
+"""Cheap look at every candidate: how much of the training residual would its regressor take away?
+
+For each candidate the parameters that are already free and the new ones are moved together in one linearised step, so
+that a candidate is never credited with what a better value of a known parameter would have done.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2
+
+from vpm.discrepancy.candidates import Candidate
+from vpm.identify import InverseDynamicsProblem, robust_covariance, segments
+from vpm.identify.identifiability import ALIAS_SHARE, closest_column, column_lengths, explained_share
+from vpm.model import Model
+
+Array = NDArray[np.float64]
+
+#: Significance asked of an effect's size on the training data.
+SIZE_LEVEL = 0.05
+
+
+@dataclass(frozen=True)
+class Alias:
+    """A parameter held at its start because the data show it only together with another one."""
+
+    parameter: str
+    partner: str
+
+
+@dataclass(frozen=True)
+class Probe:
+    """What one linearised step says about one candidate.
+
+    Attributes
+    ----------
+    candidate : Candidate
+    model : Model
+        The model with the effect at the start values of the best shape tried.
+    free : tuple of str
+        Dotted names of the effect's parameters that the data can see.
+    held : tuple of Alias
+        Those that they cannot tell from others.
+    invisible : tuple of str
+        Those without any influence at the start values.
+    values, std : dict
+        Linearised estimate by dotted name, unbounded.
+    drop : float
+        Share of the training residual's mean square that would go.
+    """
+
+    candidate: Candidate
+    model: Model
+    free: tuple[str, ...]
+    held: tuple[Alias, ...]
+    invisible: tuple[str, ...]
+    values: Mapping[str, float]
+    std: Mapping[str, float]
+    drop: float
+
+    @property
+    def score(self) -> float:
+        """Drop per fitted number: richer effects have to earn every number they bring."""
+        return self.drop / max(1, len(self.free))
+
+
+@dataclass(frozen=True)
+class Baseline:
+    """The model that candidates are added to, with its training residual and regressor."""
+
+    model: Model
+    free: tuple[str, ...]
+    residual: Array
+    jacobian: Array
+
+
+def probe(base: Baseline, data: InverseDynamicsProblem, candidate: Candidate) -> Probe:
+    """Try all start values of a candidate and keep the best, a possible one before an impossible one."""
+    probes = [_probe_start(base, data, candidate, start) for start in candidate.starts]
+    best = max(probes, key=lambda p: p.drop)
+    possible = [p for p in probes if not impossible_values(p)]
+    if possible:
+        runner_up = max(possible, key=lambda p: p.drop)
+        if runner_up.drop >= 0.5 * best.drop:
+            return runner_up
+    return best
+
+
+def impossible_values(probe: Probe) -> list[str]:
+    """Parameters whose estimate lies outside the physical range by more than one standard deviation."""
+    outside = []
+    for name in probe.free:
+        parameter = probe.model.parameters[name]
+        value, std = probe.values[name], probe.std[name]
+        if value + std < parameter.minimum or value - std > parameter.maximum:
+            outside.append(name)
+    return outside
+
+
+def size_is_clear(names: Sequence[str], values: Array, covariance: Array) -> bool:
+    """Wald test that not all of ``names`` are zero at the level ``SIZE_LEVEL``."""
+    if not names:
+        return False
+    if not np.all(np.isfinite(covariance)):
+        return False
+    statistic = float(values @ np.linalg.pinv(covariance, hermitian=True) @ values)
+    return statistic > float(chi2.isf(SIZE_LEVEL, len(names)))
+
+
+def _probe_start(
+    base: Baseline, data: InverseDynamicsProblem, candidate: Candidate, start: Mapping[str, float]
+) -> Probe:
+    model = base.model.with_effect(candidate.effect.name, at=candidate.site, **start)
+    added = _added(model, candidate)
+    columns = [model.index(name) for name in added]
+    if candidate.neutral:
+        residual, fresh = data.evaluate(model, model.theta, columns)
+        known = base.jacobian
+    else:
+        all_columns = [model.index(name) for name in base.free] + columns
+        residual, jacobian = data.evaluate(model, model.theta, all_columns)
+        known, fresh = jacobian[:, : len(base.free)], jacobian[:, len(base.free) :]
+    keep, held, invisible = _sort_columns(added, fresh, known, base.free)
+    chosen = np.column_stack([known, fresh[:, keep]])
+    names = (*base.free, *(added[i] for i in keep))
+    start_values = np.concatenate([np.zeros(len(base.free)), model.theta[[columns[i] for i in keep]]])
+    values, std, left = _linear_step(data, chosen, residual)
+    power = float(base.residual @ base.residual)
+    free = names[len(base.free) :]
+    return Probe(
+        candidate,
+        model,
+        free,
+        held,
+        invisible,
+        dict(zip(free, (values + start_values)[len(base.free) :].tolist(), strict=True)),
+        dict(zip(free, std[len(base.free) :].tolist(), strict=True)),
+        1.0 - left / power if power > 0.0 and free else 0.0,
+    )
+
+
+def _added(model: Model, candidate: Candidate) -> tuple[str, ...]:
+    for effect in model.effects:
+        if effect.name == candidate.effect.name and effect.at == candidate.site:
+            return tuple(effect.parameter_names.values())
+    return ()
+
+
+def _sort_columns(
+    added: Sequence[str], fresh: Array, known: Array, known_names: Sequence[str]
+) -> tuple[list[int], tuple[Alias, ...], tuple[str, ...]]:
+    """Split the new columns into those the data see, those they confuse with others, and those without influence."""
+    largest = float(np.max(np.linalg.norm(np.column_stack([known, fresh]), axis=0), initial=0.0))
+    visible = [i for i in range(len(added)) if np.linalg.norm(fresh[:, i]) > 1e-12 * largest]
+    invisible = tuple(added[i] for i in range(len(added)) if i not in visible)
+    keep, held = list(visible), []
+    for i in visible:
+        others = np.column_stack([known, fresh[:, [j for j in keep if j != i]]])
+        names = [*known_names, *(added[j] for j in keep if j != i)]
+        if explained_share(fresh[:, i], others) > ALIAS_SHARE:
+            held.append(Alias(added[i], names[closest_column(fresh[:, i], others)]))
+            keep.remove(i)
+    return keep, tuple(held), invisible
+
+
+def _linear_step(data: InverseDynamicsProblem, jacobian: Array, residual: Array) -> tuple[Array, Array, float]:
+    """Unbounded least-squares step, its standard deviations and the remaining sum of squares."""
+    if jacobian.shape[1] == 0:
+        return np.zeros(0), np.zeros(0), float(residual @ residual)
+    lengths = column_lengths(jacobian)
+    scaled = jacobian / lengths
+    step = np.linalg.lstsq(scaled, -residual, rcond=1e-10)[0]
+    left = residual + scaled @ step
+    std = np.sqrt(np.diag(robust_covariance(scaled, left, segments(data)))) / lengths
+    return step / lengths, std, float(left @ left)

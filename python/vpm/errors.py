@@ -1,0 +1,183 @@
+"""Errors: one sentence each, and the facts of that sentence as attributes.
+
+The sentence says which (path, name, channel, time), the failing condition, the numbers and the repair.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from difflib import get_close_matches
+
+
+class VpmError(ValueError):
+    """Something in the input cannot be right; the message is one sentence with the repair in it."""
+
+    def __init__(self, message: str) -> None:
+        super().__init__(message)
+        self.message = message
+
+
+class ModelError(VpmError):
+    """A model description is wrong.
+
+    Attributes
+    ----------
+    where : str or None
+        Place in the model, for example ``"bodies.carriage.mass"``.
+    path : str or None
+        File that the model was read from.
+    line, column : int or None
+        Place in the text, for syntax errors; both count from 1.
+    more : int
+        How many further problems the model has.
+    """
+
+    def __init__(
+        self,
+        message: str,
+        *,
+        where: str | None = None,
+        path: str | None = None,
+        line: int | None = None,
+        column: int | None = None,
+        more: int = 0,
+    ) -> None:
+        super().__init__(message)
+        self.where = where
+        self.path = path
+        self.line = line
+        self.column = column
+        self.more = more
+
+
+class UnitError(VpmError):
+    """A unit cannot be read, or is of another kind than the quantity.
+
+    Attributes
+    ----------
+    unit : str
+        The unit as it was written.
+    expected : str or None
+        A unit of the right kind.
+    """
+
+    def __init__(self, message: str, *, unit: str = "", expected: str | None = None) -> None:
+        super().__init__(message)
+        self.unit = unit
+        self.expected = expected
+
+
+class ExperimentError(VpmError):
+    """A measured record cannot be used as it is.
+
+    Attributes
+    ----------
+    path : str or None
+        File of the record.
+    channel : str or None
+        Channel that is at fault.
+    time : float or None
+        First time at which the condition fails (s).
+    """
+
+    def __init__(
+        self, message: str, *, path: str | None = None, channel: str | None = None, time: float | None = None
+    ) -> None:
+        super().__init__(message)
+        self.path = path
+        self.channel = channel
+        self.time = time
+
+
+class SimulationError(VpmError):
+    """A simulation was asked for in a way that cannot be done: unknown mode, integrator, channel or horizon."""
+
+
+class DiagnosisError(VpmError):
+    """A diagnosis was asked for in a way that cannot be done: no record, unknown effect, no motion measured."""
+
+
+class IdentificationError(VpmError):
+    """The asked parameters cannot be found from the given records.
+
+    Attributes
+    ----------
+    parameters : tuple of str
+        The parameters in question.
+    """
+
+    def __init__(self, message: str, *, parameters: Iterable[str] = ()) -> None:
+        super().__init__(message)
+        self.parameters = tuple(parameters)
+
+
+class DivergedError(SimulationError):
+    """A simulation left the finite numbers.
+
+    Attributes
+    ----------
+    run : object or None
+        The partial run, up to the last finite sample.
+    time : float or None
+        Time of the first sample that is not finite (s).
+    """
+
+    def __init__(self, message: str, *, run: object = None, time: float | None = None) -> None:
+        super().__init__(message)
+        self.run = run
+        self.time = time
+
+
+class MissingExtraError(VpmError, ImportError):
+    """A feature needs a package that is an optional extra of vpm.
+
+    Attributes
+    ----------
+    package : str
+        The package that is not there.
+    extra : str
+        The extra of ``vpm-dynamics`` that brings it.
+    """
+
+    def __init__(self, package: str, extra: str) -> None:
+        super().__init__(
+            f'this needs the package {package}, which is not installed: pip install "vpm-dynamics[{extra}]"'
+        )
+        self.package = package
+        self.extra = extra
+
+    def __reduce__(self) -> tuple[type[MissingExtraError], tuple[str, str]]:
+        return type(self), (self.package, self.extra)
+
+
+def near_match(name: str, candidates: Iterable[str], *, what: str = "the choices are") -> str:
+    """Repair for an unknown name: the nearest candidate, or the list of them.
+
+    Parameters
+    ----------
+    name : str
+        The name that is not known.
+    candidates : iterable of str
+        The known names.
+    what : str
+        How the list is announced when nothing is near.
+
+    Returns
+    -------
+    str
+        ``'did you mean "carriage"?'`` or ``'the choices are a, b, c'`` (at most twelve of them).
+    """
+    known = sorted(set(candidates))
+    near = get_close_matches(name, known, n=2, cutoff=0.6)
+    if (
+        not near
+    ):  # a part that is right says more than the spelling of the whole: "axis.viscous" of "axis.friction.viscous"
+        parts = set(name.split("."))
+        near = [candidate for candidate in known if parts <= set(candidate.split("."))][:2]
+    if near:
+        return "did you mean " + " or ".join(f'"{candidate}"' for candidate in near) + "?"
+    if not known:
+        return "there are none here"
+    shown = known[:12]
+    rest = f" and {len(known) - len(shown)} more" if len(known) > len(shown) else ""
+    return f"{what} " + ", ".join(shown) + rest

@@ -1,0 +1,21 @@
+"""Measured records: reading and checking logs, filtering them, and the motion and the noise in them."""
+
+from vpm.experiment.cutoff import CutoffChoice, choose_cutoff
+from vpm.experiment.motion import Motion, motion
+from vpm.experiment.noise import noise_std, quantisation_step
+from vpm.experiment.record import Experiment
+from vpm.experiment.signal import decimation_for, differentiate, lowpass, parallel_filter
+
+__all__ = [
+    "CutoffChoice",
+    "Experiment",
+    "Motion",
+    "choose_cutoff",
+    "decimation_for",
+    "differentiate",
+    "lowpass",
+    "motion",
+    "noise_std",
+    "parallel_filter",
+    "quantisation_step",
+]

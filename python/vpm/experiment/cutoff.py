@@ -1,0 +1,165 @@
+"""The cut-off frequency of the motion filter, chosen from the data.
+
+Low cut-off frequencies lose acceleration, high ones let through noise that two derivatives have multiplied by the
+square of the frequency. Where the position spectrum stands clearly above its noise floor it is taken for motion,
+elsewhere for noise, and the cut-off frequency is the lowest one whose expected error of the acceleration is near the
+least of all.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import welch
+
+from vpm.errors import ExperimentError
+from vpm.experiment.noise import quantisation_step
+from vpm.experiment.signal import MOTION_FILTER_ORDER, differentiator_gain
+
+Array = NDArray[np.float64]
+
+#: A spectrum stands clearly above its floor at this ratio of power (10 dB).
+CLEARLY_ABOVE = 10.0
+
+#: Cut-off frequencies that are offered, as shares of the rate.
+LOWEST, HIGHEST = 1.0 / 200.0, 0.2
+
+#: The settling of the filter at both ends may take at most half of the record: 4 * 3 rate/cutoff <= N.
+SAMPLES_PER_PERIOD = 12
+
+#: Fewest samples from which a cut-off frequency can be chosen: SAMPLES_PER_PERIOD / HIGHEST.
+FEWEST_SAMPLES = 60
+
+#: An error of the acceleration that matters to nobody, as a share of its root mean square.
+NEGLIGIBLE = 1e-3
+
+#: How far the expected squared error may exceed the least one for the sake of a lower cut-off frequency.
+NEAR_BEST = 1.1
+
+
+@dataclass(frozen=True)
+class CutoffChoice:
+    """A cut-off frequency and what it rests on.
+
+    Attributes
+    ----------
+    cutoff : float
+        Hz.
+    noise : tuple of float
+        Standard deviation of the white noise that the floor of each position spectrum stands for.
+    band : tuple of float
+        Highest frequency, up to the highest that is offered, at which each position spectrum stands clearly above its
+        floor, Hz; zero where it nowhere does.
+    limited : bool
+        The choice is the lowest or the highest frequency that is offered.
+    """
+
+    cutoff: float
+    noise: tuple[float, ...]
+    band: tuple[float, ...]
+    limited: bool
+
+
+def choose_cutoff(position: Array, rate: float) -> CutoffChoice:
+    """Cut-off frequency for deriving velocity and acceleration from measured positions.
+
+    Parameters
+    ----------
+    position : ndarray, shape (N, n)
+        One column per joint.
+    rate : float
+        Hz.
+
+    Returns
+    -------
+    CutoffChoice
+        One frequency for all joints: the lowest whose expected errors, each relative to the best for that joint, have
+        a sum near the least.
+
+    Raises
+    ------
+    ExperimentError
+        Fewer than 60 samples.
+    """
+    n = len(position)
+    if n < FEWEST_SAMPLES:
+        raise ExperimentError(
+            f"choosing a cut-off frequency needs at least {FEWEST_SAMPLES} samples, and there are {n}; "
+            "record longer, or give the cut-off frequency"
+        )
+    lowest = min(max(LOWEST, SAMPLES_PER_PERIOD / n), HIGHEST) * rate
+    offered = np.geomspace(lowest, HIGHEST * rate, 80)
+    total = np.zeros(offered.size)
+    noise, band = [], []
+    for column in position.T:
+        frequency, spectrum, floor = position_spectrum(column, rate)
+        step = quantisation_step(column)
+        floor = max(floor, 0.0 if step is None else step**2 / (6.0 * rate))  # q^2/12 over half of the rate
+        moving = spectrum > CLEARLY_ABOVE * floor
+        within = moving & (frequency <= HIGHEST * rate)
+        error = _expected_error(frequency, np.where(moving, spectrum - floor, 0.0), spectrum, rate, offered)
+        total += error / error.min() if error.min() > 0.0 else np.ones(offered.size)
+        noise.append(float(np.sqrt(floor * 0.5 * rate)))
+        band.append(float(frequency[within].max()) if within.any() else 0.0)
+    pick = int(np.flatnonzero(total <= NEAR_BEST * total.min())[0])
+    return CutoffChoice(float(offered[pick]), tuple(noise), tuple(band), pick in {0, offered.size - 1})
+
+
+def position_spectrum(position: Array, rate: float) -> tuple[Array, Array, float]:
+    """Smoothed one-sided power spectrum of a position and the level of its noise floor.
+
+    Welch's method on second differences, divided by their gain ``(2 - 2 cos w)^2``: positions fall so steeply with
+    frequency that without this the leakage of the slow motion would drown all the rest.
+
+    Parameters
+    ----------
+    position : ndarray, shape (N,)
+    rate : float
+        Hz.
+
+    Returns
+    -------
+    frequency : ndarray, shape (F,)
+        Hz, without zero.
+    spectrum : ndarray, shape (F,)
+        Unit of the position squared per hertz.
+    floor : float
+        Median of the spectrum over the top fifth of the frequencies.
+    """
+    bend = np.diff(position, 2)
+    length = int(np.clip(bend.size // 8, min(bend.size, 256), 4096))
+    frequency, power = welch(bend, rate, nperseg=length, detrend="constant")
+    gain = (2.0 - 2.0 * np.cos(2.0 * np.pi * frequency[1:] / rate)) ** 2
+    spectrum = _smooth(np.asarray(power[1:], dtype=np.float64)) / gain
+    top = frequency[1:] >= 0.4 * rate
+    return frequency[1:], spectrum, float(np.median(spectrum[top]))
+
+
+def _expected_error(frequency: Array, motion: Array, spectrum: Array, rate: float, cutoffs: Array) -> Array:
+    """Expected squared error of the acceleration for each cut-off frequency, never less than negligible.
+
+    ``integral of w^4 [(1 - h g)^2 S + (h g)^2 N] df`` with gain ``h`` of the filter, ``g`` of two derivatives,
+    spectrum ``S`` of the motion and ``N`` of the noise.
+    """
+    step = frequency[0]
+    noise = spectrum - motion
+    fourth = (2.0 * np.pi * frequency) ** 4 * step
+    slope = differentiator_gain(frequency, rate) ** 2
+    warped = np.tan(np.pi * np.minimum(frequency / rate, 0.4999))
+    below = frequency <= HIGHEST * rate  # faster motion is lost at every offered cut-off
+    errors = np.empty(cutoffs.size)
+    for i, cutoff in enumerate(cutoffs):
+        kept = slope / (1.0 + (warped / np.tan(np.pi * cutoff / rate)) ** (2 * MOTION_FILTER_ORDER))
+        errors[i] = np.sum(fourth * (np.where(below, (1.0 - kept) ** 2, 0.0) * motion + kept**2 * noise))
+    return np.maximum(errors, NEGLIGIBLE**2 * float(np.sum(fourth * motion * below)))
+
+
+def _smooth(power: Array) -> Array:
+    """Running mean over a tenth of each frequency to both sides, at least two bins."""
+    index = np.arange(power.size)
+    half = np.maximum(2, (index + 1) // 10)
+    low, high = np.maximum(index - half, 0), np.minimum(index + half + 1, power.size)
+    total = np.concatenate([[0.0], np.cumsum(power)])
+    return np.asarray((total[high] - total[low]) / (high - low), dtype=np.float64)

@@ -1,0 +1,214 @@
+"""The time grid of a log: what is refused, and what is interpolated when the user asks for it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vpm.errors import ExperimentError
+from vpm.experiment.signal import interpolate
+
+Array = NDArray[np.float64]
+
+#: Fewest samples that make a log.
+FEWEST_SAMPLES = 10
+
+#: Largest difference of one step from the median step, as a share of it: a clock written to the microsecond passes.
+STEP_TOLERANCE = 5e-3
+
+#: Largest distance of a sample from the uniform grid, in steps.
+GRID_TOLERANCE = 0.05
+
+#: A step beyond this many median steps is a gap.
+GAP = 1.5
+
+#: Quantities that change smoothly, and so may be interpolated by a spline.
+SMOOTH_QUANTITIES = ("position", "velocity", "acceleration")
+
+
+@dataclass(frozen=True)
+class Source:
+    """Where numbers came from, for the words of an error.
+
+    Attributes
+    ----------
+    name : str
+        File, or name of the record.
+    lines : ndarray of int or None
+        Line of the file for each sample; None for arrays, whose samples are counted from zero.
+    path : str or None
+        File.
+    """
+
+    name: str
+    lines: NDArray[np.int64] | None = None
+    path: str | None = None
+
+    def at(self, sample: int) -> str:
+        """Place of a sample in words."""
+        if self.lines is None:
+            return f"{self.name}, sample {sample}"
+        return f"{self.name}, line {self.lines[sample]}"
+
+    def error(self, message: str, *, channel: str | None = None, time: float | None = None) -> ExperimentError:
+        """Error that carries the path."""
+        return ExperimentError(message, path=self.path, channel=channel, time=time)
+
+
+def check_finite(values: Array, time: Array, what: str, source: Source, *, channel: str | None = None) -> None:
+    """Refuse NaN and infinity.
+
+    Raises
+    ------
+    ExperimentError
+        Names the first place, its time, and how many there are.
+    """
+    bad = np.flatnonzero(~np.isfinite(values))
+    if bad.size:
+        first = int(bad[0])
+        when = f" at t = {time[first]:.6g} s" if np.isfinite(time[first]) else ""
+        count = "the only one" if bad.size == 1 else f"the first of {bad.size}"
+        raise source.error(
+            f"{source.at(first)}: {what} is {values[first]}{when}, {count}; repair these cells, or delete "
+            'their rows and load with irregular="interpolate"',
+            channel=channel,
+            time=float(time[first]) if np.isfinite(time[first]) else None,
+        )
+
+
+def check_increasing(time: Array, source: Source) -> None:
+    """Refuse a record that is too short, or a time that stands still or goes back.
+
+    Raises
+    ------
+    ExperimentError
+    """
+    if time.size < FEWEST_SAMPLES:
+        raise source.error(
+            f"{source.name} has {time.size} samples, and at least {FEWEST_SAMPLES} are needed; record longer"
+        )
+    if np.ptp(time) == 0.0:
+        raise source.error(
+            f"{source.name}: the time is {time[0]:.9g} s in all {time.size} samples; "
+            "map the column that holds the clock",
+            time=float(time[0]),
+        )
+    back = np.flatnonzero(np.diff(time) <= 0.0)
+    if back.size:
+        first = int(back[0])
+        repair = (
+            "delete the repeated row"
+            if time[first] == time[first + 1]
+            else "sort the rows, or cut the log where its clock was set anew"
+        )
+        raise source.error(
+            f"{source.at(first + 1)}: the time goes from {time[first]:.9g} s to {time[first + 1]:.9g} s, and it has to "
+            f"increase; {repair}",
+            time=float(time[first + 1]),
+        )
+
+
+def check_uniform(time: Array, source: Source) -> str:
+    """Refuse gaps and uneven steps.
+
+    Returns
+    -------
+    str
+        Sentence on the grid for the history.
+
+    Raises
+    ------
+    ExperimentError
+        Samples are missing, one step is off by more than 0.5 % of the median step, or a sample lies further than a
+        twentieth of a step from the uniform grid.
+    """
+    steps = np.diff(time)
+    median = float(np.median(steps))
+    repair = 'trim the log there, or load with irregular="interpolate"'
+    gaps = np.flatnonzero(steps > GAP * median)
+    if gaps.size:
+        first = int(gaps[0])
+        missing = round(float(steps[first]) / median) - 1
+        more = "" if gaps.size == 1 else f" and there are {gaps.size - 1} more such gaps"
+        raise source.error(
+            f"{source.at(first + 1)}: {missing} {_samples(missing)} missing after t = {time[first]:.9g} s (a step of "
+            f"{steps[first]:.6g} s where {median:.6g} s is usual){more}; {repair}",
+            time=float(time[first]),
+        )
+    worst = int(np.argmax(np.abs(steps - median)))
+    share = abs(float(steps[worst]) - median) / median
+    if share > STEP_TOLERANCE:
+        raise source.error(
+            f"{source.at(worst + 1)}: the step at t = {time[worst]:.9g} s is {steps[worst]:.6g} s, {share:.2%} off the "
+            f"median of {median:.6g} s, and {STEP_TOLERANCE:.1%} is allowed; load with "
+            'irregular="interpolate"',
+            time=float(time[worst]),
+        )
+    _check_drift(time, source)
+    rate = (time.size - 1) / float(time[-1] - time[0])
+    return (
+        f"The {time.size} samples are {1.0 / rate:.9g} s apart ({rate:.6g} Hz), each step within {share:.1e} of that."
+    )
+
+
+def make_uniform(time: Array, data: Array, channels: tuple[str, ...], rate: float | None) -> tuple[Array, Array, str]:
+    """Interpolate a record onto a uniform grid.
+
+    Parameters
+    ----------
+    time : ndarray, shape (N,)
+        Increasing, s.
+    data : ndarray, shape (N, C)
+    channels : tuple of str
+        Positions, velocities and accelerations are interpolated by cubic splines, all others by straight lines.
+    rate : float or None
+        Hz; None takes the median step.
+
+    Returns
+    -------
+    time : ndarray, shape (M,)
+    data : ndarray, shape (M, C)
+    sentence : str
+        For the history.
+    """
+    steps = np.diff(time)
+    median = float(np.median(steps))
+    step = median if rate is None else 1.0 / rate
+    grid = time[0] + step * np.arange(int((time[-1] - time[0]) / step * (1.0 + 1e-12) + 1e-6) + 1)
+    grid = grid[grid <= time[-1] + 1e-6 * step]
+    inside = np.minimum(grid, time[-1])
+    columns = [interpolate(time, data[:, i], inside, smooth=is_smooth(channel)) for i, channel in enumerate(channels)]
+    gaps = steps[steps > GAP * median]
+    missing = int(np.sum(np.round(gaps / median) - 1))
+    text = f"The record was interpolated onto a uniform grid of {grid.size} samples, {step:.9g} s apart"
+    if missing:
+        longest = round(float(gaps.max()) / median) - 1
+        text += (
+            f"; {missing} {_samples(missing)} missing before, the longest gap being {longest} long "
+            f"after t = {time[int(np.argmax(steps))]:.6g} s"
+        )
+    return grid, np.column_stack(columns) if columns else np.zeros((grid.size, 0)), text + "."
+
+
+def is_smooth(channel: str) -> bool:
+    """Whether a channel is a motion, which has no jumps."""
+    return channel.rpartition(".")[2] in SMOOTH_QUANTITIES
+
+
+def _check_drift(time: Array, source: Source) -> None:
+    step = float(time[-1] - time[0]) / (time.size - 1)
+    away = np.abs(time - (time[0] + step * np.arange(time.size))) / step
+    worst = int(np.argmax(away))
+    if away[worst] > GRID_TOLERANCE:
+        raise source.error(
+            f"{source.at(worst)}: the sample at t = {time[worst]:.9g} s lies {away[worst]:.2g} steps from a uniform "
+            f"grid of {step:.6g} s, and {GRID_TOLERANCE:g} is allowed, because the clock's rate changes; "
+            'load with irregular="interpolate"',
+            time=float(time[worst]),
+        )
+
+
+def _samples(count: int) -> str:
+    return "sample is" if count == 1 else "samples are"

@@ -1,0 +1,211 @@
+"""The motion behind a log: position, velocity and acceleration of every joint, and the commands."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vpm.errors import ExperimentError, near_match
+from vpm.experiment.cutoff import HIGHEST, CutoffChoice, choose_cutoff
+from vpm.experiment.record import Experiment
+from vpm.experiment.signal import decimation_for, differentiate, lowpass, settling_samples
+from vpm.results import Result
+
+Array = NDArray[np.float64]
+
+#: Samples that have to remain between the two ends where the filter settles.
+FEWEST_KEPT = 10
+
+#: A floor of the position spectrum below this share of the motion's range is none that an instrument leaves.
+NO_INSTRUMENT = 1e-9
+
+
+class Machine(Protocol):
+    """What is asked of a model: its name, its joints and its actuators, in the order of its coordinates."""
+
+    @property
+    def name(self) -> str:
+        """Name of the model."""
+
+    @property
+    def joints(self) -> Iterable[str]:
+        """Names of the joints."""
+
+    @property
+    def actuators(self) -> Iterable[str]:
+        """Names of the actuators."""
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class Motion(Result):
+    """Filtered motion of all joints and the commands on the grid of the log.
+
+    Attributes
+    ----------
+    joints, actuators : tuple of str
+        Columns of the motion and of `inputs`.
+    position, velocity, acceleration : ndarray, shape (N, n)
+        m or rad, per second, per second squared.
+    inputs : ndarray, shape (N, nu)
+        Command of each actuator as logged, held from its sample to the next.
+    time : ndarray, shape (N,)
+        s.
+    dt : float
+        s.
+    cutoff : float
+        Cut-off frequency of the zero-phase filter, Hz.
+    edge : int
+        Samples at both ends in which the filter has not settled; leave them out.
+    decimation : int
+        Factor for `parallel_filter` that keeps the band which the filter left alone.
+    notes : tuple of str
+        One sentence for each choice that was made.
+    """
+
+    joints: tuple[str, ...]
+    actuators: tuple[str, ...]
+    position: Array
+    velocity: Array
+    acceleration: Array
+    inputs: Array
+    time: Array
+    dt: float
+    cutoff: float
+    edge: int
+    decimation: int
+    notes: tuple[str, ...]
+
+    @property
+    def kept(self) -> slice:
+        """Samples between the two ends."""
+        return slice(self.edge, self.time.size - self.edge)
+
+    def _headline(self) -> Mapping[str, object]:
+        return {
+            "joints": self.joints,
+            "samples": self.time.size,
+            "cutoff_hz": self.cutoff,
+            "edge": self.edge,
+            "decimation": self.decimation,
+        }
+
+    def _html_rows(self) -> Mapping[str, object]:
+        return {**self._headline(), **{f"choice {i}": note for i, note in enumerate(self.notes, 1)}}
+
+    def _frame_columns(self) -> Mapping[str, object]:
+        columns: dict[str, object] = {"time_s": self.time}
+        for column, joint in enumerate(self.joints):
+            columns[f"{joint}.position"] = self.position[:, column]
+            columns[f"{joint}.velocity"] = self.velocity[:, column]
+            columns[f"{joint}.acceleration"] = self.acceleration[:, column]
+        for column, actuator in enumerate(self.actuators):
+            columns[f"{actuator}.command"] = self.inputs[:, column]
+        return columns
+
+
+def motion(
+    experiment: Experiment, model: Machine, cutoff: float | None = None, *, measured: Collection[str] = ()
+) -> Motion:
+    """What inverse dynamics needs from a log.
+
+    Positions pass a zero-phase Butterworth filter of order 4 and two central differences, the customary preparation
+    for inverse dynamic identification (M. Gautier, "Dynamic identification of robots with power model", ICRA 1997).
+
+    Parameters
+    ----------
+    experiment : Experiment
+        With the position of every joint and the command of every actuator.
+    model : Model
+    cutoff : float, optional
+        Hz; without it `choose_cutoff` decides.
+    measured : collection of {"velocity", "acceleration"}
+        Derivatives to take from their own channels, through the same filter, instead of from the position.
+
+    Returns
+    -------
+    Motion
+
+    Raises
+    ------
+    ExperimentError
+        A channel is missing, the cut-off frequency is not possible, or the log is too short for it.
+    """
+    joints, actuators = tuple(model.joints), tuple(model.actuators)
+    unknown = sorted(set(measured) - {"velocity", "acceleration"})
+    if unknown:
+        raise ExperimentError(f'"{unknown[0]}" cannot be taken as measured; choose from velocity, acceleration')
+    raw = _channels(experiment, model, joints, "position")
+    inputs = _channels(experiment, model, actuators, "command")
+    rate = experiment.rate
+    choice = choose_cutoff(raw, rate) if cutoff is None else None
+    cutoff = choice.cutoff if choice is not None else float(cutoff or 0.0)
+    position = lowpass(raw, rate, cutoff)
+    edge = settling_samples(rate, cutoff) + 4  # two differences reach four samples outward
+    _check_length(experiment, cutoff, edge)
+    derivatives = [differentiate(position, experiment.dt)]
+    notes = [_choice_note(choice, joints, np.ptp(raw, axis=0), rate, cutoff)]
+    for order, quantity in enumerate(("velocity", "acceleration")):
+        if quantity in measured:
+            derivatives[order:] = [lowpass(_channels(experiment, model, joints, quantity), rate, cutoff)]
+            notes.append(f"The {quantity} is the measured one, through the same filter.")
+        if order == 0:
+            derivatives.append(differentiate(derivatives[0], experiment.dt))
+    decimation = min(decimation_for(rate, cutoff), (len(experiment) - 2 * edge) // 4)
+    notes.append(f"{edge} samples at each end are left to the settling of the filter.")
+    return Motion(
+        joints,
+        actuators,
+        position,
+        derivatives[0],
+        derivatives[1],
+        inputs,
+        experiment.time,
+        experiment.dt,
+        cutoff,
+        edge,
+        max(1, decimation),
+        tuple(notes),
+    )
+
+
+def _channels(experiment: Experiment, model: Machine, owners: tuple[str, ...], quantity: str) -> Array:
+    for owner in owners:
+        channel = f"{owner}.{quantity}"
+        if channel not in experiment:
+            near = near_match(channel, experiment.channels, what="the log holds")
+            raise ExperimentError(
+                f'{experiment.name}: the motion of "{model.name}" needs the channel "{channel}", which the log does '
+                f"not hold; map a column to it in the channel table ({near})",
+                channel=channel,
+            )
+    columns = [experiment[f"{owner}.{quantity}"] for owner in owners]
+    return np.ascontiguousarray(np.column_stack(columns)) if columns else np.zeros((len(experiment), 0))
+
+
+def _check_length(experiment: Experiment, cutoff: float, edge: int) -> None:
+    kept = len(experiment) - 2 * edge
+    if kept < FEWEST_KEPT:
+        raise ExperimentError(
+            f"{experiment.name}: {len(experiment)} samples at {experiment.rate:g} Hz leave {max(kept, 0)} after {edge} "
+            f"at each end in which a filter of {cutoff:g} Hz settles; record longer, or raise the cut-off frequency"
+        )
+
+
+def _choice_note(choice: CutoffChoice | None, joints: tuple[str, ...], span: Array, rate: float, cutoff: float) -> str:
+    if choice is None:
+        return f"The cut-off frequency of {cutoff:.4g} Hz was given."
+    bands = ", ".join(
+        f"{joint} up to {band:.3g} Hz (noise {noise:.2g})"
+        for joint, band, noise in zip(joints, choice.band, choice.noise, strict=True)
+    )
+    text = f"The cut-off frequency of {cutoff:.4g} Hz was chosen where motion stands 10 dB above the noise: {bands}"
+    if any(noise < NO_INSTRUMENT * reach for noise, reach in zip(choice.noise, span, strict=True)):
+        text += "; a record without a noise floor was simulated or filtered before"
+    if choice.limited:
+        edge = "highest" if cutoff > 0.5 * HIGHEST * rate else "lowest"
+        text += f"; it is the {edge} that {rate:g} Hz allows"
+    return text + "."

@@ -1,0 +1,89 @@
+"""How noisy a channel is, and in which steps it was recorded."""
+
+from __future__ import annotations
+
+from math import comb, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vpm.errors import ExperimentError
+
+Array = NDArray[np.float64]
+
+#: Ratio of the standard deviation of a normal distribution to its median absolute deviation.
+NORMAL_MAD = 1.4826
+
+#: Fewest samples from which noise can be told from motion.
+FEWEST_SAMPLES = 20
+
+
+def noise_std(values: Array) -> float:
+    """Standard deviation of the white measurement noise of a channel.
+
+    The k-th difference of white noise has the variance ``comb(2k, k)`` times that of the noise, while smooth motion
+    vanishes from it; the median absolute deviation forgives the few samples at which the motion is not smooth. The
+    least estimate over the orders 3 to 6 is taken, and it is never below that of the quantisation, ``q / sqrt(12)``
+    (B. Widrow and I. Kollar, *Quantization Noise*, 2008).
+
+    Noise that was filtered before it was recorded is underestimated.
+
+    Parameters
+    ----------
+    values : ndarray, shape (N,)
+
+    Returns
+    -------
+    float
+        Unit of the channel; zero for a constant channel.
+
+    Raises
+    ------
+    ExperimentError
+        Fewer than 20 samples.
+    """
+    if values.size < FEWEST_SAMPLES:
+        raise ExperimentError(
+            f"a noise level needs at least {FEWEST_SAMPLES} samples, and there are {values.size}; record longer"
+        )
+    estimates = []
+    for order in range(3, 7):
+        difference = np.diff(values, order)
+        spread = float(np.median(np.abs(difference - np.median(difference))))
+        estimates.append(NORMAL_MAD * spread / sqrt(comb(2 * order, order)))
+    step = quantisation_step(values)
+    return max(min(estimates), 0.0 if step is None else step / sqrt(12.0))
+
+
+def quantisation_step(values: Array) -> float | None:
+    """Step of the grid on which all values of a channel lie.
+
+    The greatest common measure of the differences between neighbours (Euclid's algorithm with a tolerance).
+
+    Parameters
+    ----------
+    values : ndarray, shape (N,)
+
+    Returns
+    -------
+    float or None
+        None where the values lie on no grid coarser than a ten-millionth of their range, or take fewer than
+        five levels.
+    """
+    if np.unique(values).size < 5:
+        return None
+    differences = np.unique(np.abs(np.diff(values)))
+    resolution = 16.0 * np.finfo(np.float64).eps * float(np.max(np.abs(values)))
+    smallest = max(1e-7 * float(np.ptp(values)), 4.0 * resolution)
+    differences = differences[differences > resolution]
+    step = float(differences[0]) if differences.size else 0.0
+    for _ in range(64):
+        if step < smallest:
+            return None
+        counts = np.round(differences / step)
+        remainder = np.abs(differences - counts * step)
+        off_grid = remainder > 0.02 * step + 2.0 * resolution
+        if not off_grid.any():
+            return float(differences @ counts / (counts @ counts))
+        step = float(remainder[off_grid].min())
+    return None

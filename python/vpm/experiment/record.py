@@ -1,0 +1,386 @@
+"""A measured record: one uniform time grid, named channels in SI units, and how it came to be what it is."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from os import PathLike
+from typing import TYPE_CHECKING, Literal, Self, TypedDict, Unpack
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from vpm.errors import ExperimentError, near_match
+from vpm.experiment.grid import FEWEST_SAMPLES, Source, check_finite, is_smooth, make_uniform
+from vpm.experiment.signal import anti_alias, differentiate, interpolate, lowpass
+from vpm.results import Result
+from vpm.units import parse_unit
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from vpm.model import ChannelEntry, Model
+
+Array = NDArray[np.float64]
+
+
+class _Changes(TypedDict, total=False):
+    """Fields that a derived record may change."""
+
+    name: str
+    time: Array
+    data: Array
+    channels: tuple[str, ...]
+    units: tuple[str, ...]
+
+
+_NEXT = {"position": "velocity", "velocity": "acceleration"}
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class Experiment(Result):
+    """A log of a machine; immutable, every change gives a new one.
+
+    Attributes
+    ----------
+    name : str
+    time : ndarray, shape (N,)
+        As logged, s.
+    data : ndarray, shape (N, C)
+        SI units.
+    channels : tuple of str
+        Names as in the model, for example ``"axis.position"``.
+    units : tuple of str
+    history : tuple of str
+        One sentence for each thing that was done to the numbers.
+    unused_columns : tuple of str
+        Columns of the file that no channel asked for.
+    """
+
+    name: str
+    time: Array
+    data: Array
+    channels: tuple[str, ...]
+    units: tuple[str, ...]
+    history: tuple[str, ...] = ()
+    unused_columns: tuple[str, ...] = field(default=())
+
+    def __post_init__(self) -> None:
+        """Take read-only copies of the arrays and check that the parts fit together."""
+        for attribute in ("time", "data"):
+            values = np.array(getattr(self, attribute), dtype=np.float64, order="C")
+            values.setflags(write=False)
+            object.__setattr__(self, attribute, values)
+        expected = (self.time.size, len(self.channels))
+        if self.time.ndim != 1 or self.data.shape != expected or len(self.units) != len(self.channels):
+            raise ExperimentError(
+                f"{self.name}: data of shape {self.data.shape} and {len(self.units)} units do not fit time of shape "
+                f"{self.time.shape} and {len(self.channels)} channels; give one column and one unit for each channel"
+            )
+        repeated = [channel for at, channel in enumerate(self.channels) if channel in self.channels[:at]]
+        if repeated:
+            raise ExperimentError(
+                f'{self.name}: the channel "{repeated[0]}" is there twice; rename one of them', channel=repeated[0]
+            )
+
+    @classmethod
+    def load(
+        cls,
+        path: str | PathLike[str],
+        channels: Mapping[str, ChannelEntry] | str | PathLike[str] | None = None,
+        model: Model | None = None,
+        *,
+        irregular: Literal["error", "interpolate"] = "error",
+        resample: float | None = None,
+        name: str | None = None,
+    ) -> Self:
+        """Read a log from a CSV file, or one that `save` wrote.
+
+        A channel table says which column is which channel: ``value = (column * scale + offset)`` in its unit, which
+        becomes SI, and a channel that lags the others by ``delay`` is moved back. Without any table every column is a
+        channel of its own name, a unit may stand in brackets (``q [mm]``), and the clock is the column ``time``,
+        ``time_s`` or ``t``.
+
+        Parameters
+        ----------
+        path : path-like
+        channels : mapping of str to ChannelEntry, or path-like, optional
+            Table, or TOML file of one; by default that of the model.
+        model : Model, optional
+            The channels have to be known to it and to have units of the right kind.
+        irregular : {"error", "interpolate"}
+            What to do with missing samples and uneven steps.
+        resample : float, optional
+            Interpolate onto this rate, Hz, with an anti-aliasing filter where it is lower.
+        name : str, optional
+            By default the file's name without its ending.
+
+        Returns
+        -------
+        Experiment
+
+        Raises
+        ------
+        ExperimentError
+            Something in the file cannot be right; the message says what, where, and how to repair it.
+        UnitError
+            A unit cannot be read.
+        """
+        if str(path).endswith(".npz"):
+            return super().load(path)
+        from vpm.experiment.loading import load_parts
+
+        parts = load_parts(path, channels, model, irregular=irregular, resample=resample, name=name)
+        return cls(*parts)
+
+    @classmethod
+    def from_arrays(
+        cls,
+        time: ArrayLike,
+        values: Mapping[str, ArrayLike],
+        units: Mapping[str, str] | None = None,
+        name: str = "arrays",
+        model: Model | None = None,
+        *,
+        irregular: Literal["error", "interpolate"] = "error",
+        resample: float | None = None,
+    ) -> Self:
+        """Record from arrays, checked as a file is.
+
+        Parameters
+        ----------
+        time : array-like, shape (N,)
+            s.
+        values : mapping of str to array-like, shape (N,)
+            One entry per channel.
+        units : mapping of str to str, optional
+            Unit in which each channel is given; by default that of the model, or ``"1"`` without one.
+        name : str
+        model, irregular, resample
+            As in `load`.
+
+        Returns
+        -------
+        Experiment
+
+        Raises
+        ------
+        ExperimentError, UnitError
+        """
+        from vpm.experiment.loading import array_parts
+
+        parts = array_parts(time, values, units or {}, model, irregular=irregular, resample=resample, name=name)
+        return cls(*parts)
+
+    @property
+    def dt(self) -> float:
+        """Time between samples, s: the mean over the record."""
+        return float(self.time[-1] - self.time[0]) / (self.time.size - 1)
+
+    @property
+    def rate(self) -> float:
+        """Samples per second, Hz."""
+        return 1.0 / self.dt
+
+    @property
+    def duration(self) -> float:
+        """Time from the first to the last sample, s."""
+        return float(self.time[-1] - self.time[0])
+
+    def __len__(self) -> int:
+        """Count of samples."""
+        return self.time.size
+
+    def __contains__(self, channel: object) -> bool:
+        """Whether the record has a channel of this name."""
+        return channel in self.channels
+
+    def __iter__(self) -> Iterator[str]:
+        """Names of the channels."""
+        return iter(self.channels)
+
+    def __getitem__(self, channel: str) -> Array:
+        """Values of a channel, shape (N,), in SI units."""
+        return self.data[:, self._index(channel)]
+
+    def unit(self, channel: str) -> str:
+        """SI unit of a channel."""
+        return self.units[self._index(channel)]
+
+    def trim(self, start: float | None = None, stop: float | None = None) -> Self:
+        """Part of the record from `start` to `stop`, both in s on its own clock and inclusive."""
+        slack = 1e-6 * self.dt
+        first = self.time[0] if start is None else start
+        last = self.time[-1] if stop is None else stop
+        kept = (self.time >= first - slack) & (self.time <= last + slack)
+        if kept.sum() < FEWEST_SAMPLES:
+            raise ExperimentError(
+                f"{self.name}: {kept.sum()} samples lie between {first:g} s and {last:g} s, and at least "
+                f"{FEWEST_SAMPLES} are needed; the record goes from {self.time[0]:g} s to {self.time[-1]:g} s"
+            )
+        time = self.time[kept]
+        return self._changed(
+            f"Trimmed to {time[0]:.6g} s ... {time[-1]:.6g} s, {time.size} of {len(self)} samples.",
+            time=time,
+            data=self.data[kept],
+        )
+
+    def split(self, fraction: float) -> tuple[Self, Self]:
+        """Training and validation record: the first `fraction` of the time, and the rest."""
+        count = round(fraction * len(self))
+        if min(count, len(self) - count) < FEWEST_SAMPLES:
+            raise ExperimentError(
+                f"{self.name}: a split at {fraction:g} leaves {count} and {len(self) - count} of {len(self)} samples, "
+                f"and each part needs at least {FEWEST_SAMPLES}; choose a fraction nearer to a half"
+            )
+        parts = []
+        for label, part in (("train", slice(None, count)), ("validation", slice(count, None))):
+            time = self.time[part]
+            sentence = f"Split at {fraction:g}: the {label} part, {time[0]:.6g} s ... {time[-1]:.6g} s."
+            parts.append(self._changed(sentence, name=f"{self.name}-{label}", time=time, data=self.data[part]))
+        return parts[0], parts[1]
+
+    def resample(self, rate: float) -> Self:
+        """Record on a uniform grid of another rate, Hz.
+
+        Where the rate falls, a zero-phase anti-aliasing filter comes first. Motions are interpolated by cubic splines,
+        all other channels, which may jump, by straight lines.
+        """
+        if not rate > 0.0 or self.duration * rate < FEWEST_SAMPLES:
+            raise ExperimentError(
+                f"{self.name}: {rate:g} Hz gives fewer than {FEWEST_SAMPLES} samples in {self.duration:g} s; "
+                f"choose a rate above {FEWEST_SAMPLES / self.duration:.4g} Hz"
+            )
+        factor = self.rate / rate
+        data = self.data if factor <= 1.0 else anti_alias(self.data, factor)
+        time, data, _ = make_uniform(self.time, data, self.channels, rate)
+        how = f"below a filter at {0.4 * rate:.6g} Hz" if factor > 1.0 else "without a filter"
+        return self._changed(f"Resampled from {self.rate:.6g} Hz to {rate:.6g} Hz {how}.", time=time, data=data)
+
+    def filter(self, channel: str, cutoff: float, order: int = 4) -> Self:
+        """Record with one channel behind a zero-phase Butterworth filter (see `vpm.experiment.signal.lowpass`)."""
+        values = lowpass(self[channel], self.rate, cutoff, order)
+        sentence = f"{channel} was filtered at {cutoff:.6g} Hz (Butterworth of order {order}, forward and backward)."
+        return self._with_column(channel, values, self.unit(channel), sentence)
+
+    def differentiate(self, channel: str, name: str | None = None) -> Self:
+        """Record with the derivative of a channel as a further one.
+
+        Parameters
+        ----------
+        channel : str
+        name : str, optional
+            By default ``J.velocity`` for ``J.position`` and ``J.acceleration`` for ``J.velocity``.
+        """
+        owner, _, quantity = channel.rpartition(".")
+        target = name or (f"{owner}.{_NEXT[quantity]}" if quantity in _NEXT else None)
+        if target is None:
+            raise ExperimentError(
+                f'{self.name}: the derivative of "{channel}" has no customary name; give one', channel=channel
+            )
+        if target in self:
+            raise ExperimentError(
+                f'{self.name}: the channel "{target}" is there already; give another name to the derivative',
+                channel=target,
+            )
+        unit = parse_unit(f"({self.unit(channel)})/s").si
+        sentence = f"{target} is the derivative of {channel} by central differences of fourth order."
+        return self._with_column(target, differentiate(self[channel], self.dt), unit, sentence)
+
+    def with_channel(self, name: str, values: ArrayLike, unit: str = "1") -> Self:
+        """Record with a further or a replaced channel.
+
+        Parameters
+        ----------
+        name : str
+        values : array-like, shape (N,)
+        unit : str
+            In which the values are given; they are stored in SI.
+        """
+        column = np.asarray(values, dtype=np.float64)
+        if column.shape != self.time.shape:
+            raise ExperimentError(
+                f'{self.name}: values of shape {column.shape} were given for "{name}", and the record has shape '
+                f"{self.time.shape}; give one value per sample",
+                channel=name,
+            )
+        check_finite(column, self.time, f'the channel "{name}"', Source(self.name), channel=name)
+        parsed = parse_unit(unit)
+        verb = "replaced by" if name in self else "added from"
+        return self._with_column(name, column * parsed.factor, parsed.si, f"{name} was {verb} values in {unit}.")
+
+    def align(self, delays: Mapping[str, float]) -> Self:
+        """Record with some channels moved back by the times by which they lag the others.
+
+        Parameters
+        ----------
+        delays : mapping of str to float
+            Channel to delay, s; negative where a channel runs ahead. Samples at the ends for which a moved channel has
+            no value are cut.
+        """
+        latest, earliest = max(0.0, *delays.values()), min(0.0, *delays.values())
+        slack = 1e-6 * self.dt
+        inside = (self.time + earliest >= self.time[0] - slack) & (self.time + latest <= self.time[-1] + slack)
+        if inside.sum() < FEWEST_SAMPLES:
+            raise ExperimentError(
+                f"{self.name}: delays from {earliest:g} s to {latest:g} s leave {inside.sum()} of {len(self)} samples "
+                f"over {self.duration:g} s; check their unit, which is the second"
+            )
+        data = self.data[inside].copy()
+        moved = []
+        for channel, delay in delays.items():
+            at = np.clip(self.time[inside] + delay, self.time[0], self.time[-1])
+            data[:, self._index(channel)] = interpolate(self.time, self[channel], at, smooth=is_smooth(channel))
+            moved.append(f"{channel} by {delay:.6g} s")
+        lost = len(self) - int(inside.sum())
+        sentence = f"Moved back {', '.join(moved)}; {lost} samples at the ends, which have no value there, were cut."
+        return self._changed(sentence, time=self.time[inside], data=data)
+
+    def plot(self) -> Figure:
+        """All channels over time. Needs the extra ``plot``."""
+        from vpm.plot import plot_channels
+
+        return plot_channels(self.time, self.data, self.channels, self.units, title=self.name)
+
+    def _index(self, channel: str) -> int:
+        try:
+            return self.channels.index(channel)
+        except ValueError:
+            raise ExperimentError(
+                f'{self.name} has no channel "{channel}"; {near_match(channel, self.channels, what="it has")}',
+                channel=channel,
+            ) from None
+
+    def _with_column(self, channel: str, values: Array, unit: str, sentence: str) -> Self:
+        if channel in self:
+            at = self._index(channel)
+            data = self.data.copy()
+            data[:, at] = values
+            return self._changed(sentence, data=data, units=(*self.units[:at], unit, *self.units[at + 1 :]))
+        return self._changed(
+            sentence,
+            data=np.column_stack([self.data, values]),
+            channels=(*self.channels, channel),
+            units=(*self.units, unit),
+        )
+
+    def _changed(self, sentence: str, **changes: Unpack[_Changes]) -> Self:
+        return replace(self, history=(*self.history, sentence), **changes)
+
+    def _headline(self) -> Mapping[str, object]:
+        shown: dict[str, object] = {"name": self.name, "samples": len(self), "rate_hz": self.rate}
+        shown["channels"] = self.channels
+        if self.unused_columns:
+            shown["unused_columns"] = self.unused_columns
+        return shown
+
+    def _html_rows(self) -> Mapping[str, object]:
+        rows: dict[str, object] = {"name": self.name, "samples": len(self), "rate": f"{self.rate:.6g} Hz"}
+        for channel, unit, column in zip(self.channels, self.units, self.data.T, strict=True):
+            rows[channel] = f"{column.min():.6g} ... {column.max():.6g} {unit}"
+        if self.unused_columns:
+            rows["unused columns"] = ", ".join(self.unused_columns)
+        return {**rows, **{f"history {at}": sentence for at, sentence in enumerate(self.history, 1)}}
+
+    def _frame_columns(self) -> Mapping[str, object]:
+        return {"time_s": self.time, **dict(zip(self.channels, self.data.T, strict=True))}

@@ -1,0 +1,331 @@
+"""Parameters from data: bounded least squares on any problem, with honest uncertainty."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares, lsq_linear
+
+from vpm.errors import IdentificationError
+from vpm.experiment import Experiment
+from vpm.identify.identifiability import Combination, column_lengths, unseen_combinations
+from vpm.identify.problem import InverseDynamicsProblem, OutputErrorProblem, gaps, problem, segments
+from vpm.identify.statistics import NORMAL_95, robust_covariance
+from vpm.model import Model
+from vpm.results import Result
+from vpm.simulate import Setup
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Array = NDArray[np.float64]
+AnyProblem = InverseDynamicsProblem | OutputErrorProblem
+
+#: Called after every evaluation with (evaluations so far, root mean square of the weighted residual).
+Progress = Callable[[int, float], None]
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Result of one least-squares run, as arrays over the free parameters."""
+
+    names: tuple[str, ...]
+    values: Array
+    residual: Array
+    jacobian: Array
+    covariance: Array
+    unseen: tuple[Combination, ...]
+    at_bounds: tuple[str, ...]
+    evaluations: int
+
+    @property
+    def std(self) -> Array:
+        """Standard deviation of each estimate; infinite where the data cannot see it."""
+        return np.sqrt(np.diag(self.covariance))
+
+
+def estimate(
+    model: Model,
+    data: AnyProblem,
+    free: Sequence[str],
+    *,
+    bounds: Mapping[str, tuple[float, float]] | None = None,
+    max_evaluations: int = 40,
+    progress: Progress | None = None,
+) -> Estimate:
+    """Move ``free`` parameters of ``model`` until the residual of ``data`` is least.
+
+    A first step solves the problem as if it were linear (which on the inverse-dynamics regressor it mostly is); the
+    trust-region reflective method of SciPy finishes where it is not.
+
+    Parameters
+    ----------
+    model : Model
+        Gives the structure, the start values and the bounds.
+    data : problem
+    free : sequence of str
+        Dotted parameter names.
+    bounds : mapping, optional
+        Bounds that replace those of the model, by parameter.
+    """
+    columns = [model.index(name) for name in free]
+    low, high = _bounds(model, free, bounds or {})
+    counter = _Counter(model, data, columns, progress)
+    start = np.clip(model.theta[columns], low, high)
+    if columns:
+        start = _linear_step(counter, start, low, high)
+        start = _refine(counter, start, low, high, max_evaluations)
+    residual, jacobian = counter(start)
+    unseen = unseen_combinations(jacobian, free)
+    covariance = _covariance(data, residual, jacobian, unseen, free)
+    touching = tuple(
+        name
+        for name, x, lo, hi in zip(free, start, low, high, strict=True)
+        if np.isclose(x, lo, rtol=1e-6, atol=1e-12) or np.isclose(x, hi, rtol=1e-6, atol=1e-12)
+    )
+    return Estimate(tuple(free), start, residual, jacobian, covariance, unseen, touching, counter.count)
+
+
+class _Counter:
+    """Evaluates the problem at given values of the free parameters; remembers the last point."""
+
+    def __init__(self, model: Model, data: AnyProblem, columns: list[int], progress: Progress | None) -> None:
+        self.model, self.data, self.columns, self.progress = model, data, columns, progress
+        self.theta = model.theta.copy()
+        self.count = 0
+        self._at: Array | None = None
+        self._value: tuple[Array, Array] | None = None
+
+    def __call__(self, x: Array) -> tuple[Array, Array]:
+        if self._value is None or self._at is None or not np.array_equal(x, self._at):
+            theta = self.theta.copy()
+            theta[self.columns] = x
+            self._value = self.data.evaluate(self.model, theta, self.columns)
+            self._at = x.copy()
+            self.count += 1
+            if self.progress is not None:
+                self.progress(self.count, float(np.sqrt(np.mean(self._value[0] ** 2))))
+        return self._value
+
+
+def _linear_step(counter: _Counter, start: Array, low: Array, high: Array) -> Array:
+    """The bounded minimiser of the linearised problem, if it is indeed better than the start."""
+    residual, jacobian = counter(start)
+    lengths = column_lengths(jacobian)
+    factor, scaled = np.linalg.qr(np.column_stack([jacobian / lengths, residual]), mode="r"), lengths
+    square, target = factor[:, :-1], factor[:, -1]
+    step = lsq_linear(square, -target, ((low - start) * scaled, (high - start) * scaled), tol=1e-14)
+    candidate = np.clip(start + step.x / scaled, low, high)
+    better = np.sum(counter(candidate)[0] ** 2) <= np.sum(residual**2)
+    return candidate if better else start
+
+
+def _refine(counter: _Counter, start: Array, low: Array, high: Array, max_evaluations: int) -> Array:
+    residual, jacobian = counter(start)
+    lengths = column_lengths(jacobian)
+    gradient = (jacobian / lengths).T @ residual
+    interior = (start > low) & (start < high)
+    # Nothing left to gain along any free direction: the problem was linear and the first step ended it.
+    if np.all(np.abs(gradient[interior]) <= 1e-9 * max(np.linalg.norm(residual), 1e-300)):
+        return start
+    inside = _strictly_inside(start, low, high)
+    result = least_squares(
+        lambda x: counter(x)[0],
+        inside,
+        jac=lambda x: counter(x)[1],
+        bounds=(low, high),
+        method="trf",
+        x_scale=1.0 / lengths,
+        max_nfev=max_evaluations,
+        xtol=1e-10,
+        ftol=1e-12,
+        gtol=1e-12,
+    )
+    solution: Array = result.x
+    return solution if np.sum(counter(solution)[0] ** 2) <= np.sum(residual**2) else start
+
+
+def _strictly_inside(x: Array, low: Array, high: Array) -> Array:
+    """SciPy asks for a start that does not touch the bounds."""
+    width = np.where(np.isfinite(high - low), high - low, np.maximum(1.0, np.abs(x)))
+    return np.clip(x, np.where(np.isfinite(low), low + 1e-9 * width, low), high - 1e-9 * np.minimum(width, 1e300))
+
+
+def _bounds(model: Model, free: Sequence[str], replaced: Mapping[str, tuple[float, float]]) -> tuple[Array, Array]:
+    pairs = [replaced.get(n, (model.parameters[n].minimum, model.parameters[n].maximum)) for n in free]
+    return np.array([p[0] for p in pairs], dtype=float), np.array([p[1] for p in pairs], dtype=float)
+
+
+def _covariance(
+    data: AnyProblem, residual: Array, jacobian: Array, unseen: tuple[Combination, ...], free: Sequence[str]
+) -> Array:
+    """Robust covariance; infinite variance for every parameter that takes part in an unseen combination."""
+    lengths = column_lengths(jacobian)
+    covariance = robust_covariance(jacobian / lengths, residual, segments(data)) / np.outer(lengths, lengths)
+    blind = [i for i, name in enumerate(free) if any(name in combination.names for combination in unseen)]
+    covariance[blind, :] = 0.0
+    covariance[:, blind] = 0.0
+    covariance[blind, blind] = np.inf
+    return covariance
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class Fit(Result):
+    """Identified parameters.
+
+    Attributes
+    ----------
+    mode : str
+        Mode of comparison the residual came from.
+    names, units : tuple of str
+    start, values, std : ndarray, shape (p,)
+        Before, after, and one standard deviation (robust against autocorrelated residuals).
+    correlation : ndarray, shape (p, p)
+    before, after : dict
+        ``{channel: (root mean square, share of the measured signal, unit)}`` on the fitted data.
+    unidentifiable : tuple of Combination
+        Combinations of parameters that the data cannot see; they stayed where they were.
+    at_bounds : tuple of str
+        Estimates that rest on a bound: widen it or question the model.
+    model : Model
+        The model with the identified values.
+    """
+
+    mode: str
+    experiments: tuple[str, ...]
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    start: Array
+    values: Array
+    std: Array
+    correlation: Array
+    before: dict[str, tuple[float, float, str]]
+    after: dict[str, tuple[float, float, str]]
+    unidentifiable: tuple[Combination, ...]
+    at_bounds: tuple[str, ...]
+    model: Model
+
+    @property
+    def intervals(self) -> Array:
+        """95 % intervals, shape (p, 2)."""
+        return self.values[:, None] + NORMAL_95 * self.std[:, None] * np.array([-1.0, 1.0])
+
+    def __getitem__(self, name: str) -> float:
+        """Identified value of one parameter, SI."""
+        if name not in self.names:
+            raise IdentificationError(f"'{name}' was not free in this fit; free were {', '.join(self.names)}")
+        return float(self.values[self.names.index(name)])
+
+    def _headline(self) -> Mapping[str, object]:
+        worst = max((share for _, share, _ in self.after.values()), default=0.0)
+        values = dict(zip(self.names, map(float, self.values), strict=True))
+        return {"mode": self.mode, **values, "relative_error": worst}
+
+    def _html_rows(self) -> Mapping[str, object]:
+        rows = zip(self.names, self.values, self.std, self.units, strict=True)
+        return {name: f"{value:.6g} ± {std:.2g} {unit}" for name, value, std, unit in rows}
+
+    def _frame_columns(self) -> Mapping[str, object]:
+        return {
+            "name": list(self.names),
+            "start": self.start,
+            "value": self.values,
+            "std": self.std,
+            "unit": list(self.units),
+        }
+
+    def plot(self) -> Figure:
+        """Values with their intervals, relative to the start. Needs the extra ``plot``."""
+        from vpm.plot import plot_parameters
+
+        return plot_parameters(self.names, self.values, self.std, self.start, self.units)
+
+
+def identify(
+    model: Model,
+    experiments: Experiment | Sequence[Experiment],
+    free: Sequence[str] | None = None,
+    *,
+    mode: str = "inverse_dynamics",
+    cutoff: float | None = None,
+    setup: Setup | None = None,
+    progress: Progress | None = None,
+) -> Fit:
+    """Fit parameters of ``model`` to one or several experiments at once.
+
+    Parameters
+    ----------
+    model : Model
+    experiments : Experiment or sequence of Experiment
+    free : sequence of str, optional
+        Dotted names; by default every parameter that the model file gives an uncertainty.
+    mode : {"inverse_dynamics", "free_run", "restarts", "closed_loop"}
+        Inverse dynamics is the linear regression of effort on motion; the others are output-error fits through the
+        simulation, with sensitivities exact to rounding.
+    cutoff : float, optional
+        Cut-off frequency of the motion filter, Hz.
+    setup : Setup, optional
+        Integrator, substeps and horizon of the simulated modes.
+    progress : callable, optional
+        Called with the number of evaluations and the weighted residual.
+
+    Returns
+    -------
+    Fit
+
+    Raises
+    ------
+    IdentificationError
+        Nothing is free, a name is unknown, or a channel that the mode needs is missing.
+    """
+    records = [experiments] if isinstance(experiments, Experiment) else list(experiments)
+    names = tuple(free) if free is not None else tuple(p.name for p in model.parameters.values() if p.adjustable)
+    if not names:
+        raise IdentificationError(
+            f"{model.name}: no parameter is free; give parameters an uncertainty in the model file or name them in free="
+        )
+    data = problem(model, records, mode, cutoff=cutoff, setup=setup)
+    before, _ = data.evaluate(model, model.theta)
+    result = estimate(model, data, names, progress=progress)
+    return fit_of(model, data, result, before, [e.name for e in records])
+
+
+def fit_of(model: Model, data: AnyProblem, result: Estimate, before: Array, experiments: Sequence[str]) -> Fit:
+    """Dress an estimate as a result.
+
+    Parameters
+    ----------
+    model : Model
+        The model at the start values.
+    data : problem
+        What was fitted.
+    result : Estimate
+    before : ndarray
+        Residual of the model that the fit is to be compared with.
+    experiments : sequence of str
+        Names of the records.
+    """
+    fitted = model.with_parameters(dict(zip(result.names, map(float, result.values), strict=True)))
+    seen = np.isfinite(result.std)
+    std = np.where(seen & (result.std > 0.0), result.std, 1.0)
+    correlation = np.where(np.outer(seen, seen), result.covariance / np.outer(std, std), 0.0)
+    np.fill_diagonal(correlation, 1.0)
+    return Fit(
+        data.mode,
+        tuple(experiments),
+        result.names,
+        tuple(model.parameters[name].unit for name in result.names),
+        model.theta[[model.index(name) for name in result.names]],
+        result.values,
+        result.std,
+        correlation,
+        gaps(data, before),
+        gaps(data, result.residual),
+        result.unseen,
+        result.at_bounds,
+        fitted,
+    )

@@ -1,0 +1,266 @@
+"""The residual of a model against data, in any of the four modes, with its exact derivative.
+
+A problem fixes the data and how they are compared; the model may change under it. That is what lets one problem judge
+the nominal model, the recalibrated one and every candidate effect on the same samples.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vpm.errors import IdentificationError
+from vpm.experiment import Experiment, Motion, motion, parallel_filter
+from vpm.model import Model
+from vpm.simulate import MODES, Setup, simulate_arrays
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Block:
+    """One channel of one record inside the residual vector.
+
+    Attributes
+    ----------
+    experiment, channel, unit : str
+        Where the samples come from and their unit.
+    samples : slice
+        Their place in the residual vector.
+    time : ndarray
+        Time of each sample, s.
+    scale : float
+        Size of the measured signal (root mean square), in ``unit``; relative errors refer to it.
+    weight : float
+        What the residual was multiplied by, 1/``unit``, so that channels of different units can be added.
+    """
+
+    experiment: str
+    channel: str
+    unit: str
+    samples: slice
+    time: Array
+    scale: float
+    weight: float
+
+
+class Problem(Protocol):
+    """Residual ``(measured - predicted) * weight`` of a model on fixed data."""
+
+    mode: str
+    blocks: tuple[Block, ...]
+
+    def evaluate(self, model: Model, theta: Array, columns: Sequence[int] = ()) -> tuple[Array, Array]:
+        """Residual, shape (n,), and its derivative by the named parameters, shape (n, len(columns))."""
+
+
+def segments(problem: Problem) -> list[slice]:
+    """The contiguous pieces of the residual vector."""
+    return [block.samples for block in problem.blocks]
+
+
+def gaps(problem: Problem, residual: Array) -> dict[str, tuple[float, float, str]]:
+    """Root mean square, its share of the measured signal, and the unit, for each channel over all records."""
+    result = {}
+    for channel in dict.fromkeys(block.channel for block in problem.blocks):
+        mine = [block for block in problem.blocks if block.channel == channel]
+        count = sum(block.time.size for block in mine)
+        power = sum(float(np.sum(residual[b.samples] ** 2)) / b.weight**2 for b in mine)
+        signal = sum(b.scale**2 * b.time.size for b in mine)
+        rms = float(np.sqrt(power / count))
+        result[channel] = (rms, float(np.sqrt(power / signal)) if signal > 0.0 else np.inf, mine[0].unit)
+    return result
+
+
+class InverseDynamicsProblem:
+    """Balance of effort at each joint: what the actuators deliver minus what the measured motion needs.
+
+    Both sides, and so the regressor's columns, pass the same zero-phase low-pass and decimation: the parallel
+    filtering of the inverse dynamic identification model (M. Gautier, *Annual Reviews in Control*, 1997; A. Janot et
+    al., *IEEE Trans. Control Systems Technology* 22, 2014).
+
+    Parameters
+    ----------
+    model : Model
+        Names the joints and actuators; its parameters do not enter.
+    experiments : sequence of Experiment
+        Each with the position of every joint and the command of every actuator.
+    cutoff : float, optional
+        Cut-off frequency of the motion filter, Hz; chosen from each record if not given.
+    """
+
+    mode = "inverse_dynamics"
+
+    def __init__(self, model: Model, experiments: Sequence[Experiment], *, cutoff: float | None = None) -> None:
+        self.experiments = tuple(experiments)
+        self.motions: tuple[Motion, ...] = tuple(motion(e, model, cutoff=cutoff) for e in experiments)
+        driven = sorted({model.joints.index(model.joint_of_actuator(name)) for name in model.actuators})
+        self._joints = driven or list(range(len(model.joints)))
+        self.blocks = self._lay_out(model)
+
+    def evaluate(self, model: Model, theta: Array, columns: Sequence[int] = ()) -> tuple[Array, Array]:
+        """Residual of the balance and its derivative; see :class:`Problem`."""
+        residuals, jacobians = [], []
+        for m in self.motions:
+            required, applied, jacobian = model.core.inverse_dynamics(
+                theta, m.position, m.velocity, m.acceleration, m.inputs, m.dt, list(columns)
+            )
+            residuals.append(self._retained(m, (applied - required)[:, self._joints]))
+            flat = -jacobian[:, self._joints, :].reshape(len(required), -1)
+            kept = self._retained(m, flat) if columns else np.zeros((len(residuals[-1]), 0))
+            jacobians.append(kept.reshape(len(residuals[-1]), len(self._joints), len(columns)))
+        return self._stack(residuals), self._stack(jacobians)
+
+    def effort(self, model: Model, theta: Array, record: int) -> tuple[Array, Array, Array]:
+        """Time, applied and required effort (n, joints) of one record, filtered as in the residual."""
+        m = self.motions[record]
+        required, applied, _ = model.core.inverse_dynamics(
+            theta, m.position, m.velocity, m.acceleration, m.inputs, m.dt, []
+        )
+        pair = [self._retained(m, side[:, self._joints]) for side in (applied, required)]
+        return self._retained_time(m), pair[0], pair[1]
+
+    def state(self, record: int) -> tuple[Array, Array, Array]:
+        """Position, velocity and acceleration (n, joints) of one record at the retained samples."""
+        m = self.motions[record]
+        keep = slice(m.edge, len(m.time) - m.edge)
+        position, velocity, acceleration = (
+            x[keep][:: m.decimation][:, self._joints] for x in (m.position, m.velocity, m.acceleration)
+        )
+        return position, velocity, acceleration
+
+    def _retained(self, m: Motion, values: Array) -> Array:
+        return parallel_filter(values[m.edge : len(values) - m.edge], m.decimation)
+
+    def _retained_time(self, m: Motion) -> Array:
+        return m.time[m.edge : len(m.time) - m.edge][:: m.decimation]
+
+    def _lay_out(self, model: Model) -> tuple[Block, ...]:
+        blocks, start = [], 0
+        powers = []
+        for record, m in enumerate(self.motions):
+            _, applied, _ = self.effort(model, model.theta, record)
+            powers.append(np.sqrt(np.mean(applied**2, axis=0)))
+            if len(applied) < 2 * len(model.parameters):
+                raise IdentificationError(
+                    f"{self.experiments[record].name}: only {len(applied)} samples are left after filtering at "
+                    f"{m.cutoff:.3g} Hz; record longer or pass a higher cutoff"
+                )
+        typical = np.sqrt(np.mean(np.square(powers), axis=0))
+        for record, m in enumerate(self.motions):
+            time = self._retained_time(m)
+            for column, joint in enumerate(self._joints):
+                channel = f"{model.joints[joint]}.effort"
+                weight = 1.0 if len(self._joints) == 1 or typical[column] == 0.0 else 1.0 / float(typical[column])
+                blocks.append(
+                    Block(
+                        self.experiments[record].name,
+                        channel,
+                        model.channel_unit(channel),
+                        slice(start, start + time.size),
+                        time,
+                        float(powers[record][column]),
+                        weight,
+                    )
+                )
+                start += time.size
+        return tuple(blocks)
+
+    def _stack(self, records: list[Array]) -> Array:
+        """Concatenate (n, joints, ...) arrays block by block and apply the weights."""
+        columns = [record[:, c] for record in records for c in range(len(self._joints))]
+        return np.concatenate([x * block.weight for x, block in zip(columns, self.blocks, strict=True)])
+
+
+class OutputErrorProblem:
+    """Measured minus simulated outputs in free run, restarts or closed loop.
+
+    Parameters
+    ----------
+    model : Model
+    experiments : sequence of Experiment
+    mode : {"free_run", "restarts", "closed_loop"}
+    channels : sequence of str, optional
+        Compared outputs; by default all measured ones that the simulation does not prescribe.
+    setup : Setup, optional
+        Integrator, substeps and horizon.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        experiments: Sequence[Experiment],
+        mode: str,
+        *,
+        channels: Sequence[str] | None = None,
+        setup: Setup | None = None,
+    ) -> None:
+        self.mode = mode
+        self.experiments = tuple(experiments)
+        self._setup = setup or Setup()
+        self._channels = tuple(channels) if channels is not None else _compared(model, experiments, mode)
+        if not self._channels:
+            raise IdentificationError(
+                f"no measured channel to compare in mode '{mode}': the logs hold {', '.join(experiments[0].channels)}; "
+                "log a position or velocity, or choose another mode"
+            )
+        self.blocks = self._lay_out(model)
+
+    def evaluate(self, model: Model, theta: Array, columns: Sequence[int] = ()) -> tuple[Array, Array]:
+        """Residual of the outputs and its derivative; see :class:`Problem`."""
+        residuals, jacobians = [], []
+        index = [model.output_channels.index(channel) for channel in self._channels]
+        blocks = iter(self.blocks)
+        for experiment in self.experiments:
+            result = simulate_arrays(model, experiment, self.mode, theta=theta, columns=columns, setup=self._setup)
+            for column, channel in zip(index, self._channels, strict=True):
+                weight = next(blocks).weight
+                residuals.append((experiment[channel][result.rows] - result.outputs[:, column]) * weight)
+                jacobians.append(-result.jacobian[:, column, :] * weight)
+        return np.concatenate(residuals), np.concatenate(jacobians)
+
+    def _lay_out(self, model: Model) -> tuple[Block, ...]:
+        blocks, start = [], 0
+        spread = {c: float(np.sqrt(np.mean([np.var(e[c]) for e in self.experiments]))) for c in self._channels}
+        for experiment in self.experiments:
+            rows = simulate_arrays(model, experiment, self.mode, setup=self._setup).rows
+            for channel in self._channels:
+                weight = 1.0 / spread[channel] if spread[channel] > 0.0 else 1.0
+                scale = float(np.sqrt(np.mean(experiment[channel] ** 2)))
+                samples = slice(start, start + rows.size)
+                unit = model.channel_unit(channel)
+                blocks.append(Block(experiment.name, channel, unit, samples, experiment.time[rows], scale, weight))
+                start += rows.size
+        return tuple(blocks)
+
+
+def problem(
+    model: Model,
+    experiments: Sequence[Experiment],
+    mode: str = "inverse_dynamics",
+    *,
+    cutoff: float | None = None,
+    setup: Setup | None = None,
+) -> InverseDynamicsProblem | OutputErrorProblem:
+    """Set up the residual of ``model`` against ``experiments`` in one of the four modes."""
+    if not experiments:
+        raise IdentificationError("no experiment was given; pass at least one")
+    if mode not in MODES:
+        raise IdentificationError(f"unknown mode '{mode}'; choose one of {', '.join(MODES)}")
+    if mode == "inverse_dynamics":
+        return InverseDynamicsProblem(model, experiments, cutoff=cutoff)
+    return OutputErrorProblem(model, experiments, mode, setup=setup)
+
+
+def _compared(model: Model, experiments: Sequence[Experiment], mode: str) -> tuple[str, ...]:
+    """Outputs that every log holds and that the mode does not simply copy from the log."""
+    prescribed = set() if mode == "closed_loop" else {f"{name}.command" for name in model.actuators}
+    return tuple(
+        channel
+        for channel in model.output_channels
+        if channel not in prescribed and all(channel in experiment for experiment in experiments)
+    )

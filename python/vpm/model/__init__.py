@@ -1,0 +1,10 @@
+"""Models: what a machine is made of, read from a TOML file and checked before anything moves."""
+
+from __future__ import annotations
+
+from vpm.model.channels import ChannelEntry, load_channel_table, parse_channel_table
+from vpm.model.effects import Effect
+from vpm.model.model import Model
+from vpm.model.parameters import Parameter
+
+__all__ = ["ChannelEntry", "Effect", "Model", "Parameter", "load_channel_table", "parse_channel_table"]

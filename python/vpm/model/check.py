@@ -1,0 +1,134 @@
+"""From parsed TOML to a checked document: every way in goes through `check_document`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from pydantic import ValidationError
+
+from vpm.errors import UnitError, near_match
+from vpm.model.effects import complete_effects, effect_problems
+from vpm.model.messages import Problem, place, raise_first, schema_problems
+from vpm.model.parameters import Parameter, Slot, slots, table
+from vpm.model.schema import Document
+from vpm.model.structure import (
+    Structure,
+    build_structure,
+    name_problems,
+    reference_problems,
+    tree_problems,
+)
+from vpm.units import parse_unit, require_dimension
+
+#: A joint axis may be this far from unit length; it is then normalised.
+AXIS_TOLERANCE = 1e-3
+#: An inertia may break its conditions by this share of its size: numbers in files are rounded.
+INERTIA_TOLERANCE = 1e-6
+
+
+@dataclass(frozen=True)
+class Checked:
+    """A document without problems, and what was found out on the way."""
+
+    document: Document
+    structure: Structure
+    slots: tuple[Slot, ...]
+    parameters: Mapping[str, Parameter]
+
+
+def check_document(content: Mapping[str, object], path: str | None = None) -> Checked:
+    """Check the content of a model file.
+
+    The checks come in stages, each of which relies on the ones before: form, tree, references, values.
+
+    Parameters
+    ----------
+    content : mapping
+        As `tomllib` gives it.
+    path : str, optional
+        File that it comes from, for messages.
+
+    Raises
+    ------
+    ModelError
+        One sentence about the first problem, and how many more the stage found.
+    """
+    try:
+        document = Document.model_validate(content)
+    except ValidationError as error:
+        raise_first(schema_problems(error), path)
+    _stop_at([*name_problems(document), *tree_problems(document), *_axis_problems(document)], path)
+    structure = build_structure(document)
+    _stop_at([*reference_problems(document, structure), *_command_problems(document)], path)
+    _stop_at([*effect_problems(document, structure), *_channel_problems(document, structure)], path)
+    document = complete_effects(document, structure)
+    structure = build_structure(document)
+    found = tuple(slots(document, structure))
+    _stop_at([problem for slot in found for problem in slot.problems()], path)
+    parameters = table(list(found))
+    _stop_at([problem for body in structure.bodies for problem in _inertia_problems(body, parameters)], path)
+    return Checked(document, structure, found, parameters)
+
+
+def _stop_at(problems: list[Problem], path: str | None) -> None:
+    if problems:
+        raise_first(problems, path)
+
+
+def _axis_problems(document: Document) -> Iterator[Problem]:
+    for name, joint in document.joints.items():
+        length = math.hypot(*joint.axis)
+        if abs(length - 1.0) > AXIS_TOLERANCE:
+            shown = ", ".join(f"{component:g}" for component in joint.axis)
+            repair = "divide it by its length" if length > 0.0 else "give it a direction"
+            rest = f"is [{shown}] with length {length:.6g}, but has to have length 1; {repair}"
+            yield Problem(place("joints", name, "axis"), rest)
+
+
+def _command_problems(document: Document) -> Iterator[Problem]:
+    for name, actuator in document.actuators.items():
+        try:
+            parse_unit(actuator.command_unit)
+        except UnitError as error:
+            yield Problem(place("actuators", name, "command_unit"), f"is wrong: {error}")
+
+
+def _channel_problems(document: Document, structure: Structure) -> Iterator[Problem]:
+    known = ("time", *structure.channels)
+    for name, entry in (document.channels or {}).items():
+        if name not in known:
+            repair = near_match(name, known, what="its channels are")
+            yield Problem(place("channels", name), f"is no channel of the model; {repair}")
+            continue
+        try:
+            require_dimension(entry.unit, "s" if name == "time" else structure.unit(name))
+        except UnitError as error:
+            yield Problem(place("channels", name, "unit"), f"is wrong: {error}")
+
+
+def _inertia_problems(body: str, parameters: Mapping[str, Parameter]) -> Iterator[Problem]:
+    """Conditions on the inertia about the centre of mass: no negative principal moment, and the triangle inequality.
+
+    Principal moments are integrals of squared distances, for example of y^2 + z^2, so none exceeds the sum of the other
+    two. (J. Wittenburg, "Dynamics of Multibody Systems", 2008, section 3.1.)
+    """
+    xx, yy, zz, xy, xz, yz = (
+        parameters[f"{body}.inertia.{axes}"].value for axes in ("xx", "yy", "zz", "xy", "xz", "yz")
+    )
+    moments = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    slack = INERTIA_TOLERANCE * float(np.abs(moments).max())
+    shown = ", ".join(f"{moment:.4g}" for moment in moments)
+    where = place("bodies", body, "inertia")
+    if moments[0] < -slack:
+        yield Problem(
+            where, f"has the principal moments {shown} kg m^2, but none can be negative; correct the products"
+        )
+    elif moments[0] + moments[1] < moments[2] - slack:
+        rest = (
+            f"has the principal moments {shown} kg m^2, but the largest cannot exceed the sum of the others"
+            f" ({moments[0] + moments[1]:.4g}); correct it"
+        )
+        yield Problem(where, rest)

@@ -1,0 +1,123 @@
+"""Effects of a model: checks against the catalogue, and the values that a file need not give."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+from vpm.catalogue import EFFECTS, EffectType
+from vpm.errors import near_match
+from vpm.model.messages import Problem, place
+from vpm.model.schema import Document, EffectEntry, Quantity
+from vpm.model.structure import COORDINATE_UNIT, EFFORT_UNIT, Structure
+from vpm.units import si_unit
+
+
+@dataclass(frozen=True)
+class Effect:
+    """An effect of a model.
+
+    Attributes
+    ----------
+    name : str
+        Type in the catalogue.
+    at : str
+        Component that it sits at.
+    parameter_names : mapping of str to str
+        Short name to dotted name of each parameter.
+    """
+
+    name: str
+    at: str
+    parameter_names: Mapping[str, str]
+
+    @property
+    def type(self) -> EffectType:
+        """Entry of the catalogue."""
+        return EFFECTS[self.name]
+
+
+def effect_problems(document: Document, structure: Structure) -> Iterator[Problem]:
+    """Types, sites and keys that are not there, the same effect twice at a site, and values that have to be given."""
+    seen: dict[tuple[str, str], int] = {}
+    for position, entry in enumerate(document.effects):
+        keys = ("effects", position)
+        if entry.type not in EFFECTS:
+            repair = near_match(entry.type, EFFECTS, what="the catalogue has")
+            yield Problem(place(*keys, "type"), f'is "{entry.type}", which is no effect; {repair}')
+            continue
+        effect = EFFECTS[entry.type]
+        sites = structure.sites(effect.site)
+        if entry.at not in sites:
+            repair = near_match(entry.at, sites, what="it has")
+            rest = f'is "{entry.at}", which is no {effect.site} of the model; {effect.name} sits at one, {repair}'
+            yield Problem(place(*keys, "at"), rest)
+        earlier = seen.setdefault((entry.type, entry.at), position)
+        if earlier != position:
+            rest = f'is a second {entry.type} at "{entry.at}", after effects[{earlier}]; remove one'
+            yield Problem(place(*keys), rest)
+        yield from _value_problems(effect, entry, keys)
+
+
+def _value_problems(effect: EffectType, entry: EffectEntry, keys: tuple[str, int]) -> Iterator[Problem]:
+    names = [parameter.name for parameter in effect.parameters]
+    for key in entry.values:
+        if key not in names:
+            repair = near_match(key, ["type", "at", *names])
+            yield Problem(place(*keys, key), f"is not a known key of {effect.name}; {repair}")
+    for parameter in effect.parameters:
+        if parameter.start is None and parameter.name not in entry.values:
+            yield Problem(place(*keys, parameter.name), f"is missing; add it: {parameter.meaning}")
+    sizes = [parameter.name for parameter in effect.parameters if not parameter.shape]
+    if not any(name in entry.values for name in sizes):
+        yield Problem(place(*keys, sizes[0]), f"is missing; a {effect.title} needs {' or '.join(sizes)}")
+
+
+def complete_effects(document: Document, structure: Structure) -> Document:
+    """Give every parameter of every effect a value and a unit: start values stand in for what is not given.
+
+    Values that have to be given are there: `effect_problems` has seen to it.
+    """
+    entries = []
+    for entry in document.effects:
+        effect, given = EFFECTS[entry.type], entry.values
+        joint = structure.joint_at(effect.site, entry.at)
+        kind = None if joint is None else structure.joint_kind(joint)
+        values = {}
+        for parameter in effect.parameters:
+            start = parameter.default(kind)
+            quantity = given[parameter.name] if start is None else given.get(parameter.name, Quantity(value=start))
+            unit = quantity.unit or effect_unit(parameter.unit, entry, structure)
+            values[parameter.name] = quantity.model_copy(update={"unit": unit})
+        entries.append(EffectEntry.model_validate({"type": entry.type, "at": entry.at, **values}))
+    return document.model_copy(update={"effects": tuple(entries)})
+
+
+def effect_unit(template: str, entry: EffectEntry, structure: Structure) -> str:
+    """SI unit of a parameter of an effect at its site, from the template of the catalogue."""
+    site = EFFECTS[entry.type].site
+    units: dict[str, str] = {"U": "1", "S": "1", "E": "1", "C": "1"}
+    joint = structure.joint_at(site, entry.at)
+    if joint is not None:
+        kind = structure.joint_kind(joint)
+        units |= {"C": COORDINATE_UNIT[kind], "E": EFFORT_UNIT[kind]}
+    if site == "actuator":
+        units["U"] = structure.document.actuators[entry.at].command_unit
+    if site == "sensor":
+        units["S"] = structure.unit(structure.document.sensors[entry.at].measures)
+    return si_unit(template.format_map(_Parenthesised(units)))
+
+
+class _Parenthesised(dict[str, str]):
+    """Fill templates with units that stay one factor: ``{E}/{U}`` with ``m/s`` for U is ``(N)/(m/s)``."""
+
+    def __getitem__(self, key: str) -> str:
+        return f"({super().__getitem__(key)})"
+
+
+def effects_of(document: Document) -> tuple[Effect, ...]:
+    """The effects of a checked document, in the order of the file."""
+    return tuple(
+        Effect(entry.type, entry.at, {p.name: f"{entry.at}.{p.suffix}" for p in EFFECTS[entry.type].parameters})
+        for entry in document.effects
+    )

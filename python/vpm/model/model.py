@@ -1,0 +1,431 @@
+"""The model of a machine, immutable: every change gives a new one that was checked like a file."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from functools import cached_property
+from os import PathLike
+from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, NoReturn, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vpm.catalogue import SITE_KINDS, JointKind, effect_type
+from vpm.errors import ModelError, VpmError, near_match
+from vpm.model.channels import ChannelEntry
+from vpm.model.check import Checked, check_document
+from vpm.model.compile import description
+from vpm.model.effects import Effect, effects_of
+from vpm.model.messages import parse_toml, read_toml
+from vpm.model.parameters import Parameter
+from vpm.model.writer import content_of, plain, toml_of
+from vpm.results import Storable, html_table
+
+if TYPE_CHECKING:
+    from vpm._core import System
+
+
+class Model(Storable):
+    """A machine: bodies, joints, actuators, sensors, controllers and effects, with one flat table of parameters.
+
+    Build it with `load`, `from_toml` or `from_dict`. Numbers that go in and out are SI; the units of a file are
+    converted when it is read.
+
+    Examples
+    --------
+    >>> model = Model.load("examples/emps/model.toml")
+    >>> stiffer = model.with_parameters({"axis.friction.viscous": 250.0})
+    >>> rougher = model.with_effect("coulomb_friction", at="axis", coulomb=20.0)
+    """
+
+    _checked: Checked
+    _path: str | None
+
+    def __init__(self, content: Mapping[str, object], *, path: str | None = None) -> None:
+        self.__dict__["_checked"] = check_document(content, path)
+        self.__dict__["_path"] = path
+
+    def __setattr__(self, name: str, value: object) -> NoReturn:
+        raise AttributeError(f"a model does not change, so {name} cannot be set; use with_parameters or with_effect")
+
+    def __delattr__(self, name: str) -> NoReturn:
+        raise AttributeError(f"a model does not change, so {name} cannot be deleted")
+
+    # ---- ways in and out ---------------------------------------------------------------------------------------------
+
+    @classmethod
+    def load(cls, path: str | PathLike[str]) -> Self:
+        """Read a model file.
+
+        Parameters
+        ----------
+        path : path-like
+            TOML file.
+
+        Raises
+        ------
+        ModelError
+            The file cannot be read, or describes no machine; one sentence with the place, the numbers and the repair.
+        """
+        return cls(read_toml(path), path=str(path))
+
+    @classmethod
+    def from_toml(cls, text: str) -> Self:
+        """Read a model from the text of a model file.
+
+        Raises
+        ------
+        ModelError
+            As `load`.
+        """
+        return cls(parse_toml(text))
+
+    @classmethod
+    def from_dict(cls, content: Mapping[str, object]) -> Self:
+        """Build a model from content as a TOML parser gives it.
+
+        Raises
+        ------
+        ModelError
+            As `load`.
+        """
+        return cls(content)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Content that `from_dict` reads back; a copy."""
+        return content_of(self._checked.document)
+
+    def to_toml(self) -> str:
+        """Text of a model file that reads back as an equal model; comments of the original are not kept."""
+        return toml_of(self._checked.document)
+
+    def save(self, path: str | PathLike[str]) -> Path:
+        """Write a model file.
+
+        Returns
+        -------
+        pathlib.Path
+            Where it was written.
+        """
+        target = Path(path)
+        target.write_text(self.to_toml(), encoding="utf-8")
+        return target
+
+    @property
+    def name(self) -> str:
+        """Name of the machine."""
+        return self._checked.document.name
+
+    @property
+    def path(self) -> str | None:
+        """File that the model was read from; None if it came another way or was changed since."""
+        return self._path
+
+    @property
+    def gravity(self) -> tuple[float, float, float]:
+        """Gravity in the world frame (m/s^2)."""
+        x, y, z = self._checked.document.gravity
+        return (x, y, z)
+
+    # ---- parameters --------------------------------------------------------------------------------------------------
+
+    @cached_property
+    def parameters(self) -> Mapping[str, Parameter]:
+        """Parameters by dotted name, in index order."""
+        return MappingProxyType(dict(self._checked.parameters))
+
+    @cached_property
+    def parameter_names(self) -> tuple[str, ...]:
+        """Dotted names, in index order."""
+        return tuple(self.parameters)
+
+    @cached_property
+    def theta(self) -> NDArray[np.float64]:
+        """Values of all parameters (SI), shape (P,); read-only."""
+        values = np.array([parameter.value for parameter in self.parameters.values()], dtype=np.float64)
+        values.flags.writeable = False
+        return values
+
+    def index(self, name: str) -> int:
+        """Index of a parameter in `theta`.
+
+        Raises
+        ------
+        ModelError
+            There is no such parameter; the message names near ones.
+        """
+        try:
+            return self._index[name]
+        except KeyError:
+            repair = near_match(name, self._index, what="it has")
+            raise ModelError(f'{self.name} has no parameter "{name}"; {repair}', where=name) from None
+
+    def with_parameters(self, values: Mapping[str, float]) -> Self:
+        """Model with other parameter values.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            SI values by dotted name. A changed parameter stands in SI units in the new model's file.
+
+        Raises
+        ------
+        ModelError
+            A name is unknown, or a value is outside its bounds or physically impossible.
+        """
+        content = self.to_dict()
+        for name, value in values.items():
+            slot = self._checked.slots[self.index(name)]
+            changed = slot.si_quantity().model_copy(update={"value": float(value)})
+            *way, last = slot.keys
+            target: Any = content
+            for key in way:
+                target = target[key]
+            target[last] = plain(changed)
+        model = type(self)(content)
+        if "core" in self.__dict__:  # the core is given theta at every call: one serves all values
+            model.__dict__["core"] = self.core
+        return model
+
+    # ---- effects -----------------------------------------------------------------------------------------------------
+
+    @cached_property
+    def effects(self) -> tuple[Effect, ...]:
+        """Effects in the order of the file."""
+        return effects_of(self._checked.document)
+
+    def with_effect(self, name: str, at: str, **values: float) -> Self:
+        """Model with one effect more.
+
+        Parameters
+        ----------
+        name : str
+            Effect of the catalogue.
+        at : str
+            Component that it sits at.
+        **values : float
+            SI values by short name. Sizes that are not given start where the effect does nothing, shape parameters at
+            the start value of the catalogue. The sizes become adjustable, with nothing known about them beforehand.
+
+        Raises
+        ------
+        ModelError
+            Effect, site or parameter is unknown; the effect is already there; a value is physically impossible.
+        """
+        effect = effect_type(name)
+        entry: dict[str, Any] = {"type": name, "at": at}
+        for short in values:
+            effect.parameter(short)
+        for parameter in effect.parameters:
+            given = values.get(parameter.name, parameter.neutral)
+            if given is not None and parameter.shape:
+                entry[parameter.name] = float(given)
+            elif given is not None:
+                entry[parameter.name] = {"value": float(given), "uncertainty": math.inf}
+        content = self.to_dict()
+        content.setdefault("effects", []).append(entry)
+        return type(self)(content)
+
+    def without_effect(self, name: str, at: str) -> Self:
+        """Model with one effect less.
+
+        Raises
+        ------
+        ModelError
+            The model has no such effect at this site.
+        """
+        content = self.to_dict()
+        kept = [entry for entry in content.get("effects", []) if (entry["type"], entry["at"]) != (name, at)]
+        if len(kept) == len(self.effects):
+            present = ", ".join(f"{effect.name} at {effect.at}" for effect in self.effects) or "none"
+            raise ModelError(f'{self.name} has no effect {name} at "{at}"; its effects are: {present}', where=name)
+        content["effects"] = kept
+        return type(self)(content)
+
+    def sites(self, kind: str) -> tuple[str, ...]:
+        """Names of the components of a kind, in the order of the core.
+
+        Parameters
+        ----------
+        kind : {"joint", "body", "actuator", "sensor"}
+        """
+        for known in SITE_KINDS:
+            if kind == known:
+                return self._checked.structure.sites(known)
+        raise ModelError(f'effects do not sit at a "{kind}"; {near_match(kind, SITE_KINDS)}', where=kind)
+
+    # ---- components --------------------------------------------------------------------------------------------------
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Joints; joint k is coordinate k and moves body k."""
+        return self._checked.structure.joints
+
+    @property
+    def bodies(self) -> tuple[str, ...]:
+        """Bodies, parents before children."""
+        return self._checked.structure.bodies
+
+    @property
+    def actuators(self) -> tuple[str, ...]:
+        """Actuators; actuator k is input k."""
+        return tuple(self._checked.document.actuators)
+
+    @property
+    def sensors(self) -> tuple[str, ...]:
+        """Sensors."""
+        return tuple(self._checked.document.sensors)
+
+    @property
+    def controllers(self) -> tuple[str, ...]:
+        """Controllers."""
+        return tuple(self._checked.document.controllers)
+
+    def joint_kind(self, joint: str) -> JointKind:
+        """Kind of a joint, "prismatic" or "revolute"."""
+        return self._checked.structure.joint_kind(self._known(joint, self.joints, "joint"))
+
+    def joint_of_actuator(self, actuator: str) -> str:
+        """Joint that an actuator drives."""
+        return self._checked.document.actuators[self._known(actuator, self.actuators, "actuator")].joint
+
+    @cached_property
+    def controlled_actuators(self) -> tuple[str, ...]:
+        """Actuators that a controller commands, in the order of `actuators`."""
+        controlled = {controller.actuator for controller in self._checked.document.controllers.values()}
+        return tuple(name for name in self.actuators if name in controlled)
+
+    def has_lag(self, actuator: str) -> bool:
+        """Whether an actuator follows its command with a lag, which adds a state."""
+        self._known(actuator, self.actuators, "actuator")
+        return any(effect.name == "actuator_lag" and effect.at == actuator for effect in self.effects)
+
+    def _known(self, name: str, names: tuple[str, ...], what: str) -> str:
+        if name not in names:
+            raise ModelError(
+                f'{self.name} has no {what} "{name}"; {near_match(name, names, what="it has")}', where=name
+            )
+        return name
+
+    # ---- channels ----------------------------------------------------------------------------------------------------
+
+    @cached_property
+    def channel_table(self) -> Mapping[str, ChannelEntry]:
+        """How the columns of logs map on channels, and on ``"time"``; empty if the model does not say."""
+        return MappingProxyType(dict(self._checked.document.channels or {}))
+
+    @cached_property
+    def channels(self) -> tuple[str, ...]:
+        """Every channel that a log may hold."""
+        return self._checked.structure.channels
+
+    @cached_property
+    def input_channels(self) -> tuple[str, ...]:
+        """Commands, one per actuator."""
+        return tuple(f"{name}.command" for name in self.actuators)
+
+    @cached_property
+    def output_channels(self) -> tuple[str, ...]:
+        """What a simulation gives: per joint position, velocity, acceleration, effort; per actuator command, force."""
+        return self._checked.structure.outputs
+
+    def channel_unit(self, channel: str) -> str:
+        """SI unit of a channel.
+
+        Raises
+        ------
+        ModelError
+            There is no such channel; the message names near ones.
+        """
+        return self._checked.structure.unit(channel)
+
+    def sensor_of(self, channel: str) -> str | None:
+        """Sensor that reads a channel, if there is one."""
+        for name, sensor in self._checked.document.sensors.items():
+            if sensor.measures == channel:
+                return name
+        return None
+
+    # ---- core --------------------------------------------------------------------------------------------------------
+
+    def description(self) -> str:
+        """Description for the core, as JSON text."""
+        return description(self._checked)
+
+    @cached_property
+    def core(self) -> System:
+        """Compiled system; built once, and shared by models that differ in parameter values only.
+
+        Raises
+        ------
+        ModelError
+            The core refuses the description.
+        """
+        try:
+            from vpm._core import System
+        except ImportError as error:
+            raise VpmError(f"the compiled core of vpm cannot be imported ({error}); reinstall vpm-dynamics") from error
+        try:
+            return System(self.description())
+        except ValueError as error:
+            raise ModelError(f"{self.name}: {error}") from error
+
+    # ---- manners -----------------------------------------------------------------------------------------------------
+
+    def __repr__(self) -> str:
+        free = sum(parameter.adjustable for parameter in self.parameters.values())
+        counts = [
+            f"{len(items)} {what}{'' if len(items) == 1 else 's'}"
+            for what, items in (
+                ("joint", self.joints),
+                ("actuator", self.actuators),
+                ("sensor", self.sensors),
+                ("controller", self.controllers),
+                ("effect", self.effects),
+                ("parameter", self.parameters),
+            )
+        ]
+        return f"Model({self.name!r}: {', '.join(counts)}, {free} adjustable)"
+
+    def _repr_html_(self) -> str:
+        rows: list[tuple[object, ...]] = [
+            (p.name, p.value, p.unit, "known" if p.uncertainty is None else p.uncertainty, p.minimum, p.maximum)
+            for p in self.parameters.values()
+        ]
+        return html_table(self.name, ("parameter", "value", "unit", "uncertainty", "min", "max"), rows)
+
+    @cached_property
+    def _index(self) -> Mapping[str, int]:
+        return {name: i for i, name in enumerate(self.parameters)}
+
+    @cached_property
+    def _content(self) -> tuple[object, ...]:
+        """What makes two models equal: units and places of a file do not, what they say does."""
+        return (self.name, self.description(), tuple(self.parameters.values()), tuple(self.channel_table.items()))
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Model):
+            return NotImplemented
+        return self._content == other._content
+
+    def __hash__(self) -> int:
+        return hash(self._content[:3])
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return _rebuild, (type(self), self.to_dict(), self.path)
+
+    def to_stored(self) -> Mapping[str, object]:
+        """Content as text, for the files of results."""
+        return {"toml": self.to_toml()}
+
+    @classmethod
+    def from_stored(cls, content: Mapping[str, Any]) -> Self:
+        """Model from what `to_stored` gave."""
+        return cls.from_toml(str(content["toml"]))
+
+
+def _rebuild(cls: type[Model], content: dict[str, Any], path: str | None) -> Model:
+    return cls(content, path=path)

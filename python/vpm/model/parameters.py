@@ -1,0 +1,222 @@
+"""The parameters of a model: one flat, ordered table with SI values, read from the document and checked.
+
+Order: bodies (mass, centre of mass, inertia), actuators (gain), controllers, then effects as they stand in the file.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+from vpm.catalogue import EFFECTS, POSITIVE
+from vpm.errors import UnitError
+from vpm.model.effects import effect_unit
+from vpm.model.messages import Problem, place
+from vpm.model.schema import Cascade, Controller, Document, EffectEntry, Quantity
+from vpm.model.structure import EFFORT_UNIT, Structure
+from vpm.units import convert, require_dimension, si_unit
+
+ParameterKind = Literal["linear", "shape"]
+
+INERTIA_AXES = ("xx", "yy", "zz", "xy", "xz", "yz")
+
+_ANY = (-math.inf, math.inf)
+_ABOVE_ZERO = (POSITIVE, math.inf)
+_NOT_NEGATIVE = (0.0, math.inf)
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One parameter of a model.
+
+    Attributes
+    ----------
+    name : str
+        Dotted name, ``"axis.friction.viscous"``.
+    value : float
+        In `unit`.
+    unit : str
+        SI unit, ``"N s/m"``.
+    uncertainty : float or None
+        One standard deviation, in `unit`; infinite if nothing is known beforehand, None if the value is taken as known.
+    minimum, maximum : float
+        Bounds in `unit`: those of the file, inside what is physically possible.
+    kind : {"linear", "shape"}
+        Whether the effort that a motion needs is linear in the parameter.
+    """
+
+    name: str
+    value: float
+    unit: str
+    uncertainty: float | None
+    minimum: float
+    maximum: float
+    kind: ParameterKind
+
+    @property
+    def adjustable(self) -> bool:
+        """Whether a calibration may move the value."""
+        return self.uncertainty is not None
+
+
+@dataclass(frozen=True)
+class Slot:
+    """Place of a parameter in the document, and what may stand there.
+
+    Attributes
+    ----------
+    name : str
+        Dotted name of the parameter.
+    keys : tuple of str or int
+        Way to it in the document.
+    quantity : Quantity
+        What stands there.
+    unit : str
+        SI unit.
+    physical : (float, float)
+        Physically possible range (SI).
+    kind : {"linear", "shape"}
+    impossible : str
+        What a value outside the range would mean.
+    """
+
+    name: str
+    keys: tuple[str | int, ...]
+    quantity: Quantity
+    unit: str
+    physical: tuple[float, float]
+    kind: ParameterKind
+    impossible: str = ""
+
+    def problems(self) -> Iterator[Problem]:
+        """Wrong unit, bounds that leave no room, a value outside of them, an uncertainty that is none."""
+        quantity, where = self.quantity, place(*self.keys)
+        unit = quantity.unit or self.unit
+        try:
+            require_dimension(unit, self.unit)
+        except UnitError as error:
+            yield Problem(where, f"has a wrong unit: {error}")
+            return
+        spread, low, high = quantity.uncertainty, quantity.minimum, quantity.maximum
+        if spread is not None and not spread > 0.0:
+            rest = f"has the uncertainty {spread:g} {unit}, which has to be above 0; leave it out if the value is known"
+            yield Problem(where, rest)
+        if any(bound is not None and math.isnan(bound) for bound in (low, high)):
+            yield Problem(where, "has a bound that is not a number; correct min and max")
+            return
+        if low is not None and high is not None and low >= high:
+            yield Problem(where, f"has min {low:g} {unit} and max {high:g} {unit}, but min has to be below max")
+            return
+        yield from self._range_problems(where, unit)
+
+    def _range_problems(self, where: str, unit: str) -> Iterator[Problem]:
+        parameter = self.parameter()
+        possible = _range_text(*self.physical, self.unit)
+        shown = f"{self.quantity.value:g} {unit}"
+        if not self.physical[0] <= parameter.value <= self.physical[1]:
+            reason = f" ({self.impossible})" if self.impossible else ""
+            yield Problem(where, f"is {shown}, but only {possible} is physically possible{reason}; correct the value")
+        elif parameter.minimum >= parameter.maximum:
+            yield Problem(
+                where, f"has bounds that leave nothing of what is physically possible, {possible}; widen them"
+            )
+        elif not parameter.minimum <= parameter.value <= parameter.maximum:
+            low, high = (convert(bound, self.unit, unit) for bound in (parameter.minimum, parameter.maximum))
+            yield Problem(
+                where, f"is {shown}, outside its bounds {low:g} to {high:g} {unit}; correct the value or the bounds"
+            )
+
+    def parameter(self) -> Parameter:
+        """Table entry in SI; the unit has to be right."""
+        quantity = self.si_quantity()
+        low = -math.inf if quantity.minimum is None else quantity.minimum
+        high = math.inf if quantity.maximum is None else quantity.maximum
+        low, high = max(low, self.physical[0]), min(high, self.physical[1])
+        return Parameter(self.name, quantity.value, self.unit, quantity.uncertainty, low, high, self.kind)
+
+    def si_quantity(self) -> Quantity:
+        """What stands there, in the SI unit."""
+        given = self.quantity
+        if given.unit is None:
+            return given
+
+        def si(number: float | None) -> float | None:
+            return None if number is None else convert(number, given.unit or self.unit, self.unit)
+
+        return Quantity(
+            value=convert(given.value, given.unit, self.unit),
+            unit=self.unit,
+            uncertainty=si(given.uncertainty),
+            minimum=si(given.minimum),
+            maximum=si(given.maximum),
+        )
+
+
+def _range_text(low: float, high: float, unit: str) -> str:
+    """Physical range in words; the catalogue and this module know ranges with a lower end only."""
+    if low == POSITIVE:
+        return f"more than 0 {unit}"
+    return f"{low:g} {unit} or more" if math.isinf(high) else f"{low:g} to {high:g} {unit}"
+
+
+def slots(document: Document, structure: Structure) -> Iterator[Slot]:
+    """Every parameter of a document whose references are right and whose effects are complete, in index order."""
+    for name in structure.bodies:
+        yield from _body_slots(name, document)
+    for name, actuator in document.actuators.items():
+        kind = structure.joint_kind(actuator.joint)
+        unit = si_unit(f"{EFFORT_UNIT[kind]}/({actuator.command_unit})")
+        yield Slot(f"{name}.gain", ("actuators", name, "gain"), actuator.gain, unit, _ANY, "linear")
+    for name, controller in document.controllers.items():
+        yield from _controller_slots(name, controller, document, structure)
+    for position, entry in enumerate(document.effects):
+        yield from _effect_slots(position, entry, structure)
+
+
+def _body_slots(name: str, document: Document) -> Iterator[Slot]:
+    body, keys = document.bodies[name], ("bodies", name)
+    yield Slot(f"{name}.mass", (*keys, "mass"), body.mass, "kg", _ABOVE_ZERO, "linear")
+    for i, (axis, quantity) in enumerate(zip("xyz", body.center_of_mass, strict=True)):
+        yield Slot(f"{name}.center_of_mass.{axis}", (*keys, "center_of_mass", i), quantity, "m", _ANY, "shape")
+    for i, (axes, quantity) in enumerate(zip(INERTIA_AXES, body.inertia, strict=True)):
+        bounds = _NOT_NEGATIVE if i < 3 else _ANY
+        yield Slot(f"{name}.inertia.{axes}", (*keys, "inertia", i), quantity, "kg m^2", bounds, "linear")
+
+
+def _controller_slots(name: str, controller: Controller, document: Document, structure: Structure) -> Iterator[Slot]:
+    command = document.actuators[controller.actuator].command_unit
+    held = structure.unit(controller.measures)
+    if isinstance(controller, Cascade):
+        units = {"position_gain": "1/s", "velocity_gain": f"({command}) s/({held})"}
+    else:
+        units = {
+            "proportional": f"({command})/({held})",
+            "integral": f"({command})/({held} s)",
+            "derivative": f"({command}) s/({held})",
+        }
+    for key, unit in units.items():
+        yield Slot(f"{name}.{key}", ("controllers", name, key), getattr(controller, key), si_unit(unit), _ANY, "shape")
+    if controller.limit is not None:
+        keys = ("controllers", name, "limit")
+        yield Slot(f"{name}.limit", keys, controller.limit, si_unit(command), _ABOVE_ZERO, "shape")
+
+
+def _effect_slots(position: int, entry: EffectEntry, structure: Structure) -> Iterator[Slot]:
+    effect, given = EFFECTS[entry.type], entry.values
+    for parameter in effect.parameters:
+        yield Slot(
+            f"{entry.at}.{parameter.suffix}",
+            ("effects", position, parameter.name),
+            given[parameter.name],
+            effect_unit(parameter.unit, entry, structure),
+            parameter.physical,
+            "linear" if parameter.linear else "shape",
+            effect.impossible,
+        )
+
+
+def table(found: list[Slot]) -> Mapping[str, Parameter]:
+    """Parameters by name, in index order."""
+    return {slot.name: slot.parameter() for slot in found}

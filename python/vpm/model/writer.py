@@ -1,0 +1,83 @@
+"""From a checked document back to the content and the text of a model file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import tomli_w
+from pydantic import BaseModel
+
+from vpm.model.schema import Document, EffectEntry, Quantity
+
+
+def content_of(document: Document) -> dict[str, Any]:
+    """Plain content that reads back as the same document; what stands at its default is left out.
+
+    Parameters
+    ----------
+    document : Document
+    """
+    return _table(document)
+
+
+def plain(value: object) -> object:
+    """Value as a TOML parser would give it; a quantity that is nothing but a number is a number."""
+    match value:
+        case Quantity():
+            table = _table(value)
+            return table["value"] if len(table) == 1 else table
+        case BaseModel():
+            return _table(value)
+        case Mapping():
+            return {key: plain(item) for key, item in value.items()}
+        case tuple():
+            return [plain(item) for item in value]
+    return value
+
+
+def _table(entry: BaseModel) -> dict[str, Any]:
+    table: dict[str, Any] = {}
+    for name, field in type(entry).model_fields.items():
+        value = getattr(entry, name)
+        if field.is_required() or value != field.get_default(call_default_factory=True):
+            table[field.alias or name] = plain(value)
+    if isinstance(entry, EffectEntry):
+        table |= {name: plain(quantity) for name, quantity in entry.values.items()}
+    return table
+
+
+def toml_of(document: Document) -> str:
+    """Text of a model file: one table per component, one line per key, as a person would write it."""
+    return "\n".join(_lines(content_of(document))) + "\n"
+
+
+def _lines(content: Mapping[str, Any]) -> Iterator[str]:
+    sections = {key: value for key, value in content.items() if isinstance(value, dict) or key == "effects"}
+    yield from (_pair(key, value) for key, value in content.items() if key not in sections)
+    for section, components in sections.items():
+        if section == "channels":
+            yield from ("", "[channels]", *(_pair(name, table) for name, table in components.items()))
+        elif section == "effects":
+            for effect in components:
+                yield from ("", "[[effects]]", *(_pair(key, value) for key, value in effect.items()))
+        else:
+            for name, table in components.items():
+                yield from ("", f"[{section}.{_key(name)}]", *(_pair(key, value) for key, value in table.items()))
+
+
+def _pair(key: str, value: object) -> str:
+    return f"{_key(key)} = {_value(value)}"
+
+
+def _value(value: object) -> str:
+    """Value on one line; escapes of text and forms of numbers are left to the TOML library."""
+    if isinstance(value, Mapping):
+        return "{ " + ", ".join(_pair(key, item) for key, item in value.items()) + " }"
+    if isinstance(value, list):
+        return "[" + ", ".join(map(_value, value)) + "]"
+    return tomli_w.dumps({"v": value}).removeprefix("v = ").removesuffix("\n")
+
+
+def _key(key: str) -> str:
+    return tomli_w.dumps({key: 0}).removesuffix(" = 0\n")

@@ -1,0 +1,30 @@
+"""Pictures of results. Needs the extra ``plot``; each function returns a matplotlib figure and opens no window."""
+
+from vpm.plot.bars import plot_candidates, plot_gap, plot_ladder, plot_parameters, plot_step_cost
+from vpm.plot.signals import (
+    plot_channels,
+    plot_correlation,
+    plot_residual_against,
+    plot_residual_time,
+    plot_run,
+    plot_spectrum,
+)
+from vpm.plot.style import figure_to_svg
+from vpm.plot.summaries import plot_comparison, plot_pictures
+
+__all__ = [
+    "figure_to_svg",
+    "plot_candidates",
+    "plot_channels",
+    "plot_comparison",
+    "plot_correlation",
+    "plot_gap",
+    "plot_ladder",
+    "plot_parameters",
+    "plot_pictures",
+    "plot_residual_against",
+    "plot_residual_time",
+    "plot_run",
+    "plot_spectrum",
+    "plot_step_cost",
+]

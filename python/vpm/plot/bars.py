@@ -1,0 +1,234 @@
+"""Pictures of numbers: parameters, gaps, candidates, ladders and step times."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from vpm.plot.style import BLUE, GREEN, INK, LINE, ORANGE, SOFT, panels, styled
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+Array = NDArray[np.float64]
+
+#: Candidates that are drawn.
+MOST_CANDIDATES = 16
+
+
+class GapLike(Protocol):
+    """Gap of one channel at each stage."""
+
+    @property
+    def before(self) -> float:
+        """Of the nominal model."""
+
+    @property
+    def recalibrated(self) -> float:
+        """With fitted parameters."""
+
+    @property
+    def after(self) -> float:
+        """With the accepted effects."""
+
+    @property
+    def noise_floor(self) -> float:
+        """What noise alone leaves; may be NaN."""
+
+    @property
+    def signal(self) -> float:
+        """Root mean square of the measured signal."""
+
+
+class CandidateLike(Protocol):
+    """One candidate effect of a search."""
+
+    @property
+    def name(self) -> str:
+        """Effect."""
+
+    @property
+    def site(self) -> str:
+        """Where it would be."""
+
+    @property
+    def round(self) -> int:
+        """Round of the search."""
+
+    @property
+    def screened(self) -> float:
+        """Share of the training mean square that it would take."""
+
+    @property
+    def unseen(self) -> float:
+        """Share of the unseen mean square that it took; may be NaN."""
+
+    @property
+    def accepted(self) -> bool:
+        """Whether it was believed."""
+
+
+@styled
+def plot_parameters(
+    names: Sequence[str], values: ArrayLike, std: ArrayLike, start: ArrayLike, units: Sequence[str]
+) -> Figure:
+    """Draw parameters relative to where they started, with 95 % intervals and the numbers beside them.
+
+    Parameters
+    ----------
+    names, units : sequence of str
+    values, std, start : array-like, shape (p,)
+        SI. Where a start is zero, the axis shows the value over its own size.
+    """
+    value, sigma, begin = (np.asarray(each, dtype=np.float64) for each in (values, std, start))
+    scale = np.where(begin == 0.0, np.where(value == 0.0, 1.0, np.abs(value)), np.abs(begin))
+    figure, axes = panels(1, height=0.6 + 0.34 * len(names))
+    axis = axes[0][0]
+    rows = np.arange(len(names))
+    axis.plot(begin / scale, rows, "|", color=SOFT, markersize=13, markeredgewidth=2, label="start")
+    error = np.nan_to_num(1.96 * sigma / scale)
+    axis.errorbar(value / scale, rows, xerr=error, fmt="o", color=BLUE, capsize=3, markersize=5, label="fit, 95 %")
+    for row, (number, spread, unit) in enumerate(zip(value, sigma, units, strict=True)):
+        text = f"{number:.5g} ± {spread:.2g} {unit if unit != '1' else ''}"
+        axis.annotate(text, (1.01, row), xycoords=("axes fraction", "data"), va="center", fontsize=8.5, color=INK)
+    _name_rows(axis, names)
+    axis.set_xlabel("value / size of the start")
+    axis.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, borderaxespad=0.2)
+    return figure
+
+
+@styled
+def plot_gap(gaps: Mapping[str, GapLike]) -> Figure:
+    """Draw the gap of each channel at each stage as a share of the measured signal, with the noise floor.
+
+    Parameters
+    ----------
+    gaps : mapping of str to ChannelGap
+    """
+    figure, axes = panels(1, height=0.5 + 0.85 * max(1, len(gaps)))
+    axis = axes[0][0]
+    stages = (("before", SOFT), ("recalibrated", ORANGE), ("after", BLUE))
+    largest = 0.0
+    for row, gap in enumerate(gaps.values()):
+        signal = gap.signal if gap.signal > 0.0 else 1.0
+        for shift, (stage, color) in enumerate(stages):
+            share = 100.0 * float(getattr(gap, stage)) / signal
+            largest = max(largest, share)
+            place = row + 0.27 * (shift - 1)
+            axis.barh(place, share, height=0.24, color=color, label=stage if row == 0 else "")
+            axis.annotate(f"{share:.3g} %", (share, place), xytext=(4, 0), textcoords="offset points", va="center")
+        if np.isfinite(gap.noise_floor):
+            floor = 100.0 * gap.noise_floor / signal
+            axis.plot([floor, floor], [row - 0.42, row + 0.42], "--", color=INK, linewidth=1.1)
+            axis.plot([], [], "--", color=INK, linewidth=1.1, label="noise floor" if row == 0 else "")
+    axis.set_xlim(0.0, 1.13 * largest if largest > 0.0 else 1.0)
+    _name_rows(axis, list(gaps))
+    axis.set_xlabel("root mean square gap / measured signal [%]")
+    axis.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=4, borderaxespad=0.2)
+    return figure
+
+
+@styled
+def plot_candidates(candidates: Sequence[CandidateLike]) -> Figure:
+    """Draw what each candidate of the first round would explain, and what those that were refitted did explain.
+
+    Parameters
+    ----------
+    candidates : sequence of RankedCandidate
+        The best sixteen are drawn; an accepted one in whichever round it was.
+    """
+    first = min((c.round for c in candidates), default=1)
+    chosen = [c for c in candidates if c.round == first or c.accepted]
+    chosen.sort(key=lambda c: (not c.accepted, c.round if c.accepted else 0, -c.screened))
+    chosen = chosen[:MOST_CANDIDATES]
+    figure, axes = panels(1, height=0.5 + 0.36 * max(1, len(chosen)))
+    axis = axes[0][0]
+    for row, each in enumerate(chosen):
+        axis.barh(row + 0.17, 100.0 * each.screened, height=0.3, color=LINE)
+        axis.barh(row - 0.17, 100.0 * np.nan_to_num(each.unseen), height=0.3, color=GREEN if each.accepted else ORANGE)
+        if not np.isfinite(each.unseen):
+            axis.annotate(
+                "not refitted",
+                (0.0, row - 0.17),
+                xytext=(4, 0),
+                textcoords="offset points",
+                va="center",
+                fontsize=7.5,
+                color=SOFT,
+            )
+    for color, text in (
+        (LINE, "screened, training data"),
+        (GREEN, "accepted, unseen data"),
+        (ORANGE, "refused, unseen data"),
+    ):
+        axis.barh([], [], color=color, label=text)
+    axis.axvline(0.0, color=INK, linewidth=0.8)
+    _name_rows(axis, [f"{c.name.replace('_', ' ')} at {c.site}" for c in chosen])
+    axis.set_xlabel("share of the residual's mean square that goes [%]")
+    axis.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, borderaxespad=0.2)
+    return figure
+
+
+@styled
+def plot_ladder(seconds: Sequence[float], errors: Sequence[float], chosen: int) -> Figure:
+    """Draw error against step time of the rungs of a simplification, the chosen one marked.
+
+    Parameters
+    ----------
+    seconds : sequence of float
+        s per step.
+    errors : sequence of float
+        Shares of the signal.
+    chosen : int
+        Index of the rung to take.
+    """
+    figure, axes = panels(1, height=3.0)
+    axis = axes[0][0]
+    times, gaps = 1e6 * np.asarray(seconds), 100.0 * np.asarray(errors)
+    axis.plot(times, gaps, "o", color=SOFT, alpha=0.7, markersize=5, label="tried")
+    axis.plot(times[chosen], gaps[chosen], "D", color=BLUE, markersize=8, label="chosen")
+    axis.set_xlabel("time of one step [µs]")
+    axis.set_ylabel("error / measured signal [%]")
+    axis.set_ylim(bottom=0.0)
+    axis.legend(loc="upper right")
+    return figure
+
+
+@styled
+def plot_step_cost(quantiles: Mapping[str, float], period: float) -> Figure:
+    """Draw the quantiles of the step time against the period, on a logarithmic axis.
+
+    Parameters
+    ----------
+    quantiles : mapping of str to float
+        Name of the quantile to seconds.
+    period : float
+        s.
+    """
+    figure, axes = panels(1, height=0.5 + 0.4 * max(1, len(quantiles)))
+    axis = axes[0][0]
+    times = 1e6 * np.array(list(quantiles.values()))
+    late = times > 1e6 * period
+    low = 0.5 * min(float(times.min()), 1e6 * period)
+    for row, (time, is_late) in enumerate(zip(times, late, strict=True)):
+        axis.barh(row, time - low, left=low, height=0.55, color=ORANGE if is_late else BLUE)
+        text = f"{time:.3g} µs, {100e-6 * time / period:.2g} % of the period"
+        axis.annotate(text, (time, row), xytext=(5, 0), textcoords="offset points", va="center")
+    axis.axvline(1e6 * period, color=INK, linewidth=1.4, linestyle="--")
+    axis.annotate("period", (1e6 * period, 1.0), xycoords=("data", "axes fraction"), ha="center", va="bottom")
+    axis.set_xscale("log")
+    axis.set_xlim(low, 40.0 * max(1e6 * period, float(times.max())) if late.any() else 4.0 * 1e6 * period)
+    _name_rows(axis, list(quantiles))
+    axis.set_xlabel("time of one step [µs]")
+    return figure
+
+
+def _name_rows(axis: Axes, names: Sequence[str]) -> None:
+    axis.set_yticks(np.arange(len(names)), names)
+    axis.set_ylim(len(names) - 0.4, -0.6)
+    axis.grid(visible=False, axis="y")
+    axis.tick_params(axis="y", length=0, labelcolor=INK)

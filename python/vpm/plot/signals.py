@@ -1,0 +1,287 @@
+"""Pictures of signals: over time, over the state, over frequency, over lags."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import pairwise
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vpm.plot.style import BLUE, INK, ORANGE, SOFT, STAGES, label, panels, styled, thinned
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+Array = NDArray[np.float64]
+
+#: Bins of the running mean over a state.
+MEAN_BINS = 40
+
+#: Share of the samples that a bin needs before its mean is drawn.
+LEAST_IN_BIN = 0.0005
+
+
+class RunLike(Protocol):
+    """What `plot_run` draws."""
+
+    @property
+    def model_name(self) -> str:
+        """Name of the model."""
+
+    @property
+    def experiment_name(self) -> str:
+        """Name of the log."""
+
+    @property
+    def mode(self) -> str:
+        """Mode of the simulation."""
+
+    @property
+    def time(self) -> Array:
+        """Shape (N,), s."""
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Names of the C channels."""
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """Their units."""
+
+    @property
+    def values(self) -> Array:
+        """Shape (N, C)."""
+
+    @property
+    def measured(self) -> Array:
+        """Shape (N, C), NaN where not measured."""
+
+    @property
+    def starts(self) -> NDArray[np.int64]:
+        """Rows at which a piece begins."""
+
+
+@styled
+def plot_channels(
+    time: Array, data: Array, channels: Sequence[str], units: Sequence[str], *, title: str = ""
+) -> Figure:
+    """Draw each channel over time in a panel of its own.
+
+    Parameters
+    ----------
+    time : ndarray, shape (N,)
+        s.
+    data : ndarray, shape (N, C)
+    channels, units : sequence of str
+    title : str
+    """
+    figure, axes = panels(max(1, len(channels)), height=1.6, share_x=True)
+    for at, (channel, unit) in enumerate(zip(channels, units, strict=True)):
+        axis = axes[at][0]
+        axis.plot(*thinned(time, data[:, at]), color=BLUE)
+        axis.set_ylabel(label("", unit).strip())
+        axis.set_title(channel)
+    _finish_time(figure, axes[-1][0], title)
+    return figure
+
+
+@styled
+def plot_run(run: RunLike) -> Figure:
+    """Draw simulated over measured, a panel per channel that was measured (all channels if none was)."""
+    measured = [bool(np.isfinite(column).all()) for column in run.measured.T]
+    shown = [at for at in range(len(run.channels)) if measured[at]] or list(range(len(run.channels)))
+    figure, axes = panels(len(shown), height=1.9, share_x=True)
+    for row, at in enumerate(shown):
+        axis = axes[row][0]
+        real = run.measured[:, at] if measured[at] else None
+        draw_overlay(axis, run.time, real, run.values[:, at], [int(start) for start in run.starts])
+        axis.set_ylabel(label("", run.units[at]).strip())
+        axis.set_title(run.channels[at])
+    axes[0][0].legend(loc="upper right", ncols=2)
+    _finish_time(figure, axes[-1][0], f"{run.model_name} on {run.experiment_name}, {run.mode.replace('_', ' ')}")
+    return figure
+
+
+@styled
+def plot_residual_time(time: Array, stages: Mapping[str, Array], unit: str) -> Figure:
+    """Draw residuals over time, later stages on top.
+
+    Parameters
+    ----------
+    time : ndarray, shape (N,)
+        s.
+    stages : mapping of str to ndarray, shape (N,)
+        Name of the stage to its residual.
+    unit : str
+    """
+    figure, axes = panels(1, height=2.6)
+    draw_residual_time(axes[0][0], time, stages, unit)
+    return figure
+
+
+@styled
+def plot_residual_against(values: Array, stages: Mapping[str, Array], axis_label: str, unit: str) -> Figure:
+    """Draw residuals over a state with their running mean: a line that is not zero is physics that is missing.
+
+    Parameters
+    ----------
+    values : ndarray, shape (N,)
+        Velocity or position.
+    stages : mapping of str to ndarray, shape (N,)
+    axis_label : str
+        With the unit.
+    unit : str
+        Of the residual.
+    """
+    figure, axes = panels(1, height=3.0)
+    draw_residual_against(axes[0][0], values, stages, axis_label, unit=unit)
+    return figure
+
+
+@styled
+def plot_spectrum(signals: Mapping[str, Array], rate: float, unit: str) -> Figure:
+    """Draw amplitude spectral densities (Welch's method).
+
+    Parameters
+    ----------
+    signals : mapping of str to ndarray, shape (N,)
+    rate : float
+        Hz.
+    unit : str
+    """
+    from scipy.signal import welch
+
+    figure, axes = panels(1, height=2.8)
+    axis = axes[0][0]
+    for (name, values), color in zip(signals.items(), STAGES[2:] + STAGES[:2], strict=False):
+        frequency, power = welch(values, rate, nperseg=min(values.size, 4096), detrend="constant")
+        axis.loglog(frequency[1:], np.sqrt(power[1:]), color=color, label=name)
+    axis.set_xlabel("frequency [Hz]")
+    axis.set_ylabel(label("density", f"{unit}/√Hz"))
+    axis.legend(loc="lower left")
+    return figure
+
+
+@styled
+def plot_correlation(lags: Array, values: Array, band: float, name: str) -> Figure:
+    """Draw a correlation over lags with its 95 % band.
+
+    Parameters
+    ----------
+    lags : ndarray, shape (L,)
+        s.
+    values : ndarray, shape (L,)
+    band : float
+    name : str
+        What is correlated.
+    """
+    figure, axes = panels(1, height=2.4)
+    axis = axes[0][0]
+    axis.axhspan(-band, band, color=SOFT, alpha=0.18, linewidth=0, label="95 % if independent")
+    axis.vlines(lags, 0.0, values, color=BLUE, linewidth=1.0)
+    axis.plot(lags, values, "o", color=BLUE, markersize=2.5)
+    axis.axhline(0.0, color=INK, linewidth=0.8)
+    axis.set_ylim(min(-0.25, 1.1 * float(values.min())), max(0.25, 1.1 * float(values.max())))
+    axis.set_xlabel("lag [s]")
+    axis.set_ylabel("correlation")
+    axis.set_title(name)
+    axis.legend(loc="upper right")
+    return figure
+
+
+def draw_overlay(axis: Axes, time: Array, measured: Array | None, simulated: Array, starts: Iterable[int]) -> None:
+    """Measured as a pale broad line, simulated as a thin one on it; pieces are not joined."""
+    edges = [*starts, time.size]
+    for number, (first, last) in enumerate(pairwise(edges)):
+        piece = slice(first, last)
+        names = ("measured", "simulated") if number == 0 else ("", "")
+        if measured is not None:
+            lines = thinned(time[piece], measured[piece], simulated[piece])
+            axis.plot(lines[0], lines[1], color=SOFT, alpha=0.55, linewidth=2.6, label=names[0])
+        else:
+            lines = thinned(time[piece], simulated[piece])
+        axis.plot(lines[0], lines[-1], color=ORANGE, linewidth=1.0, label=names[1])
+
+
+def draw_residual_time(axis: Axes, time: Array, stages: Mapping[str, Array], unit: str) -> None:
+    """Residuals over time, later stages on top."""
+    for (name, residual), color in zip(stages.items(), _colors(len(stages)), strict=True):
+        axis.plot(*thinned(time, residual), color=color, linewidth=0.9, label=name)
+    axis.axhline(0.0, color=INK, linewidth=0.7)
+    axis.set_xlabel("time [s]")
+    axis.set_ylabel(label("residual", unit))
+    axis.margins(x=0.01)
+    if len(stages) > 1:
+        _legend_above(axis, len(stages))
+
+
+def draw_residual_against(
+    axis: Axes, values: Array, stages: Mapping[str, Array], axis_label: str, *, unit: str
+) -> None:
+    """Residuals as pale points over a state, their running means as lines."""
+    step = -(-values.size // MOST_DOTS)
+    bottom, top = 0.0, 0.0
+    for (name, residual), color in zip(stages.items(), _colors(len(stages)), strict=True):
+        axis.plot(
+            values[::step],
+            residual[::step],
+            ".",
+            color=color,
+            alpha=0.22,
+            markersize=2.5,
+            markeredgewidth=0,
+            rasterized=True,
+        )
+        centers, means = running_mean(values, residual)
+        axis.plot(centers, means, color="white", linewidth=3.4)
+        axis.plot(centers, means, color=color, linewidth=1.9, label=f"{name}, mean" if name else "mean")
+        low, high = np.percentile(residual, [0.2, 99.8])
+        bottom, top = min(bottom, float(low)), max(top, float(high))
+    if top > bottom:
+        axis.set_ylim(bottom - 0.08 * (top - bottom), top + 0.08 * (top - bottom))
+    axis.axhline(0.0, color=INK, linewidth=0.7)
+    axis.set_xlabel(axis_label)
+    axis.set_ylabel(label("residual", unit))
+    _legend_above(axis, len(stages))
+
+
+#: Points that a cloud keeps.
+MOST_DOTS = 5000
+
+
+def running_mean(values: Array, residual: Array) -> tuple[Array, Array]:
+    """Mean residual in 40 bins of a state, where there are enough samples.
+
+    Returns
+    -------
+    centers, means : ndarray, shape (M,)
+        NaN between bins that are not neighbours, so that no line joins them.
+    """
+    edges = np.linspace(float(values.min()), float(values.max()), MEAN_BINS + 1)
+    place = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, MEAN_BINS - 1)
+    counts = np.bincount(place, minlength=MEAN_BINS)
+    sums = np.bincount(place, weights=residual, minlength=MEAN_BINS)
+    enough = counts >= max(3.0, LEAST_IN_BIN * values.size)
+    means = np.where(enough, sums / np.maximum(counts, 1), np.nan)
+    return 0.5 * (edges[:-1] + edges[1:]), means
+
+
+def _colors(count: int) -> tuple[str, ...]:
+    """Colours of stages: one alone is blue, of several the last is."""
+    if count == 1:
+        return (BLUE,)
+    return (STAGES[:count] if count >= 3 else (ORANGE, BLUE)) if count <= len(STAGES) else STAGES * (count // 6 + 1)
+
+
+def _legend_above(axis: Axes, columns: int) -> None:
+    axis.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=min(columns, 4), borderaxespad=0.2)
+
+
+def _finish_time(figure: Figure, bottom: Axes, title: str) -> None:
+    bottom.set_xlabel("time [s]")
+    bottom.margins(x=0.01)
+    if title:
+        figure.suptitle(title, fontsize=11, x=0.02, ha="left")

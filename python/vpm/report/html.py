@@ -1,0 +1,56 @@
+"""A diagnosis as one HTML page that needs nothing else: plots are SVG inside it."""
+
+from __future__ import annotations
+
+from importlib.resources import files
+
+from vpm.discrepancy import Diagnosis
+from vpm.errors import MissingExtraError
+from vpm.plot import figure_to_svg, plot_candidates, plot_gap, plot_residual_against, plot_residual_time
+from vpm.report.story import VERDICT_WORDS
+
+
+def render_html(diagnosis: Diagnosis) -> str:
+    """Render the page.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+
+    Returns
+    -------
+    str
+        A complete HTML document.
+
+    Raises
+    ------
+    MissingExtraError
+        jinja2 or matplotlib is not installed.
+    """
+    try:
+        from jinja2 import Environment
+    except ImportError as error:
+        raise MissingExtraError("jinja2", "report") from error
+    environment = Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
+    environment.filters["percent"] = lambda share: f"{100.0 * share:.2f} %"
+    environment.filters["short"] = lambda value: "–" if value is None or value != value else f"{value:.4g}"
+    template = environment.from_string((files("vpm.report") / "report.html.jinja").read_text(encoding="utf-8"))
+    return template.render(d=diagnosis, words=VERDICT_WORDS[diagnosis.verdict], figures=_figures(diagnosis))
+
+
+def _figures(diagnosis: Diagnosis) -> list[tuple[str, str]]:
+    """Captions and SVG pictures."""
+    pictures = [("Gap on unseen data at each stage, relative to the measured signal", plot_gap(diagnosis.gap))]
+    for p in diagnosis.pictures:
+        stages = {"recalibrated": p.recalibrated, "with the accepted effects": p.after}
+        name = f"{p.channel}, first unseen record"
+        pictures.append((f"{name}: residual over time", plot_residual_time(p.time, stages, p.unit)))
+        for axis, values, unit in (
+            ("velocity", p.velocity, f"{p.coordinate_unit}/s"),
+            ("position", p.position, p.coordinate_unit),
+        ):
+            figure = plot_residual_against(values, stages, f"{axis} [{unit}]", p.unit)
+            pictures.append((f"{name}: residual against {axis}", figure))
+    if diagnosis.candidates:
+        pictures.append(("Candidates: what each would explain", plot_candidates(diagnosis.candidates)))
+    return [(caption, figure_to_svg(figure)) for caption, figure in pictures]

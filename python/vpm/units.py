@@ -1,0 +1,365 @@
+"""Units at the door: everything inside is SI.
+
+A unit is written as products, quotients, powers and parentheses of symbols: ``N s/m``, ``kg m^2``, ``V/(m/s)``,
+``N m s/rad``, ``1/s``, ``l/min``. A space, ``*`` or ``·`` multiplies. A product after a slash (``J/kg K``) is refused,
+because readers disagree about it: write ``J/(kg K)``.
+
+Angles have no dimension, and ``rad`` is 1 (SI brochure, 9th edition, section 2.3.3), so ``N m`` and ``N m/rad`` are of
+one kind; so are ``Hz`` and ``rad/s``, and no factor of 2 pi stands between these two. Write ``rev/s`` for turns.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import overload
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vpm.errors import UnitError, near_match
+
+#: The base units that the dimension vectors count.
+BASE_UNITS = ("m", "kg", "s", "A", "K")
+
+_PREFIXES = {
+    "n": 1e-9,
+    "u": 1e-6,
+    "µ": 1e-6,
+    "μ": 1e-6,
+    "m": 1e-3,
+    "c": 1e-2,
+    "d": 1e-1,
+    "h": 1e2,
+    "k": 1e3,
+    "M": 1e6,
+    "G": 1e9,
+}
+
+_TOKEN = re.compile(r"\s*(?:(?P<name>[^\W\d_]+|[°%])|(?P<power>\^|\*\*)|(?P<integer>[+-]?\d+)|(?P<mark>[*·/()]))")
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A unit that was understood.
+
+    Attributes
+    ----------
+    text : str
+        As it was written.
+    factor : float
+        SI value of one such unit.
+    dimension : tuple of int
+        Powers of `BASE_UNITS`.
+    si_terms : tuple of (str, int)
+        The same unit with every symbol replaced by its SI symbol; symbols and powers.
+    """
+
+    text: str
+    factor: float
+    dimension: tuple[int, ...]
+    si_terms: tuple[tuple[str, int], ...]
+
+    @property
+    def si(self) -> str:
+        """The SI unit of the same build: ``"N/m"`` for ``"N/mm"``, ``"rad/s"`` for ``"rpm"``."""
+        return _write(self.si_terms)
+
+    @property
+    def kind(self) -> str:
+        """The dimension in base units: ``"kg/s^2"`` for ``"N/m"``, ``"1"`` for angles and ratios."""
+        powers = dict(zip(BASE_UNITS, self.dimension, strict=True))
+        return _write(tuple((name, powers[name]) for name in ("kg", "m", "s", "A", "K")))
+
+
+@dataclass(frozen=True)
+class _Symbol:
+    factor: float
+    dimension: tuple[int, ...]
+    si: tuple[tuple[str, int], ...]
+    prefixes: str = ""
+
+
+def _symbol(factor: float, dimension: tuple[int, ...], si: str, prefixes: str = "") -> _Symbol:
+    """Table entry; `si` is like ``"m^3 s^-1"``."""
+    terms = tuple((name, int(power or 1)) for name, _, power in (term.partition("^") for term in si.split()))
+    return _Symbol(factor, dimension, terms, prefixes)
+
+
+_INCH = 0.0254  # exact: international inch, pound and pound-force (NIST SP 811, appendix B)
+_POUND = 0.45359237
+_STANDARD_GRAVITY = 9.80665
+
+_SYMBOLS: Mapping[str, _Symbol] = {
+    "m": _symbol(1.0, (1, 0, 0, 0, 0), "m", "nuµμmcdk"),
+    "inch": _symbol(_INCH, (1, 0, 0, 0, 0), "m"),
+    "in": _symbol(_INCH, (1, 0, 0, 0, 0), "m"),
+    "ft": _symbol(12 * _INCH, (1, 0, 0, 0, 0), "m"),
+    "l": _symbol(1e-3, (3, 0, 0, 0, 0), "m^3", "umcd"),
+    "L": _symbol(1e-3, (3, 0, 0, 0, 0), "m^3", "umcd"),
+    "g": _symbol(1e-3, (0, 1, 0, 0, 0), "kg", "uµμmk"),
+    "t": _symbol(1e3, (0, 1, 0, 0, 0), "kg"),
+    "lb": _symbol(_POUND, (0, 1, 0, 0, 0), "kg"),
+    "s": _symbol(1.0, (0, 0, 1, 0, 0), "s", "nuµμm"),
+    "min": _symbol(60.0, (0, 0, 1, 0, 0), "s"),
+    "h": _symbol(3600.0, (0, 0, 1, 0, 0), "s"),
+    "Hz": _symbol(1.0, (0, 0, -1, 0, 0), "Hz", "mkM"),
+    "rpm": _symbol(2 * math.pi / 60, (0, 0, -1, 0, 0), "rad s^-1"),
+    "rad": _symbol(1.0, (0, 0, 0, 0, 0), "rad", "uµμm"),
+    "deg": _symbol(math.pi / 180, (0, 0, 0, 0, 0), "rad"),
+    "°": _symbol(math.pi / 180, (0, 0, 0, 0, 0), "rad"),
+    "rev": _symbol(2 * math.pi, (0, 0, 0, 0, 0), "rad"),
+    "%": _symbol(1e-2, (0, 0, 0, 0, 0), ""),
+    "N": _symbol(1.0, (1, 1, -2, 0, 0), "N", "uµμmckM"),
+    "lbf": _symbol(_POUND * _STANDARD_GRAVITY, (1, 1, -2, 0, 0), "N"),
+    "kgf": _symbol(_STANDARD_GRAVITY, (1, 1, -2, 0, 0), "N"),
+    "J": _symbol(1.0, (2, 1, -2, 0, 0), "J", "mkM"),
+    "W": _symbol(1.0, (2, 1, -3, 0, 0), "W", "umkM"),
+    "Pa": _symbol(1.0, (-1, 1, -2, 0, 0), "Pa", "hkMG"),
+    "bar": _symbol(1e5, (-1, 1, -2, 0, 0), "Pa", "m"),
+    "psi": _symbol(_POUND * _STANDARD_GRAVITY / _INCH**2, (-1, 1, -2, 0, 0), "Pa"),
+    "A": _symbol(1.0, (0, 0, 0, 1, 0), "A", "nuµμmk"),
+    "C": _symbol(1.0, (0, 0, 1, 1, 0), "C", "m"),
+    "V": _symbol(1.0, (2, 1, -3, -1, 0), "V", "nuµμmk"),
+    "Ohm": _symbol(1.0, (2, 1, -3, -2, 0), "Ohm", "mkM"),
+    "Ω": _symbol(1.0, (2, 1, -3, -2, 0), "Ohm", "mkM"),
+    "H": _symbol(1.0, (2, 1, -2, -2, 0), "H", "nuµμm"),
+    "F": _symbol(1.0, (-2, -1, 4, 2, 0), "F", "nuµμm"),
+    "T": _symbol(1.0, (0, 1, -2, -1, 0), "T", "um"),
+    "Wb": _symbol(1.0, (2, 1, -2, -1, 0), "Wb", "m"),
+    "K": _symbol(1.0, (0, 0, 0, 0, 1), "K", "m"),
+}
+
+_DIMENSIONLESS = (0,) * len(BASE_UNITS)
+
+
+@lru_cache(maxsize=1024)
+def parse_unit(text: str) -> Unit:
+    """Read a unit.
+
+    Parameters
+    ----------
+    text : str
+        For example ``"N s/m"``; ``""`` and ``"1"`` mean no unit.
+
+    Returns
+    -------
+    Unit
+
+    Raises
+    ------
+    UnitError
+        A symbol is not known (the message names near ones) or the expression cannot be read.
+    """
+    if not text.strip():
+        return Unit(text, 1.0, _DIMENSIONLESS, ())
+    reader = _Reader(text)
+    factor, dimension, terms = reader.expression()
+    if reader.next is not None:
+        raise _unreadable(text, f'"{reader.next}" is not expected there')
+    return Unit(text, factor, dimension, tuple(terms.items()))
+
+
+def factor_to_si(unit: str) -> float:
+    """SI value of one `unit`: 0.001 for ``"mm"``.
+
+    Raises
+    ------
+    UnitError
+        The unit cannot be read.
+    """
+    return parse_unit(unit).factor
+
+
+def si_unit(unit: str) -> str:
+    """SI unit of the same build as `unit`: ``"m^3/s"`` for ``"l/min"``, ``"1"`` for ``"%"``.
+
+    Raises
+    ------
+    UnitError
+        The unit cannot be read.
+    """
+    return parse_unit(unit).si
+
+
+def same_dimension(left: str, right: str) -> bool:
+    """Whether one unit can be converted into the other.
+
+    Raises
+    ------
+    UnitError
+        One of them cannot be read.
+    """
+    return parse_unit(left).dimension == parse_unit(right).dimension
+
+
+def require_dimension(unit: str, expected: str) -> None:
+    """Refuse a unit of the wrong kind.
+
+    Parameters
+    ----------
+    unit : str
+        The unit as it was written.
+    expected : str
+        A unit of the right kind, which the message suggests.
+
+    Raises
+    ------
+    UnitError
+        The dimensions differ, or a unit cannot be read.
+    """
+    given, wanted = parse_unit(unit), parse_unit(expected)
+    if given.dimension != wanted.dimension:
+        raise UnitError(
+            f'unit "{unit}" is of the kind {given.kind}, but {wanted.kind} is needed; write for example "{expected}"',
+            unit=unit,
+            expected=expected,
+        )
+
+
+@overload
+def convert(value: float, from_unit: str, to_unit: str) -> float: ...
+@overload
+def convert(value: NDArray[np.float64], from_unit: str, to_unit: str) -> NDArray[np.float64]: ...
+def convert(value: float | NDArray[np.float64], from_unit: str, to_unit: str) -> float | NDArray[np.float64]:
+    """Express a quantity in another unit.
+
+    Parameters
+    ----------
+    value : float or ndarray
+        In `from_unit`.
+    from_unit, to_unit : str
+
+    Returns
+    -------
+    float or ndarray
+        In `to_unit`; the same object where both units are equally large.
+
+    Raises
+    ------
+    UnitError
+        The dimensions differ, or a unit cannot be read.
+    """
+    require_dimension(from_unit, to_unit)
+    given, wanted = factor_to_si(from_unit), factor_to_si(to_unit)
+    return value if given == wanted else value * (given / wanted)
+
+
+_Parsed = tuple[float, tuple[int, ...], dict[str, int]]
+
+
+class _Reader:
+    """Recursive descent over ``expression = power {("*" | "/" | " ") power}``, ``power = atom ["^" integer]``."""
+
+    def __init__(self, text: str) -> None:
+        self.text = text
+        self.tokens = _tokens(text)
+        self.at = 0
+
+    @property
+    def next(self) -> str | None:
+        return self.tokens[self.at] if self.at < len(self.tokens) else None
+
+    def expression(self) -> _Parsed:
+        factor, dimension, terms = self.power()
+        divided = False
+        while self.next not in {None, ")"}:
+            sign = 1
+            if self.next in {"*", "·", "/"}:
+                sign = -1 if self.next == "/" else 1
+                self.at += 1
+            if divided and sign == 1:
+                raise _unreadable(self.text, "a product after a slash is ambiguous, put the divisor into parentheses")
+            divided = divided or sign == -1
+            other = self.power()
+            factor *= other[0] ** sign
+            dimension = tuple(a + sign * b for a, b in zip(dimension, other[1], strict=True))
+            for name, power in other[2].items():
+                terms[name] = terms.get(name, 0) + sign * power
+        return factor, dimension, terms
+
+    def power(self) -> _Parsed:
+        factor, dimension, terms = self.atom()
+        if self.next not in {"^", "**"}:
+            return factor, dimension, terms
+        self.at += 1
+        digits = self.next or ""
+        if not digits.lstrip("+-").isdigit():
+            raise _unreadable(self.text, 'an integer has to follow the "^"')
+        exponent = int(digits)
+        if abs(exponent) > 9:
+            raise _unreadable(self.text, f"the power {exponent} is beyond 9")
+        self.at += 1
+        scaled = {name: power * exponent for name, power in terms.items()}
+        return factor**exponent, tuple(power * exponent for power in dimension), scaled
+
+    def atom(self) -> _Parsed:
+        symbol = self.next
+        self.at += 1
+        if symbol == "1":
+            return 1.0, _DIMENSIONLESS, {}
+        if symbol == "(":
+            inside = self.expression()
+            if self.next != ")":
+                raise _unreadable(self.text, 'a ")" is missing')
+            self.at += 1
+            return inside
+        if symbol is None:
+            raise _unreadable(self.text, "it ends where a symbol is needed")
+        if not (symbol.isalpha() or symbol in {"°", "%"}):
+            raise _unreadable(self.text, f'"{symbol}" stands where a symbol is needed')
+        return _look_up(symbol, self.text)
+
+
+def _tokens(text: str) -> list[str]:
+    tokens, at, end = [], 0, len(text.rstrip())
+    while at < end:
+        match = _TOKEN.match(text, at)
+        if match is None:
+            raise _unreadable(text, f'"{text[at:].strip()[0]}" is not part of a unit')
+        tokens.append(match.group().strip())
+        at = match.end()
+    return tokens
+
+
+def _look_up(name: str, text: str) -> _Parsed:
+    """Find a symbol, or raise with the repair."""
+    found = _find(name)
+    if found is not None:
+        return found
+    repair = near_match(name, _SYMBOLS, what="known symbols are")
+    for at in range(1, len(name)):
+        if _find(name[:at]) and _find(name[at:]):
+            repair = f'did you mean "{name[:at]} {name[at:]}", with a space?'
+            break
+    raise UnitError(f'unit "{text}" has the unknown symbol "{name}"; {repair}', unit=text)
+
+
+def _find(name: str) -> _Parsed | None:
+    """Find a symbol in the table, else a prefix before one that takes it: exact names win, so "min" is a minute."""
+    symbol, scale = _SYMBOLS.get(name), 1.0
+    if symbol is None and name[0] in _PREFIXES:
+        symbol, scale = _SYMBOLS.get(name[1:]), _PREFIXES[name[0]]
+        if symbol is not None and name[0] not in symbol.prefixes:
+            return None
+    return None if symbol is None else (symbol.factor * scale, symbol.dimension, dict(symbol.si))
+
+
+def _unreadable(text: str, reason: str) -> UnitError:
+    return UnitError(f'unit "{text}" cannot be read: {reason}; units are written like "N s/m" or "kg m^2"', unit=text)
+
+
+def _write(terms: tuple[tuple[str, int], ...]) -> str:
+    """Symbols and powers as text that `parse_unit` reads back."""
+
+    def product(sign: int) -> list[str]:
+        return [name if abs(power) == 1 else f"{name}^{abs(power)}" for name, power in terms if power * sign > 0]
+
+    above, below = product(1), product(-1)
+    if not below:
+        return " ".join(above) or "1"
+    divisor = below[0] if len(below) == 1 else f"({' '.join(below)})"
+    return f"{' '.join(above) or '1'}/{divisor}"

@@ -1,0 +1,214 @@
+"""Identification against known truth: values, intervals that cover, and what cannot be seen."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from synthetic import Truth, nominal, simulate_axis
+
+from vpm.errors import IdentificationError
+from vpm.experiment import Experiment
+from vpm.identify import (
+    InverseDynamicsProblem,
+    OutputErrorProblem,
+    gain,
+    identify,
+    problem,
+    robust_covariance,
+    unseen_combinations,
+)
+from vpm.identify.identifiability import explained_share
+from vpm.identify.statistics import correlation_length
+from vpm.simulate import Setup
+
+TRUTH = Truth(mass=21.3, viscous=71.0)
+CLEAN = replace(TRUTH, noise=0.0)
+
+
+@pytest.fixture(scope="module")
+def record() -> Experiment:
+    return simulate_axis(TRUTH, 1, 10.0, first_seed=3)[0]
+
+
+def test_inverse_dynamics_recovers_mass_and_friction(record: Experiment) -> None:
+    fit = identify(nominal(), record)
+    assert fit["slide.mass"] == pytest.approx(21.3, rel=5e-3)
+    assert fit["axis.friction.viscous"] == pytest.approx(71.0, rel=1e-2)
+    assert not fit.unidentifiable
+    assert not fit.at_bounds
+
+
+@pytest.mark.parametrize("mode", ["closed_loop", "restarts"])
+def test_output_error_recovers_them_too(record: Experiment, mode: str) -> None:
+    fit = identify(nominal(), record, mode=mode, setup=Setup(substeps=2, horizon=0.5))
+    assert fit["slide.mass"] == pytest.approx(21.3, rel=2e-2)
+    assert fit["axis.friction.viscous"] == pytest.approx(71.0, rel=2e-2)
+
+
+def test_free_run_recovers_friction() -> None:
+    """Friction and gain of an integrating axis by free run on a noise-free record."""
+    (record,) = simulate_axis(CLEAN, 1, 4.0, first_seed=3)
+    fit = identify(nominal(), record, mode="free_run", setup=Setup(substeps=4))
+    assert fit["axis.friction.viscous"] == pytest.approx(71.0, rel=2e-2)
+
+
+def test_several_experiments_in_one_fit_are_better_than_one() -> None:
+    records = simulate_axis(TRUTH, 4, 8.0, first_seed=20)
+    one, all_four = identify(nominal(), records[0]), identify(nominal(), records)
+    assert np.all(all_four.std < one.std)
+    assert all_four.experiments == tuple(r.name for r in records)
+
+
+def test_intervals_cover_the_truth() -> None:
+    """Ninety-five percent intervals over forty noise seeds: binomial chance of fewer than 32 hits is below 1e-3."""
+    noisy = replace(TRUTH, force_noise=3.0)
+    hits = np.zeros(2)
+    for record in simulate_axis(noisy, 40, 8.0, first_seed=300):
+        low, high = identify(nominal(), record).intervals.T
+        truth = np.array([21.3, 71.0])
+        hits += (low <= truth) & (truth <= high)
+    assert np.all(hits >= 32), hits
+
+
+def test_a_model_is_unchanged_by_its_own_fit(record: Experiment) -> None:
+    first = identify(nominal(), record)
+    second = identify(first.model, record)
+    np.testing.assert_allclose(second.values, first.values, rtol=1e-8)
+
+
+def test_fit_reports_what_the_data_cannot_see(record: Experiment) -> None:
+    """A payload at the origin of the body is the same number as the body's mass."""
+    model = nominal().with_effect("payload", at="slide")
+    fit = identify(model, record, free=["slide.mass", "slide.payload.mass", "axis.friction.viscous"])
+    (combination,) = fit.unidentifiable
+    assert set(combination.names) == {"slide.mass", "slide.payload.mass"}
+    assert np.isinf(fit.std[:2]).all()
+    assert np.isfinite(fit.std[2])
+
+
+def test_parameter_without_influence_keeps_its_value(record: Experiment) -> None:
+    fit = identify(nominal(), record, free=["slide.mass", "slide.inertia.xx"])
+    assert fit["slide.inertia.xx"] == nominal().parameters["slide.inertia.xx"].value
+    assert fit.unidentifiable[0].names == ("slide.inertia.xx",)
+
+
+def test_estimate_on_a_bound_is_reported() -> None:
+    (record,) = simulate_axis(Truth(mass=20.0, viscous=0.0, bias=3.0), 1, 6.0, first_seed=2)
+    model = nominal().with_effect("coulomb_friction", at="axis").without_effect("viscous_friction", "axis")
+    fit = identify(model, record, free=["slide.mass", "axis.friction.coulomb"])
+    if fit["axis.friction.coulomb"] == 0.0:
+        assert fit.at_bounds == ("axis.friction.coulomb",)
+    else:
+        assert abs(fit["axis.friction.coulomb"]) < 0.3
+
+
+def test_fit_saves_and_loads(record: Experiment, tmp_path) -> None:  # type: ignore[no-untyped-def]
+    fit = identify(nominal(), record)
+    assert type(fit).load(fit.save(tmp_path / "fit.npz")) == fit
+
+
+@pytest.mark.parametrize("mode", ["inverse_dynamics", "restarts", "closed_loop"])
+def test_problem_jacobian_matches_differences(record: Experiment, mode: str) -> None:
+    model = nominal().with_effect("coulomb_friction", at="axis", coulomb=4.0, transition_velocity=0.02)
+    short = record.trim(1.0, 4.0)
+    data = problem(model, [short], mode, setup=Setup(substeps=2))
+    names = ["slide.mass", "axis.friction.viscous", "axis.friction.coulomb", "axis.friction.transition_velocity"]
+    columns = [model.index(name) for name in names]
+    _, jacobian = data.evaluate(model, model.theta, columns)
+    for place, column in enumerate(columns):
+        step = 1e-5 * model.theta[column]
+        ends = []
+        for sign in (1.0, -1.0):
+            theta = model.theta.copy()
+            theta[column] += sign * step
+            ends.append(data.evaluate(model, theta)[0])
+        difference = (ends[0] - ends[1]) / (2.0 * step)
+        np.testing.assert_allclose(
+            jacobian[:, place], difference, rtol=1e-4, atol=1e-5 * np.abs(difference).max(), err_msg=names[place]
+        )
+
+
+def test_blocks_cover_the_residual_once(record: Experiment) -> None:
+    model = nominal()
+    for data in (InverseDynamicsProblem(model, [record, record]), OutputErrorProblem(model, [record], "closed_loop")):
+        residual, _ = data.evaluate(model, model.theta)
+        covered = np.concatenate([np.arange(residual.size)[b.samples] for b in data.blocks])
+        np.testing.assert_array_equal(np.sort(covered), np.arange(residual.size))
+        assert all(b.time.size == b.samples.stop - b.samples.start for b in data.blocks)
+
+
+def test_nothing_free_is_an_error(record: Experiment) -> None:
+    known = nominal()
+    with pytest.raises(IdentificationError, match="no parameter is free"):
+        identify(known, record, free=[])
+
+
+def test_unknown_mode_is_an_error(record: Experiment) -> None:
+    with pytest.raises(IdentificationError, match="unknown mode 'forward'"):
+        identify(nominal(), record, mode="forward")
+
+
+@given(seed=st.integers(0, 1000), rows=st.integers(200, 400))
+@settings(max_examples=20, deadline=None)
+def test_robust_covariance_is_the_usual_one_for_white_residuals(seed: int, rows: int) -> None:
+    generator = np.random.default_rng(seed)
+    jacobian = generator.standard_normal((20 * rows, 2))
+    residual = generator.standard_normal(20 * rows)
+    usual = np.linalg.inv(jacobian.T @ jacobian)
+    robust = robust_covariance(jacobian, residual, [slice(0, 20 * rows)])
+    np.testing.assert_allclose(np.diag(robust), np.diag(usual), rtol=0.25)
+
+
+def test_robust_covariance_grows_with_correlation() -> None:
+    """Mean of an AR(1) sequence: its variance is (1 + a)/(1 - a) times that of white noise (Priestley, 1981)."""
+    generator = np.random.default_rng(1)
+    a, n = 0.9, 200_000
+    noise = generator.standard_normal(n)
+    residual = np.empty(n)
+    residual[0] = noise[0]
+    for k in range(1, n):
+        residual[k] = a * residual[k - 1] + noise[k]
+    robust = robust_covariance(np.ones((n, 1)), residual, [slice(0, n)])[0, 0]
+    expected = residual.var() / n * (1.0 + a) / (1.0 - a)
+    assert robust == pytest.approx(expected, rel=0.25)
+
+
+def test_correlation_length_of_a_sine_is_its_quarter_period() -> None:
+    residual = np.cos(2.0 * np.pi * np.arange(4000) / 400.0)
+    assert 80 <= correlation_length(residual) <= 110
+
+
+@given(scale=st.floats(1e-6, 1e6))
+@settings(max_examples=30, deadline=None)
+def test_unseen_combinations_do_not_depend_on_units(scale: float) -> None:
+    generator = np.random.default_rng(4)
+    x = generator.standard_normal((100, 2))
+    jacobian = np.column_stack([x[:, 0], x[:, 0] * scale, x[:, 1]])
+    (combination,) = unseen_combinations(jacobian, ["a", "b", "c"])
+    assert set(combination.names) == {"a", "b"} or len(combination.names) == 1
+    np.testing.assert_allclose(jacobian[:, :2] @ _weights(combination, ["a", "b"]), 0.0, atol=1e-6 * max(1.0, scale))
+
+
+def _weights(combination, names):  # type: ignore[no-untyped-def]
+    table = dict(zip(combination.names, combination.weights, strict=True))
+    return np.array([table.get(name, 0.0) for name in names])
+
+
+def test_explained_share_is_the_squared_cosine() -> None:
+    x = np.array([1.0, 0.0, 0.0])
+    y = np.array([[1.0], [1.0], [0.0]])
+    assert explained_share(x, y) == pytest.approx(0.5)
+
+
+def test_gain_of_a_smaller_residual_is_significant_and_of_noise_is_not() -> None:
+    generator = np.random.default_rng(9)
+    before = generator.standard_normal(5000)
+    better = gain(before, 0.5 * before, [slice(0, 5000)])
+    assert better.relative == pytest.approx(0.75)
+    assert better.score > 10.0
+    other = gain(before, generator.permutation(before), [slice(0, 5000)])
+    assert abs(other.score) < 4.0

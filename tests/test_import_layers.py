@@ -1,0 +1,149 @@
+"""Python modules import downward only, and heavy optional libraries only where they are used.
+
+The layers stand in pyproject.toml, where import-linter reads them too. This check needs nothing but Python, and also
+covers the compiled module, which import-linter cannot see.
+"""
+
+import ast
+import subprocess
+import sys
+import tomllib
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+PACKAGE = ROOT / "python" / "vpm"
+
+OPTIONAL = {"h5py", "jinja2", "matplotlib", "pandas", "pyarrow", "rosbags"}
+"""Libraries of the extras: a plain install has none of them."""
+
+SLOW = OPTIONAL | {"rich", "scipy.signal", "scipy.stats", "typer"}
+"""What ``import vpm`` must not load."""
+
+
+class Import(NamedTuple):
+    """One import statement's target, with where it stands."""
+
+    target: str
+    line: int
+    at_module_level: bool
+
+
+def layers() -> dict[str, int]:
+    """Height of each part of the package; the lowest is 0."""
+    with (ROOT / "pyproject.toml").open("rb") as file:
+        (contract,) = tomllib.load(file)["tool"]["importlinter"]["contracts"]
+    rows = reversed(contract["layers"])
+    return {part.strip(" ()"): height for height, row in enumerate(rows) for part in row.split("|")}
+
+
+def is_type_checking(node: ast.AST) -> bool:
+    return isinstance(node, ast.If) and ast.unparse(node.test) in {"TYPE_CHECKING", "typing.TYPE_CHECKING"}
+
+
+def imports(nodes: Iterable[ast.AST], at_module_level: bool = True) -> Iterator[Import]:
+    """All imports that can happen at run time, ``from a import b`` as ``a.b``."""
+    for node in nodes:
+        if is_type_checking(node):
+            continue
+        if isinstance(node, ast.Import):
+            yield from (Import(alias.name, node.lineno, at_module_level) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            yield from (Import(f"{node.module}.{alias.name}", node.lineno, at_module_level) for alias in node.names)
+        else:
+            inside_function = isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda)
+            yield from imports(ast.iter_child_nodes(node), at_module_level and not inside_function)
+
+
+def upward(part: str, found: Iterable[Import], heights: dict[str, int]) -> list[str]:
+    """Sentences on the imports of `part` that do not go downward."""
+    wrong = []
+    for target, line, _ in found:
+        root, *names = target.split(".")
+        if root != "vpm" or names == ["__version__"] or names[:1] == [part]:
+            continue
+        if not names or names[0] not in heights:
+            wrong.append(f"line {line}: {target} is taken from the package as a whole; name its module")
+        elif heights[names[0]] >= heights[part]:
+            wrong.append(f"line {line}: {part} may not import {names[0]}, which is not below it")
+    return wrong
+
+
+def modules() -> list[Path]:
+    return sorted(path for path in PACKAGE.rglob("*.py") if path != PACKAGE / "__init__.py")
+
+
+def part_of(path: Path) -> str:
+    return path.relative_to(PACKAGE).parts[0].removesuffix(".py")
+
+
+def found_in(path: Path) -> list[Import]:
+    return list(imports(ast.parse(path.read_text(encoding="utf-8")).body))
+
+
+def test_every_part_has_its_layer() -> None:
+    parts = {part_of(path) for path in modules()} | {"_core"}
+    assert parts == set(layers())
+
+
+@pytest.mark.parametrize("path", modules(), ids=lambda path: path.relative_to(PACKAGE).as_posix())
+def test_imports_go_downward(path: Path) -> None:
+    assert upward(part_of(path), found_in(path), layers()) == []
+
+
+@pytest.mark.parametrize("path", modules(), ids=lambda path: path.relative_to(PACKAGE).as_posix())
+def test_optional_libraries_are_imported_on_use(path: Path) -> None:
+    early = [found for found in found_in(path) if found.at_module_level and found.target.split(".")[0] in OPTIONAL]
+    assert early == []
+
+
+def test_demo_log_is_made_without_vpm() -> None:
+    used = {found.target for found in found_in(PACKAGE / "demo" / "generate.py")}
+    assert [target for target in used if target.startswith("vpm")] == []
+
+
+def test_import_vpm_is_light() -> None:
+    program = "import sys, vpm; print('\\n'.join(sys.modules))"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert SLOW & set(done.stdout.split()) == set()
+
+
+@pytest.mark.parametrize(
+    ("source", "sentence"),
+    [
+        ("import vpm.report", "line 1: model may not import report, which is not below it"),
+        ("from vpm.model import Model", ""),
+        ("def f():\n    from vpm import simulate", "line 2: model may not import simulate, which is not below it"),
+        ("if TYPE_CHECKING:\n    from vpm import simulate", ""),
+        ("from vpm import Experiment", "line 1: vpm.Experiment is taken from the package as a whole; name its module"),
+        ("from vpm import _core, errors", ""),
+        ("from vpm import __version__", ""),
+    ],
+)
+def test_the_check_sees(source: str, sentence: str) -> None:
+    heights = {"_core": 0, "errors": 1, "model": 2, "simulate": 3, "report": 4}
+    assert upward("model", imports(ast.parse(source).body), heights) == ([sentence] if sentence else [])
+
+
+def test_the_check_tells_module_level_from_function_level() -> None:
+    source = "import numpy\nclass A:\n    import pandas\n    def f(self):\n        import matplotlib.pyplot as plt"
+    found = [(item.target, item.at_module_level) for item in imports(ast.parse(source).body)]
+    assert found == [("numpy", True), ("pandas", True), ("matplotlib.pyplot", False)]
+
+
+def test_functions_keep_their_names_beside_modules_of_the_same_name() -> None:
+    # Importing a module binds it in its package under its own name, where a function may stand already, or come later.
+    parts = sorted({part_of(path) for path in modules()} - {"cli"})
+    program = f"""
+import importlib, vpm
+for part in {parts}:
+    importlib.import_module("vpm." + part)
+for name in vpm.__all__:
+    if name.islower() and name != "__version__":
+        assert callable(getattr(vpm, name)), name
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
