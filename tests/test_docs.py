@@ -16,7 +16,7 @@ import pytest
 from typer.testing import CliRunner
 
 import vpm
-from vpm.catalogue import CATALOGUE
+from vpm.catalogue import EFFECTS
 from vpm.cli import app
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -103,7 +103,7 @@ def test_the_physics_page_lists_the_catalogue() -> None:
     text = (ROOT / "docs" / "physics.md").read_text(encoding="utf-8")
     rows = [row.split("|")[1:3] for row in re.findall(r"^\| `[a-z_]+` \|.*$", text, re.MULTILINE)]
     listed = {effect.strip(" `"): re.findall(r"`([a-z_.]+)`", parameters) for effect, parameters in rows}
-    for effect in CATALOGUE.values():
+    for effect in EFFECTS.values():
         # The page shortens `payload.x`, `payload.y`, `payload.z` to `payload.x`, `.y`, `.z`.
         full = [name if not name.startswith(".") else effect.group + name for name in listed[effect.name]]
         assert sorted(full) == sorted(parameter.suffix for parameter in effect.parameters), effect.name

@@ -6,6 +6,8 @@ from typing import final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+__all__ = ["Diverged", "System"]
+
 class Diverged(ArithmeticError):
     """A simulation left the finite numbers.
 
@@ -93,7 +95,7 @@ class System:
         integrator: str,
         sensitivities: Sequence[int] = ...,
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """Closed loop on ``references`` (N, m), with ``disturbances`` (N, m) added to the commands; else as `simulate`."""
+        """Closed loop on ``references`` (N, m); ``disturbances`` (N, m) are added to the commands. Else as `simulate`."""
     def restart(
         self,
         theta: ArrayLike,

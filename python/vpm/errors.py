@@ -6,7 +6,7 @@ The sentence says which (path, name, channel, time), the failing condition, the 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from difflib import get_close_matches
+from difflib import SequenceMatcher, get_close_matches
 
 
 class VpmError(ValueError):
@@ -169,9 +169,10 @@ def near_match(name: str, candidates: Iterable[str], *, what: str = "the choices
     """
     known = sorted(set(candidates))
     near = get_close_matches(name, known, n=2, cutoff=0.6)
-    if (
-        not near
-    ):  # a part that is right says more than the spelling of the whole: "axis.viscous" of "axis.friction.viscous"
+    if len(near) == 2 and _likeness(name, near[1]) < _likeness(name, near[0]) - 0.1:
+        near = near[:1]
+    if not near:
+        # A part that is right says more than the spelling of the whole: "axis.viscous" of "axis.friction.viscous".
         parts = set(name.split("."))
         near = [candidate for candidate in known if parts <= set(candidate.split("."))][:2]
     if near:
@@ -181,3 +182,7 @@ def near_match(name: str, candidates: Iterable[str], *, what: str = "the choices
     shown = known[:12]
     rest = f" and {len(known) - len(shown)} more" if len(known) > len(shown) else ""
     return f"{what} " + ", ".join(shown) + rest
+
+
+def _likeness(left: str, right: str) -> float:
+    return SequenceMatcher(None, left, right).ratio()

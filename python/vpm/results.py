@@ -29,6 +29,7 @@ import html
 import json
 import math
 import zipfile
+import zlib
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
 from importlib import import_module
@@ -168,11 +169,13 @@ class Result(Storable):
             ) from error
         if version > FORMAT:
             raise VpmError(f"{path} has format {version}, and this version reads up to {FORMAT}; use a newer version")
-        result = _decode(content, arrays, path)
+        try:
+            result = _decode(content, arrays, path)
+        except (KeyError, TypeError) as error:
+            raise VpmError(f"{path} does not fit this version of its class: {error}; write it anew") from error
         if not isinstance(result, cls):
-            raise VpmError(
-                f"{path} holds a {type(result).__name__}, not a {cls.__name__}; use {type(result).__name__}.load"
-            )
+            found = type(result).__name__
+            raise VpmError(f"{path} is a saved {found}, not a {cls.__name__}; use {found}.load")
         return result
 
 
@@ -197,14 +200,15 @@ def html_table(caption: str, head: tuple[str, ...], rows: list[tuple[object, ...
 
 
 def _read_arrays(path: Path) -> dict[str, np.ndarray[Any, Any]]:
+    """Arrays of an .npz file; pickled objects are refused."""
     try:
+        if not path.exists():
+            raise VpmError(f"{path} does not exist; check the path")
+        if not zipfile.is_zipfile(path):
+            raise VpmError(f"{path} is not a saved result: it is no .npz file")
         with np.load(path, allow_pickle=False) as file:
-            if not isinstance(file, np.lib.npyio.NpzFile):
-                raise VpmError(f"{path} holds a single array and is not a saved result")
             return {name: file[name] for name in file.files}
-    except FileNotFoundError as error:
-        raise VpmError(f"{path} does not exist") from error
-    except (OSError, EOFError, zipfile.BadZipFile) as error:
+    except (OSError, EOFError, zipfile.BadZipFile, zlib.error) as error:
         raise VpmError(f"{path} cannot be read as a saved result: {error}") from error
     except ValueError as error:
         if isinstance(error, VpmError):

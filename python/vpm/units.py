@@ -157,7 +157,12 @@ def parse_unit(text: str) -> Unit:
     if not text.strip():
         return Unit(text, 1.0, _DIMENSIONLESS, ())
     reader = _Reader(text)
-    factor, dimension, terms = reader.expression()
+    try:
+        factor, dimension, terms = reader.expression()
+    except OverflowError:
+        factor = math.inf
+    if not 0.0 < factor < math.inf:
+        raise _unreadable(text, "it is too large or too small for a number")
     if reader.next is not None:
         raise _unreadable(text, f'"{reader.next}" is not expected there')
     return Unit(text, factor, dimension, tuple(terms.items()))
@@ -290,8 +295,8 @@ class _Reader:
         if not digits.lstrip("+-").isdigit():
             raise _unreadable(self.text, 'an integer has to follow the "^"')
         exponent = int(digits)
-        if abs(exponent) > 9:
-            raise _unreadable(self.text, f"the power {exponent} is beyond 9")
+        if abs(exponent) > 99:
+            raise _unreadable(self.text, f"the power {exponent} is beyond 99")
         self.at += 1
         scaled = {name: power * exponent for name, power in terms.items()}
         return factor**exponent, tuple(power * exponent for power in dimension), scaled

@@ -184,7 +184,7 @@ pub type Result<T> = std::result::Result<T, Error>;
 /// A simulation that left the finite numbers, with what it had computed until then.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error(
-    "{what} is no longer finite at t = {time} s (sample {sample_index}) with {method} in steps of {step} s; {repair}"
+    "{what} is no longer finite at t = {time:.6} s (sample {sample_index}) with {method} in steps of {step:.3e} s; {repair}"
 )]
 pub struct Diverged {
     /// Which quantity, for example ``the velocity of joint `axis` ``.

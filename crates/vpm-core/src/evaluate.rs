@@ -14,7 +14,8 @@ pub fn accelerations(
     velocity: &[f64],
     effort: &[f64],
 ) -> Result<Vec<f64>> {
-    let mut dynamics = prepare(description, theta, [("position", position), ("velocity", velocity), ("effort", effort)])?;
+    let mut dynamics =
+        prepare(description, theta, [("position", position), ("velocity", velocity), ("effort", effort)])?;
     Ok(dynamics.accelerations(position, velocity, effort).to_vec())
 }
 
@@ -41,7 +42,7 @@ fn prepare<const N: usize>(
     joint_vectors: [(&str, &[f64]); N],
 ) -> Result<Dynamics<f64>> {
     for (name, vector) in joint_vectors {
-        Table::new(name, vector, 1, vector.len())?.expect(name, 1, description.n_joints())?;
+        Table::vector(name, vector, description.n_joints(), "joint")?;
     }
     description.check_values(theta)?;
     Build::dynamics(&description, theta)

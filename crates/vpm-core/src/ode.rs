@@ -13,4 +13,9 @@ pub trait Ode<S> {
 
     /// Writes df/dx, row by row: entry (i, j) at `i * dim + j`.
     fn jacobian(&mut self, x: &[S], jacobian: &mut [S]);
+
+    /// Writes the matrix that an implicit step puts in the place of df/dx; a system that knows one of better stability says so here.
+    fn iteration_matrix(&mut self, x: &[S], matrix: &mut [S]) {
+        self.jacobian(x, matrix);
+    }
 }

@@ -133,7 +133,8 @@ pub fn restarts(
 }
 
 pub(crate) fn check_state(name: &str, description: &Description, state: &[f64]) -> Result<()> {
-    Table::new(name, state, 1, state.len())?.expect(name, 1, description.n_states())
+    Table::vector(name, state, description.n_states(), "state of the model: positions, velocities, lags of actuators")?;
+    Ok(())
 }
 
 struct Simulation<'a> {

@@ -11,6 +11,9 @@ use crate::scalar::{Dual, Scalar};
 /// Directions in which the state Jacobian is taken at once: the two states of a single axis, and a good fit to the vector registers.
 const LANES: usize = 2;
 
+/// A number with its derivatives along the states.
+type Lifted<S> = Dual<S, LANES>;
+
 /// The right-hand side: everything that acts, in one number type, with its buffers.
 ///
 /// Law: with x = [q, v, s], `dq/dt = v`, `M(q) dv/dt + h(q, v) = sum of actuator and effect efforts`, `T ds/dt = w - s`.
@@ -71,13 +74,25 @@ impl<S: Scalar> Dynamics<S> {
     }
 
     /// dx/dt at x.
+    #[inline]
     pub fn rhs(&mut self, x: &[S], dxdt: &mut [S]) {
+        self.rhs_with(x, dxdt, add_effects);
+    }
+
+    /// dx/dt at x, with the efforts of the effects at (q, v) added by `add`.
+    #[inline]
+    fn rhs_with(
+        &mut self,
+        x: &[S],
+        dxdt: &mut [S],
+        add: impl FnOnce(&[(usize, JointEffect<S>)], &[S], &[S], &mut [S]),
+    ) {
         let n = self.joints();
         let ((q, v), lags) = (x[..2 * n].split_at(n), &x[2 * n..]);
         self.actuate(lags, &mut dxdt[2 * n..]);
         dxdt[..n].copy_from_slice(v);
         self.loads.copy_from_slice(&self.efforts);
-        add_effects(&self.effects, q, v, &mut self.loads);
+        add(&self.effects, q, v, &mut self.loads);
         dxdt[n..2 * n].copy_from_slice(aba(&self.model, &mut self.data, q, v, &self.loads));
     }
 
@@ -110,9 +125,10 @@ pub(crate) fn add_effects<S: Scalar>(effects: &[(usize, JointEffect<S>)], q: &[S
 #[derive(Clone, Debug)]
 pub struct System<S> {
     dynamics: Dynamics<S>,
-    tangent: Dynamics<Dual<S, LANES>>,
-    tangent_state: Vec<Dual<S, LANES>>,
-    tangent_rate: Vec<Dual<S, LANES>>,
+    tangent: Dynamics<Lifted<S>>,
+    tangent_state: Vec<Lifted<S>>,
+    tangent_rate: Vec<Lifted<S>>,
+    resistances: Vec<S>,
 }
 
 impl<S: Scalar> System<S> {
@@ -121,7 +137,8 @@ impl<S: Scalar> System<S> {
         let lifted: Vec<_> = theta.iter().map(|&value| Dual::constant(value)).collect();
         let (dynamics, tangent) = (build.dynamics(theta)?, build.dynamics(&lifted)?);
         let zero = vec![Dual::default(); dynamics.dim()];
-        Ok(Self { dynamics, tangent, tangent_state: zero.clone(), tangent_rate: zero })
+        let resistances = vec![S::zero(); dynamics.joints()];
+        Ok(Self { dynamics, tangent, tangent_state: zero.clone(), tangent_rate: zero, resistances })
     }
 
     /// The right-hand side.
@@ -162,16 +179,51 @@ impl<S: Scalar> Ode<S> for System<S> {
         self.dynamics.rhs(x, dxdt);
     }
 
-    /// Columns by forward accumulation, [`LANES`] at a time; exact also where S itself carries derivatives.
+    /// Columns by forward accumulation; exact also where S itself carries derivatives.
     fn jacobian(&mut self, x: &[S], jacobian: &mut [S]) {
+        self.columns(x, jacobian, |tangent, x, rate, _| tangent.rhs(x, rate));
+    }
+
+    /// As df/dx, but with chords from rest in the place of the tangents of friction laws.
+    ///
+    /// The tangent of dry friction is flat beyond the transition velocity, so that a step which crosses it would not see the friction
+    /// turn around, and could keep a joint creeping for ever; the chord sees it. At rest, and for viscous friction, they are the same.
+    fn iteration_matrix(&mut self, x: &[S], matrix: &mut [S]) {
+        let n = self.coordinates();
+        self.resistances.fill(S::zero());
+        for (joint, effect) in &self.dynamics.effects {
+            self.resistances[*joint] += effect.resistance(x[n + joint]);
+        }
+        self.columns(x, matrix, |tangent, x, rate, resistances| {
+            tangent.rhs_with(x, rate, |effects, q, v, total| {
+                for (joint, effect) in effects {
+                    total[*joint] += effect.effort_at_rest(q[*joint]);
+                }
+                for ((total, &v), &resistance) in total.iter_mut().zip(v).zip(resistances) {
+                    *total -= Dual::constant(resistance) * v;
+                }
+            });
+        });
+    }
+}
+
+impl<S: Scalar> System<S> {
+    /// The derivative of `rhs` along each state, [`LANES`] at a time, as columns of a matrix stored row by row.
+    #[inline]
+    fn columns(
+        &mut self,
+        x: &[S],
+        matrix: &mut [S],
+        rhs: impl Fn(&mut Dynamics<Lifted<S>>, &[Lifted<S>], &mut [Lifted<S>], &[S]),
+    ) {
         let dim = x.len();
         for first in (0..dim).step_by(LANES) {
-            for (column, (tangent, &value)) in self.tangent_state.iter_mut().zip(x).enumerate() {
+            for (column, (state, &value)) in self.tangent_state.iter_mut().zip(x).enumerate() {
                 // A column before `first` wraps around to a lane that does not exist, which gives a constant.
-                *tangent = Dual::variable(value, column.wrapping_sub(first));
+                *state = Dual::variable(value, column.wrapping_sub(first));
             }
-            self.tangent.rhs(&self.tangent_state, &mut self.tangent_rate);
-            for (row, rate) in jacobian.chunks_exact_mut(dim).zip(&self.tangent_rate) {
+            rhs(&mut self.tangent, &self.tangent_state, &mut self.tangent_rate, &self.resistances);
+            for (row, rate) in matrix.chunks_exact_mut(dim).zip(&self.tangent_rate) {
                 for (entry, &slope) in row[first..].iter_mut().zip(&rate.gradient) {
                     *entry = slope;
                 }

@@ -18,10 +18,22 @@ impl<'a> Table<'a> {
             return Err(Error::Dimension { what, expected: rows.saturating_mul(columns), found: numbers.len(), each });
         }
         if let Some(place) = numbers.iter().position(|number| !number.is_finite()) {
-            let path = format!("{name}[{}, {}]", place / columns, place % columns);
+            let path = match rows {
+                1 => format!("{name}[{place}]"),
+                _ => format!("{name}[{}, {}]", place / columns, place % columns),
+            };
             return Err(Error::NonFinite { path, value: numbers[place] });
         }
         Ok(Self { numbers, rows, columns })
+    }
+
+    /// A single row of `length` numbers, one per `each`.
+    pub(crate) fn vector(name: &str, numbers: &'a [f64], length: usize, each: &str) -> Result<Self> {
+        if numbers.len() != length {
+            let (what, each) = (name.to_owned(), each.to_owned());
+            return Err(Error::Dimension { what, expected: length, found: numbers.len(), each });
+        }
+        Self::new(name, numbers, 1, length)
     }
 
     /// Number of samples.

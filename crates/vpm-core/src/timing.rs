@@ -9,12 +9,7 @@ use crate::table::Table;
 /// Duration in s of each of `count` steps on the way through `inputs`, which begins again from `initial_state` at its end.
 ///
 /// A step is what a real-time loop does between two samples: hold the command, evaluate and record the sample, integrate all substeps.
-pub fn time_steps(
-    setting: Setting<'_>,
-    initial_state: &[f64],
-    inputs: Table<'_>,
-    count: usize,
-) -> Result<Vec<f64>> {
+pub fn time_steps(setting: Setting<'_>, initial_state: &[f64], inputs: Table<'_>, count: usize) -> Result<Vec<f64>> {
     inputs.expect("inputs", inputs.rows(), setting.description.n_actuators())?;
     check_state("initial_state", setting.description, initial_state)?;
     if inputs.rows() == 0 {
@@ -31,11 +26,8 @@ pub fn time_steps(
         }
         let begin = Instant::now();
         stepper.sample(row, 0)?;
-        stepper.advance();
+        stepper.advance(setting.interrupt)?;
         durations.push(begin.elapsed().as_secs_f64());
-        if number % 256 == 0 && (setting.interrupt)() {
-            return Err(Error::Interrupted);
-        }
     }
     Ok(durations)
 }

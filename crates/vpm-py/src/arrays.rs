@@ -51,7 +51,9 @@ impl Numbers {
 
 fn read(name: &str, array: &Bound<'_, PyAny>) -> PyResult<(Vec<f64>, Vec<usize>)> {
     let array: PyArrayLikeDyn<'_, f64, AllowTypeChange> = array.extract().map_err(|_| {
-        PyValueError::new_err(format!("`{name}` must be an array of numbers; convert it with numpy.asarray(..., float)"))
+        PyValueError::new_err(format!(
+            "`{name}` must be an array of numbers; convert it with numpy.asarray(..., float)"
+        ))
     })?;
     let view = array.as_array();
     Ok((view.iter().copied().collect(), view.shape().to_vec()))

@@ -42,5 +42,7 @@ pub(crate) fn interruptible<T: Send>(
 }
 
 fn crashed() -> PyErr {
-    PyRuntimeError::new_err("the core stopped on an internal error; please report it with the model and the record that lead to it")
+    PyRuntimeError::new_err(
+        "the core stopped on an internal error; please report it with the model and the record that lead to it",
+    )
 }

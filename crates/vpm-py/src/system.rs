@@ -50,8 +50,9 @@ impl Request {
         (time_step, substeps, integrator): (f64, i64, &str),
         sensitivities: &[i64],
     ) -> PyResult<Self> {
-        let substeps = usize::try_from(substeps)
-            .map_err(|_| PyValueError::new_err(format!("substeps must be at least 1, got {substeps}; use 1 to begin with")))?;
+        let substeps = usize::try_from(substeps).map_err(|_| {
+            PyValueError::new_err(format!("substeps must be at least 1, got {substeps}; use 1 to begin with"))
+        })?;
         let stepping = Method::from_name(integrator).and_then(|method| Stepping::new(time_step, substeps, method));
         Ok(Self {
             theta: Numbers::vector("theta", theta)?,
@@ -81,12 +82,7 @@ impl System {
         self.checked(py, result)
     }
 
-    fn run<'py>(
-        &self,
-        py: Python<'py>,
-        run: Run,
-        variables: usize,
-    ) -> PyResult<(Table<'py>, Table<'py>, Cube<'py>)> {
+    fn run<'py>(&self, py: Python<'py>, run: Run, variables: usize) -> PyResult<(Table<'py>, Table<'py>, Cube<'py>)> {
         let (outputs, states) = (self.description.n_outputs(), self.description.n_states());
         let rows = run.states.len().checked_div(states).unwrap_or(0);
         Ok((
@@ -293,13 +289,7 @@ impl System {
     }
 
     /// Kinetic and potential energy in J: of bodies in gravity, and of effects that have a potential.
-    fn energy(
-        &self,
-        py: Python<'_>,
-        theta: &Any<'_>,
-        position: &Any<'_>,
-        velocity: &Any<'_>,
-    ) -> PyResult<(f64, f64)> {
+    fn energy(&self, py: Python<'_>, theta: &Any<'_>, position: &Any<'_>, velocity: &Any<'_>) -> PyResult<(f64, f64)> {
         let theta = Numbers::vector("theta", theta)?;
         let (q, v) = (Numbers::vector("position", position)?, Numbers::vector("velocity", velocity)?);
         self.checked(py, evaluate::energy(&self.description, theta.values(), q.values(), v.values()))
@@ -321,8 +311,9 @@ impl System {
         let request = Request::new(self, theta, (time_step, substeps, integrator), &[])?;
         let initial = Numbers::vector("initial_state", initial_state)?;
         let inputs = Numbers::table("inputs", inputs)?;
-        let count = usize::try_from(count)
-            .map_err(|_| PyValueError::new_err(format!("count must not be negative, got {count}; ask for some steps")))?;
+        let count = usize::try_from(count).map_err(|_| {
+            PyValueError::new_err(format!("count must not be negative, got {count}; ask for some steps"))
+        })?;
         let durations = self.compute(py, |interrupt| {
             time_steps(request.setting(&self.description, interrupt), initial.values(), inputs.as_table()?, count)
         })?;

@@ -50,6 +50,7 @@ PAYLOAD = EffectType(
     confused_with={
         "bias_force": "they agree where gravity's lever does not change; other poses or fast motion part them",
         "spring": "near the hanging position gravity acts like a spring; large angles or fast motion part them",
+        "torque_ripple": "gravity on a revolute joint repeats once per turn; a vertical axis or fast motion parts them",
         "sensor_gain": "both scale the effort that an acceleration needs; a record with a known load parts them",
     },
 )
@@ -138,6 +139,7 @@ ACTUATOR_LAG = EffectType(
     impossible="a negative time constant would mean a drive that runs away from its command",
     confused_with={
         "input_delay": "they agree for slow commands; steps and fast commands part them",
+        "sensor_delay": "they agree for slow motion; steps and fast motion part them",
         "viscous_friction": "both weaken fast motion; steady motion at several speeds shows the friction alone",
     },
 )
@@ -162,7 +164,7 @@ SENSOR_OFFSET = EffectType(
     sentence="{at} reads {value} too much, always.",
     impossible="either sign is possible: it says in which direction the zero is shifted",
     confused_with={
-        "bias_force": "through gravity or a spring a shifted zero acts like a constant load; other poses part them",
+        "bias_force": "through gravity or a spring a shifted zero acts like a load; other poses part them",
         "spring": "a shifted zero and a shifted rest position agree; a reference position parts them",
     },
 )

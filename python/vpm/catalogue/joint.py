@@ -47,6 +47,8 @@ VISCOUS_FRICTION = EffectType(
     confused_with={
         "coulomb_friction": "motion at one speed alone does not part them; records at several speeds do",
         "actuator_lag": "both weaken fast motion; steady motion at several speeds shows the friction alone",
+        "saturation": "both weaken large commands; large commands at low speed part them",
+        "sensor_gain": "both scale the effort that a speed needs; a reference length parts them",
     },
 )
 
@@ -166,6 +168,7 @@ BIAS_FORCE = EffectType(
             " starts from rest part them"
         ),
         "payload": "they agree where gravity's lever does not change; other poses or fast motion part them",
+        "sensor_offset": "through gravity or a spring a shifted zero acts like a load; other poses part them",
         "spring": "they agree over a short way; motion over a longer way parts them",
     },
 )
@@ -199,6 +202,7 @@ SPRING = EffectType(
     confused_with={
         "bias_force": "they agree over a short way; motion over a longer way parts them",
         "payload": "near the hanging position gravity acts like a spring; large angles or fast motion part them",
+        "sensor_offset": "a shifted rest position and a shifted zero agree; a reference position parts them",
         "torque_ripple": "they agree over less than a quarter of a period; a longer way parts them",
     },
 )

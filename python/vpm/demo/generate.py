@@ -120,7 +120,7 @@ def train_reference(time: float) -> float:
 
 
 def validation_reference(time: float) -> float:
-    """Reference of the validation record: moves from angle to angle, each followed by a rest.
+    """Reference of the validation record: moves from angle to angle, each followed by a short rest.
 
     Parameters
     ----------
@@ -132,8 +132,8 @@ def validation_reference(time: float) -> float:
     float
         Reference angle [rad].
     """
-    angles = (0.0, 0.9, 0.3, -1.1, -0.5, 0.6, 1.2, -0.2, -0.9, 0.4, 0.0)
-    move, rest = 0.6, 0.35
+    angles = (0.0, 0.9, 0.3, -1.1, -0.5, 0.6, 1.2, -0.2, -0.9, 0.4, 1.0, -0.6, 0.0)
+    move, rest = 0.7, 0.1
     number, within = divmod(time, move + rest)
     here = angles[min(int(number), len(angles) - 1)]
     there = angles[min(int(number) + 1, len(angles) - 1)]

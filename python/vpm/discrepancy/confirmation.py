@@ -15,6 +15,11 @@ from vpm.model import Model
 
 Array = NDArray[np.float64]
 
+#: A shape is fitted too if moving it would take away this share of the training mean square, to first order.
+LEAST_RELEASED = 1e-3
+#: A refit stops when the sum of squares changes by less than this share: far below what a verdict rests on.
+TOLERANCE = 1e-6
+
 
 @dataclass(frozen=True)
 class Data:
@@ -95,7 +100,7 @@ def judge(model: Model, free: tuple[str, ...], data: Data, bounds: dict[str, tup
     DivergedError
         The fitted model cannot simulate the unseen records.
     """
-    fit = estimate(model, data.training, free, bounds=bounds)
+    fit = estimate(model, data.training, free, bounds=bounds, tolerance=TOLERANCE)
     fitted = model.with_parameters(dict(zip(free, map(float, fit.values), strict=True)))
     unseen, _ = data.unseen.evaluate(fitted, fitted.theta)
     simulated = None
@@ -109,10 +114,11 @@ def confirm(current: Judged, data: Data, probe: Probe) -> Trial:
     bounds = _bounds(probe)
     start = probe.model.with_parameters(_inside(probe, bounds))
     free = (*current.free, *probe.free)
-    fit = estimate(start, data.training, free, bounds=bounds)
-    released, held = _release(start, data, free, fit, probe)
-    if released:
-        start = start.with_parameters(dict(zip(free, map(float, fit.values), strict=True)))
+    held: tuple[Alias, ...] = ()
+    if probe.invisible:
+        rough = estimate(start, data.training, free, bounds=bounds, linear_only=True)
+        released, held = _release(start, data, free, rough, probe)
+        start = start.with_parameters(dict(zip(free, map(float, rough.values), strict=True)))
         free = (*free, *released)
     diverged = ""
     try:
@@ -167,8 +173,6 @@ def _release(
     model: Model, data: Data, free: tuple[str, ...], fit: Estimate, probe: Probe
 ) -> tuple[tuple[str, ...], tuple[Alias, ...]]:
     """Parameters without influence at zero size (a period, a transition velocity) that have one now."""
-    if not probe.invisible:
-        return (), ()
     theta = model.theta.copy()
     theta[[model.index(name) for name in free]] = fit.values
     _, fresh = data.training.evaluate(model, theta, [model.index(name) for name in probe.invisible])
@@ -176,7 +180,7 @@ def _release(
     held: list[Alias] = []
     known, names = fit.jacobian, list(free)
     for name, column in zip(probe.invisible, fresh.T, strict=True):
-        if not np.any(column):
+        if not np.any(column) or explained_share(fit.residual, column[:, None]) < LEAST_RELEASED:
             continue
         if explained_share(column, known) > ALIAS_SHARE:
             held.append(Alias(name, names[closest_column(column, known)]))

@@ -161,7 +161,8 @@ def _data(
     notes: list[str],
 ) -> Data:
     fitted = InverseDynamicsProblem(model, training, cutoff=cutoff)
-    predicted = InverseDynamicsProblem(model, unseen, cutoff=cutoff)
+    # One filter for all records: a gap that is measured in another band is another gap.
+    predicted = InverseDynamicsProblem(model, unseen, cutoff=cutoff or min(m.cutoff for m in fitted.motions))
     for problem in (fitted, predicted):
         for record, m in zip(problem.experiments, problem.motions, strict=True):
             notes.append(f"{record.name}: motion filtered at {m.cutoff:.4g} Hz, decimated by {m.decimation}")

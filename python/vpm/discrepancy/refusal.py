@@ -35,9 +35,9 @@ class Thresholds:
     candidates: int
     interval: float
 
-    def score(self, blocks: int) -> float:
-        """Least standard deviations of unseen gain, by Student's t with one degree of freedom less than blocks."""
-        return float(student.isf(FALSE_ALARM_LEVEL / max(1, self.candidates), max(1, blocks - 1)))
+    def score(self, pieces: int) -> float:
+        """Least standard deviations of unseen gain, by Student's t with one degree of freedom less than pieces."""
+        return float(student.isf(FALSE_ALARM_LEVEL / max(1, self.candidates), max(1, pieces - 1)))
 
 
 def refuse_probe(probe: Probe) -> str:
@@ -79,8 +79,7 @@ def _too_short(trial: Trial, thresholds: Thresholds) -> str:
     model = trial.judged.model
     for name in trial.parameters:
         parameter = model.parameters[name]
-        is_time = parameter.unit == "s" and parameter.kind != "shape"
-        if is_time and parameter.value < thresholds.interval:
+        if parameter.unit == "s" and parameter.value < thresholds.interval:
             return (
                 f"{name} comes out as {1e3 * parameter.value:.3g} ms, less than the sampling interval of "
                 f"{1e3 * thresholds.interval:.3g} ms: it cannot be told from the sampling itself"
@@ -116,11 +115,11 @@ def _too_little(trial: Trial, thresholds: Thresholds) -> str:
             f"it lowers the unseen error by only {_percent(unseen.relative)} of its mean square "
             f"({_rms(unseen.before, unseen.after)})"
         )
-    needed = thresholds.score(unseen.blocks)
+    needed = thresholds.score(unseen.pieces)
     if unseen.score < needed:
         return (
-            f"its gain on unseen data is {unseen.score:.1f} standard deviations over {unseen.blocks} independent "
-            f"blocks, and {needed:.1f} are needed when {thresholds.candidates} candidates are tried"
+            f"its gain on unseen data is {unseen.score:.1f} standard deviations over {unseen.pieces} independent "
+            f"pieces, and {needed:.1f} are needed when {thresholds.candidates} candidates are tried"
         )
     return ""
 

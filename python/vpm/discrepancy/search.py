@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from functools import partial
+from typing import TypeVar
 
 from vpm.discrepancy.candidates import candidates
 from vpm.discrepancy.confirmation import Data, Judged, Trial, confirm
@@ -16,6 +20,9 @@ from vpm.identify import gain, segments
 SHORT_LIST = 6
 #: Another candidate is as good as the accepted one if it reaches this share of its gain.
 TIE_SHARE = 0.9
+
+Item = TypeVar("Item")
+Outcome = TypeVar("Outcome")
 
 #: Called with a sentence on what is being done.
 Tell = Callable[[str], None]
@@ -74,10 +81,10 @@ def _round(
     thresholds = Thresholds(len(listed) * number, min(m.dt for m in data.training.motions))
     refused: dict[tuple[str, str], str] = {}
     promising: list[Probe] = []
+    base = current.baseline
     ranking: dict[tuple[str, str], RankedCandidate] = {}
-    for candidate in listed:
-        tell(f"round {number}: screening {candidate.label}")
-        result = probe(current.baseline, data.training, candidate)
+    tell(f"round {number}: screening {len(listed)} candidates")
+    for candidate, result in zip(listed, _side_by_side(partial(probe, base, data.training), listed), strict=True):
         key = (candidate.effect.name, candidate.site)
         ranking[key] = RankedCandidate(*key, number, result.drop, float("nan"), accepted=False)
         if reason := refuse_probe(result):
@@ -85,12 +92,12 @@ def _round(
         else:
             promising.append(result)
     promising.sort(key=lambda p: -p.score)
-    trials = []
-    for result in promising[:SHORT_LIST]:
-        tell(f"round {number}: refitting with {result.candidate.label}")
-        trial = confirm(current, data, result)
-        trials.append(trial)
-        key = (result.candidate.effect.name, result.candidate.site)
+    short_list = promising[:SHORT_LIST]
+    if short_list:
+        tell(f"round {number}: refitting with {', '.join(p.candidate.label for p in short_list)}")
+    trials = _side_by_side(partial(confirm, current, data), short_list)
+    for trial in trials:
+        key = (trial.probe.candidate.effect.name, trial.probe.candidate.site)
         ranking[key] = replace(ranking[key], unseen=trial.unseen.relative)
         if reason := refuse_trial(trial, thresholds):
             refused[key] = reason
@@ -106,6 +113,12 @@ def _round(
     order = tuple(replace(c, accepted=True) if (c.name, c.site) == key else c for c in order)
     tell(f"round {number}: accepted {best.probe.candidate.label}")
     return Round(Accepted(best, _rivals(best, believed, data)), _listed(refused), order)
+
+
+def _side_by_side(work: Callable[[Item], Outcome], items: Sequence[Item]) -> list[Outcome]:
+    """Results in the order of the items; the core lets go of the interpreter, so threads use all processors."""
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        return list(pool.map(work, items))
 
 
 def _rivals(best: Trial, believed: Sequence[Trial], data: Data) -> tuple[str, ...]:

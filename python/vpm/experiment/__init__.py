@@ -1,7 +1,7 @@
 """Measured records: reading and checking logs, filtering them, and the motion and the noise in them."""
 
 from vpm.experiment.cutoff import CutoffChoice, choose_cutoff
-from vpm.experiment.motion import Motion, motion
+from vpm.experiment.motion import Motion, common_cutoff, motion
 from vpm.experiment.noise import noise_std, quantisation_step
 from vpm.experiment.record import Experiment
 from vpm.experiment.signal import decimation_for, differentiate, lowpass, parallel_filter
@@ -11,6 +11,7 @@ __all__ = [
     "Experiment",
     "Motion",
     "choose_cutoff",
+    "common_cutoff",
     "decimation_for",
     "differentiate",
     "lowpass",

@@ -2,8 +2,8 @@
 
 Low cut-off frequencies lose acceleration, high ones let through noise that two derivatives have multiplied by the
 square of the frequency. Where the position spectrum stands clearly above its noise floor it is taken for motion,
-elsewhere for noise, and the cut-off frequency is the lowest one whose expected error of the acceleration is near the
-least of all.
+elsewhere for noise, and the cut-off frequency is the highest one whose expected error of the acceleration is near the
+least of all: what follows averages over noise, but nothing brings back motion that was cut off.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ FEWEST_SAMPLES = 60
 #: An error of the acceleration that matters to nobody, as a share of its root mean square.
 NEGLIGIBLE = 1e-3
 
-#: How far the expected squared error may exceed the least one for the sake of a lower cut-off frequency.
+#: How far the expected squared error may exceed the least one for the sake of a higher cut-off frequency.
 NEAR_BEST = 1.1
 
 
@@ -75,7 +75,7 @@ def choose_cutoff(position: Array, rate: float) -> CutoffChoice:
     Returns
     -------
     CutoffChoice
-        One frequency for all joints: the lowest whose expected errors, each relative to the best for that joint, have
+        One frequency for all joints: the highest whose expected errors, each relative to the best for that joint, have
         a sum near the least.
 
     Raises
@@ -103,14 +103,14 @@ def choose_cutoff(position: Array, rate: float) -> CutoffChoice:
         total += error / error.min() if error.min() > 0.0 else np.ones(offered.size)
         noise.append(float(np.sqrt(floor * 0.5 * rate)))
         band.append(float(frequency[within].max()) if within.any() else 0.0)
-    pick = int(np.flatnonzero(total <= NEAR_BEST * total.min())[0])
+    pick = int(np.flatnonzero(total <= NEAR_BEST * total.min())[-1])
     return CutoffChoice(float(offered[pick]), tuple(noise), tuple(band), pick in {0, offered.size - 1})
 
 
 def position_spectrum(position: Array, rate: float) -> tuple[Array, Array, float]:
     """Smoothed one-sided power spectrum of a position and the level of its noise floor.
 
-    Welch's method on second differences, divided by their gain ``(2 - 2 cos w)^2``: positions fall so steeply with
+    Welch's method on second differences, divided by their gain ``(2 - 2 cos w)^2`` as the window and the smoothing show it: positions fall so steeply with
     frequency that without this the leakage of the slow motion would drown all the rest.
 
     Parameters
@@ -131,8 +131,10 @@ def position_spectrum(position: Array, rate: float) -> tuple[Array, Array, float
     bend = np.diff(position, 2)
     length = int(np.clip(bend.size // 8, min(bend.size, 256), 4096))
     frequency, power = welch(bend, rate, nperseg=length, detrend="constant")
-    gain = (2.0 - 2.0 * np.cos(2.0 * np.pi * frequency[1:] / rate)) ** 2
-    spectrum = _smooth(np.asarray(power[1:], dtype=np.float64)) / gain
+    gain = (2.0 - 2.0 * np.cos(2.0 * np.pi * frequency / rate)) ** 2
+    # What Hann's window makes of the gain: its spectrum has the powers 1/6, 2/3, 1/6 over three lines.
+    seen = np.convolve(np.concatenate([gain[1:2], gain, gain[-2:-1]]), [1.0 / 6.0, 2.0 / 3.0, 1.0 / 6.0], "valid")
+    spectrum = _smooth(np.asarray(power[1:], dtype=np.float64)) / _smooth(seen[1:])
     top = frequency[1:] >= 0.4 * rate
     return frequency[1:], spectrum, float(np.median(spectrum[top]))
 

@@ -172,6 +172,35 @@ def motion(
     )
 
 
+def common_cutoff(experiments: Iterable[Experiment], model: Machine) -> float:
+    """Cut-off frequency for records that are compared with each other: the lowest that `motion` chooses for any.
+
+    Residuals of two records say the same only in the same band; a record that was filtered before it was stored would
+    otherwise be judged in a wider one than the record that the parameters were fitted to.
+
+    Parameters
+    ----------
+    experiments : iterable of Experiment
+        At least one, each with the position of every joint.
+    model : Model
+
+    Returns
+    -------
+    float
+        Hz.
+
+    Raises
+    ------
+    ExperimentError
+        There is no record, a channel is missing, or a record is too short.
+    """
+    joints = tuple(model.joints)
+    cutoffs = [choose_cutoff(_channels(each, model, joints, "position"), each.rate).cutoff for each in experiments]
+    if not cutoffs:
+        raise ExperimentError("a common cut-off frequency needs at least one record, and none was given")
+    return min(cutoffs)
+
+
 def _channels(experiment: Experiment, model: Machine, owners: tuple[str, ...], quantity: str) -> Array:
     for owner in owners:
         channel = f"{owner}.{quantity}"

@@ -67,14 +67,14 @@ def quantisation_step(values: Array) -> float | None:
     Returns
     -------
     float or None
-        None where the values lie on no grid coarser than a ten-millionth of their range, or take fewer than
+        None where the values lie on no grid coarser than a billionth of their range, or take fewer than
         five levels.
     """
     if np.unique(values).size < 5:
         return None
     differences = np.unique(np.abs(np.diff(values)))
     resolution = 16.0 * np.finfo(np.float64).eps * float(np.max(np.abs(values)))
-    smallest = max(1e-7 * float(np.ptp(values)), 4.0 * resolution)
+    smallest = max(1e-9 * float(np.ptp(values)), 4.0 * resolution)
     differences = differences[differences > resolution]
     step = float(differences[0]) if differences.size else 0.0
     for _ in range(64):

@@ -59,7 +59,7 @@ def lowpass(values: Array, rate: float, cutoff: float, order: int = MOTION_FILTE
         raise ExperimentError(f"a filter of order {order} does nothing; choose an order of at least 1")
     _need_samples(values, 4, "filtering")
     sections = butter(order, cutoff / (0.5 * rate), output="sos")
-    return _forward_backward(sections, values, settling_samples(rate, cutoff))
+    return _forward_backward(sections, values, 2 * settling_samples(rate, cutoff))
 
 
 def settling_samples(rate: float, cutoff: float) -> int:

@@ -25,6 +25,9 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 AnyProblem = InverseDynamicsProblem | OutputErrorProblem
 
+#: Evaluations after which a fit is ended as it stands.
+MOST_EVALUATIONS = 40
+
 #: Called after every evaluation with (evaluations so far, root mean square of the weighted residual).
 Progress = Callable[[int, float], None]
 
@@ -54,7 +57,8 @@ def estimate(
     free: Sequence[str],
     *,
     bounds: Mapping[str, tuple[float, float]] | None = None,
-    max_evaluations: int = 40,
+    tolerance: float = 1e-8,
+    linear_only: bool = False,
     progress: Progress | None = None,
 ) -> Estimate:
     """Move ``free`` parameters of ``model`` until the residual of ``data`` is least.
@@ -71,6 +75,11 @@ def estimate(
         Dotted parameter names.
     bounds : mapping, optional
         Bounds that replace those of the model, by parameter.
+    tolerance : float
+        Relative change of parameters or of the sum of squares at which to stop.
+    linear_only : bool
+        Stop after the first step.
+    progress : callable, optional
     """
     columns = [model.index(name) for name in free]
     low, high = _bounds(model, free, bounds or {})
@@ -78,7 +87,7 @@ def estimate(
     start = np.clip(model.theta[columns], low, high)
     if columns:
         start = _linear_step(counter, start, low, high)
-        start = _refine(counter, start, low, high, max_evaluations)
+        start = start if linear_only else _refine(counter, start, low, high, tolerance)
     residual, jacobian = counter(start)
     unseen = unseen_combinations(jacobian, free)
     covariance = _covariance(data, residual, jacobian, unseen, free)
@@ -124,7 +133,7 @@ def _linear_step(counter: _Counter, start: Array, low: Array, high: Array) -> Ar
     return candidate if better else start
 
 
-def _refine(counter: _Counter, start: Array, low: Array, high: Array, max_evaluations: int) -> Array:
+def _refine(counter: _Counter, start: Array, low: Array, high: Array, tolerance: float) -> Array:
     residual, jacobian = counter(start)
     lengths = column_lengths(jacobian)
     gradient = (jacobian / lengths).T @ residual
@@ -140,9 +149,9 @@ def _refine(counter: _Counter, start: Array, low: Array, high: Array, max_evalua
         bounds=(low, high),
         method="trf",
         x_scale=1.0 / lengths,
-        max_nfev=max_evaluations,
-        xtol=1e-10,
-        ftol=1e-12,
+        max_nfev=MOST_EVALUATIONS,
+        xtol=tolerance,
+        ftol=tolerance,
         gtol=1e-12,
     )
     solution: Array = result.x

@@ -67,34 +67,47 @@ def robust_covariance(jacobian: Array, residual: Array, segments: Iterable[slice
     bread = np.linalg.pinv(jacobian.T @ jacobian, hermitian=True)
     meat = np.zeros_like(bread)
     for segment in segments:
-        score = jacobian[segment] * residual[segment, None]
-        meat += score.T @ score
-        lags = correlation_length(residual[segment])
-        for lag in range(1, lags + 1):
-            cross = score[lag:].T @ score[:-lag]
-            meat += (1.0 - lag / (lags + 1)) * (cross + cross.T)
+        sums = _window_sums(jacobian[segment] * residual[segment, None], correlation_length(residual[segment]) + 1)
+        meat += sums.T @ sums
     covariance: Array = bread @ meat @ bread
     return 0.5 * (covariance + covariance.T)
 
 
+def _window_sums(score: Array, length: int) -> Array:
+    """Sums over all windows of ``length`` rows, those that hang over the ends too, divided by ``sqrt(length)``.
+
+    Two rows ``l`` apart share ``length - l`` windows, so the products of these sums carry the Bartlett weights
+    ``1 - l/length`` without a loop over lags.
+    """
+    total = np.zeros((len(score) + 2 * length, score.shape[1]))
+    np.cumsum(score, axis=0, out=total[length : length + len(score)])
+    total[length + len(score) :] = total[length + len(score) - 1]
+    sums: Array = (total[length:] - total[:-length]) / np.sqrt(length)
+    return sums
+
+
 @dataclass(frozen=True)
 class Gain:
-    """How much smaller one residual is than another on the same samples.
+    """How much smaller one residual is than another on the same samples, and how sure that is.
 
     Attributes
     ----------
     before, after : float
         Root mean square of the two residuals.
+    weight : float
+        Share of the change from one prediction to the other that the data ask for: 1 if the second prediction is
+        right, 0 if the change has nothing to do with the data.
     score : float
-        Mean drop of the squared residual over its standard error between blocks, in standard deviations.
-    blocks : int
-        Number of blocks the standard error rests on.
+        That weight in standard deviations.
+    pieces : int
+        Independent pieces of the records that the standard deviation rests on.
     """
 
     before: float
     after: float
+    weight: float
     score: float
-    blocks: int
+    pieces: int
 
     @property
     def relative(self) -> float:
@@ -103,10 +116,11 @@ class Gain:
 
 
 def gain(before: Array, after: Array, segments: Sequence[slice]) -> Gain:
-    """Compare two residuals of the same records, block by block.
+    """Compare two residuals of the same records.
 
-    Samples of one correlation length are drawn together into a block, so that the standard error of the mean drop
-    counts independent pieces (P. Carlstein's non-overlapping block variance, *Annals of Statistics* 14, 1986).
+    Does the second model know something that the first does not? The first residual is regressed on the change,
+    ``before = weight (before - after) + rest``: the test of forecast encompassing (D. Harvey, S. Leybourne, P. Newbold,
+    *J. Business & Economic Statistics* 16, 1998), with the standard deviation of :func:`robust_covariance`.
 
     Parameters
     ----------
@@ -114,18 +128,16 @@ def gain(before: Array, after: Array, segments: Sequence[slice]) -> Gain:
     segments : sequence of slice
         The records, in the order of the samples.
     """
-    drops = np.concatenate([_block_means(before[s] ** 2 - after[s] ** 2, before[s] - after[s]) for s in segments])
-    spread = float(drops.std(ddof=1)) / np.sqrt(drops.size) if drops.size > 1 else np.inf
-    mean = float(drops.mean())
-    score = mean / spread if spread > 0.0 else (np.inf if mean > 0.0 else 0.0)
-    return Gain(_rms(before), _rms(after), float(score), int(drops.size))
-
-
-def _block_means(drop: Array, difference: Array) -> Array:
-    """Means of ``drop`` over blocks of two correlation lengths, at least eight blocks to a record."""
-    length = min(2 * max(correlation_length(drop), correlation_length(difference)), max(1, drop.size // 8))
-    count = max(1, drop.size // length)
-    return np.array([piece.mean() for piece in np.array_split(drop, count)])
+    change = before - after
+    power = float(change @ change)
+    lengths = [correlation_length(change[s] * before[s]) for s in segments]
+    pieces = sum(max(1, (s.stop - s.start) // length) for s, length in zip(segments, lengths, strict=True))
+    if power <= 1e-24 * float(before @ before):
+        return Gain(_rms(before), _rms(after), 0.0, 0.0, pieces)
+    weight = float(change @ before) / power
+    variance = robust_covariance(change[:, None], before - weight * change, segments)[0, 0]
+    score = weight / np.sqrt(variance) if variance > 0.0 else np.inf
+    return Gain(_rms(before), _rms(after), weight, float(score), pieces)
 
 
 def _rms(values: Array) -> float:

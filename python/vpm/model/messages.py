@@ -21,7 +21,8 @@ _EXAMPLES: Mapping[str, str] = {
     "bodies": "a table [bodies.link]",
     "joints": "a table [joints.axis]",
     "mass": 'mass = { value = 1.0, unit = "kg" }',
-    "type": 'type = "..."',
+    "joints.type": 'type = "prismatic"',
+    "effects.type": 'type = "viscous_friction"',
     "parent": 'parent = "world"',
     "child": 'child = "link"',
     "axis": "axis = [1.0, 0.0, 0.0]",
@@ -110,7 +111,10 @@ def schema_problems(error: ValidationError, *, within: tuple[str, ...] = ()) -> 
         keys = (*within, *detail["loc"])
         if keys[0] == "controllers" and len(keys) > 3:  # the schema puts the type of the controller into the path
             keys = (*keys[:2], *keys[3:])
-        if keys[-1] == "value" and detail["type"] != "missing":  # a bare number has no such key
+        if keys[-1] == "value" and detail["type"] not in {
+            "missing",
+            "extra_forbidden",
+        }:  # bare numbers have no such key
             keys = keys[:-1]
         problems.append(
             Problem(
@@ -125,7 +129,7 @@ def _sentence(kind: str, keys: tuple[str | int, ...], found: object, context: Ma
     if kind == "extra_forbidden":
         return f"is not a known key; {near_match(str(keys[-1]), _known_keys(keys))}"
     if kind == "missing":
-        example = _EXAMPLES.get(str(keys[-1]))
+        example = _EXAMPLES.get(f"{keys[0]}.{keys[-1]}", _EXAMPLES.get(str(keys[-1])))
         return "is missing; add it" + (f", for example {example}" if example else "")
     if kind in _KINDS:
         return f"is {_shown(found)}, but has to be {_KINDS[kind]}; correct it"

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from vpm.plot.style import BLUE, GREEN, INK, LINE, ORANGE, SOFT, panels, styled
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -109,6 +110,9 @@ def plot_gap(gaps: Mapping[str, GapLike]) -> Figure:
     ----------
     gaps : mapping of str to ChannelGap
     """
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
     figure, axes = panels(1, height=0.5 + 0.85 * max(1, len(gaps)))
     axis = axes[0][0]
     stages = (("before", SOFT), ("recalibrated", ORANGE), ("after", BLUE))
@@ -119,16 +123,17 @@ def plot_gap(gaps: Mapping[str, GapLike]) -> Figure:
             share = 100.0 * float(getattr(gap, stage)) / signal
             largest = max(largest, share)
             place = row + 0.27 * (shift - 1)
-            axis.barh(place, share, height=0.24, color=color, label=stage if row == 0 else "")
+            axis.barh(place, share, height=0.24, color=color)
             axis.annotate(f"{share:.3g} %", (share, place), xytext=(4, 0), textcoords="offset points", va="center")
         if np.isfinite(gap.noise_floor):
             floor = 100.0 * gap.noise_floor / signal
             axis.plot([floor, floor], [row - 0.42, row + 0.42], "--", color=INK, linewidth=1.1)
-            axis.plot([], [], "--", color=INK, linewidth=1.1, label="noise floor" if row == 0 else "")
     axis.set_xlim(0.0, 1.13 * largest if largest > 0.0 else 1.0)
     _name_rows(axis, list(gaps))
     axis.set_xlabel("root mean square gap / measured signal [%]")
-    axis.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=4, borderaxespad=0.2)
+    kinds = [Patch(color=color, label=stage) for stage, color in stages]
+    floor_line = Line2D([], [], linestyle="--", color=INK, linewidth=1.1, label="noise floor")
+    _legend_above(axis, [*kinds, floor_line] if any(np.isfinite(g.noise_floor) for g in gaps.values()) else kinds)
     return figure
 
 
@@ -141,6 +146,8 @@ def plot_candidates(candidates: Sequence[CandidateLike]) -> Figure:
     candidates : sequence of RankedCandidate
         The best sixteen are drawn; an accepted one in whichever round it was.
     """
+    from matplotlib.patches import Patch
+
     first = min((c.round for c in candidates), default=1)
     chosen = [c for c in candidates if c.round == first or c.accepted]
     chosen.sort(key=lambda c: (not c.accepted, c.round if c.accepted else 0, -c.screened))
@@ -160,16 +167,11 @@ def plot_candidates(candidates: Sequence[CandidateLike]) -> Figure:
                 fontsize=7.5,
                 color=SOFT,
             )
-    for color, text in (
-        (LINE, "screened, training data"),
-        (GREEN, "accepted, unseen data"),
-        (ORANGE, "refused, unseen data"),
-    ):
-        axis.barh([], [], color=color, label=text)
     axis.axvline(0.0, color=INK, linewidth=0.8)
     _name_rows(axis, [f"{c.name.replace('_', ' ')} at {c.site}" for c in chosen])
     axis.set_xlabel("share of the residual's mean square that goes [%]")
-    axis.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, borderaxespad=0.2)
+    kinds = {"screened, training data": LINE, "accepted, unseen data": GREEN, "refused, unseen data": ORANGE}
+    _legend_above(axis, [Patch(color=color, label=text) for text, color in kinds.items()])
     return figure
 
 
@@ -216,15 +218,19 @@ def plot_step_cost(quantiles: Mapping[str, float], period: float) -> Figure:
     low = 0.5 * min(float(times.min()), 1e6 * period)
     for row, (time, is_late) in enumerate(zip(times, late, strict=True)):
         axis.barh(row, time - low, left=low, height=0.55, color=ORANGE if is_late else BLUE)
-        text = f"{time:.3g} µs, {100e-6 * time / period:.2g} % of the period"
-        axis.annotate(text, (time, row), xytext=(5, 0), textcoords="offset points", va="center")
+        text = f"{time:.4g} µs, {100e-6 * time / period:.3g} %"
+        axis.annotate(text, (1.02, row), xycoords=("axes fraction", "data"), va="center", fontsize=8.5)
     axis.axvline(1e6 * period, color=INK, linewidth=1.4, linestyle="--")
-    axis.annotate("period", (1e6 * period, 1.0), xycoords=("data", "axes fraction"), ha="center", va="bottom")
+    axis.annotate("period, 100 %", (1e6 * period, 1.0), xycoords=("data", "axes fraction"), ha="center", va="bottom")
     axis.set_xscale("log")
-    axis.set_xlim(low, 40.0 * max(1e6 * period, float(times.max())) if late.any() else 4.0 * 1e6 * period)
+    axis.set_xlim(low, 2.0 * max(1e6 * period, float(times.max())))
     _name_rows(axis, list(quantiles))
     axis.set_xlabel("time of one step [µs]")
     return figure
+
+
+def _legend_above(axis: Axes, handles: Sequence[Artist]) -> None:
+    axis.legend(handles=handles, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=4, borderaxespad=0.2)
 
 
 def _name_rows(axis: Axes, names: Sequence[str]) -> None:

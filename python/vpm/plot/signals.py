@@ -100,7 +100,7 @@ def plot_run(run: RunLike) -> Figure:
         draw_overlay(axis, run.time, real, run.values[:, at], [int(start) for start in run.starts])
         axis.set_ylabel(label("", run.units[at]).strip())
         axis.set_title(run.channels[at])
-    axes[0][0].legend(loc="upper right", ncols=2)
+    legend_above(axes[0][0], 2, right=True)
     _finish_time(figure, axes[-1][0], f"{run.model_name} on {run.experiment_name}, {run.mode.replace('_', ' ')}")
     return figure
 
@@ -119,6 +119,8 @@ def plot_residual_time(time: Array, stages: Mapping[str, Array], unit: str) -> F
     """
     figure, axes = panels(1, height=2.6)
     draw_residual_time(axes[0][0], time, stages, unit)
+    if len(stages) > 1:
+        legend_above(axes[0][0], len(stages))
     return figure
 
 
@@ -138,6 +140,7 @@ def plot_residual_against(values: Array, stages: Mapping[str, Array], axis_label
     """
     figure, axes = panels(1, height=3.0)
     draw_residual_against(axes[0][0], values, stages, axis_label, unit=unit)
+    legend_above(axes[0][0], len(stages))
     return figure
 
 
@@ -157,7 +160,7 @@ def plot_spectrum(signals: Mapping[str, Array], rate: float, unit: str) -> Figur
     figure, axes = panels(1, height=2.8)
     axis = axes[0][0]
     for (name, values), color in zip(signals.items(), STAGES[2:] + STAGES[:2], strict=False):
-        frequency, power = welch(values, rate, nperseg=min(values.size, 4096), detrend="constant")
+        frequency, power = welch(values, rate, nperseg=min(values.size, max(256, values.size // 8)), detrend="constant")
         axis.loglog(frequency[1:], np.sqrt(power[1:]), color=color, label=name)
     axis.set_xlabel("frequency [Hz]")
     axis.set_ylabel(label("density", f"{unit}/√Hz"))
@@ -214,8 +217,6 @@ def draw_residual_time(axis: Axes, time: Array, stages: Mapping[str, Array], uni
     axis.set_xlabel("time [s]")
     axis.set_ylabel(label("residual", unit))
     axis.margins(x=0.01)
-    if len(stages) > 1:
-        _legend_above(axis, len(stages))
 
 
 def draw_residual_against(
@@ -230,14 +231,16 @@ def draw_residual_against(
             residual[::step],
             ".",
             color=color,
-            alpha=0.22,
-            markersize=2.5,
+            alpha=0.35,
+            markersize=3.2,
             markeredgewidth=0,
             rasterized=True,
         )
         centers, means = running_mean(values, residual)
         axis.plot(centers, means, color="white", linewidth=3.4)
-        axis.plot(centers, means, color=color, linewidth=1.9, label=f"{name}, mean" if name else "mean")
+        axis.plot(
+            centers, means, "o-", color=color, linewidth=1.9, markersize=3.2, label=f"{name}, mean" if name else "mean"
+        )
         low, high = np.percentile(residual, [0.2, 99.8])
         bottom, top = min(bottom, float(low)), max(top, float(high))
     if top > bottom:
@@ -245,7 +248,6 @@ def draw_residual_against(
     axis.axhline(0.0, color=INK, linewidth=0.7)
     axis.set_xlabel(axis_label)
     axis.set_ylabel(label("residual", unit))
-    _legend_above(axis, len(stages))
 
 
 #: Points that a cloud keeps.
@@ -276,8 +278,14 @@ def _colors(count: int) -> tuple[str, ...]:
     return (STAGES[:count] if count >= 3 else (ORANGE, BLUE)) if count <= len(STAGES) else STAGES * (count // 6 + 1)
 
 
-def _legend_above(axis: Axes, columns: int) -> None:
-    axis.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=min(columns, 4), borderaxespad=0.2)
+def legend_above(axis: Axes, columns: int, *, right: bool = False) -> None:
+    """Legend above the axes, where it hides nothing."""
+    axis.legend(
+        loc="lower right" if right else "lower left",
+        bbox_to_anchor=(1.0 if right else 0.0, 1.0),
+        ncols=min(columns, 4),
+        borderaxespad=0.2,
+    )
 
 
 def _finish_time(figure: Figure, bottom: Axes, title: str) -> None:

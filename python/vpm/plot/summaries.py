@@ -133,7 +133,6 @@ def plot_comparison(comparison: ComparisonLike) -> Figure:
         row[0].set_title(f"{each.channel}, error {each.relative_error:.3g} %")
         row[0].set_xlabel("time [s]")
         row[0].set_ylabel(label(each.channel.rpartition(".")[2], each.unit))
-        row[0].legend(loc="upper right", ncols=2)
         draw_residual_time(row[1], each.time, {"": each.residual}, each.unit)
         row[1].set_title("residual over time")
         velocity = _velocity_of(comparison, each.channel)
@@ -142,8 +141,11 @@ def plot_comparison(comparison: ComparisonLike) -> Figure:
             continue
         name = f"{velocity} [{comparison.state_units[velocity]}]"
         draw_residual_against(row[2], comparison.state[velocity], {"": each.residual}, name, unit=each.unit)
+        row[2].set_title("residual and its mean over velocity")
     title = f"{comparison.model_name} against {comparison.experiment_name}, {comparison.mode.replace('_', ' ')}"
     figure.suptitle(title, fontsize=11, x=0.01, ha="left")
+    lines, names = axes[0][0].get_legend_handles_labels()
+    figure.legend(lines, names, loc="outside upper right", ncols=2)
     return figure
 
 
@@ -162,7 +164,10 @@ def plot_pictures(pictures: Sequence[PictureLike]) -> Figure:
         unit = each.coordinate_unit
         draw_residual_against(row[1], each.velocity, stages, f"velocity [{unit}/s]", unit=each.unit)
         draw_residual_against(row[2], each.position, stages, f"position [{unit}]", unit=each.unit)
-        row[0].set_title(each.channel, y=1.1)
+        row[0].set_title(each.channel)
+    if pictures:
+        lines, names = axes[0][0].get_legend_handles_labels()
+        figure.legend(lines, names, loc="outside upper left", ncols=3)
     return figure
 
 

@@ -15,6 +15,9 @@ pub(super) fn references(description: &Description) -> Result<()> {
             each: "parameter".to_owned(),
         });
     }
+    if description.bodies.is_empty() {
+        return Err(Error::Description { message: "it has no body, but a machine needs at least one".to_owned() });
+    }
     for (what, index) in used_parameters(description) {
         within(&what, "parameter", index, description.parameters.len())?;
     }

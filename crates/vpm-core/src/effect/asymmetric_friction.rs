@@ -2,7 +2,7 @@
 
 use serde::Deserialize;
 
-use super::Domain;
+use super::{Domain, tanh_ratio};
 use crate::scalar::Scalar;
 
 /// Asymmetric friction of a joint: the part of the friction that does not change sign with the direction of motion.
@@ -50,5 +50,13 @@ impl<S: Scalar> AsymmetricFriction<S> {
     pub fn effort(&self, v: S) -> S {
         let direction = (v / self.transition_velocity).tanh();
         (self.coulomb_difference * direction + self.viscous_difference * v) * direction * -0.5
+    }
+
+    /// Resistance r at velocity `v`, with `effort = -r v`; finite at rest.
+    #[inline]
+    pub fn resistance(&self, v: S) -> S {
+        let ratio = v / self.transition_velocity;
+        let size = (self.coulomb_difference * ratio.tanh() + self.viscous_difference * v) * 0.5;
+        size * tanh_ratio(ratio) / self.transition_velocity
     }
 }

@@ -2,14 +2,14 @@
 
 use serde::Deserialize;
 
-use super::Domain;
+use super::{Domain, tanh_ratio};
 use crate::scalar::Scalar;
 
 /// Coulomb friction of a joint: a constant resistance against the direction of motion, rounded off around rest.
 ///
 /// Law: `tau = -coulomb tanh(v / transition_velocity)`, with tau and `coulomb` in N or N m, velocities in m/s or rad/s.
-/// The rounding keeps the law differentiable; below the transition velocity the joint creeps instead of sticking. A step h follows it
-/// where `coulomb h / inertia` stays below about twice the transition velocity.
+/// The rounding keeps the law differentiable; below the transition velocity the joint creeps instead of sticking. An explicit step h
+/// follows it where `coulomb h / inertia` stays below about twice the transition velocity, else the joint chatters.
 /// Source: Andersson, Söderberg & Björklund 2007, "Friction models for sliding dry, boundary and mixed lubricated contacts",
 /// Tribology International 40(4), smoothed Coulomb law. Checked: the transition velocity must be positive.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
@@ -38,5 +38,11 @@ impl<S: Scalar> CoulombFriction<S> {
     #[inline]
     pub fn effort(&self, v: S) -> S {
         -(self.coulomb * (v / self.transition_velocity).tanh())
+    }
+
+    /// Resistance r at velocity `v`, with `effort = -r v`; finite at rest.
+    #[inline]
+    pub fn resistance(&self, v: S) -> S {
+        self.coulomb * tanh_ratio(v / self.transition_velocity) / self.transition_velocity
     }
 }

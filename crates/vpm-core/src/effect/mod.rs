@@ -90,6 +90,33 @@ impl<S: Scalar> JointEffect<S> {
         }
     }
 
+    /// Resistance r in N s/m or N m s/rad at velocity `v`: what depends on the velocity is `-r v`, so that
+    /// `effort(q, v) = effort(q, 0) - r v`. It is the slope of the chord from rest to `v`, not of the tangent.
+    #[inline]
+    pub fn resistance(&self, v: S) -> S {
+        match self {
+            Self::ViscousFriction(law) => law.resistance(),
+            Self::CoulombFriction(law) => law.resistance(v),
+            Self::AsymmetricFriction(law) => law.resistance(v),
+            Self::StribeckFriction(law) => law.resistance(v),
+            Self::BiasForce(_) | Self::Spring(_) | Self::TorqueRipple(_) => S::zero(),
+        }
+    }
+
+    /// Effort at rest, N or N m, at coordinate `q`.
+    #[inline]
+    pub fn effort_at_rest(&self, q: S) -> S {
+        match self {
+            Self::BiasForce(law) => law.effort(),
+            Self::Spring(law) => law.effort(q),
+            Self::TorqueRipple(law) => law.effort(q),
+            Self::ViscousFriction(_)
+            | Self::CoulombFriction(_)
+            | Self::AsymmetricFriction(_)
+            | Self::StribeckFriction(_) => S::zero(),
+        }
+    }
+
     /// Potential energy in J at coordinate `q`: `effort = -d potential/dq` for effects of the coordinate alone, zero for friction.
     #[inline]
     pub fn potential(&self, q: S) -> S {
@@ -97,7 +124,20 @@ impl<S: Scalar> JointEffect<S> {
             Self::BiasForce(law) => law.potential(q),
             Self::Spring(law) => law.potential(q),
             Self::TorqueRipple(law) => law.potential(q),
-            Self::ViscousFriction(_) | Self::CoulombFriction(_) | Self::AsymmetricFriction(_) | Self::StribeckFriction(_) => S::zero(),
+            Self::ViscousFriction(_)
+            | Self::CoulombFriction(_)
+            | Self::AsymmetricFriction(_)
+            | Self::StribeckFriction(_) => S::zero(),
         }
     }
+}
+
+/// tanh(x)/x, smooth through x = 0.
+#[inline]
+fn tanh_ratio<S: Scalar>(x: S) -> S {
+    if x.re().abs() < 1e-4 {
+        // The series 1 - x^2/3 + 2 x^4/15 ...: what is left out is below rounding.
+        return -(x * x / 3.0) + 1.0;
+    }
+    x.tanh() / x
 }

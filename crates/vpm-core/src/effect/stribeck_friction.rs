@@ -2,7 +2,7 @@
 
 use serde::Deserialize;
 
-use super::Domain;
+use super::{Domain, tanh_ratio};
 use crate::scalar::Scalar;
 
 /// Stribeck friction of a joint: what static friction adds to Coulomb friction, fading as the speed grows.
@@ -48,5 +48,13 @@ impl<S: Scalar> StribeckFriction<S> {
     pub fn effort(&self, v: S) -> S {
         let ratio = v / self.stribeck_velocity;
         -(self.stribeck * (v / self.transition_velocity).tanh() * (-(ratio * ratio)).exp())
+    }
+
+    /// Resistance r at velocity `v`, with `effort = -r v`; finite at rest.
+    #[inline]
+    pub fn resistance(&self, v: S) -> S {
+        let ratio = v / self.stribeck_velocity;
+        let peak = self.stribeck * (-(ratio * ratio)).exp();
+        peak * tanh_ratio(v / self.transition_velocity) / self.transition_velocity
     }
 }

@@ -35,4 +35,10 @@ impl<S: Scalar> ViscousFriction<S> {
     pub fn effort(&self, v: S) -> S {
         -(self.viscous * v)
     }
+
+    /// Resistance r with `effort = -r v`.
+    #[inline]
+    pub fn resistance(&self) -> S {
+        self.viscous
+    }
 }

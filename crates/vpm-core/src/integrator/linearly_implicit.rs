@@ -10,8 +10,8 @@ const GAMMA: f64 = 1.0 - std::f64::consts::FRAC_1_SQRT_2;
 /// Second order and L-stable: stiff friction and springs are damped out instead of blowing up, in bounded work (one Jacobian, one
 /// factorisation, two right-hand sides and solves a step, no iteration).
 ///
-/// Law (ROS2), with J = df/dx at x:
-/// `(1 - g h J) k1 = f(x)`, `(1 - g h J) k2 = f(x + h k1) - 2 k1`, `x+ = x + 3/2 h k1 + 1/2 h k2`.
+/// Law (ROS2): `(1 - g h A) k1 = f(x)`, `(1 - g h A) k2 = f(x + h k1) - 2 k1`, `x+ = x + 3/2 h k1 + 1/2 h k2`.
+/// The order is 2 whatever A is, the stability is that of A = df/dx; [`Ode::iteration_matrix`] chooses A.
 /// Source: Verwer, Spee, Blom & Hundsdorfer 1999, "A second-order Rosenbrock method applied to photochemical dispersion problems",
 /// SIAM J. Sci. Comput. 20(4), equation 3.3; theory in Hairer & Wanner 1996, "Solving Ordinary Differential Equations II",
 /// section IV.7. Checked: order 2; a stiff decay is damped at steps far beyond its time constant.
@@ -48,10 +48,10 @@ impl<S: Scalar> LinearlyImplicit<S> {
         }
     }
 
-    /// Factorises 1 - g h J.
+    /// Factorises 1 - g h A.
     fn factorise(&mut self, ode: &mut impl Ode<S>, x: &[S], step: f64) {
         let matrix = self.lu.matrix();
-        ode.jacobian(x, matrix);
+        ode.iteration_matrix(x, matrix);
         for entry in matrix.iter_mut() {
             *entry = *entry * (-GAMMA * step);
         }

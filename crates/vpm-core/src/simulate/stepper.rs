@@ -50,6 +50,8 @@ pub(crate) struct Stepper<'a, S> {
     memories: Vec<ControlMemory<S>>,
     state: Vec<S>,
     rate: Vec<S>,
+    /// Integration steps so far.
+    steps: usize,
     /// Commands of the whole record, row by row; given ones from the beginning, a controller's as time goes by.
     commands: Vec<S>,
     /// True channels of the piece, row by row.
@@ -83,6 +85,7 @@ impl<'a, S: Scalar> Stepper<'a, S> {
             system,
             state: vec![zero; dim],
             rate: vec![zero; dim],
+            steps: 0,
             commands,
             truth: vec![zero; rows * description.n_outputs()],
             states: vec![zero; rows * dim],
@@ -114,15 +117,11 @@ impl<'a, S: Scalar> Stepper<'a, S> {
     }
 
     fn piece(&mut self, number: usize, start: usize, interrupt: Interrupt<'_>) -> Result<()> {
-        let often = (PATIENCE / self.stepping.substeps).max(1);
         self.restart(number);
         for row in 0..self.plan.horizon {
             self.sample(row, start)?;
-            if row % often == 0 && interrupt() {
-                return Err(Error::Interrupted);
-            }
             if row + 1 < self.plan.horizon {
-                self.advance();
+                self.advance(interrupt)?;
             }
         }
         Ok(())
@@ -158,11 +157,16 @@ impl<'a, S: Scalar> Stepper<'a, S> {
     }
 
     /// Carries the state to the next sample.
-    pub(crate) fn advance(&mut self) {
+    pub(crate) fn advance(&mut self, interrupt: Interrupt<'_>) -> Result<()> {
         let step = self.stepping.step();
         for _ in 0..self.stepping.substeps {
             self.integrator.step(&mut self.system, &mut self.state, step);
+            self.steps = self.steps.wrapping_add(1);
+            if self.steps % PATIENCE == 0 && interrupt() {
+                return Err(Error::Interrupted);
+            }
         }
+        Ok(())
     }
 
     fn record_motion(&mut self, row: usize) {

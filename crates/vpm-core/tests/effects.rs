@@ -1,0 +1,194 @@
+//! Each physical effect against a closed form of the motion it gives, or an independent statement about it.
+
+mod common;
+
+use common::{ALWAYS, Bench, Machine, close};
+use std::f64::consts::{PI, TAU};
+use vpm_core::effect::{
+    AsymmetricFriction, BiasForce, CoulombFriction, JointEffect, Spring, StribeckFriction, TorqueRipple, ViscousFriction,
+};
+use vpm_core::evaluate;
+use vpm_core::integrator::Method;
+use vpm_core::samples::{Random, double_pendulum, slider};
+use vpm_core::{Dual, Scalar};
+
+/// Free motion of a 2 kg slider with one effect, from (q, v), for `rows` samples of 1 ms: positions and velocities.
+fn slide(kind: &str, numbers: &[(&str, f64)], (q, v): (f64, f64), rows: usize) -> (Vec<f64>, Vec<f64>) {
+    let mut machine = Machine::new(&slider(2.0));
+    machine.effect(kind, 0, numbers).actuator(0, &[("gain", 1.0)]);
+    let bench = Bench::new(&machine, 1e-3, 4, Method::Rk4);
+    let run = bench.free(&[q, v], &vec![0.0; rows]);
+    (bench.channel(&run, 0), bench.channel(&run, 1))
+}
+
+#[test]
+fn viscous_friction_decays_exponentially() {
+    let (_, velocity) = slide("viscous_friction", &[("viscous", 3.0)], (0.0, 0.7), 1001);
+    for (k, v) in velocity.iter().enumerate() {
+        close(*v, 0.7 * (-1.5e-3 * k as f64).exp(), 1e-12);
+    }
+}
+
+#[test]
+fn coulomb_friction_stops_within_the_work_of_the_force() {
+    // 1/2 m v0^2 = F d, up to what the rounded corner adds: m vt times the speed it rounds, about vt v0 ln 2 / (F/m) and less.
+    let (mass, speed, force, transition) = (2.0, 0.5, 1.0, 1e-4);
+    let numbers = [("coulomb", force), ("transition_velocity", transition)];
+    let (position, velocity) = slide("coulomb_friction", &numbers, (0.0, speed), 1200);
+    let distance = 0.5 * mass * speed * speed / force;
+    close(position[1199], distance, 1e-7);
+    assert!(velocity[1199].abs() < 1e-9);
+    // Until then it brakes evenly.
+    close(velocity[500], speed - force / mass * 0.5, 1e-9);
+}
+
+#[test]
+fn spring_swings_as_a_sinusoid_about_its_rest() {
+    let numbers = [("stiffness", 200.0), ("rest", 0.1)];
+    let (position, _) = slide("spring", &numbers, (0.15, 0.0), 2001);
+    for (k, q) in position.iter().enumerate() {
+        close(*q, 0.1 + 0.05 * (10.0 * k as f64 * 1e-3).cos(), 1e-9);
+    }
+}
+
+#[test]
+fn bias_force_accelerates_evenly_against_the_motion() {
+    let (position, _) = slide("bias_force", &[("force", 3.0)], (0.0, 0.0), 1001);
+    close(position[1000], -0.5 * 1.5, 1e-12);
+}
+
+#[test]
+fn stribeck_friction_peaks_where_its_slope_vanishes_and_fades() {
+    // With a sharp corner the law is F exp(-(v/vs)^2): its value at vs is F/e, far beyond it nothing is left.
+    let law = StribeckFriction { stribeck: 5.0, stribeck_velocity: 0.1, transition_velocity: 1e-4 };
+    close(law.effort(0.1), -5.0 / 1.0_f64.exp(), 1e-12);
+    close(law.effort(-0.1), 5.0 / 1.0_f64.exp(), 1e-12);
+    close(law.effort(1.0), 0.0, 1e-40);
+    // The peak of the rounded law: d/dv = 0 where (1 - tanh^2)/(vt tanh) = 2 v / vs^2, found here by scanning.
+    let law = StribeckFriction { stribeck: 5.0, stribeck_velocity: 0.1, transition_velocity: 0.01 };
+    let peak = (1..2000).map(|k| f64::from(k) * 1e-4).max_by(|a, b| law.effort(*b).total_cmp(&law.effort(*a))).unwrap();
+    let tanh = (peak / 0.01).tanh();
+    close((1.0 - tanh * tanh) / (0.01 * tanh), 2.0 * peak / 0.01, 0.1);
+    assert!(-law.effort(peak) > 0.85 * 5.0 && peak > 0.01 && peak < 0.1);
+}
+
+#[test]
+fn asymmetric_friction_gives_each_direction_its_own_coefficients() {
+    // Beside symmetric friction with the means (4, 30), the differences (1, 6) give (4.5, 33) forward and (3.5, 27) backward.
+    let symmetric = [
+        JointEffect::CoulombFriction(CoulombFriction { coulomb: 4.0, transition_velocity: 1e-4 }),
+        JointEffect::ViscousFriction(ViscousFriction { viscous: 30.0 }),
+    ];
+    let difference = JointEffect::AsymmetricFriction(AsymmetricFriction {
+        coulomb_difference: 1.0,
+        viscous_difference: 6.0,
+        transition_velocity: 1e-4,
+    });
+    let total = |v: f64| symmetric.iter().map(|law| law.effort(0.0, v)).sum::<f64>() + difference.effort(0.0, v);
+    close(total(0.2), -(4.5 + 33.0 * 0.2), 1e-12);
+    close(total(-0.2), 3.5 + 27.0 * 0.2, 1e-12);
+    close(total(0.0), 0.0, 0.0);
+}
+
+#[test]
+fn torque_ripple_repeats_and_stores_what_it_takes() {
+    let law = TorqueRipple { period: 0.02, cosine: 0.3, sine: -0.4 };
+    for q in [0.0, 0.0031, -0.017] {
+        close(law.effort(q), law.effort(q + 0.02), 1e-13);
+        close(law.effort(q), -law.effort(q + 0.01), 1e-13);
+    }
+    close(law.effort(0.0), -0.3, 1e-15);
+    close(law.effort(0.005), 0.4, 1e-15);
+    // Largest effort sqrt(0.3^2 + 0.4^2), over a period no work is done.
+    let efforts: Vec<f64> = (0..1000).map(|k| law.effort(f64::from(k) * 2e-5)).collect();
+    close(efforts.iter().copied().fold(0.0, f64::max), 0.5, 1e-5);
+    close(efforts.iter().sum::<f64>(), 0.0, 1e-10);
+    close(TAU * 0.02 / TAU, 0.02, 1e-17);
+}
+
+#[test]
+fn potentials_are_what_the_efforts_integrate_to() {
+    let laws = [
+        JointEffect::BiasForce(BiasForce { force: 2.0 }),
+        JointEffect::Spring(Spring { stiffness: 70.0, rest: 0.2 }),
+        JointEffect::TorqueRipple(TorqueRipple { period: 0.3, cosine: 1.0, sine: 2.0 }),
+    ];
+    for law in laws {
+        let lifted = law.map(&mut |&number| Dual::<f64, 1>::constant(number));
+        for q in [-0.4, 0.0, 0.33] {
+            let slope = lifted.potential(Dual::variable(q, 0)).gradient[0];
+            close(law.effort(q, 0.9), -slope, 1e-12);
+        }
+    }
+}
+
+#[test]
+fn every_law_splits_into_rest_and_resistance() {
+    let mut random = Random::new(3);
+    let laws = [
+        JointEffect::ViscousFriction(ViscousFriction { viscous: 2.0 }),
+        JointEffect::CoulombFriction(CoulombFriction { coulomb: 3.0, transition_velocity: 0.02 }),
+        JointEffect::AsymmetricFriction(AsymmetricFriction {
+            coulomb_difference: 1.0,
+            viscous_difference: -2.0,
+            transition_velocity: 0.05,
+        }),
+        JointEffect::StribeckFriction(StribeckFriction {
+            stribeck: 2.0,
+            stribeck_velocity: 0.3,
+            transition_velocity: 0.04,
+        }),
+        JointEffect::BiasForce(BiasForce { force: 2.0 }),
+        JointEffect::Spring(Spring { stiffness: 70.0, rest: 0.2 }),
+        JointEffect::TorqueRipple(TorqueRipple { period: 0.3, cosine: 1.0, sine: 2.0 }),
+    ];
+    for law in laws {
+        for v in [0.0, 1e-9, -1e-7, 0.003, -0.02, random.symmetric(), 50.0] {
+            let q = random.symmetric();
+            close(law.effort_at_rest(q) - law.resistance(v) * v, law.effort(q, v), 1e-13 * (1.0 + law.effort(q, v).abs()));
+        }
+        // At rest the chord is the tangent.
+        let lifted = law.map(&mut |&number| Dual::<f64, 1>::constant(number));
+        let slope = lifted.effort(Dual::constant(0.1), Dual::variable(0.0, 0)).gradient[0];
+        close(-law.resistance(0.0), slope, 1e-12);
+    }
+}
+
+#[test]
+fn fast_motion_over_a_sharp_corner_stays_finite_with_its_derivatives() {
+    let law = CoulombFriction { coulomb: 2.0, transition_velocity: 1e-9 }.map(&mut |&number| Dual::<f64, 3>::constant(number));
+    for v in [1e3, -1e3, 0.0] {
+        assert!(law.effort(Dual::variable(v, 0)).is_finite());
+        assert!(law.resistance(Dual::variable(v, 0)).is_finite());
+    }
+}
+
+#[test]
+fn payload_adds_its_inertia_to_the_mass_matrix() {
+    // On the lower arm of a double pendulum, at its tip: the same as a heavier bob (a point mass itself).
+    let mut loaded = Machine::new(&double_pendulum([1.0, 2.0], [0.5, 0.7]));
+    loaded.payload(1, 0.8, [0.0, 0.0, -0.7]);
+    let heavier = Machine::new(&double_pendulum([1.0, 2.8], [0.5, 0.7]));
+    for q in [[0.0, 0.0], [0.4, -1.1], [PI / 3.0, 2.0]] {
+        let with = evaluate::mass_matrix(&loaded.build(), &loaded.values, &q).unwrap();
+        let reference = evaluate::mass_matrix(&heavier.build(), &heavier.values, &q).unwrap();
+        for (found, expected) in with.iter().zip(reference) {
+            close(*found, expected, 1e-13);
+        }
+    }
+    // Off the joint axis it adds m r^2 about it.
+    let mut loaded = Machine::new(&double_pendulum([1.0, 2.0], [0.5, 0.7]));
+    loaded.payload(1, 0.8, [0.3, 0.9, -0.4]);
+    let bare = Machine::new(&double_pendulum([1.0, 2.0], [0.5, 0.7]));
+    let entry = |machine: &Machine| evaluate::mass_matrix(&machine.build(), &machine.values, &[0.2, 0.5]).unwrap()[3];
+    close(entry(&loaded) - entry(&bare), 0.8 * (0.09 + 0.16), 1e-13);
+}
+
+#[test]
+fn forward_dynamics_hears_every_effect() {
+    let mut machine = Machine::new(&slider(4.0));
+    machine.effect("viscous_friction", 0, &[("viscous", 3.0)]).effect("bias_force", 0, &[("force", -2.0)]);
+    let acceleration = evaluate::accelerations(&machine.build(), &machine.values, &[0.0], &[0.5], &[6.0]).unwrap();
+    close(acceleration[0], (6.0 - 1.5 + 2.0) / 4.0, 1e-14);
+    assert!(!ALWAYS());
+}

@@ -1,0 +1,173 @@
+"""Units: values against scipy's table of constants, and the algebra as properties."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy import constants
+
+from vpm.errors import UnitError
+from vpm.units import convert, factor_to_si, parse_unit, require_dimension, same_dimension, si_unit
+
+SYMBOLS = ["m", "mm", "inch", "kg", "g", "lb", "s", "ms", "min", "h", "rad", "deg", "rev", "rpm", "Hz", "%", "N", "kN"]
+SYMBOLS += ["lbf", "J", "W", "Pa", "bar", "psi", "A", "mA", "C", "V", "uV", "Ohm", "H", "F", "T", "Wb", "K", "l", "kgf"]
+
+
+@st.composite
+def expressions(draw: st.DrawFn) -> str:
+    """A unit of one to four powers, with at most one parenthesised divisor."""
+    power = st.builds(
+        lambda symbol, exponent: symbol if exponent == 1 else f"{symbol}^{exponent}",
+        st.sampled_from(SYMBOLS),
+        st.sampled_from([1, 1, 1, 2, 3, -1]),
+    )
+    above = draw(st.lists(power, min_size=1, max_size=2))
+    below = draw(st.lists(power, max_size=2))
+    text = draw(st.sampled_from([" ", "*", "·"])).join(above)
+    return f"{text}/({' '.join(below)})" if below else text
+
+
+@pytest.mark.parametrize(
+    ("unit", "value"),
+    [
+        ("inch", constants.inch),
+        ("ft", constants.foot),
+        ("lb", constants.pound),
+        ("lbf", constants.pound_force),
+        ("kgf", constants.kilogram_force),
+        ("psi", constants.psi),
+        ("bar", constants.bar),
+        ("min", constants.minute),
+        ("h", constants.hour),
+        ("l", constants.liter),
+        ("deg", constants.degree),
+        ("t", constants.metric_ton),
+        ("mm", constants.milli),
+        ("uV", constants.micro),
+        ("MPa", constants.mega),
+        ("rpm", 2 * constants.pi / constants.minute),
+        ("l/min", constants.liter / constants.minute),
+        ("N mm/deg", constants.milli / constants.degree),
+        ("g/s^2", constants.gram),
+        ("%", 0.01),
+        ("1", 1.0),
+        ("", 1.0),
+    ],
+)
+def test_values(unit: str, value: float) -> None:
+    assert factor_to_si(unit) == pytest.approx(value, rel=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("unit", "definition"),
+    [
+        ("N", "kg m/s^2"),
+        ("Pa", "N/m^2"),
+        ("J", "N m"),
+        ("W", "J/s"),
+        ("C", "A s"),
+        ("V", "W/A"),
+        ("Ohm", "V/A"),
+        ("F", "C/V"),
+        ("H", "Wb/A"),
+        ("T", "Wb/m^2"),
+        ("Wb", "V s"),
+        ("Hz", "1/s"),
+    ],
+)
+def test_derived_units_follow_from_their_definitions(unit: str, definition: str) -> None:
+    assert parse_unit(unit).dimension == parse_unit(definition).dimension
+    assert factor_to_si(unit) == factor_to_si(definition) == 1.0
+
+
+@given(expressions(), st.floats(-1e12, 1e12))
+def test_there_and_back(unit: str, value: float) -> None:
+    target = si_unit(unit)
+    assert convert(convert(value, unit, target), target, unit) == pytest.approx(value, rel=1e-14)
+
+
+@given(expressions())
+def test_the_si_unit_is_of_the_same_kind_and_its_own_si_unit(unit: str) -> None:
+    target = si_unit(unit)
+    assert same_dimension(unit, target)
+    assert factor_to_si(target) == 1.0
+    assert si_unit(target) == target
+
+
+@given(expressions(), expressions())
+def test_products_and_quotients(left: str, right: str) -> None:
+    a, b = parse_unit(left), parse_unit(right)
+    product, quotient = parse_unit(f"({left})({right})"), parse_unit(f"({left})/({right})")
+    assert product.factor == pytest.approx(a.factor * b.factor, rel=1e-14)
+    assert quotient.factor == pytest.approx(a.factor / b.factor, rel=1e-14)
+    assert product.dimension == tuple(np.add(a.dimension, b.dimension))
+    assert quotient.dimension == tuple(np.subtract(a.dimension, b.dimension))
+
+
+@given(expressions(), st.lists(st.floats(-1e6, 1e6), min_size=1, max_size=5))
+def test_arrays_convert_as_numbers_do(unit: str, values: list[float]) -> None:
+    target = si_unit(unit)
+    together = convert(np.array(values), unit, target)
+    assert together.tolist() == [convert(value, unit, target) for value in values]
+
+
+@given(st.one_of(st.text(max_size=12), st.text("Nmskg/^()*19 -", max_size=12)))
+def test_any_text_is_a_unit_or_a_unit_error(text: str) -> None:
+    try:
+        unit = parse_unit(text)
+    except UnitError:
+        return
+    assert math.isfinite(unit.factor)
+    assert unit.factor > 0.0
+
+
+def test_the_same_unit_changes_no_bit() -> None:
+    assert convert(0.1, "mm", "mm") == 0.1
+    assert convert(0.3, "N s/m", "kg/s") == 0.3
+
+
+def test_a_minute_is_no_milli_inch() -> None:
+    assert factor_to_si("min") == 60.0
+    assert factor_to_si("m in") == pytest.approx(0.0254)
+
+
+@pytest.mark.parametrize(
+    ("unit", "words"),
+    [
+        ("Nm", '"N m", with a space'),
+        ("kNm", '"kN m", with a space'),
+        ("foo", 'unknown symbol "foo"'),
+        ("volt", "known symbols are"),
+        ("rpn", '"rpm"'),
+        ("J/kg K", "put the divisor into parentheses"),
+        ("(N", 'a ")" is missing'),
+        ("N)", '")" is not expected'),
+        ("N^x", "an integer has to follow"),
+        ("N^", "an integer has to follow"),
+        ("m^100", "beyond 99"),
+        ("GPa^99", "too large"),
+        ("nm^99", "too small"),
+        ("3 m", '"3" stands where a symbol is needed'),
+        ("/s", '"/" stands where a symbol is needed'),
+        ("m/", "ends where a symbol is needed"),
+        ("m$", '"$" is not part of a unit'),
+    ],
+)
+def test_what_cannot_be_read(unit: str, words: str) -> None:
+    with pytest.raises(UnitError) as caught:
+        parse_unit(unit)
+    assert words in str(caught.value)
+    assert f'"{unit}"' in str(caught.value)
+    assert caught.value.unit == unit
+
+
+def test_a_wrong_kind_names_both_kinds_and_a_right_unit() -> None:
+    with pytest.raises(UnitError) as caught:
+        require_dimension("N", "N s/m")
+    for part in ('"N"', "kg m/s^2", "kg/s", '"N s/m"'):
+        assert part in str(caught.value)
+    assert caught.value.expected == "N s/m"
+    with pytest.raises(UnitError):
+        convert(1.0, "N", "N s/m")
