@@ -54,10 +54,10 @@ viscous = {{ value = 60.0, unit = "N s/m", uncertainty = 20.0, min = 0.0, max = 
 
 @dataclass(frozen=True)
 class Truth:
-    """What the machine really is; zero means that the effect is not there."""
+    """What the machine really is; zero means that the effect is not there. Arrays hold one value for each seed."""
 
-    mass: float = 21.0
-    viscous: float = 66.0
+    mass: float | Array = 21.0
+    viscous: float | Array = 66.0
     coulomb: float = 0.0
     stribeck: float = 0.0
     stribeck_velocity: float = 0.02
@@ -71,8 +71,8 @@ class Truth:
     lag: float = 0.0
     saturation: float = np.inf
     cubic: float = 0.0
-    noise: float = 2e-6
-    force_noise: float = 0.0
+    noise: float | Array = 2e-6
+    force_noise: float | Array = 0.0
 
 
 @dataclass
@@ -87,7 +87,7 @@ class _Plant:
     extra: dict[str, float] = field(default_factory=dict)
 
     def advance(self, command: Array, disturbance: Array) -> None:
-        """One fine step: semi-implicit, with friction that holds the axis where it can."""
+        """One fine step under constant force, with friction that holds the axis where it can."""
         t = self.truth
         command = np.clip(np.sign(command) * np.maximum(np.abs(command) - t.dead_zone, 0.0), -t.saturation, t.saturation)
         if t.lag > 0.0:
@@ -101,7 +101,7 @@ class _Plant:
         free = v + self.step * force / t.mass
         brake = self.step * holding / t.mass
         self.velocity = np.sign(free) * np.maximum(np.abs(free) - brake, 0.0)
-        self.position = self.position + self.step * self.velocity
+        self.position = self.position + 0.5 * self.step * (v + self.velocity)
 
 
 def reference(seconds: float, phases: Array, still: float = 0.0) -> Array:

@@ -354,6 +354,27 @@ def test_effects_that_cannot_be_added(emps: Model, name: str, at: str, values: d
     assert words in str(caught.value)
 
 
+def test_values_that_the_file_leaves_out_can_be_changed(emps: Model) -> None:
+    pid = EMPS.replace('"cascade"', '"pid"').replace(
+        'position_gain = { value = 160.18, unit = "1/s" }', "proportional = 9"
+    )
+    pid = pid.replace('velocity_gain = { value = 243.45, unit = "V/(m/s)" }', "")
+    values = {"servo.integral": 2.0, "servo.derivative": 3.0}
+    changed = Model.from_toml(pid).with_parameters(values)
+    assert {name: changed.parameters[name].value for name in values} == values
+    assert [changed.parameters[f"servo.{key}"].unit for key in ("proportional", "integral", "derivative")] == [
+        *("V/m", "V/(m s)", "V s/m"),
+    ]
+    values = {f"carriage.inertia.{axes}": 1.0 + 0.1 * i for i, axes in enumerate(("xx", "yy", "zz"))}
+    values |= {"carriage.center_of_mass.y": 0.25, "carriage.inertia.yz": 0.05}
+    changed = emps.with_parameters(values)
+    assert {name: changed.parameters[name].value for name in values} == values
+    assert Model.from_toml(changed.to_toml()) == changed
+    assert changed.with_parameters(dict.fromkeys(values, 0.0)) == emps
+    with pytest.raises(ModelError, match="principal moments"):
+        emps.with_parameters({"carriage.inertia.xx": 1.0})
+
+
 def test_changes_that_cannot_be_made(emps: Model) -> None:
     with pytest.raises(ModelError, match=r'did you mean "axis.friction.viscous"\?'):
         emps.with_parameters({"axis.viscous": 1.0})

@@ -28,6 +28,7 @@ from __future__ import annotations
 import html
 import json
 import math
+import re
 import zipfile
 import zlib
 from collections.abc import Mapping
@@ -242,8 +243,10 @@ def _encode_container(value: object, where: str, arrays: dict[str, np.ndarray[An
         case np.ndarray():
             if value.dtype.kind not in "biufcU":
                 raise VpmError(f"{where} cannot be stored: it is an array of {value.dtype}, not of numbers or text")
-            arrays[where] = value
-            return "array", where
+            # The number keeps names apart; the place is for people who look into the file.
+            name = f"{len(arrays)}_{re.sub(r'[^A-Za-z0-9_.-]', '_', where)[:80]}"
+            arrays[name] = value
+            return "array", name
         case tuple():
             return "tuple", _encode(list(value), where, arrays)
         case Mapping():

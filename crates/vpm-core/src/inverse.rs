@@ -96,7 +96,7 @@ impl Inverse<'_> {
         let (mut q, mut v, mut a, mut effects) = (zero.clone(), zero.clone(), zero.clone(), zero);
         let mut required = vec![S::zero(); self.motion.position.numbers().len()];
         for (k, row) in required.chunks_exact_mut(joints).enumerate() {
-            if k % PATIENCE == 0 && (self.interrupt)() {
+            if k.is_multiple_of(PATIENCE) && (self.interrupt)() {
                 return Err(Error::Interrupted);
             }
             for (joint, sensor) in sensors.iter().enumerate() {

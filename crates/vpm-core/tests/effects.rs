@@ -2,10 +2,11 @@
 
 mod common;
 
-use common::{ALWAYS, Bench, Machine, close};
-use std::f64::consts::{PI, TAU};
+use common::{Bench, Machine, close};
+use std::f64::consts::PI;
 use vpm_core::effect::{
-    AsymmetricFriction, BiasForce, CoulombFriction, JointEffect, Spring, StribeckFriction, TorqueRipple, ViscousFriction,
+    AsymmetricFriction, BiasForce, CoulombFriction, JointEffect, Spring, StribeckFriction, TorqueRipple,
+    ViscousFriction,
 };
 use vpm_core::evaluate;
 use vpm_core::integrator::Method;
@@ -31,12 +32,12 @@ fn viscous_friction_decays_exponentially() {
 
 #[test]
 fn coulomb_friction_stops_within_the_work_of_the_force() {
-    // 1/2 m v0^2 = F d, up to what the rounded corner adds: m vt times the speed it rounds, about vt v0 ln 2 / (F/m) and less.
-    let (mass, speed, force, transition) = (2.0, 0.5, 1.0, 1e-4);
+    // Separation of variables: d = m/F ∫ v / tanh(v/vt) dv = m v0^2 / (2 F) + m vt^2 pi^2 / (12 F) for v0 >> vt.
+    let (mass, speed, force, transition) = (2.0, 0.5, 1.0, 1e-3);
     let numbers = [("coulomb", force), ("transition_velocity", transition)];
     let (position, velocity) = slide("coulomb_friction", &numbers, (0.0, speed), 1200);
-    let distance = 0.5 * mass * speed * speed / force;
-    close(position[1199], distance, 1e-7);
+    let distance = mass / force * (0.5 * speed * speed + transition * transition * PI * PI / 12.0);
+    close(position[1199], distance, 1e-9);
     assert!(velocity[1199].abs() < 1e-9);
     // Until then it brakes evenly.
     close(velocity[500], speed - force / mass * 0.5, 1e-9);
@@ -103,7 +104,6 @@ fn torque_ripple_repeats_and_stores_what_it_takes() {
     let efforts: Vec<f64> = (0..1000).map(|k| law.effort(f64::from(k) * 2e-5)).collect();
     close(efforts.iter().copied().fold(0.0, f64::max), 0.5, 1e-5);
     close(efforts.iter().sum::<f64>(), 0.0, 1e-10);
-    close(TAU * 0.02 / TAU, 0.02, 1e-17);
 }
 
 #[test]
@@ -145,7 +145,11 @@ fn every_law_splits_into_rest_and_resistance() {
     for law in laws {
         for v in [0.0, 1e-9, -1e-7, 0.003, -0.02, random.symmetric(), 50.0] {
             let q = random.symmetric();
-            close(law.effort_at_rest(q) - law.resistance(v) * v, law.effort(q, v), 1e-13 * (1.0 + law.effort(q, v).abs()));
+            close(
+                law.effort_at_rest(q) - law.resistance(v) * v,
+                law.effort(q, v),
+                1e-13 * (1.0 + law.effort(q, v).abs()),
+            );
         }
         // At rest the chord is the tangent.
         let lifted = law.map(&mut |&number| Dual::<f64, 1>::constant(number));
@@ -156,7 +160,8 @@ fn every_law_splits_into_rest_and_resistance() {
 
 #[test]
 fn fast_motion_over_a_sharp_corner_stays_finite_with_its_derivatives() {
-    let law = CoulombFriction { coulomb: 2.0, transition_velocity: 1e-9 }.map(&mut |&number| Dual::<f64, 3>::constant(number));
+    let law = CoulombFriction { coulomb: 2.0, transition_velocity: 1e-9 }
+        .map(&mut |&number| Dual::<f64, 3>::constant(number));
     for v in [1e3, -1e3, 0.0] {
         assert!(law.effort(Dual::variable(v, 0)).is_finite());
         assert!(law.resistance(Dual::variable(v, 0)).is_finite());
@@ -190,5 +195,4 @@ fn forward_dynamics_hears_every_effect() {
     machine.effect("viscous_friction", 0, &[("viscous", 3.0)]).effect("bias_force", 0, &[("force", -2.0)]);
     let acceleration = evaluate::accelerations(&machine.build(), &machine.values, &[0.0], &[0.5], &[6.0]).unwrap();
     close(acceleration[0], (6.0 - 1.5 + 2.0) / 4.0, 1e-14);
-    assert!(!ALWAYS());
 }

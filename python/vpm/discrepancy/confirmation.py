@@ -16,7 +16,7 @@ from vpm.model import Model
 Array = NDArray[np.float64]
 
 #: A shape is fitted too if moving it would take away this share of the training mean square, to first order.
-LEAST_RELEASED = 1e-3
+LEAST_RELEASED = 1e-2
 #: A refit stops when the sum of squares changes by less than this share: far below what a verdict rests on.
 TOLERANCE = 1e-6
 
@@ -132,12 +132,23 @@ def confirm(current: Judged, data: Data, probe: Probe) -> Trial:
         judged,
         own,
         (*probe.held, *held),
-        gain(current.fit.residual, judged.fit.residual, segments(data.training)),
-        gain(current.unseen, judged.unseen, segments(data.unseen)),
+        gain(current.fit.residual, judged.fit.residual * _shrinkage(data.training, current, judged), segments(data.training)),
+        gain(current.unseen, judged.unseen * _shrinkage(data.unseen, current, judged), segments(data.unseen)),
         _simulated_gain(current, judged, data),
         diverged,
         _clear(judged, own),
     )
+
+
+def _shrinkage(problem: InverseDynamicsProblem, current: Judged, judged: Judged) -> float:
+    """How much weaker the actuators have become, at least 1.
+
+    An effect that swallows the command leaves a small gap between two small efforts; errors are compared relative to
+    the effort, so that nothing is won that way.
+    """
+    after = problem.strength(judged.model)
+    before = problem.strength(current.model)
+    return max(1.0, before / max(after, 1e-6 * before)) if before > 0.0 else 1.0
 
 
 def _simulated_gain(current: Judged, judged: Judged, data: Data) -> Gain | None:

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import ndtri
 
 from vpm.catalogue import EFFECTS
 from vpm.compare import compare
@@ -21,7 +22,7 @@ from vpm.discrepancy.diagnosis import (
     Step,
 )
 from vpm.discrepancy.floor import noise_floor
-from vpm.discrepancy.refusal import FALSE_ALARM_LEVEL
+from vpm.discrepancy.refusal import FALSE_ALARM_LEVEL, LEAST_GAIN
 from vpm.discrepancy.search import Accepted, Search, ambiguities, search
 from vpm.discrepancy.structure import Structure, structure
 from vpm.errors import DiagnosisError, DivergedError, near_match
@@ -246,18 +247,12 @@ def _verdict(
             f"it. Error on unseen data: {numbers}.",
         )
     better = gain(nominal.unseen, recalibrated.unseen, segments(data.unseen))
-    if better.relative > 0.0 and better.score > -float(_normal_quantile()):
+    if better.relative > LEAST_GAIN and better.score > float(ndtri(1.0 - FALSE_ALARM_LEVEL)):
         return (
             "parameters_only",
             f"Nothing is missing: other values of the known parameters close the gap. Error on unseen data: {numbers}.",
         )
     return "no_disagreement", f"The nominal model agrees with the data. Error on unseen data: {numbers}."
-
-
-def _normal_quantile() -> float:
-    from scipy.special import ndtri
-
-    return float(ndtri(FALSE_ALARM_LEVEL))
 
 
 def _percent(value: float, gap: ChannelGap) -> str:

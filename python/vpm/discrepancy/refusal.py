@@ -16,6 +16,9 @@ from vpm.model import Model
 FALSE_ALARM_LEVEL = 0.01
 #: Drop of the unseen mean square below which an effect is not worth its name.
 LEAST_GAIN = 0.02
+#: Below this drop nine tenths of the residual are something else, which the effect might merely imitate: the evidence
+#: then has to be this many times as strong.
+MODEST_GAIN, MODEST_FACTOR = 0.1, 3.0
 #: Drop of the training mean square below which a candidate is not refitted at all.
 LEAST_SCREENED = 0.005
 
@@ -115,10 +118,10 @@ def _too_little(trial: Trial, thresholds: Thresholds) -> str:
             f"it lowers the unseen error by only {_percent(unseen.relative)} of its mean square "
             f"({_rms(unseen.before, unseen.after)})"
         )
-    needed = thresholds.score(unseen.pieces)
+    needed = thresholds.score(unseen.pieces) * (MODEST_FACTOR if unseen.relative < MODEST_GAIN else 1.0)
     if unseen.score < needed:
         return (
-            f"its gain on unseen data is {unseen.score:.1f} standard deviations over {unseen.pieces} independent "
+            f"its gain of {_percent(unseen.relative)} on unseen data is {unseen.score:.1f} standard deviations over {unseen.pieces} independent "
             f"pieces, and {needed:.1f} are needed when {thresholds.candidates} candidates are tried"
         )
     return ""

@@ -95,22 +95,20 @@ def choose_cutoff(position: Array, rate: float) -> CutoffChoice:
     noise, band = [], []
     for column in position.T:
         frequency, spectrum, floor = position_spectrum(column, rate)
-        step = quantisation_step(column)
-        floor = max(floor, 0.0 if step is None else step**2 / (6.0 * rate))  # q^2/12 over half of the rate
         moving = spectrum > CLEARLY_ABOVE * floor
         within = moving & (frequency <= HIGHEST * rate)
         error = _expected_error(frequency, np.where(moving, spectrum - floor, 0.0), spectrum, rate, offered)
         total += error / error.min() if error.min() > 0.0 else np.ones(offered.size)
-        noise.append(float(np.sqrt(floor * 0.5 * rate)))
+        noise.append(float(np.sqrt(floor[-1] * 0.5 * rate)))
         band.append(float(frequency[within].max()) if within.any() else 0.0)
     pick = int(np.flatnonzero(total <= NEAR_BEST * total.min())[-1])
     return CutoffChoice(float(offered[pick]), tuple(noise), tuple(band), pick in {0, offered.size - 1})
 
 
-def position_spectrum(position: Array, rate: float) -> tuple[Array, Array, float]:
+def position_spectrum(position: Array, rate: float) -> tuple[Array, Array, Array]:
     """Smoothed one-sided power spectrum of a position and the level of its noise floor.
 
-    Welch's method on second differences, divided by their gain ``(2 - 2 cos w)^2`` as the window and the smoothing show it: positions fall so steeply with
+    Welch's method on second differences, divided by their gain ``(2 - 2 cos w)^2``: positions fall so steeply with
     frequency that without this the leakage of the slow motion would drown all the rest.
 
     Parameters
@@ -125,18 +123,22 @@ def position_spectrum(position: Array, rate: float) -> tuple[Array, Array, float
         Hz, without zero.
     spectrum : ndarray, shape (F,)
         Unit of the position squared per hertz.
-    floor : float
-        Median of the spectrum over the top fifth of the frequencies.
+    floor : ndarray, shape (F,)
+        What white noise gives whose level is the median over the top fifth of the frequencies, and at least that of
+        the quantisation. Its lowest lines are raised by the window and the smoothing.
     """
     bend = np.diff(position, 2)
     length = int(np.clip(bend.size // 8, min(bend.size, 256), 4096))
-    frequency, power = welch(bend, rate, nperseg=length, detrend="constant")
+    # Without the mean taken off: of differences it is no offset, and its loss would stand in the lowest line.
+    frequency, power = welch(bend, rate, nperseg=length, detrend=False)
     gain = (2.0 - 2.0 * np.cos(2.0 * np.pi * frequency / rate)) ** 2
     # What Hann's window makes of the gain: its spectrum has the powers 1/6, 2/3, 1/6 over three lines.
     seen = np.convolve(np.concatenate([gain[1:2], gain, gain[-2:-1]]), [1.0 / 6.0, 2.0 / 3.0, 1.0 / 6.0], "valid")
-    spectrum = _smooth(np.asarray(power[1:], dtype=np.float64)) / _smooth(seen[1:])
-    top = frequency[1:] >= 0.4 * rate
-    return frequency[1:], spectrum, float(np.median(spectrum[top]))
+    spectrum = _smooth(np.asarray(power[1:], dtype=np.float64)) / gain[1:]
+    level = float(np.median(spectrum[frequency[1:] >= 0.4 * rate]))
+    step = quantisation_step(position)
+    level = max(level, 0.0 if step is None else step**2 / (6.0 * rate))  # q^2/12 over half of the rate
+    return frequency[1:], spectrum, level * _smooth(seen[1:]) / gain[1:]
 
 
 def _expected_error(frequency: Array, motion: Array, spectrum: Array, rate: float, cutoffs: Array) -> Array:

@@ -80,10 +80,28 @@ def quantisation_step(values: Array) -> float | None:
     for _ in range(64):
         if step < smallest:
             return None
-        counts = np.round(differences / step)
-        remainder = np.abs(differences - counts * step)
-        off_grid = remainder > 0.02 * step + 2.0 * resolution
-        if not off_grid.any():
-            return float(differences @ counts / (counts @ counts))
-        step = float(remainder[off_grid].min())
+        step, remainder = _measure(step, differences, 2.0 * resolution)
+        if remainder is None:
+            return step
+        step = remainder
     return None
+
+
+def _measure(step: float, differences: Array, rounding: float) -> tuple[float, float | None]:
+    """Step fitted to its multiples, from the small ones up, and the first remainder that is none of its multiples.
+
+    Each round takes in multiples ten times larger, which it can count because the last one has sharpened the step.
+    """
+    reach = 10.0
+    while True:
+        near = differences[differences < reach * step]
+        counts = np.round(near / step)
+        remainder = np.abs(near - counts * step)
+        off_grid = remainder > 0.02 * step + rounding
+        if off_grid.any():
+            return step, float(remainder[off_grid].min())
+        if near.size:
+            step = float(near @ counts / (counts @ counts))
+        if near.size == differences.size:
+            return step, None
+        reach *= 10.0

@@ -124,6 +124,15 @@ class InverseDynamicsProblem:
         pair = [self._retained(m, side[:, self._joints]) for side in (applied, required)]
         return self._retained_time(m), pair[0], pair[1]
 
+    def strength(self, model: Model) -> float:
+        """Root mean square of the weighted applied effort over all records: what a relative error is relative to."""
+        power = 0.0
+        for record in range(len(self.motions)):
+            _, applied, _ = self.effort(model, model.theta, record)
+            blocks = self.blocks[record * len(self._joints) :]
+            power += sum(float(np.sum((applied[:, c] * blocks[c].weight) ** 2)) for c in range(len(self._joints)))
+        return float(np.sqrt(power / sum(block.time.size for block in self.blocks)))
+
     def state(self, record: int) -> tuple[Array, Array, Array]:
         """Position, velocity and acceleration (n, joints) of one record at the retained samples."""
         m = self.motions[record]

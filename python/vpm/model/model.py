@@ -176,7 +176,7 @@ class Model(Storable):
         ModelError
             A name is unknown, or a value is outside its bounds or physically impossible.
         """
-        content = self.to_dict()
+        content = content_of(self._checked.document, complete=True)
         for name, value in values.items():
             slot = self._checked.slots[self.index(name)]
             changed = slot.si_quantity().model_copy(update={"value": float(value)})

@@ -11,39 +11,42 @@ from pydantic import BaseModel
 from vpm.model.schema import Document, EffectEntry, Quantity
 
 
-def content_of(document: Document) -> dict[str, Any]:
-    """Plain content that reads back as the same document; what stands at its default is left out.
+def content_of(document: Document, *, complete: bool = False) -> dict[str, Any]:
+    """Plain content that reads back as the same document.
 
     Parameters
     ----------
     document : Document
+    complete : bool
+        Keep what stands at its default; else it is left out.
     """
-    return _table(document)
+    return _table(document, complete)
 
 
-def plain(value: object) -> object:
+def plain(value: object, complete: bool = False) -> object:
     """Value as a TOML parser would give it; a quantity that is nothing but a number is a number."""
     match value:
         case Quantity():
-            table = _table(value)
+            table = _table(value, complete)
             return table["value"] if len(table) == 1 else table
         case BaseModel():
-            return _table(value)
+            return _table(value, complete)
         case Mapping():
-            return {key: plain(item) for key, item in value.items()}
+            return {key: plain(item, complete) for key, item in value.items()}
         case tuple():
-            return [plain(item) for item in value]
+            return [plain(item, complete) for item in value]
     return value
 
 
-def _table(entry: BaseModel) -> dict[str, Any]:
+def _table(entry: BaseModel, complete: bool) -> dict[str, Any]:
     table: dict[str, Any] = {}
     for name, field in type(entry).model_fields.items():
         value = getattr(entry, name)
-        if field.is_required() or value != field.get_default(call_default_factory=True):
-            table[field.alias or name] = plain(value)
+        default = None if field.is_required() else field.get_default(call_default_factory=True)
+        if value is not None and (complete or value != default):
+            table[field.alias or name] = plain(value, complete)
     if isinstance(entry, EffectEntry):
-        table |= {name: plain(quantity) for name, quantity in entry.values.items()}
+        table |= {name: plain(quantity, complete) for name, quantity in entry.values.items()}
     return table
 
 

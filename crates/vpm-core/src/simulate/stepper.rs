@@ -151,7 +151,7 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         self.read(row);
         let width = self.description.n_outputs();
         if let Some(column) = self.outputs[row * width..(row + 1) * width].iter().position(|out| !out.is_finite()) {
-            return Err(diverged(self, self.output_name(column), row, start));
+            return Err(diverged(self, self.output_name(column, row * width), row, start));
         }
         Ok(())
     }
@@ -162,7 +162,7 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         for _ in 0..self.stepping.substeps {
             self.integrator.step(&mut self.system, &mut self.state, step);
             self.steps = self.steps.wrapping_add(1);
-            if self.steps % PATIENCE == 0 && interrupt() {
+            if self.steps.is_multiple_of(PATIENCE) && interrupt() {
                 return Err(Error::Interrupted);
             }
         }
@@ -260,17 +260,22 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         of_what(&name, self.state[place])
     }
 
-    /// An output that failed although the state is finite.
-    fn output_name(&self, column: usize) -> String {
-        let n = self.description.n_joints();
-        let name = match self.description.bodies.get(column / 4) {
-            Some(body) if column < Channel::count(n, 0) => {
+    /// An output in words, of the row whose numbers begin at `row`.
+    fn output_name(&self, column: usize, row: usize) -> String {
+        let Description { bodies, actuators, .. } = self.description;
+        let of_joints = Channel::count(bodies.len(), 0);
+        let name = match bodies.get(column / 4) {
+            Some(body) => {
                 let quantity = ["position", "velocity", "acceleration", "effort"][column % 4];
                 format!("{quantity} of joint `{}`", body.joint.name)
             }
-            _ => format!("output number {column}"),
+            None => {
+                let quantity = ["command", "force"][(column - of_joints) % 2];
+                let actuator = actuators.get((column - of_joints) / 2);
+                format!("{quantity} of actuator `{}`", actuator.map_or("", |actuator| &actuator.name))
+            }
         };
-        of_what(&name, self.truth[column])
+        of_what(&name, self.outputs[row + column])
     }
 }
 

@@ -58,8 +58,11 @@ impl Machine {
 
     /// A payload on a body.
     pub fn payload(&mut self, body: usize, mass: f64, position: [f64; 3]) -> &mut Self {
-        let position: Vec<_> =
-            ["x", "y", "z"].iter().zip(position).map(|(axis, p)| self.parameter(&format!("payload.{axis}"), p)).collect();
+        let position: Vec<_> = ["x", "y", "z"]
+            .iter()
+            .zip(position)
+            .map(|(axis, p)| self.parameter(&format!("payload.{axis}"), p))
+            .collect();
         let part = json!({"type": "payload", "body": body, "position": position});
         self.part("effects", "payload", part, &[("mass", mass)])
     }
@@ -146,7 +149,8 @@ impl Bench {
     }
 
     pub fn closed(&self, initial: &[f64], references: &[f64], disturbances: &[f64]) -> Run {
-        let (references, disturbances) = (self.table("references", references), self.table("disturbances", disturbances));
+        let (references, disturbances) =
+            (self.table("references", references), self.table("disturbances", disturbances));
         closed_loop(self.setting(), initial, references, disturbances).unwrap()
     }
 

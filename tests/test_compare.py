@@ -1,0 +1,329 @@
+"""Comparisons of runs whose difference from the record is known."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from vpm.compare import Comparison, autocorrelation, compare, cross_correlation, effective_samples
+from vpm.errors import ExperimentError
+from vpm.experiment import Experiment
+from vpm.model import Model
+from vpm.simulate import simulate
+
+Array = NDArray[np.float64]
+
+RATE = 200.0
+
+
+@dataclass(frozen=True)
+class Run:
+    """A run that is made up."""
+
+    time: Array
+    values: Array
+    measured: Array | None
+    channels: tuple[str, ...] = ("axis.position",)
+    units: tuple[str, ...] = ("m",)
+    model_name: str = "slide"
+    mode: str = "free_run"
+    starts: NDArray[np.int64] = field(default_factory=lambda: np.zeros(1, dtype=np.int64))
+
+
+def log(samples: int = 4000) -> Experiment:
+    time = np.arange(samples) / RATE
+    values = {
+        "axis.position": 0.5 * np.sin(2 * np.pi * 0.2 * time) + 0.01,
+        "drive.command": np.sign(np.sin(2 * np.pi * 0.13 * time)),
+        "drive.disturbance": np.zeros(samples),
+    }
+    return Experiment.from_arrays(time, values, {"axis.position": "m", "drive.command": "V"}, "log")
+
+
+def run_with(residual: Array, exp: Experiment | None = None) -> Run:
+    """Run whose residual, measured minus simulated, is given."""
+    exp = exp or log(residual.size)
+    return Run(exp.time, (exp["axis.position"] - residual)[:, None], None)
+
+
+def white(samples: int = 4000, seed: int = 0) -> Array:
+    return np.random.default_rng(seed).standard_normal(samples)
+
+
+def speed(exp: Experiment) -> Array:
+    return np.pi * 0.2 * np.cos(2 * np.pi * 0.2 * exp.time)
+
+
+# ---- numbers ---------------------------------------------------------------------------------------------------------
+
+
+def test_the_numbers_are_those_of_their_definitions() -> None:
+    exp = log()
+    residual = 0.02 * white() + 0.005
+    residual[1234] = -0.3
+    got = compare(run_with(residual), exp)["axis.position"]
+    y = exp["axis.position"]
+    assert got.rmse == pytest.approx(np.sqrt(np.mean(residual**2)))
+    assert got.relative_error == pytest.approx(100 * np.linalg.norm(residual) / np.linalg.norm(y))
+    assert got.fit == pytest.approx(100 * (1 - np.linalg.norm(residual) / np.linalg.norm(y - y.mean())))
+    assert got.bias == pytest.approx(residual.mean())
+    assert got.max_error == pytest.approx(-0.3)
+    assert got.max_error_time == pytest.approx(1234 / RATE)
+    np.testing.assert_allclose(got.residual, residual, atol=1e-12)
+    assert (got.channel, got.unit) == ("axis.position", "m")
+
+
+@settings(max_examples=20)
+@given(st.floats(1e-3, 1e3), st.integers(0, 100))
+def test_units_change_no_ratio(scale: float, seed: int) -> None:
+    exp = log(400)
+    residual = 0.02 * white(400, seed)
+    small = compare(run_with(residual, exp), exp)["axis.position"]
+    scaled = exp.with_channel("axis.position", scale * exp["axis.position"], "m")
+    large = compare(run_with(scale * residual, scaled), scaled)["axis.position"]
+    assert large.rmse == pytest.approx(scale * small.rmse)
+    for name in ("relative_error", "fit", "effective_samples"):
+        assert getattr(large, name) == pytest.approx(getattr(small, name), rel=1e-6)
+    np.testing.assert_allclose(large.autocorrelation.values, small.autocorrelation.values, atol=1e-9)
+    assert [r.quantity for r in large.where.regions] == [r.quantity for r in small.where.regions]
+
+
+def test_a_perfect_run_and_a_silent_channel() -> None:
+    exp = log()
+    perfect = compare(run_with(np.zeros(4000)), exp)["axis.position"]
+    assert (perfect.rmse, perfect.relative_error, perfect.fit) == (0.0, 0.0, 100.0)
+    silent = exp.with_channel("axis.position", np.zeros(4000), "m")
+    got = compare(Run(exp.time, np.ones((4000, 1)), None), silent)["axis.position"]
+    assert got.relative_error == np.inf
+
+
+# ---- which channels --------------------------------------------------------------------------------------------------
+
+
+def test_inputs_that_are_repeated_are_left_out_and_named() -> None:
+    exp = log()
+    values = np.column_stack([exp["axis.position"] + 0.1, exp["drive.command"], np.zeros(4000)])
+    run = Run(exp.time, values, None, ("axis.position", "drive.command", "axis.velocity"), ("m", "V", "m/s"))
+    got = compare(run, exp)
+    assert [each.channel for each in got.channels] == ["axis.position"]
+    assert set(got.skipped) == {
+        "drive.command is given to the simulation, which repeats it.",
+        "axis.velocity was not measured.",
+    }
+    chosen = compare(run, exp, ["drive.command", "axis.position", "drive.command"])
+    assert [each.channel for each in chosen.channels] == ["drive.command", "axis.position"]
+
+
+def test_measured_values_of_the_run_come_first() -> None:
+    exp = log()
+    run = Run(exp.time, np.zeros((4000, 1)), 3.0 * np.ones((4000, 1)), ("axis.effort",), ("N",))
+    assert compare(run, exp)["axis.effort"].bias == pytest.approx(3.0)
+
+
+def test_what_is_refused() -> None:
+    exp = log()
+    run = run_with(0.01 * white())
+    with pytest.raises(ExperimentError, match=r'the run has no channel "axis.positon"; did you mean "axis.position"\?'):
+        compare(run, exp, ["axis.positon"])
+    unmeasured = Run(exp.time, np.zeros((4000, 2)), None, ("axis.position", "axis.velocity"), ("m", "m/s"))
+    with pytest.raises(ExperimentError, match='"axis.velocity" was simulated but not measured in mode free_run'):
+        compare(unmeasured, exp, ["axis.velocity"])
+    other = Run(exp.time, np.zeros((4000, 1)), None, ("elbow.position",), ("rad",))
+    with pytest.raises(ExperimentError, match=r"nothing to compare in mode free_run, the run has elbow.position"):
+        compare(other, exp)
+    late = Run(exp.time + 100.0, np.zeros((4000, 1)), None)
+    with pytest.raises(ExperimentError, match=r"the nearest of the log is 1\d\d s away; simulate this log"):
+        compare(late, exp)
+    between = Run(exp.time[:-1] + 0.5 / RATE, np.zeros((3999, 1)), None)
+    with pytest.raises(ExperimentError, match=r"the nearest of the log is 0\.0025 s away"):
+        compare(between, exp)
+    with pytest.raises(ExperimentError, match="has 1 samples; compare at least two"):
+        compare(Run(exp.time[:1], np.zeros((1, 1)), None), exp)
+    with pytest.raises(ExperimentError, match='the comparison has no channel "q"; it has axis.position'):
+        compare(run, exp)["q"]
+
+
+def test_a_slower_run_is_compared_on_its_own_samples() -> None:
+    exp = log()
+    rows = slice(5, None, 10)
+    got = compare(Run(exp.time[rows], exp["axis.position"][rows, None] - 0.25, None), exp)["axis.position"]
+    np.testing.assert_allclose(got.residual, 0.25)
+    assert got.time.size == 400
+
+
+# ---- correlation -----------------------------------------------------------------------------------------------------
+
+
+def whole(samples: int) -> list[slice]:
+    return [slice(0, samples)]
+
+
+def test_white_residuals_stay_within_the_band() -> None:
+    shares = [autocorrelation(white(2000, seed), whole(2000), 0.01, "r").outside for seed in range(40)]
+    assert np.mean(shares) == pytest.approx(0.05, abs=0.01)
+    one = autocorrelation(white(2000), whole(2000), 0.01, "r")
+    assert one.values[0] == 1.0
+    assert one.lags[1] == 0.01
+    assert one.band == pytest.approx(1.96 / np.sqrt(2000), rel=1e-4)
+
+
+@pytest.mark.parametrize("memory", [0.0, 0.5, 0.9, 0.97])
+def test_correlation_and_worth_of_a_first_order_process(memory: float) -> None:
+    n, residual = 100_000, white(100_000, 3)
+    for k in range(1, n):
+        residual[k] += memory * residual[k - 1]
+    rho = autocorrelation(residual, whole(n), 1.0, "r").values
+    np.testing.assert_allclose(rho[:20], memory ** np.arange(20), atol=0.05)
+    assert effective_samples(residual, whole(n)) == pytest.approx(n * (1 - memory) / (1 + memory), rel=0.15)
+
+
+def test_an_input_that_leaks_into_the_residual_is_seen_at_its_lag() -> None:
+    signal = np.repeat(white(500, 9), 8)
+    residual = 0.3 * np.roll(signal, 12) + white(4000, 1)
+    found = cross_correlation(residual, signal, whole(4000), 1.0, "drive.command")
+    assert found.lags[np.argmax(np.abs(found.values))] == 12.0
+    assert found.values.max() > 2 * found.band
+    exp = log().with_channel("drive.command", signal, "V")
+    got = compare(run_with(0.01 * residual, exp), exp)["axis.position"]
+    assert [each.of for each in got.inputs] == ["drive.command"]  # the disturbance does not vary
+    assert got.inputs[0].outside > 0.02
+
+
+def test_slow_signals_that_have_nothing_in_common_stay_within_the_band() -> None:
+    shares = []
+    for seed in range(60):
+        a, b = (np.convolve(white(4200, 2 * seed + side), np.ones(60) / 60, "same")[100:4100] for side in (0, 1))
+        shares.append(cross_correlation(a, b, whole(4000), 1.0, "u").outside)
+    assert np.mean(shares) < 0.1  # with the band of white noise it would be 0.7
+
+
+def test_pieces_are_not_joined() -> None:
+    piece = np.linspace(-1, 1, 50)
+    pieces = [slice(50 * k, 50 * k + 50) for k in range(40)]
+    alone = autocorrelation(np.tile(piece, 40), pieces, 1.0, "r")
+    lag = 5
+    direct = (piece[lag:] @ piece[:-lag]) / (piece @ piece)
+    assert alone.values[lag] == pytest.approx(direct)
+    assert alone.values.size == 13
+
+
+# ---- where -----------------------------------------------------------------------------------------------------------
+
+
+def test_shares_are_shares() -> None:
+    got = compare(run_with(0.01 * white()), log())["axis.position"]
+    names = [region.quantity for region in got.where.regions]
+    assert names == ["time", "frequency", "axis.speed", "axis.velocity", "axis.acceleration", "axis.position"]
+    for region in got.where.regions:
+        assert sum(each.share for each in region.bins) == pytest.approx(1.0)
+        assert sum(each.occupancy for each in region.bins) == pytest.approx(1.0)
+    assert len(got.where.sentences) == len(names)
+    with pytest.raises(KeyError, match="there are time, frequency"):
+        got.where["colour"]
+
+
+def test_a_burst_is_found_in_its_slice_of_time() -> None:
+    residual = 1e-4 * white()
+    residual[1600:1700] += 0.1
+    region = compare(run_with(residual), log())["axis.position"].where["time"]
+    assert len(region.bins) == 20
+    assert (region.worst.low, region.worst.high) == pytest.approx((8.0, 9.0), abs=0.01)
+    assert region.worst.share > 0.99
+    assert region.sentence == "100 % of the residual's energy lies between 8 and 9 s, 5 % of the time."
+
+
+def test_a_tone_is_found_in_its_octave() -> None:
+    exp = log()
+    region = compare(run_with(0.01 * np.sin(2 * np.pi * 17 * exp.time)), exp)["axis.position"].where["frequency"]
+    assert (region.worst.low, region.worst.high) == (12.5, 25.0)
+    assert region.worst.share > 0.99
+    assert "lies between 12.5 and 25 Hz, where the measured signal has almost nothing" in region.sentence
+
+
+def test_missing_coulomb_friction_shows_in_the_sign_of_the_velocity() -> None:
+    exp = log()
+    where = compare(run_with(0.02 * np.sign(speed(exp)) + 0.005), exp)["axis.position"].where
+    assert where["axis.velocity"].sentence.startswith(
+        "The mean residual is +0.025 m when axis moves forward and -0.015 m when it moves backward"
+    )
+    bins = where["axis.velocity"].bins
+    assert bins[0].mean == pytest.approx(-0.015, abs=1e-4)
+    assert bins[-1].mean == pytest.approx(0.025, abs=1e-4)
+    assert "spread evenly" in where["time"].sentence
+
+
+def test_a_residual_at_low_speed_and_one_at_one_place() -> None:
+    exp = log()
+    slow = np.abs(speed(exp)) < 0.05 * np.abs(speed(exp)).max()
+    region = compare(run_with(np.where(slow, 0.01, 1e-5)), exp)["axis.position"].where["axis.speed"]
+    low = [each for each in region.bins if each.high <= 0.0501 * np.abs(speed(exp)).max()]
+    assert sum(each.share for each in low) > 0.95
+    assert region.sentence.startswith("100 % of the residual's energy lies below 0.0314 m/s, 3 % of the time")
+    place = np.abs(exp["axis.position"] - 0.3) < 0.04
+    region = compare(run_with(np.where(place, 0.01, 1e-5)), exp)["axis.position"].where["axis.position"]
+    assert region.worst.low < 0.3 < region.worst.high
+
+
+def test_restarts_tell_how_the_error_grows() -> None:
+    exp = log(4000)
+    starts = np.arange(0, 4000, 100)
+    since = (np.arange(4000) % 100) / RATE
+    run = Run(exp.time, (exp["axis.position"] - since**2)[:, None], None, mode="restarts", starts=starts)
+    got = compare(run, exp)["axis.position"]
+    region = got.where["time since restart"]
+    assert len(region.bins) == 5
+    assert region.worst is region.bins[-1]
+    assert "above 0.297 s after a restart" in region.sentence or "above 0.396 s after a restart" in region.sentence
+    assert got.autocorrelation.values.size == 26  # a quarter of a piece
+
+
+def test_without_a_measured_position_the_simulated_motion_says_where() -> None:
+    exp = Experiment.from_arrays(log().time, {"axis.effort": white()}, {"axis.effort": "N"})
+    values = np.column_stack([np.zeros(4000), speed(log())])
+    run = Run(exp.time, values, None, ("axis.effort", "axis.velocity"), ("N", "m/s"))
+    got = compare(run, exp)
+    assert list(got.state) == ["axis.velocity"]
+    assert got.state_units == {"axis.velocity": "m/s"}
+    assert "m/s of the time" not in got["axis.effort"].where["axis.speed"].sentence
+
+
+# ---- the result ------------------------------------------------------------------------------------------------------
+
+
+def test_it_is_a_result(tmp_path: Path) -> None:
+    got = compare(run_with(0.01 * white()), log())
+    assert Comparison.load(got.save(tmp_path / "c.npz")) == got
+    frame = got.to_frame()
+    assert frame["channel"].tolist() == ["axis.position"]
+    assert frame["rmse"][0] == pytest.approx(got["axis.position"].rmse)
+    assert repr(got).startswith("Comparison(model='slide', experiment='log', mode='free_run'")
+    assert "\n" not in repr(got)
+    assert "rms error 0.01" in str(got)
+    assert "<table>" in got._repr_html_()
+
+
+def test_every_mode_of_a_simulation_can_be_compared(emps: Model) -> None:
+    time = np.arange(3000) / 1000
+    reference = 0.05 * (1 - np.cos(2 * np.pi * 0.8 * time))
+    exp = Experiment.from_arrays(
+        time,
+        {"axis.position": reference, "drive.command": 2 * np.sin(5 * time), "drive.reference": reference},
+        name="made up",
+        model=emps,
+    )
+    expected = {
+        "free_run": {"axis.position"},
+        "restarts": {"axis.position"},
+        "closed_loop": {"axis.position", "drive.command"},
+        "inverse_dynamics": {"axis.effort"},
+    }
+    for mode, channels in expected.items():
+        got = compare(simulate(emps, exp, mode), exp)
+        assert {each.channel for each in got.channels} == channels, mode
+        assert all(np.isfinite(each.relative_error) for each in got.channels)
