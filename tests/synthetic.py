@@ -89,7 +89,9 @@ class _Plant:
     def advance(self, command: Array, disturbance: Array) -> None:
         """One fine step under constant force, with friction that holds the axis where it can."""
         t = self.truth
-        command = np.clip(np.sign(command) * np.maximum(np.abs(command) - t.dead_zone, 0.0), -t.saturation, t.saturation)
+        command = np.clip(
+            np.sign(command) * np.maximum(np.abs(command) - t.dead_zone, 0.0), -t.saturation, t.saturation
+        )
         if t.lag > 0.0:
             self.lagged += (command - self.lagged) * (1.0 - np.exp(-self.step / t.lag))
             command = self.lagged

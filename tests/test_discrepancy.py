@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from synthetic import Truth, nominal, simulate_axis
 
+from synthetic import Truth, nominal, simulate_axis
 from vpm.discrepancy import Diagnosis, diagnose
 from vpm.errors import DiagnosisError, ExperimentError
 

@@ -217,13 +217,14 @@ def test_quantisation_is_found_and_counts_as_noise(step: float) -> None:
 
 def test_a_grid_is_found_from_differences_that_are_all_larger() -> None:
     steps = np.random.default_rng(3).choice(np.array([0.0, 2.0, 3.0, 5.0]), 400)
-    assert quantisation_step(0.01 * np.cumsum(steps)) == pytest.approx(0.01)
+    values = np.cumsum(0.01 * steps).astype(np.float64)
+    assert quantisation_step(values) == pytest.approx(0.01)
 
 
 def test_no_quantisation_in_smooth_or_two_valued_signals() -> None:
     assert quantisation_step(sines(clock(3000))[0]) is None
     assert quantisation_step(np.random.default_rng(0).standard_normal(1000)) is None
-    assert quantisation_step(5.0 * (np.arange(100) % 7 > 3)) is None
+    assert quantisation_step(np.where(np.arange(100) % 7 > 3, 5.0, 0.0)) is None
     assert quantisation_step(np.zeros(50)) is None
     assert noise_std(np.full(50, 3.0)) == 0.0
 

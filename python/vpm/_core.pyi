@@ -95,7 +95,7 @@ class System:
         integrator: str,
         sensitivities: Sequence[int] = ...,
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """Closed loop on ``references``, with ``disturbances`` added to the commands, both (N, m); else as `simulate`."""
+        """Closed loop on ``references``; ``disturbances`` add to the commands; both (N, m); else as `simulate`."""
     def restart(
         self,
         theta: ArrayLike,

@@ -129,9 +129,7 @@ def budget(
     setup = Setup(integrator, substeps)
     inputs = _commands(model, rate, experiment)
     state = np.zeros(model.core.n_states)
-    seconds = model.core.time_steps(
-        model.theta, state, inputs, 1.0 / rate, setup.substeps, setup.integrator, steps
-    )
+    seconds = model.core.time_steps(model.theta, state, inputs, 1.0 / rate, setup.substeps, setup.integrator, steps)
     quantiles = {name: float(np.quantile(seconds, q)) for name, q in QUANTILES.items()}
     overruns = int(np.count_nonzero(seconds > 1.0 / rate))
     return BudgetReport(model.name, integrator, rate, steps, quantiles, share, overruns, _machine())
@@ -142,7 +140,7 @@ def _commands(model: Model, rate: float, experiment: Experiment | None) -> Array
         columns = [experiment[f"{name}.command"] for name in model.actuators]
     else:
         time = np.arange(0.0, SWEEP_SECONDS, 1.0 / rate)
-        wave = sum(np.sin(2.0 * np.pi * f * time) for f in SWEEP_FREQUENCIES) / len(SWEEP_FREQUENCIES)
+        wave = np.mean([np.sin(2.0 * np.pi * f * time) for f in SWEEP_FREQUENCIES], axis=0)
         columns = [wave for _ in model.actuators]
     return np.ascontiguousarray(np.column_stack(columns)) if columns else np.zeros((1, 0))
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -72,7 +73,9 @@ def info(model: Annotated[Path | None, typer.Argument(metavar="[MODEL]", help="M
     console.print(repr(loaded), markup=False)
     for p in loaded.parameters.values():
         spread = "known" if p.uncertainty is None else f"± {p.uncertainty:g}"
-        console.print(f"  {p.name:40s} {p.value:14.6g} {p.unit:10s} {spread:12s} [{p.minimum:g}, {p.maximum:g}]", markup=False)
+        console.print(
+            f"  {p.name:40s} {p.value:14.6g} {p.unit:10s} {spread:12s} [{p.minimum:g}, {p.maximum:g}]", markup=False
+        )
 
 
 @app.command(epilog="Example:  vpm simulate examples/emps/model.toml log.csv --mode closed_loop --plot run.png")
@@ -140,7 +143,12 @@ def identify(
     machine, records = _load_all(model, logs, channels)
     with _progress() as tell:
         fit = fit_logs(
-            machine, records, free, mode=mode, cutoff=cutoff, progress=lambda n, r: tell(f"evaluation {n}: residual {r:.5g}")
+            machine,
+            records,
+            free,
+            mode=mode,
+            cutoff=cutoff,
+            progress=lambda n, r: tell(f"evaluation {n}: residual {r:.5g}"),
         )
     for name, value, std, unit in zip(fit.names, fit.values, fit.std, fit.units, strict=True):
         console.print(f"  {name:40s} {value:14.6g} ± {std:<10.3g} {unit}", markup=False)
@@ -203,7 +211,9 @@ def simplify(
 def budget(
     model: ModelPath,
     rate: Annotated[float, typer.Option(help="Rate of the controller, Hz.")] = 1000.0,
-    share: Annotated[float, typer.Option(help="Share of the period that a step may take at its 99.9 % quantile.")] = 0.2,
+    share: Annotated[
+        float, typer.Option(help="Share of the period that a step may take at its 99.9 % quantile.")
+    ] = 0.2,
     steps: Annotated[int, typer.Option(help="Number of steps to time.")] = 1_000_000,
     integrator: Integrator = "linearly_implicit",
 ) -> None:
@@ -249,12 +259,12 @@ def _load_all(model: Path, logs: list[Path], channels: Path | None) -> tuple[Mod
 
 @contextmanager
 def _progress() -> Iterator[Callable[[str], None]]:
-    """A line that says what is being done; plain text where the output is not a terminal."""
+    """A line on the terminal that says what is being done; a line each where the output goes to a file."""
     if not errors.is_terminal:
-        yield lambda _: None
+        yield partial(errors.print, markup=False)
         return
     with errors.status("starting") as status:
-        yield lambda sentence: status.update(sentence)
+        yield status.update
 
 
 def _save_plot(draw: Callable[[], Figure], path: Path | None) -> None:

@@ -102,7 +102,9 @@ class Ladder(Result):
         """Error against step time. Needs the extra ``plot``."""
         from vpm.plot import plot_ladder
 
-        return plot_ladder([r.seconds for r in self.rungs], [r.error for r in self.rungs], self.rungs.index(self.chosen))
+        return plot_ladder(
+            [r.seconds for r in self.rungs], [r.error for r in self.rungs], self.rungs.index(self.chosen)
+        )
 
 
 def simplify(

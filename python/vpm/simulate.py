@@ -210,14 +210,14 @@ def _dispatch(
     stepping = (experiment.dt, setup.substeps, setup.integrator, columns)
     if mode == "free_run":
         inputs = _columns(experiment, [f"{name}.command" for name in model.actuators], mode)
-        state = _initial_state(model, experiment, theta, cutoff) if initial_state is None else initial_state
+        state = _initial_state(model, experiment, theta) if initial_state is None else initial_state
         outputs, _, jacobian = model.core.simulate(theta, state, inputs, *stepping)
         return SimulatedArrays(outputs, jacobian, rows, begin)
     if mode == "closed_loop":
         _check_controllers(model)
         references = _columns(experiment, [f"{name}.reference" for name in model.actuators], mode)
         disturbances = _optional(experiment, [f"{name}.disturbance" for name in model.actuators])
-        state = _initial_state(model, experiment, theta, cutoff) if initial_state is None else initial_state
+        state = _initial_state(model, experiment, theta) if initial_state is None else initial_state
         outputs, _, jacobian = model.core.simulate_closed_loop(theta, state, references, disturbances, *stepping)
         return SimulatedArrays(outputs, jacobian, rows, begin)
     if mode == "restarts":
@@ -287,7 +287,8 @@ def _columns(experiment: Experiment, channels: Sequence[str], mode: str) -> Arra
 
 def _optional(experiment: Experiment, channels: Sequence[str]) -> Array:
     zero = np.zeros(len(experiment))
-    return np.ascontiguousarray(np.column_stack([experiment[c] if c in experiment else zero for c in channels]))
+    known = {channel: experiment[channel] for channel in channels if channel in experiment}
+    return np.ascontiguousarray(np.column_stack([known.get(channel, zero) for channel in channels]))
 
 
 def _check_controllers(model: Model) -> None:
@@ -319,7 +320,7 @@ def _states(model: Model, experiment: Experiment, theta: Array, cutoff: float | 
     )
 
 
-def _initial_state(model: Model, experiment: Experiment, theta: Array, cutoff: float | None) -> Array:
+def _initial_state(model: Model, experiment: Experiment, theta: Array) -> Array:
     """State at the first sample: at rest at zero where the log holds no position, lags settled at the command."""
     n = len(model.joints)
     state = np.zeros(model.core.n_states)

@@ -1,5 +1,6 @@
 //! Each link of the actuator chain, sensors and controllers, as rigs of their own and inside a simulation.
 
+#[cfg(test)]
 mod common;
 
 use common::{Bench, Machine, close};

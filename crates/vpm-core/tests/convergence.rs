@@ -1,5 +1,6 @@
 //! Order of convergence, stability on stiff systems, and exactness of the state Jacobian.
 
+#[cfg(test)]
 mod common;
 
 use common::{Bench, Machine, close};
@@ -136,7 +137,7 @@ fn dry_friction_holds_against_a_load_below_it() {
 
 /// Jacobian against central differences of the right-hand side, at random states.
 fn check_jacobian(machine: &Machine, states: usize) {
-    let mut system = machine.build().system(&machine.values).unwrap();
+    let mut system = machine.system();
     let mut random = Random::new(11);
     assert_eq!(system.dim(), states);
     for _ in 0..5 {
@@ -174,7 +175,7 @@ fn iteration_matrix_is_the_jacobian_but_for_chords_of_friction() {
         0,
         &[("stiffness", 3.0), ("rest", 0.0)],
     );
-    let mut system = machine.build().system(&machine.values).unwrap();
+    let mut system = machine.system();
     let (mut exact, mut chosen) = ([0.0; 4], [0.0; 4]);
     system.jacobian(&[0.3, 0.8], &mut exact);
     system.iteration_matrix(&[0.3, 0.8], &mut chosen);
@@ -182,7 +183,7 @@ fn iteration_matrix_is_the_jacobian_but_for_chords_of_friction() {
         close(chosen, *exact, 1e-13);
     }
     machine.effect("coulomb_friction", 0, &[("coulomb", 2.0), ("transition_velocity", 0.01)]);
-    let mut system = machine.build().system(&machine.values).unwrap();
+    let mut system = machine.system();
     system.iteration_matrix(&[0.3, 0.8], &mut chosen);
     close(chosen[3], exact[3] - 2.0 / 0.8 / 0.25, 1e-12);
     close(chosen[2], exact[2], 1e-12);

@@ -1,5 +1,6 @@
 //! Each physical effect against a closed form of the motion it gives, or an independent statement about it.
 
+#[cfg(test)]
 mod common;
 
 use common::{Bench, Machine, close};

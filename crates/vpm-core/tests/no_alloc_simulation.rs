@@ -1,5 +1,6 @@
 //! A simulation allocates before its first step and never after: a record ten times as long takes the same number of allocations.
 
+#[cfg(test)]
 mod common;
 
 use allocation_counter::measure;

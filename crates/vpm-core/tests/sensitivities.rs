@@ -1,5 +1,6 @@
 //! Exact sensitivities against central differences, for every parameter of every part, in every mode.
 
+#[cfg(test)]
 mod common;
 
 use common::{ALWAYS, Bench, Machine};

@@ -1,5 +1,6 @@
 //! Whole-record simulation: restarts are pieces of a free run, loops close, energy balances, nonsense is refused in one sentence.
 
+#[cfg(test)]
 mod common;
 
 use common::{ALWAYS, Bench, Machine, close};
@@ -126,11 +127,11 @@ fn inverse_dynamics_recovers_the_effort_that_was_applied() {
     };
     let efforts = inverse_dynamics(&bench.description, &bench.theta, motion, &[], ALWAYS).unwrap();
     // What the motion needs is what acted at that very instant; what is applied is its mean over the two intervals around.
-    for place in 0..1600 {
-        close(efforts.required[place], effort[place], 1e-11);
+    for (required, acted) in efforts.required.iter().zip(&effort) {
+        close(*required, *acted, 1e-11);
     }
-    for place in 2..1600 {
-        close(efforts.applied[place], effort[place], 0.03);
+    for (applied, acted) in efforts.applied.iter().zip(&effort).skip(2) {
+        close(*applied, *acted, 0.03);
     }
     // With the lag the state at the sample is the mean of the neighbouring intervals' means up to second order of the step.
     let error = (1..800).map(|k| (efforts.applied[2 * k] - effort[2 * k]).abs()).fold(0.0, f64::max);

@@ -114,7 +114,6 @@ ASYMMETRIC_FRICTION = EffectType(
             " starts from rest part them"
         ),
     },
-    requires="coulomb_friction",
 )
 
 STRIBECK_FRICTION = EffectType(

@@ -76,7 +76,7 @@ class ChannelComparison(Storable):
         return (
             f"{self.channel}: rms error {self.rmse:.4g} {self.unit}, {self.relative_error:.3g} % of the "
             f"signal, fit {self.fit:.4g} %; largest {self.max_error:.3g} {self.unit} at {self.max_error_time:.4g} s, "
-            f"mean {self.bias:.3g} {self.unit}; {self.time.size} samples, worth {self.effective_samples:.0f} alone"
+            f"mean {self.bias:.3g} {self.unit}; {self.time.size} samples, {self.effective_samples:.0f} independent"
         )
 
     def _headline(self) -> Mapping[str, object]:

@@ -15,6 +15,9 @@ Array = NDArray[np.float64]
 #: A region that holds this much more of the energy than of the samples is worth naming.
 WORTH_NAMING = 0.1
 
+#: A bin at the end of a region that adds less than this is left out of the sentence.
+NOT_WORTH_A_BIN = 0.01
+
 #: Edges of the bins of speed, as shares of the highest speed.
 SPEED_EDGES = (0.0, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)
 
@@ -216,6 +219,10 @@ def _concentrated(bins: Sequence[Bin]) -> tuple[int, int]:
         running += each.share - each.occupancy
         if running > best + 1e-12:
             best, first, last = running, begin, at + 1
+    while last - first > 1 and bins[first].share - bins[first].occupancy < NOT_WORTH_A_BIN:
+        first += 1
+    while last - first > 1 and bins[last - 1].share - bins[last - 1].occupancy < NOT_WORTH_A_BIN:
+        last -= 1
     return first, last
 
 

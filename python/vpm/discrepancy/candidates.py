@@ -36,6 +36,8 @@ class Candidate:
         Start values by short parameter name; several where the effect has a shape to be searched.
     bounds : dict
         Data-driven bounds of shape parameters by short name, within the physical range.
+    fixed : tuple of str
+        Short names of shape parameters that stay at their start.
     neutral : bool
         Whether the effect does nothing at its start values, so that the current residual still holds.
     """
@@ -44,6 +46,7 @@ class Candidate:
     site: str
     starts: tuple[Mapping[str, float], ...]
     bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    fixed: tuple[str, ...] = ()
     neutral: bool = True
 
     @property
@@ -91,27 +94,27 @@ def candidates(
     return tuple(found)
 
 
-def _candidate(
-    effect: EffectType, site: str, model: Model, data: InverseDynamicsProblem, residual: Array
-) -> Candidate:
+def _candidate(effect: EffectType, site: str, model: Model, data: InverseDynamicsProblem, residual: Array) -> Candidate:
     joint = _joint_of(effect.site, site, model)
     seen = _excitation(data, model, joint, site if effect.site == "actuator" else None)
     if effect.name == "coulomb_friction":
         return Candidate(effect, site, _grid("transition_velocity", TRANSITION_SHARES, seen.speed), _slow(seen))
     if effect.name == "asymmetric_friction":
         velocity = _known_transition(model, site, seen)
-        return Candidate(effect, site, ({"transition_velocity": velocity},), _slow(seen))
+        return Candidate(effect, site, ({"transition_velocity": velocity},), fixed=("transition_velocity",))
     if effect.name == "stribeck_friction":
         velocity = _known_transition(model, site, seen)
         starts = tuple({"stribeck_velocity": s * seen.speed, "transition_velocity": velocity} for s in STRIBECK_SHARES)
-        bounds = {"stribeck_velocity": (2.0 * velocity, seen.speed), **_slow(seen)}
-        return Candidate(effect, site, starts, bounds)
+        bounds = {"stribeck_velocity": (2.0 * velocity, seen.speed)}
+        return Candidate(effect, site, starts, bounds, fixed=("transition_velocity",))
     if effect.name == "torque_ripple":
         periods = _ripple_periods(data, model, joint, residual)
         bounds = {"period": (min(periods) / 1.5, max(periods) * 1.5)}
         return Candidate(effect, site, tuple({"period": p} for p in periods), bounds)
     if effect.name == "spring":
         return Candidate(effect, site, ({"rest": seen.middle},), {"rest": _around(seen)})
+    if effect.name == "payload":
+        return Candidate(effect, site, _payload_places(model, site))
     if effect.name == "actuator_lag":
         starts = tuple({"time_constant": n * seen.interval} for n in LAG_INTERVALS)
         return Candidate(effect, site, starts, {"time_constant": (0.02 * seen.interval, np.inf)}, neutral=False)
@@ -119,6 +122,13 @@ def _candidate(
         starts = tuple({"limit": share * seen.command} for share in LIMIT_SHARES)
         return Candidate(effect, site, starts, {"limit": (0.02 * seen.command, seen.command)}, neutral=False)
     return Candidate(effect, site, ({},))
+
+
+def _payload_places(model: Model, body: str) -> tuple[Mapping[str, float], ...]:
+    """At the origin of the body, at its centre of mass, and twice as far out."""
+    centre = {axis: model.parameters[f"{body}.center_of_mass.{axis}"].value for axis in "xyz"}
+    factors = (0.0, 1.0, 2.0) if any(centre.values()) else (0.0,)
+    return tuple({axis: factor * value for axis, value in centre.items()} for factor in factors)
 
 
 def _grid(name: str, shares: Sequence[float], size: float) -> tuple[Mapping[str, float], ...]:

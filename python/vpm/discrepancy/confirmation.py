@@ -15,8 +15,6 @@ from vpm.model import Model
 
 Array = NDArray[np.float64]
 
-#: A shape is fitted too if moving it would take away this share of the training mean square, to first order.
-LEAST_RELEASED = 1e-2
 #: A refit stops when the sum of squares changes by less than this share: far below what a verdict rests on.
 TOLERANCE = 1e-6
 
@@ -132,7 +130,11 @@ def confirm(current: Judged, data: Data, probe: Probe) -> Trial:
         judged,
         own,
         (*probe.held, *held),
-        gain(current.fit.residual, judged.fit.residual * _shrinkage(data.training, current, judged), segments(data.training)),
+        gain(
+            current.fit.residual,
+            judged.fit.residual * _shrinkage(data.training, current, judged),
+            segments(data.training),
+        ),
         gain(current.unseen, judged.unseen * _shrinkage(data.unseen, current, judged), segments(data.unseen)),
         _simulated_gain(current, judged, data),
         diverged,
@@ -184,14 +186,16 @@ def _release(
     model: Model, data: Data, free: tuple[str, ...], fit: Estimate, probe: Probe
 ) -> tuple[tuple[str, ...], tuple[Alias, ...]]:
     """Parameters without influence at zero size (a period, a transition velocity) that have one now."""
+    fixed = {dotted for short, dotted in _short_names(probe).items() if short in probe.candidate.fixed}
+    asleep = [name for name in probe.invisible if name not in fixed]
     theta = model.theta.copy()
     theta[[model.index(name) for name in free]] = fit.values
-    _, fresh = data.training.evaluate(model, theta, [model.index(name) for name in probe.invisible])
+    _, fresh = data.training.evaluate(model, theta, [model.index(name) for name in asleep])
     released: list[str] = []
     held: list[Alias] = []
     known, names = fit.jacobian, list(free)
-    for name, column in zip(probe.invisible, fresh.T, strict=True):
-        if not np.any(column) or explained_share(fit.residual, column[:, None]) < LEAST_RELEASED:
+    for name, column in zip(asleep, fresh.T, strict=True):
+        if not np.any(column):
             continue
         if explained_share(column, known) > ALIAS_SHARE:
             held.append(Alias(name, names[closest_column(column, known)]))

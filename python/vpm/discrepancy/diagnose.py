@@ -204,19 +204,20 @@ def _moved_far(model: Model, recalibrated: Judged) -> list[str]:
 def _gaps(
     data: Data, nominal: Judged, recalibrated: Judged, final: Judged, floor: dict[str, float]
 ) -> dict[str, ChannelGap]:
-    stages = [gaps(data.unseen, judged.unseen) for judged in (nominal, recalibrated, final)]
+    stages = [gaps(data.unseen, stage.unseen) for stage in (nominal, recalibrated, final)]
     result = {}
     for channel, (_, _, unit) in stages[0].items():
-        values = [stage[channel][0] for stage in stages]
+        before, known, after = (stage[channel][0] for stage in stages)
         signal = _signal(data.unseen, channel)
-        result[channel] = ChannelGap(*values, floor.get(channel, np.nan), unit, signal, data.unseen.mode)
+        result[channel] = ChannelGap(before, known, after, floor.get(channel, np.nan), unit, signal, data.unseen.mode)
+    judged = (nominal, recalibrated, final)
     if data.simulation is not None and nominal.simulated is not None:
-        simulated = [gaps(data.simulation, j.simulated) for j in (nominal, recalibrated, final) if j.simulated is not None]
+        simulated = [gaps(data.simulation, j.simulated) for j in judged if j.simulated is not None]
         for channel, (_, _, unit) in simulated[0].items():
-            values = [stage[channel][0] for stage in simulated]
+            before, known, after = (stage[channel][0] for stage in simulated)
             signal = _signal(data.simulation, channel)
             key = f"{channel} ({data.simulation.mode})"
-            result[key] = ChannelGap(*values, np.nan, unit, signal, data.simulation.mode)
+            result[key] = ChannelGap(before, known, after, np.nan, unit, signal, data.simulation.mode)
     return result
 
 
@@ -243,8 +244,8 @@ def _verdict(
     if remaining:
         return (
             "unexplained",
-            f"The residual is structured and {above:.2g} times the noise floor, and no effect of the catalogue explains "
-            f"it. Error on unseen data: {numbers}.",
+            f"The residual is structured and {above:.2g} times the noise floor, and no effect of the catalogue "
+            f"explains it. Error on unseen data: {numbers}.",
         )
     better = gain(nominal.unseen, recalibrated.unseen, segments(data.unseen))
     if better.relative > LEAST_GAIN and better.score > float(ndtri(1.0 - FALSE_ALARM_LEVEL)):
@@ -282,9 +283,7 @@ def _accepted_effect(entry: Accepted, final: Judged) -> AcceptedEffect:
 
 def _steps(data: Data, found: Search) -> tuple[Step, ...]:
     labels = [("", ""), *((e.trial.probe.candidate.effect.name, e.trial.probe.candidate.site) for e in found.accepted)]
-    return tuple(
-        _step(data, judged, effect, site) for judged, (effect, site) in zip(found.stages, labels, strict=True)
-    )
+    return tuple(_step(data, judged, effect, site) for judged, (effect, site) in zip(found.stages, labels, strict=True))
 
 
 def _step(data: Data, judged: Judged, effect: str, site: str) -> Step:

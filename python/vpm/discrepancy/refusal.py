@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 from scipy.stats import t as student
@@ -60,14 +59,14 @@ def refuse_probe(probe: Probe) -> str:
 
 def refuse_trial(trial: Trial, thresholds: Thresholds) -> str:
     """Reason not to accept a refitted candidate, or ""."""
-    checks: tuple[Callable[[Trial, Thresholds], str], ...] = (
-        _too_short,
-        _only_training,
-        _not_clear,
-        _worse_in_simulation,
-        _too_little,
+    reasons = (
+        _too_short(trial, thresholds.interval),
+        _only_training(trial),
+        _not_clear(trial),
+        _worse_in_simulation(trial),
+        _too_little(trial, thresholds),
     )
-    return next((reason for check in checks if (reason := check(trial, thresholds))), "")
+    return next(filter(None, reasons), "")
 
 
 def _impossible(probe: Probe, name: str) -> str:
@@ -77,20 +76,20 @@ def _impossible(probe: Probe, name: str) -> str:
     return f"its coefficient {name} comes out {sign} ({value}): {probe.candidate.effect.impossible}"
 
 
-def _too_short(trial: Trial, thresholds: Thresholds) -> str:
+def _too_short(trial: Trial, interval: float) -> str:
     """A delay or lag below one sampling interval cannot be told from the hold of the sampled command."""
     model = trial.judged.model
     for name in trial.parameters:
         parameter = model.parameters[name]
-        if parameter.unit == "s" and parameter.value < thresholds.interval:
+        if parameter.unit == "s" and parameter.value < interval:
             return (
                 f"{name} comes out as {1e3 * parameter.value:.3g} ms, less than the sampling interval of "
-                f"{1e3 * thresholds.interval:.3g} ms: it cannot be told from the sampling itself"
+                f"{1e3 * interval:.3g} ms: it cannot be told from the sampling itself"
             )
     return ""
 
 
-def _only_training(trial: Trial, thresholds: Thresholds) -> str:
+def _only_training(trial: Trial) -> str:
     seen, unseen = trial.training, trial.unseen
     if unseen.relative >= 0.0:
         return ""
@@ -100,7 +99,7 @@ def _only_training(trial: Trial, thresholds: Thresholds) -> str:
     )
 
 
-def _not_clear(trial: Trial, thresholds: Thresholds) -> str:
+def _not_clear(trial: Trial) -> str:
     if trial.clear:
         return ""
     model, fit = trial.judged.model, trial.judged.fit
@@ -121,17 +120,18 @@ def _too_little(trial: Trial, thresholds: Thresholds) -> str:
     needed = thresholds.score(unseen.pieces) * (MODEST_FACTOR if unseen.relative < MODEST_GAIN else 1.0)
     if unseen.score < needed:
         return (
-            f"its gain of {_percent(unseen.relative)} on unseen data is {unseen.score:.1f} standard deviations over {unseen.pieces} independent "
-            f"pieces, and {needed:.1f} are needed when {thresholds.candidates} candidates are tried"
+            f"its gain of {_percent(unseen.relative)} on unseen data is {unseen.score:.1f} standard deviations over "
+            f"{unseen.pieces} independent pieces, and {needed:.1f} are needed when {thresholds.candidates} candidates "
+            "are tried"
         )
     return ""
 
 
-def _worse_in_simulation(trial: Trial, thresholds: Thresholds) -> str:
+def _worse_in_simulation(trial: Trial) -> str:
     if trial.diverged:
         return f"with it the simulation of the unseen record fails: {trial.diverged}"
     simulated = trial.simulated
-    if simulated is not None and simulated.relative < -LEAST_GAIN and simulated.score < -2.0:
+    if simulated is not None and simulated.relative < -LEAST_GAIN:
         return (
             "it helps the balance of effort and makes the simulation of the unseen record worse by "
             f"{_percent(-simulated.relative)} of its mean square"

@@ -1,4 +1,4 @@
-"""Cheap look at every candidate: how much of the training residual would its regressor take away?
+"""Cheap look at every candidate: the share of the training residual that its regressor would take away.
 
 For each candidate the parameters that are already free and the new ones are moved together in one linearised step, so
 that a candidate is never credited with what a better value of a known parameter would have done.

@@ -52,7 +52,12 @@ def structure(
 
 
 def _predicted(
-    training: InverseDynamicsProblem, unseen: InverseDynamicsProblem, fitted: Array, residual: Array, j: int, joints: int
+    training: InverseDynamicsProblem,
+    unseen: InverseDynamicsProblem,
+    fitted: Array,
+    residual: Array,
+    j: int,
+    joints: int,
 ) -> float:
     """Cross-validated share of one joint's residual that bins of its state explain."""
     states = [np.vstack([_state(problem, r, j) for r in range(len(problem.motions))]) for problem in (training, unseen)]

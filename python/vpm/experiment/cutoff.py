@@ -12,7 +12,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import welch
 
 from vpm.errors import ExperimentError
 from vpm.experiment.noise import quantisation_step
@@ -127,6 +126,8 @@ def position_spectrum(position: Array, rate: float) -> tuple[Array, Array, Array
         What white noise gives whose level is the median over the top fifth of the frequencies, and at least that of
         the quantisation. Its lowest lines are raised by the window and the smoothing.
     """
+    from scipy.signal import welch
+
     bend = np.diff(position, 2)
     length = int(np.clip(bend.size // 8, min(bend.size, 256), 4096))
     # Without the mean taken off: of differences it is no offset, and its loss would stand in the lowest line.

@@ -6,8 +6,6 @@ from math import ceil
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import make_interp_spline
-from scipy.signal import butter, cheby1, sosfiltfilt
 
 from vpm.errors import ExperimentError
 
@@ -58,6 +56,8 @@ def lowpass(values: Array, rate: float, cutoff: float, order: int = MOTION_FILTE
     if order < 1:
         raise ExperimentError(f"a filter of order {order} does nothing; choose an order of at least 1")
     _need_samples(values, 4, "filtering")
+    from scipy.signal import butter
+
     sections = butter(order, cutoff / (0.5 * rate), output="sos")
     return _forward_backward(sections, values, 2 * settling_samples(rate, cutoff))
 
@@ -151,6 +151,8 @@ def parallel_filter(values: Array, decimation: int) -> Array:
 
 def anti_alias(values: Array, factor: float) -> Array:
     """Zero-phase Chebyshev low-pass (order 8, 0.05 dB) at 80 % of the Nyquist frequency that is left after `factor`."""
+    from scipy.signal import cheby1
+
     sections = cheby1(8, 0.05, RETAINED_BAND / factor, output="sos")
     return _forward_backward(sections, values, ceil(40 * factor))
 
@@ -172,11 +174,15 @@ def interpolate(time: Array, values: Array, at: Array, *, smooth: bool) -> Array
     -------
     ndarray, shape (M,) or (M, C)
     """
+    from scipy.interpolate import make_interp_spline
+
     degree = 3 if smooth and len(time) > 3 else 1
     return np.asarray(make_interp_spline(time, values, k=degree, axis=0)(at), dtype=np.float64)
 
 
 def _forward_backward(sections: Array, values: Array, padding: int) -> Array:
+    from scipy.signal import sosfiltfilt
+
     return np.asarray(
         sosfiltfilt(sections, np.asarray(values, dtype=np.float64), axis=0, padlen=min(len(values) - 1, padding)),
         dtype=np.float64,

@@ -120,15 +120,20 @@ class _Counter:
                 self.progress(self.count, float(np.sqrt(np.mean(self._value[0] ** 2))))
         return self._value
 
+    def residual(self, x: Array) -> Array:
+        return self(x)[0]
+
+    def jacobian(self, x: Array) -> Array:
+        return self(x)[1]
+
 
 def _linear_step(counter: _Counter, start: Array, low: Array, high: Array) -> Array:
     """The bounded minimiser of the linearised problem, if it is indeed better than the start."""
     residual, jacobian = counter(start)
     lengths = column_lengths(jacobian)
-    factor, scaled = np.linalg.qr(np.column_stack([jacobian / lengths, residual]), mode="r"), lengths
-    square, target = factor[:, :-1], factor[:, -1]
-    step = lsq_linear(square, -target, ((low - start) * scaled, (high - start) * scaled), tol=1e-14)
-    candidate = np.clip(start + step.x / scaled, low, high)
+    orthogonal, square = np.linalg.qr(jacobian / lengths)
+    step = lsq_linear(square, -orthogonal.T @ residual, ((low - start) * lengths, (high - start) * lengths), tol=1e-14)
+    candidate = np.clip(start + step.x / lengths, low, high)
     better = np.sum(counter(candidate)[0] ** 2) <= np.sum(residual**2)
     return candidate if better else start
 
@@ -139,13 +144,12 @@ def _refine(counter: _Counter, start: Array, low: Array, high: Array, tolerance:
     gradient = (jacobian / lengths).T @ residual
     interior = (start > low) & (start < high)
     # Nothing left to gain along any free direction: the problem was linear and the first step ended it.
-    if np.all(np.abs(gradient[interior]) <= 1e-9 * max(np.linalg.norm(residual), 1e-300)):
+    if np.all(np.abs(gradient[interior]) <= 1e-9 * np.sqrt(residual @ residual)):
         return start
-    inside = _strictly_inside(start, low, high)
     result = least_squares(
-        lambda x: counter(x)[0],
-        inside,
-        jac=lambda x: counter(x)[1],
+        counter.residual,
+        _strictly_inside(start, low, high),
+        jac=counter.jacobian,
         bounds=(low, high),
         method="trf",
         x_scale=1.0 / lengths,
@@ -221,7 +225,7 @@ class Fit(Result):
     @property
     def intervals(self) -> Array:
         """95 % intervals, shape (p, 2)."""
-        return self.values[:, None] + NORMAL_95 * self.std[:, None] * np.array([-1.0, 1.0])
+        return np.column_stack([self.values - NORMAL_95 * self.std, self.values + NORMAL_95 * self.std])
 
     def __getitem__(self, name: str) -> float:
         """Identified value of one parameter, SI."""
@@ -295,7 +299,7 @@ def identify(
     names = tuple(free) if free is not None else tuple(p.name for p in model.parameters.values() if p.adjustable)
     if not names:
         raise IdentificationError(
-            f"{model.name}: no parameter is free; give parameters an uncertainty in the model file or name them in free="
+            f"{model.name}: no parameter is free; give some an uncertainty in the model file or name them in free="
         )
     data = problem(model, records, mode, cutoff=cutoff, setup=setup)
     before, _ = data.evaluate(model, model.theta)

@@ -32,7 +32,7 @@ class Combination(Storable):
     names : tuple of str
         Parameters that take part, the strongest first.
     weights : tuple of float
-        Change of each, in units of its own parameter, normalised to the largest.
+        Change of each, in units of its own parameter, for a change of the first by one.
     singular_value : float
         Relative to the largest one of the scaled regressor.
     """
@@ -74,7 +74,7 @@ def unseen_combinations(
     largest = values[0] if values[0] > 0.0 else 1.0
     # A column of zeros has no length to be scaled by, so its singular value is exactly zero: caught like the rest.
     return tuple(
-        _combination(direction / lengths, names, float(value / largest))
+        _combination(direction, lengths, names, float(value / largest))
         for value, direction in zip(values, directions, strict=True)
         if value / largest < tolerance
     )
@@ -98,8 +98,10 @@ def closest_column(column: Array, others: Array) -> int:
     return int(np.argmax(cosine))
 
 
-def _combination(direction: Array, names: Sequence[str], value: float) -> Combination:
-    largest = direction[np.argmax(np.abs(direction))]
-    relative = direction / largest
-    order = [int(i) for i in np.argsort(-np.abs(relative)) if abs(relative[i]) > 1e-3]
-    return Combination(tuple(names[i] for i in order), tuple(float(relative[i]) for i in order), value)
+def _combination(direction: Array, lengths: Array, names: Sequence[str], value: float) -> Combination:
+    """Who takes part is judged on the scaled columns, which know no units; the weights are in the parameters' units."""
+    share = np.abs(direction) / np.max(np.abs(direction))
+    order = [int(i) for i in np.argsort(-share) if share[i] > 1e-3]
+    weights = direction / lengths
+    first = weights[order[0]]
+    return Combination(tuple(names[i] for i in order), tuple(float(weights[i] / first) for i in order), value)

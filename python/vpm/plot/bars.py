@@ -91,7 +91,7 @@ def plot_parameters(
     axis = axes[0][0]
     rows = np.arange(len(names))
     axis.plot(begin / scale, rows, "|", color=SOFT, markersize=13, markeredgewidth=2, label="start")
-    error = np.nan_to_num(1.96 * sigma / scale)
+    error = np.where(np.isfinite(sigma), 1.96 * sigma / scale, 0.0)
     axis.errorbar(value / scale, rows, xerr=error, fmt="o", color=BLUE, capsize=3, markersize=5, label="fit, 95 %")
     for row, (number, spread, unit) in enumerate(zip(value, sigma, units, strict=True)):
         text = f"{number:.5g} ± {spread:.2g} {unit if unit != '1' else ''}"

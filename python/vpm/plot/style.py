@@ -114,7 +114,7 @@ def panels(
 def figure_to_svg(figure: Figure) -> str:
     """SVG of a figure, as an element to put into an HTML page.
 
-    The same figure always gives the same text. Letters are drawn as shapes, so that they look alike everywhere.
+    Figures that are made alike give the same text. Letters are drawn as shapes, so that they look alike everywhere.
 
     Parameters
     ----------

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from importlib.resources import files
+from math import isnan
 
 from vpm.discrepancy import Diagnosis
 from vpm.errors import MissingExtraError
@@ -33,7 +34,7 @@ def render_html(diagnosis: Diagnosis) -> str:
         raise MissingExtraError("jinja2", "report") from error
     environment = Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
     environment.filters["percent"] = lambda share: f"{100.0 * share:.2f} %"
-    environment.filters["short"] = lambda value: "–" if value is None or value != value else f"{value:.4g}"
+    environment.filters["short"] = lambda value: "–" if isnan(value) else f"{value:.4g}"
     template = environment.from_string((files("vpm.report") / "report.html.jinja").read_text(encoding="utf-8"))
     return template.render(d=diagnosis, words=VERDICT_WORDS[diagnosis.verdict], figures=_figures(diagnosis))
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import isnan
+
 from rich.console import Console
 
 from vpm.discrepancy import ChannelGap, Diagnosis, Step
@@ -22,56 +24,68 @@ def print_story(diagnosis: Diagnosis, console: Console) -> None:
     diagnosis : Diagnosis
     console : rich.console.Console
     """
+    for paragraph in (_verdict, _effects, _steps, _gaps, _refused, _ambiguous, _where, _notes):
+        lines = paragraph(diagnosis)
+        if lines:
+            console.print("\n".join(lines), markup=False)
+            console.print()
 
-    def say(text: str = "") -> None:
-        console.print(text, markup=False)
 
-    say(f"{diagnosis.model.name}: fitted on {', '.join(diagnosis.training)}; judged on {', '.join(diagnosis.unseen)}")
-    say()
-    say(f"verdict: {diagnosis.verdict}  ({VERDICT_WORDS[diagnosis.verdict]})")
-    say(diagnosis.summary)
-    if diagnosis.effects:
-        say()
-        say("effects, in the order of acceptance:")
-        for number, effect in enumerate(diagnosis.effects, 1):
-            say(
-                f"  {number}. {effect.name} at {effect.site}: took {100 * effect.gain:.1f} % of the unseen mean square "
-                f"({effect.score:.1f} standard deviations)"
-            )
-            for p in effect.parameters:
-                say(f"       {p.dotted} = {p.value:.5g} {_spread(p.std)}{p.unit}")
-            for note in effect.notes:
-                say(f"       {note}")
-    say()
-    say("error on unseen data, step by step (share of the measured effort):")
-    for step in diagnosis.steps:
-        say(f"  {_step_name(step):44s} {100 * step.unseen_error:6.2f} %")
-    say()
-    say("gap on unseen data (root mean square):")
-    say(f"  {'channel':34s} {'before':>11s} {'recalibrated':>13s} {'after':>11s} {'noise floor':>12s}")
-    for channel, gap in diagnosis.gap.items():
-        say(f"  {channel:34s} {_cell(gap.before)} {_cell(gap.recalibrated, 13)} {_cell(gap.after)} {_floor(gap)} {gap.unit}")
-        relative = f"{_share(gap.before, gap)} {_share(gap.recalibrated, gap, 13)} {_share(gap.after, gap)}"
-        say(f"  {'':34s} {relative}")
-    if diagnosis.refused:
-        say()
-        say("refused:")
-        for refused in diagnosis.refused:
-            say(f"  {refused.name} at {refused.site}: {refused.reason}")
-    if diagnosis.ambiguous_with:
-        say()
-        say("these data cannot tell apart:")
-        for ambiguity in diagnosis.ambiguous_with:
-            say(f"  {ambiguity.name} at {ambiguity.site} and {', '.join(ambiguity.others)}: {ambiguity.reason}")
-    for title, sentences in diagnosis.where.items():
-        say()
-        say(f"where the recalibrated model parts from {title}:")
-        for sentence in sentences:
-            say(f"  {sentence}")
-    say()
-    for note in diagnosis.notes:
-        say(f"note: {note}")
-    say(f"took {diagnosis.seconds:.1f} s")
+def _verdict(d: Diagnosis) -> list[str]:
+    return [
+        f"{d.model.name}: fitted on {', '.join(d.training)}; judged on {', '.join(d.unseen)}",
+        f"verdict: {d.verdict}  ({VERDICT_WORDS[d.verdict]})",
+        d.summary,
+    ]
+
+
+def _effects(d: Diagnosis) -> list[str]:
+    lines = ["effects, in the order of acceptance:"] if d.effects else []
+    for number, effect in enumerate(d.effects, 1):
+        lines.append(
+            f"  {number}. {effect.name} at {effect.site}: took {100 * effect.gain:.1f} % of the unseen mean square "
+            f"({effect.score:.1f} standard deviations)"
+        )
+        lines += [f"       {p.dotted} = {p.value:.5g} {_spread(p.std)}{p.unit}" for p in effect.parameters]
+        lines += [f"       {note}" for note in effect.notes]
+    return lines
+
+
+def _steps(d: Diagnosis) -> list[str]:
+    rows = [f"  {_step_name(step):44s} {100 * step.unseen_error:6.2f} %" for step in d.steps]
+    return ["error on unseen data, step by step (share of the measured effort):", *rows]
+
+
+def _gaps(d: Diagnosis) -> list[str]:
+    head = f"  {'channel':34s} {'before':>11s} {'recalibrated':>13s} {'after':>11s} {'noise floor':>12s}"
+    lines = ["gap on unseen data (root mean square):", head]
+    for channel, gap in d.gap.items():
+        numbers = f"{_cell(gap.before)} {_cell(gap.recalibrated, 13)} {_cell(gap.after)} {_floor(gap)}"
+        shares = f"{_share(gap.before, gap)} {_share(gap.recalibrated, gap, 13)} {_share(gap.after, gap)}"
+        lines += [f"  {channel:34s} {numbers} {gap.unit}", f"  {'':34s} {shares}"]
+    return lines
+
+
+def _refused(d: Diagnosis) -> list[str]:
+    lines = [f"  {refused.name} at {refused.site}: {refused.reason}" for refused in d.refused]
+    return ["refused:", *lines] if lines else []
+
+
+def _ambiguous(d: Diagnosis) -> list[str]:
+    lines = [f"  {a.name} at {a.site} and {', '.join(a.others)}: {a.reason}" for a in d.ambiguous_with]
+    return ["these data cannot tell apart:", *lines] if lines else []
+
+
+def _where(d: Diagnosis) -> list[str]:
+    lines = []
+    for channel, sentences in d.where.items():
+        lines.append(f"where the recalibrated model parts from {channel}:")
+        lines += [f"  {sentence}" for sentence in sentences]
+    return lines
+
+
+def _notes(d: Diagnosis) -> list[str]:
+    return [*(f"note: {note}" for note in d.notes), f"took {d.seconds:.1f} s"]
 
 
 def _step_name(step: Step) -> str:
@@ -91,4 +105,4 @@ def _share(value: float, gap: ChannelGap, width: int = 11) -> str:
 
 
 def _floor(gap: ChannelGap) -> str:
-    return f"{gap.noise_floor:>12.4g}" if gap.noise_floor == gap.noise_floor else f"{'-':>12s}"
+    return f"{'-':>12s}" if isnan(gap.noise_floor) else f"{gap.noise_floor:>12.4g}"

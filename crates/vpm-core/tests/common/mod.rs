@@ -7,6 +7,7 @@ use vpm_core::integrator::Method;
 use vpm_core::samples::Sample;
 use vpm_core::sensitivity::Interrupt;
 use vpm_core::simulate::{Run, Setting, Stepping, closed_loop, free_run, restarts};
+use vpm_core::system::System;
 use vpm_core::table::Table;
 
 /// Never stops a computation.
@@ -102,6 +103,11 @@ impl Machine {
     /// The description.
     pub fn build(&self) -> Description {
         Description::from_json(&self.json()).unwrap()
+    }
+
+    /// The machine as a system of equations.
+    pub fn system(&self) -> System<f64> {
+        self.build().system(&self.values).unwrap()
     }
 
     /// The place of a parameter.

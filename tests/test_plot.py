@@ -1,0 +1,237 @@
+"""Pictures: what is drawn, that it is readable text and no window, and that pages can hold it."""
+
+from __future__ import annotations
+
+import sys
+import xml.etree.ElementTree as ET
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from vpm import plot
+from vpm.compare import compare
+from vpm.errors import MissingExtraError
+from vpm.experiment import Experiment
+from vpm.plot.signals import running_mean
+from vpm.plot.style import MOST_POINTS, thinned
+
+matplotlib = pytest.importorskip("matplotlib")
+from matplotlib.figure import Figure  # noqa: E402  # only where there is one
+
+Array = NDArray[np.float64]
+
+TIME = np.arange(600) / 100
+WAVE = np.sin(2 * TIME)
+
+
+@dataclass(frozen=True)
+class Run:
+    """A run that is made up."""
+
+    time: Array = field(default_factory=lambda: TIME)
+    channels: tuple[str, ...] = ("axis.position", "axis.velocity")
+    units: tuple[str, ...] = ("m", "m/s")
+    values: Array = field(default_factory=lambda: np.column_stack([WAVE, 2 * np.cos(2 * TIME)]))
+    measured: Array = field(default_factory=lambda: np.column_stack([WAVE + 0.1, np.full(600, np.nan)]))
+    starts: NDArray[np.int64] = field(default_factory=lambda: np.array([0, 300]))
+    model_name: str = "slide"
+    experiment_name: str = "log"
+    mode: str = "free_run"
+
+
+@dataclass(frozen=True)
+class Gap:
+    """A gap that is made up."""
+
+    before: float = 5.0
+    recalibrated: float = 2.0
+    after: float = 1.0
+    noise_floor: float = 0.3
+    signal: float = 10.0
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A candidate that is made up."""
+
+    name: str
+    site: str = "axis"
+    round: int = 1
+    screened: float = 0.5
+    unseen: float = 0.4
+    accepted: bool = False
+
+
+@dataclass(frozen=True)
+class Picture:
+    """Residuals that are made up."""
+
+    channel: str = "axis.effort"
+    unit: str = "N"
+    coordinate_unit: str = "m"
+    time: Array = field(default_factory=lambda: TIME)
+    position: Array = field(default_factory=lambda: WAVE)
+    velocity: Array = field(default_factory=lambda: 2 * np.cos(2 * TIME))
+    before: Array = field(default_factory=lambda: 3 * WAVE)
+    recalibrated: Array = field(default_factory=lambda: 2 * WAVE)
+    after: Array = field(default_factory=lambda: WAVE)
+
+
+CANDIDATES = [
+    Candidate("coulomb_friction", accepted=True),
+    Candidate("asymmetric_friction", round=2, accepted=True),
+    Candidate("bias_force", unseen=float("nan")),
+    Candidate("stribeck_friction", screened=0.7),
+]
+
+FIGURES: dict[str, tuple[Callable[[], Figure], list[str]]] = {
+    "channels": (
+        lambda: plot.plot_channels(TIME, np.column_stack([WAVE, WAVE]), ["a", "b"], ["m", "1"], title="log"),
+        ["time [s]", "[m]", "log", "a", "b"],
+    ),
+    "run": (
+        lambda: plot.plot_run(Run()),
+        ["time [s]", "[m]", "axis.position", "measured", "simulated", "slide on log, free run"],
+    ),
+    "residual_time": (
+        lambda: plot.plot_residual_time(TIME, {"recalibrated": WAVE, "after": 0.1 * WAVE}, "N"),
+        ["residual [N]", "time [s]", "recalibrated", "after"],
+    ),
+    "residual_against": (
+        lambda: plot.plot_residual_against(WAVE, {"recalibrated": WAVE, "after": 0.1 * WAVE}, "velocity [m/s]", "N"),
+        ["residual [N]", "velocity [m/s]", "recalibrated, mean", "after, mean"],
+    ),
+    "spectrum": (lambda: plot.plot_spectrum({"a": WAVE}, 100.0, "N"), ["frequency [Hz]", "density [N/√Hz]", "a"]),
+    "correlation": (
+        lambda: plot.plot_correlation(TIME[:50], WAVE[:50], 0.1, "with itself"),
+        ["lag [s]", "correlation", "with itself", "95 % if independent"],
+    ),
+    "parameters": (
+        lambda: plot.plot_parameters(["mass", "bias"], [95.0, -3.0], [0.2, np.inf], [100.0, 0.0], ["kg", "N"]),
+        ["mass", "bias", "95 ± 0.2 kg", "-3 ± inf N", "value / size of the start"],
+    ),
+    "gap": (
+        lambda: plot.plot_gap({"axis.effort": Gap(), "b.effort": Gap(noise_floor=float("nan"), signal=0.0)}),
+        ["axis.effort", "before", "recalibrated", "after", "noise floor", "50 %", "20 %", "10 %"],
+    ),
+    "candidates": (
+        lambda: plot.plot_candidates(CANDIDATES),
+        ["coulomb friction at axis", "not refitted", "accepted, unseen data", "refused, unseen data"],
+    ),
+    "ladder": (
+        lambda: plot.plot_ladder([1e-6, 2e-6], [0.3, 0.1], 1),
+        ["time of one step [µs]", "error / measured signal [%]", "chosen", "tried"],
+    ),
+    "step_cost": (
+        lambda: plot.plot_step_cost({"p50": 1e-6, "max": 1.2e-3}, 1e-3),
+        ["p50", "max", "1 µs, 0.1 %", "1200 µs, 120 %", "period, 100 %"],
+    ),
+    "pictures": (
+        lambda: plot.plot_pictures([Picture(), Picture(channel="b.effort")]),
+        ["axis.effort", "b.effort", "velocity [m/s]", "position [m]", "before", "recalibrated", "with the effects"],
+    ),
+    "comparison": (
+        lambda: plot.plot_comparison(compare(Run(), log())),
+        ["slide against log, free run", "residual over time", "axis.velocity [m/s]", "measured", "simulated"],
+    ),
+}
+
+
+def log() -> Experiment:
+    return Experiment.from_arrays(TIME, {"axis.position": WAVE + 0.1}, {"axis.position": "m"}, "log")
+
+
+def texts(figure: Figure) -> set[str]:
+    """Everything that is written in a figure."""
+    figure.draw_without_rendering()
+    return {text.get_text() for text in figure.findobj(matplotlib.text.Text)}
+
+
+@pytest.mark.parametrize("name", FIGURES)
+def test_figures_say_what_they_show(name: str) -> None:
+    make, expected = FIGURES[name]
+    figure = make()
+    assert isinstance(figure, Figure)
+    written = texts(figure)
+    assert [text for text in expected if text not in written] == []
+    if "matplotlib.pyplot" in sys.modules:
+        assert matplotlib.pyplot.get_fignums() == []  # no figure that somebody would have to close
+
+
+@pytest.mark.parametrize("name", FIGURES)
+def test_figures_become_svg_elements(name: str) -> None:
+    figure = FIGURES[name][0]()
+    svg = plot.figure_to_svg(figure)
+    root = ET.fromstring(svg)
+    assert root.tag.endswith("svg")
+    ids = [element.attrib["id"] for element in root.iter() if "id" in element.attrib]
+    assert len(ids) == len(set(ids))
+    wanted = {
+        value[1:] for e in root.iter() for key, value in e.attrib.items() if key.endswith("href") and value[:1] == "#"
+    }
+    wanted |= {v[5:-1] for e in root.iter() for v in e.attrib.values() if v.startswith("url(#")}
+    assert wanted <= set(ids)
+    assert plot.figure_to_svg(FIGURES[name][0]()) == svg
+    assert "dc:date" not in svg
+
+
+def test_svg_names_of_two_figures_do_not_meet() -> None:
+    one, two = (plot.figure_to_svg(FIGURES[name][0]()) for name in ("gap", "ladder"))
+    ids = [{e.attrib["id"] for e in ET.fromstring(svg).iter() if "id" in e.attrib} for svg in (one, two)]
+    assert ids[0].isdisjoint(ids[1])
+
+
+def test_only_measured_channels_of_a_run_are_drawn() -> None:
+    assert len(plot.plot_run(Run()).axes) == 1
+    nothing = Run(measured=np.full((600, 2), np.nan))
+    assert len(plot.plot_run(nothing).axes) == 2
+    # Two pieces, measured and simulated: four lines, none across the restart.
+    lines = plot.plot_run(Run()).axes[0].get_lines()
+    assert [len(np.asarray(line.get_xdata())) for line in lines] == [300, 300, 300, 300]
+
+
+def test_results_draw_themselves() -> None:
+    assert len(log().plot().axes) == 1
+    assert len(compare(Run(), log()).plot().axes) == 3
+
+
+def test_an_accepted_candidate_of_a_later_round_is_drawn_and_others_are_not() -> None:
+    later = [*CANDIDATES, Candidate("torque_ripple", round=2)]
+    written = texts(plot.plot_candidates(later))
+    assert "asymmetric friction at axis" in written
+    assert "torque ripple at axis" not in written
+    assert len(plot.plot_candidates([]).axes) == 1
+
+
+def test_thinning_keeps_every_peak() -> None:
+    time = np.arange(200_000.0)
+    values = np.random.default_rng(0).standard_normal(200_000)
+    values[123_456] = 50.0
+    kept, shown = thinned(time, values)
+    assert kept.size <= MOST_POINTS + 200
+    assert shown.max() == 50.0
+    assert shown.min() == values.min()
+    assert np.all(np.diff(kept) > 0)
+    short = thinned(time[:10], values[:10])
+    np.testing.assert_array_equal(short[1], values[:10])
+
+
+def test_running_mean_leaves_gaps_open() -> None:
+    values = np.concatenate([np.linspace(0, 1, 500), np.linspace(3, 4, 500)])
+    centers, means = running_mean(values, 2.0 * values)
+    filled = np.isfinite(means)
+    assert not filled[(centers > 1.1) & (centers < 2.9)].any()
+    np.testing.assert_allclose(means[filled], 2.0 * centers[filled], atol=0.1)
+
+
+def test_without_matplotlib_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    for module in [name for name in sys.modules if name.partition(".")[0] == "matplotlib"]:
+        monkeypatch.delitem(sys.modules, module)
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    with pytest.raises(MissingExtraError, match=r'pip install "vpm-dynamics\[plot\]"'):
+        plot.plot_ladder([1e-6], [0.1], 0)
+    with pytest.raises(MissingExtraError, match="matplotlib"):
+        log().plot()
