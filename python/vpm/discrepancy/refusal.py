@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from vpm.discrepancy.confirmation import Trial
 from vpm.discrepancy.screening import Probe, impossible_values
@@ -39,7 +39,7 @@ class Thresholds:
 
     def score(self, pieces: int) -> float:
         """Least standard deviations of unseen gain, by Student's t with one degree of freedom less than pieces."""
-        return float(student.isf(FALSE_ALARM_LEVEL / max(1, self.candidates), max(1, pieces - 1)))
+        return float(stdtrit(max(1, pieces - 1), 1.0 - FALSE_ALARM_LEVEL / max(1, self.candidates)))
 
 
 def refuse_probe(probe: Probe) -> str:

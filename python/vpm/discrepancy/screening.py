@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from vpm.discrepancy.candidates import Candidate
 from vpm.identify import InverseDynamicsProblem, robust_covariance, segments
@@ -108,7 +108,7 @@ def size_is_clear(names: Sequence[str], values: Array, covariance: Array) -> boo
     if not np.all(np.isfinite(covariance)):
         return False
     statistic = float(values @ np.linalg.pinv(covariance, hermitian=True) @ values)
-    return statistic > float(chi2.isf(SIZE_LEVEL, len(names)))
+    return statistic > float(chdtri(len(names), SIZE_LEVEL))
 
 
 def _probe_start(

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from math import isnan
-
-from rich.console import Console
+from typing import TYPE_CHECKING
 
 from vpm.discrepancy import ChannelGap, Diagnosis, Step
+
+if TYPE_CHECKING:
+    from rich.console import Console
 
 VERDICT_WORDS = {
     "effect_found": "An effect is missing in the model, and the data name it.",
