@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 QUANTILES = {"p50": 0.5, "p99": 0.99, "p99.9": 0.999, "p99.99": 0.9999, "max": 1.0}
-#: Length of the command that is repeated when no record is given, s, and its frequencies, Hz.
-SWEEP_SECONDS = 10.0
+#: The command that is repeated when no record is given: samples, and frequencies in Hz.
+SWEEP_SAMPLES = 10_000
 SWEEP_FREQUENCIES = (0.3, 0.7, 1.9, 4.3)
 
 
@@ -139,7 +139,7 @@ def _commands(model: Model, rate: float, experiment: Experiment | None) -> Array
     if experiment is not None:
         columns = [experiment[f"{name}.command"] for name in model.actuators]
     else:
-        time = np.arange(0.0, SWEEP_SECONDS, 1.0 / rate)
+        time = np.arange(SWEEP_SAMPLES) / rate
         wave = np.mean([np.sin(2.0 * np.pi * f * time) for f in SWEEP_FREQUENCIES], axis=0)
         columns = [wave for _ in model.actuators]
     return np.ascontiguousarray(np.column_stack(columns)) if columns else np.zeros((1, 0))

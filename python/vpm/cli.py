@@ -50,15 +50,12 @@ Out = Annotated[Path, typer.Option(help="Folder for report.json, report.html and
 
 
 def main() -> None:
-    """Run the command line; an error of the input is one sentence and exit code 1, an interruption exit code 130."""
+    """Run the command line; an error of the input is one sentence and exit code 1."""
     try:
         app()
     except VpmError as error:
         errors.print(f"error: {error}", markup=False)
         sys.exit(1)
-    except KeyboardInterrupt:
-        errors.print("interrupted")
-        sys.exit(130)
 
 
 @app.command(epilog="Example:  vpm info examples/emps/model.toml")

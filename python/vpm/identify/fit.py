@@ -113,12 +113,22 @@ class _Counter:
         if self._value is None or self._at is None or not np.array_equal(x, self._at):
             theta = self.theta.copy()
             theta[self.columns] = x
-            self._value = self.data.evaluate(self.model, theta, self.columns)
+            self._value = self._evaluate(theta)
             self._at = x.copy()
             self.count += 1
             if self.progress is not None:
                 self.progress(self.count, float(np.sqrt(np.mean(self._value[0] ** 2))))
         return self._value
+
+    def _evaluate(self, theta: Array) -> tuple[Array, Array]:
+        """Infinite where the values make no machine (an inertia that no body has): a step to there is not taken."""
+        try:
+            return self.data.evaluate(self.model, theta, self.columns)
+        except ValueError:
+            if self.count == 0:  # the start itself: an error of the input, not of a step
+                raise
+            rows = self.data.blocks[-1].samples.stop
+            return np.full(rows, np.inf), np.zeros((rows, len(self.columns)))
 
     def residual(self, x: Array) -> Array:
         return self(x)[0]

@@ -1,0 +1,127 @@
+"""The commands as a user types them: exit codes, one sentence for an error, files where they were asked for."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from vpm.demo import MODEL, TRAIN, VALIDATION
+
+COMMANDS = ("info", "simulate", "compare", "identify", "diagnose", "simplify", "budget", "demo")
+
+
+def vpm(*words: str | Path, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "vpm", *map(str, words)]
+    return subprocess.run(command, capture_output=True, text=True, check=False, cwd=cwd)
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_has_help_with_an_example(command: str) -> None:
+    done = vpm(command, "--help")
+    assert done.returncode == 0
+    assert "Example:" in done.stdout
+
+
+def test_info_lists_parameters_with_units() -> None:
+    done = vpm("info", MODEL)
+    assert done.returncode == 0
+    assert "shoulder.friction.viscous" in done.stdout
+    assert "N m s/rad" in done.stdout
+
+
+def test_simulate_saves_and_plots(tmp_path: Path) -> None:
+    done = vpm(
+        "simulate",
+        MODEL,
+        VALIDATION,
+        "--mode",
+        "closed_loop",
+        "--out",
+        tmp_path / "r.npz",
+        "--plot",
+        tmp_path / "r.svg",
+    )
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "r.npz").stat().st_size > 1000
+    assert "<svg" in (tmp_path / "r.svg").read_text(encoding="utf-8")
+
+
+def test_compare_says_where_the_residual_lives() -> None:
+    done = vpm("compare", MODEL, VALIDATION)
+    assert done.returncode == 0, done.stderr
+    assert "of the residual's energy" in done.stdout
+
+
+def test_identify_prints_values_and_writes_the_model(tmp_path: Path) -> None:
+    fitted = tmp_path / "fitted.toml"
+    done = vpm("identify", MODEL, TRAIN, "--free", "shoulder.friction.viscous", "--out", fitted)
+    assert done.returncode == 0, done.stderr
+    assert "shoulder.friction.viscous" in done.stdout
+    assert vpm("info", fitted).returncode == 0
+
+
+def test_diagnose_writes_its_report(tmp_path: Path) -> None:
+    done = vpm("diagnose", MODEL, TRAIN, "--validate", VALIDATION, "--effect", "coulomb_friction", "--out", tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))["verdict"] == "effect_found"
+    assert (tmp_path / "report.html").is_file()
+    assert "coulomb" in (tmp_path / "model.toml").read_text(encoding="utf-8")
+
+
+def test_budget_exit_code_says_whether_it_holds() -> None:
+    assert vpm("budget", MODEL, "--steps", "5000").returncode == 0
+    assert vpm("budget", MODEL, "--steps", "5000", "--rate", "1e9").returncode == 1
+
+
+def test_simplify_leaves_out_what_does_not_matter(tmp_path: Path) -> None:
+    done = vpm("simplify", MODEL, VALIDATION, "--tolerance", "0.5", "--out", tmp_path / "cheap.toml")
+    assert done.returncode == 0, done.stderr
+    assert "cheapest within 50 %" in done.stdout
+    assert vpm("info", tmp_path / "cheap.toml").returncode == 0
+
+
+def test_demo_tells_the_story(tmp_path: Path) -> None:
+    done = vpm("demo", "--out", tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "verdict: effect_found" in done.stdout
+    assert "coulomb_friction at shoulder; found: coulomb_friction at shoulder" in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (("info", "nowhere.toml"), "nowhere.toml"),
+        (("simulate", MODEL, "nowhere.csv"), "nowhere.csv"),
+        (("simulate", MODEL, TRAIN, "--mode", "sideways"), "unknown mode 'sideways'"),
+        (("diagnose", MODEL, TRAIN, "--effect", "coulomb"), "coulomb_friction"),
+        (("identify", MODEL, TRAIN, "--free", "shoulder.viscous"), "shoulder.friction.viscous"),
+        (("budget", MODEL, "--rate", "-5"), "a rate of -5 Hz"),
+    ],
+)
+def test_errors_are_one_sentence(words: tuple[str | Path, ...], sentence: str) -> None:
+    done = vpm(*words)
+    assert done.returncode == 1
+    last = done.stderr.strip().splitlines()[-1]
+    assert last.startswith("error: ")
+    assert sentence in last
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of another kind")
+def test_interrupting_a_long_command_ends_it_at_once() -> None:
+    command = [sys.executable, "-m", "vpm", "budget", str(MODEL), "--steps", "2000000000"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=os.environ.copy()) as process:
+        time.sleep(4.0)
+        began = time.monotonic()
+        process.send_signal(signal.SIGINT)
+        _, err = process.communicate(timeout=20.0)
+        assert time.monotonic() - began < 10.0
+    assert process.returncode == 130
+    assert b"Traceback" not in err

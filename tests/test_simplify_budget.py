@@ -1,0 +1,83 @@
+"""Walking down: what may be left out, and whether a step fits the period."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from synthetic import Truth, nominal, simulate_axis
+from vpm.budget import BudgetReport, budget
+from vpm.errors import SimulationError
+from vpm.experiment import Experiment
+from vpm.simplify import Ladder, simplify
+
+
+@pytest.fixture(scope="module")
+def record() -> Experiment:
+    return simulate_axis(Truth(mass=20.0, viscous=60.0, coulomb=8.0), 1, 6.0, first_seed=4)[0]
+
+
+@pytest.fixture(scope="module")
+def ladder(record: Experiment) -> Ladder:
+    full = nominal().with_effect("coulomb_friction", at="axis", coulomb=8.0, transition_velocity=1e-3)
+    full = full.with_effect("torque_ripple", at="axis", period=0.05, cosine=0.001)
+    return simplify(full, record, tolerance=0.01)
+
+
+def test_leaves_out_what_does_nothing_and_keeps_what_matters(ladder: Ladder) -> None:
+    kept = {effect.name for effect in ladder.model.effects}
+    assert "coulomb_friction" in kept
+    assert "torque_ripple" not in kept
+    assert ladder.chosen.loss <= 0.01
+
+
+def test_every_subset_and_integrator_was_tried(ladder: Ladder) -> None:
+    assert len({(r.removed, r.integrator) for r in ladder.rungs}) == len(ladder.rungs)
+    assert {r.removed for r in ladder.rungs} >= {(), ("coulomb_friction at axis",), ("torque_ripple at axis",)}
+
+
+def test_rungs_come_cheapest_first(ladder: Ladder) -> None:
+    seconds = [r.seconds for r in ladder.rungs]
+    assert seconds == sorted(seconds)
+
+
+def test_ladder_saves_and_loads(ladder: Ladder, tmp_path: Path) -> None:
+    assert Ladder.load(ladder.save(tmp_path / "ladder.npz")) == ladder
+
+
+def test_negative_tolerance_is_refused(record: Experiment) -> None:
+    with pytest.raises(SimulationError, match="tolerance of -1"):
+        simplify(nominal(), record, tolerance=-1.0)
+
+
+def test_budget_reports_ordered_quantiles(record: Experiment) -> None:
+    report = budget(nominal(), steps=20_000, experiment=record)
+    values = list(report.quantiles.values())
+    assert values == sorted(values)
+    assert values[0] > 0.0
+    assert report.taken == pytest.approx(report.quantiles["p99.9"] * 1000.0)
+
+
+def test_a_rate_that_no_machine_has_does_not_hold() -> None:
+    report = budget(nominal(), rate=1e9, steps=2000)
+    assert not report.holds
+    assert report.overruns > 1900
+    assert "does not hold" in str(report)
+
+
+def test_budget_report_saves_and_loads(tmp_path: Path) -> None:
+    report = budget(nominal(), steps=2000)
+    assert BudgetReport.load(report.save(tmp_path / "budget.npz")) == report
+
+
+@pytest.mark.parametrize("steps", [0, 999])
+def test_too_few_steps_are_refused(steps: int) -> None:
+    with pytest.raises(SimulationError, match="too few"):
+        budget(nominal(), steps=steps)
+
+
+def test_more_substeps_take_longer() -> None:
+    one, many = (np.median(budget(nominal(), steps=5000, substeps=n).quantiles["p50"]) for n in (1, 40))
+    assert many > 5.0 * one

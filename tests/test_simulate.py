@@ -1,0 +1,138 @@
+"""The four modes against closed forms, against each other, and against bad input."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from synthetic import Truth, nominal, simulate_axis
+from vpm.compare import compare
+from vpm.errors import DivergedError, ExperimentError, SimulationError
+from vpm.experiment import Experiment
+from vpm.model import Model
+from vpm.simulate import INTEGRATORS, MODES, Run, Setup, simulate
+
+TRUTH = Truth(mass=20.0, viscous=60.0, noise=0.0)
+
+
+@pytest.fixture(scope="module")
+def record() -> Experiment:
+    """A record of exactly the nominal machine, from other code."""
+    return simulate_axis(TRUTH, 1, 6.0, first_seed=1)[0]
+
+
+def constant_push(volts: float, seconds: float, dt: float = 0.001) -> Experiment:
+    time = np.arange(0.0, seconds, dt)
+    channels = {"drive.command": np.full(time.size, volts), "axis.position": np.zeros(time.size)}
+    return Experiment.from_arrays(time, channels, units={"drive.command": "V", "axis.position": "m"}, name="push")
+
+
+@pytest.mark.parametrize("integrator", INTEGRATORS)
+def test_free_run_reaches_terminal_speed_as_the_closed_form_says(integrator: str) -> None:
+    """m dv/dt = F - c v: v = F/c (1 - exp(-c t/m))."""
+    run = simulate(nominal(), constant_push(3.0, 2.0), integrator=integrator, substeps=4, initial_state=np.zeros(2))
+    force, mass, viscous = 30.0, 20.0, 60.0
+    expected = force / viscous * (1.0 - np.exp(-viscous * run.time / mass))
+    tolerance = 1e-3 if integrator == "semi_implicit" else 1e-6
+    np.testing.assert_allclose(run["axis.velocity"], expected, atol=tolerance)
+
+
+def test_closed_loop_follows_the_other_simulation(record: Experiment) -> None:
+    run = simulate(nominal(), record, "closed_loop", substeps=4)
+    assert compare(run, record)["axis.position"].relative_error < 0.01  # per cent
+    assert compare(run, record)["drive.command"].relative_error < 2.0
+
+
+def test_restarts_stay_near_where_a_free_run_drifts(record: Experiment) -> None:
+    heavier = nominal().with_parameters({"slide.mass": 21.0})
+    free = compare(simulate(heavier, record, "free_run"), record)["axis.position"].relative_error
+    restarted = compare(simulate(heavier, record, "restarts", horizon=0.2), record)["axis.position"].relative_error
+    assert restarted < 0.3 * free
+
+
+def test_restarts_cover_the_log_in_pieces_of_the_horizon(record: Experiment) -> None:
+    run = simulate(nominal(), record, "restarts", horizon=0.5)
+    length = round(0.5 / record.dt) + 1
+    np.testing.assert_array_equal(np.diff(run.starts), length)
+    assert run.time.size == run.starts.size * length
+    measured = run.measured[:, run.channels.index("axis.position")]
+    np.testing.assert_allclose(run["axis.position"][run.starts], measured[run.starts], atol=2e-5)
+
+
+def test_inverse_dynamics_gives_back_the_effort(record: Experiment) -> None:
+    run = simulate(nominal(), record, "inverse_dynamics")
+    assert run.channels == ("axis.effort",)
+    residual = run.values - run.measured
+    assert np.sqrt(np.mean(residual**2)) < 0.01 * np.sqrt(np.mean(run.measured**2))
+
+
+def test_simulation_does_not_depend_on_the_number_of_substeps_in_the_limit(record: Experiment) -> None:
+    model = nominal().with_effect("coulomb_friction", at="axis", coulomb=5.0, transition_velocity=0.01)
+    fine, finer = (
+        simulate(model, record, "closed_loop", integrator="rk4", substeps=n)["axis.position"] for n in (8, 16)
+    )
+    np.testing.assert_allclose(fine, finer, atol=1e-7)
+
+
+def test_run_has_the_manners_of_a_result(record: Experiment, tmp_path: Path) -> None:
+    run = simulate(nominal(), record, "closed_loop")
+    assert "\n" not in repr(run)
+    assert Run.load(run.save(tmp_path / "run.npz")) == run
+    frame = run.to_frame()
+    assert list(frame.columns)[:2] == ["time", "axis.position"]
+    assert "<table" in run._repr_html_()
+
+
+def test_divergence_carries_the_run_so_far() -> None:
+    stiff = nominal().with_parameters({"axis.friction.viscous": 999.0, "slide.mass": 1.0})
+    with pytest.raises(DivergedError) as caught:
+        simulate(stiff, constant_push(1.0, 5.0, dt=0.01), integrator="semi_implicit")
+    run = caught.value.run
+    assert isinstance(run, Run)
+    assert 0 < run.time.size < 500
+    assert np.isfinite(run.values).all()
+    assert "axis" in str(caught.value)
+
+
+def test_missing_command_names_channel_and_mode() -> None:
+    time = np.arange(0.0, 1.0, 0.01)
+    log = Experiment.from_arrays(time, {"axis.position": np.sin(time)}, units={"axis.position": "m"}, name="bare")
+    with pytest.raises(ExperimentError, match=r"bare: mode 'free_run' needs channel 'drive\.command'"):
+        simulate(nominal(), log)
+
+
+def test_closed_loop_without_controller_is_refused(record: Experiment) -> None:
+    content = nominal().to_dict()
+    del content["controllers"]
+    with pytest.raises(SimulationError, match="needs a controller for actuator 'drive'"):
+        simulate(Model.from_dict(content), record, "closed_loop")
+
+
+def test_horizon_longer_than_the_log_is_refused(record: Experiment) -> None:
+    with pytest.raises(SimulationError, match="longer than the log"):
+        simulate(nominal(), record, "restarts", horizon=100.0)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        ({"integrator": "euler"}, "unknown integrator 'euler'"),
+        ({"substeps": 0}, "substeps is 0"),
+        ({"horizon": float("nan")}, "horizon is nan"),
+    ],
+)
+def test_bad_settings_are_named(arguments: dict[str, object], sentence: str) -> None:
+    with pytest.raises(SimulationError, match=sentence):
+        Setup(**arguments)  # type: ignore[arg-type]
+
+
+def test_unknown_mode_lists_the_modes(record: Experiment) -> None:
+    with pytest.raises(SimulationError, match=", ".join(MODES)):
+        simulate(nominal(), record, "backwards")
+
+
+def test_unknown_channel_lists_the_channels(record: Experiment) -> None:
+    with pytest.raises(SimulationError, match=r"no channel 'axis\.speed'"):
+        simulate(nominal(), record, "closed_loop")["axis.speed"]
