@@ -246,7 +246,7 @@ class Fit(Result):
     def _headline(self) -> Mapping[str, object]:
         worst = max((share for _, share, _ in self.after.values()), default=0.0)
         values = dict(zip(self.names, map(float, self.values), strict=True))
-        return {"mode": self.mode, **values, "relative_error": worst}
+        return {"mode": self.mode, **values, "residual": f"{100.0 * worst:.2f} %"}
 
     def _html_rows(self) -> Mapping[str, object]:
         rows = zip(self.names, self.values, self.std, self.units, strict=True)
