@@ -83,7 +83,8 @@ class Ladder(Result):
         lines = [
             f"cheapest within {100 * self.tolerance:g} %: left out {left_out}; {self.chosen.integrator}; "
             f"error {100 * self.chosen.error:.2f} % (loss {100 * self.chosen.loss:.2f} %), "
-            f"{1e6 * self.chosen.seconds:.3g} us a step, {100 * self.chosen.slowest * self.rate:.3g} % of the period at p99.9"
+            f"{1e6 * self.chosen.seconds:.3g} us a step, "
+            f"{100 * self.chosen.slowest * self.rate:.3g} % of the period at p99.9"
         ]
         lines += [
             f"  {1e6 * r.seconds:8.3g} us  error {100 * r.error:7.2f} %  {r.integrator:18s} "
