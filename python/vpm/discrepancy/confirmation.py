@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from vpm.discrepancy.screening import Alias, Baseline, Probe, size_is_clear
 from vpm.errors import DivergedError
 from vpm.identify import Estimate, Gain, InverseDynamicsProblem, OutputErrorProblem, estimate, gain, segments
-from vpm.identify.identifiability import ALIAS_SHARE, closest_column, explained_share
+from vpm.identify.identifiability import closest_column, is_alias
 from vpm.model import Model
 
 Array = NDArray[np.float64]
@@ -197,7 +197,7 @@ def _release(
     for name, column in zip(asleep, fresh.T, strict=True):
         if not np.any(column):
             continue
-        if explained_share(column, known) > ALIAS_SHARE:
+        if is_alias(column, known, fit.residual):
             held.append(Alias(name, names[closest_column(column, known)]))
             continue
         released.append(name)

@@ -38,6 +38,8 @@ Array = NDArray[np.float64]
 HELD_OUT = 0.3
 #: A residual within this factor of the noise floor has nothing left to explain.
 FLOOR_FACTOR = 1.3
+#: Neither has one below this share of the measured effort.
+NEGLIGIBLE = 0.01
 #: Parameters that move by more of their stated uncertainties than this are reported.
 FAR = 3.0
 
@@ -231,7 +233,8 @@ def _verdict(
 ) -> tuple[str, str]:
     main = [g for g in gap.values() if g.mode == "inverse_dynamics"]
     above = max((g.after / g.noise_floor if g.noise_floor > 0.0 else np.inf) for g in main)
-    remaining = left.present and above > FLOOR_FACTOR
+    share = max(g.after / g.signal if g.signal > 0.0 else 0.0 for g in main)
+    remaining = left.present and above > FLOOR_FACTOR and share > NEGLIGIBLE
     worst = max(main, key=lambda g: g.recalibrated / g.signal if g.signal else 0.0)
     numbers = f"{_percent(worst.before, worst)} before, {_percent(worst.recalibrated, worst)} recalibrated"
     if found.accepted:

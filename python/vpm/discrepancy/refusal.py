@@ -18,6 +18,9 @@ LEAST_GAIN = 0.02
 #: Below this drop nine tenths of the residual are something else, which the effect might merely imitate: the evidence
 #: then has to be this many times as strong.
 MODEST_GAIN, MODEST_FACTOR = 0.1, 3.0
+#: From this drop on, the balance of effort decides alone on a machine of several joints: with two effects missing, the
+#: simulation of a machine that has one of them may well be worse, because errors of coupled joints had cancelled.
+CLEAR_GAIN = 0.5
 #: Drop of the training mean square below which a candidate is not refitted at all.
 LEAST_SCREENED = 0.005
 
@@ -131,7 +134,8 @@ def _worse_in_simulation(trial: Trial) -> str:
     if trial.diverged:
         return f"with it the simulation of the unseen record fails: {trial.diverged}"
     simulated = trial.simulated
-    if simulated is not None and simulated.relative < -LEAST_GAIN:
+    coupled = len(trial.judged.model.joints) > 1 and trial.unseen.relative >= CLEAR_GAIN
+    if simulated is not None and simulated.relative < -LEAST_GAIN and not coupled:
         return (
             "it helps the balance of effort and makes the simulation of the unseen record worse by "
             f"{_percent(-simulated.relative)} of its mean square"

@@ -15,7 +15,7 @@ from scipy.special import chdtri
 
 from vpm.discrepancy.candidates import Candidate
 from vpm.identify import InverseDynamicsProblem, robust_covariance, segments
-from vpm.identify.identifiability import ALIAS_SHARE, closest_column, column_lengths, explained_share
+from vpm.identify.identifiability import closest_column, column_lengths, is_alias
 from vpm.model import Model
 
 Array = NDArray[np.float64]
@@ -124,7 +124,7 @@ def _probe_start(
         all_columns = [model.index(name) for name in base.free] + columns
         residual, jacobian = data.evaluate(model, model.theta, all_columns)
         known, fresh = jacobian[:, : len(base.free)], jacobian[:, len(base.free) :]
-    keep, held, invisible = _sort_columns(added, fresh, known, base.free)
+    keep, held, invisible = _sort_columns(added, fresh, known, base.free, residual)
     chosen = np.column_stack([known, fresh[:, keep]])
     names = (*base.free, *(added[i] for i in keep))
     start_values = np.concatenate([np.zeros(len(base.free)), model.theta[[columns[i] for i in keep]]])
@@ -151,7 +151,7 @@ def _added(model: Model, candidate: Candidate) -> tuple[str, ...]:
 
 
 def _sort_columns(
-    added: Sequence[str], fresh: Array, known: Array, known_names: Sequence[str]
+    added: Sequence[str], fresh: Array, known: Array, known_names: Sequence[str], residual: Array
 ) -> tuple[list[int], tuple[Alias, ...], tuple[str, ...]]:
     """Split the new columns into those the data see, those they confuse with others, and those without influence."""
     largest = float(np.max(np.linalg.norm(np.column_stack([known, fresh]), axis=0), initial=0.0))
@@ -161,7 +161,7 @@ def _sort_columns(
     for i in visible:
         others = np.column_stack([known, fresh[:, [j for j in keep if j != i]]])
         names = [*known_names, *(added[j] for j in keep if j != i)]
-        if explained_share(fresh[:, i], others) > ALIAS_SHARE:
+        if is_alias(fresh[:, i], others, residual):
             held.append(Alias(added[i], names[closest_column(fresh[:, i], others)]))
             keep.remove(i)
     return keep, tuple(held), invisible

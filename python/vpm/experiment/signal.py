@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from math import ceil
 
 import numpy as np
@@ -151,10 +152,15 @@ def parallel_filter(values: Array, decimation: int) -> Array:
 
 def anti_alias(values: Array, factor: float) -> Array:
     """Zero-phase Chebyshev low-pass (order 8, 0.05 dB) at 80 % of the Nyquist frequency that is left after `factor`."""
+    return _forward_backward(_anti_alias_sections(factor), values, ceil(40 * factor))
+
+
+@lru_cache(maxsize=32)
+def _anti_alias_sections(factor: float) -> Array:
+    """Designed once for each factor: a fit filters with the same one hundreds of times."""
     from scipy.signal import cheby1
 
-    sections = cheby1(8, 0.05, RETAINED_BAND / factor, output="sos")
-    return _forward_backward(sections, values, ceil(40 * factor))
+    return np.asarray(cheby1(8, 0.05, RETAINED_BAND / factor, output="sos"), dtype=np.float64)
 
 
 def interpolate(time: Array, values: Array, at: Array, *, smooth: bool) -> Array:

@@ -179,8 +179,26 @@ def _strictly_inside(x: Array, low: Array, high: Array) -> Array:
 
 
 def _bounds(model: Model, free: Sequence[str], replaced: Mapping[str, tuple[float, float]]) -> tuple[Array, Array]:
-    pairs = [replaced.get(n, (model.parameters[n].minimum, model.parameters[n].maximum)) for n in free]
+    pairs = [replaced.get(n, _range(model, n, free)) for n in free]
     return np.array([p[0] for p in pairs], dtype=float), np.array([p[1] for p in pairs], dtype=float)
+
+
+def _range(model: Model, name: str, free: Sequence[str]) -> tuple[float, float]:
+    """Bounds of the model file, and for a single free principal inertia what the other two allow.
+
+    No principal moment of a body exceeds the sum of the other two, nor is it less than their difference.
+    """
+    parameter = model.parameters[name]
+    body, _, axis = name.rpartition(".inertia.")
+    names = [f"{body}.inertia.{other}" for other in ("xx", "yy", "zz") if other != axis]
+    products = [f"{body}.inertia.{pair}" for pair in ("xy", "xz", "yz")]
+    alone = axis in {"xx", "yy", "zz"} and not any(n in free for n in (*names, *products))
+    if not alone or any(model.parameters[n].value for n in products):
+        return parameter.minimum, parameter.maximum
+    first, second = (model.parameters[n].value for n in names)
+    if first + second == 0.0:
+        return parameter.minimum, parameter.maximum
+    return max(parameter.minimum, abs(first - second)), min(parameter.maximum, first + second)
 
 
 def _covariance(

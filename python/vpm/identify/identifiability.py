@@ -19,8 +19,11 @@ Array = NDArray[np.float64]
 
 #: Relative singular value below which a direction counts as unseen.
 RANK_TOLERANCE = 1e-6
-#: Share of a column that the others must explain before two effects count as the same.
+#: A column is taken for a copy of others if they explain this share of it and its rest nothing much of the residual...
 ALIAS_SHARE = 0.98
+ALIAS_REST = 0.1
+#: ... or if they explain this share of it.
+COPY_SHARE = 0.9999
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -90,6 +93,30 @@ def explained_share(column: Array, others: Array) -> float:
     scaled = others / column_lengths(others)
     rest = column - scaled @ np.linalg.lstsq(scaled, column, rcond=1e-10)[0]
     return 1.0 - float(rest @ rest) / power
+
+
+def is_alias(column: Array, others: Array, residual: Array) -> bool:
+    """Whether the data show ``column`` only together with ``others``.
+
+    A constant load and a weight that hardly turns are nearly the same column; what differs may still be just what the
+    residual asks for, and then they are two effects.
+
+    Parameters
+    ----------
+    column : ndarray, shape (n,)
+    others : ndarray, shape (n, k)
+    residual : ndarray, shape (n,)
+        What is left to explain.
+    """
+    share = explained_share(column, others)
+    if share <= ALIAS_SHARE or others.shape[1] == 0:
+        return False
+    if share > COPY_SHARE:
+        return True
+    scaled = others / column_lengths(others)
+    left = residual - scaled @ np.linalg.lstsq(scaled, residual, rcond=1e-10)[0]
+    rest = column - scaled @ np.linalg.lstsq(scaled, column, rcond=1e-10)[0]
+    return explained_share(left, rest[:, None]) < ALIAS_REST
 
 
 def closest_column(column: Array, others: Array) -> int:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.fft import irfft, next_fast_len, rfft
 
 Array = NDArray[np.float64]
 
@@ -38,8 +39,9 @@ def correlation_length(residual: Array) -> int:
     limit = max(1, n // 10)
     if n < 4 or power == 0.0:
         return 1
-    spectrum = np.abs(np.fft.rfft(centred, 2 * n)) ** 2
-    correlation = np.fft.irfft(spectrum)[: limit + 1] / power
+    padded = next_fast_len(n + limit, real=True)
+    spectrum = np.abs(rfft(centred, padded)) ** 2
+    correlation = irfft(spectrum, padded)[: limit + 1] / power
     outside = np.flatnonzero(np.abs(correlation) > NORMAL_95 / np.sqrt(n))
     gaps = np.flatnonzero(np.diff(outside) > 1)
     last = outside[gaps[0]] if gaps.size else outside[-1]
