@@ -14,12 +14,15 @@ from vpm.model import Model
 
 Array = NDArray[np.float64]
 
+#: Name of an effect and where it sits.
+Key = tuple[str, str]
+
 #: Transition and Stribeck velocities tried, as shares of the largest speed in the data.
 TRANSITION_SHARES = (0.002, 0.01, 0.04)
 STRIBECK_SHARES = (0.08, 0.25, 0.6)
 #: Lags tried, in sampling intervals, and saturation limits, as shares of the largest command.
 LAG_INTERVALS = (1.0, 4.0, 16.0)
-LIMIT_SHARES = (0.95, 0.8)
+LIMIT_SHARES = (0.95, 0.7, 0.4)
 #: Number of ripple periods proposed by the periodogram.
 PERIODS = 3
 
@@ -48,6 +51,11 @@ class Candidate:
     bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     fixed: tuple[str, ...] = ()
     neutral: bool = True
+
+    @property
+    def key(self) -> Key:
+        """Effect and site."""
+        return self.effect.name, self.site
 
     @property
     def label(self) -> str:

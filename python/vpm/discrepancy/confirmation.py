@@ -138,7 +138,7 @@ def confirm(current: Judged, data: Data, probe: Probe) -> Trial:
         gain(current.unseen, judged.unseen * _shrinkage(data.unseen, current, judged), segments(data.unseen)),
         _simulated_gain(current, judged, data),
         diverged,
-        _clear(judged, own),
+        is_clear(judged, own),
     )
 
 
@@ -205,8 +205,8 @@ def _release(
     return tuple(released), tuple(held)
 
 
-def _clear(judged: Judged, own: tuple[str, ...]) -> bool:
-    """Whether the effect's linear parameters (its size) differ from zero together."""
+def is_clear(judged: Judged, own: tuple[str, ...]) -> bool:
+    """Whether an effect's linear parameters (its size) differ from zero together."""
     size = [n for n in own if judged.model.parameters[n].kind == "linear"] or list(own)
     index = [judged.free.index(name) for name in size]
     return size_is_clear(size, judged.fit.values[index], judged.fit.covariance[np.ix_(index, index)])

@@ -12,7 +12,7 @@ from scipy.special import ndtri
 
 from vpm.catalogue import EFFECTS
 from vpm.compare import compare
-from vpm.discrepancy.confirmation import Data, Judged, judge
+from vpm.discrepancy.confirmation import Data, Judged, is_clear, judge
 from vpm.discrepancy.diagnosis import (
     AcceptedEffect,
     ChannelGap,
@@ -23,11 +23,11 @@ from vpm.discrepancy.diagnosis import (
 )
 from vpm.discrepancy.floor import noise_floor
 from vpm.discrepancy.refusal import FALSE_ALARM_LEVEL, LEAST_GAIN
-from vpm.discrepancy.search import Accepted, Search, ambiguities, search
+from vpm.discrepancy.search import Accepted, Search, Stage, ambiguities, search
 from vpm.discrepancy.structure import Structure, structure
 from vpm.errors import DiagnosisError, DivergedError, near_match
 from vpm.experiment import Experiment
-from vpm.identify import Estimate, InverseDynamicsProblem, OutputErrorProblem, gain, gaps, segments
+from vpm.identify import InverseDynamicsProblem, OutputErrorProblem, gain, gaps, segments
 from vpm.identify.fit import fit_of
 from vpm.model import Model
 from vpm.simulate import Setup, simulate
@@ -98,7 +98,9 @@ def diagnose(
     say = tell or (lambda _: None)
     _check_effects(effects)
     training, unseen, notes = _records(experiments, validate)
-    data = _data(model, training, unseen, cutoff, setup, notes)
+    # A record cut off in the middle of a motion does not say what its controller remembers.
+    mode = "restarts" if notes else _simulation_mode(model, unseen)
+    data = _data(model, training, unseen, mode, cutoff, setup, notes)
     say("comparing the nominal model with the data")
     nominal = _nominal(model, data, notes)
     say("recalibrating the nominal parameters")
@@ -123,7 +125,7 @@ def diagnose(
         found.ranking,
         ambiguities(found.accepted),
         _where(recalibrated.model, unseen, cutoffs),
-        _steps(data, found),
+        tuple(_step(data, stage) for stage in found.stages),
         tuple(e.name for e in training),
         tuple(e.name for e in unseen),
         tuple(notes),
@@ -159,6 +161,7 @@ def _data(
     model: Model,
     training: Sequence[Experiment],
     unseen: Sequence[Experiment],
+    mode: str,
     cutoff: float | None,
     setup: Setup | None,
     notes: list[str],
@@ -169,7 +172,6 @@ def _data(
     for problem in (fitted, predicted):
         for record, m in zip(problem.experiments, problem.motions, strict=True):
             notes.append(f"{record.name}: motion filtered at {m.cutoff:.4g} Hz, decimated by {m.decimation}")
-    mode = _simulation_mode(model, unseen)
     notes.append(f"unseen records simulated in mode {mode}")
     return Data(fitted, predicted, OutputErrorProblem(model, unseen, mode, setup=setup))
 
@@ -273,6 +275,8 @@ def _accepted_effect(entry: Accepted, final: Judged) -> AcceptedEffect:
         estimates.append(EffectParameterEstimate(short, dotted, parameter.value, parameter.unit, std))
     texts = {e.name: f"{e.value:.4g} {e.unit}" for e in estimates}
     notes = [f"{alias.parameter} held: not told from {alias.partner}" for alias in entry.trial.held]
+    if not is_clear(final, tuple(e.dotted for e in estimates if e.std > 0.0)):
+        notes.append("beside the effects that came later, its interval covers zero: one of them may be enough")
     return AcceptedEffect(
         candidate.effect.name,
         candidate.site,
@@ -284,22 +288,18 @@ def _accepted_effect(entry: Accepted, final: Judged) -> AcceptedEffect:
     )
 
 
-def _steps(data: Data, found: Search) -> tuple[Step, ...]:
-    labels = [("", ""), *((e.trial.probe.candidate.effect.name, e.trial.probe.candidate.site) for e in found.accepted)]
-    return tuple(_step(data, judged, effect, site) for judged, (effect, site) in zip(found.stages, labels, strict=True))
-
-
-def _step(data: Data, judged: Judged, effect: str, site: str) -> Step:
-    std: Estimate = judged.fit
-    names = judged.free
+def _step(data: Data, stage: Stage) -> Step:
+    fit, model = stage.judged.fit, stage.judged.model
+    names = stage.judged.free
     return Step(
-        effect,
-        site,
-        {name: judged.model.parameters[name].value for name in names},
-        dict(zip(names, map(float, std.std), strict=True)),
-        {name: judged.model.parameters[name].unit for name in names},
-        max(share for _, share, _ in gaps(data.training, std.residual).values()),
-        max(share for _, share, _ in gaps(data.unseen, judged.unseen).values()),
+        stage.change,
+        stage.effect,
+        stage.site,
+        {name: model.parameters[name].value for name in names},
+        dict(zip(names, map(float, fit.std), strict=True)),
+        {name: model.parameters[name].unit for name in names},
+        max(share for _, share, _ in gaps(data.training, fit.residual).values()),
+        max(share for _, share, _ in gaps(data.unseen, stage.judged.unseen).values()),
     )
 
 

@@ -133,8 +133,20 @@ class ChannelGap(Storable):
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Step(Storable):
-    """The model after one stage: which effect came in, all fitted values, and the relative error on unseen data."""
+    """The model after one stage of the search.
 
+    Attributes
+    ----------
+    change : {"recalibrated", "added", "removed"}
+    effect, site : str
+        What was added or removed.
+    values, std, units : dict
+        All fitted parameters by dotted name.
+    training_error, unseen_error : float
+        Largest gap of any channel relative to the measured effort.
+    """
+
+    change: str
     effect: str
     site: str
     values: dict[str, float]
@@ -189,7 +201,7 @@ class Diagnosis(Result):
     where : dict of str to tuple of str
         Where the residual lives before any effect was added, by channel.
     steps : tuple of Step
-        The recalibrated model and the model after each accepted effect.
+        The recalibrated model and the model after each effect that came in or went out again.
     training, unseen : tuple of str
         Records.
     notes : tuple of str

@@ -1,4 +1,4 @@
-"""Greedy search: screen every candidate, refit the most promising, accept at most one, and begin again."""
+"""Search: screen every candidate, refit the most promising, accept at most one, drop what is not needed any more."""
 
 from __future__ import annotations
 
@@ -9,17 +9,19 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import TypeVar
 
-from vpm.discrepancy.candidates import candidates
-from vpm.discrepancy.confirmation import Data, Judged, Trial, confirm
+import numpy as np
+
+from vpm.discrepancy.candidates import Key, candidates
+from vpm.discrepancy.confirmation import Data, Judged, Trial, confirm, judge
 from vpm.discrepancy.diagnosis import Ambiguity, RankedCandidate, RefusedEffect
-from vpm.discrepancy.refusal import Thresholds, refuse_probe, refuse_trial
+from vpm.discrepancy.refusal import LEAST_GAIN, Thresholds, refuse_probe, refuse_trial
 from vpm.discrepancy.screening import Probe, probe
 from vpm.identify import gain, segments
 
 #: Candidates refitted in one round.
 SHORT_LIST = 6
-#: Another candidate is as good as the accepted one if it reaches this share of its gain.
-TIE_SHARE = 0.9
+#: An instrument is blamed for what the machine may have done only if it leaves less than this share of the gap.
+SENSOR_SHARE = 0.25
 
 Item = TypeVar("Item")
 Outcome = TypeVar("Outcome")
@@ -30,89 +32,161 @@ Tell = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Accepted:
-    """An effect that came in, and the trial that let it in."""
+    """An effect that came in, the trial that let it in, and those that would have done as well."""
 
     trial: Trial
     rivals: tuple[str, ...]
 
+    @property
+    def key(self) -> Key:
+        """Effect and site."""
+        return self.trial.probe.candidate.key
+
 
 @dataclass(frozen=True)
-class Round:
-    """One round of the search: what was tried, what came in, and why the rest did not."""
+class Stage:
+    """The model at one point of the search; ``change`` is "recalibrated", "added" or "removed"."""
 
-    accepted: Accepted | None
-    refused: tuple[RefusedEffect, ...]
-    ranking: tuple[RankedCandidate, ...]
+    change: str
+    effect: str
+    site: str
+    judged: Judged
 
 
 @dataclass(frozen=True)
 class Search:
     """Outcome of the whole search."""
 
-    final: Judged
-    stages: tuple[Judged, ...]
+    stages: tuple[Stage, ...]
     accepted: tuple[Accepted, ...]
     refused: tuple[RefusedEffect, ...]
     ranking: tuple[RankedCandidate, ...]
 
+    @property
+    def final(self) -> Judged:
+        """The model that came out."""
+        return self.stages[-1].judged
+
 
 def search(start: Judged, data: Data, effects: Sequence[str] | None, limit: int, tell: Tell) -> Search:
-    """Add effects one at a time until none is believed any more."""
-    current, stages = start, [start]
+    """Add effects one at a time, and drop earlier ones that later ones replace, until none is believed any more."""
+    stages = [Stage("recalibrated", "", "", start)]
     accepted: list[Accepted] = []
-    rounds: list[Round] = []
-    while True:
-        last = len(accepted) == limit
-        outcome = _round(current, data, effects, len(rounds) + 1, tell, look_only=last)
-        rounds.append(outcome)
-        if outcome.accepted is None:
+    ranking: list[RankedCandidate] = []
+    dropped: dict[Key, str] = {}
+    for number in range(1, 2 * limit + 2):
+        outcome = _Round(stages[-1].judged, data, number, tell)
+        outcome.screen(effects, set(dropped))
+        outcome.confirm()
+        best = outcome.best() if len(accepted) < limit else None
+        ranking += outcome.ranked()
+        if best is None:
             break
-        accepted.append(outcome.accepted)
-        current = outcome.accepted.trial.judged
-        stages.append(current)
-    ranking = tuple(entry for outcome in rounds for entry in outcome.ranking)
-    return Search(current, tuple(stages), tuple(accepted), rounds[-1].refused, ranking)
+        accepted.append(best)
+        stages.append(Stage("added", *best.key, best.trial.judged))
+        tell(f"round {number}: accepted {best.trial.probe.candidate.label}")
+        _drop_replaced(stages, accepted, data, dropped)
+    refused = {**dropped, **outcome.refused}
+    return Search(tuple(stages), tuple(accepted), _listed(refused), tuple(ranking))
 
 
-def _round(
-    current: Judged, data: Data, effects: Sequence[str] | None, number: int, tell: Tell, *, look_only: bool
-) -> Round:
-    listed = candidates(current.model, data.training, current.fit.residual, effects)
-    thresholds = Thresholds(len(listed) * number, min(m.dt for m in data.training.motions))
-    refused: dict[tuple[str, str], str] = {}
-    promising: list[Probe] = []
-    base = current.baseline
-    ranking: dict[tuple[str, str], RankedCandidate] = {}
-    tell(f"round {number}: screening {len(listed)} candidates")
-    for candidate, result in zip(listed, _side_by_side(partial(probe, base, data.training), listed), strict=True):
-        key = (candidate.effect.name, candidate.site)
-        ranking[key] = RankedCandidate(*key, number, result.drop, float("nan"), accepted=False)
-        if reason := refuse_probe(result):
-            refused[key] = reason
-        else:
-            promising.append(result)
-    promising.sort(key=lambda p: -p.score)
-    short_list = promising[:SHORT_LIST]
-    if short_list:
-        tell(f"round {number}: refitting with {', '.join(p.candidate.label for p in short_list)}")
-    trials = _side_by_side(partial(confirm, current, data), short_list)
-    for trial in trials:
-        key = (trial.probe.candidate.effect.name, trial.probe.candidate.site)
-        ranking[key] = replace(ranking[key], unseen=trial.unseen.relative)
-        if reason := refuse_trial(trial, thresholds):
-            refused[key] = reason
-    for result in promising[SHORT_LIST:]:
-        key = (result.candidate.effect.name, result.candidate.site)
-        refused[key] = f"{SHORT_LIST} candidates explain more of the training residual, and none of them was enough"
-    believed = [t for t in trials if (t.probe.candidate.effect.name, t.probe.candidate.site) not in refused]
-    order = tuple(sorted(ranking.values(), key=lambda c: -c.screened))
-    if not believed or look_only:
-        return Round(None, _listed(refused), order)
-    best = max(believed, key=lambda t: t.score)
-    key = (best.probe.candidate.effect.name, best.probe.candidate.site)
-    order = tuple(replace(c, accepted=True) if (c.name, c.site) == key else c for c in order)
-    tell(f"round {number}: accepted {best.probe.candidate.label}")
-    return Round(Accepted(best, _rivals(best, believed, data)), _listed(refused), order)
+class _Round:
+    """One round of the search."""
+
+    def __init__(self, current: Judged, data: Data, number: int, tell: Tell) -> None:
+        self.current, self.data, self.number, self.tell = current, data, number, tell
+        self.refused: dict[Key, str] = {}
+        self._ranking: dict[Key, RankedCandidate] = {}
+        self._promising: list[Probe] = []
+        self._believed: list[Trial] = []
+
+    def screen(self, effects: Sequence[str] | None, without: set[Key]) -> None:
+        """Probe every candidate and set aside those that cannot be."""
+        current, data = self.current, self.data
+        found = candidates(current.model, data.training, current.fit.residual, effects)
+        listed = [c for c in found if c.key not in without]
+        self.tell(f"round {self.number}: screening {len(listed)} candidates")
+        for result in _side_by_side(partial(probe, current.baseline, data.training), listed):
+            key = result.candidate.key
+            self._ranking[key] = RankedCandidate(*key, self.number, result.drop, float("nan"), accepted=False)
+            if reason := refuse_probe(result):
+                self.refused[key] = reason
+            else:
+                self._promising.append(result)
+        self._promising.sort(key=lambda p: -p.score)
+
+    def confirm(self) -> None:
+        """Refit with the most promising ones and judge them on unseen data."""
+        short_list = self._promising[:SHORT_LIST]
+        if short_list:
+            self.tell(f"round {self.number}: refitting with {', '.join(p.candidate.label for p in short_list)}")
+        tried = len(self._ranking) * self.number
+        thresholds = Thresholds(tried, min(m.dt for m in self.data.training.motions))
+        for trial in _side_by_side(partial(confirm, self.current, self.data), short_list):
+            key = trial.probe.candidate.key
+            self._ranking[key] = replace(self._ranking[key], unseen=trial.unseen.relative)
+            if reason := refuse_trial(trial, thresholds):
+                self.refused[key] = reason
+            else:
+                self._believed.append(trial)
+        for result in self._promising[SHORT_LIST:]:
+            self.refused[result.candidate.key] = (
+                f"{SHORT_LIST} candidates explain more of the training residual, and none of them was enough"
+            )
+
+    def best(self) -> Accepted | None:
+        """The candidate with the largest unseen gain per number; of those that are as good, the best simulation."""
+        if not self._believed:
+            return None
+        first = max(self._believed, key=lambda t: t.score)
+        equals = [t for t in self._believed if _as_good(t, first)]
+        chosen = min(equals, key=_evidence)
+        key = chosen.probe.candidate.key
+        self._ranking[key] = replace(self._ranking[key], accepted=True)
+        return Accepted(chosen, tuple(t.probe.candidate.label for t in equals if t is not chosen))
+
+    def ranked(self) -> list[RankedCandidate]:
+        """Candidates of this round, the most promising first."""
+        return sorted(self._ranking.values(), key=lambda c: -c.screened)
+
+
+def _as_good(trial: Trial, first: Trial) -> bool:
+    """Whether a trial explains the unseen data as the first one does, with no more numbers."""
+    close = trial.unseen.relative >= first.unseen.relative - LEAST_GAIN
+    return close and len(trial.parameters) <= len(first.parameters)
+
+
+def _evidence(trial: Trial) -> float:
+    """Logarithm of what is left of the gap in both views, in tenths: smaller differences are left to the catalogue."""
+    left = np.log(max(trial.unseen.after, 1e-300) / trial.unseen.before)
+    if trial.probe.candidate.effect.site == "sensor":
+        left -= np.log(SENSOR_SHARE)
+    coupled = len(trial.judged.model.joints) > 1  # errors of coupled joints cancel; see refusal.CLEAR_GAIN
+    if trial.simulated is not None and trial.simulated.before > 0.0 and not coupled:
+        left += np.log(max(trial.simulated.after, 1e-300) / trial.simulated.before)
+    return round(float(left), 1)
+
+
+def _drop_replaced(stages: list[Stage], accepted: list[Accepted], data: Data, dropped: dict[Key, str]) -> None:
+    """Backward elimination: drop every earlier effect without which the model predicts the unseen data as well.
+
+    An effect stays if a parameter of another one was held because the data show the two only together: which of the
+    two is there is then a matter of names, and the first one named keeps its place.
+    """
+    newest = accepted[-1]
+    for entry in accepted[:-1]:
+        current = stages[-1].judged
+        own = set(entry.trial.parameters)
+        if any(alias.partner in own for other in accepted for alias in other.trial.held):
+            continue
+        model = current.model.without_effect(*entry.key)
+        free = tuple(name for name in current.free if name in model.parameters)
+        reduced = judge(model, free, data, {})
+        loss = gain(reduced.unseen, current.unseen, segments(data.unseen))
+        if loss.relative < LEAST_GAIN:
+            accepted.remove(entry)
+            stages.append(Stage("removed", *entry.key, reduced))
+            dropped[entry.key] = f"it is not needed any more beside {newest.trial.probe.candidate.label}"
 
 
 def _side_by_side(work: Callable[[Item], Outcome], items: Sequence[Item]) -> list[Outcome]:
@@ -121,19 +195,7 @@ def _side_by_side(work: Callable[[Item], Outcome], items: Sequence[Item]) -> lis
         return list(pool.map(work, items))
 
 
-def _rivals(best: Trial, believed: Sequence[Trial], data: Data) -> tuple[str, ...]:
-    """Believed candidates whose prediction of the unseen data is as good, within its uncertainty."""
-    tied = []
-    for other in believed:
-        if other is best or other.unseen.relative < TIE_SHARE * best.unseen.relative:
-            continue
-        difference = gain(other.judged.unseen, best.judged.unseen, segments(data.unseen))
-        if abs(difference.score) < 2.0 and len(other.parameters) <= len(best.parameters):
-            tied.append(other.probe.candidate.label)
-    return tuple(tied)
-
-
-def _listed(refused: dict[tuple[str, str], str]) -> tuple[RefusedEffect, ...]:
+def _listed(refused: dict[Key, str]) -> tuple[RefusedEffect, ...]:
     return tuple(RefusedEffect(name, site, reason) for (name, site), reason in refused.items())
 
 

@@ -20,6 +20,9 @@ from vpm.simulate import MODES, Setup, simulate_arrays
 
 Array = NDArray[np.float64]
 
+#: A record with fewer samples after decimation says nothing about anything.
+FEWEST_SAMPLES = 12
+
 
 @dataclass(frozen=True)
 class Block:
@@ -154,7 +157,7 @@ class InverseDynamicsProblem:
         for record, m in enumerate(self.motions):
             _, applied, _ = self.effort(model, model.theta, record)
             powers.append(np.sqrt(np.mean(applied**2, axis=0)))
-            if len(applied) < 2 * len(model.parameters):
+            if len(applied) < FEWEST_SAMPLES:
                 raise IdentificationError(
                     f"{self.experiments[record].name}: only {len(applied)} samples are left after filtering at "
                     f"{m.cutoff:.3g} Hz; record longer or pass a higher cutoff"

@@ -91,7 +91,8 @@ def _notes(d: Diagnosis) -> list[str]:
 
 
 def _step_name(step: Step) -> str:
-    return f"+ {step.effect} at {step.site}" if step.effect else "recalibrated parameters"
+    signs = {"recalibrated": "recalibrated parameters", "added": "+ ", "removed": "- "}
+    return signs[step.change] + (f"{step.effect} at {step.site}" if step.effect else "")
 
 
 def _spread(std: float) -> str:
