@@ -157,14 +157,14 @@ def _as_good(trial: Trial, first: Trial) -> bool:
 
 
 def _evidence(trial: Trial) -> float:
-    """Logarithm of what is left of the gap in both views, in tenths: smaller differences are left to the catalogue."""
+    """Logarithm of what is left of the gap in both views; the machine is blamed before its instruments."""
     left = np.log(max(trial.unseen.after, 1e-300) / trial.unseen.before)
     if trial.probe.candidate.effect.site == "sensor":
         left -= np.log(SENSOR_SHARE)
     coupled = len(trial.judged.model.joints) > 1  # errors of coupled joints cancel; see refusal.CLEAR_GAIN
     if trial.simulated is not None and trial.simulated.before > 0.0 and not coupled:
         left += np.log(max(trial.simulated.after, 1e-300) / trial.simulated.before)
-    return round(float(left), 1)
+    return float(left)
 
 
 def _drop_replaced(stages: list[Stage], accepted: list[Accepted], data: Data, dropped: dict[Key, str]) -> None:
