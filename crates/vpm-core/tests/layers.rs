@@ -5,7 +5,8 @@ use std::io::Result;
 use std::path::{Path, PathBuf};
 
 /// The rigid tree, lowest first: each may import any before it.
-const TREE: [&str; 8] = ["error", "scalar", "spatial", "joint", "body", "model", "data", "dynamics"];
+const TREE: [&str; 11] =
+    ["error", "scalar", "algebra", "spatial", "kinematics", "joint", "body", "model", "data", "dynamics", "linkage"];
 /// Parts that stand alone, each a rig of its own, and all that they may import besides themselves.
 const ALONE: [(&str, &[&str]); 10] = [
     ("error", &[]),
