@@ -18,6 +18,7 @@ pub mod integrator;
 pub mod inverse;
 pub mod joint;
 pub mod kinematics;
+pub mod linkage;
 pub mod model;
 pub mod ode;
 pub mod samples;

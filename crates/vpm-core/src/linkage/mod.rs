@@ -1,0 +1,13 @@
+//! Closed linkages: assembly, velocities, accelerations, singularities, and the machines built from them.
+//!
+//! Equation numbers are those of D'Imperio 2016, "Modelling and simulation techniques for advanced robotic systems",
+//! chapter 2 ("the thesis"), with the corrections named where they matter. Angles are in rad, lengths in m.
+
+mod constraint;
+pub mod karl;
+mod newton;
+mod stroke;
+
+pub use constraint::{ClosedLinkage, LinkageMotion, acceleration, velocity};
+pub use newton::{Newton, Solution};
+pub use stroke::{Alignment, Slider, StrokeGeometry, StrokeLinkage};
