@@ -23,7 +23,7 @@ const ALONE: [(&str, &[&str]); 10] = [
 /// What puts the parts together, lowest first: each may import any part, any tree module and any before it.
 const WHOLE: [&str; 8] =
     ["sensitivity", "system", "description", "simulate", "inverse", "evaluate", "timing", "samples"];
-const WITNESSES: [&str; 3] = ["aba", "crba", "rnea"];
+const WITNESSES: [&str; 4] = ["aba", "crba", "rnea", "virtual_work"];
 
 fn sources(folder: &Path, found: &mut Vec<PathBuf>) -> Result<()> {
     for entry in fs::read_dir(folder)? {

@@ -5,9 +5,12 @@
 
 mod constraint;
 pub mod karl;
+pub mod leg;
+mod line_actuator;
 mod newton;
 mod stroke;
 
 pub use constraint::{ClosedLinkage, LinkageMotion, acceleration, velocity};
+pub use line_actuator::{ActuatorBody, LineActuator, PointMotion};
 pub use newton::{Newton, Solution};
 pub use stroke::{Alignment, Slider, StrokeGeometry, StrokeLinkage};
