@@ -202,6 +202,18 @@ fn alignments_are_the_zeros_of_the_determinants_whatever_the_direction_of_the_an
 }
 
 #[test]
+fn a_short_rod_folds_on_the_near_side_of_the_axis() {
+    let geometry =
+        StrokeGeometry { slider: Slider::OnFrame, start: [0.0; 2], direction: 0.0, anchor: [0.0, 0.3], rod: 0.1 };
+    let linkage = StrokeLinkage::new("short", geometry).unwrap();
+    let [far, _, near, _] = linkage.alignments()[..] else { panic!("four alignments") };
+    // The slider moves along a line through the axis: the arm points at it at both ends, and never gets far from it.
+    assert!((far.stroke - 0.4).abs() < 1e-15 && (near.stroke - 0.2).abs() < 1e-15);
+    assert!([far, near].iter().all(|at| linkage.constraint(at.stroke, at.angle).abs() < 1e-16));
+    assert_eq!(linkage.span(&far, &near, 1.0), 0.0);
+}
+
+#[test]
 fn a_rod_across_the_stroke_is_the_inverse_singularity() {
     // A rod of 0.15 m reaches the line y = 0.1 m from the arm of 0.2 m up to |0.1 - 0.2 sin q| = 0.15 m.
     let (limit, reach) = (0.25_f64.asin(), 0.2 * (1.0 - 0.0625_f64).sqrt());
@@ -271,6 +283,10 @@ fn what_cannot_be_assembled_is_said_with_its_numbers() {
         rod: 1.0,
     };
     assert!(matches!(StrokeLinkage::new("flat", flat), Err(Error::NonFinite { .. })));
+    // With rod and arm of one length, a slider on the axis leaves the angle free.
+    let equal = StrokeGeometry { start: [0.0; 2], ..flat };
+    let text = StrokeLinkage::new("equal", equal).unwrap().angles(0.0).unwrap_err().to_string();
+    assert!(text.starts_with("linkage `equal` is singular at coordinates [0.0]"), "{text}");
     let pose = KarlPose { angles: [0.2, 0.0], strokes: [0.2, 0.2] };
     assert_eq!(karl.end_point_determinant(pose.angles), 0.0);
 }

@@ -4,6 +4,17 @@
 //! its origin at the second joint B and turns with the distal body by q2. Both actuators slide along one direction of
 //! frame 1. Source: section 2.4.1 of the thesis. Its printed numbers fix everything but the direction of O; with
 //! them the point B = (0.300, 0.050) m is in a drawing frame turned by `-alpha`.
+//!
+//! ```
+//! use vpm_core::linkage::karl::{Karl, KarlGeometry};
+//!
+//! let karl = Karl::new(KarlGeometry::default())?;
+//! for pose in karl.direct([0.20, 0.18])? {
+//!     let (torques, end_point) = (karl.torques(&pose, [300.0, 600.0]), karl.end_point(pose.angles));
+//!     println!("{:?} rad: C at {end_point:?} m, {torques:?} N m at full force", pose.angles);
+//! }
+//! # Ok::<(), vpm_core::Error>(())
+//! ```
 
 use super::{ClosedLinkage, Slider, StrokeGeometry, StrokeLinkage};
 use crate::error::{Error, LinkageError, Result};

@@ -2,6 +2,7 @@
 
 use std::f64::consts::PI;
 
+use super::constraint::singular;
 use crate::algebra::{Conic, degree, quadratic_roots, resultant};
 use crate::error::{Error, LinkageError, Result};
 use crate::scalar::Scalar;
@@ -45,17 +46,6 @@ pub struct StrokeLinkage {
     direction: Vector2<f64>,
 }
 
-/// A stroke at which axis, slider and anchor are in line: there the stroke cannot control the angle.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Alignment {
-    /// The stroke in m.
-    pub stroke: f64,
-    /// The angle in rad, in (-pi, pi].
-    pub angle: f64,
-    /// Whether axis, anchor and slider lie with rod and arm end to end (true), or the rod folded back over the arm.
-    pub extended: bool,
-}
-
 impl StrokeLinkage {
     /// A linkage, or what is wrong with its dimensions.
     pub fn new(name: &str, geometry: StrokeGeometry) -> Result<Self> {
@@ -86,7 +76,7 @@ impl StrokeLinkage {
     }
 
     /// The rod's end on the rocker (in the rocker's axes) and on the frame.
-    fn ends<S: Scalar>(&self, stroke: S) -> (Vector2<S>, Vector2<S>) {
+    pub(super) fn ends<S: Scalar>(&self, stroke: S) -> (Vector2<S>, Vector2<S>) {
         let (slider, anchor) = (self.slider(stroke), Vector2::from_f64(self.geometry.anchor));
         match self.geometry.slider {
             Slider::OnRocker => (slider, anchor),
@@ -112,11 +102,16 @@ impl StrokeLinkage {
     /// Both angles (rad) at a stroke (m): all assembly modes, in closed form.
     ///
     /// Law: `q = arg b - arg a +- acos((|a|^2 + |b|^2 - l^2) / (2 |a| |b|))`, the mode with + first; in (-pi, pi].
-    /// Fails where the rod is too long or too short. Checked: against [`StrokeLinkage::angles_by_resultant`].
+    /// Fails where the rod is too long or too short, and
+    /// where every angle will do. Checked: against [`StrokeLinkage::angles_by_resultant`].
     pub fn angles(&self, stroke: f64) -> Result<[f64; 2]> {
         let (a, b) = self.ends(stroke);
         let (far, near, rod) = (a.length(), b.length(), self.geometry.rod);
         let cosine = (far * far + near * near - rod * rod) / (2.0 * far * near);
+        if cosine.is_nan() && stroke.is_finite() {
+            // The slider sits on the axis and the rod lies on the arm: every angle closes the linkage.
+            return Err(singular(&self.name, &[stroke], 0.0).into());
+        }
         if cosine.is_nan() || cosine.abs() > 1.0 + ROUNDING {
             return Err(self.apart("stroke (m)", stroke));
         }
@@ -161,7 +156,7 @@ impl StrokeLinkage {
     }
 
     /// The strokes at which a point that starts at `gap` from another one has the given distance from it.
-    fn strokes_at_distance(&self, gap: Vector2<f64>, distance: f64) -> Option<[f64; 2]> {
+    pub(super) fn strokes_at_distance(&self, gap: Vector2<f64>, distance: f64) -> Option<[f64; 2]> {
         quadratic_roots([gap.dot(gap) - distance * distance, 2.0 * gap.dot(self.direction), 1.0])
     }
 
@@ -189,41 +184,13 @@ impl StrokeLinkage {
         2.0 * self.stroke_slope(stroke, angle) / self.determinant(stroke, angle)
     }
 
-    /// The strokes at which axis, slider and anchor are in line: zeros of [`StrokeLinkage::determinant`] on the
-    /// closed linkage. First the two with rod and arm end to end, then the two folded, the larger stroke first.
-    pub fn alignments(&self) -> Vec<Alignment> {
-        let (rod, arm) = (self.geometry.rod, self.arm());
-        let mut found = Vec::with_capacity(4);
-        for (extended, distance) in [(true, rod + arm), (false, rod - arm)] {
-            let strokes = self.strokes_at_distance(Vector2::from_f64(self.geometry.start), distance.abs());
-            for stroke in strokes.into_iter().flatten() {
-                found.push(Alignment { stroke, angle: self.aligned(stroke, extended), extended });
-            }
-        }
-        found
-    }
-
-    /// The angle at an alignment: extended, the anchor lies between axis and slider.
-    fn aligned(&self, stroke: f64, extended: bool) -> f64 {
-        let (a, b) = self.ends(stroke);
-        let same_side = extended || self.geometry.rod < self.arm();
-        wrapped(b.argument() - a.argument() + if same_side { 0.0 } else { PI })
-    }
-
-    /// How far the rocker turns (rad) in one assembly mode while the stroke goes from the extended to the folded alignment.
-    ///
-    /// Law: the angle `arg b - arg a` to the moving slider changes by a little, the angle of the triangle by pi; the sign of
-    /// `mode` is the sign in [`StrokeLinkage::angles`].
-    pub fn span(&self, extended: &Alignment, folded: &Alignment, mode: f64) -> f64 {
-        let middle = |stroke: f64| {
-            let (a, b) = self.ends(stroke);
-            b.argument() - a.argument()
-        };
-        wrapped(middle(folded.stroke) - middle(extended.stroke)) + PI.copysign(mode)
+    /// Length of the rod in m.
+    pub(super) fn rod(&self) -> f64 {
+        self.geometry.rod
     }
 
     /// Distance of the anchor from the axis in m.
-    fn arm(&self) -> f64 {
+    pub(super) fn arm(&self) -> f64 {
         let [x, y] = self.geometry.anchor;
         x.hypot(y)
     }
@@ -249,7 +216,7 @@ impl StrokeLinkage {
 }
 
 /// The same angle in (-pi, pi].
-fn wrapped(angle: f64) -> f64 {
+pub(super) fn wrapped(angle: f64) -> f64 {
     let turn = angle.rem_euclid(2.0 * PI);
     if turn > PI { turn - 2.0 * PI } else { turn }
 }

@@ -5,6 +5,18 @@
 //! Equation of motion: `tau = M(q) a + V(q, v) + G(q)`. A cylinder force is positive when it extends. Three derivations
 //! ([`Leg::terms`], [`Leg::lagrange`], [`Leg::newton_euler`]) share only the places of the points.
 //! Source: section 2.4.2 of the thesis.
+//!
+//! ```
+//! use vpm_core::linkage::leg::{DutyCycle, HyqData, Leg, LegParameters, ShareStudy};
+//!
+//! let leg = Leg::new(LegParameters::hyq(HyqData::Cad, 0.341))?;
+//! let (q, v, a) = ([0.35, -1.4], [2.0, -3.0], [4.0, -5.0]);
+//! let torques = leg.terms(q, v).effort(&a);
+//! println!("{:?} N in the cylinders", leg.cylinder_forces(q, torques));
+//! println!("{} N on the foot", leg.newton_euler(q, v, a)?.ground);
+//! println!("{:?} of the effort", leg.shares(&ShareStudy::of(DutyCycle::MEDIUM))?);
+//! # Ok::<(), vpm_core::Error>(())
+//! ```
 
 mod jacobian;
 mod lagrange;
