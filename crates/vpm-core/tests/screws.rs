@@ -217,6 +217,10 @@ fn denavit_hartenberg_gives_the_textbook_poses_of_a_planar_arm() {
     let end = chain.pose(&[q1, q2]).translation;
     assert!((end.x - 0.4 * q1.cos() - 0.3 * (q1 + q2).cos()).abs() < 1e-15);
     assert!((end.y - 0.4 * q1.sin() - 0.3 * (q1 + q2).sin()).abs() < 1e-15);
+    let mut frames = [Pose::identity(); 2];
+    assert!(pose_apart(chain.frames(&[q1, q2], &mut frames), chain.pose(&[q1, q2])) == 0.0);
+    let elbow = Vector3::from_f64([0.4 * q1.cos(), 0.4 * q1.sin(), 0.0]);
+    assert!(pose_apart(frames[0], Pose::identity()) == 0.0 && size(frames[1].translation - elbow) < 1e-15);
     // A sliding joint adds to d; alpha turns the next axis.
     let slide = DenavitHartenberg { theta: 0.3, d: 0.2, alpha: FRAC_PI_2, a: 0.1, pair: LowerPair::Prismatic };
     let end = SerialChain::from_denavit_hartenberg(&[slide]).pose(&[0.5]);

@@ -52,7 +52,8 @@ fn largest(numbers: impl IntoIterator<Item = f64>) -> f64 {
     numbers.into_iter().map(f64::abs).fold(1.0, f64::max)
 }
 
-/// Dependent coordinates as functions of two independent ones: `amplitude sin(q . wave)`, with gradients and their rates.
+/// Dependent coordinates as functions of two independent ones: `amplitude sin(q . wave)`, with gradients and their
+/// rates.
 struct Coupling {
     amplitudes: [f64; B],
     waves: [[f64; 2]; B],

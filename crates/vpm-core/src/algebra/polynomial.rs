@@ -58,7 +58,8 @@ impl Conic {
 ///
 /// Law: determinant of the 4 x 4 Sylvester matrix of `f` and `g` as polynomials in c,
 /// `(f2 g0 - f0 g2)^2 - (f2 g1 - f1 g2)(f1 g0 - f0 g1)`. Source: D'Imperio 2016, "Modelling and simulation
-/// techniques for advanced robotic systems", eq 2.66, whose last two rows belong to the second polynomial. Degree 4 in general, 2 if both conics are circles, as for a rod between two points.
+/// techniques for advanced robotic systems", eq 2.66, whose last two rows belong to the second polynomial. Degree 4 in
+/// general, 2 if both conics are circles, as for a rod between two points.
 pub fn resultant(f: &Conic, g: &Conic) -> [f64; 5] {
     let ([f0, f1, f2], [g0, g1, g2]) = (f.in_c(), g.in_c());
     let minor = |a: [f64; 3], b: [f64; 3], c: [f64; 3], d: [f64; 3]| difference(product(a, b), product(c, d));

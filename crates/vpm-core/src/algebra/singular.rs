@@ -7,8 +7,8 @@ const SWEEPS: usize = 40;
 
 /// Singular values of an m x n matrix with the right singular vectors, all n of them.
 ///
-/// Law: one-sided Jacobi rotations, `A V = U S` (Golub & Van Loan 2013, section 8.6.3), which gives small singular values
-/// to the rounding of the largest, where the eigenvalues of `A^T A` would lose half of the digits.
+/// Law: one-sided Jacobi rotations, `A V = U S` (Golub & Van Loan 2013, section 8.6.3), which gives small singular
+/// values to the rounding of the largest, where the eigenvalues of `A^T A` would lose half of the digits.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SingularValues {
     /// n values, descending; those beyond the m-th are zero up to rounding.

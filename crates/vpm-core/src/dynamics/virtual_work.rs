@@ -15,8 +15,8 @@ pub struct Carried<S, const B: usize> {
     pub mass: S,
     /// Rotational inertia about the centre of mass, in world axes, in kg m^2.
     pub inertia: Symmetric3<S>,
-    /// Column b: angular velocity and velocity of the centre of mass per unit rate of coordinate b, in world axes, each entry
-    /// with its time derivative along the motion.
+    /// Column b: angular velocity and velocity of the centre of mass per unit rate of coordinate b, in world axes, each
+    /// entry with its time derivative along the motion.
     pub jacobian: [Twist<Rate<S>>; B],
 }
 
@@ -37,7 +37,8 @@ impl<S: Scalar, const N: usize> Terms<S, N> {
         from_fn(|i| (0..N).map(|j| self.mass_matrix[i][j] * a[j]).sum())
     }
 
-    /// `M a + V + G`, the efforts for accelerations `a`. Source: D'Imperio 2016, eq 2.104, with all signs as written here.
+    /// `M a + V + G`, the efforts for accelerations `a`. Source: D'Imperio 2016, eq 2.104, with all signs as written
+    /// here.
     pub fn effort(&self, a: &[S; N]) -> [S; N] {
         let inertia = self.inertia(a);
         from_fn(|i| inertia[i] + self.velocity[i] + self.gravity[i])
@@ -49,10 +50,10 @@ impl<S: Scalar, const N: usize> Terms<S, N> {
 /// Law: with `K = J Psi` the Jacobian for the independent rates `v`, `M = sum K^T m K`,
 /// `V = sum K^T (m K_dot + gamma K) v`, `G = -sum K^T (0; m g)`, `m = diag(I, m 1)`, `gamma = diag([w]x I, 0)`, and
 /// `K_dot = J_dot Psi + J Psi_dot`. `psi[b]` is the gradient of coordinate b, with its time derivative.
-/// Source: D'Imperio 2016, "Modelling and simulation techniques for advanced robotic systems", eqs 2.98 to 2.107, whose M, V
-/// and G have the opposite signs. Allocates nothing.
-/// Checked: against the recursive algorithms on trees in space, also with dependent coordinates; on a closed linkage against
-/// Lagrange's equations and the balances of every body.
+/// Source: D'Imperio 2016, "Modelling and simulation techniques for advanced robotic systems", eqs 2.98 to 2.107, whose
+/// M, V and G have the opposite signs. Allocates nothing.
+/// Checked: against the recursive algorithms on trees in space, also with dependent coordinates; on a closed linkage
+/// against Lagrange's equations and the balances of every body.
 pub fn virtual_work<S: Scalar, const B: usize, const N: usize>(
     bodies: &[Carried<S, B>],
     psi: &[[Rate<S>; N]; B],
@@ -83,7 +84,8 @@ pub fn virtual_work<S: Scalar, const B: usize, const N: usize>(
 
 /// Efforts of a wrench `(moment, force)` that acts on a body, for the independent coordinates: `Psi^T J^T w`.
 ///
-/// Source: D'Imperio 2016, eq 2.108, with the wrench in the order of all others. On the side of `tau` in the equation of motion.
+/// Source: D'Imperio 2016, eq 2.108, with the wrench in the order of all others. On the side of `tau` in the equation
+/// of motion.
 pub fn effort_of_wrench<S: Scalar, const B: usize, const N: usize>(
     jacobian: &[Twist<Rate<S>>; B],
     psi: &[[Rate<S>; N]; B],

@@ -64,19 +64,28 @@ impl SerialChain {
     /// The pose of the tool at coordinates `q` (rad or m). Source: eq 2.17.
     pub fn pose<S: Scalar>(&self, q: &[S]) -> Pose<S> {
         debug_assert!(q.len() == self.n_coordinates());
-        self.walk(|k| q[k], |_, _| ())
+        self.walk(|k| q[k], |_, _, _| ())
     }
 
-    /// Goes along the chain with `coordinate(k)`, shows each screw in world axes at the world's origin, ends at the tool.
+    /// The pose of the tool and, in `frames`, that of the frame that each coordinate moves, before its own motion.
+    ///
+    /// For a chain by Denavit and Hartenberg, frame k is `A_0k` of eq 2.17, since its z axis is that of joint k + 1.
+    pub fn frames<S: Scalar>(&self, q: &[S], frames: &mut [Pose<S>]) -> Pose<S> {
+        debug_assert!(q.len() == self.n_coordinates() && frames.len() == q.len());
+        self.walk(|k| q[k], |k, frame, _| frames[k] = *frame)
+    }
+
+    /// Goes along the chain with `coordinate(k)`, shows each frame and its screw, in world axes at the world's origin,
+    /// ends at the tool.
     pub(super) fn walk<S: Scalar>(
         &self,
         coordinate: impl Fn(usize) -> S,
-        mut visit: impl FnMut(usize, Twist<S>),
+        mut visit: impl FnMut(usize, &Pose<S>, Twist<S>),
     ) -> Pose<S> {
         let mut pose = Pose::identity();
         for (k, step) in self.steps.iter().enumerate() {
             pose = pose * constant(&step.frame);
-            visit(k, pose.twist(step.screw.twist()));
+            visit(k, &pose, pose.twist(step.screw.twist()));
             pose = pose * step.screw.displacement(coordinate(k));
         }
         pose * constant(&self.tool)

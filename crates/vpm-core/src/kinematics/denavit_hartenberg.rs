@@ -5,7 +5,8 @@ use crate::spatial::{Matrix3, Pose, Vector3};
 
 /// A link by its four parameters, and the joint before it.
 ///
-/// Law: `A = T(z, theta) T(z, d) T(x, alpha) T(x, a)`, with the joint's coordinate added to theta (revolute) or d (prismatic).
+/// Law: `A = T(z, theta) T(z, d) T(x, alpha) T(x, a)`, with the joint's coordinate added to theta (revolute) or d
+/// (prismatic).
 /// Source: eqs 2.14, 2.15 and 2.18; a point transforms as `p_0 = A_0n p_n` (2.16 corrected).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DenavitHartenberg {

@@ -7,13 +7,13 @@ use crate::spatial::{Matrix3, Pose, Twist, Vector3};
 impl SerialChain {
     /// The conventional Jacobian: column k is the tool's angular velocity and velocity per unit rate of coordinate k.
     ///
-    /// Law: partial derivatives of the pose, `v = dp/dq_k` and `[w]x = dR/dq_k R^T`, exact by dual numbers. Source: eqs 2.32
-    /// and 2.25. Gives the pose as well; allocates nothing. Checked: against [`SerialChain::screw_jacobian`].
+    /// Law: partial derivatives of the pose, `v = dp/dq_k` and `[w]x = dR/dq_k R^T`, exact by dual numbers. Source: eqs
+    /// 2.32 and 2.25. Gives the pose as well; allocates nothing. Checked: against [`SerialChain::screw_jacobian`].
     pub fn conventional_jacobian<S: Scalar>(&self, q: &[S], columns: &mut [Twist<S>]) -> Pose<S> {
         debug_assert!(q.len() == self.n_coordinates() && columns.len() == q.len());
         for (lane, column) in columns.iter_mut().enumerate() {
             let coordinate = |k: usize| if k == lane { Dual::variable(q[k], 0) } else { Dual::constant(q[k]) };
-            *column = rate(&self.walk::<Dual<S, 1>>(coordinate, |_, _| ()));
+            *column = rate(&self.walk::<Dual<S, 1>>(coordinate, |_, _, _| ()));
         }
         self.pose(q)
     }
@@ -23,32 +23,34 @@ impl SerialChain {
     /// Source: eq 2.34. Gives the tool's pose as well; allocates nothing. The tool's velocity follows by [`at_point`].
     pub fn screw_jacobian<S: Scalar>(&self, q: &[S], columns: &mut [Twist<S>]) -> Pose<S> {
         debug_assert!(q.len() == self.n_coordinates() && columns.len() == q.len());
-        self.walk(|k| q[k], |k, screw| columns[k] = screw)
+        self.walk(|k| q[k], |k, _, screw| columns[k] = screw)
     }
 
     /// The tool's motion by differentiating its pose twice along the coordinates' motion `q`, `v`, `a`.
     ///
-    /// Law: `J a + J_dot v`, which is `phi_q a + phi_q_dot v + phi_t_dot = 0` with `phi = x - f(q)` (eq 2.37 with the signs
-    /// corrected), exact by nested dual numbers. `a = 0` gives `J_dot v`. Checked: against [`SerialChain::motion_by_screws`].
+    /// Law: `J a + J_dot v`, which is `phi_q a + phi_q_dot v + phi_t_dot = 0` with `phi = x - f(q)` (eq 2.37 with the
+    /// signs corrected), exact by nested dual numbers. `a = 0` gives `J_dot v`. Checked: against
+    /// [`SerialChain::motion_by_screws`].
     pub fn motion_by_differentiation<S: Scalar>(&self, q: &[S], v: &[S], a: &[S]) -> Motion<S> {
         debug_assert!(q.len() == self.n_coordinates() && v.len() == q.len() && a.len() == q.len());
         let time = |k: usize| Dual {
             value: Dual { value: q[k], gradient: [v[k]] },
             gradient: [Dual { value: v[k], gradient: [a[k]] }],
         };
-        second_order(&self.walk::<Dual<Dual<S, 1>, 1>>(time, |_, _| ()))
+        second_order(&self.walk::<Dual<Dual<S, 1>, 1>>(time, |_, _, _| ()))
     }
 
     /// The tool's motion by sums over the screws.
     ///
-    /// Law: `V = sum $_i v_i` (eq 2.33), `V_dot = sum $_i a_i + sum_(i<j) v_i v_j [$_i, $_j]` (eq 2.38), with the bracket
-    /// of two screws; the double sum is gathered joint by joint, since `sum_(i<j) v_i $_i` is the velocity before joint j.
+    /// Law: `V = sum $_i v_i` (eq 2.33), `V_dot = sum $_i a_i + sum_(i<j) v_i v_j [$_i, $_j]` (eq 2.38), with the
+    /// bracket of two screws; the double sum is gathered joint by joint, since `sum_(i<j) v_i $_i` is the velocity
+    /// before joint j.
     pub fn motion_by_screws<S: Scalar>(&self, q: &[S], v: &[S], a: &[S]) -> Motion<S> {
         debug_assert!(q.len() == self.n_coordinates() && v.len() == q.len() && a.len() == q.len());
         let (mut velocity, mut acceleration) = (Twist::zero(), Twist::zero());
         let pose = self.walk(
             |k| q[k],
-            |k, screw| {
+            |k, _, screw| {
                 acceleration += screw * a[k] + velocity.cross(screw) * v[k];
                 velocity += screw * v[k];
             },

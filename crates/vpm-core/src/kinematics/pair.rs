@@ -4,8 +4,8 @@ use super::Screw;
 
 /// Two bodies in contact over a surface: the six lower pairs, and none of the freedoms for a fixed joint.
 ///
-/// In the joint frame, whose z axis is the pair's axis. Source: Table 2.1 of the thesis. Checked: the twists that a pair
-/// allows span exactly the displacements and rotations of the table.
+/// In the joint frame, whose z axis is the pair's axis. Source: Table 2.1 of the thesis. Checked: the twists that a
+/// pair allows span exactly the displacements and rotations of the table.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LowerPair {
     /// No relative motion.

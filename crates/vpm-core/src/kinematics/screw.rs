@@ -9,8 +9,8 @@ const UNIT_TOLERANCE: f64 = 1e-9;
 
 /// A unit screw: the line through `point` along `direction`, with a pitch.
 ///
-/// Law: `$ = (s; s_o x s + lambda s)` in `[angular; linear]`, with s_o the position of any point of the line; a prismatic
-/// one is `(0; s)`. Source: eqs 2.26 to 2.28. Checked: its displacement, differentiated, is its twist.
+/// Law: `$ = (s; s_o x s + lambda s)` in `[angular; linear]`, with s_o the position of any point of the line; a
+/// prismatic one is `(0; s)`. Source: eqs 2.26 to 2.28. Checked: its displacement, differentiated, is its twist.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Screw {
     direction: [f64; 3],

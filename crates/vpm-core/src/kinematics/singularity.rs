@@ -50,10 +50,11 @@ pub struct Analysis {
 impl SerialChain {
     /// Rank of the task's Jacobian at `q`, and what kind of singularity it is.
     ///
-    /// Law: singular where `det J = 0` (section 2.2.5 of the thesis), or the smallest singular value is zero when J is not
-    /// square. With a lost direction u (`u^T J = 0`) and joint motions v that leave the task at rest (`J v = 0`), the tool
-    /// moves by `1/2 u . (J_dot v)` along u: if that has one sign for all v the tool touches its boundary, otherwise the
-    /// singularity is interior. At a rank loss above one, boundary means: in one of the lost directions found.
+    /// Law: singular where `det J = 0` (section 2.2.5 of the thesis), or the smallest singular value is zero when J is
+    /// not square. With a lost direction u (`u^T J = 0`) and joint motions v that leave the task at rest (`J v = 0`),
+    /// the tool moves by `1/2 u . (J_dot v)` along u: if that has one sign for all v the tool touches its boundary,
+    /// otherwise the singularity is interior. At a rank loss above one, boundary means: in one of the lost directions
+    /// found.
     /// Checked: stretched, folded and aligned planar arms; the wrist of a six-joint arm.
     pub fn analyse(&self, q: &[f64], task: &Task) -> Result<Analysis> {
         self.check(q, task)?;

@@ -37,15 +37,18 @@ impl StrokeLinkage {
         wrapped(b.argument() - a.argument() + if extended { 0.0 } else { self.folded() })
     }
 
-    /// Angle at the axis between slider and anchor when folded: the axis lies between them if the rod is the longer link.
+    /// Angle at the axis between slider and anchor when folded: the axis lies between them if the rod is the longer
+    /// link.
     fn folded(&self) -> f64 {
         if self.rod() > self.arm() { PI } else { 0.0 }
     }
 
-    /// How far the rocker turns (rad) in one assembly mode while the stroke goes from the extended to the folded alignment.
+    /// How far the rocker turns (rad) in one assembly mode while the stroke goes from the extended to the folded
+    /// alignment.
     ///
-    /// Law: `arg b - arg a`, which follows the moving slider, changes by less than half a turn; the angle between slider and
-    /// anchor goes from zero to its folded value, with the sign of `mode`, that in [`StrokeLinkage::angles`].
+    /// Law: `arg b - arg a`, which follows the moving slider, changes by less than half a turn; the angle between
+    /// slider and anchor goes from zero to its folded value, with the sign of `mode`, that in
+    /// [`StrokeLinkage::angles`].
     pub fn span(&self, extended: &Alignment, folded: &Alignment, mode: f64) -> f64 {
         let middle = |stroke: f64| {
             let (a, b) = self.ends(stroke);

@@ -50,8 +50,9 @@ pub fn velocity<L: ClosedLinkage<N, I>, const N: usize, const I: usize>(
 
 /// Motion of the coordinates for an input motion, at coordinates `q` that close the linkage.
 ///
-/// Law: `phi_q a + phi_q_dot v + phi_t_dot = 0`, where the last two terms are the second time derivative of the constraints
-/// with `a = 0`. Source: eq 2.37 with its signs corrected. Checked: against finite differences and closed forms.
+/// Law: `phi_q a + phi_q_dot v + phi_t_dot = 0`, where the last two terms are the second time derivative of the
+/// constraints with `a = 0`. Source: eq 2.37 with its signs corrected. Checked: against finite differences and closed
+/// forms.
 pub fn acceleration<L: ClosedLinkage<N, I>, const N: usize, const I: usize>(
     linkage: &L,
     q: &[f64; N],

@@ -1,9 +1,9 @@
 //! KARL: a limb of two joints whose two linear actuators both sit on its first body.
 //!
-//! Frame 0 has its origin at the first joint A; frame 1 turns with the medial body by q1, its x axis along A to B; frame 2 has
-//! its origin at the second joint B and turns with the distal body by q2. Both actuators slide along one direction of
-//! frame 1. Source: section 2.4.1 of the thesis. Its printed numbers fix everything but the direction of O; with
-//! them the point B = (0.300, 0.050) m is in a drawing frame turned by `-alpha`.
+//! Frame 0 has its origin at the first joint A; frame 1 turns with the medial body by q1, its x axis along A to B;
+//! frame 2 has its origin at the second joint B and turns with the distal body by q2. Both actuators slide along one
+//! direction of frame 1. Source: section 2.4.1 of the thesis. Its printed numbers fix everything but the direction of
+//! O; with them the point B = (0.300, 0.050) m is in a drawing frame turned by `-alpha`.
 //!
 //! ```
 //! use vpm_core::linkage::karl::{Karl, KarlGeometry};
@@ -40,7 +40,8 @@ pub struct KarlGeometry {
 }
 
 impl Default for KarlGeometry {
-    /// The prototype. `ground_anchor` is 0.040 m from A by the printed singular strokes; that it lies below A is an assumption.
+    /// The prototype. `ground_anchor` is 0.040 m from A by the printed singular strokes; that it lies below A is an
+    /// assumption.
     fn default() -> Self {
         let b = [0.300_f64, 0.050_f64];
         Self {
@@ -160,7 +161,8 @@ impl Karl {
         std::array::from_fn(|k| self.linkages[k].ratio(pose.strokes[k], pose.angles[k]))
     }
 
-    /// Joint torques (N m) of actuator forces (N, positive along the stroke): `tau = Lambda^-T F`. Source: after eq 2.84.
+    /// Joint torques (N m) of actuator forces (N, positive along the stroke): `tau = Lambda^-T F`. Source: after eq
+    /// 2.84.
     pub fn torques(&self, pose: &KarlPose, forces: [f64; 2]) -> [f64; 2] {
         let lambda = self.lambda(pose);
         std::array::from_fn(|k| forces[k] / lambda[k])

@@ -63,8 +63,9 @@ impl<S: Scalar, const B: usize> Line<S, B> {
 impl LineActuator {
     /// Jacobians of barrel and rod at their centres of mass, where coordinate number `stroke` is the actuator's length.
     ///
-    /// Law: both parts turn with the line. The barrel's centre is `base + c u`; the rod's is `base + (s - c) u`, so that it also
-    /// moves by u per unit rate of s, the coordinate that its `levers` make dependent. Source: eqs 2.85 to 2.95.
+    /// Law: both parts turn with the line. The barrel's centre is `base + c u`; the rod's is `base + (s - c) u`, so
+    /// that it also moves by u per unit rate of s, the coordinate that its `levers` make dependent. Source: eqs 2.85 to
+    /// 2.95.
     /// Checked: the sum over all coordinates is the derivative of the centres' positions.
     pub(super) fn jacobians<S: Scalar, const B: usize>(
         &self,

@@ -35,8 +35,8 @@ impl Default for Newton {
 impl Newton {
     /// The coordinates near `start` that close the linkage at `input`.
     ///
-    /// Law: `phi(q_k) + phi_q (q_(k+1) - q_k) = 0` (eq 2.19, which lacks the first term), the step halved while it does not
-    /// reduce the violation; the number of steps is bounded. Fails with the violation that is left, or with the
+    /// Law: `phi(q_k) + phi_q (q_(k+1) - q_k) = 0` (eq 2.19, which lacks the first term), the step halved while it does
+    /// not reduce the violation; the number of steps is bounded. Fails with the violation that is left, or with the
     /// pivot of a singular configuration. Which assembly mode it finds depends on `start`.
     /// Checked: against the closed form and the resultant.
     pub fn solve<L: ClosedLinkage<N, I>, const N: usize, const I: usize>(

@@ -20,7 +20,8 @@ pub enum Slider {
     OnFrame,
 }
 
-/// Dimensions of a stroke linkage. All points are relative to the rocker's axis, in the axes of the body that they sit on.
+/// Dimensions of a stroke linkage. All points are relative to the rocker's axis, in the axes of the body that they sit
+/// on.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StrokeGeometry {
     /// Which body carries the slider.
@@ -37,8 +38,8 @@ pub struct StrokeGeometry {
 
 /// A rocker with angle `q` about an axis, a slider with stroke `delta`, and a rod between the slider and an anchor.
 ///
-/// Law: `Pi = |R(q) a - b|^2 - l^2 = 0`, with a the rod's end on the rocker and b its end on the frame; one of them moves as
-/// `start + delta u`. Source: eqs 2.61 and 2.67, which are the two cases of [`Slider`].
+/// Law: `Pi = |R(q) a - b|^2 - l^2 = 0`, with a the rod's end on the rocker and b its end on the frame; one of them
+/// moves as `start + delta u`. Source: eqs 2.61 and 2.67, which are the two cases of [`Slider`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct StrokeLinkage {
     name: String,
@@ -121,8 +122,8 @@ impl StrokeLinkage {
 
     /// Both angles (rad) at a stroke (m), by eliminating one of c and s.
     ///
-    /// Law: the resultant of `Pi` and `c^2 + s^2 - 1` is a polynomial of degree 2, whose zeros are the assembly modes; the
-    /// other unknown follows from the kernel of the Sylvester matrix. Source: eqs 2.64 to 2.66.
+    /// Law: the resultant of `Pi` and `c^2 + s^2 - 1` is a polynomial of degree 2, whose zeros are the assembly modes;
+    /// the other unknown follows from the kernel of the Sylvester matrix. Source: eqs 2.64 to 2.66.
     pub fn angles_by_resultant(&self, stroke: f64) -> Result<[f64; 2]> {
         let pi = self.polynomial(stroke);
         // Eliminate the unknown with the larger linear factor, so that the kernel determines it.
@@ -160,14 +161,16 @@ impl StrokeLinkage {
         quadratic_roots([gap.dot(gap) - distance * distance, 2.0 * gap.dot(self.direction), 1.0])
     }
 
-    /// `d Pi / d(c, s)` with `d(c^2 + s^2 - 1) / d(c, s)`: the determinant that vanishes where the stroke loses control of
-    /// the angle, in m^2. Source: eq 2.77 (with the anchor where it prints A_0) for a slider on the rocker, eq 2.79 on the frame.
+    /// `d Pi / d(c, s)` with `d(c^2 + s^2 - 1) / d(c, s)`: the determinant that vanishes where the stroke loses control
+    /// of the angle, in m^2. Source: eq 2.77 (with the anchor where it prints A_0) for a slider on the rocker, eq 2.79
+    /// on the frame.
     pub fn determinant(&self, stroke: f64, angle: f64) -> f64 {
         let ((a, b), (sine, cosine)) = (self.ends(stroke), angle.sin_cos());
         4.0 * (a.perpendicular().dot(b) * cosine - a.dot(b) * sine)
     }
 
-    /// `d Pi / d delta` in m: zero where the rod is perpendicular to the stroke, so that the angle cannot move the stroke.
+    /// `d Pi / d delta` in m: zero where the rod is perpendicular to the stroke, so that the angle cannot move the
+    /// stroke.
     pub fn stroke_slope(&self, stroke: f64, angle: f64) -> f64 {
         let ((a, b), slope) = (self.ends(stroke), angle.sin_cos());
         let rod = a.rotated(slope) - b;

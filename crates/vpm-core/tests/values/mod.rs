@@ -1,4 +1,5 @@
-//! Published and recomputed values of the linkages, each with its unit, tolerance and source, and how near the core comes.
+//! Published and recomputed values of the linkages, each with its unit, tolerance and source, and how near the core
+//! comes.
 
 use std::collections::{BTreeMap, BTreeSet};
 

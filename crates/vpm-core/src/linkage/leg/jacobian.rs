@@ -10,7 +10,8 @@ use crate::spatial::{Symmetric3, Twist, Vector2};
 /// Dependent coordinates: q1, q2 and the lengths s1, s2 of the cylinders.
 const DEPENDENT: usize = 4;
 
-/// Jacobians of the seven bodies for the rates of (q1, q2, s1, s2), and those of the dependent coordinates for (q1, q2).
+/// Jacobians of the seven bodies for the rates of (q1, q2, s1, s2), and those of the dependent coordinates for (q1,
+/// q2).
 struct Kinematics<S> {
     bodies: [[Twist<S>; DEPENDENT]; 7],
     psi: [[S; 2]; DEPENDENT],
@@ -19,8 +20,8 @@ struct Kinematics<S> {
 impl Leg {
     /// M (kg m^2), V and G (N m) at angles `q` (rad) and rates `v` (rad/s), by virtual work.
     ///
-    /// Law: [`virtual_work`] with the coordinates (q1, q2, s1, s2) of eq 2.92 and `Psi = d(q1, q2, s1, s2)/d(q1, q2)`; the
-    /// Jacobians are written out below, their time derivatives come exact from dual numbers. Allocates nothing.
+    /// Law: [`virtual_work`] with the coordinates (q1, q2, s1, s2) of eq 2.92 and `Psi = d(q1, q2, s1, s2)/d(q1, q2)`;
+    /// the Jacobians are written out below, their time derivatives come exact from dual numbers. Allocates nothing.
     /// Source: eqs 2.92 to 2.107. Checked: against [`Leg::lagrange`] and [`Leg::newton_euler`].
     pub fn terms<S: Scalar>(&self, q: [S; 2], v: [S; 2]) -> Terms<S, 2> {
         let moving: [Rate<S>; 2] = std::array::from_fn(|k| Rate { value: q[k], gradient: [v[k]] });

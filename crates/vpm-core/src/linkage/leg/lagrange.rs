@@ -11,8 +11,8 @@ type Second = Dual<Dual<f64, 4>, 4>;
 impl Leg {
     /// M (kg m^2), V and G (N m) at angles `q` (rad) and rates `v` (rad/s), from the energies alone.
     ///
-    /// Law: `M = d^2T/dv^2`, `V = (d^2T/dv dq) v - dT/dq`, `G = dU/dq`, exact by nested dual numbers. Source: eqs 2.54 to 2.60,
-    /// with `U = -sum m g . r` (2.56 corrected).
+    /// Law: `M = d^2T/dv^2`, `V = (d^2T/dv dq) v - dT/dq`, `G = dU/dq`, exact by nested dual numbers. Source: eqs 2.54
+    /// to 2.60, with `U = -sum m g . r` (2.56 corrected).
     pub fn lagrange(&self, q: [f64; 2], v: [f64; 2]) -> Terms<f64, 2> {
         let lift = |value: f64, lane: usize| Second::variable(Dual::variable(value, lane), lane);
         let (angles, rates) = ([lift(q[0], 0), lift(q[1], 1)], [lift(v[0], 2), lift(v[1], 3)]);
@@ -27,7 +27,8 @@ impl Leg {
         }
     }
 
-    /// Kinetic energy in J: `1/2 sum (m |c_dot|^2 + I w^2)`, with the rates of places by dual numbers along `v`. Source: eq 2.55.
+    /// Kinetic energy in J: `1/2 sum (m |c_dot|^2 + I w^2)`, with the rates of places by dual numbers along `v`.
+    /// Source: eq 2.55.
     pub fn kinetic_energy<S: Scalar>(&self, q: [S; 2], v: [S; 2]) -> S {
         let moving: [Dual<S, 1>; 2] = std::array::from_fn(|k| Dual { value: q[k], gradient: [v[k]] });
         let energy = |(place, (mass, inertia)): (super::Place<Dual<S, 1>>, (f64, f64))| {

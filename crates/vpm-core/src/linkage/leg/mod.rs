@@ -1,9 +1,9 @@
 //! The HyQ leg: seven rigid bodies on a vertical slider, driven by two cylinders, its foot sliding on the ground.
 //!
-//! Frame 0 has its origin on the ground below the hip, y up. The hip axis A slides along x = 0, the foot C along y = 0; the upper
-//! leg points along `(sin q1, -cos q1)`, the lower leg along `(sin(q1+q2), -cos(q1+q2))`, so that q2 < 0 bends the knee.
-//! Equation of motion: `tau = M(q) a + V(q, v) + G(q)`. A cylinder force is positive when it extends. Three derivations
-//! ([`Leg::terms`], [`Leg::lagrange`], [`Leg::newton_euler`]) share only the places of the points.
+//! Frame 0 has its origin on the ground below the hip, y up. The hip axis A slides along x = 0, the foot C along y = 0;
+//! the upper leg points along `(sin q1, -cos q1)`, the lower leg along `(sin(q1+q2), -cos(q1+q2))`, so that q2 < 0
+//! bends the knee. Equation of motion: `tau = M(q) a + V(q, v) + G(q)`. A cylinder force is positive when it extends.
+//! Three derivations ([`Leg::terms`], [`Leg::lagrange`], [`Leg::newton_euler`]) share only the places of the points.
 //! Source: section 2.4.2 of the thesis.
 //!
 //! ```

@@ -22,7 +22,8 @@ pub struct Reactions {
     pub ground: f64,
     /// Of the guide on the slider: force along x, moment.
     pub guide: [f64; 2],
-    /// In the pins: slider on upper leg (A), upper on lower leg (B), then on the four ends H1, H2, K1, K2 of the cylinders.
+    /// In the pins: slider on upper leg (A), upper on lower leg (B), then on the four ends H1, H2, K1, K2 of the
+    /// cylinders.
     pub pins: [[f64; 2]; 6],
     /// Of each barrel on its rod: force across the line at the tip, moment.
     pub bearings: [[f64; 2]; 2],
@@ -39,9 +40,10 @@ struct Balances {
 impl Leg {
     /// All reactions at angles `q` (rad), rates `v` (rad/s) and accelerations `a` (rad/s^2).
     ///
-    /// Law: for each body `sum f = m (c_ddot - g)` and `sum (r x f + n) = I w_dot` about its centre of mass, 21 equations for
-    /// 21 reactions; accelerations by differentiating the places twice in time. No friction. Source: eqs 2.39 to 2.44, with
-    /// the moment arms of 2.41 corrected. Fails where the reactions are not determined. Allocates nothing.
+    /// Law: for each body `sum f = m (c_ddot - g)` and `sum (r x f + n) = I w_dot` about its centre of mass, 21
+    /// equations for 21 reactions; accelerations by differentiating the places twice in time. No friction. Source: eqs
+    /// 2.39 to 2.44, with the moment arms of 2.41 corrected. Fails where the reactions are not determined. Allocates
+    /// nothing.
     pub fn newton_euler(&self, q: [f64; 2], v: [f64; 2], a: [f64; 2]) -> Result<Reactions> {
         let time: [InTime; 2] = std::array::from_fn(|k| Dual {
             value: Dual { value: q[k], gradient: [v[k]] },

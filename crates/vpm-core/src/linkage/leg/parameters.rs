@@ -66,9 +66,10 @@ pub struct Leg {
 impl LegParameters {
     /// The leg of HyQ; `shank` is the distance from knee to foot in m (0.341, or 0.375 to meet the published shares).
     ///
-    /// Geometry: "HyQ-Robot: Standard definition for joint angles and kinematic parameters", V4.0, 2017. Masses: Table 5.1 of the
-    /// thesis, which lists one inertia per actuator: it is divided between barrel and rod by mass, or equally for the identified
-    /// column. Centres of mass are not published: 0.14 and 0.1254 m down the legs, 0.110 and 0.090 m along the cylinders.
+    /// Geometry: "HyQ-Robot: Standard definition for joint angles and kinematic parameters", V4.0, 2017. Masses: Table
+    /// 5.1 of the thesis, which lists one inertia per actuator: it is divided between barrel and rod by mass, or
+    /// equally for the identified column. Centres of mass are not published: 0.14 and 0.1254 m down the legs, 0.110 and
+    /// 0.090 m along the cylinders.
     pub fn hyq(data: HyqData, shank: f64) -> Self {
         let cad = [7.360, 0.885, 0.876, 1.216, 0.215, 1.214, 0.215];
         let split =

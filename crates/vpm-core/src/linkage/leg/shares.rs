@@ -6,8 +6,8 @@ use crate::error::{Error, Result};
 
 /// What the norm of one term is divided by.
 ///
-/// Printed is a ratio to the torque (eq 2.109), which is unbounded since the torque passes through zero; the published averages
-/// are those of [`ShareDefinition::SumOfNorms`].
+/// Printed is a ratio to the torque (eq 2.109), which is unbounded since the torque passes through zero; the published
+/// averages are those of [`ShareDefinition::SumOfNorms`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ShareDefinition {
     /// `|M a| + |V| + |G|`: the three shares add up to one at every instant.
