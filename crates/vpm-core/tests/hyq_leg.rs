@@ -156,7 +156,7 @@ proptest! {
         let determinant = xx * yy - xy * yx;
         prop_assert!((xy - yx).abs() < 1e-15 && xx > 0.0 && determinant > 0.0);
         let condition = (xx + yy) * (xx + yy) / determinant;
-        prop_assert!(apart(a, found, 10.0) < 1e-14 * condition * 10.0, "condition {condition}");
+        prop_assert!(apart(a, found, 10.0) < 1e-13 * condition, "condition {condition}");
     }
 
     #[test]

@@ -40,8 +40,8 @@ pub enum LinkageError {
     },
     /// The constraints do not determine the motion.
     #[error(
-        "linkage `{linkage}` is singular at coordinates {coordinates:?}: the smallest pivot of its equations is {pivot:e} \
-         of its row's largest entry; move away from the aligned configuration"
+        "linkage `{linkage}` is singular at coordinates {coordinates:?}: the smallest pivot of its equations is \
+         {pivot:e} of its row's largest entry; move away from the aligned configuration"
     )]
     Singular {
         /// Name of the linkage.
