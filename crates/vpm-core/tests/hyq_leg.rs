@@ -4,10 +4,9 @@ mod values;
 
 use proptest::prelude::*;
 use values::check_all;
-use vpm_core::dynamics::{Rate, Terms, effort_of_wrench};
+use vpm_core::dynamics::Terms;
 use vpm_core::linkage::leg::{BODIES, DutyCycle, HyqData, Leg, LegParameters, ShareDefinition, ShareStudy, Shares};
 use vpm_core::samples::Random;
-use vpm_core::spatial::{Twist, Vector3, Wrench};
 use vpm_core::{Dual, Result};
 
 /// Rounding of three derivations through 21 equations, relative to the larger of torque and its largest term.
@@ -252,19 +251,6 @@ fn every_definition_of_the_shares_keeps_its_promise() {
     let other = ShareStudy { definition: ShareDefinition::NormOfAbsoluteSum, ..ShareStudy::of(DutyCycle::MEDIUM) };
     let both = [leg.shares(&other).unwrap(), leg.shares(&ShareStudy::of(DutyCycle::MEDIUM)).unwrap()].map(percent);
     assert!(largest(both[0].iter().zip(&both[1]).map(|(left, right)| left - right)) < 0.3);
-}
-
-#[test]
-fn a_wrench_on_a_body_gives_the_efforts_of_its_power() {
-    // One body on two coordinates, the second dependent on the first twice as fast.
-    let fixed = |value: f64| Rate::<f64>::constant(value);
-    let column = |spin: f64, x: f64| {
-        let (zero, none) = (fixed(0.0), Vector3::<Rate<f64>>::zero());
-        Twist::new(Vector3::new(zero, zero, fixed(spin)), Vector3 { x: fixed(x), ..none })
-    };
-    let wrench = Wrench::new(Vector3::from_f64([0.0, 0.0, 5.0]), Vector3::from_f64([7.0, 100.0, 0.0]));
-    let efforts = effort_of_wrench(&[column(1.0, 0.3), column(0.0, 0.5)], &[[fixed(1.0)], [fixed(2.0)]], wrench);
-    assert!((efforts[0] - (5.0 + 7.0 * (0.3 + 2.0 * 0.5))).abs() < 1e-14);
 }
 
 #[test]

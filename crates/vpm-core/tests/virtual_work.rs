@@ -3,9 +3,9 @@
 
 use proptest::prelude::*;
 use vpm_core::data::Data;
-use vpm_core::dynamics::{Carried, Rate, Terms, crba, kinematics, rnea, virtual_work};
+use vpm_core::dynamics::{Carried, Rate, Terms, crba, effort_of_wrench, kinematics, rnea, virtual_work};
 use vpm_core::samples::{Random, Sample, random_tree};
-use vpm_core::spatial::{Matrix3, Pose, Symmetric3, Twist, Vector3};
+use vpm_core::spatial::{Matrix3, Pose, Symmetric3, Twist, Vector3, Wrench};
 use vpm_core::{Error, Result, Scalar};
 
 const TOLERANCE: f64 = 1e-11;
@@ -123,4 +123,17 @@ proptest! {
             prop_assert!((found[n] - expected).abs() < TOLERANCE * largest(efforts.iter().copied()));
         }
     }
+}
+
+#[test]
+fn a_wrench_on_a_body_gives_the_efforts_of_its_power() {
+    // One body on two coordinates, the second dependent on the first twice as fast.
+    let fixed = |value: f64| Rate::<f64>::constant(value);
+    let column = |spin: f64, x: f64| {
+        let (zero, none) = (fixed(0.0), Vector3::<Rate<f64>>::zero());
+        Twist::new(Vector3::new(zero, zero, fixed(spin)), Vector3 { x: fixed(x), ..none })
+    };
+    let wrench = Wrench::new(Vector3::from_f64([0.0, 0.0, 5.0]), Vector3::from_f64([7.0, 100.0, 0.0]));
+    let efforts = effort_of_wrench(&[column(1.0, 0.3), column(0.0, 0.5)], &[[fixed(1.0)], [fixed(2.0)]], wrench);
+    assert!((efforts[0] - (5.0 + 7.0 * (0.3 + 2.0 * 0.5))).abs() < 1e-14);
 }

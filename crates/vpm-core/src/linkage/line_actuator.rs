@@ -34,9 +34,10 @@ pub struct PointMotion<S, const B: usize> {
     pub columns: [Vector2<S>; B],
 }
 
-/// The line between two points: its length, its direction, and how both change with the coordinates.
+/// The line between two points: its length, its direction, and how both change with the coordinates. Its `levers` are the
+/// row of `Psi` that belongs to the length as a dependent coordinate.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Line<S, const B: usize> {
+pub struct Line<S, const B: usize> {
     /// Distance s of the points in m.
     pub length: S,
     /// Unit vector u from base to tip.
@@ -67,7 +68,7 @@ impl LineActuator {
     /// that it also moves by u per unit rate of s, the coordinate that its `levers` make dependent. Source: eqs 2.85 to
     /// 2.95.
     /// Checked: the sum over all coordinates is the derivative of the centres' positions.
-    pub(super) fn jacobians<S: Scalar, const B: usize>(
+    pub fn jacobians<S: Scalar, const B: usize>(
         &self,
         base: &PointMotion<S, B>,
         line: &Line<S, B>,

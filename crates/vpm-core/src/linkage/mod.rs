@@ -13,6 +13,6 @@ mod stroke;
 
 pub use alignment::Alignment;
 pub use constraint::{ClosedLinkage, LinkageMotion, acceleration, velocity};
-pub use line_actuator::{ActuatorBody, LineActuator, PointMotion};
+pub use line_actuator::{ActuatorBody, Line, LineActuator, PointMotion};
 pub use newton::{Newton, Solution};
 pub use stroke::{Slider, StrokeGeometry, StrokeLinkage};

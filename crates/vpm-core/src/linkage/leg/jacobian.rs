@@ -2,16 +2,15 @@
 
 use super::{Leg, Points};
 use crate::dynamics::{Carried, Rate, Terms, virtual_work};
-use crate::linkage::PointMotion;
-use crate::linkage::line_actuator::{Line, planar};
+use crate::linkage::line_actuator::planar;
+use crate::linkage::{Line, PointMotion};
 use crate::scalar::Scalar;
 use crate::spatial::{Symmetric3, Twist, Vector2};
 
 /// Dependent coordinates: q1, q2 and the lengths s1, s2 of the cylinders.
 const DEPENDENT: usize = 4;
 
-/// Jacobians of the seven bodies for the rates of (q1, q2, s1, s2), and those of the dependent coordinates for (q1,
-/// q2).
+/// Jacobians of the seven bodies for the rates of (q1, q2, s1, s2), and how those depend on the rates of q1 and q2.
 struct Kinematics<S> {
     bodies: [[Twist<S>; DEPENDENT]; 7],
     psi: [[S; 2]; DEPENDENT],
