@@ -1,5 +1,9 @@
 //! What can go wrong, as data: which part, the failing condition, the numbers and the repair, in one sentence each.
 
+pub use linkage::LinkageError;
+
+mod linkage;
+
 /// An input or a computation that has no physical meaning.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -170,6 +174,9 @@ pub enum Error {
         /// Name of the actuator.
         actuator: String,
     },
+    /// A linkage that cannot be closed, or not be solved for its motion.
+    #[error("{0}")]
+    Linkage(#[from] LinkageError),
     /// A computation left the finite numbers.
     #[error("{0}")]
     Diverged(Box<Diverged>),

@@ -4,6 +4,7 @@
 //! are SI. Coordinate `k` is the motion of joint `k`, which carries body `k`; parents come before children.
 
 pub mod actuator;
+pub mod algebra;
 pub mod body;
 pub mod controller;
 pub mod data;
@@ -16,6 +17,8 @@ pub mod evaluate;
 pub mod integrator;
 pub mod inverse;
 pub mod joint;
+pub mod kinematics;
+pub mod linkage;
 pub mod model;
 pub mod ode;
 pub mod samples;

@@ -5,7 +5,8 @@ use std::io::Result;
 use std::path::{Path, PathBuf};
 
 /// The rigid tree, lowest first: each may import any before it.
-const TREE: [&str; 8] = ["error", "scalar", "spatial", "joint", "body", "model", "data", "dynamics"];
+const TREE: [&str; 11] =
+    ["error", "scalar", "algebra", "spatial", "kinematics", "joint", "body", "model", "data", "dynamics", "linkage"];
 /// Parts that stand alone, each a rig of its own, and all that they may import besides themselves.
 const ALONE: [(&str, &[&str]); 10] = [
     ("error", &[]),
@@ -22,7 +23,7 @@ const ALONE: [(&str, &[&str]); 10] = [
 /// What puts the parts together, lowest first: each may import any part, any tree module and any before it.
 const WHOLE: [&str; 8] =
     ["sensitivity", "system", "description", "simulate", "inverse", "evaluate", "timing", "samples"];
-const WITNESSES: [&str; 3] = ["aba", "crba", "rnea"];
+const WITNESSES: [&str; 4] = ["aba", "crba", "rnea", "virtual_work"];
 
 fn sources(folder: &Path, found: &mut Vec<PathBuf>) -> Result<()> {
     for entry in fs::read_dir(folder)? {

@@ -9,6 +9,7 @@ mod matrix;
 mod pose;
 mod twist;
 mod vector;
+mod vector2;
 mod wrench;
 
 pub use articulated::ArticulatedInertia;
@@ -17,4 +18,5 @@ pub use matrix::{Matrix3, Symmetric3};
 pub use pose::Pose;
 pub use twist::Twist;
 pub use vector::Vector3;
+pub use vector2::Vector2;
 pub use wrench::Wrench;
