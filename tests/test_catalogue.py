@@ -85,7 +85,8 @@ def test_every_effect_can_be_added_and_its_units_fit_its_law(effect: EffectType,
     for short, dotted in added.parameter_names.items():
         parameter = model.parameters[dotted]
         assert parameter.kind == ("linear" if effect.parameter(short).linear else "shape")
-        assert parameter.adjustable is not effect.parameter(short).shape
+        bends = effect.parameter(short).scale == "speed" and short not in given(effect)
+        assert parameter.adjustable is (bends or not effect.parameter(short).shape)
     joint_unit = {"prismatic": "m", "revolute": "rad"}[kind]
     effort_unit = {"prismatic": "N", "revolute": "N m"}[kind]
     # Every size of a joint effect times the state quantity that its scale names is an effort.

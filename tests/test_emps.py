@@ -16,6 +16,7 @@ import pytest
 
 from vpm.discrepancy import Diagnosis, diagnose
 from vpm.experiment import Experiment
+from vpm.identify import identify
 from vpm.model import Model
 
 ROOT = Path(__file__).parents[1]
@@ -96,3 +97,10 @@ def test_no_number_of_the_data_is_in_the_package() -> None:
     sources = [p for p in package.rglob("*") if p.suffix in {".py", ".toml", ".jinja"}]
     for number in ("35.15", "160.18", "243.45", "95.1", "203.5", "20.39", "3.16"):
         assert not [p.name for p in sources if number in p.read_text(encoding="utf-8")], number
+
+
+def test_identify_agrees_with_published_values() -> None:
+    model = Model.load(MODEL).with_effect("coulomb_friction", at="axis").with_effect("bias_force", at="axis")
+    fit = identify(model, Experiment.load(DATA / "emps_train.csv", model=model))
+    for name, value in PUBLISHED.items():
+        assert fit[name] == pytest.approx(value, rel=0.01), name

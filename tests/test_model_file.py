@@ -325,7 +325,9 @@ def test_an_added_effect_is_adjustable_and_can_be_taken_away(emps: Model) -> Non
     rough = emps.with_effect("coulomb_friction", at="axis", coulomb=20.0)
     coulomb = rough.parameters["axis.friction.coulomb"]
     assert (coulomb.value, coulomb.unit, coulomb.uncertainty, coulomb.minimum) == (20.0, "N", math.inf, 0.0)
-    assert rough.parameters["axis.friction.transition_velocity"].uncertainty is None
+    assert rough.parameters["axis.friction.transition_velocity"].uncertainty == math.inf
+    told = emps.with_effect("coulomb_friction", at="axis", transition_velocity=1e-3)
+    assert told.parameters["axis.friction.transition_velocity"].uncertainty is None
     assert dict(rough.effects[-1].parameter_names) == {
         "coulomb": "axis.friction.coulomb",
         "transition_velocity": "axis.friction.transition_velocity",

@@ -208,7 +208,8 @@ class Model(Storable):
             Component that it sits at.
         **values : float
             SI values by short name. Sizes that are not given start where the effect does nothing, shape parameters at
-            the start value of the catalogue. The sizes become adjustable, with nothing known about them beforehand.
+            the start value of the catalogue. Sizes, and velocities of friction laws that are not given, become adjustable,
+            with nothing known about them beforehand.
 
         Raises
         ------
@@ -219,12 +220,16 @@ class Model(Storable):
         entry: dict[str, Any] = {"type": name, "at": at}
         for short in values:
             effect.parameter(short)
+        kind = self.joint_kind(at) if at in self.joints else None
         for parameter in effect.parameters:
             given = values.get(parameter.name, parameter.neutral)
-            if given is not None and parameter.shape:
-                entry[parameter.name] = float(given)
-            elif given is not None:
-                entry[parameter.name] = {"value": float(given), "uncertainty": math.inf}
+            if given is None:
+                given = parameter.default(kind)
+            if given is None:
+                continue  # the check below says what is missing
+            # Nobody knows beforehand at which velocity a friction law bends; places and periods are told.
+            known = parameter.shape and (parameter.name in values or parameter.scale != "speed")
+            entry[parameter.name] = float(given) if known else {"value": float(given), "uncertainty": math.inf}
         content = self.to_dict()
         content.setdefault("effects", []).append(entry)
         return type(self)(content)
