@@ -208,8 +208,8 @@ class Model(Storable):
             Component that it sits at.
         **values : float
             SI values by short name. Sizes that are not given start where the effect does nothing, shape parameters at
-            the start value of the catalogue. Sizes, and velocities of friction laws that are not given, become adjustable,
-            with nothing known about them beforehand.
+            the start value of the catalogue. Sizes, and velocities of friction laws that are not given, become
+            adjustable, with nothing known about them beforehand.
 
         Raises
         ------
