@@ -4,6 +4,7 @@
 //! are SI. Coordinate `k` is the motion of joint `k`, which carries body `k`; parents come before children.
 
 pub mod actuator;
+pub mod beam;
 pub mod body;
 pub mod controller;
 pub mod data;
