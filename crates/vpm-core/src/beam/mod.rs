@@ -5,6 +5,9 @@
 //! `K = diag(EJx, EJy, GJ, ax GA, ay GA, EA)`, its inertia per length `rho diag(Jx, Jy, J, A, A, A)`.
 //!
 //! [`linear`] interpolates the deflection: constant matrices, small deflection, stiffening by the second-order shortening.
+//! [`linear`] interpolates the deflection: constant matrices, small deflection, stiffening by the second-order shortening.
+//! [`planar`] interpolates the strain of inextensible links that move in one plane: exact at any deflection, in fixed sizes, made
+//! for real time.
 //!
 //! Sources: Selig & Ding 2009, "A screw theory of Timoshenko beams", J. Appl. Mech. 76(3) 031003, for screws and their
 //! derivative; Simo & Vu-Quoc 1986, "On the dynamics of flexible beams under large overall motions", J. Appl. Mech. 53, for
@@ -13,6 +16,7 @@
 pub mod basis;
 pub mod eigen;
 pub mod linear;
+pub mod planar;
 pub mod quadrature;
 pub mod section;
 
