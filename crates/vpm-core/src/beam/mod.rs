@@ -6,8 +6,8 @@
 //!
 //! [`linear`] interpolates the deflection: constant matrices, small deflection, stiffening by the second-order shortening.
 //! [`linear`] interpolates the deflection: constant matrices, small deflection, stiffening by the second-order shortening.
-//! [`planar`] interpolates the strain of inextensible links that move in one plane: exact at any deflection, in fixed sizes, made
-//! for real time.
+//! [`strain`] interpolates the strain and integrates the pose along the axis: exact at any deflection, in space, in a tree.
+//! [`planar`] is the same for chains of inextensible links that move in one plane, in fixed sizes, made for real time.
 //!
 //! Sources: Selig & Ding 2009, "A screw theory of Timoshenko beams", J. Appl. Mech. 76(3) 031003, for screws and their
 //! derivative; Simo & Vu-Quoc 1986, "On the dynamics of flexible beams under large overall motions", J. Appl. Mech. 53, for
@@ -19,6 +19,7 @@ pub mod linear;
 pub mod planar;
 pub mod quadrature;
 pub mod section;
+pub mod strain;
 
 pub use basis::Basis;
 pub use section::{Material, Section, Shape};
