@@ -113,6 +113,31 @@ fn an_explicit_method_finds_the_same_motion() -> Result<()> {
 }
 
 #[test]
+fn a_record_is_what_the_steps_give() -> Result<()> {
+    let reference = case("fast")?.reference();
+    let (mut stepped, mut recorded) = (arm::<4, 8>(5, 2e-3)?, arm::<4, 8>(5, 2e-3)?);
+    let mut state = State::default();
+    let rows = recorded.record(State::default(), reference, 3, 50)?;
+    assert_eq!((rows.len(), rows[0]), (3, State::default()));
+    (0..100).for_each(|_| stepped.step(&mut state, reference));
+    assert_eq!(rows[2], state);
+    Ok(())
+}
+
+#[test]
+fn a_record_that_diverges_hands_over_what_it_had() -> Result<()> {
+    let mut start = State::<8>::default();
+    start.motion.velocity[1] = 1e160;
+    let rest = |_| [Reference::default(); 2];
+    let Err(Error::Diverged(diverged)) = arm::<4, 8>(5, 2e-3)?.record(start, rest, 5, 10) else {
+        panic!("a motion at 1e160 rad/s stayed finite");
+    };
+    assert_eq!((diverged.states.len(), diverged.sample_index), (16, 1));
+    assert!(diverged.to_string().contains("no longer finite at t = 0.02"), "{diverged}");
+    Ok(())
+}
+
+#[test]
 fn steps_allocate_nothing() -> Result<()> {
     let reference = case("fast")?.reference();
     let (mut arm, mut state) = (arm::<5, 10>(5, 2e-3)?, State::default());

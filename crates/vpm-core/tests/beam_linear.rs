@@ -122,6 +122,32 @@ fn the_order_of_a_bezier_curve_decides_what_it_can_tell() -> Result<()> {
     Ok(())
 }
 
+#[test]
+fn the_table_of_bases_holds() -> Result<()> {
+    // Basis, errors of the first frequencies in percent, tip deflection and root curvature under a tip load (1 is exact).
+    let modal = |count| bezier(12)?.modal_basis(count);
+    let table: [(Basis, &[f64], [f64; 2]); 7] = [
+        (Basis::bernstein(1.0, 4, 2)?, &[0.0302, 0.9025, 91.49], [1.0, 1.0]),
+        (Basis::bernstein(1.0, 5, 2)?, &[0.000_154, 0.5598, 2.673], [1.0, 1.0]),
+        (Basis::bernstein(1.0, 6, 2)?, &[3.85e-6, 0.002_83, 2.500], [1.0, 1.0]),
+        (Basis::hermite(1.0, 2)?, &[0.0483, 0.8486, 21.82], [1.0, 1.0]),
+        (Basis::hermite(1.0, 4)?, &[0.003_27, 0.1165, 0.7742], [1.0, 1.0]),
+        (modal(1)?, &[0.0], [0.9707, 1.1377]),
+        (modal(2)?, &[0.0, 0.0], [0.9954, 0.9561]),
+    ];
+    for (basis, percents, [deflection, curvature]) in table {
+        let beam = unit(basis, TipBody::default())?;
+        let frequencies = beam.modes(None)?.frequencies;
+        for ((found, root), percent) in frequencies.iter().zip(ROOTS).zip(percents) {
+            let error = 100.0 * (found / (root * root) - 1.0);
+            assert!((error - percent).abs() < 3e-3 * percent + 1e-8, "{error} is not {percent}");
+        }
+        let load = beam.static_deflection(1.0, 0.0)?;
+        close(&[3.0 * beam.at(1.0, &load)[0], beam.at(0.0, &load)[2]], &[deflection, curvature], 1e-4);
+    }
+    Ok(())
+}
+
 /// Flap and lag frequencies of a beam on a hub of that radius, at that speed.
 fn rotating(hub: f64, speed: f64) -> Result<[Vec<f64>; 2]> {
     let beam = bezier(14)?;

@@ -86,6 +86,11 @@ impl<const LINKS: usize, const EACH: usize, const ALL: usize> Arm<LINKS, EACH, A
         &self.plant.chain
     }
 
+    /// Its step in s.
+    pub fn step_size(&self) -> f64 {
+        self.step
+    }
+
     /// Stiffness K and damping D of elasticity and servos together.
     pub fn linear(&self) -> [[[f64; ALL]; ALL]; 2] {
         [self.plant.stiffness, self.plant.damping]

@@ -21,6 +21,7 @@ mod chain;
 mod cholesky;
 mod dynamics;
 mod link;
+mod record;
 mod rosenbrock;
 mod statics;
 
