@@ -5,6 +5,7 @@
 
 use nalgebra::DMatrix;
 use vpm_core::Result;
+use vpm_core::beam::eigen::modes;
 use vpm_core::beam::linear::{LinearBeam, Plane, Theory, TipBody};
 use vpm_core::beam::{Basis, Material, Section, Shape};
 
@@ -198,9 +199,11 @@ fn modes_are_a_basis_like_any_other() -> Result<()> {
 }
 
 #[test]
-fn a_loose_root_is_refused() -> Result<()> {
+fn beams_that_cannot_be_are_refused() -> Result<()> {
     let message = unit(Basis::legendre(1.0, 3)?, TipBody::default()).map_err(|error| error.to_string()).unwrap_err();
     assert!(message.contains("vanish at the clamped root"), "{message}");
     assert!(bezier(4)?.modes(Some(&DMatrix::zeros(2, 2))).is_err());
+    assert!(bezier(4)?.modes(Some(&DMatrix::repeat(3, 3, f64::NAN))).is_err());
+    assert!(modes(&DMatrix::identity(2, 2), &DMatrix::repeat(2, 2, 1.0)).is_err());
     Ok(())
 }

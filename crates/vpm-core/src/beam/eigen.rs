@@ -2,6 +2,7 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen};
 
+use super::dimension;
 use crate::error::{Error, Result};
 
 /// Natural modes of `M q'' + K q = 0`, slowest first.
@@ -16,8 +17,13 @@ pub struct Modes {
 /// Solves `K a = omega^2 M a`.
 ///
 /// Law: with `M = L L^T` the problem becomes that of the symmetric `L^-1 K L^-T` (Golub & Van Loan 2013, "Matrix Computations",
-/// algorithm 8.7.1). Checked: M must be positive definite.
+/// algorithm 8.7.1). Checked: both matrices of one size, K finite, M positive definite. Of K the symmetric part counts.
 pub fn modes(stiffness: &DMatrix<f64>, mass: &DMatrix<f64>) -> Result<Modes> {
+    dimension("the rows of the stiffness matrix", mass.nrows(), stiffness.nrows(), "row of the mass matrix")?;
+    dimension("the columns of the stiffness matrix", mass.ncols(), stiffness.ncols(), "column of the mass matrix")?;
+    if let Some(&value) = stiffness.iter().find(|entry| !entry.is_finite()) {
+        return Err(Error::NonFinite { path: "beam.stiffness".to_owned(), value });
+    }
     let lower = factor(mass)?.l();
     let half = solve_lower(&lower, stiffness.clone());
     let both = solve_lower(&lower, half.transpose());
