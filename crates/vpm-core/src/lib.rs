@@ -1,10 +1,11 @@
-//! Rigid robot dynamics and its physical effects, written once over a number type that can carry exact derivatives.
+//! Robot dynamics, rigid and flexible, and its physical effects, written once over a number type that can carry exact derivatives.
 //!
 //! Frames are capital letters and cancel: `X_WB = X_WP * X_PB`. Spatial vectors are `[angular; linear]`. All numbers
 //! are SI. Coordinate `k` is the motion of joint `k`, which carries body `k`; parents come before children.
 
 pub mod actuator;
 pub mod algebra;
+pub mod beam;
 pub mod body;
 pub mod controller;
 pub mod data;

@@ -1,0 +1,53 @@
+//! What a flexible arm costs: the planar two-link arm under control, over a motion of 24 s and per step.
+
+use std::hint::black_box;
+use std::time::{Duration, Instant};
+
+use criterion::Criterion;
+use vpm_core::Result;
+use vpm_core::beam::planar::State;
+use vpm_core::error::Error;
+
+#[path = "../crates/vpm-core/tests/common/flexible_arm.rs"]
+mod flexible_arm;
+use flexible_arm::{Case, arm};
+
+/// Length of the motion in s.
+const MOTION: f64 = 24.0;
+
+/// The whole fast motion with `EACH - 1` curvature coordinates per link in steps of `step` (s).
+fn motion<const EACH: usize, const ALL: usize>(case: &Case, step: f64) -> Result<impl FnMut() + use<EACH, ALL>> {
+    let (mut arm, reference) = (arm::<EACH, ALL>(5, step)?, case.reference());
+    let steps = (MOTION / step).round() as usize;
+    Ok(move || {
+        let mut state = State::default();
+        for _ in 0..steps {
+            arm.step(black_box(&mut state), reference);
+        }
+    })
+}
+
+fn main() -> Result<()> {
+    let mut criterion = Criterion::default()
+        .warm_up_time(Duration::from_millis(500))
+        .measurement_time(Duration::from_secs(3))
+        .sample_size(30)
+        .configure_from_args();
+    let case = Case::load("fast").ok_or(Error::Interrupted)?;
+    let mut usual = motion::<5, 10>(&case, 2e-3)?;
+    criterion.bench_function("flexible_arm/24s_four_coordinates_2ms", |bencher| bencher.iter(&mut usual));
+    let mut small = motion::<4, 8>(&case, 2e-3)?;
+    criterion.bench_function("flexible_arm/24s_three_coordinates_2ms", |bencher| bencher.iter(&mut small));
+    let mut close = motion::<5, 10>(&case, 1e-3)?;
+    criterion.bench_function("flexible_arm/24s_four_coordinates_1ms", |bencher| bencher.iter(&mut close));
+    criterion.final_summary();
+    let begin = Instant::now();
+    usual();
+    let (wall, errors) = (begin.elapsed(), case.run::<5, 10>(5, 2e-3)?);
+    println!(
+        "24 s of the fast motion take {wall:?} in steps of 2 ms: {:.0} times real time",
+        MOTION / wall.as_secs_f64()
+    );
+    println!("tip error {:.1e} m, strain errors {:.1e} and {:.1e}", errors.tip, errors.strain[0], errors.strain[1]);
+    Ok(())
+}

@@ -1,0 +1,57 @@
+//! Slender flexible links: one beam, several bases, two kinematics.
+//!
+//! The axis of a beam is z of its root frame, `mu` in `[0, L]` the arc length. Its small deflection is the screw
+//! `s = [theta; v]`, its strain the screw `e = s' + [0; k x theta]`, its wrench `W = K e` with
+//! `K = diag(EJx, EJy, GJ, ax GA, ay GA, EA)`, its inertia per length `rho diag(Jx, Jy, J, A, A, A)`.
+//!
+//! [`linear`] interpolates the deflection: constant matrices, small deflection, stiffening by the second-order shortening.
+//! [`linear`] interpolates the deflection: constant matrices, small deflection, stiffening by the second-order shortening.
+//! [`strain`] interpolates the strain and integrates the pose along the axis: exact at any deflection, in space, in a tree.
+//! [`planar`] is the same for chains of inextensible links that move in one plane, in fixed sizes, made for real time.
+//!
+//! Sources: Selig & Ding 2009, "A screw theory of Timoshenko beams", J. Appl. Mech. 76(3) 031003, for screws and their
+//! derivative; Simo & Vu-Quoc 1986, "On the dynamics of flexible beams under large overall motions", J. Appl. Mech. 53, for
+//! the geometrically exact beam.
+
+pub mod basis;
+pub mod eigen;
+pub mod linear;
+pub mod planar;
+pub mod quadrature;
+pub mod section;
+pub mod strain;
+
+pub use basis::Basis;
+pub use section::{Material, Section, Shape};
+
+use crate::error::{Error, Result};
+
+/// Checks that a number of the beam's description is positive and finite.
+pub(crate) fn positive(path: &str, value: f64) -> Result<f64> {
+    if !value.is_finite() {
+        return Err(Error::NonFinite { path: path.to_owned(), value });
+    }
+    if value <= 0.0 {
+        return Err(Error::Domain { path: path.to_owned(), condition: "be positive", value });
+    }
+    Ok(value)
+}
+
+/// Checks that a number of the beam's description is finite and not negative.
+pub(crate) fn not_negative(path: &str, value: f64) -> Result<f64> {
+    if !value.is_finite() {
+        return Err(Error::NonFinite { path: path.to_owned(), value });
+    }
+    if value < 0.0 {
+        return Err(Error::Domain { path: path.to_owned(), condition: "be zero or positive", value });
+    }
+    Ok(value)
+}
+
+/// Checks how many numbers an array holds.
+pub(crate) fn dimension(what: &str, expected: usize, found: usize, each: &str) -> Result<()> {
+    if expected == found {
+        return Ok(());
+    }
+    Err(Error::Dimension { what: what.to_owned(), expected, found, each: each.to_owned() })
+}
