@@ -26,7 +26,8 @@ positive = st.floats(1e-3, 1e3)
 @st.composite
 def quantities(draw: st.DrawFn, unit: str, low: float, high: float) -> float | dict[str, Any]:
     """A parameter in [low, high]: bare, or a table with some of unit, uncertainty and bounds around the value."""
-    value = draw(st.floats(max(low, -1e3), min(high, 1e3)))
+    least = 1e-3 if 0.0 < low < 1e-3 else low  # well inside, for the unit may be a part of the base unit
+    value = draw(st.floats(max(least, -1e3), min(high, 1e3)))
     if draw(st.booleans()):
         return value
     table: dict[str, Any] = {"value": value, "unit": unit}

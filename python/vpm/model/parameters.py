@@ -156,9 +156,10 @@ class Slot:
 
 def _range_text(low: float, high: float, unit: str) -> str:
     """Physical range in words; the catalogue and this module know ranges with a lower end only."""
+    shown = "" if unit == "1" else f" {unit}"
     if low == POSITIVE:
-        return f"more than 0 {unit}"
-    return f"{low:g} {unit} or more" if math.isinf(high) else f"{low:g} to {high:g} {unit}"
+        return f"more than 0{shown}"
+    return f"{low:g}{shown} or more" if math.isinf(high) else f"{low:g} to {high:g}{shown}"
 
 
 def slots(document: Document, structure: Structure) -> Iterator[Slot]:
