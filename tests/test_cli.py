@@ -14,7 +14,7 @@ import pytest
 
 from vpm.demo import MODEL, TRAIN, VALIDATION
 
-COMMANDS = ("info", "simulate", "compare", "identify", "diagnose", "simplify", "budget", "demo")
+COMMANDS = ("info", "simulate", "compare", "identify", "diagnose", "report", "simplify", "budget", "demo")
 
 
 def vpm(*words: str | Path, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
@@ -73,6 +73,11 @@ def test_diagnose_writes_its_report(tmp_path: Path) -> None:
     assert json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))["verdict"] == "effect_found"
     assert (tmp_path / "report.html").is_file()
     assert "coulomb" in (tmp_path / "model.toml").read_text(encoding="utf-8")
+    again = vpm("report", tmp_path / "diagnosis.npz", "--out", tmp_path / "again")
+    assert again.returncode == 0, again.stderr
+    assert "verdict: effect_found" in again.stdout
+    first, second = ((folder / "report.json").read_bytes() for folder in (tmp_path, tmp_path / "again"))
+    assert first == second
 
 
 def test_budget_exit_code_says_whether_it_holds() -> None:

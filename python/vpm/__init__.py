@@ -17,7 +17,7 @@ from vpm.errors import VpmError
 from vpm.experiment import Experiment
 from vpm.identify import Fit, identify
 from vpm.model import Model
-from vpm.report import write_report
+from vpm.report import Report, report, write_report
 from vpm.simplify import Ladder, simplify
 from vpm.simulate import Run, Setup, simulate
 
@@ -32,6 +32,7 @@ __all__ = [
     "Fit",
     "Ladder",
     "Model",
+    "Report",
     "Run",
     "Setup",
     "VpmError",
@@ -40,6 +41,7 @@ __all__ = [
     "compare",
     "diagnose",
     "identify",
+    "report",
     "simplify",
     "simulate",
     "write_report",

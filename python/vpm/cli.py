@@ -1,4 +1,4 @@
-"""Command line: ``vpm demo | simulate | compare | identify | diagnose | simplify | budget | info``."""
+"""Command line: ``vpm demo | info | simulate | compare | identify | diagnose | report | simplify | budget``."""
 
 from __future__ import annotations
 
@@ -181,6 +181,21 @@ def diagnose(
         diagnosis = find_missing(machine, records, unseen or None, effects=effect or None, cutoff=cutoff, tell=tell)
     print_story(diagnosis, console)
     for path in write_report(diagnosis, out):
+        console.print(f"wrote {path}", markup=False)
+
+
+@app.command(epilog="Example:  vpm report report/diagnosis.npz --out report/")
+def report(
+    diagnosis: Annotated[Path, typer.Argument(metavar="DIAGNOSIS", help="The diagnosis.npz of an earlier run.")],
+    out: Out = Path("report"),
+) -> None:
+    """Tell the story of an earlier diagnosis again and write its report anew."""
+    from vpm.discrepancy import Diagnosis
+    from vpm.report import print_story, write_report
+
+    earlier = Diagnosis.load(diagnosis)
+    print_story(earlier, console)
+    for path in write_report(earlier, out):
         console.print(f"wrote {path}", markup=False)
 
 

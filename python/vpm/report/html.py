@@ -2,21 +2,66 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from importlib.resources import files
 from math import isnan
+from os import PathLike
+from pathlib import Path
 
 from vpm.discrepancy import Diagnosis
 from vpm.errors import MissingExtraError
 from vpm.plot import figure_to_svg, plot_candidates, plot_gap, plot_residual_against, plot_residual_time
 from vpm.report.story import VERDICT_WORDS
+from vpm.simplify import Ladder
 
 
-def render_html(diagnosis: Diagnosis) -> str:
+@dataclass(frozen=True)
+class Report:
+    """A diagnosis, and the way down if there is one, as a page.
+
+    Attributes
+    ----------
+    diagnosis : Diagnosis
+    ladder : Ladder or None
+    """
+
+    diagnosis: Diagnosis
+    ladder: Ladder | None = None
+
+    def save(self, path: str | PathLike[str]) -> Path:
+        """Write the page to an HTML file that needs no other file."""
+        target = Path(path)
+        target.write_text(render_html(self.diagnosis, self.ladder), encoding="utf-8")
+        return target
+
+    def _repr_html_(self) -> str:
+        return render_html(self.diagnosis, self.ladder)
+
+
+def report(diagnosis: Diagnosis, ladder: Ladder | None = None) -> Report:
+    """Put a diagnosis, and the simplification that followed it, on one page.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+    ladder : Ladder, optional
+        What `vpm.simplify` made of the repaired model.
+
+    Returns
+    -------
+    Report
+        ``report(why).save("report.html")`` writes the page; a notebook shows it.
+    """
+    return Report(diagnosis, ladder)
+
+
+def render_html(diagnosis: Diagnosis, ladder: Ladder | None = None) -> str:
     """Render the page.
 
     Parameters
     ----------
     diagnosis : Diagnosis
+    ladder : Ladder, optional
 
     Returns
     -------
@@ -36,7 +81,9 @@ def render_html(diagnosis: Diagnosis) -> str:
     environment.filters["percent"] = lambda share: f"{100.0 * share:.2f} %"
     environment.filters["short"] = lambda value: "–" if isnan(value) else f"{value:.4g}"
     template = environment.from_string((files("vpm.report") / "report.html.jinja").read_text(encoding="utf-8"))
-    return template.render(d=diagnosis, words=VERDICT_WORDS[diagnosis.verdict], figures=_figures(diagnosis))
+    words = VERDICT_WORDS[diagnosis.verdict]
+    way_down = figure_to_svg(ladder.plot()) if ladder is not None else ""
+    return template.render(d=diagnosis, words=words, figures=_figures(diagnosis), ladder=ladder, way_down=way_down)
 
 
 def _figures(diagnosis: Diagnosis) -> list[tuple[str, str]]:

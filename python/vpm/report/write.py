@@ -5,11 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 
 from vpm.discrepancy import Diagnosis
-from vpm.report.html import render_html
+from vpm.report.html import report
 
 
 def write_report(diagnosis: Diagnosis, folder: Path) -> tuple[Path, ...]:
-    """Write ``report.json``, ``report.html`` and the repaired ``model.toml`` into a folder, made if need be.
+    """Write ``report.json``, ``report.html``, the repaired ``model.toml`` and ``diagnosis.npz`` into a folder.
+
+    The folder is made if need be; the last file holds everything, for `Diagnosis.load` and ``vpm report``.
 
     Parameters
     ----------
@@ -30,6 +32,6 @@ def write_report(diagnosis: Diagnosis, folder: Path) -> tuple[Path, ...]:
     document = diagnosis.save_json(folder / "report.json")
     repaired = folder / "model.toml"
     diagnosis.model.save(repaired)
-    page = folder / "report.html"
-    page.write_text(render_html(diagnosis), encoding="utf-8")
-    return document, page, repaired
+    everything = diagnosis.save(folder / "diagnosis.npz")
+    page = report(diagnosis).save(folder / "report.html")
+    return document, page, repaired, everything
