@@ -142,6 +142,39 @@ def test_blocks_cover_the_residual_once(record: Experiment) -> None:
         assert all(b.time.size == b.samples.stop - b.samples.start for b in data.blocks)
 
 
+def moves_and_rests() -> Experiment:
+    """Minimum-jerk moves to and fro, with rests in which friction of 10 N holds a load of 5 N; mass 21, viscous 66."""
+    dt, count = 0.002, 750
+    x = np.arange(count) / count
+    reach, slope, bend = x**3 * (10 - 15 * x + 6 * x**2), 30 * (x * (1 - x)) ** 2, 60 * x * (1 - x) * (1 - 2 * x)
+    position, force, here = [], [], 0.0
+    for step in (0.1, -0.16, 0.13, -0.07, 0.2, -0.2):
+        v, a = step * slope / (count * dt), step * bend / (count * dt) ** 2
+        position += [here + step * reach, np.full(300, here + step)]
+        force += [21.0 * a + 66.0 * v + 10.0 * np.sign(v), np.full(300, 5.0)]
+        here += step
+    channels = {"axis.position": np.concatenate(position), "drive.command": np.concatenate(force) / 10.0}
+    time = dt * np.arange(channels["axis.position"].size)
+    return Experiment.from_arrays(time, channels, units={"axis.position": "m", "drive.command": "V"}, name="rests")
+
+
+def test_standstill_does_not_count() -> None:
+    """Friction at rest holds any load up to its size; counted, the rests would pull every estimate towards it."""
+    model = nominal().with_effect("coulomb_friction", at="axis", coulomb=8.0, transition_velocity=1e-4)
+    record = moves_and_rests()
+    assert InverseDynamicsProblem(model, [record], cutoff=20.0).standstill(0) == pytest.approx(0.3, abs=0.06)
+    fit = identify(model, record, cutoff=20.0)
+    np.testing.assert_allclose(fit.values, [21.0, 66.0, 10.0], rtol=0.02)
+
+
+def test_a_machine_that_mostly_stands_is_compared_all_the_same() -> None:
+    time = 0.002 * np.arange(3000)
+    position = 0.05 * np.clip(time - 5.0, 0.0, 0.5)
+    channels = {"axis.position": position, "drive.command": np.full(time.size, 0.3)}
+    log = Experiment.from_arrays(time, channels, units={"axis.position": "m", "drive.command": "V"}, name="still")
+    assert InverseDynamicsProblem(nominal(), [log], cutoff=20.0).standstill(0) == 0.0
+
+
 def test_nothing_free_is_an_error(record: Experiment) -> None:
     known = nominal()
     with pytest.raises(IdentificationError, match="no parameter is free"):

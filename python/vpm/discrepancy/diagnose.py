@@ -170,8 +170,10 @@ def _data(
     # One filter for all records: a gap that is measured in another band is another gap.
     predicted = InverseDynamicsProblem(model, unseen, cutoff=cutoff or min(m.cutoff for m in fitted.motions))
     for problem in (fitted, predicted):
-        for record, m in zip(problem.experiments, problem.motions, strict=True):
-            notes.append(f"{record.name}: motion filtered at {m.cutoff:.4g} Hz, decimated by {m.decimation}")
+        for number, (record, m) in enumerate(zip(problem.experiments, problem.motions, strict=True)):
+            still = problem.standstill(number)
+            rest = f"; {100 * still:.0f} % at standstill left out of the balance" if still > 0.0 else ""
+            notes.append(f"{record.name}: motion filtered at {m.cutoff:.4g} Hz, decimated by {m.decimation}{rest}")
     notes.append(f"unseen records simulated in mode {mode}")
     return Data(fitted, predicted, OutputErrorProblem(model, unseen, mode, setup=setup))
 
@@ -227,7 +229,7 @@ def _gaps(
 
 def _signal(problem: InverseDynamicsProblem | OutputErrorProblem, channel: str) -> float:
     mine = [block for block in problem.blocks if block.channel == channel]
-    return float(np.sqrt(np.average([b.scale**2 for b in mine], weights=[b.time.size for b in mine])))
+    return float(np.sqrt(np.average([b.scale**2 for b in mine], weights=[b.moving.sum() for b in mine])))
 
 
 def _verdict(

@@ -12,6 +12,7 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter1d
 
 from vpm.errors import IdentificationError
 from vpm.experiment import Experiment, Motion, motion, parallel_filter
@@ -20,6 +21,8 @@ from vpm.simulate import MODES, Setup, simulate_arrays
 
 Array = NDArray[np.float64]
 
+#: A joint stands still where it is slower than this share of its largest speed for two decimated samples on end.
+STANDSTILL_SHARE = 0.005
 #: A record with fewer samples after decimation says nothing about anything.
 FEWEST_SAMPLES = 12
 
@@ -40,6 +43,8 @@ class Block:
         Size of the measured signal (root mean square), in ``unit``; relative errors refer to it.
     weight : float
         What the residual was multiplied by, 1/``unit``, so that channels of different units can be added.
+    moving : ndarray
+        1 for samples that count, 0 for those at standstill, whose residual is zero.
     """
 
     experiment: str
@@ -49,6 +54,7 @@ class Block:
     time: Array
     scale: float
     weight: float
+    moving: Array
 
 
 class Problem(Protocol):
@@ -71,9 +77,9 @@ def gaps(problem: Problem, residual: Array) -> dict[str, tuple[float, float, str
     result = {}
     for channel in dict.fromkeys(block.channel for block in problem.blocks):
         mine = [block for block in problem.blocks if block.channel == channel]
-        count = sum(block.time.size for block in mine)
+        count = sum(float(block.moving.sum()) for block in mine)
         power = sum(float(np.sum(residual[b.samples] ** 2)) / b.weight**2 for b in mine)
-        signal = sum(b.scale**2 * b.time.size for b in mine)
+        signal = sum(b.scale**2 * float(b.moving.sum()) for b in mine)
         rms = float(np.sqrt(power / count))
         result[channel] = (rms, float(np.sqrt(power / signal)) if signal > 0.0 else np.inf, mine[0].unit)
     return result
@@ -85,6 +91,9 @@ class InverseDynamicsProblem:
     Both sides, and so the regressor's columns, pass the same zero-phase low-pass and decimation: the parallel
     filtering of the inverse dynamic identification model (M. Gautier, *Annual Reviews in Control*, 1997; A. Janot et
     al., *IEEE Trans. Control Systems Technology* 22, 2014).
+
+    Samples at which a joint stands still do not count, as long as half of them remain: friction at rest takes whatever
+    value holds the joint, which no balance can predict.
 
     Parameters
     ----------
@@ -133,8 +142,17 @@ class InverseDynamicsProblem:
         for record in range(len(self.motions)):
             _, applied, _ = self.effort(model, model.theta, record)
             blocks = self.blocks[record * len(self._joints) :]
-            power += sum(float(np.sum((applied[:, c] * blocks[c].weight) ** 2)) for c in range(len(self._joints)))
-        return float(np.sqrt(power / sum(block.time.size for block in self.blocks)))
+            power += sum(
+                float(np.sum((applied[:, c] * blocks[c].weight * blocks[c].moving) ** 2))
+                for c in range(len(self._joints))
+            )
+        return float(np.sqrt(power / sum(float(block.moving.sum()) for block in self.blocks)))
+
+    def standstill(self, record: int) -> float:
+        """Share of the samples of one record that do not count because a joint stands still."""
+        count = len(self._joints)
+        mine = self.blocks[record * count : (record + 1) * count]
+        return 1.0 - float(np.mean([block.moving.mean() for block in mine]))
 
     def state(self, record: int) -> tuple[Array, Array, Array]:
         """Position, velocity and acceleration (n, joints) of one record at the retained samples."""
@@ -153,10 +171,10 @@ class InverseDynamicsProblem:
 
     def _lay_out(self, model: Model) -> tuple[Block, ...]:
         blocks, start = [], 0
-        powers = []
+        powers, moving = [], self._moving()
         for record, m in enumerate(self.motions):
             _, applied, _ = self.effort(model, model.theta, record)
-            powers.append(np.sqrt(np.mean(applied**2, axis=0)))
+            powers.append(np.sqrt(np.average(applied**2, axis=0, weights=moving[record])))
             if len(applied) < FEWEST_SAMPLES:
                 raise IdentificationError(
                     f"{self.experiments[record].name}: only {len(applied)} samples are left after filtering at "
@@ -177,15 +195,39 @@ class InverseDynamicsProblem:
                         time,
                         float(powers[record][column]),
                         weight,
+                        moving[record][:, column],
                     )
                 )
                 start += time.size
         return tuple(blocks)
 
+    def _moving(self) -> list[Array]:
+        """For each record (n, joints): 1 where a joint moves, 0 where it stands still; all 1 if it mostly stands."""
+        speeds = [np.abs(m.velocity[m.edge : len(m.time) - m.edge][:, self._joints]) for m in self.motions]
+        largest = np.max([np.quantile(speed, 0.999, axis=0) for speed in speeds], axis=0)
+        masks = [
+            ~_widened(_standing(speed, STANDSTILL_SHARE * largest, m.decimation), m)[:: m.decimation]
+            for m, speed in zip(self.motions, speeds, strict=True)
+        ]
+        mostly = np.mean(np.vstack(masks), axis=0) >= 0.5
+        return [np.where(mostly, mask, True).astype(np.float64) for mask in masks]
+
     def _stack(self, records: list[Array]) -> Array:
         """Concatenate (n, joints, ...) arrays block by block and apply the weights."""
         columns = [record[:, c] for record in records for c in range(len(self._joints))]
-        return np.concatenate([x * block.weight for x, block in zip(columns, self.blocks, strict=True)])
+        scaled = zip(columns, self.blocks, strict=True)
+        return np.concatenate([(x.T * (block.weight * block.moving)).T for x, block in scaled])
+
+
+def _standing(speed: Array, limit: Array, samples: int) -> NDArray[np.bool_]:
+    """Where all speeds within ``samples`` to both sides are below the limit."""
+    return np.asarray(maximum_filter1d(speed, 2 * samples + 1, axis=0) < limit)
+
+
+def _widened(standing: NDArray[np.bool_], m: Motion) -> NDArray[np.bool_]:
+    """Standstill with its surroundings, into which the filters carry what happens in it."""
+    reach = m.decimation + round(1.0 / (m.cutoff * m.dt))
+    return np.asarray(maximum_filter1d(standing.view(np.uint8), 2 * reach + 1, axis=0).astype(np.bool_))
 
 
 class OutputErrorProblem:
@@ -245,7 +287,8 @@ class OutputErrorProblem:
                 scale = float(np.sqrt(np.mean(experiment[channel] ** 2)))
                 samples = slice(start, start + rows.size)
                 unit = model.channel_unit(channel)
-                blocks.append(Block(experiment.name, channel, unit, samples, experiment.time[rows], scale, weight))
+                time = experiment.time[rows]
+                blocks.append(Block(experiment.name, channel, unit, samples, time, scale, weight, np.ones(rows.size)))
                 start += rows.size
         return tuple(blocks)
 
