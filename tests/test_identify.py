@@ -159,12 +159,13 @@ def moves_and_rests() -> Experiment:
 
 
 def test_standstill_does_not_count() -> None:
-    """Friction at rest holds any load up to its size; counted, the rests would pull every estimate towards it."""
+    """Friction at rest holds any load up to its size; counted, the rests would be a gap of a sixth of the effort."""
     model = nominal().with_effect("coulomb_friction", at="axis", coulomb=8.0, transition_velocity=1e-4)
     record = moves_and_rests()
     assert InverseDynamicsProblem(model, [record], cutoff=20.0).standstill(0) == pytest.approx(0.3, abs=0.06)
     fit = identify(model, record, cutoff=20.0)
     np.testing.assert_allclose(fit.values, [21.0, 66.0, 10.0], rtol=0.02)
+    assert fit.after["axis.effort"][1] < 0.01
 
 
 def test_a_machine_that_mostly_stands_is_compared_all_the_same() -> None:
