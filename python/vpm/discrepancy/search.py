@@ -10,6 +10,7 @@ from functools import partial
 from typing import TypeVar
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from vpm.discrepancy.candidates import Key, candidates
 from vpm.discrepancy.confirmation import Data, Judged, Trial, confirm, judge
@@ -190,8 +191,11 @@ def _drop_replaced(stages: list[Stage], accepted: list[Accepted], data: Data, dr
 
 
 def _side_by_side(work: Callable[[Item], Outcome], items: Sequence[Item]) -> list[Outcome]:
-    """Results in the order of the items; the core lets go of the interpreter, so threads use all processors."""
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
+    """Results in the order of the items; the core lets go of the interpreter, so threads use all processors.
+
+    The linear algebra inside is small: with threads of its own it would only take the processors from the others.
+    """
+    with threadpool_limits(1, user_api="blas"), ThreadPoolExecutor(os.cpu_count()) as pool:
         return list(pool.map(work, items))
 
 
