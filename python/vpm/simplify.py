@@ -15,7 +15,7 @@ from vpm.experiment import Experiment
 from vpm.identify import InverseDynamicsProblem, OutputErrorProblem, estimate, gaps
 from vpm.model import Effect, Model
 from vpm.results import Result, Storable
-from vpm.simulate import INTEGRATORS, Setup
+from vpm.simulate import INTEGRATORS, Setup, judging_mode
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -194,12 +194,8 @@ def _refitted(model: Model, records: Sequence[Experiment]) -> Model:
 
 def _error(model: Model, records: Sequence[Experiment], integrator: str) -> float:
     """Largest relative error over the channels; infinite where the simulation fails."""
-    closed = all(name in model.controlled_actuators for name in model.actuators) and all(
-        f"{name}.reference" in record for name in model.actuators for record in records
-    )
-    setup = Setup(integrator)
     try:
-        data = OutputErrorProblem(model, records, "closed_loop" if closed else "restarts", setup=setup)
+        data = OutputErrorProblem(model, records, judging_mode(model, records), setup=Setup(integrator))
         residual, _ = data.evaluate(model, model.theta)
     except DivergedError:
         return np.inf

@@ -126,6 +126,16 @@ class SimulatedArrays:
     starts: NDArray[np.int64]
 
 
+def judging_mode(model: Model, records: Sequence[Experiment]) -> str:
+    """Mode in which a simulation of these records says most: closed loop where controllers and references are known.
+
+    Elsewhere restarts, which need no more than position and command.
+    """
+    controlled = all(name in model.controlled_actuators for name in model.actuators)
+    known = all(f"{name}.reference" in record for name in model.actuators for record in records)
+    return "closed_loop" if model.actuators and controlled and known else "restarts"
+
+
 def simulate(
     model: Model,
     experiment: Experiment,

@@ -30,7 +30,7 @@ from vpm.experiment import Experiment
 from vpm.identify import InverseDynamicsProblem, OutputErrorProblem, gain, gaps, segments
 from vpm.identify.fit import fit_of
 from vpm.model import Model
-from vpm.simulate import Setup, simulate
+from vpm.simulate import Setup, judging_mode, simulate
 
 Array = NDArray[np.float64]
 
@@ -99,7 +99,7 @@ def diagnose(
     _check_effects(effects)
     training, unseen, notes = _records(experiments, validate)
     # A record cut off in the middle of a motion does not say what its controller remembers.
-    mode = "restarts" if notes else _simulation_mode(model, unseen)
+    mode = "restarts" if notes else judging_mode(model, unseen)
     data = _data(model, training, unseen, mode, cutoff, setup, notes)
     say("comparing the nominal model with the data")
     nominal = _nominal(model, data, notes)
@@ -176,13 +176,6 @@ def _data(
             notes.append(f"{record.name}: motion filtered at {m.cutoff:.4g} Hz, decimated by {m.decimation}{rest}")
     notes.append(f"unseen records simulated in mode {mode}")
     return Data(fitted, predicted, OutputErrorProblem(model, unseen, mode, setup=setup))
-
-
-def _simulation_mode(model: Model, records: Sequence[Experiment]) -> str:
-    """Closed loop where controllers and references are known, else restarts."""
-    controlled = all(name in model.controlled_actuators for name in model.actuators)
-    known = all(f"{name}.reference" in record for name in model.actuators for record in records)
-    return "closed_loop" if model.actuators and controlled and known else "restarts"
 
 
 def _nominal(model: Model, data: Data, notes: list[str]) -> Judged:
