@@ -60,6 +60,11 @@ impl Description {
         self.bodies.len()
     }
 
+    /// Number of generalised coordinates: those of the joints lead.
+    pub fn n_coordinates(&self) -> usize {
+        self.n_joints()
+    }
+
     /// Number of actuators, which is the number of inputs.
     pub fn n_actuators(&self) -> usize {
         self.actuators.len()
@@ -67,7 +72,7 @@ impl Description {
 
     /// Length of the state: coordinates, rates, one state per lag in the order of the actuators.
     pub fn n_states(&self) -> usize {
-        2 * self.n_joints() + self.actuators.iter().filter(|actuator| actuator.lag.is_some()).count()
+        2 * self.n_coordinates() + self.actuators.iter().filter(|actuator| actuator.lag.is_some()).count()
     }
 
     /// Number of output channels.
