@@ -5,7 +5,7 @@ use crate::error::{Error, Result};
 use crate::joint::JointKind;
 use crate::model::Model;
 use crate::scalar::Scalar;
-use crate::spatial::{ArticulatedInertia, Twist, Vector3, Wrench};
+use crate::spatial::{ArticulatedInertia, Symmetric3, Twist, Vector3, Wrench};
 
 /// A joint counts as moving no inertia below this fraction of the inertia of its body in other directions.
 const SINGULAR: f64 = 1e-12;
@@ -38,11 +38,12 @@ pub fn check_regular<S: Scalar>(model: &Model<S>, data: &mut Data<S>) -> Result<
     for (frame, slot) in model.frames().iter().zip(data.aba.iter().skip(1)).rev() {
         let kind = frame.joint.kind;
         let inertia = kind.effort(&slot.unit_wrench).re();
-        let block = match kind {
-            JointKind::Prismatic => slot.inertia.linear,
-            JointKind::Revolute => slot.inertia.angular,
+        let size = |block: Symmetric3<S>| (block.xx + block.yy + block.zz).re();
+        let scale = match kind {
+            JointKind::Prismatic => size(slot.inertia.linear),
+            JointKind::Revolute => size(slot.inertia.angular),
+            JointKind::Helical { pitch } => size(slot.inertia.angular) + pitch * pitch * size(slot.inertia.linear),
         };
-        let scale = (block.xx + block.yy + block.zz).re();
         if inertia.is_nan() || inertia <= SINGULAR * scale {
             return Err(Error::SingularJoint { joint: frame.joint.name.clone(), inertia });
         }
@@ -110,6 +111,10 @@ fn unit_wrench<S: Scalar>(kind: JointKind, inertia: &ArticulatedInertia<S>) -> W
             let [x, y, z] = coupling.columns;
             let j = inertia.angular;
             Wrench::new(Vector3::new(j.xz, j.yz, j.zz), Vector3::new(x.z, y.z, z.z))
+        }
+        JointKind::Helical { pitch } => {
+            let turning = unit_wrench(JointKind::Revolute, inertia);
+            turning + unit_wrench(JointKind::Prismatic, inertia) * S::from_f64(pitch)
         }
     }
 }

@@ -61,5 +61,9 @@ fn unit_wrench<S: Scalar>(kind: JointKind, body: &SpatialInertia<S>) -> Wrench<S
             let inertia = body.rotational;
             Wrench::new(Vector3::new(inertia.xz, inertia.yz, inertia.zz), Vector3::new(-h.y, h.x, zero))
         }
+        JointKind::Helical { pitch } => {
+            let turning = unit_wrench(JointKind::Revolute, body);
+            turning + unit_wrench(JointKind::Prismatic, body) * S::from_f64(pitch)
+        }
     }
 }
