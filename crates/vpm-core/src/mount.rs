@@ -17,18 +17,13 @@ pub enum Mount {
     World,
     /// The frame of the body of that number.
     Body(usize),
-    /// The frame of a section of a beam.
-    Section(Section),
-}
-
-/// A section of a beam. Its frame has z along the tangent of the axis.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Section {
-    /// Number of the beam.
-    pub beam: usize,
-    /// Arc length from the root, m.
-    pub at: f64,
+    /// The frame of a section of a beam. It has z along the tangent of the axis.
+    Section {
+        /// Number of the beam.
+        beam: usize,
+        /// Arc length from the root, m.
+        at: f64,
+    },
 }
 
 /// A frame to watch.

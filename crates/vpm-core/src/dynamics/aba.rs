@@ -98,23 +98,25 @@ fn accelerations<S: Scalar>(model: &Model<S>, data: &mut Data<S>) {
     }
 }
 
-/// U = I^A S for a joint axis along z: one column of the 6 x 6 inertia.
+/// U = I^A S for a joint axis along z: one column of the 6 x 6 inertia, or a sum of two.
 #[inline]
 fn unit_wrench<S: Scalar>(kind: JointKind, inertia: &ArticulatedInertia<S>) -> Wrench<S> {
-    let coupling = inertia.coupling;
     match kind {
-        JointKind::Prismatic => {
-            let m = inertia.linear;
-            Wrench::new(coupling.columns[2], Vector3::new(m.xz, m.yz, m.zz))
-        }
-        JointKind::Revolute => {
-            let [x, y, z] = coupling.columns;
-            let j = inertia.angular;
-            Wrench::new(Vector3::new(j.xz, j.yz, j.zz), Vector3::new(x.z, y.z, z.z))
-        }
-        JointKind::Helical { pitch } => {
-            let turning = unit_wrench(JointKind::Revolute, inertia);
-            turning + unit_wrench(JointKind::Prismatic, inertia) * S::from_f64(pitch)
-        }
+        JointKind::Prismatic => sliding(inertia),
+        JointKind::Revolute => turning(inertia),
+        JointKind::Helical { pitch } => turning(inertia) + sliding(inertia) * S::from_f64(pitch),
     }
+}
+
+#[inline]
+fn sliding<S: Scalar>(inertia: &ArticulatedInertia<S>) -> Wrench<S> {
+    let m = inertia.linear;
+    Wrench::new(inertia.coupling.columns[2], Vector3::new(m.xz, m.yz, m.zz))
+}
+
+#[inline]
+fn turning<S: Scalar>(inertia: &ArticulatedInertia<S>) -> Wrench<S> {
+    let [x, y, z] = inertia.coupling.columns;
+    let j = inertia.angular;
+    Wrench::new(Vector3::new(j.xz, j.yz, j.zz), Vector3::new(x.z, y.z, z.z))
 }
