@@ -21,6 +21,7 @@ pub mod joint;
 pub mod kinematics;
 pub mod linkage;
 pub mod model;
+pub mod mount;
 pub mod ode;
 pub mod samples;
 pub mod scalar;
