@@ -1,7 +1,7 @@
 //! Every buffer the recursions need, allocated once per model.
 
 use crate::algebra::Cholesky;
-use crate::beam::flexible::Sections;
+use crate::beam::Sections;
 use crate::model::Model;
 use crate::scalar::Scalar;
 use crate::spatial::{ArticulatedInertia, Pose, SpatialInertia, Twist, Vector3, Wrench};

@@ -10,7 +10,7 @@ use serde::Deserialize;
 pub use entry::{ControllerEntry, EffectEntry};
 
 use crate::actuator::Actuator;
-use crate::beam::entry::BeamEntry;
+use crate::beam::BeamEntry;
 use crate::body::{Body, PointMass, Weld};
 use crate::data::Data;
 use crate::dynamics::check_regular;

@@ -74,7 +74,8 @@ impl<S: Scalar> Line<S> {
         check_finite(&self.name, "to.point", &self.to.point)?;
         for (which, part) in [("barrel", &self.barrel), ("rod", &self.rod)] {
             let Some(LinePart { mass, center, inertia }) = part else { continue };
-            for (quantity, number, signed) in [("mass", mass, false), ("center", center, true), ("inertia", inertia, false)]
+            for (quantity, number, signed) in
+                [("mass", mass, false), ("center", center, true), ("inertia", inertia, false)]
             {
                 let (path, value) = (format!("{}.{which}.{quantity}", self.name), number.re());
                 if !number.is_finite() {

@@ -8,12 +8,11 @@ mod place;
 pub use assemble::Parts;
 pub(crate) use place::Place;
 
-use crate::beam::flexible::Beam;
+use crate::beam::{Beam, Gauge};
 use crate::body::{Body, PointMass};
 use crate::error::Result;
 use crate::joint::{Joint, JointKind};
 use crate::line::LinePart;
-use crate::mount::Gauge;
 use crate::scalar::Scalar;
 use crate::spatial::{Matrix3, Pose, SpatialInertia, Vector3};
 
@@ -33,7 +32,7 @@ pub struct Model<S> {
     order: Vec<Node>,
     lines: Vec<Wire<S>>,
     markers: Vec<Place>,
-    gauges: Vec<Gauge>,
+    gauges: Vec<Strip>,
     n_coordinates: usize,
     n_frames: usize,
     recursive: bool,
@@ -70,10 +69,22 @@ pub(crate) struct BodyFrame<S> {
     pub(crate) inertia: SpatialInertia<S>,
 }
 
+/// A strain gauge, ready to be read.
+#[derive(Clone, Debug)]
+pub(crate) struct Strip {
+    /// First coordinate of its beam.
+    pub(crate) first: usize,
+    /// Number of coordinates of its beam.
+    pub(crate) len: usize,
+    /// The strain of the section.
+    pub(crate) section: Gauge,
+    /// Its point in the section, m.
+    pub(crate) point: [f64; 2],
+}
+
 /// A beam in its place.
 #[derive(Clone, Debug)]
 pub(crate) struct Elastic<S> {
-    pub(crate) name: String,
     pub(crate) beam: Beam<S>,
     /// Where its root is.
     pub(crate) root: Place,
@@ -194,7 +205,7 @@ impl<S: Scalar> Model<S> {
 
     /// The strain gauges.
     #[inline]
-    pub(crate) fn gauges(&self) -> &[Gauge] {
+    pub(crate) fn gauges(&self) -> &[Strip] {
         &self.gauges
     }
 

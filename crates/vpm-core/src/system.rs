@@ -121,12 +121,7 @@ impl<S: Scalar> Dynamics<S> {
 
     /// Accelerations under the efforts and tensions that stand, left in the data.
     #[inline]
-    fn accelerate(
-        &mut self,
-        q: &[S],
-        v: &[S],
-        add: impl FnOnce(&[(usize, JointEffect<S>)], &[S], &[S], &mut [S]),
-    ) {
+    fn accelerate(&mut self, q: &[S], v: &[S], add: impl FnOnce(&[(usize, JointEffect<S>)], &[S], &[S], &mut [S])) {
         let Self { model, data, loads, tensions, .. } = self;
         let (of_joints, elastic) = loads.split_at_mut(model.n_joints());
         of_joints.copy_from_slice(&self.efforts);

@@ -199,4 +199,3 @@ pub fn required<S: Scalar>(model: &Model<S>, data: &Data<S>, (q, v): (&[S], &[S]
         *effort = product(row, a) + bias - *effort;
     }
 }
-

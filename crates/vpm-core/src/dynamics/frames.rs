@@ -1,9 +1,10 @@
 //! Where all frames of a machine are and how they move.
 
+use crate::beam::Sections;
 use crate::data::{Composite, Data, FrameSlot, LineSlot, PointSlot};
 use crate::model::{Elastic, Model, Node, Place, Wire};
 use crate::scalar::Scalar;
-use crate::spatial::{Twist, Vector3};
+use crate::spatial::{Pose, Twist, Vector3};
 
 /// Motion of every frame at coordinates `q`, rates `v` and zero coordinate accelerations, outward from the world.
 ///
@@ -32,7 +33,7 @@ pub fn frames<S: Scalar>(model: &Model<S>, data: &mut Data<S>, q: &[S], v: &[S])
                 let (own, parent) = (*coordinate..coordinate + beam.len(), frames[root.frame]);
                 let sections = &mut sections[*number];
                 beam.motion(&q[own.clone()], &v[own], sections);
-                let root = crate::spatial::Pose::from_f64(root.pose);
+                let root = Pose::from_f64(root.pose);
                 let stations = frames.iter_mut().skip(frame.unwrap_or(0)).zip(&sections.at).zip(inertias);
                 for ((slot, section), inertia) in stations {
                     slot.across = root * section.pose;
@@ -100,7 +101,7 @@ fn move_point<S: Scalar>(frame: &FrameSlot<S>, place: &Place, point: &mut PointS
 pub(crate) fn for_each_column<S: Scalar>(
     model: &Model<S>,
     frames: &[FrameSlot<S>],
-    sections: &[crate::beam::flexible::Sections<S>],
+    sections: &[Sections<S>],
     mut frame: usize,
     mut visit: impl FnMut(usize, Twist<S>),
 ) {

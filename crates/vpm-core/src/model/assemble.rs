@@ -2,8 +2,7 @@
 
 use super::order::{Hanging, Part};
 use super::{Elastic, Model, Place};
-use crate::beam::entry::{BeamEntry, Level};
-use crate::beam::flexible::Beam;
+use crate::beam::{Beam, BeamEntry, Level};
 use crate::body::{Body, PointMass, Site, Weld, check_physical};
 use crate::error::{Error, Result};
 use crate::joint::Joint;
@@ -74,7 +73,8 @@ impl<S: Scalar> Parts<S> {
         let welds = self.welds.iter().map(|weld| (format!("body `{}`", weld.name), weld.on));
         let beams = self.beams.iter().map(|beam| (format!("beam `{}`", beam.name), beam.on));
         let markers = self.markers.iter().map(|marker| (format!("marker `{}`", marker.name), marker.on));
-        let gauge = |gauge: &Gauge| (format!("gauge `{}`", gauge.name), Mount::Section { beam: gauge.beam, at: gauge.at });
+        let gauge =
+            |gauge: &Gauge| (format!("gauge `{}`", gauge.name), Mount::Section { beam: gauge.beam, at: gauge.at });
         let ends = self.lines.iter().flat_map(|line| {
             [("from", line.from.on), ("to", line.to.on)].map(|(end, on)| (format!("`{}.{end}`", line.name), on))
         });
@@ -146,8 +146,8 @@ impl<'a, S: Scalar> Assembly<'a, S> {
             let (first, rigid) = (coordinate, entry.level == Level::Rigid);
             let of_first_station = (!rigid).then_some(frame);
             (coordinate, frame) = (coordinate + beam.len(), frame + if rigid { 0 } else { beam.stations() });
-            let (name, root) = (entry.name.clone(), Place::world());
-            beams.push(Elastic { name, beam, root, coordinate: first, frame: of_first_station, inertias: Vec::new() });
+            let root = Place::world();
+            beams.push(Elastic { beam, root, coordinate: first, frame: of_first_station, inertias: Vec::new() });
         }
         Ok(Self { parts, joints, marks, beams, inertias: vec![SpatialInertia::zero(); frame] })
     }

@@ -2,11 +2,11 @@
 
 use super::assemble::Assembly;
 use super::order::Part;
-use super::{BodyFrame, Elastic, Link, Model, Node, Place, Wire};
+use super::{BodyFrame, Elastic, Link, Model, Node, Place, Strip, Wire};
 use crate::error::Result;
 use crate::joint::Joint;
 use crate::line::{Line, LineEnd};
-use crate::mount::placed;
+use crate::mount::{Gauge, Marker, placed};
 use crate::scalar::Scalar;
 use crate::spatial::{Matrix3, Pose, Vector3};
 
@@ -22,7 +22,7 @@ impl<S: Scalar> Assembly<'_, S> {
             frames.push(frame);
         }
         let lines = self.parts.lines.iter().map(|line| self.wire(line)).collect::<Result<Vec<_>>>()?;
-        let marker = |marker: &crate::mount::Marker| {
+        let marker = |marker: &Marker| {
             let pose = placed(&marker.name, marker.translation, marker.rotation)?;
             Ok(self.aligned(self.resolved(marker.on).beyond(pose)))
         };
@@ -45,7 +45,7 @@ impl<S: Scalar> Assembly<'_, S> {
             frames,
             lines,
             markers,
-            gauges: self.parts.gauges.clone(),
+            gauges: self.parts.gauges.iter().map(|gauge| self.strip(gauge)).collect(),
             beams: self.beams,
             n_coordinates,
         })
@@ -66,6 +66,11 @@ impl<S: Scalar> Assembly<'_, S> {
             self.aligned(self.resolved(end.on).beyond(point))
         };
         Ok(Wire { from: end(line.from), to: end(line.to), barrel: line.barrel, rod: line.rod })
+    }
+
+    fn strip(&self, gauge: &Gauge) -> Strip {
+        let Elastic { beam, coordinate, .. } = &self.beams[gauge.beam];
+        Strip { first: *coordinate, len: beam.len(), section: beam.gauge(gauge.at), point: [gauge.x, gauge.y] }
     }
 
     /// The nodes in their order, each with the coordinates beyond it.

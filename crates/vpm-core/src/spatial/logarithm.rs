@@ -23,11 +23,8 @@ impl<S: Scalar> Matrix3<S> {
             return v * (series * 2.0 / w);
         }
         let size = square.sqrt();
-        let half = if size.re() < w.re() {
-            (size / w).atan()
-        } else {
-            -(w / size).atan() + std::f64::consts::FRAC_PI_2
-        };
+        let half =
+            if size.re() < w.re() { (size / w).atan() } else { -(w / size).atan() + std::f64::consts::FRAC_PI_2 };
         v * (half * 2.0 / size)
     }
 
@@ -35,7 +32,8 @@ impl<S: Scalar> Matrix3<S> {
     fn quaternion(self) -> (S, Vector3<S>) {
         let [x, y, z] = self.columns;
         let trace = x.x + y.y + z.z;
-        let (minus, plus) = (Vector3::new(y.z - z.y, z.x - x.z, x.y - y.x), Vector3::new(y.z + z.y, z.x + x.z, x.y + y.x));
+        let (minus, plus) =
+            (Vector3::new(y.z - z.y, z.x - x.z, x.y - y.x), Vector3::new(y.z + z.y, z.x + x.z, x.y + y.x));
         let largest = [trace, x.x, y.y, z.z].map(|entry| entry.re());
         let best = (1..4).fold(0, |best, k| if largest[k] > largest[best] { k } else { best });
         // Four times the square of the largest component is 1 + 2 (its diagonal entry) - trace, or 1 + trace.

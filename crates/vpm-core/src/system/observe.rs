@@ -4,6 +4,7 @@ use super::Dynamics;
 use crate::dynamics::{frames, lines, poses};
 use crate::scalar::Scalar;
 use crate::sensor::Layout;
+use crate::spatial::Pose;
 
 impl<S: Scalar> Dynamics<S> {
     /// Where the outputs are.
@@ -48,12 +49,12 @@ impl<S: Scalar> Dynamics<S> {
             channels[1] = line.direction.dot(line.to.velocity - line.from.velocity);
         }
         for (output, gauge) in outputs[layout.gauges()..].iter_mut().zip(model.gauges()) {
-            let Some((beam, first)) = model.beam(gauge.beam) else { continue };
-            let [kappa_x, kappa_y, .., extension] = beam.strain(gauge.at, &q[first..first + beam.len()]);
-            *output = extension + kappa_x * gauge.y - kappa_y * gauge.x;
+            let [kappa_x, kappa_y, .., extension] = gauge.section.strain(&q[gauge.first..gauge.first + gauge.len]);
+            let [x, y] = gauge.point;
+            *output = extension + kappa_x * y - kappa_y * x;
         }
         for (channels, place) in outputs[layout.markers()..].chunks_exact_mut(6).zip(model.markers()) {
-            let pose = data.composite.frames[place.frame].pose * crate::spatial::Pose::from_f64(place.pose);
+            let pose = data.composite.frames[place.frame].pose * Pose::from_f64(place.pose);
             channels[..3].copy_from_slice(&pose.translation.to_array());
             channels[3..].copy_from_slice(&pose.rotation.rotation_vector().to_array());
         }
