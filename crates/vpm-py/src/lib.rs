@@ -19,6 +19,8 @@ mod _core {
     #[pymodule_export]
     use crate::errors::Diverged;
     #[pymodule_export]
+    use crate::interrupt::stop_when;
+    #[pymodule_export]
     use crate::stepping::Simulation;
     #[pymodule_export]
     use crate::system::System;
