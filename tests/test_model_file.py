@@ -156,7 +156,7 @@ def test_every_parameter_stands_in_the_description_once(content: dict[str, Any])
     used: list[int] = []
 
     def collect(value: object, key: str = "") -> None:
-        if key in {"gravity", "parameters", "axis", "translation", "rotation", "parent", "body", "channel", "measures"}:
+        if key in {"gravity", "parameters", "axis", "translation", "rotation", "on", "body", "channel", "measures"}:
             return
         if isinstance(value, dict):
             for name, item in value.items():
@@ -173,15 +173,15 @@ def test_every_parameter_stands_in_the_description_once(content: dict[str, Any])
     assert described["parameters"] == model.theta.tolist()
     assert [model.index(name) for name in model.parameter_names] == list(range(len(model.theta)))
     for k, body in enumerate(described["bodies"]):
-        assert body["parent"] is None or body["parent"] < k
+        assert body["on"] == "world" or body["on"]["body"] < k
         entry = content["joints"][body["joint"]["name"]]
-        parent = "world" if body["parent"] is None else described["bodies"][body["parent"]]["name"]
+        parent = "world" if body["on"] == "world" else described["bodies"][body["on"]["body"]]["name"]
         assert (entry["child"], entry["parent"]) == (body["name"], parent)
         expected = Rotation.from_euler("xyz", entry["rotation"]).as_matrix()  # extrinsic: about fixed axes
         assert np.reshape(body["joint"]["rotation"], (3, 3)) == pytest.approx(expected, abs=1e-12)
     for actuator in described["actuators"]:
         assert (
-            described["bodies"][actuator["joint"]]["joint"]["name"] == content["actuators"][actuator["name"]]["joint"]
+            described["bodies"][actuator["on"]["joint"]]["joint"]["name"] == content["actuators"][actuator["name"]]["joint"]
         )
 
 

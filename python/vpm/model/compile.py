@@ -47,11 +47,13 @@ def _body(k: int, structure: Structure, index: Mapping[str, int]) -> dict[str, A
     name, joint = structure.bodies[k], structure.joints[k]
     return {
         "name": name,
-        "parent": structure.parents[k],
+        "on": "world" if structure.parents[k] is None else {"body": structure.parents[k]},
         "joint": _joint(joint, structure.document.joints[joint]),
-        "mass": index[f"{name}.mass"],
-        "center_of_mass": [index[f"{name}.center_of_mass.{axis}"] for axis in "xyz"],
-        "inertia": [index[f"{name}.inertia.{axes}"] for axes in INERTIA_AXES],
+        "inertia": {
+            "mass": index[f"{name}.mass"],
+            "center_of_mass": [index[f"{name}.center_of_mass.{axis}"] for axis in "xyz"],
+            "moments": [index[f"{name}.inertia.{axes}"] for axes in INERTIA_AXES],
+        },
     }
 
 
@@ -95,7 +97,7 @@ def _effect(effect: Effect, structure: Structure, index: Mapping[str, int]) -> d
 def _actuator(name: str, structure: Structure, index: Mapping[str, int]) -> dict[str, Any]:
     return {
         "name": name,
-        "joint": structure.joints.index(structure.document.actuators[name].joint),
+        "on": {"joint": structure.joints.index(structure.document.actuators[name].joint)},
         "gain": index[f"{name}.gain"],
         "delay": index.get(f"{name}.delay.time"),
         "dead_zone": index.get(f"{name}.dead_zone.width"),
