@@ -19,6 +19,7 @@ from vpm.model.channels import ChannelEntry
 from vpm.model.check import Checked, check_document
 from vpm.model.compile import description
 from vpm.model.effects import Effect, effects_of
+from vpm.model.evaluation import Evaluations
 from vpm.model.messages import parse_toml, read_toml
 from vpm.model.parameters import Parameter
 from vpm.model.writer import content_of, plain, toml_of
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
     from vpm._core import System
 
 
-class Model(Storable):
+class Model(Evaluations, Storable):
     """A machine: bodies, joints, actuators, sensors, controllers and effects, with one flat table of parameters.
 
     Build it with `load`, `from_toml` or `from_dict`. Numbers that go in and out are SI; the units of a file are
@@ -273,6 +274,28 @@ class Model(Storable):
     def bodies(self) -> tuple[str, ...]:
         """Bodies, parents before children."""
         return self._checked.structure.bodies
+
+    @property
+    def beams(self) -> tuple[str, ...]:
+        """Flexible links."""
+        return ()
+
+    @property
+    def markers(self) -> tuple[str, ...]:
+        """Frames to watch."""
+        return ()
+
+    @property
+    def coordinates(self) -> tuple[str, ...]:
+        """Coordinates."""
+        return self.joints
+
+    @cached_property
+    def state_names(self) -> tuple[str, ...]:
+        """State of a simulation: position and velocity of every coordinate, then what actuators with a lag hold."""
+        positions = [f"{name}.position" for name in self.coordinates]
+        velocities = [f"{name}.velocity" for name in self.coordinates]
+        return (*positions, *velocities, *(f"{name}.lag" for name in self.actuators if self.has_lag(name)))
 
     @property
     def actuators(self) -> tuple[str, ...]:
