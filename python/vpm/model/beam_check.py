@@ -24,9 +24,6 @@ def beam_problems(document: Document) -> Iterator[Problem]:
             yield Problem(
                 place("beams", name, "length"), f"is {beam.length:g} m, but has to be above 0; correct the length"
             )
-        reason = beam.detail.problem(beam.deforms)
-        if reason is not None:
-            yield Problem(place("beams", name, "level"), reason)
         yield from _section_problems(name, beam)
 
 
@@ -84,8 +81,8 @@ def _fit_problems(where: str, section: Section, sizes: Mapping[str, float]) -> I
         case Tube() if sizes["inner"] >= sizes["outer"]:
             rest = f"has inner {sizes['inner']:g} m and outer {sizes['outer']:g} m, but inner has to be below outer"
             yield Problem(where, f"{rest}; correct them")
-        case IBeam() if sizes["web"] > sizes["width"]:
-            rest = f"has web {sizes['web']:g} m, which is more than the width {sizes['width']:g} m; correct them"
+        case IBeam() if sizes["web"] >= sizes["width"]:
+            rest = f"has web {sizes['web']:g} m, which is not below the width {sizes['width']:g} m; correct them"
             yield Problem(where, rest)
         case IBeam() if 2.0 * sizes["flange"] >= sizes["height"]:
             rest = (

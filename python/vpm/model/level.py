@@ -27,17 +27,16 @@ class _Form:
     counts: str
     least: int
     most: int
-    shear: bool = False
 
 
-#: The upper ends are far beyond what pays off, and before what is too badly conditioned to be solved.
+#: The ranges of the core: the upper ends are beyond what pays off, and before what rounding errors spoil.
 FORMS: Mapping[str, _Form] = {
-    "lumped": _Form("rigid segments", 1, 100, shear=True),
-    "modal": _Form("modes per component", 1, 10),
+    "lumped": _Form("the number of rigid segments", 1, 200),
+    "modal": _Form("the number of modes per component", 1, 8),
     "bezier": _Form("the degree of the curve", 2, 12),
-    "hermite": _Form("cubic elements", 1, 50),
-    "strain": _Form("polynomials per component", 1, 12, shear=True),
-    "elements": _Form("elements", 1, 50, shear=True),
+    "hermite": _Form("the number of cubic elements", 1, 100),
+    "strain": _Form("the number of polynomials per component", 1, 12),
+    "elements": _Form("the number of elements", 1, 100),
 }
 LEVEL_NAMES: tuple[str, ...] = ("rigid", *FORMS)
 
@@ -62,8 +61,8 @@ class Level:
     def count(self, component: str) -> int:
         """Coordinates of a component.
 
-        A Bezier curve and the cubic elements start from a clamp: the curve has one control point less for the
-        deflection and two less for deflection and slope.
+        Deflections start from a clamp: a Bezier curve has two control points less for bending, which is clamped in
+        value and slope, and one less for the others; the elements of a deflection that does not bend are linear.
 
         Parameters
         ----------
@@ -77,20 +76,24 @@ class Level:
             case "bezier":
                 return self.number - 1 if bends else self.number
             case "hermite":
-                return 2 * self.number
+                return 2 * self.number if bends else self.number
             case "elements":
                 return self.number + 1
         return self.number
 
-    def problem(self, deforms: Sequence[str]) -> str | None:
-        """Why a beam with these deformations cannot have this level, as the rest of a sentence; None if it can."""
-        shears = [component for component in deforms if component.startswith("shear")]
-        if self.name in FORMS and not FORMS[self.name].shear and shears:
-            return (
-                f'is "{self}", whose deflections know no shear, but the beam deforms in {" and ".join(shears)};'
-                ' take "strain(n)", "elements(n)" or "lumped(n)", or leave the shear out'
-            )
-        return None
+    def coordinates(self, deforms: Sequence[str]) -> tuple[str, ...]:
+        """Names of the coordinates of a beam, in the order of the core: ``bending_x.0``.
+
+        One component after the other, except for springs between rigid segments: there one segment after the other.
+
+        Parameters
+        ----------
+        deforms : sequence of str
+            Components, in the order of the file.
+        """
+        if self.name == "lumped":
+            return tuple(f"{component}.{i}" for i in range(self.number) for component in deforms)
+        return tuple(f"{component}.{i}" for component in deforms for i in range(self.count(component)))
 
 
 def parse_level(text: str) -> Level:
@@ -107,12 +110,14 @@ def parse_level(text: str) -> Level:
         There is no such level, or its number is missing or out of range; the rest of a sentence, with the repair.
     """
     found = _WRITTEN.fullmatch(text)
-    name = found["name"] if found else text
-    if found is None or name not in LEVEL_NAMES:
+    name = found["name"] if found else text.partition("(")[0].strip()
+    if name not in LEVEL_NAMES:
         known = ["rigid", *(f"{level}(n)" for level in FORMS)]
         near = near_match(name, LEVEL_NAMES)
         repair = near if near.startswith("did you") else f"write one of {', '.join(known)}"
         raise ValueError(f'is "{text}", which is no level of detail; {repair}')
+    if found is None:
+        raise ValueError(f'is "{text}", which is not a name with a whole number; write for example "{_example(name)}"')
     number = None if found["number"] is None else int(found["number"])
     if name == "rigid":
         if number is not None:
@@ -120,8 +125,12 @@ def parse_level(text: str) -> Level:
         return Level("rigid")
     form = FORMS[name]
     if number is None:
-        raise ValueError(f'is "{text}", which needs a number: {form.counts}; write for example "{name}(3)"')
+        raise ValueError(f'is "{text}", which needs a number: {form.counts}; write for example "{_example(name)}"')
     if not form.least <= number <= form.most:
         rest = f'is "{text}", but {form.counts} can be {form.least} to {form.most}; take a number in this range'
         raise ValueError(rest)
     return Level(name, number)
+
+
+def _example(name: str) -> str:
+    return "rigid" if name == "rigid" else f"{name}(3)"

@@ -119,12 +119,8 @@ class Structure:
     @property
     def coordinates(self) -> tuple[str, ...]:
         """Every coordinate: those of the joints, then ``beam.component.number`` of each beam."""
-        elastic = [
-            f"{name}.{component}.{i}"
-            for name in self.beams
-            for component in self.document.beams[name].deforms
-            for i in range(self.document.beams[name].detail.count(component))
-        ]
+        beams = ((name, self.document.beams[name]) for name in self.beams)
+        elastic = [f"{name}.{own}" for name, beam in beams for own in beam.detail.coordinates(beam.deforms)]
         return (*self.joints, *elastic)
 
     def mounted(self, parent: str, at: float | None, placed: Pose) -> Frame:

@@ -120,7 +120,7 @@ def _loop_problems(document: Document) -> Iterator[Problem]:
         if way[-1] in parent and way[-1] not in settled:  # the last one's parent is already on the way
             loop = [*way[way.index(parent[way[-1]]) :], parent[way[-1]]]
             rest = f'is in a loop that never reaches the world: {" -> ".join(loop)}; give one of them parent = "world"'
-            yield Problem(place("bodies" if name in document.bodies else "beams", name), rest)
+            yield Problem(place("bodies" if loop[0] in document.bodies else "beams", loop[0]), rest)
         settled.update(way)
 
 
