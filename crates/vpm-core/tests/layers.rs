@@ -8,9 +8,10 @@ use std::path::{Path, PathBuf};
 const TREE: [&str; 11] =
     ["error", "scalar", "algebra", "spatial", "kinematics", "joint", "body", "model", "data", "dynamics", "linkage"];
 /// Parts that stand alone, each a rig of its own, and all that they may import besides themselves.
-const ALONE: [(&str, &[&str]); 10] = [
+const ALONE: [(&str, &[&str]); 11] = [
     ("error", &[]),
     ("scalar", &[]),
+    ("mount", &[]),
     ("table", &["error"]),
     ("delay", &["error", "scalar"]),
     ("ode", &["error", "scalar"]),
