@@ -7,6 +7,8 @@ use pyo3::prelude::*;
 mod arrays;
 mod errors;
 mod interrupt;
+mod linkage;
+mod planar;
 mod system;
 
 /// The compiled core of vpm: a machine as one object, arrays in and out.
@@ -14,6 +16,10 @@ mod system;
 mod _core {
     #[pymodule_export]
     use crate::errors::Diverged;
+    #[pymodule_export]
+    use crate::linkage::{Karl, Leg, hyq_parameters};
+    #[pymodule_export]
+    use crate::planar::PlanarArm;
     #[pymodule_export]
     use crate::system::System;
 }
