@@ -9,6 +9,7 @@ Each arrow is a function of this module, each result one frozen object.
 
 from importlib.metadata import version
 
+from vpm import linkages
 from vpm.budget import BudgetReport, budget
 from vpm.catalogue import EFFECTS
 from vpm.compare import Comparison, compare
@@ -17,6 +18,7 @@ from vpm.errors import VpmError
 from vpm.experiment import Experiment
 from vpm.identify import Fit, identify
 from vpm.model import Model
+from vpm.planar import PlanarArm
 from vpm.report import Report, report, write_report
 from vpm.simplify import Ladder, simplify
 from vpm.simulate import Run, Setup, simulate
@@ -32,6 +34,7 @@ __all__ = [
     "Fit",
     "Ladder",
     "Model",
+    "PlanarArm",
     "Report",
     "Run",
     "Setup",
@@ -41,6 +44,7 @@ __all__ = [
     "compare",
     "diagnose",
     "identify",
+    "linkages",
     "report",
     "simplify",
     "simulate",
