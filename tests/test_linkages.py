@@ -240,7 +240,7 @@ def test_what_cannot_be_is_said_with_its_numbers() -> None:
         leg.shares(samples=1)
     with pytest.raises(ModelError, match=r"needs the shape \(2,\) or \(N, 2\), got \(3,\)"):
         leg.strokes([1.0, 2.0, 3.0])
-    with pytest.raises(ModelError, match="leg.upper.mass"):
+    with pytest.raises(ModelError, match=r"leg\.upper\.mass"):
         Leg(replace(leg.parameters, upper=replace(leg.parameters.upper, mass=-1.0)))
     with pytest.raises(ModelError, match="the choices are table, identified, plausible"):
         LegParameters.hyq("cad")  # type: ignore[arg-type]

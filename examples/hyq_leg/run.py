@@ -16,7 +16,6 @@ HERE = Path(__file__).resolve().parent
 
 def main(folder: Path) -> None:
     leg = linkages.load(HERE / "leg.toml")
-    assert isinstance(leg, linkages.Leg)
     folder.mkdir(parents=True, exist_ok=True)
 
     table = leg.stroke_table()

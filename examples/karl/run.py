@@ -15,15 +15,13 @@ HERE = Path(__file__).resolve().parent
 
 def main(folder: Path) -> None:
     karl = linkages.load(HERE / "karl.toml")
-    assert isinstance(karl, linkages.Karl)
     folder.mkdir(parents=True, exist_ok=True)
 
     singular = karl.singularities()
     print("singular strokes:")
-    for row in zip(
-        singular.actuator, singular.kind, singular.arrangement, singular.where, singular.strokes, strict=True
-    ):
-        print("  actuator {}: {}, {}, {}, at {:+.6f} m".format(*row))
+    kinds = zip(singular.kind, singular.arrangement, singular.where, strict=True)
+    for actuator, stroke, kind in zip(singular.actuator, singular.strokes, kinds, strict=True):
+        print(f"  actuator {actuator + 1}: at {stroke:+.6f} m, {', '.join(kind)}")
 
     poses = karl.direct((0.20, 0.18))
     print(f"the strokes 0.200 m and 0.180 m leave {len(poses)} configurations (deg):")

@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, repr=False, eq=False)
 class FlexibleLink(Storable):
-    """One link: a hub around its joint, an inextensible Euler-Bernoulli beam from the rim of the hub, a body at its tip.
+    """One link: a hub around its joint, an inextensible beam from the rim of the hub, a body at its tip.
 
     Attributes
     ----------

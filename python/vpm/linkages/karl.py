@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -92,12 +92,12 @@ class Karl:
         g = self.geometry
         return f"Karl({self.name!r}, medial={g.medial:.6g} m, distal={g.distal:.6g} m, rods={g.rods} m)"
 
-    def direct(self, strokes: Sequence[float]) -> KarlPoses:
+    def direct(self, strokes: ArrayLike) -> KarlPoses:
         """All four assembly modes at two strokes (m). Source: D'Imperio 2016, eqs 2.61 to 2.71.
 
         Parameters
         ----------
-        strokes : sequence of two float
+        strokes : array_like, shape (2,)
 
         Returns
         -------
@@ -109,15 +109,16 @@ class Karl:
         ModelError
             The rods are too long or too short for these strokes.
         """
-        angles = self._ask(lambda: self._core.direct(strokes))
-        return self._poses(angles, np.tile(np.asarray(strokes, dtype=float), (4, 1)))
+        pair = self._pair(strokes)
+        angles = self._ask(lambda: self._core.direct(pair))
+        return self._poses(angles, np.tile(pair, (4, 1)))
 
-    def inverse(self, target: Sequence[float]) -> KarlPoses:
+    def inverse(self, target: ArrayLike) -> KarlPoses:
         """All eight configurations that put the end point C at a target (m).
 
         Parameters
         ----------
-        target : sequence of two float
+        target : array_like, shape (2,)
             In the frame of the base.
 
         Returns
@@ -130,7 +131,8 @@ class Karl:
         ModelError
             The target is out of reach, or an elbow there cannot be driven by any stroke.
         """
-        rows = self._ask(lambda: self._core.inverse(target))
+        pair = self._pair(target)
+        rows = self._ask(lambda: self._core.inverse(pair))
         return self._poses(rows[:, :2], rows[:, 2:])
 
     def end_point(self, angles: ArrayLike) -> Array:
@@ -289,6 +291,12 @@ class Karl:
         return KarlPoses(
             angles, strokes, self._core.end_point(angles), self._core.transmission(angles, strokes), elbows
         )
+
+    def _pair(self, numbers: ArrayLike) -> Pair:
+        array = np.asarray(numbers, dtype=float)
+        if array.shape != (2,):
+            raise ModelError(f"{self.name}: needs two numbers, got the shape {array.shape}; give one row")
+        return float(array[0]), float(array[1])
 
     def _ask(self, question: Callable[[], Array]) -> Array:
         try:

@@ -108,7 +108,8 @@ class KarlSingularities(Result):
         """
         rows = zip(self.actuator, self.kind, self.arrangement, strict=True)
         keep = [a == actuator and k == kind and arrangement in {None, form} for a, k, form in rows]
-        return self.strokes[np.array(keep, dtype=bool)]
+        strokes: Array = self.strokes[np.array(keep, dtype=bool)]
+        return strokes
 
     def _frame_columns(self) -> Mapping[str, object]:
         names = {"actuator": self.actuator, "kind": self.kind, "arrangement": self.arrangement, "where": self.where}

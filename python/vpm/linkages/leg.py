@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 Derivation = Literal["virtual_work", "lagrange", "newton_euler"]
 ShareDefinition = Literal["sum_of_norms", "norm_of_absolute_sum", "root_of_squares", "torque"]
 
-#: Limits of joint rates (rad/s) and accelerations (rad/s^2) of low, medium and high dynamics. D'Imperio 2016, section 2.4.2.
+#: Limits of joint rates (rad/s) and accelerations (rad/s^2). D'Imperio 2016, section 2.4.2.
 DUTIES = {"low": (2.5, 1.25), "medium": (5.0, 2.5), "high": (10.0, 5.0)}
 
 #: Joint angles of the published averages: every 10 deg.
@@ -29,9 +29,9 @@ _SECOND = np.radians(np.arange(-140.0, -19.5, 10.0))
 class Leg:
     """A leg of upper and lower part, slider and two cylinders, in the plane.
 
-    Frame 0 has its origin on the ground below the hip, y up. The hip slides along x = 0, the foot along y = 0. The upper
-    leg points along ``(sin q1, -cos q1)``, the lower leg along ``(sin(q1 + q2), -cos(q1 + q2))``, so that q2 < 0 bends
-    the knee. A cylinder force is positive when it extends. Source: D'Imperio 2016, section 2.4.2.
+    Frame 0 has its origin on the ground below the hip, y up. The hip slides along x = 0, the foot along y = 0. The
+    upper leg points along ``(sin q1, -cos q1)``, the lower leg along ``(sin(q1 + q2), -cos(q1 + q2))``, so that q2 < 0
+    bends the knee. A cylinder force is positive when it extends. Source: D'Imperio 2016, section 2.4.2.
 
     Parameters
     ----------
@@ -159,7 +159,7 @@ class Leg:
     def torques(
         self, angles: ArrayLike, rates: ArrayLike, accelerations: ArrayLike, derivation: Derivation = "virtual_work"
     ) -> Array:
-        """Joint torques (N m) that a motion needs, by one of three derivations that share only the places of the points.
+        """Joint torques (N m) that a motion needs, by one of three derivations that share only the points.
 
         Parameters
         ----------
@@ -199,9 +199,9 @@ class Leg:
     ) -> ShareMap:
         """How much of the effort is inertia, velocity and weight, over the workspace: mu_M, mu_V, mu_G.
 
-        Source: D'Imperio 2016, eq 2.109 and section 2.4.2. The printed ratio to the torque is unbounded where the torque
-        passes through zero; the sum of norms is the reading that gives the published averages. The interpreter lock is
-        released, and Ctrl-C stops the computation.
+        Source: D'Imperio 2016, eq 2.109 and section 2.4.2. The printed ratio to the torque is unbounded where the
+        torque passes through zero; the sum of norms is the reading that gives the published averages. The
+        interpreter lock is released, and Ctrl-C stops the computation.
 
         Parameters
         ----------
@@ -213,8 +213,8 @@ class Leg:
             Equispaced values of each rate and acceleration, limits included. An odd number includes standstill, which
             makes mu_G 1 for any machine.
         definition : {"sum_of_norms", "norm_of_absolute_sum", "root_of_squares", "torque"}
-            What the norm of one term is divided by: ``|M a| + |V| + |G|``; the norm of the componentwise sum of absolute
-            values; ``sqrt(|M a|^2 + |V|^2 + |G|^2)``; ``|M a + V + G|``.
+            What the norm of one term is divided by: ``|M a| + |V| + |G|``; the norm of the componentwise sum of
+            absolute values; ``sqrt(|M a|^2 + |V|^2 + |G|^2)``; ``|M a + V + G|``.
         progress : callable, optional
             Called with the number of rows of angles done and their total.
 

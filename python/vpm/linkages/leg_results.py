@@ -40,16 +40,13 @@ class LegTerms(Result):
     def torques(self, accelerations: ArrayLike) -> Array:
         """Joint torques (N, 2) in N m for joint accelerations (2,) or (N, 2) in rad/s^2."""
         a = np.broadcast_to(np.asarray(accelerations, dtype=float), self.velocity.shape)
-        return np.einsum("nij,nj->ni", self.mass_matrix, a) + self.velocity + self.gravity
+        inertia: Array = np.einsum("nij,nj->ni", self.mass_matrix, a)
+        return inertia + self.velocity + self.gravity
 
     def _frame_columns(self) -> Mapping[str, object]:
         columns: dict[str, object] = {}
-        for name, table in {
-            "q{}_rad": self.angles,
-            "rate{}": self.rates,
-            "V{}": self.velocity,
-            "G{}": self.gravity,
-        }.items():
+        tables = {"q{}_rad": self.angles, "v{}_rad_per_s": self.rates, "V{}_Nm": self.velocity, "G{}_Nm": self.gravity}
+        for name, table in tables.items():
             columns |= {name.format(k + 1): table[:, k] for k in (0, 1)}
         return columns | {f"M{i + 1}{j + 1}": self.mass_matrix[:, i, j] for i in (0, 1) for j in (0, 1)}
 
@@ -187,14 +184,8 @@ class ShareMap(Result):
         }
 
     def _headline(self) -> Mapping[str, object]:
-        inertia, velocity, gravity = map(float, self.mean)
-        return {
-            "rate": self.rate,
-            "acceleration": self.acceleration,
-            "mu_M": inertia,
-            "mu_V": velocity,
-            "mu_G": gravity,
-        }
+        shares = dict(zip(("mu_M", "mu_V", "mu_G"), map(float, self.mean), strict=True))
+        return {"rate": self.rate, "acceleration": self.acceleration, **shares}
 
     def plot(self) -> Figure:
         """Three maps over the joint angles, each with its average.

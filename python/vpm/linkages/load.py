@@ -58,7 +58,7 @@ class _Table:
             if key not in self.asked:
                 self._refuse(key, f"is not a known key; {near_match(key, self.asked)}")
 
-    def _value(self, key: str, unit: str) -> Any:
+    def _value(self, key: str, unit: str) -> object:
         value = self._get(key)
         if isinstance(value, Mapping):
             inner = _Table(value, self.path, self._place(key))
@@ -76,7 +76,7 @@ class _Table:
         except UnitError as error:
             self._refuse(key, f"has a wrong unit: {error}")
 
-    def _get(self, key: str) -> Any:
+    def _get(self, key: str) -> object:
         self.asked.add(key)
         if key not in self.content:
             self._refuse(key, "is missing; add it")
