@@ -123,9 +123,9 @@ fn correct<S: Scalar>(mode: &mut Mode<S>, stiffness: &[S], mass: &[S], inverse: 
     residual.push((S::one() - dot(&momentum, &mode.shape)) * 0.5);
     let step = |row: usize| residual.iter().enumerate().map(|(k, &entry)| entry * inverse[(row, k)]).sum::<S>();
     for (row, entry) in mode.shape.iter_mut().enumerate() {
-        *entry = *entry - step(row);
+        *entry -= step(row);
     }
-    mode.square = mode.square - step(n);
+    mode.square -= step(n);
 }
 
 fn rows<S>(matrix: &[S], n: usize) -> impl Iterator<Item = &[S]> {
