@@ -2,7 +2,7 @@
 
 use crate::scalar::Scalar;
 
-/// The strain at one place of the axis as a linear map of the coordinates, made by [`Beam::gauge`].
+/// The strain at one place of the axis as a linear map of the coordinates, made by `Beam::gauge`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Gauge {
     /// Coordinate, component, and strain per unit of the coordinate.

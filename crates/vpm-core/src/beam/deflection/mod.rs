@@ -26,7 +26,7 @@ pub(super) struct DeflectionAxis {
     components: Vec<Component>,
     /// Arc length of each section in m.
     places: Vec<f64>,
-    /// Displacement and slope (of bending) or rotation (of torsion) per unit of each coordinate, section by section.
+    /// Displacement (of torsion: rotation) and its slope per unit of each coordinate, section by section, and at the tip.
     rows: Vec<[f64; 2]>,
     /// What is quadratic in the coordinates.
     forms: Forms,
@@ -44,7 +44,8 @@ impl DeflectionAxis {
     pub fn new(fields: &Fields, places: &[f64]) -> Self {
         let components: Vec<Component> = fields.components.iter().map(|&component| Component::ALL[component]).collect();
         let mut rows = Vec::with_capacity(places.len() * components.len());
-        for &place in places {
+        let tip = fields.list.first().map(|field| field.basis.length());
+        for &place in places.iter().chain(&tip) {
             let (values, slopes) = (fields.row(place, |_| 0), fields.row(place, |_| 1));
             rows.extend(values.into_iter().zip(slopes).map(|(value, slope)| [value, slope]));
         }
@@ -74,9 +75,10 @@ impl DeflectionAxis {
         for rows in self.rows.chunks_exact(n) {
             let mut slope = [S::zero(); 2];
             for ((&component, &[_, entry]), &q) in self.components.iter().zip(rows).zip(q) {
-                if component.bends() {
-                    let across = usize::from(component == Component::BendingX);
-                    slope[across] += q * entry;
+                match component {
+                    Component::BendingY | Component::ShearX => slope[0] += q * entry,
+                    Component::BendingX | Component::ShearY => slope[1] += q * entry,
+                    Component::Torsion | Component::Extension => {}
                 }
             }
             most = most.max(slope[0] * slope[0] + slope[1] * slope[1]);
