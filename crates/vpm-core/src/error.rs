@@ -171,6 +171,14 @@ pub enum Error {
         /// Largest stable step in s.
         limit: f64,
     },
+    /// The adaptive reference solver gave up.
+    #[error(
+        "the reference solution was not reached: {message}; loosen the tolerance, or check the equations where it stopped"
+    )]
+    ReferenceSolution {
+        /// What the solver says.
+        message: String,
+    },
     /// A setting of a computation is out of range.
     #[error("{setting} must {condition}, got {value}; {repair}")]
     Setting {

@@ -7,6 +7,7 @@
 //! [`linear`] interpolates the deflection: constant matrices, small deflection, stiffening by the second-order shortening.
 //! [`linear`] interpolates the deflection: constant matrices, small deflection, stiffening by the second-order shortening.
 //! [`strain`] interpolates the strain and integrates the pose along the axis: exact at any deflection, in space, in a tree.
+//! [`two_node`] is an independent finite element in absolute coordinates that checks them at large deflection.
 //! [`planar`] is the same for chains of inextensible links that move in one plane, in fixed sizes, made for real time.
 //!
 //! Sources: Selig & Ding 2009, "A screw theory of Timoshenko beams", J. Appl. Mech. 76(3) 031003, for screws and their
@@ -20,6 +21,7 @@ pub mod planar;
 pub mod quadrature;
 pub mod section;
 pub mod strain;
+pub mod two_node;
 
 pub use basis::Basis;
 pub use section::{Material, Section, Shape};
