@@ -28,7 +28,7 @@ impl Owned {
     fn refusal(&self, method: Method, step: f64) -> (String, f64, f64) {
         match self.check(method, step) {
             Err(Error::StepTooLarge { coordinate, frequency, limit, .. }) => (coordinate, frequency, limit),
-            other => panic!("{}: a step of {step} s gives {other:?}", method.name()),
+            other => (format!("a step of {step} s gives {other:?}"), f64::NAN, f64::NAN),
         }
     }
 }
@@ -62,7 +62,7 @@ fn a_single_oscillator_has_the_limits_of_the_books() {
             relative(limit, 8.0_f64.sqrt() / omega, 1e-8);
         }
     }
-    relative(decay_limit(), 2.785_293_563_405_281_6, 1e-12);
+    relative(decay_limit(), 2.785_293_563_405_28, 1e-12);
     // Overdamped: rates of decay a and b with a + b = d, a b = k.
     let (fast, slow) = (5000.0, 3.0);
     let system = Owned::new(&[1.0], &[fast * slow], &[fast + slow], &["slide"]);

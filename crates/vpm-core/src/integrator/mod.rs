@@ -2,6 +2,8 @@
 
 mod linearly_implicit;
 mod lu;
+#[cfg(feature = "reference")]
+pub mod reference;
 mod rk4;
 mod rosenbrock;
 mod semi_implicit;
