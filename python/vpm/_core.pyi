@@ -49,13 +49,15 @@ class Dynamics:
     def inverse_dynamics(
         self, position: ArrayLike, velocity: ArrayLike, acceleration: ArrayLike
     ) -> NDArray[np.float64]:
-        """Efforts (n,) that accelerations (n,) need from the actuators: ``M a + h - effects``."""
+        """Efforts (n,) that accelerations (n,) need: ``M a + h - effects``; what no actuator gives has to be zero."""
     def forward_dynamics(self, position: ArrayLike, velocity: ArrayLike, effort: ArrayLike) -> NDArray[np.float64]:
-        """Accelerations (n,) under ``effort`` (n,) of the actuators, with all effects."""
+        """Accelerations (n,) under efforts (n_joints,) of the actuators, with all effects."""
     def mass_matrix(self, position: ArrayLike) -> NDArray[np.float64]:
         """Mass matrix (n, n), payloads included."""
     def energy(self, position: ArrayLike, velocity: ArrayLike) -> tuple[float, float]:
         """Kinetic and potential energy in J: of bodies in gravity, and of effects that have a potential."""
+    def jacobian(self, position: ArrayLike, marker: int) -> NDArray[np.float64]:
+        """Jacobian (6, n) of a marker by number: angular velocity, then velocity of its origin, in world axes."""
 
 @final
 class Simulation:
@@ -117,6 +119,15 @@ class System:
     @property
     def n_joints(self) -> int:
         """Number of joints n."""
+    @property
+    def n_coordinates(self) -> int:
+        """Number of coordinates: joints, then the elastic coordinates of the beams."""
+    @property
+    def n_elastic(self) -> int:
+        """Number of elastic coordinates."""
+    @property
+    def n_beams(self) -> int:
+        """Number of beams."""
     @property
     def n_states(self) -> int:
         """Length of the state."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Iterator, Mapping
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -11,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from vpm.errors import ModelError, near_match
 from vpm.linear import LinearModel
+from vpm.model.components import Components
 
 if TYPE_CHECKING:
     from vpm._core import Dynamics, System
@@ -19,38 +21,27 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-class Evaluations:
+class Evaluations(Components):
     """The part of a model that asks the core about one state.
 
     Positions, velocities and so on are arrays of one number per coordinate, in the order of ``model.coordinates``
     (joints, then the elastic coordinates of flexible links); m or rad, per second, N or N m.
     """
 
-    if TYPE_CHECKING:  # what the rest of the model gives
+    @property
+    @abstractmethod
+    def parameters(self) -> Mapping[str, Parameter]:
+        """Parameters by dotted name."""
 
-        @property
-        def name(self) -> str: ...
-        @property
-        def joints(self) -> tuple[str, ...]: ...
-        @property
-        def coordinates(self) -> tuple[str, ...]: ...
-        @cached_property
-        def state_names(self) -> tuple[str, ...]: ...
-        @property
-        def actuators(self) -> tuple[str, ...]: ...
-        @property
-        def beams(self) -> tuple[str, ...]: ...
-        @property
-        def markers(self) -> tuple[str, ...]: ...
-        @cached_property
-        def output_channels(self) -> tuple[str, ...]: ...
-        @cached_property
-        def parameters(self) -> Mapping[str, Parameter]: ...
-        @cached_property
-        def theta(self) -> Array: ...
-        @cached_property
-        def core(self) -> System: ...
-        def channel_unit(self, channel: str) -> str: ...
+    @property
+    @abstractmethod
+    def theta(self) -> Array:
+        """Values of all parameters."""
+
+    @property
+    @abstractmethod
+    def core(self) -> System:
+        """Compiled system."""
 
     # ---- single evaluations ------------------------------------------------------------------------------------------
 
