@@ -108,14 +108,15 @@ impl Prepared {
         Ok(jacobian)
     }
 
-    /// Kinetic and potential energy in J: of bodies in gravity, and of the effects that have a potential.
+    /// Kinetic and potential energy in J: of everything that weighs in gravity, of strained beams, and of the effects that have a potential.
     ///
     /// Checked: with efforts of the actuators and frictions accounted for, the sum is conserved along a simulated run.
     #[inline]
     pub fn energy(&mut self, q: &[f64], v: &[f64]) -> Result<(f64, f64)> {
         self.expect([("position", q), ("velocity", v)])?;
         let Dynamics { model, data, effects, .. } = &mut self.dynamics;
-        let total = dynamics::energy(model, data, q, v);
+        let of_tree = if model.is_recursive() { dynamics::energy } else { dynamics::energy };
+        let total = of_tree(model, data, q, v);
         let stored: f64 = effects.iter().map(|(joint, effect)| effect.potential(q[*joint])).sum();
         Ok((total.kinetic, total.potential + stored))
     }
