@@ -67,7 +67,7 @@ impl Dynamics {
         result.map(|effort| PyArray1::from_slice(py, effort)).map_err(|error| exception(py, error, 0, 0))
     }
 
-    /// Accelerations (n,) that efforts (n,) of the actuators give, with all effects.
+    /// Accelerations (n,) that efforts (n,) give, with all effects.
     fn forward_dynamics<'py>(
         &self,
         py: Python<'py>,
