@@ -1,10 +1,12 @@
 //! Simulation of a whole record: free run on commands, closed loop on references, restarts from many samples.
 
 mod names;
+mod prescribed;
 mod stability;
 mod stepper;
 
 pub(crate) use names::state_name;
+pub use prescribed::prescribed;
 pub(crate) use stability::check_step;
 pub(crate) use stepper::{Drive, Plan, Stepper};
 
