@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 MODES = ("free_run", "inverse_dynamics", "restarts", "closed_loop")
-INTEGRATORS = ("linearly_implicit", "rk4", "semi_implicit")
+INTEGRATORS = ("linearly_implicit", "rosenbrock", "rk4", "semi_implicit")
 
 
 @dataclass(frozen=True)
@@ -38,8 +38,9 @@ class Setup:
 
     Attributes
     ----------
-    integrator : {"linearly_implicit", "rk4", "semi_implicit"}
-        The first is stable whatever the stiffness of a friction law; the others are explicit.
+    integrator : {"linearly_implicit", "rosenbrock", "rk4", "semi_implicit"}
+        The first two are stable whatever is stiff, of order 2 and 4, the first also on dry friction far sharper than a step;
+        the others are explicit, but for the constant stiffness of flexible links in the last.
     substeps : int
         Integration steps per sample of the log.
     horizon : float

@@ -160,7 +160,9 @@ fn execute(setting: Setting<'_>, plan: Plan<'_>) -> Result<Run> {
 pub(crate) fn diverged<S: Scalar>(stepper: &Stepper<'_, S>, what: String, row: usize, start: usize) -> Error {
     let stepping = stepper.stepping();
     let repair = match stepping.method {
-        Method::LinearlyImplicit => "use more substeps, or check the signs and sizes of the parameters",
+        Method::LinearlyImplicit | Method::Rosenbrock => {
+            "use more substeps, or check the signs and sizes of the parameters"
+        }
         Method::Rk4 | Method::SemiImplicit => "use more substeps or the integrator linearly_implicit",
     };
     let (outputs, states) = stepper.before(row);
