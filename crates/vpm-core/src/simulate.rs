@@ -3,6 +3,7 @@
 mod names;
 mod stepper;
 
+pub(crate) use names::state_name;
 pub(crate) use stepper::{Drive, Plan, Stepper};
 
 use crate::description::Description;

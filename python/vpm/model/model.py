@@ -17,8 +17,8 @@ from vpm.catalogue import SITE_KINDS, effect_type
 from vpm.errors import ModelError, VpmError, near_match
 from vpm.model.check import Checked, check_document
 from vpm.model.compile import description
-from vpm.model.components import Components
 from vpm.model.effects import Effect, effects_of
+from vpm.model.evaluation import Evaluations
 from vpm.model.messages import parse_toml, read_toml
 from vpm.model.parameters import Parameter
 from vpm.model.writer import content_of, plain, toml_of
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from vpm._core import System
 
 
-class Model(Components, Storable):
+class Model(Evaluations, Storable):
     """A machine: bodies, joints, beams, actuators, sensors, controllers and effects, with one flat table of parameters.
 
     Build it with `load`, `from_toml` or `from_dict`. Numbers that go in and out are SI; the units of a file are

@@ -22,7 +22,7 @@ pub use aba::{aba, check_regular};
 pub use crba::crba;
 pub use energy::{Energy, energy};
 pub use frames::frames;
-pub(crate) use frames::{lines, poses};
+pub(crate) use frames::{for_each_column, lines, poses};
 pub use kinematics::kinematics;
 pub use rnea::rnea;
 pub use virtual_work::{Carried, Rate, Terms, effort_of_wrench, virtual_work};

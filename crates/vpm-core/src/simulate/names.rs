@@ -4,7 +4,7 @@ use crate::description::Description;
 use crate::sensor::Layout;
 
 /// A state in words.
-pub(super) fn state_name(description: &Description, place: usize) -> String {
+pub(crate) fn state_name(description: &Description, place: usize) -> String {
     let n = description.n_coordinates();
     if place < n {
         return coordinate_name(description, "position", place);
