@@ -64,7 +64,6 @@ pub fn linearize(description: &Description, theta: &[f64], state: &[f64], inputs
 struct Tangent {
     system: System<Number>,
     sensors: Vec<Sensor<Number>>,
-    joints: usize,
     state: Vec<Number>,
     commands: Vec<Number>,
     rate: Vec<Number>,
@@ -78,7 +77,6 @@ impl Tangent {
         Ok(Self {
             system: description.system(&theta)?,
             sensors: description.sensors(&theta),
-            joints: description.n_joints(),
             state: zeros(description.n_states()),
             commands: zeros(description.n_actuators()),
             rate: zeros(description.n_states()),
@@ -104,19 +102,16 @@ impl Tangent {
         self.observe();
     }
 
+    /// The outputs as the sensors show them.
     fn observe(&mut self) {
-        let n = self.joints;
         let dynamics = self.system.dynamics();
-        let (of_joints, of_actuators) = self.reading.split_at_mut(4 * n);
-        for (joint, channels) in of_joints.chunks_exact_mut(4).enumerate() {
-            let values = [self.state[joint], self.state[n + joint], self.rate[n + joint], dynamics.efforts()[joint]];
-            channels.copy_from_slice(&values);
-        }
-        for (actuator, channels) in of_actuators.chunks_exact_mut(2).enumerate() {
-            channels.copy_from_slice(&[self.commands[actuator], dynamics.forces()[actuator]]);
+        let layout = dynamics.layout();
+        dynamics.observe(&self.state, &self.rate, &mut self.reading);
+        for (channels, &command) in self.reading[layout.actuators()..].chunks_exact_mut(2).zip(&self.commands) {
+            channels[0] = command;
         }
         for sensor in &self.sensors {
-            let reading = &mut self.reading[sensor.channel.column(n)];
+            let reading = &mut self.reading[sensor.channel.column(layout)];
             let truth = *reading;
             *reading = sensor.read(0, 1.0, |_| truth);
         }

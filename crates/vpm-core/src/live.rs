@@ -7,7 +7,7 @@ use crate::error::{Diverged, Error, Result};
 use crate::integrator::Integrator;
 use crate::ode::Ode;
 use crate::sensor::Sensor;
-use crate::simulate::{Stepping, check_state};
+use crate::simulate::{Stepping, check_state, check_step, state_name};
 use crate::system::System;
 use crate::table::Table;
 
@@ -38,6 +38,8 @@ pub struct Live {
 impl Live {
     /// The machine in `state`, no command given yet.
     pub fn new(description: Arc<Description>, theta: &[f64], state: &[f64], stepping: Stepping) -> Result<Self> {
+        check_state("state", &description, state)?;
+        check_step(&description, theta, stepping, state)?;
         let system: System<f64> = description.system(theta)?;
         let (dim, sensors) = (system.dim(), description.sensors(theta));
         let depth = depth(&description, theta, stepping.time_step)?;
@@ -121,22 +123,18 @@ impl Live {
             return Err(self.diverged(place));
         }
         self.system.rhs(&self.state, &mut self.rate);
-        let (n, actuators, width) = (self.description.n_joints(), self.description.n_actuators(), self.outputs.len());
+        let (layout, width) = (self.description.layout(), self.outputs.len());
+        let row = self.sample % self.depth * width;
+        self.system.dynamics().observe(&self.state, &self.rate, &mut self.truth[row..row + width]);
         // The command that is still held at the end of its interval; none before the first.
-        let held = (self.sample.saturating_sub(1) % self.depth) * actuators;
-        let row = self.sample % self.depth;
-        let (of_joints, of_actuators) = self.truth[row * width..(row + 1) * width].split_at_mut(4 * n);
-        let dynamics = self.system.dynamics();
-        for (joint, channels) in of_joints.chunks_exact_mut(4).enumerate() {
-            let values = [self.state[joint], self.state[n + joint], self.rate[n + joint], dynamics.efforts()[joint]];
-            channels.copy_from_slice(&values);
+        let held = self.sample.saturating_sub(1) % self.depth * layout.actuators;
+        let channels = self.truth[row + layout.actuators()..row + layout.lines()].chunks_exact_mut(2);
+        for (channels, &command) in channels.zip(&self.commands[held..]) {
+            channels[0] = command;
         }
-        for (number, channels) in of_actuators.chunks_exact_mut(2).enumerate() {
-            channels.copy_from_slice(&[self.commands[held + number], dynamics.forces()[number]]);
-        }
-        self.outputs.copy_from_slice(&self.truth[row * width..(row + 1) * width]);
+        self.outputs.copy_from_slice(&self.truth[row..row + width]);
         for sensor in &self.sensors {
-            let column = sensor.channel.column(n);
+            let column = sensor.channel.column(layout);
             let truth = |sample: usize| self.truth[(sample % self.depth) * width + column];
             self.outputs[column] = sensor.read(self.sample, self.stepping.time_step, truth);
         }
@@ -146,7 +144,7 @@ impl Live {
     #[cold]
     fn diverged(&self, place: usize) -> Error {
         Error::Diverged(Box::new(Diverged {
-            what: format!("state number {place}"),
+            what: format!("the {}", state_name(&self.description, place)),
             time: self.time(),
             sample_index: self.sample,
             method: self.stepping.method.name(),

@@ -1,9 +1,8 @@
 //! A machine with fixed parameters and all its buffers, for many fast evaluations: what a controller asks at every sample.
 
 use crate::description::Description;
-use crate::dynamics;
 use crate::error::{Error, Result};
-use crate::system::{Build, Dynamics, add_effects};
+use crate::system::{Build, Dynamics};
 
 /// The dynamics of a machine, ready to be evaluated again and again without allocation.
 ///
@@ -12,63 +11,70 @@ use crate::system::{Build, Dynamics, add_effects};
 #[derive(Clone, Debug)]
 pub struct Prepared {
     dynamics: Dynamics<f64>,
-    effects: Vec<f64>,
+    efforts: Vec<f64>,
+    jacobian: Vec<f64>,
 }
 
 impl Prepared {
     /// The machine with the parameters `theta`.
     pub fn new(description: &Description, theta: &[f64]) -> Result<Self> {
         description.check_values(theta)?;
+        let n = description.n_coordinates();
         let dynamics = Build::dynamics(&description, theta)?;
-        Ok(Self { dynamics, effects: vec![0.0; description.n_coordinates()] })
+        Ok(Self { dynamics, efforts: vec![0.0; n], jacobian: vec![0.0; 6 * n] })
     }
 
     /// Number of coordinates.
     #[inline]
     pub fn coordinates(&self) -> usize {
-        self.effects.len()
+        self.efforts.len()
     }
 
-    /// Efforts (N or N m) that the actuators have to put on the joints for accelerations `a` at coordinates `q` and rates `v`.
+    /// Efforts (N or N m) on all coordinates for accelerations `a` at coordinates `q` and rates `v`, those of the effects taken off.
     ///
-    /// Law: `M(q) a + h(q, v) - effects(q, v)`; frictions, springs, loads and payloads are carried as well. Inverse of
+    /// Law: `M(q) a + h(q, v) + K q + D v - effects(q, v)`; frictions, springs, loads and payloads are carried as well. Inverse of
     /// [`Prepared::forward_dynamics`].
     #[inline]
     pub fn inverse_dynamics(&mut self, q: &[f64], v: &[f64], a: &[f64]) -> Result<&[f64]> {
         self.expect([("position", q), ("velocity", v), ("acceleration", a)])?;
-        let Self { dynamics: Dynamics { model, data, effects, .. }, effects: required } = self;
-        required.fill(0.0);
-        add_effects(effects, q, v, required);
-        for (required, &rigid) in required.iter_mut().zip(dynamics::rnea(model, data, q, v, a)) {
-            *required = rigid - *required;
-        }
-        Ok(required)
+        self.dynamics.inverse_dynamics(q, v, a, &mut self.efforts);
+        Ok(&self.efforts)
     }
 
-    /// Accelerations (m/s^2 or rad/s^2) that efforts `tau` (N or N m) of the actuators on the joints give, with all effects.
+    /// Accelerations (m/s^2 or rad/s^2) that efforts `tau` (N or N m) on all coordinates give, with all effects.
     #[inline]
     pub fn forward_dynamics(&mut self, q: &[f64], v: &[f64], tau: &[f64]) -> Result<&[f64]> {
         self.expect([("position", q), ("velocity", v), ("effort", tau)])?;
-        Ok(self.dynamics.accelerations(q, v, tau))
+        Ok(self.dynamics.forward_dynamics(q, v, tau))
     }
 
     /// Mass matrix with payloads, n x n (kg, kg m or kg m^2), symmetric.
     #[inline]
     pub fn mass_matrix(&mut self, q: &[f64]) -> Result<&[f64]> {
         self.expect([("position", q)])?;
-        Ok(dynamics::crba(&self.dynamics.model, &mut self.dynamics.data, q))
+        Ok(self.dynamics.mass_matrix(q))
     }
 
-    /// Kinetic and potential energy in J: of bodies in gravity, and of the effects that have a potential.
-    ///
-    /// Checked: with efforts of the actuators and frictions accounted for, the sum is conserved along a simulated run.
+    /// Kinetic and potential energy in J. The potential is that of gravity, of the beams, and of the effects that have one.
     #[inline]
     pub fn energy(&mut self, q: &[f64], v: &[f64]) -> Result<(f64, f64)> {
         self.expect([("position", q), ("velocity", v)])?;
-        let Dynamics { model, data, effects, .. } = &mut self.dynamics;
-        let total = dynamics::energy(model, data, q, v);
-        let stored: f64 = effects.iter().map(|(joint, effect)| effect.potential(q[*joint])).sum();
-        Ok((total.kinetic, total.potential + stored))
+        let total = self.dynamics.energy(q, v);
+        Ok((total.kinetic, total.potential))
+    }
+
+    /// Jacobian of marker `number`, 6 x n row by row: angular velocity and velocity of its origin per unit rate of each coordinate, in
+    /// world axes.
+    #[inline]
+    pub fn jacobian(&mut self, q: &[f64], number: usize) -> Result<&[f64]> {
+        self.expect([("position", q)])?;
+        let count = self.dynamics.layout().markers;
+        if number >= count {
+            let what = "the request for a Jacobian".to_owned();
+            return Err(Error::Reference { what, target: "marker", index: number, count });
+        }
+        self.dynamics.jacobian(q, number, &mut self.jacobian);
+        Ok(&self.jacobian)
     }
 
     #[inline]

@@ -105,11 +105,13 @@ fn wrong_shape(name: &str, wanted: &str, shape: &[usize]) -> PyErr {
 
 /// Places in a list that Python may have counted from the end or beyond.
 pub(crate) fn places(name: &str, numbers: &[i64]) -> PyResult<Vec<usize>> {
-    let place = |&number: &i64| {
-        usize::try_from(number)
-            .map_err(|_| PyValueError::new_err(format!("`{name}` must not be negative, got {number}; count from 0")))
-    };
-    numbers.iter().map(place).collect()
+    numbers.iter().map(|&number| place(name, number)).collect()
+}
+
+/// A place that Python may have counted from the end or beyond.
+pub(crate) fn place(name: &str, number: i64) -> PyResult<usize> {
+    usize::try_from(number)
+        .map_err(|_| PyValueError::new_err(format!("`{name}` must not be negative, got {number}; count from 0")))
 }
 
 /// A table as an array of shape (rows, columns).

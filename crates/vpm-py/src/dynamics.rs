@@ -2,12 +2,12 @@
 
 use std::sync::{Mutex, MutexGuard};
 
-use numpy::{PyArray1, PyArray2};
+use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use vpm_core::prepared::Prepared;
 
-use crate::arrays::{Numbers, Vector, square};
+use crate::arrays::{Numbers, Vector, place, square};
 use crate::errors::exception;
 use crate::system::System;
 
@@ -52,7 +52,7 @@ impl Dynamics {
         Ok(Self { prepared: Mutex::new(system.checked(py, prepared)?) })
     }
 
-    /// Efforts (n,) of the actuators that accelerations (n,) need, effects carried as well.
+    /// Efforts (n,) that accelerations (n,) need, effects carried as well.
     fn inverse_dynamics<'py>(
         &self,
         py: Python<'py>,
@@ -67,7 +67,7 @@ impl Dynamics {
         result.map(|effort| PyArray1::from_slice(py, effort)).map_err(|error| exception(py, error, 0, 0))
     }
 
-    /// Accelerations (n,) that efforts (n,) of the actuators give, with all effects.
+    /// Accelerations (n,) that efforts (n,) give, with all effects.
     fn forward_dynamics<'py>(
         &self,
         py: Python<'py>,
@@ -97,6 +97,18 @@ impl Dynamics {
     fn energy(&self, py: Python<'_>, position: &Any<'_>, velocity: &Any<'_>) -> PyResult<(f64, f64)> {
         let (q, v) = (Vector::new("position", position)?, Vector::new("velocity", velocity)?);
         self.prepared()?.energy(q.values()?, v.values()?).map_err(|error| exception(py, error, 0, 0))
+    }
+
+    /// Jacobian (6, n) of a marker by number: angular velocity, then velocity of its origin, in world axes.
+    fn jacobian<'py>(&self, py: Python<'py>, position: &Any<'py>, marker: i64) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let q = Vector::new("position", position)?;
+        let marker = place("marker", marker)?;
+        let mut prepared = self.prepared()?;
+        let n = prepared.coordinates();
+        match prepared.jacobian(q.values()?, marker) {
+            Ok(jacobian) => PyArray1::from_slice(py, jacobian).reshape([6, n]),
+            Err(error) => Err(exception(py, error, 0, 0)),
+        }
     }
 
     fn __repr__(&self) -> PyResult<String> {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Iterator, Mapping
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -11,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from vpm.errors import ModelError, near_match
 from vpm.linear import LinearModel
+from vpm.model.components import Components
 
 if TYPE_CHECKING:
     from vpm._core import Dynamics, System
@@ -19,38 +21,27 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-class Evaluations:
+class Evaluations(Components):
     """The part of a model that asks the core about one state.
 
     Positions, velocities and so on are arrays of one number per coordinate, in the order of ``model.coordinates``
     (joints, then the elastic coordinates of flexible links); m or rad, per second, N or N m.
     """
 
-    if TYPE_CHECKING:  # what the rest of the model gives
+    @property
+    @abstractmethod
+    def parameters(self) -> Mapping[str, Parameter]:
+        """Parameters by dotted name."""
 
-        @property
-        def name(self) -> str: ...
-        @property
-        def joints(self) -> tuple[str, ...]: ...
-        @property
-        def coordinates(self) -> tuple[str, ...]: ...
-        @cached_property
-        def state_names(self) -> tuple[str, ...]: ...
-        @property
-        def actuators(self) -> tuple[str, ...]: ...
-        @property
-        def beams(self) -> tuple[str, ...]: ...
-        @property
-        def markers(self) -> tuple[str, ...]: ...
-        @cached_property
-        def output_channels(self) -> tuple[str, ...]: ...
-        @cached_property
-        def parameters(self) -> Mapping[str, Parameter]: ...
-        @cached_property
-        def theta(self) -> Array: ...
-        @cached_property
-        def core(self) -> System: ...
-        def channel_unit(self, channel: str) -> str: ...
+    @property
+    @abstractmethod
+    def theta(self) -> Array:
+        """Values of all parameters."""
+
+    @property
+    @abstractmethod
+    def core(self) -> System:
+        """Compiled system."""
 
     # ---- single evaluations ------------------------------------------------------------------------------------------
 
@@ -139,6 +130,72 @@ class Evaluations:
         """
         return self.dynamics.energy(q, v)
 
+    def jacobian(self, marker: str, q: ArrayLike) -> Array:
+        """Jacobian of a marker: what the rates of the coordinates do to it.
+
+        Parameters
+        ----------
+        marker : str
+        q : array_like, shape (n,)
+
+        Returns
+        -------
+        ndarray, shape (6, n)
+            Angular velocity (rows 0 to 2) and velocity of its origin, in world axes, per unit rate of each coordinate.
+
+        Raises
+        ------
+        ModelError
+            There is no such marker.
+        ValueError
+            The length is wrong.
+        """
+        return self.dynamics.jacobian(q, self.markers.index(self._known(marker, self.markers, "marker")))
+
+    # ---- rest --------------------------------------------------------------------------------------------------------
+
+    def equilibrium(self, q: ArrayLike) -> tuple[Array, Array]:
+        """Rest under gravity with the joints held: how far flexible links sag, and what holds the joints.
+
+        Parameters
+        ----------
+        q : array_like, shape (joints,)
+            Positions of the joints.
+
+        Returns
+        -------
+        coordinates : ndarray, shape (n,)
+            ``q``, then the elastic coordinates.
+        effort : ndarray, shape (joints,)
+            N or N m; springs and loads of the joints are carried too.
+
+        Raises
+        ------
+        ValueError
+            The length is wrong, or there is no rest: what the links carry buckles them.
+        """
+        return self.core.equilibrium(self.theta, q)
+
+    def natural_frequencies(self, q: ArrayLike) -> Array:
+        """Frequencies of free vibration about rest with the joints locked, without damping.
+
+        Parameters
+        ----------
+        q : array_like, shape (joints,)
+            Positions of the joints.
+
+        Returns
+        -------
+        ndarray, shape (elastic coordinates,)
+            Hz, slowest first; a negative one is the rate of growth of a link that buckles.
+
+        Raises
+        ------
+        ValueError
+            As `equilibrium`.
+        """
+        return self.core.natural_frequencies(self.theta, q)
+
     # ---- linear models -----------------------------------------------------------------------------------------------
 
     def state(self, values: Mapping[str, float] | ArrayLike | None = None) -> Array:
@@ -190,8 +247,8 @@ class Evaluations:
         Parameters
         ----------
         state : mapping of str to float, or array_like of shape (nx,), optional
-            As in `state`; by default all coordinates and velocities are zero. Lags that are not named have settled on
-            their commands.
+            As in `state`; by default all joints are at zero and at rest. Flexible links of which no coordinate is named
+            rest under gravity, lags that are not named have settled on their commands.
         inputs : mapping of str to float, or array_like of shape (nu,), optional
             As in `command`; the commands that stand.
 
@@ -227,10 +284,13 @@ class Evaluations:
         )
 
     def _settled(self, values: Mapping[str, float] | ArrayLike | None, command: Array) -> Array:
-        """State in which lags that are not named hold their command."""
+        """State in which flexible links that are not named rest and lags that are not named hold their command."""
         place = self.state(values)
         if values is None or isinstance(values, Mapping):
             named = values or {}
+            joints, coordinates = len(self.joints), len(self.coordinates)
+            if coordinates > joints and not any(name in named for name in self.state_names[joints:coordinates]):
+                place[:coordinates] = self.equilibrium(place[:joints])[0]
             for column, name in enumerate(self.actuators):
                 if f"{name}.lag" in self.state_names and f"{name}.lag" not in named:
                     place[self.state_names.index(f"{name}.lag")] = command[column]

@@ -17,7 +17,6 @@ from vpm.catalogue import SITE_KINDS, effect_type
 from vpm.errors import ModelError, VpmError, near_match
 from vpm.model.check import Checked, check_document
 from vpm.model.compile import description
-from vpm.model.components import Components
 from vpm.model.effects import Effect, effects_of
 from vpm.model.evaluation import Evaluations
 from vpm.model.messages import parse_toml, read_toml

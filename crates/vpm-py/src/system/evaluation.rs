@@ -2,12 +2,13 @@
 
 use numpy::{PyArray1, PyArray2, PyArray3};
 use pyo3::prelude::*;
+use vpm_core::beam::Beam;
 use vpm_core::evaluate;
 use vpm_core::inverse::{Motion, inverse_dynamics};
 use vpm_core::linearize::linearize;
 
 use super::System;
-use crate::arrays::{Numbers, cube, matrix, places};
+use crate::arrays::{Numbers, cube, matrix, place, places};
 
 type Table<'py> = Bound<'py, PyArray2<f64>>;
 type Cube<'py> = Bound<'py, PyArray3<f64>>;
@@ -74,7 +75,7 @@ impl System {
     fn mass_matrix<'py>(&self, py: Python<'py>, theta: &Any<'py>, position: &Any<'py>) -> PyResult<Table<'py>> {
         let (theta, q) = (Numbers::vector("theta", theta)?, Numbers::vector("position", position)?);
         let result = evaluate::mass_matrix(&self.description, theta.values(), q.values());
-        let n = self.description.n_joints();
+        let n = self.description().n_coordinates();
         matrix(py, self.checked(py, result)?, [n, n])
     }
 
@@ -104,5 +105,59 @@ impl System {
             matrix(py, linear.output, [ny, nx])?,
             matrix(py, linear.feedthrough, [ny, nu])?,
         ))
+    }
+
+    /// All coordinates (n,) at rest under gravity with the joints held, and the efforts (n_joints,) that hold them.
+    fn equilibrium<'py>(
+        &self,
+        py: Python<'py>,
+        theta: &Any<'py>,
+        position: &Any<'py>,
+    ) -> PyResult<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>)> {
+        let (theta, q) = (Numbers::vector("theta", theta)?, Numbers::vector("position", position)?);
+        let result = py.detach(|| evaluate::equilibrium(self.description(), theta.values(), q.values()));
+        let (coordinates, efforts) = self.checked(py, result)?;
+        Ok((PyArray1::from_vec(py, coordinates), PyArray1::from_vec(py, efforts)))
+    }
+
+    /// Natural frequencies (k,) in Hz about rest with the joints locked, slowest first; negative for growth instead of vibration.
+    fn natural_frequencies<'py>(
+        &self,
+        py: Python<'py>,
+        theta: &Any<'py>,
+        position: &Any<'py>,
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let (theta, q) = (Numbers::vector("theta", theta)?, Numbers::vector("position", position)?);
+        let result = py.detach(|| evaluate::natural_frequencies(self.description(), theta.values(), q.values()));
+        Ok(PyArray1::from_vec(py, self.checked(py, result)?))
+    }
+
+    /// Largest slope in rad of each beam in each of many states (N, n_beams); not a number where the kinematics are exact.
+    fn slopes<'py>(&self, py: Python<'py>, theta: &Any<'py>, states: &Any<'py>) -> PyResult<Table<'py>> {
+        let (theta, states) = (Numbers::vector("theta", theta)?, Numbers::table("states", states)?);
+        let slopes = self.compute(py, |_| {
+            evaluate::slopes(self.description(), theta.values(), states.as_table()?)
+        })?;
+        matrix(py, slopes, [states.rows(), self.description().n_beams()])
+    }
+
+    /// Slope in rad up to which the kinematics of small slopes are right within 1 %.
+    #[getter]
+    fn slope_limit(&self) -> f64 {
+        Beam::<f64>::slope_limit()
+    }
+
+    /// Jacobian (6, n) of a marker by number: angular velocity, then velocity of its origin, in world axes.
+    fn jacobian<'py>(
+        &self,
+        py: Python<'py>,
+        theta: &Any<'py>,
+        position: &Any<'py>,
+        marker: i64,
+    ) -> PyResult<Table<'py>> {
+        let (theta, q) = (Numbers::vector("theta", theta)?, Numbers::vector("position", position)?);
+        let number = place("marker", marker)?;
+        let result = evaluate::marker_jacobian(self.description(), theta.values(), q.values(), number);
+        matrix(py, self.checked(py, result)?, [6, self.description().n_coordinates()])
     }
 }

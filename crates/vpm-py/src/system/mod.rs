@@ -70,6 +70,24 @@ impl System {
         self.description.n_joints()
     }
 
+    /// Number of coordinates: joints, then the elastic coordinates of the beams.
+    #[getter]
+    fn n_coordinates(&self) -> usize {
+        self.description.n_coordinates()
+    }
+
+    /// Number of elastic coordinates.
+    #[getter]
+    fn n_elastic(&self) -> usize {
+        self.description.n_elastic()
+    }
+
+    /// Number of beams.
+    #[getter]
+    fn n_beams(&self) -> usize {
+        self.description.n_beams()
+    }
+
     /// Length of the state: positions, velocities, one state per actuator with lag.
     #[getter]
     fn n_states(&self) -> usize {
