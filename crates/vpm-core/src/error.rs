@@ -81,6 +81,15 @@ pub enum Error {
         /// Length of the beam, m.
         length: f64,
     },
+    /// Inverse dynamics of a machine whose beams are elastic.
+    #[error(
+        "the motion of the joints alone does not tell the efforts of a machine with the elastic beam `{beam}`, whose own motion counts \
+         too; simulate it with prescribed joint motion, or make its beams rigid"
+    )]
+    Flexible {
+        /// Name of the first such beam.
+        beam: String,
+    },
     /// A payload sits on a body that does not exist.
     #[error(
         "payload number {payload} sits on body number {body}, but the model has {bodies} bodies; use a number below {bodies}"

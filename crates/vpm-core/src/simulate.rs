@@ -1,9 +1,11 @@
 //! Simulation of a whole record: free run on commands, closed loop on references, restarts from many samples.
 
 mod names;
+mod prescribed;
 mod stepper;
 
 pub(crate) use names::state_name;
+pub use prescribed::prescribed;
 pub(crate) use stepper::{Drive, Plan, Stepper};
 
 use crate::description::Description;
