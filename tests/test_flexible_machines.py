@@ -11,7 +11,7 @@ from scipy.linalg import eigh
 from scipy.optimize import root
 from scipy.spatial.transform import Rotation
 
-from test_beam_files import trees
+from random_trees import trees
 from vpm._core import Dynamics
 from vpm.model import Model
 
