@@ -8,7 +8,7 @@
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .SUFFIXES:
-.PHONY: help demo test test-rust test-python lint lint-rust lint-python bench docs package clean
+.PHONY: help demo test test-rust test-python reference lint lint-rust lint-python bench docs package clean
 
 PYTHON ?= python3
 DEMO_OUT ?= demo-report
@@ -35,6 +35,9 @@ test: test-rust test-python ## all tests, Rust and Python
 
 test-rust: | $(VENV)/.tools-found
 	cargo test $(CARGO_ARGS)
+
+reference: | $(VENV)/.tools-found ## integrators against an adaptive solver, which takes minutes to build
+	cargo test --features reference --test reference $(CARGO_ARGS)
 
 test-python: $(VENV)/.installed
 	$(BIN)/python -m pytest $(PYTEST_ARGS)

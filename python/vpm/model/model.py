@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from vpm._core import System
 
 
-class Model(Components, Evaluations, Storable):
+class Model(Evaluations, Storable):
     """A machine: bodies, joints, beams, actuators, sensors, controllers and effects, with one flat table of parameters.
 
     Build it with `load`, `from_toml` or `from_dict`. Numbers that go in and out are SI; the units of a file are

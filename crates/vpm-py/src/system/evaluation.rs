@@ -135,9 +135,7 @@ impl System {
     /// Largest slope in rad of each beam in each of many states (N, n_beams); not a number where the kinematics are exact.
     fn slopes<'py>(&self, py: Python<'py>, theta: &Any<'py>, states: &Any<'py>) -> PyResult<Table<'py>> {
         let (theta, states) = (Numbers::vector("theta", theta)?, Numbers::table("states", states)?);
-        let slopes = self.compute(py, |_| {
-            evaluate::slopes(self.description(), theta.values(), states.as_table()?)
-        })?;
+        let slopes = self.compute(py, |_| evaluate::slopes(self.description(), theta.values(), states.as_table()?))?;
         matrix(py, slopes, [states.rows(), self.description().n_beams()])
     }
 
