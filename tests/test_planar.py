@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flexible_arm import DURATION, MOTIONS, errors, planar_arm, swing
+from reference_arm import DURATION, MOTIONS, errors, planar_arm, swing
 from vpm.errors import DivergedError, ModelError
 from vpm.planar import FlexibleLink, Gauge, PlanarArm, PlanarRun, SampledReference, Swing
 
