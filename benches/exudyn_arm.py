@@ -1,8 +1,8 @@
 """The two-link flexible arm with geometrically exact beam elements of three nodes, in Exudyn.
 
 Settings are those that make it fastest here: the build without range checks, symbolic functions instead of Python ones
-for the references (nothing calls Python while it runs), a modified Newton method, one thread, no files, sensors at 10 Hz,
-and the linear solver that a trial run finds fastest.
+for the references (nothing calls Python while it runs), a modified Newton method, one thread, no files, sensors at
+10 Hz, and the linear solver that a trial run finds fastest.
 """
 
 from __future__ import annotations
@@ -14,12 +14,13 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
 from reference_arm import DURATION, P, swing
 
 sys.exudynFast = True  # type: ignore[attr-defined]  # read by exudyn when it is imported
 
 import exudyn as exu  # noqa: E402
-from exudyn import itemInterface as items  # noqa: E402
+from exudyn import itemInterface as items  # noqa: E402, N813
 from exudyn.advancedUtilities import CreateSymbolicUserFunction  # noqa: E402
 
 Array = NDArray[np.float64]

@@ -146,7 +146,8 @@ def goal(found: list[Row]) -> str:
     )
     return (
         f"Within {GOAL['ms']:g} ms of CPU time for 24 s, tip errors of {GOAL['tip']:g} m and strain errors of "
-        f"{GOAL['strains'][0]:g} and {GOAL['strains'][1]:g} are reached on both motions by: {'; '.join(good) or 'none'}."
+        f"{GOAL['strains'][0]:g} and {GOAL['strains'][1]:g} are reached on both motions by: "
+        f"{'; '.join(good) or 'none'}."
     )
 
 

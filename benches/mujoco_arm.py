@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 from mujoco import rollout
 from numpy.typing import NDArray
+
 from reference_arm import DURATION, P, swing
 
 Array = NDArray[np.float64]
