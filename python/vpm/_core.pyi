@@ -1,12 +1,12 @@
 """The compiled core of vpm: a machine as one object, arrays in and out."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["Diverged", "Karl", "Leg", "PlanarArm", "System", "hyq_parameters"]
+__all__ = ["Diverged", "Dynamics", "Karl", "Leg", "PlanarArm", "Simulation", "System", "hyq_parameters", "stop_when"]
 
 class Diverged(ArithmeticError):
     """A simulation left the finite numbers.
@@ -24,6 +24,80 @@ class Diverged(ArithmeticError):
     sample_index: int
     outputs: NDArray[np.float64]
     states: NDArray[np.float64]
+
+def stop_when(asked: Callable[[], bool] | None) -> None:
+    """Let long computations of the calling thread stop with ``KeyboardInterrupt`` when ``asked()`` is true.
+
+    Ctrl-C reaches Python's main thread only; this is how it tells the threads that work for it. None ends it.
+    """
+
+@final
+class Dynamics:
+    """Single evaluations of a machine with fixed parameters, as fast as the crossing into Python allows.
+
+    One-dimensional contiguous arrays of double precision are read where they are, others are converted first. n is
+    the number of coordinates. Raises ``ValueError`` for other sizes; numbers that are not finite give results that
+    are not finite.
+
+    Parameters
+    ----------
+    system : System
+    theta : array_like, shape (P,)
+    """
+
+    def __new__(cls, system: System, theta: ArrayLike) -> Dynamics: ...
+    def inverse_dynamics(
+        self, position: ArrayLike, velocity: ArrayLike, acceleration: ArrayLike
+    ) -> NDArray[np.float64]:
+        """Efforts (n,) that accelerations (n,) need: ``M a + h - effects``; what no actuator gives has to be zero."""
+    def forward_dynamics(self, position: ArrayLike, velocity: ArrayLike, effort: ArrayLike) -> NDArray[np.float64]:
+        """Accelerations (n,) under efforts (n_joints,) of the actuators, with all effects."""
+    def mass_matrix(self, position: ArrayLike) -> NDArray[np.float64]:
+        """Mass matrix (n, n), payloads included."""
+    def energy(self, position: ArrayLike, velocity: ArrayLike) -> tuple[float, float]:
+        """Kinetic and potential energy in J: of bodies in gravity, and of effects that have a potential."""
+    def jacobian(self, position: ArrayLike, marker: int) -> NDArray[np.float64]:
+        """Jacobian (6, n) of a marker by number: angular velocity, then velocity of its origin, in world axes."""
+
+@final
+class Simulation:
+    """A simulation that goes on one sample at a time.
+
+    Parameters
+    ----------
+    system : System
+    theta : array_like, shape (P,)
+    state : array_like, shape (n_states,)
+    time_step : float
+        Time between samples, s.
+    substeps : int
+    integrator : str
+    """
+
+    def __new__(
+        cls,
+        system: System,
+        theta: ArrayLike,
+        state: ArrayLike,
+        time_step: float,
+        substeps: int,
+        integrator: str,
+    ) -> Simulation: ...
+    @property
+    def time(self) -> float:
+        """Time since the beginning, s."""
+    @property
+    def state(self) -> NDArray[np.float64]:
+        """State now (n_states,); a copy."""
+    @property
+    def outputs(self) -> NDArray[np.float64]:
+        """What the sensors show now (n_outputs,); a copy."""
+    def step(self, inputs: ArrayLike) -> NDArray[np.float64]:
+        """Hold ``inputs`` (n_inputs,) for one sample; outputs (n_outputs,) at its end, with the inputs still held."""
+    def run(self, inputs: ArrayLike) -> NDArray[np.float64]:
+        """A step for each row of ``inputs`` (N, n_inputs); outputs (N, n_outputs)."""
+    def reset(self, state: ArrayLike) -> None:
+        """Begin again at time zero in ``state`` (n_states,), with nothing remembered."""
 
 @final
 class System:
@@ -45,6 +119,15 @@ class System:
     @property
     def n_joints(self) -> int:
         """Number of joints n."""
+    @property
+    def n_coordinates(self) -> int:
+        """Number of coordinates: joints, then the elastic coordinates of the beams."""
+    @property
+    def n_elastic(self) -> int:
+        """Number of elastic coordinates."""
+    @property
+    def n_beams(self) -> int:
+        """Number of beams."""
     @property
     def n_states(self) -> int:
         """Length of the state."""
@@ -144,6 +227,18 @@ class System:
         """Mass matrix (n, n), payloads included."""
     def energy(self, theta: ArrayLike, position: ArrayLike, velocity: ArrayLike) -> tuple[float, float]:
         """Kinetic and potential energy in J: of bodies in gravity, and of effects that have a potential."""
+    def linearize(
+        self, theta: ArrayLike, state: ArrayLike, inputs: ArrayLike
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Exact derivatives at ``state`` (n_states,) under standing commands ``inputs`` (m,).
+
+        Delays pass their input unchanged; dead zones and saturations have the slope at the command.
+
+        Returns
+        -------
+        A, B, C, D : ndarray, shapes (nx, nx), (nx, m), (ny, nx), (ny, m)
+            Of the rates and of all outputs, sensors' gains included.
+        """
     def time_steps(
         self,
         theta: ArrayLike,

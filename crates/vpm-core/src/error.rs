@@ -50,6 +50,37 @@ pub enum Error {
         /// The parent asked for.
         parent: usize,
     },
+    /// Parts that hang on each other in a ring.
+    #[error(
+        "`{}` hang on each other in a ring, but from every part of a tree one way leads to the world; hang one of them on the \
+         world or on a part that is not of the ring", names.join("`, `")
+    )]
+    Loop {
+        /// Names of the bodies and beams in the ring, each before what it hangs on.
+        names: Vec<String>,
+    },
+    /// A body without mass that carries nothing.
+    #[error(
+        "`{body}` has no inertia and carries nothing that has, so its joint moves nothing; give it an inertia or hang a body on it"
+    )]
+    Carrier {
+        /// Name of the body.
+        body: String,
+    },
+    /// A section that lies outside of its beam.
+    #[error(
+        "{what} sits on beam `{beam}` at {at} m, but the beam ends at {length} m; give an arc length from 0 to {length} m"
+    )]
+    Section {
+        /// What sits there, for example ``marker `tip` ``.
+        what: String,
+        /// Name of the beam.
+        beam: String,
+        /// The arc length asked for, m.
+        at: f64,
+        /// Length of the beam, m.
+        length: f64,
+    },
     /// A payload sits on a body that does not exist.
     #[error(
         "payload number {payload} sits on body number {body}, but the model has {bodies} bodies; use a number below {bodies}"

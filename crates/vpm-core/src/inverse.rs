@@ -1,5 +1,6 @@
 //! Inverse dynamics of a whole record: the effort that the motion needs against the effort that the actuators deliver.
 
+use crate::actuator::Target;
 use crate::description::Description;
 use crate::dynamics::rnea;
 use crate::error::{Error, Result};
@@ -133,6 +134,7 @@ impl Inverse<'_> {
         let joints = dynamics.joints();
         let mut applied = vec![S::zero(); inputs.rows() * joints];
         for (number, actuator) in dynamics.actuators.iter().enumerate() {
+            let Target::Joint(joint) = actuator.on else { continue };
             let command = |sample: usize| S::from_f64(inputs.at(sample, number));
             let (mut state, mut before) = (None, None);
             for (k, row) in applied.chunks_exact_mut(joints).enumerate() {
@@ -146,7 +148,7 @@ impl Inverse<'_> {
                     None => input,
                 };
                 let effort = actuator.motor.effort(mean);
-                row[actuator.joint] += (before.unwrap_or(effort) + effort) * 0.5;
+                row[joint] += (before.unwrap_or(effort) + effort) * 0.5;
                 before = Some(effort);
             }
         }

@@ -1,7 +1,9 @@
 //! Simulation of a whole record: free run on commands, closed loop on references, restarts from many samples.
 
+mod names;
 mod stepper;
 
+pub(crate) use names::state_name;
 pub(crate) use stepper::{Drive, Plan, Stepper};
 
 use crate::description::Description;
@@ -51,7 +53,7 @@ pub(crate) fn check_time_step(time_step: f64) -> Result<()> {
 /// What a simulation gives, each table row by row.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Run {
-    /// Outputs of each sample: position, velocity, acceleration, effort of each joint, command and force of each actuator.
+    /// Outputs of each sample, in the order of [`crate::sensor::Layout`].
     pub outputs: Vec<f64>,
     /// State of each sample.
     pub states: Vec<f64>,

@@ -4,8 +4,8 @@ use std::f64::consts::TAU;
 
 use allocation_counter::measure;
 use nalgebra::{DMatrix, DVector};
-use vpm_core::beam::Section;
-use vpm_core::beam::strain::{Drive, FlexibleLink, FlexibleTree, Strain, StrainBeam, TreeMotion};
+use vpm_core::beam::strain::{Drive, FlexibleLink, FlexibleTree, StrainBeam, TreeMotion};
+use vpm_core::beam::{Component, Section};
 use vpm_core::integrator::{Integrator, Method};
 use vpm_core::ode::Ode;
 use vpm_core::samples::Random;
@@ -36,7 +36,7 @@ impl Drive for Spin {
 /// The arm of Simo & Vu-Quoc 1986: 10 m, EJ = 1.4e4, aGA = 1e7, EA = 2.8e7, rhoA = 1.2, rhoJ = 6e-4.
 fn spinner() -> Result<FlexibleTree> {
     let section = Section::given([1.4e4, 1.4e4, 1e4, 1e7, 1e7, 2.8e7], [6e-4, 6e-4, 6e-4, 1.2, 1.2, 1.2])?;
-    let list = fields(10.0, &[(Strain::BendingX, 4), (Strain::ShearY, 2), (Strain::Extension, 3)])?;
+    let list = fields(10.0, &[(Component::BendingX, 4), (Component::ShearY, 2), (Component::Extension, 3)])?;
     let beam = Some((along_x(0.0), StrainBeam::new(section, list, 0.0, 8)?));
     FlexibleTree::new(
         vec![FlexibleLink { joint: Some(pin([0.0, 0.0, 1.0])), beam, ..FlexibleLink::welded() }],
@@ -83,7 +83,7 @@ fn a_pendulum_that_shears_and_stretches_falls_as_two_other_codes_say() -> Result
         [1.0 / 6.0, 1.0 / 6.0, 1.0, 6_535.947_712_418_301, 6_535.947_712_418_301, 2e4],
         [1.833e-6, 1.833e-6, 1.833e-6, 0.22, 0.22, 0.22],
     )?;
-    let list = fields(1.0, &[(Strain::BendingX, 10), (Strain::ShearY, 2), (Strain::Extension, 3)])?;
+    let list = fields(1.0, &[(Component::BendingX, 10), (Component::ShearY, 2), (Component::Extension, 3)])?;
     let beam = Some((along_x(0.0), StrainBeam::new(section, list, 0.0, 12)?));
     let link = FlexibleLink { joint: Some(pin([0.0, 0.0, 1.0])), beam, ..FlexibleLink::welded() };
     let tree = FlexibleTree::new(vec![link], [0.0, -9.81, 0.0])?;
@@ -104,7 +104,7 @@ fn a_pendulum_that_shears_and_stretches_falls_as_two_other_codes_say() -> Result
 #[test]
 fn a_free_motion_keeps_its_energy() -> Result<()> {
     let section = Section::given([3.0, 2.0, 1.5, 20.0, 25.0, 40.0], [0.02, 0.03, 0.05, 1.0, 1.0, 1.0])?;
-    let list = fields(0.7, &[(Strain::BendingX, 2), (Strain::BendingY, 2), (Strain::Torsion, 1)])?;
+    let list = fields(0.7, &[(Component::BendingX, 2), (Component::BendingY, 2), (Component::Torsion, 1)])?;
     let beam = Some((along_x(0.1), StrainBeam::new(section, list, 0.0, 6)?));
     let joint = Some(pin([0.0, 0.0, 1.0]));
     let link = FlexibleLink { parent: None, joint, hub: body(0.5, 0.02), beam, tip: body(0.3, 0.01) };
@@ -170,7 +170,7 @@ fn trees_that_cannot_be_are_refused() -> Result<()> {
     assert!(FlexibleTree::new(vec![], [f64::NAN, 0.0, 0.0]).is_err());
     let section = Section::given([1.0; 6], [0.0, 0.0, 0.0, 1.0, 1.0, 1.0])?;
     assert!(StrainBeam::new(section, vec![], 0.0, 6).is_err());
-    let beam = StrainBeam::new(section, fields(1.0, &[(Strain::Torsion, 1)])?, 0.0, 6)?;
+    let beam = StrainBeam::new(section, fields(1.0, &[(Component::Torsion, 1)])?, 0.0, 6)?;
     let link = FlexibleLink { beam: Some((Pose::identity(), beam)), ..FlexibleLink::welded() };
     let tree = FlexibleTree::new(vec![link], [0.0; 3])?;
     assert!(

@@ -5,8 +5,7 @@ use std::f64::consts::PI;
 use nalgebra::DMatrix;
 use vpm_core::Result;
 use vpm_core::beam::quadrature::gauss;
-use vpm_core::beam::section::Properties;
-use vpm_core::beam::{Basis, Material, Section, Shape};
+use vpm_core::beam::{Basis, Material, Properties, Section, Shape};
 
 const STEEL: Material = Material { young: 210e9, poisson: 0.3, density: 7850.0 };
 

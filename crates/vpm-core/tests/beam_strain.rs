@@ -4,8 +4,8 @@ use std::f64::consts::TAU;
 
 use nalgebra::DMatrix;
 use vpm_core::beam::eigen::modes;
-use vpm_core::beam::strain::{FlexibleLink, FlexibleTree, Strain, StrainBeam, TipLoad, exponential, tangent};
-use vpm_core::beam::{Material, Section, Shape};
+use vpm_core::beam::strain::{FlexibleLink, FlexibleTree, StrainBeam, TipLoad, exponential, tangent};
+use vpm_core::beam::{Component, Material, Section, Shape};
 use vpm_core::samples::Random;
 use vpm_core::spatial::{Matrix3, Pose, Twist, Vector3};
 use vpm_core::{Dual, Result};
@@ -57,7 +57,8 @@ fn the_tangent_is_the_derivative_of_the_exponential() {
 fn a_tip_load_bends_the_elastica_in_any_plane() -> Result<()> {
     // Elliptic integrals at P L^2 / EJ = 10: w / L, u / L.
     let (across, along) = (0.810_609_024_880_296_4, 0.554_995_597_753_751_3);
-    for (angle, list) in [(0.0, vec![(Strain::BendingY, 9)]), (0.7, vec![(Strain::BendingX, 9), (Strain::BendingY, 9)])]
+    for (angle, list) in
+        [(0.0, vec![(Component::BendingY, 9)]), (0.7, vec![(Component::BendingX, 9), (Component::BendingY, 9)])]
     {
         let tree = clamped(StrainBeam::new(unit()?, fields(1.0, &list)?, 0.0, 24)?)?;
         let (mut q, (sin, cos)) = (vec![0.0; tree.len()], f64::sin_cos(angle));
@@ -74,7 +75,7 @@ fn a_tip_load_bends_the_elastica_in_any_plane() -> Result<()> {
 
 #[test]
 fn a_tip_moment_rolls_the_beam_up() -> Result<()> {
-    let tree = clamped(StrainBeam::new(unit()?, fields(1.0, &[(Strain::BendingY, 1)])?, 0.0, 8)?)?;
+    let tree = clamped(StrainBeam::new(unit()?, fields(1.0, &[(Component::BendingY, 1)])?, 0.0, 8)?)?;
     for phi in [0.25 * TAU, 0.5 * TAU, TAU, 2.0 * TAU] {
         let q = tree.equilibrium(&[0.0], &[TipLoad { link: 0, force: [0.0; 3], moment: [0.0, phi, 0.0] }])?;
         let mut workspace = tree.workspace();
@@ -87,7 +88,7 @@ fn a_tip_moment_rolls_the_beam_up() -> Result<()> {
 
 #[test]
 fn shear_and_extension_have_their_closed_forms() -> Result<()> {
-    let list = [(Strain::BendingY, 3), (Strain::ShearX, 2), (Strain::Extension, 2), (Strain::Torsion, 1)];
+    let list = [(Component::BendingY, 3), (Component::ShearX, 2), (Component::Extension, 2), (Component::Torsion, 1)];
     let section = Section::given([5.0, 6.0, 7.0, 8.0, 9.0, 10.0], [0.0, 0.0, 0.0, 1.0, 1.0, 1.0])?;
     let tree = clamped(StrainBeam::new(section, fields(2.0, &list)?, 0.0, 12)?)?;
     let tip = |load| -> Result<[f64; 3]> {
@@ -107,7 +108,7 @@ fn shear_and_extension_have_their_closed_forms() -> Result<()> {
 fn a_thick_beam_vibrates_as_timoshenko_says() -> Result<()> {
     let steel = Material { young: 210e9, poisson: 0.3, density: 7850.0 };
     let section = Section::new(Shape::Rectangle { width: 0.1, height: 0.1 }, steel)?;
-    let list = fields(1.0, &[(Strain::BendingX, 9), (Strain::ShearY, 9)])?;
+    let list = fields(1.0, &[(Component::BendingX, 9), (Component::ShearY, 9)])?;
     let tree = clamped(StrainBeam::new(section, list, 0.0, 60)?)?;
     let mut workspace = tree.workspace();
     tree.terms(&[0.0; 18], &[0.0; 18], &[], &mut workspace);

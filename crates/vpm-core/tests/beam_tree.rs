@@ -3,11 +3,12 @@
 use nalgebra::{DMatrix, DVector};
 use vpm_core::beam::linear::TipBody;
 use vpm_core::beam::planar::{Hub, LinkParameters, Load, Motion, PlanarChain};
-use vpm_core::beam::strain::{FlexibleLink, FlexibleTree, Strain, StrainBeam};
-use vpm_core::beam::{Basis, Section};
+use vpm_core::beam::strain::{FlexibleLink, FlexibleTree, StrainBeam};
+use vpm_core::beam::{Basis, Component, Section};
 use vpm_core::data::Data;
 use vpm_core::dynamics::{crba, rnea};
 use vpm_core::joint::Joint;
+use vpm_core::mount::Mount;
 use vpm_core::samples::{Random, random_tree};
 use vpm_core::{Dual, Result, Scalar};
 
@@ -15,15 +16,23 @@ use vpm_core::{Dual, Result, Scalar};
 mod beams;
 use beams::{along_x, body, fields, near, pin, spatial};
 
+/// The body that a body of a rigid tree hangs on.
+fn parent(body: &vpm_core::body::Body<f64>) -> Option<usize> {
+    match body.on {
+        Mount::Body(parent) => Some(parent),
+        _ => None,
+    }
+}
+
 #[test]
 fn without_beams_the_tree_is_the_rigid_one() -> Result<()> {
     for seed in 0..5 {
         let (sample, mut random) = (random_tree(seed, 7), Random::new(seed));
         let bodies = sample.bodies.iter();
         let links = bodies.map(|body| FlexibleLink {
-            parent: body.parent,
+            parent: parent(body),
             joint: Some(body.joint.clone()),
-            hub: body.spatial_inertia(),
+            hub: body.spatial_inertia().unwrap_or_default(),
             ..FlexibleLink::welded()
         });
         let tree = FlexibleTree::new(links.collect(), sample.gravity)?;
@@ -47,7 +56,7 @@ fn in_a_plane_the_tree_is_the_planar_chain() -> Result<()> {
     let chain = PlanarChain::<2, 3, 6>::new([first?, second?], [1.3, -9.81], 16)?;
     let section = Section::given([1.0; 6], [0.01, 0.01, 0.01, 1.0, 1.0, 1.0])?;
     let spatial = lengths.iter().enumerate().map(|(k, &length)| {
-        let beam = StrainBeam::new(section, fields(length, &[(Strain::BendingX, 2)])?, 0.0, 30)?;
+        let beam = StrainBeam::new(section, fields(length, &[(Component::BendingX, 2)])?, 0.0, 30)?;
         // The next joint's frame has to stand as the planar hub does: turned back from the beam's axes.
         let rotation = [0.0, 0.0, 1.0, 0.0, -1.0, 0.0, 1.0, 0.0, 0.0];
         let joint = if k == 0 { pin([0.0, 0.0, 1.0]) } else { Joint { rotation, ..pin([0.0, 0.0, 1.0]) } };

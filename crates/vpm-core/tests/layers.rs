@@ -8,9 +8,10 @@ use std::path::{Path, PathBuf};
 const TREE: [&str; 11] =
     ["error", "scalar", "algebra", "spatial", "kinematics", "joint", "body", "model", "data", "dynamics", "linkage"];
 /// Parts that stand alone, each a rig of its own, and all that they may import besides themselves.
-const ALONE: [(&str, &[&str]); 10] = [
+const ALONE: [(&str, &[&str]); 11] = [
     ("error", &[]),
     ("scalar", &[]),
+    ("mount", &[]),
     ("table", &["error"]),
     ("delay", &["error", "scalar"]),
     ("ode", &["error", "scalar"]),
@@ -21,8 +22,20 @@ const ALONE: [(&str, &[&str]); 10] = [
     ("controller", &["error", "scalar", "effect::Domain", "actuator::Saturation"]),
 ];
 /// What puts the parts together, lowest first: each may import any part, any tree module and any before it.
-const WHOLE: [&str; 9] =
-    ["beam", "sensitivity", "system", "description", "simulate", "inverse", "evaluate", "timing", "samples"];
+const WHOLE: [&str; 12] = [
+    "beam",
+    "sensitivity",
+    "system",
+    "description",
+    "simulate",
+    "inverse",
+    "evaluate",
+    "linearize",
+    "live",
+    "prepared",
+    "timing",
+    "samples",
+];
 const WITNESSES: [&str; 4] = ["aba", "crba", "rnea", "virtual_work"];
 
 fn sources(folder: &Path, found: &mut Vec<PathBuf>) -> Result<()> {

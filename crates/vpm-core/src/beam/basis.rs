@@ -19,6 +19,7 @@ pub struct Basis {
 enum Kind {
     Bernstein { degree: usize, clamped: usize },
     Hermite { elements: usize },
+    Linear { elements: usize, clamped: usize },
     Legendre { count: usize },
     Monomial { count: usize },
     Combination { base: Box<Basis>, columns: DMatrix<f64> },
@@ -39,6 +40,13 @@ impl Basis {
     pub fn hermite(length: f64, elements: usize) -> Result<Self> {
         within("the number of Hermite elements", elements, 1, 1000)?;
         Self::new(length, Kind::Hermite { elements })
+    }
+
+    /// Piecewise linear functions on elements of equal length, one for each node but the first `clamped` (0 or 1).
+    pub fn linear(length: f64, elements: usize, clamped: usize) -> Result<Self> {
+        within("the number of linear elements", elements, 1, 1000)?;
+        within("the clamped nodes of linear elements", clamped, 0, 1)?;
+        Self::new(length, Kind::Linear { elements, clamped })
     }
 
     /// Legendre polynomials `P_0 .. P_(count-1)` in `2 mu / L - 1`: orthogonal, the natural choice for strains.
@@ -74,6 +82,7 @@ impl Basis {
         match &self.kind {
             Kind::Bernstein { degree, clamped } => degree + 1 - clamped,
             Kind::Hermite { elements } => 2 * elements,
+            Kind::Linear { elements, clamped } => elements + 1 - clamped,
             Kind::Legendre { count } | Kind::Monomial { count } => *count,
             Kind::Combination { columns, .. } => columns.ncols(),
         }
@@ -87,7 +96,9 @@ impl Basis {
     /// Arc lengths between which every function is one polynomial, in m, root and tip included.
     pub fn breaks(&self) -> Vec<f64> {
         match &self.kind {
-            Kind::Hermite { elements } => (0..=*elements).map(|k| self.length * k as f64 / *elements as f64).collect(),
+            Kind::Hermite { elements } | Kind::Linear { elements, .. } => {
+                (0..=*elements).map(|k| self.length * k as f64 / *elements as f64).collect()
+            }
             Kind::Combination { base, .. } => base.breaks(),
             _ => vec![0.0, self.length],
         }
@@ -98,6 +109,7 @@ impl Basis {
         match &self.kind {
             Kind::Bernstein { degree, .. } => degree + 1,
             Kind::Hermite { .. } => 4,
+            Kind::Linear { .. } => 2,
             Kind::Legendre { count } | Kind::Monomial { count } => *count,
             Kind::Combination { base, .. } => base.points(),
         }
@@ -112,6 +124,7 @@ impl Basis {
                 (*clamped..=*degree).map(|k| bernstein(*degree, k, order, x)).collect()
             }
             Kind::Hermite { elements } => return hermite(self.length, *elements, mu, order),
+            Kind::Linear { elements, clamped } => return linear(self.length, *elements, *clamped, (mu, order)),
             Kind::Legendre { count } => legendre(*count, order, x),
             Kind::Monomial { count } => (0..*count).map(|power| monomial(power, order, x)).collect(),
             Kind::Combination { base, columns } => {
@@ -191,4 +204,18 @@ fn hermite(length: f64, elements: usize, mu: f64, order: usize) -> Vec<f64> {
         row[2 * element + k] = value * slope * size.powi(-(order as i32));
     }
     row.split_off(2)
+}
+
+/// Hat functions of all nodes but the first `clamped`; at a node the slope is that of the element after it.
+fn linear(length: f64, elements: usize, clamped: usize, (mu, order): (f64, usize)) -> Vec<f64> {
+    let size = length / elements as f64;
+    let element = ((mu / size) as usize).min(elements - 1);
+    let x = mu / size - element as f64;
+    let mut row = vec![0.0; elements + 1];
+    (row[element], row[element + 1]) = match order {
+        0 => (1.0 - x, x),
+        1 => (-1.0 / size, 1.0 / size),
+        _ => (0.0, 0.0),
+    };
+    row.split_off(clamped)
 }

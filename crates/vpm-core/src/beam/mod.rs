@@ -4,7 +4,8 @@
 //! `s = [theta; v]`, its strain the screw `e = s' + [0; k x theta]`, its wrench `W = K e` with
 //! `K = diag(EJx, EJy, GJ, ax GA, ay GA, EA)`, its inertia per length `rho diag(Jx, Jy, J, A, A, A)`.
 //!
-//! [`linear`] interpolates the deflection: constant matrices, small deflection, stiffening by the second-order shortening.
+//! [`flexible`] is the beam of a machine, over the number type of its parameters: the same sums for every level, only the map from
+//! coordinates to sections differs ([`strain`], [`deflection`], [`lumped`]).
 //! [`linear`] interpolates the deflection: constant matrices, small deflection, stiffening by the second-order shortening.
 //! [`strain`] interpolates the strain and integrates the pose along the axis: exact at any deflection, in space, in a tree.
 //! [`planar`] is the same for chains of inextensible links that move in one plane, in fixed sizes, made for real time.
@@ -14,36 +15,51 @@
 //! the geometrically exact beam.
 
 pub mod basis;
+mod check;
+mod damping;
+mod deflection;
 pub mod eigen;
+mod entry;
+mod fields;
+mod flexible;
 pub mod linear;
+mod lumped;
+mod motion;
 pub mod planar;
+mod profile;
 pub mod quadrature;
 pub mod section;
+pub mod shape;
 pub mod strain;
 
 pub use basis::Basis;
-pub use section::{Material, Section, Shape};
+pub use entry::{BeamEntry, Component, DampingEntry, Level, SectionEntry};
+pub use flexible::{Beam, Gauge};
+pub use motion::{SectionMotion, Sections};
+pub use section::{Material, Section};
+pub use shape::{Properties, Shape};
 
 use crate::error::{Error, Result};
+use crate::scalar::Scalar;
 
 /// Checks that a number of the beam's description is positive and finite.
-pub(crate) fn positive(path: &str, value: f64) -> Result<f64> {
-    if !value.is_finite() {
-        return Err(Error::NonFinite { path: path.to_owned(), value });
+pub(crate) fn positive<S: Scalar>(path: &str, value: S) -> Result<S> {
+    if !value.re().is_finite() {
+        return Err(Error::NonFinite { path: path.to_owned(), value: value.re() });
     }
-    if value <= 0.0 {
-        return Err(Error::Domain { path: path.to_owned(), condition: "be positive", value });
+    if value.re() <= 0.0 {
+        return Err(Error::Domain { path: path.to_owned(), condition: "be positive", value: value.re() });
     }
     Ok(value)
 }
 
 /// Checks that a number of the beam's description is finite and not negative.
-pub(crate) fn not_negative(path: &str, value: f64) -> Result<f64> {
-    if !value.is_finite() {
-        return Err(Error::NonFinite { path: path.to_owned(), value });
+pub(crate) fn not_negative<S: Scalar>(path: &str, value: S) -> Result<S> {
+    if !value.re().is_finite() {
+        return Err(Error::NonFinite { path: path.to_owned(), value: value.re() });
     }
-    if value < 0.0 {
-        return Err(Error::Domain { path: path.to_owned(), condition: "be zero or positive", value });
+    if value.re() < 0.0 {
+        return Err(Error::Domain { path: path.to_owned(), condition: "be zero or positive", value: value.re() });
     }
     Ok(value)
 }

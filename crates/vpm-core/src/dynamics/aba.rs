@@ -5,7 +5,7 @@ use crate::error::{Error, Result};
 use crate::joint::JointKind;
 use crate::model::Model;
 use crate::scalar::Scalar;
-use crate::spatial::{ArticulatedInertia, Twist, Vector3, Wrench};
+use crate::spatial::{ArticulatedInertia, Symmetric3, Twist, Vector3, Wrench};
 
 /// A joint counts as moving no inertia below this fraction of the inertia of its body in other directions.
 const SINGULAR: f64 = 1e-12;
@@ -38,11 +38,12 @@ pub fn check_regular<S: Scalar>(model: &Model<S>, data: &mut Data<S>) -> Result<
     for (frame, slot) in model.frames().iter().zip(data.aba.iter().skip(1)).rev() {
         let kind = frame.joint.kind;
         let inertia = kind.effort(&slot.unit_wrench).re();
-        let block = match kind {
-            JointKind::Prismatic => slot.inertia.linear,
-            JointKind::Revolute => slot.inertia.angular,
+        let size = |block: Symmetric3<S>| (block.xx + block.yy + block.zz).re();
+        let scale = match kind {
+            JointKind::Prismatic => size(slot.inertia.linear),
+            JointKind::Revolute => size(slot.inertia.angular),
+            JointKind::Helical { pitch } => size(slot.inertia.angular) + pitch * pitch * size(slot.inertia.linear),
         };
-        let scale = (block.xx + block.yy + block.zz).re();
         if inertia.is_nan() || inertia <= SINGULAR * scale {
             return Err(Error::SingularJoint { joint: frame.joint.name.clone(), inertia });
         }
@@ -97,19 +98,25 @@ fn accelerations<S: Scalar>(model: &Model<S>, data: &mut Data<S>) {
     }
 }
 
-/// U = I^A S for a joint axis along z: one column of the 6 x 6 inertia.
+/// U = I^A S for a joint axis along z: one column of the 6 x 6 inertia, or a sum of two.
 #[inline]
 fn unit_wrench<S: Scalar>(kind: JointKind, inertia: &ArticulatedInertia<S>) -> Wrench<S> {
-    let coupling = inertia.coupling;
     match kind {
-        JointKind::Prismatic => {
-            let m = inertia.linear;
-            Wrench::new(coupling.columns[2], Vector3::new(m.xz, m.yz, m.zz))
-        }
-        JointKind::Revolute => {
-            let [x, y, z] = coupling.columns;
-            let j = inertia.angular;
-            Wrench::new(Vector3::new(j.xz, j.yz, j.zz), Vector3::new(x.z, y.z, z.z))
-        }
+        JointKind::Prismatic => sliding(inertia),
+        JointKind::Revolute => turning(inertia),
+        JointKind::Helical { pitch } => turning(inertia) + sliding(inertia) * S::from_f64(pitch),
     }
+}
+
+#[inline]
+fn sliding<S: Scalar>(inertia: &ArticulatedInertia<S>) -> Wrench<S> {
+    let m = inertia.linear;
+    Wrench::new(inertia.coupling.columns[2], Vector3::new(m.xz, m.yz, m.zz))
+}
+
+#[inline]
+fn turning<S: Scalar>(inertia: &ArticulatedInertia<S>) -> Wrench<S> {
+    let [x, y, z] = inertia.coupling.columns;
+    let j = inertia.angular;
+    Wrench::new(Vector3::new(j.xz, j.yz, j.zz), Vector3::new(x.z, y.z, z.z))
 }

@@ -3,8 +3,8 @@
 #![allow(dead_code, reason = "each test uses some of them")]
 
 use vpm_core::Result;
-use vpm_core::beam::strain::{Field, FlexibleLink, FlexibleTree, Strain, StrainBeam};
-use vpm_core::beam::{Basis, Section};
+use vpm_core::beam::strain::{Field, FlexibleLink, FlexibleTree, StrainBeam};
+use vpm_core::beam::{Basis, Component, Section};
 use vpm_core::joint::{Joint, JointKind};
 use vpm_core::spatial::{Matrix3, Pose, SpatialInertia, Symmetric3, Vector3};
 
@@ -16,7 +16,7 @@ pub fn near(found: &[f64], expected: &[f64], tolerance: f64) {
 }
 
 /// Legendre fields of these sizes.
-pub fn fields(length: f64, list: &[(Strain, usize)]) -> Result<Vec<Field>> {
+pub fn fields(length: f64, list: &[(Component, usize)]) -> Result<Vec<Field>> {
     list.iter().map(|&(strain, count)| Ok(Field { strain, basis: Basis::legendre(length, count)? })).collect()
 }
 
@@ -39,7 +39,7 @@ pub fn body(mass: f64, inertia: f64) -> SpatialInertia<f64> {
 
 /// Two links in space with every strain there is.
 pub fn spatial() -> Result<FlexibleTree> {
-    use Strain::{BendingX, BendingY, Extension, ShearX, ShearY, Torsion};
+    use Component::{BendingX, BendingY, Extension, ShearX, ShearY, Torsion};
     let section = Section::given([3.0, 2.0, 1.5, 20.0, 25.0, 40.0], [0.02, 0.03, 0.05, 1.0, 1.0, 1.0])?;
     let all = fields(0.7, &[(BendingX, 2), (BendingY, 1), (Torsion, 1), (ShearX, 1), (ShearY, 1), (Extension, 1)])?;
     let beam = StrainBeam::new(section, all, 1e-3, 6)?;

@@ -3,6 +3,44 @@
 use crate::scalar::Scalar;
 use crate::spatial::{Matrix3, Pose, Twist, Vector3};
 
+/// Terms of the power series, enough for a full turn.
+const TERMS: usize = 30;
+
+/// How the coefficients of a power series in `-x` come about: `(factor + slope k) / (2 k + first)!`.
+const fn series_of(first: usize, factor: f64, slope: f64) -> [f64; TERMS] {
+    let mut coefficients = [0.0; TERMS];
+    let (mut k, mut inverse, mut done) = (0, 1.0, 0);
+    while k < TERMS {
+        while done < 2 * k + first {
+            done += 1;
+            inverse /= done as f64;
+        }
+        let sign = if k % 2 == 0 { 1.0 } else { -1.0 };
+        coefficients[k] = sign * (factor + slope * k as f64) * inverse;
+        k += 1;
+    }
+    coefficients
+}
+
+/// `sin(phi) / phi`, `(1 - cos(phi)) / phi^2` and `(phi - sin(phi)) / phi^3` in powers of `x = phi^2`.
+const TURN: [[f64; TERMS]; 3] = [series_of(1, 1.0, 0.0), series_of(2, 1.0, 0.0), series_of(3, 1.0, 0.0)];
+/// The factors of `ad .. ad^4` in [`Tangent`] in powers of `x = phi^2`, their signs included.
+const TANGENT: [[f64; TERMS]; 4] =
+    [series_of(2, -1.0, 1.0), series_of(3, 1.0, -1.0), series_of(4, -1.0, -1.0), series_of(5, 1.0, 1.0)];
+
+/// Power series at `x`, up to about 40; few terms do for the small turns of a piece of a beam.
+fn powers<S: Scalar, const N: usize>(series: &[[f64; TERMS]; N], x: S) -> [S; N] {
+    let size = x.re().abs();
+    let terms = if size < 0.1 {
+        7
+    } else if size < 1.0 {
+        12
+    } else {
+        TERMS
+    };
+    series.each_ref().map(|row| row[..terms].iter().rev().fold(S::zero(), |sum, &entry| sum * x + entry))
+}
+
 /// The pose `exp(twist)` that a body reaches after moving with that constant twist, in its own axes, for a unit of time.
 ///
 /// Law: with rotation vector w, `phi = |w|` and W the matrix of `w x`: `R = 1 + a W + b W^2`, `t = (1 + b W + c W^2) v`,
@@ -11,51 +49,60 @@ use crate::spatial::{Matrix3, Pose, Twist, Vector3};
 /// equations 2.14 and 2.36. Checked: to rounding up to a full turn, which is more than a piece of a beam may bend.
 pub fn exponential<S: Scalar>(twist: Twist<S>) -> Pose<S> {
     let (w, v) = (twist.angular, twist.linear);
-    let square = w.dot(w);
-    let [a, b, c] = [1, 2, 3].map(|first| series(square, first));
-    let columns = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|unit| {
-        let unit = Vector3::from_f64(unit);
-        let once = w.cross(unit);
-        unit + once * a + w.cross(once) * b
-    });
+    let [a, b, c] = powers(&TURN, w.dot(w));
     let once = w.cross(v);
-    Pose::new(Matrix3 { columns }, v + once * b + w.cross(once) * c)
+    Pose::new(turn(w, a, b), v + once * b + w.cross(once) * c)
 }
 
-/// `sum_k (-x)^k / (2 k + first)!`, for x up to about 40.
-fn series<S: Scalar>(x: S, first: u32) -> S {
-    let mut term = S::from_f64(1.0 / f64::from((1..=first).product::<u32>()));
-    let mut sum = term;
-    for k in (first..first + 60).step_by(2).map(f64::from) {
-        term = -(term * x) / ((k + 1.0) * (k + 2.0));
-        sum += term;
-        // Derivatives may lag behind the value by a few terms.
-        if k > 12.0 && term.re().abs() < 1e-20 {
-            break;
-        }
+/// `1 + a [w]x + b [w]x^2`, entry by entry.
+fn turn<S: Scalar>(w: Vector3<S>, a: S, b: S) -> Matrix3<S> {
+    let (wb, wa) = (w * b, w * a);
+    let (xx, yy, zz) = (w.x * wb.x, w.y * wb.y, w.z * wb.z);
+    let (xy, xz, yz) = (w.x * wb.y, w.x * wb.z, w.y * wb.z);
+    let one = S::one();
+    Matrix3::from_columns(
+        Vector3::new(one - yy - zz, xy + wa.z, xz - wa.y),
+        Vector3::new(xy - wa.z, one - xx - zz, yz + wa.x),
+        Vector3::new(xz + wa.y, yz - wa.x, one - xx - yy),
+    )
+}
+
+/// The rotation `exp([w]x)` and the columns of `1 - b [w]x + c [w]x^2`, which makes the angular velocity, in the turned axes, from the
+/// rate of `w` (Murray, Li & Sastry 1994, section 2.2; `b` and `c` of [`exponential`]).
+pub(in crate::beam) fn rotation<S: Scalar>(w: Vector3<S>) -> (Matrix3<S>, Matrix3<S>) {
+    let [a, b, c] = powers(&TURN, w.dot(w));
+    (turn(w, a, b), turn(w, -b, c))
+}
+
+/// The derivative of [`exponential`] at a twist, prepared for many rates.
+///
+/// Law: `sum_k (-1)^k / (k + 1)! ad^k`, `ad = twist x` (Iserles et al. 2000, equation 2.46); because of
+/// `ad^5 = -2 phi^2 ad^3 - phi^4 ad` only four powers of `ad` remain (Selig 2005, "Geometric Fundamentals of Robotics", section 4.5),
+/// with factors that are power series in `phi^2`. Checked: against the derivative of [`exponential`].
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Tangent<S> {
+    twist: Twist<S>,
+    factors: [S; 4],
+}
+
+impl<S: Scalar> Tangent<S> {
+    /// At `twist`.
+    pub fn new(twist: Twist<S>) -> Self {
+        Self { twist, factors: powers(&TANGENT, twist.angular.dot(twist.angular)) }
     }
-    sum
+
+    /// The twist, in the moved body's axes, for a `rate` of the exponent.
+    pub fn apply(&self, rate: Twist<S>) -> Twist<S> {
+        let (mut power, mut sum) = (rate, rate);
+        for factor in self.factors {
+            power = self.twist.cross(power);
+            sum += power * factor;
+        }
+        sum
+    }
 }
 
 /// The twist, in the moved body's axes, of `exp(twist)` when `twist` changes at `rate`.
-///
-/// Law: `sum_k (-1)^k / (k + 1)! ad^k rate`, `ad = twist x` (Iserles et al. 2000, equation 2.46). Checked: against the derivative of
-/// [`exponential`].
 pub fn tangent<S: Scalar>(twist: Twist<S>, rate: Twist<S>) -> Twist<S> {
-    let size = twist.angular.dot(twist.angular).re().sqrt();
-    let (mut term, mut sum) = (rate, rate);
-    let (mut bound, mut spare) = (1.0, 4);
-    for k in (1..60).map(f64::from) {
-        term = twist.cross(term) * S::from_f64(-1.0 / (k + 1.0));
-        sum += term;
-        bound *= size / (k + 1.0);
-        // A few terms more than the rotation alone needs: the translation, and derivatives, lag behind.
-        if bound < 1e-17 {
-            spare -= 1;
-        }
-        if spare == 0 {
-            break;
-        }
-    }
-    sum
+    Tangent::new(twist).apply(rate)
 }

@@ -11,13 +11,18 @@
 mod beam;
 mod exponential;
 mod motion;
+mod plane;
+mod space;
 mod statics;
 mod sweep;
 mod tree;
 
-pub use beam::{Field, Strain, StrainBeam};
+pub use beam::{Field, StrainBeam};
+pub(super) use exponential::rotation;
 pub use exponential::{exponential, tangent};
 pub use motion::{Drive, TreeMotion};
+pub(super) use plane::PlaneAxis;
+pub(super) use space::SpaceAxis;
 pub use statics::TipLoad;
 pub use sweep::{Frame, TreeWorkspace};
 pub use tree::{FlexibleLink, FlexibleTree};

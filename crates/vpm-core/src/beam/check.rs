@@ -1,0 +1,104 @@
+//! Whether a beam can exist as it is described.
+
+use super::entry::{BeamEntry, Level};
+use super::{Section, not_negative, positive};
+use crate::error::{Error, Result};
+use crate::scalar::Scalar;
+
+impl Level {
+    /// The number that comes with the level, its bounds, and the sentence that names them.
+    fn range(self) -> Option<(usize, usize, usize, &'static str)> {
+        match self {
+            Self::Rigid => None,
+            Self::Lumped(n) => Some((n, 1, 200, "lie between 1 and 200 for rigid segments")),
+            Self::Modal(k) => Some((k, 1, 8, "lie between 1 and 8 for modes of a component")),
+            Self::Bezier(n) => Some((n, 2, 12, "lie between 2 and 12 for the degree of a Bezier centreline")),
+            Self::Hermite(n) => Some((n, 1, 100, "lie between 1 and 100 for cubic elements")),
+            Self::Strain(n) => Some((n, 1, 12, "lie between 1 and 12 for Legendre coefficients of strain")),
+            Self::Elements(n) => Some((n, 1, 100, "lie between 1 and 100 for elements of linear strain")),
+        }
+    }
+}
+
+impl<S: Scalar> BeamEntry<S> {
+    /// Whether the beam exists: positive length and sections, a level in its range, at least one component, places on the axis,
+    /// damping that takes energy out.
+    pub fn check(&self) -> Result<()> {
+        positive(&format!("{}.length", self.name), self.length)?;
+        self.check_level()?;
+        self.check_sections()?;
+        self.check_damping()
+    }
+
+    /// An error of a number of this beam, called `{name}.{what}`.
+    fn domain(&self, what: &str, condition: &'static str, value: f64) -> Error {
+        Error::Domain { path: format!("{}.{what}", self.name), condition, value }
+    }
+
+    /// Whether a place along the axis lies on the beam.
+    pub(super) fn check_place(&self, what: &str, at: f64) -> Result<()> {
+        // Places that a length was computed for may miss the tip by rounding.
+        if at >= 0.0 && at <= self.length * (1.0 + 1e-12) {
+            return Ok(());
+        }
+        Err(self.domain(what, "lie between 0 and the length of the beam", at))
+    }
+
+    fn check_level(&self) -> Result<()> {
+        let Some((size, least, most, condition)) = self.level.range() else { return Ok(()) };
+        if !(least..=most).contains(&size) {
+            return Err(self.domain("level", condition, size as f64));
+        }
+        if self.deforms.is_empty() {
+            return Err(self.domain("deforms", "name at least one component unless the level is rigid", 0.0));
+        }
+        let twice = self.deforms.iter().enumerate().find(|(place, part)| self.deforms[..*place].contains(part));
+        twice.map_or(Ok(()), |(place, _)| Err(self.domain("deforms", "name every component once", place as f64)))
+    }
+
+    fn check_sections(&self) -> Result<()> {
+        if self.sections.is_empty() {
+            return Err(self.domain("sections", "hold at least one section", 0.0));
+        }
+        let several = self.sections.len() > 1;
+        for (place, entry) in self.sections.iter().enumerate() {
+            let what = if several { format!("section.{place}") } else { "section".to_owned() };
+            self.check_place(&format!("{what}.at"), entry.at)?;
+            Section::new(entry.shape, self.material).map_err(|error| self.named(error, &what))?;
+            let Some(before) = place.checked_sub(1).map(|before| &self.sections[before]) else { continue };
+            if entry.at <= before.at {
+                return Err(self.domain(&format!("{what}.at"), "lie beyond the section before it", entry.at));
+            }
+            if before.shape.between(&entry.shape, 0.5).is_none() {
+                let condition = "have the same kind of shape as the section before it";
+                return Err(self.domain(&format!("{what}.shape"), condition, place as f64));
+            }
+        }
+        Ok(())
+    }
+
+    /// Puts the name of the beam, and of the section, in front of a parameter's.
+    fn named(&self, error: Error, section: &str) -> Error {
+        let full = |path: String| match (path.strip_prefix("section."), path.strip_prefix("material.")) {
+            (Some(size), _) => format!("{}.{section}.{size}", self.name),
+            (_, Some(parameter)) => format!("{}.{parameter}", self.name),
+            _ => format!("{}.{path}", self.name),
+        };
+        match error {
+            Error::Domain { path, condition, value } => Error::Domain { path: full(path), condition, value },
+            Error::NonFinite { path, value } => Error::NonFinite { path: full(path), value },
+            other => other,
+        }
+    }
+
+    fn check_damping(&self) -> Result<()> {
+        let damping = &self.damping;
+        for (what, value) in [("stiffness", damping.stiffness), ("mass", damping.mass)] {
+            value.map_or(Ok(S::zero()), |value| not_negative(&format!("{}.damping.{what}", self.name), value))?;
+        }
+        for (place, &ratio) in damping.ratios.iter().enumerate() {
+            not_negative(&format!("{}.damping.ratios.{place}", self.name), ratio)?;
+        }
+        Ok(())
+    }
+}

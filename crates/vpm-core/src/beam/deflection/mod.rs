@@ -1,0 +1,187 @@
+//! Beams whose deflection is interpolated: cheap, and right up to second order in the deflection.
+//!
+//! The linear fields are `s = Phi q`; the rotation vector of a section is `w = Phi_w q + 1/2 q^T W q`, its place
+//! `v = Phi_v q + 1/2 q^T V q` with constant matrices, and its axes are `exp([w]x)`: a proper rotation that takes z to the tangent by the
+//! least rotation, and goes with the section along the curve, up to second order. The strain stays linear in `q`, so the stiffness is
+//! constant. Source: Kane, Ryan & Banerjee 1987, "Dynamics of a cantilever beam attached to a moving base", J. Guidance 10(2), for the
+//! shortening, without which a beam that turns fast loses its centrifugal stiffening.
+
+mod forms;
+mod modal;
+
+pub(super) use modal::modal;
+
+use super::entry::Component;
+use super::fields::Fields;
+use super::motion::{SectionMotion, Sections};
+use super::strain::rotation;
+use crate::scalar::{Dual, Scalar};
+use crate::spatial::{Matrix3, Pose, Twist, Vector3};
+use forms::{Form, Forms};
+
+/// The map from deflection coordinates to sections.
+#[derive(Clone, Debug)]
+pub(super) struct DeflectionAxis {
+    /// The component of each coordinate.
+    components: Vec<Component>,
+    /// Arc length of each section in m.
+    places: Vec<f64>,
+    /// Displacement and slope (of bending) or rotation (of torsion) per unit of each coordinate, section by section.
+    rows: Vec<[f64; 2]>,
+    /// Which quadratic forms there are.
+    targets: Vec<Form>,
+    /// Their symmetric matrices, section by section, form by form, row by row.
+    matrices: Vec<f64>,
+}
+
+/// Rotation vector and displacement as functions of time: value, rate, and second rate at constant coordinate rates.
+struct Screw<S> {
+    value: [S; 6],
+    rate: [S; 6],
+    second: [S; 6],
+}
+
+impl DeflectionAxis {
+    /// An axis with sections at `places`, ascending.
+    pub fn new(fields: &Fields, places: &[f64]) -> Self {
+        let components: Vec<Component> = fields.components.iter().map(|&component| Component::ALL[component]).collect();
+        let mut rows = Vec::with_capacity(places.len() * components.len());
+        for &place in places {
+            let (values, slopes) = (fields.row(place, |_| 0), fields.row(place, |_| 1));
+            rows.extend(values.into_iter().zip(slopes).map(|(value, slope)| [value, slope]));
+        }
+        let forms = Forms::new(fields, places);
+        Self { components, places: places.to_vec(), rows, targets: forms.targets, matrices: forms.matrices }
+    }
+
+    /// Numbers of partial sums that a motion needs.
+    pub fn scratch(&self) -> usize {
+        self.targets.len() * self.components.len()
+    }
+
+    /// Poses, twists, columns and accelerations of all sections.
+    pub fn motion<S: Scalar>(&self, q: &[S], v: &[S], out: &mut Sections<S>) {
+        for station in 0..self.places.len() {
+            let screw = self.screw(station, (q, v), &mut out.scratch);
+            self.section(station, &screw, out);
+        }
+    }
+
+    /// The largest slope of the axis against its direction at the root, in rad.
+    pub fn slope<S: Scalar>(&self, q: &[S]) -> S {
+        let n = self.components.len();
+        let mut most = S::zero();
+        for rows in self.rows.chunks_exact(n) {
+            let mut slope = [S::zero(); 2];
+            for ((&component, &[_, entry]), &q) in self.components.iter().zip(rows).zip(q) {
+                if component.bends() {
+                    let across = usize::from(component == Component::BendingX);
+                    slope[across] += q * entry;
+                }
+            }
+            most = most.max(slope[0] * slope[0] + slope[1] * slope[1]);
+        }
+        // The root of zero has no derivative; there the slope is at its least.
+        if most.re() > 0.0 { most.sqrt() } else { S::zero() }
+    }
+
+    /// The rows of the first-order fields (rotation vector, displacement) per unit of a coordinate.
+    #[inline]
+    fn linear(component: Component, [value, slope]: [f64; 2]) -> [(usize, f64); 2] {
+        match component {
+            Component::BendingX => [(0, -slope), (4, value)],
+            Component::BendingY => [(1, slope), (3, value)],
+            Component::Torsion => [(2, value), (2, 0.0)],
+            Component::ShearX => [(3, value), (3, 0.0)],
+            Component::ShearY => [(4, value), (4, 0.0)],
+            Component::Extension => [(5, value), (5, 0.0)],
+        }
+    }
+
+    /// Rotation vector and displacement of a section; `scratch` then holds the derivatives of the quadratic forms.
+    fn screw<S: Scalar>(&self, station: usize, (q, v): (&[S], &[S]), scratch: &mut [S]) -> Screw<S> {
+        let (n, zero) = (self.components.len(), S::zero());
+        let (mut value, mut rate, mut second) = ([zero; 6], [zero; 6], [zero; 6]);
+        for (k, &component) in self.components.iter().enumerate() {
+            for (target, entry) in Self::linear(component, self.rows[station * n + k]) {
+                value[target] += q[k] * entry;
+                rate[target] += v[k] * entry;
+            }
+        }
+        value[5] += S::from_f64(self.places[station]);
+        let size = n * n * self.targets.len();
+        let matrices = self.matrices[station * size..(station + 1) * size].chunks_exact(n * n);
+        for ((form, matrix), slopes) in self.targets.iter().zip(matrices).zip(scratch.chunks_exact_mut(n)) {
+            for (i, (row, slope)) in matrix.chunks_exact(n).zip(&mut *slopes).enumerate() {
+                *slope = zero;
+                let Some(partners) = form.partners[i].clone() else { continue };
+                let mut change = zero;
+                for j in partners {
+                    *slope += q[j] * row[j];
+                    change += v[j] * row[j];
+                }
+                value[form.target] += q[i] * *slope * 0.5;
+                rate[form.target] += v[i] * *slope;
+                second[form.target] += v[i] * change;
+            }
+        }
+        Screw { value, rate, second }
+    }
+
+    fn section<S: Scalar>(&self, station: usize, screw: &Screw<S>, out: &mut Sections<S>) {
+        let n = self.components.len();
+        let Screw { value, rate, second } = screw;
+        let halves = |six: &[S; 6]| (Vector3::new(six[0], six[1], six[2]), Vector3::new(six[3], six[4], six[5]));
+        let ((w, p), (w_rate, p_rate), (w_second, p_second)) = (halves(value), halves(rate), halves(second));
+        let (turn, tangent) = rotation(w);
+        let turning = turning(w, w_rate, w_second);
+        let speed = turn.transpose_mul(p_rate);
+        let change = turn.transpose_mul(p_second) - turning[0].cross(speed);
+        out.at[station] = SectionMotion {
+            pose: Pose::new(turn, p),
+            twist: Twist::new(turning[0], speed),
+            acceleration: Twist::new(turning[1], change),
+        };
+        let rows = Rows { angular: tangent.columns, linear: turn.transpose().columns };
+        for (k, (&component, column)) in
+            self.components.iter().zip(&mut out.columns[station * n..(station + 1) * n]).enumerate()
+        {
+            *column = Twist::zero();
+            for (target, entry) in Self::linear(component, self.rows[station * n + k]) {
+                rows.add(column, target, S::from_f64(entry));
+            }
+            for (form, slopes) in self.targets.iter().zip(out.scratch.chunks_exact(n)) {
+                if form.partners[k].is_some() {
+                    rows.add(column, form.target, slopes[k]);
+                }
+            }
+        }
+    }
+}
+
+/// What a rate of each entry of rotation vector and displacement gives in the section's axes.
+struct Rows<S> {
+    angular: [Vector3<S>; 3],
+    linear: [Vector3<S>; 3],
+}
+
+impl<S: Scalar> Rows<S> {
+    #[inline]
+    fn add(&self, column: &mut Twist<S>, target: usize, factor: S) {
+        match target {
+            0..3 => column.angular += self.angular[target] * factor,
+            _ => column.linear += self.linear[target - 3] * factor,
+        }
+    }
+}
+
+/// Angular velocity in the turned axes and its rate, from the rotation vector as a function of time.
+fn turning<S: Scalar>(w: Vector3<S>, rate: Vector3<S>, second: Vector3<S>) -> [Vector3<S>; 2] {
+    let join = |value: Vector3<S>, rate: Vector3<S>| {
+        let dual = |value, rate| Dual::<S, 1> { value, gradient: [rate] };
+        Vector3::new(dual(value.x, rate.x), dual(value.y, rate.y), dual(value.z, rate.z))
+    };
+    let tangent: Matrix3<Dual<S, 1>> = rotation(join(w, rate)).1;
+    let turning = (tangent * join(rate, second)).to_array();
+    [Vector3::from(turning.map(|entry| entry.value)), Vector3::from(turning.map(|entry| entry.gradient[0]))]
+}

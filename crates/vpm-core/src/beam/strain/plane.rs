@@ -1,0 +1,152 @@
+//! The axis of a beam that bends in one plane and cannot stretch or shear: the exact map in closed form but for one quadrature.
+
+use crate::beam::entry::Component;
+use crate::beam::fields::Fields;
+use crate::beam::motion::{SectionMotion, Sections};
+use crate::beam::quadrature::composite;
+use crate::scalar::Scalar;
+use crate::spatial::{Matrix3, Pose, Twist, Vector3};
+
+/// Gauss points between neighbouring sections: exact to the sixth order of the angle that the beam bends between them.
+const POINTS: usize = 3;
+
+/// An axis whose slope angle is linear in the coordinates, `alpha(mu) = int_0^mu Phi q`.
+///
+/// Law: `r(mu) = int_0^mu t dmu` with the tangent t turned by alpha, and its derivatives under the same quadrature, so that Jacobian and
+/// acceleration are those of the map itself to rounding. Checked: against the exponentials in space and against dual numbers.
+#[derive(Clone, Debug)]
+pub(in crate::beam) struct PlaneAxis {
+    /// Whether it bends about y, deflecting along x; otherwise about x, along y.
+    about_y: bool,
+    n: usize,
+    /// Weight of each point in m; a section instead of a point has none.
+    weights: Vec<Option<f64>>,
+    /// Derivative of the angle at each point by the coordinates.
+    rows: Vec<f64>,
+}
+
+impl PlaneAxis {
+    /// An axis with sections at `places`, if the fields are one curvature and nothing else.
+    pub fn new(fields: &Fields, places: &[f64]) -> Option<Self> {
+        let [field] = &fields.list[..] else { return None };
+        if !field.component.bends() {
+            return None;
+        }
+        let mut axis = Self {
+            about_y: field.component == Component::BendingY,
+            n: fields.len(),
+            weights: Vec::new(),
+            rows: Vec::new(),
+        };
+        let (mut begin, mut angle) = (0.0, vec![0.0; axis.n]);
+        for &place in places {
+            let inside = fields.breaks().into_iter().filter(|&at| at > begin && at < place);
+            for end in inside.chain(std::iter::once(place)).collect::<Vec<_>>() {
+                let reach = |to: f64| turned(fields, &angle, begin, to);
+                for point in composite(POINTS, &[begin, end]) {
+                    axis.weights.push(Some(point.weight));
+                    axis.rows.extend(reach(point.place));
+                }
+                angle = reach(end);
+                begin = end;
+            }
+            axis.weights.push(None);
+            axis.rows.extend(&angle);
+        }
+        Some(axis)
+    }
+
+    /// Numbers of partial sums that a motion needs.
+    pub fn scratch(&self) -> usize {
+        2 * self.n
+    }
+
+    /// Poses, twists, columns and accelerations of all sections.
+    pub fn motion<S: Scalar>(&self, q: &[S], v: &[S], out: &mut Sections<S>) {
+        let (n, mut station) = (self.n, 0);
+        let zero = S::zero();
+        // Across and along the root's axis: place, and acceleration at zero coordinate accelerations.
+        let (mut place, mut change) = ([zero; 2], [zero; 2]);
+        out.scratch.fill(zero);
+        for (weight, row) in self.weights.iter().zip(self.rows.chunks_exact(n)) {
+            let (sin, cos) = dot(row, q).sin_cos();
+            let rate = dot(row, v);
+            let Some(weight) = *weight else {
+                self.section(row, (sin, cos, rate), (place, change), v, (station, &mut *out));
+                station += 1;
+                continue;
+            };
+            let (sin, cos) = (sin * weight, cos * weight);
+            let square = rate * rate;
+            (place[0], place[1]) = (place[0] + sin, place[1] + cos);
+            (change[0], change[1]) = (change[0] - sin * square, change[1] - cos * square);
+            for (sums, &entry) in out.scratch.chunks_exact_mut(2).zip(row) {
+                sums[0] += cos * entry;
+                sums[1] += -(sin * entry);
+            }
+        }
+    }
+
+    /// Writes one section from the sums up to it.
+    fn section<S: Scalar>(
+        &self,
+        row: &[f64],
+        (sin, cos, rate): (S, S, S),
+        (place, change): ([S; 2], [S; 2]),
+        v: &[S],
+        (station, out): (usize, &mut Sections<S>),
+    ) {
+        // Into the section's axes: across and along.
+        let turn = |[across, along]: [S; 2]| [cos * across - sin * along, sin * across + cos * along];
+        let columns = &mut out.columns[station * self.n..(station + 1) * self.n];
+        let mut speed = [S::zero(); 2];
+        for (((column, sums), &entry), &v) in columns.iter_mut().zip(out.scratch.chunks_exact(2)).zip(row).zip(v) {
+            let own = turn([sums[0], sums[1]]);
+            *column = self.twist(S::from_f64(entry), own);
+            (speed[0], speed[1]) = (speed[0] + own[0] * v, speed[1] + own[1] * v);
+        }
+        let change = turn(change);
+        // d/dt of R^T dr/dt: the axes turn with the rate.
+        let change = [change[0] - rate * speed[1], change[1] + rate * speed[0]];
+        let pose = Pose::new(self.rotation(sin, cos), self.vector(place));
+        out.at[station] =
+            SectionMotion { pose, twist: self.twist(rate, speed), acceleration: self.twist(S::zero(), change) };
+    }
+
+    fn vector<S: Scalar>(&self, [across, along]: [S; 2]) -> Vector3<S> {
+        let zero = S::zero();
+        if self.about_y { Vector3::new(across, zero, along) } else { Vector3::new(zero, -across, along) }
+    }
+
+    fn twist<S: Scalar>(&self, rate: S, speed: [S; 2]) -> Twist<S> {
+        let zero = S::zero();
+        let angular = if self.about_y { Vector3::new(zero, rate, zero) } else { Vector3::new(rate, zero, zero) };
+        Twist::new(angular, self.vector(speed))
+    }
+
+    fn rotation<S: Scalar>(&self, sin: S, cos: S) -> Matrix3<S> {
+        let (zero, one) = (S::zero(), S::one());
+        let [x, y, z] = [[one, zero, zero], [zero, one, zero], [zero, zero, one]].map(Vector3::from);
+        if self.about_y {
+            Matrix3::from_columns(Vector3::new(cos, zero, -sin), y, Vector3::new(sin, zero, cos))
+        } else {
+            let _ = (y, z);
+            Matrix3::from_columns(x, Vector3::new(zero, cos, sin), Vector3::new(zero, -sin, cos))
+        }
+    }
+}
+
+/// The derivative of the angle at `to` by the coordinates, from that at `begin`.
+fn turned(fields: &Fields, angle: &[f64], begin: f64, to: f64) -> Vec<f64> {
+    let mut turned = angle.to_vec();
+    for point in composite(fields.points(), &[begin, to]) {
+        for (sum, entry) in turned.iter_mut().zip(fields.row(point.place, |_| 0)) {
+            *sum += point.weight * entry;
+        }
+    }
+    turned
+}
+
+fn dot<S: Scalar>(row: &[f64], x: &[S]) -> S {
+    row.iter().zip(x).fold(S::zero(), |sum, (&entry, &x)| sum + x * entry)
+}

@@ -1,0 +1,163 @@
+//! The axis of a beam in space, as a map from strain coordinates to sections, by exponentials on SE(3).
+
+use crate::beam::fields::Fields;
+use crate::beam::motion::Sections;
+use crate::beam::quadrature::gauss;
+use crate::scalar::{Dual, Scalar};
+use crate::spatial::{Pose, Twist, Vector3};
+
+use super::exponential::{Tangent, exponential};
+
+/// A straight axis, cut into pieces that one exponential each crosses.
+#[derive(Clone, Debug)]
+pub(in crate::beam) struct SpaceAxis {
+    /// The component of each coordinate, 0 to 5.
+    components: Vec<usize>,
+    pieces: Vec<Piece>,
+    /// Values of all shape functions at both Gauss points of every piece, one after the other.
+    rows: Vec<f64>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Piece {
+    size: f64,
+    /// Whether a section stands at its end.
+    section: bool,
+}
+
+/// How a frame moves on across a piece: pose, twist of its end relative to its begin, and the rate of that at constant coordinate
+/// rates.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Crossing<S> {
+    pub pose: Pose<S>,
+    pub twist: Twist<S>,
+    pub acceleration: Twist<S>,
+    strains: [Twist<S>; 2],
+    tangent: Tangent<S>,
+}
+
+impl SpaceAxis {
+    /// An axis with sections at `places`, ascending, cut there and at the breaks of the shape functions.
+    pub fn new(fields: &Fields, places: &[f64]) -> Self {
+        let (mut pieces, mut rows, mut begin) = (Vec::new(), Vec::new(), 0.0);
+        for &place in places {
+            let inside = fields.breaks().into_iter().filter(|&at| at > begin && at < place);
+            for end in inside.chain(std::iter::once(place)).collect::<Vec<_>>() {
+                for point in gauss(2, begin, end) {
+                    rows.extend(fields.row(point.place, |_| 0));
+                }
+                pieces.push(Piece { size: end - begin, section: end == place });
+                begin = end;
+            }
+        }
+        Self { components: fields.components.clone(), pieces, rows }
+    }
+
+    /// How many pieces there are.
+    pub fn pieces(&self) -> usize {
+        self.pieces.len()
+    }
+
+    /// The shape functions at both Gauss points of a piece.
+    fn rows(&self, piece: usize) -> [&[f64]; 2] {
+        let n = self.components.len();
+        [2 * piece, 2 * piece + 1].map(|row| &self.rows[row * n..(row + 1) * n])
+    }
+
+    /// Crosses a piece with coordinates `c` and rates `rates`.
+    ///
+    /// Law: fourth-order Magnus step (Iserles et al. 2000, section 5.3): `Omega = h/2 (e1 + e2) + sqrt(3)/12 h^2 e1 x e2` at the
+    /// two Gauss points; the sign of the bracket is that of a strain that multiplies from the right.
+    pub(super) fn cross<S: Scalar>(&self, piece: usize, c: &[S], rates: &[S]) -> Crossing<S> {
+        let (size, rows) = (self.pieces[piece].size, self.rows(piece));
+        let mut strains = rows.map(|row| self.sum(row, c));
+        for strain in &mut strains {
+            strain.linear.z = strain.linear.z + 1.0;
+        }
+        let [one_rate, two_rate] = rows.map(|row| self.sum(row, rates));
+        let [one, two] = strains;
+        let (half, bracket) = (S::from_f64(0.5 * size), S::from_f64(bracket(size)));
+        let screw = (one + two) * half + one.cross(two) * bracket;
+        let rate = (one_rate + two_rate) * half + (one_rate.cross(two) + one.cross(two_rate)) * bracket;
+        let second = one_rate.cross(two_rate) * (bracket * 2.0);
+        // The exponent as a function of time: its rate and the rate of that make twist and acceleration.
+        let moving = Tangent::new(along(screw, rate)).apply(along(rate, second));
+        Crossing {
+            pose: exponential(screw),
+            twist: part(moving, |number| number.value),
+            acceleration: part(moving, |number| number.gradient[0]),
+            strains,
+            tangent: Tangent::new(screw),
+        }
+    }
+
+    /// The twist of the end of a piece relative to its begin, per unit rate of coordinate `k`; none where it does nothing.
+    pub(super) fn column<S: Scalar>(&self, piece: usize, crossing: &Crossing<S>, k: usize) -> Option<Twist<S>> {
+        let (size, [one, two]) = (self.pieces[piece].size, self.rows(piece).map(|row| row[k]));
+        if one == 0.0 && two == 0.0 {
+            return None;
+        }
+        let unit = unit(self.components[k]);
+        let turned = crossing.strains[0] * S::from_f64(two) - crossing.strains[1] * S::from_f64(one);
+        let change = unit * S::from_f64((one + two) * 0.5 * size) - unit.cross(turned) * S::from_f64(bracket(size));
+        Some(crossing.tangent.apply(change))
+    }
+
+    /// Poses, twists, columns and accelerations of all sections.
+    pub fn motion<S: Scalar>(&self, q: &[S], v: &[S], out: &mut Sections<S>) {
+        let (n, mut station) = (self.components.len(), 0);
+        let mut moving = out.begin(station, n);
+        for (number, piece) in self.pieces.iter().enumerate() {
+            let crossing = self.cross(number, q, v);
+            moving.advance(&crossing.pose, crossing.twist, crossing.acceleration);
+            for (k, column) in out.columns[station * n..(station + 1) * n].iter_mut().enumerate() {
+                *column = crossing.pose.inverse_twist(*column);
+                if let Some(own) = self.column(number, &crossing, k) {
+                    *column += own;
+                }
+            }
+            if piece.section {
+                out.at[station] = moving;
+                station += 1;
+                if station < out.at.len() {
+                    moving = out.begin(station, n);
+                }
+            }
+        }
+    }
+
+    fn sum<S: Scalar>(&self, row: &[f64], c: &[S]) -> Twist<S> {
+        let mut sum = [S::zero(); 6];
+        for ((&value, &component), &c) in row.iter().zip(&self.components).zip(c) {
+            sum[component] += c * value;
+        }
+        let [a, b, c, d, e, f] = sum;
+        Twist::new(Vector3::new(a, b, c), Vector3::new(d, e, f))
+    }
+}
+
+fn bracket(size: f64) -> f64 {
+    3.0_f64.sqrt() / 12.0 * size * size
+}
+
+fn unit<S: Scalar>(component: usize) -> Twist<S> {
+    let mut parts = [0.0; 6];
+    parts[component] = 1.0;
+    let [a, b, c, d, e, f] = parts;
+    Twist::new(Vector3::from_f64([a, b, c]), Vector3::from_f64([d, e, f]))
+}
+
+/// A twist as a function of time: value and rate.
+fn along<S: Scalar>(value: Twist<S>, rate: Twist<S>) -> Twist<Dual<S, 1>> {
+    let join = |v: Vector3<S>, r: Vector3<S>| {
+        let dual = |value, rate| Dual { value, gradient: [rate] };
+        Vector3::new(dual(v.x, r.x), dual(v.y, r.y), dual(v.z, r.z))
+    };
+    Twist::new(join(value.angular, rate.angular), join(value.linear, rate.linear))
+}
+
+/// One part of a twist over dual numbers.
+fn part<S: Scalar>(twist: Twist<Dual<S, 1>>, pick: impl Fn(Dual<S, 1>) -> S) -> Twist<S> {
+    let vector = |v: Vector3<Dual<S, 1>>| Vector3::from(v.to_array().map(&pick));
+    Twist::new(vector(twist.angular), vector(twist.linear))
+}

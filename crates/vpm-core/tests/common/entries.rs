@@ -1,0 +1,33 @@
+//! Beams by their entries, for tests of the map and of the sums.
+
+#![allow(dead_code, reason = "each test uses some of them")]
+
+use vpm_core::Scalar;
+use vpm_core::beam::{BeamEntry, Component, DampingEntry, Level, Material, SectionEntry, Shape};
+use vpm_core::mount::Mount;
+
+/// Steel.
+pub const STEEL: Material = Material { young: 210e9, poisson: 0.3, density: 7850.0 };
+/// The six components in the order of the screw.
+pub const ALL: [Component; 6] = Component::ALL;
+
+/// A beam of one rectangle.
+pub fn entry(level: Level, deforms: &[Component], length: f64, [width, height]: [f64; 2]) -> BeamEntry<f64> {
+    BeamEntry {
+        name: "arm".to_owned(),
+        on: Mount::World,
+        translation: [0.0; 3],
+        rotation: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
+        length,
+        level,
+        deforms: deforms.to_vec(),
+        material: STEEL,
+        sections: vec![SectionEntry { at: 0.0, shape: Shape::Rectangle { width, height } }],
+        damping: DampingEntry::default(),
+    }
+}
+
+/// The same beam over another number type, without derivatives.
+pub fn lift<S: Scalar>(entry: &BeamEntry<f64>) -> BeamEntry<S> {
+    entry.map(&mut |&value| S::from_f64(value))
+}
