@@ -33,7 +33,7 @@ Run = Callable[[], tuple[Array, Array]]
 OWN = ((2, 4, 50), (3, 4, 50), (3, 4, 100), (3, 4, 125), (4, 5, 50), (4, 5, 60), (4, 5, 100))
 #: Elements per link and step (s).
 EXUDYN = ((2, 2e-3), (2, 1e-3), (4, 2e-3), (4, 1e-3))
-#: Steps (s); beyond 1 ms the hinges are unstable.
+#: Steps (s).
 MUJOCO = (1e-3, 5e-4)
 #: What the arm has to reach with 24 s in 45 ms.
 GOAL = {"tip": 3e-5, "strains": (4e-4, 2.5e-3), "ms": 45.0}
