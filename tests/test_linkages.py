@@ -7,9 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import ArrayLike
+from typer.testing import CliRunner
 
 from published import check_all
 from vpm import linkages
+from vpm.cli import app
 from vpm.errors import ModelError
 from vpm.linkages import Karl, KarlGeometry, KarlPoses, Leg, LegParameters, ShareMap
 
@@ -244,6 +246,17 @@ def test_what_cannot_be_is_said_with_its_numbers() -> None:
         Leg(replace(leg.parameters, upper=replace(leg.parameters.upper, mass=-1.0)))
     with pytest.raises(ModelError, match="the choices are table, identified, plausible"):
         LegParameters.hyq("cad")  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("file", "word"),
+    [(KARL_FILE, "singularity at +0.253443 m, extended"), (LEG_FILE, "hip cylinder: 0.282239 to 0.360181")],
+)
+def test_the_command_line_tells_and_plots(file: Path, word: str, tmp_path: Path) -> None:
+    done = CliRunner().invoke(app, ["linkage", str(file), "--plot", str(tmp_path / "out.png")])
+    assert done.exit_code == 0, done.output
+    assert word in done.output
+    assert (tmp_path / "out.png").stat().st_size > 5000
 
 
 @pytest.mark.parametrize(

@@ -1,12 +1,17 @@
 """The planar flexible arm from Python: accuracy, sizes, references, restarts, errors."""
 
+import _thread
+import threading
+import time
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from flexible_arm import DURATION, MOTIONS, errors, planar_arm, swing
+from reference_arm import DURATION, MOTIONS, errors, planar_arm, swing
 from vpm.errors import DivergedError, ModelError
+from vpm.linkages import Leg
 from vpm.planar import FlexibleLink, Gauge, PlanarArm, PlanarRun, SampledReference, Swing
 
 STRIP = {"young": 210e9, "density": 7850.0}
@@ -117,3 +122,20 @@ def test_a_run_that_diverges_says_when() -> None:
     start[9] = 1e160
     with pytest.raises(DivergedError, match="no longer finite at t = "):
         arm.run(1.0, 11, 50, start=start)
+
+
+@pytest.mark.parametrize(
+    "long",
+    [
+        lambda: planar_arm("slow", 4, 40).run(36_000.0, samples=3601, steps=5000),
+        lambda: Leg.hyq().shares(samples=60, second=np.linspace(-2.4, -0.4, 400)),
+    ],
+    ids=["planar arm", "shares of a leg"],
+)
+def test_ctrl_c_stops_a_long_computation(long: Callable[[], object]) -> None:
+    timer = threading.Timer(0.3, _thread.interrupt_main)
+    timer.start()
+    begin = time.monotonic()
+    with pytest.raises(KeyboardInterrupt):
+        long()
+    assert time.monotonic() - begin < 5.0

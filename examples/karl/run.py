@@ -17,11 +17,7 @@ def main(folder: Path) -> None:
     karl = linkages.load(HERE / "karl.toml")
     folder.mkdir(parents=True, exist_ok=True)
 
-    singular = karl.singularities()
-    print("singular strokes:")
-    kinds = zip(singular.kind, singular.arrangement, singular.where, strict=True)
-    for actuator, stroke, kind in zip(singular.actuator, singular.strokes, kinds, strict=True):
-        print(f"  actuator {actuator + 1}: at {stroke:+.6f} m, {', '.join(kind)}")
+    print(*karl.summary, sep="\n")
 
     poses = karl.direct((0.20, 0.18))
     print(f"the strokes 0.200 m and 0.180 m leave {len(poses)} configurations (deg):")
@@ -32,11 +28,7 @@ def main(folder: Path) -> None:
     print(f"full force gives the torques {karl.torques(poses.angles[0], poses.strokes[0], full).round(2)} N m")
 
     # The strokes between the singular ones, in the mode that the prototype is built in.
-    low, high = singular.of(0, arrangement="folded").max(), singular.of(0, arrangement="extended").max()
-    first = np.linspace(low + 1e-4, high - 1e-4, 81)
-    low, high = singular.of(1).min(), np.sort(singular.of(1))[1]
-    second = np.linspace(low + 1e-4, high - 1e-4, 81)
-    workspace = karl.workspace(first, second, mode=0)
+    workspace = karl.workspace(mode=0)
     print(workspace)
     for name, figure in {"workspace.png": workspace.plot(), "modes.png": poses.plot()}.items():
         figure.savefig(folder / name)

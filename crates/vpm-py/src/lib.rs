@@ -22,6 +22,7 @@ mod _core {
     use crate::errors::Diverged;
     #[pymodule_export]
     use crate::interrupt::stop_when;
+    #[pymodule_export]
     use crate::linkage::{Karl, Leg, hyq_parameters};
     #[pymodule_export]
     use crate::planar::PlanarArm;

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,6 +14,9 @@ from vpm.errors import ModelError
 from vpm.linkages.arrays import rowwise
 from vpm.linkages.karl_results import KarlPoses, KarlSingularities, KarlWorkspace
 from vpm.results import Storable
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
 Pair = tuple[float, float]
@@ -248,13 +252,15 @@ class Karl:
         """
         return np.array(self._core.resultant(actuator, stroke))
 
-    def workspace(self, first: ArrayLike, second: ArrayLike, mode: int = 0) -> KarlWorkspace:
+    def workspace(
+        self, first: ArrayLike | None = None, second: ArrayLike | None = None, mode: int = 0
+    ) -> KarlWorkspace:
         """The end point over a grid of strokes.
 
         Parameters
         ----------
-        first, second : array_like, shape (N,) and (M,)
-            Strokes of the actuators (m).
+        first, second : array_like, shape (N,) and (M,), optional
+            Strokes of the actuators (m); by default 81 between the two least positive singular ones of each.
         mode : {0, 1, 2, 3}
             Row of `direct`. The prototype is built in mode 0, |q1| < 90 deg and q2 > 0.
 
@@ -262,7 +268,7 @@ class Karl:
         -------
         KarlWorkspace
         """
-        one, two = np.asarray(first, dtype=float), np.asarray(second, dtype=float)
+        one, two = self._strokes(0, first), self._strokes(1, second)
         if mode not in range(4):
             raise ModelError(f"{self.name} has the assembly modes 0 to 3, not {mode}; choose one of them")
         angles = np.full((one.size, two.size, 2), np.nan)
@@ -277,6 +283,39 @@ class Karl:
         transmission = self.transmission(flat, strokes.reshape(-1, 2)).reshape(angles.shape)
         tips = self.end_point(flat).reshape(angles.shape)
         return KarlWorkspace(one, two, mode, angles, tips, transmission, self.singularities())
+
+    @property
+    def summary(self) -> tuple[str, ...]:
+        """Singular strokes, one sentence each."""
+        s = self.singularities()
+        rows = zip(s.actuator, s.kind, s.arrangement, s.where, s.strokes, s.angles, strict=True)
+        return tuple(
+            f"actuator {actuator + 1}: {kind} singularity at {stroke:+.6f} m, {arrangement}, "
+            f"joint at {np.degrees(angle):.3f} deg, {where}"
+            for actuator, kind, arrangement, where, stroke, angle in rows
+        )
+
+    def plot(self) -> Figure:
+        """Reach, joint angles and transmission between the singular strokes; see `KarlWorkspace.plot`.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+        """
+        return self.workspace().plot()
+
+    def _strokes(self, actuator: int, given: ArrayLike | None) -> Array:
+        if given is not None:
+            return np.atleast_1d(np.asarray(given, dtype=float))
+        singular = np.sort(self.singularities().of(actuator))
+        low_high = singular[singular > 0.0][:2]
+        if low_high.size < 2:
+            raise ModelError(
+                f"{self.name}: actuator {actuator + 1} has {low_high.size} positive singular strokes, but two are "
+                "needed for a range between them; give the strokes"
+            )
+        inset = 1e-3 * (low_high[1] - low_high[0])
+        return np.linspace(low_high[0] + inset, low_high[1] - inset, 81)
 
     def _where(self, actuator: int, kind: str, _form: str, stroke: float, angle: float) -> str:
         angles, strokes = np.zeros((1, 2)), np.zeros((1, 2))

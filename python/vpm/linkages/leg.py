@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Literal, Self
+from typing import TYPE_CHECKING, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,6 +13,9 @@ from vpm.errors import ModelError, near_match
 from vpm.linkages.arrays import rowwise
 from vpm.linkages.leg_parameters import Cylinder, HyqSet, LegParameters, LegPart, Segment
 from vpm.linkages.leg_results import LegReactions, LegStrokes, LegTerms, ShareMap
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
 Derivation = Literal["virtual_work", "lagrange", "newton_euler"]
@@ -239,6 +242,28 @@ class Leg:
             if progress is not None:
                 progress(row + 1, one.size)
         return ShareMap(one, two, maps[..., 0], maps[..., 1], maps[..., 2], rate, acceleration, samples, definition)
+
+    @property
+    def summary(self) -> tuple[str, ...]:
+        """Ranges of the cylinders and shares of dynamics, one sentence each."""
+        ranges = [
+            f"{name} cylinder: {low:.6f} to {high:.6f} m"
+            for name, (low, high) in zip(("hip", "knee"), self.stroke_table().range, strict=True)
+        ]
+        shares = []
+        for duty in DUTIES:
+            inertia, velocity, gravity = 100.0 * self.shares(duty).mean
+            shares.append(f"{duty} dynamics: mu_M {inertia:.2f} %, mu_V {velocity:.2f} %, mu_G {gravity:.2f} %")
+        return (*ranges, *shares)
+
+    def plot(self) -> Figure:
+        """Strokes and lever arms of the cylinders over the angles; see `LegStrokes.plot`.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+        """
+        return self.stroke_table().plot()
 
     def _rows(self, question: Callable[..., Array], *tables: ArrayLike) -> Array:
         return rowwise(question, *tables, what=self.name)
