@@ -244,7 +244,9 @@ def test_a_joint_of_several_coordinates_is_driven_by_one_of_them() -> None:
     motor = {"motor": {"joint": "planar", "gain": 1.0}}
     with pytest.raises(ModelError, match="name one of its coordinates, planar_x, planar_y, planar_rotation"):
         machine({"type": "planar", "axis": [0.0, 0.0, 1.0]}, actuators=motor)
-    with pytest.raises(ModelError, match='is "bolts", a fixed joint, which has no coordinates; name a joint that moves'):
+    with pytest.raises(
+        ModelError, match='is "bolts", a fixed joint, which has no coordinates; name a joint that moves'
+    ):
         Model.from_dict({**GANTRY, "actuators": {"motor": {"joint": "bolts", "gain": 1.0}}})
 
 

@@ -163,11 +163,12 @@ pub(crate) fn add_line_forces<S: Scalar>(data: &Data<S>, forces: &[S], loads: &m
 /// Takes off `loads` what the beams' stiffness and damping carry: `K q + D v`.
 pub(crate) fn subtract_elastic<S: Scalar>(model: &Model<S>, q: &[S], v: &[S], loads: &mut [S]) {
     for Elastic { beam, coordinate, .. } in model.beams() {
-        let own = *coordinate..coordinate + beam.len();
+        let len = beam.len();
+        let own = *coordinate..coordinate + len;
         let (q, v) = (&q[own.clone()], &v[own.clone()]);
-        let width = beam.len().max(1); // a rigid beam has no rows
-        let rows = beam.stiffness().chunks_exact(width).zip(beam.damping().chunks_exact(width));
-        for (load, (stiffness, damping)) in loads[own].iter_mut().zip(rows) {
+        for ((load, stiffness), damping) in
+            loads[own].iter_mut().zip(beam.stiffness().chunks_exact(len.max(1))).zip(beam.damping().chunks_exact(len.max(1)))
+        {
             *load -= product(stiffness, q) + product(damping, v);
         }
     }
