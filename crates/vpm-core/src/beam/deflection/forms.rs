@@ -1,5 +1,7 @@
 //! The constant quadratic forms of a beam's second-order kinematics, summed up along its axis.
 
+use std::ops::Range;
+
 use crate::beam::fields::Fields;
 use crate::beam::quadrature::composite;
 use crate::scalar::Scalar;
@@ -10,6 +12,8 @@ pub(super) struct Forms {
     n: usize,
     /// Which entries of `(w, v)` have a form: 0 to 2 rotation vector, 3 to 5 displacement.
     targets: Vec<usize>,
+    /// The coordinates from the first to the last that take part in each.
+    spans: Vec<Range<usize>>,
     segments: Vec<Segment>,
 }
 
@@ -19,8 +23,21 @@ struct Segment {
     size: f64,
     /// The coordinates that bend it.
     local: Vec<usize>,
-    /// A symmetric matrix over them for each target, one after the other, row by row.
-    blocks: Vec<f64>,
+    /// Rows of symmetric matrices that are not zero.
+    rows: Vec<Row>,
+    entries: Vec<f64>,
+}
+
+/// A row of a matrix.
+#[derive(Clone, Debug)]
+struct Row {
+    /// Place of the form among the targets.
+    form: usize,
+    coordinate: usize,
+    /// The local coordinates that it couples with; none for those between which there is nothing.
+    partners: Range<usize>,
+    /// Its entries.
+    entries: Range<usize>,
 }
 
 /// Values of the forms at a section: `1/2 q^T A q`, its rate, and the rate of that at constant coordinate rates.
@@ -67,12 +84,16 @@ impl Forms {
         }
         let here = |target: usize| dense.iter().any(|(.., blocks)| blocks[target].iter().any(|&entry| entry != 0.0));
         let targets: Vec<usize> = (0..6).filter(|&target| here(target)).collect();
-        let pack = |(size, local, blocks): (f64, Vec<usize>, [Vec<f64>; 6])| {
-            let blocks = targets.iter().flat_map(|&target| blocks[target].clone()).collect();
-            Segment { size, local, blocks }
+        let segments: Vec<Segment> =
+            dense.into_iter().map(|(size, local, blocks)| Segment::packed(size, local, &blocks, &targets)).collect();
+        let span = |form: usize| {
+            // A rotation leans on into the displacement across it.
+            let from = |own: usize| own == form || matches!((targets[own], targets[form]), (1, 3) | (0, 4));
+            let all = segments.iter().flat_map(|segment| &segment.rows).filter(|row| from(row.form));
+            all.fold(fields.len()..0, |span, row| span.start.min(row.coordinate)..span.end.max(row.coordinate + 1))
         };
-        let segments = dense.into_iter().map(pack).collect();
-        Self { n: fields.len(), targets, segments }
+        let spans = (0..targets.len()).map(span).collect();
+        Self { n: fields.len(), targets, spans, segments }
     }
 
     /// How many derivatives of forms there are.
@@ -80,29 +101,27 @@ impl Forms {
         self.targets.len() * self.n
     }
 
-    /// Derivatives of the forms by the coordinates, with the entry of `(w, v)` each belongs to.
-    pub fn rows<'a, S>(&'a self, slopes: &'a [S]) -> impl Iterator<Item = (usize, &'a [S])> {
-        self.targets.iter().copied().zip(slopes.chunks_exact(self.n))
+    /// Derivatives of the forms by the coordinates, with the entry of `(w, v)` each belongs to and the first coordinate.
+    pub fn rows<'a, S>(&'a self, slopes: &'a [S]) -> impl Iterator<Item = (usize, usize, &'a [S])> {
+        let each = self.targets.iter().zip(&self.spans).zip(slopes.chunks_exact(self.n));
+        each.map(|((&target, span), slopes)| (target, span.start, &slopes[span.clone()]))
     }
 
     /// Goes on across a segment; `slopes` are the derivatives of the forms by the coordinates.
     pub fn advance<S: Scalar>(&self, number: usize, (q, v): (&[S], &[S]), second: &mut Second<S>, slopes: &mut [S]) {
-        let Segment { size, local, blocks } = &self.segments[number];
+        let Segment { size, local, rows, entries } = &self.segments[number];
         self.lean(*size, second, slopes);
-        let each = local.len() * local.len();
-        let all = blocks.chunks_exact(each.max(1)).zip(&self.targets).zip(slopes.chunks_exact_mut(self.n));
-        for ((block, &target), slopes) in all {
-            for (&i, row) in local.iter().zip(block.chunks_exact(local.len())) {
-                let (mut slope, mut change) = (S::zero(), S::zero());
-                for (&j, &entry) in local.iter().zip(row) {
-                    slope += q[j] * entry;
-                    change += v[j] * entry;
-                }
-                slopes[i] += slope;
-                second.value[target] += q[i] * slope * 0.5;
-                second.rate[target] += v[i] * slope;
-                second.change[target] += v[i] * change;
+        for row in rows {
+            let (mut slope, mut change) = (S::zero(), S::zero());
+            for (&j, &entry) in local[row.partners.clone()].iter().zip(&entries[row.entries.clone()]) {
+                slope += q[j] * entry;
+                change += v[j] * entry;
             }
+            let (i, target) = (row.coordinate, self.targets[row.form]);
+            slopes[row.form * self.n + i] += slope;
+            second.value[target] += q[i] * slope * 0.5;
+            second.rate[target] += v[i] * slope;
+            second.change[target] += v[i] * change;
         }
     }
 
@@ -114,11 +133,28 @@ impl Forms {
             for six in [&mut second.value, &mut second.rate, &mut second.change] {
                 six[shift] += six[turn] * lever;
             }
-            for k in 0..self.n {
+            for k in self.spans[from].clone() {
                 let slope = slopes[from * self.n + k] * lever;
                 slopes[to * self.n + k] += slope;
             }
         }
+    }
+}
+
+impl Segment {
+    /// Leaves out what is zero.
+    fn packed(size: f64, local: Vec<usize>, blocks: &[Vec<f64>; 6], targets: &[usize]) -> Self {
+        let (m, mut rows, mut entries) = (local.len(), Vec::new(), Vec::new());
+        for (form, &target) in targets.iter().enumerate() {
+            for (row, &coordinate) in blocks[target].chunks_exact(m.max(1)).zip(&local) {
+                let Some(first) = row.iter().position(|&entry| entry != 0.0) else { continue };
+                let last = row.iter().rposition(|&entry| entry != 0.0).unwrap_or(first);
+                let begin = entries.len();
+                entries.extend(&row[first..=last]);
+                rows.push(Row { form, coordinate, partners: first..last + 1, entries: begin..entries.len() });
+            }
+        }
+        Self { size, local, rows, entries }
     }
 }
 

@@ -129,15 +129,17 @@ impl DeflectionAxis {
             acceleration: Twist::new(turning[1], change),
         };
         let rows = Rows { angular: tangent.columns, linear: turn.transpose().columns };
-        for (k, (&component, column)) in
-            self.components.iter().zip(&mut out.columns[station * n..(station + 1) * n]).enumerate()
+        let columns = &mut out.columns[station * n..(station + 1) * n];
+        for ((&component, column), &entries) in self.components.iter().zip(&mut *columns).zip(&self.rows[station * n..])
         {
             *column = Twist::zero();
-            for (target, entry) in Self::linear(component, self.rows[station * n + k]) {
+            for (target, entry) in Self::linear(component, entries) {
                 rows.add(column, target, S::from_f64(entry));
             }
-            for (target, slopes) in self.forms.rows(&out.scratch) {
-                rows.add(column, target, slopes[k]);
+        }
+        for (target, first, slopes) in self.forms.rows(&out.scratch) {
+            for (column, &slope) in columns[first..].iter_mut().zip(slopes) {
+                rows.add(column, target, slope);
             }
         }
     }
