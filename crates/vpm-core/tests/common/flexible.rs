@@ -146,6 +146,7 @@ pub fn description(parts: &Parts<f64>, change: impl FnOnce(&mut Value)) -> Descr
         let (mass, position) = (number(&point.mass), point.position.each_ref().map(&mut number));
         let (site, place) = match point.on {
             Site::Body(body) => ("body", body),
+            Site::Weld(weld) => ("weld", weld),
             Site::Tip(beam) => ("beam", beam),
         };
         effects.push(json!({"type": "payload", site: place, "mass": mass, "position": position}));
