@@ -273,9 +273,9 @@ def _dispatch(
 
 def _prescribed(model: Model, m: Motion, theta: Array, columns: list[int], setup: Setup) -> SimulatedArrays:
     """Joints on the filtered motion, from behind the filter's settling to before it."""
-    followed = (np.ascontiguousarray(x[m.kept]) for x in (m.position, m.velocity, m.acceleration))
+    q, v, a = (np.ascontiguousarray(x[m.kept]) for x in (m.position, m.velocity, m.acceleration))
     outputs, states, jacobian = model.core.simulate_prescribed(
-        theta, *followed, m.dt, setup.substeps, setup.integrator, columns
+        theta, q, v, a, m.dt, setup.substeps, setup.integrator, columns
     )
     rows = np.arange(len(m.time))[m.kept]
     return SimulatedArrays(outputs, jacobian, rows, np.zeros(1, dtype=np.int64), states)
