@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import argparse
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -29,8 +29,10 @@ GAUGES = ("21", "22", "31", "32")
 CHANNELS = tuple(f"gauge_{name}.strain" for name in GAUGES)
 #: Above the second mode of the arm (16 Hz), below half the sampling rate: what the joints' angles are filtered at, Hz.
 CUTOFF = 30.0
-#: The play closes within milliseconds, a sample takes ten.
-SETUP = Setup(substeps=6)
+#: Steps per sample of 10 ms: contacts of the play close within milliseconds, the modes of the strips are slower.
+SUBSTEPS = {True: 6, False: 2}
+#: Relative change of the sum of squares at which a fit ends; its statistical uncertainty is a hundred times larger.
+TOLERANCE = 1e-4
 #: Fitted beside the gauges' offsets; one gain for all gauges and one damping for both strips.
 FREE = (
     "bridge_21.gain.value",
@@ -43,13 +45,11 @@ PLAY = ("play_2.backlash.gap", "play_2.backlash.damping")
 TIES = {f"bridge_{name}.gain.value": "bridge_21.gain.value" for name in GAUGES[1:]} | {
     "strip_2.damping.stiffness": "strip_1.damping.stiffness"
 }
-#: How far around a place the second gauges are sought, m.
-REACH = 0.03
 
 
 @dataclass(frozen=True)
 class Fitted:
-    """A model fitted to one record, the places of its second gauges among what was fitted."""
+    """A model fitted to one record, and where its second gauges were put."""
 
     fit: Fit
     places: dict[str, float]
@@ -71,30 +71,25 @@ class Fitted:
 # ---- the flexible model ----------------------------------------------------------------------------------------------
 
 
-def machine(places: Mapping[str, float] | None = None, *, play: bool = True, **extra: float) -> Model:
-    """The model file with gauges elsewhere, `extra` gauges on the strip of the gauge that they are named after."""
+def machine(places: Mapping[str, float] | None = None, *, play: bool = True) -> Model:
+    """The model file with gauges at other places, and with the play or a stiff joint."""
     content = Model.load(HERE / "merit.toml").to_dict()
     for name, at in (places or {}).items():
         content["gauges"][name]["at"] = at
-    for name, at in extra.items():
-        content["gauges"][name] = {**content["gauges"]["_".join(name.split("_")[:2])], "at": at}
     if not play:
         content["joints"]["play_2"] = {"type": "fixed", "parent": "gear", "child": "hub"}
         content["effects"] = [effect for effect in content["effects"] if effect["type"] != "backlash"]
     return Model.from_dict(content)
 
 
-def fitted(record: Experiment, *, play: bool = True, rounds: int = 2) -> Fitted:
-    """Fit to one record: parameters at given places of the second gauges, places at given parameters, in turns."""
+def fitted(record: Experiment, *, play: bool = True) -> Fitted:
+    """Fit to one record: first the places of the second gauges from the strains at rest, then everything that is free."""
     places = places_at_rest(record)
     free = (*FREE, *(PLAY if play else ()), *_offsets())
     model = started(machine(places, play=play), record)
-    for turn in range(rounds):
-        fit = identify(model, record, free, mode="prescribed_motion", cutoff=CUTOFF, setup=SETUP, ties=TIES)
-        if turn + 1 < rounds:
-            places = places_in_motion(fit.model, record, places, play=play)
-            values = {name: fit.model.parameters[name].value for name in (*free, *TIES)}
-            model = machine(places, play=play).with_parameters(values)
+    setup = Setup(substeps=SUBSTEPS[play])
+    mode = "prescribed_motion"
+    fit = identify(model, record, free, mode=mode, cutoff=CUTOFF, setup=setup, ties=TIES, tolerance=TOLERANCE)
     return Fitted(fit, places)
 
 
@@ -109,10 +104,11 @@ def started(model: Model, record: Experiment) -> Model:
     return model.with_parameters(values | dict(zip(_offsets(), map(float, offsets), strict=True)))
 
 
-def strains(model: Model, record: Experiment, names: Sequence[str] = CHANNELS) -> tuple[Array, Array, Array]:
+def strains(model: Model, record: Experiment) -> tuple[Array, Array, Array]:
     """Predicted and measured strains (N, gauges) and their time (s), the joints following the record."""
-    run = simulate(model, record, "prescribed_motion", cutoff=CUTOFF, substeps=SETUP.substeps)
-    columns = [run.channels.index(name) for name in names]
+    substeps = SUBSTEPS["play_2" in model.joints]
+    run = simulate(model, record, "prescribed_motion", cutoff=CUTOFF, substeps=substeps)
+    columns = [run.channels.index(name) for name in CHANNELS]
     return run.values[:, columns], run.measured[:, columns], run.time
 
 
@@ -145,27 +141,6 @@ def places_at_rest(record: Experiment) -> dict[str, float]:
     wanted = row[1, 0] / row[0, 0] * moment(first[0])
     at_22 = float(brentq(lambda x: moment(x) - wanted, first[0], lengths[0]))
     return {"gauge_22": at_22, "gauge_32": float(at_32)}
-
-
-def places_in_motion(model: Model, record: Experiment, places: Mapping[str, float], *, play: bool) -> dict[str, float]:
-    """Where, along the fitted strips, the strain is most like the measured one: least squares on a grid, then a parabola."""
-    steps = np.linspace(-REACH, REACH, 7)
-    extra = {f"{name}_{k}": at + step for name, at in places.items() for k, step in enumerate(steps)}
-    dense = machine(places, play=play, **extra)
-    dense = dense.with_parameters({name: p.value for name, p in model.parameters.items()})
-    names = [f"{name}.strain" for name in extra]
-    curves, _, _ = strains(dense, record, names)
-    _, measured, _ = strains(model, record)
-    gain = model.parameters["bridge_21.gain.value"].value
-    found = {}
-    for gauge, at in places.items():
-        column = CHANNELS.index(f"{gauge}.strain")
-        mine = [names.index(f"{gauge}_{k}.strain") for k in range(len(steps))]
-        misfit = np.var(measured[:, [column]] - gain * curves[:, mine], axis=0)
-        best = int(np.clip(np.argmin(misfit), 1, len(steps) - 2))
-        a, b, _ = np.polyfit(steps[best - 1 : best + 2], misfit[best - 1 : best + 2] / misfit.max(), 2)
-        found[gauge] = at + float(np.clip(-0.5 * b / a, steps[0], steps[-1]))
-    return found
 
 
 # ---- baselines -------------------------------------------------------------------------------------------------------
@@ -275,7 +250,7 @@ def main(path: Path, folder: Path) -> None:
         print(f"{way}: fit of the gauges {', '.join(GAUGES)} on the half that was not fitted, %")
         for name, fits in result.fits.items():
             print(f"  {name:20s}" + "".join(f"{value:8.1f}" for value in fits))
-    for file in write_report(folder, results, machine()):
+    for file in write_report(folder, results):
         print(f"wrote {file}")
     print(f"{time.perf_counter() - began:.0f} s")
 

@@ -296,6 +296,7 @@ def identify(
     cutoff: float | None = None,
     setup: Setup | None = None,
     ties: Mapping[str, str] | None = None,
+    tolerance: float = 1e-8,
     progress: Progress | None = None,
 ) -> Fit:
     """Fit parameters of ``model`` to one or several experiments at once.
@@ -316,6 +317,8 @@ def identify(
     ties : mapping of str to str, optional
         Parameters that take the value of another: ``{"gauge_2.gain.value": "gauge_1.gain.value"}`` fits one gain for
         two gauges. The other may be free or not; the fitted model holds the common value in both.
+    tolerance : float
+        Relative change of parameters or of the sum of squares at which to stop.
     progress : callable, optional
         Called with the number of evaluations and the weighted residual.
 
@@ -339,7 +342,7 @@ def identify(
         check_ties(model, ties, names)
         data = TiedProblem(data, ties)
     before, _ = data.evaluate(model, model.theta)
-    result = estimate(model, data, names, progress=progress)
+    result = estimate(model, data, names, tolerance=tolerance, progress=progress)
     return fit_of(model, data, result, before, [e.name for e in records], ties or {})
 
 
