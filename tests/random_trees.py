@@ -30,7 +30,7 @@ def trees(draw: st.DrawFn) -> dict[str, Any]:
         else:
             name = f"body{k}"
             bodies[name] = {"mass": draw(sizes), "inertia": [0.1, 0.1, 0.1, 0.0, 0.0, 0.0]}
-            joints[f"joint{k}"] = where | {"child": name} | draw(joint_tables())
+            joints[f"joint{k}"] = where | {"child": name} | draw(joint_tables(fixed=k > 0))
         standing.append(name)
     content: dict[str, Any] = {"name": "tree", "gravity": [0.0, 0.0, -9.81]}
     for key, table in (("bodies", bodies), ("joints", joints), ("beams", beams)):
@@ -40,8 +40,10 @@ def trees(draw: st.DrawFn) -> dict[str, Any]:
 
 
 @st.composite
-def joint_tables(draw: st.DrawFn) -> dict[str, Any]:
-    kind = draw(st.sampled_from(["prismatic", "revolute", "helical", "cylindrical", "planar", "spherical", "fixed"]))
+def joint_tables(draw: st.DrawFn, *, fixed: bool) -> dict[str, Any]:
+    """A joint of any type; of one that moves, unless `fixed` ones are allowed."""
+    moving = ["prismatic", "revolute", "helical", "cylindrical", "planar", "spherical"]
+    kind = draw(st.sampled_from([*moving, "fixed"] if fixed else moving))
     table: dict[str, Any] = {"type": kind}
     if kind not in {"spherical", "fixed"}:
         axis = np.array(draw(st.tuples(*[st.floats(-1.0, 1.0)] * 3).filter(lambda a: math.hypot(*a) > 0.1)))

@@ -247,7 +247,7 @@ def test_a_joint_of_several_coordinates_is_driven_by_one_of_them() -> None:
     with pytest.raises(
         ModelError, match='is "bolts", a fixed joint, which has no coordinates; name a joint that moves'
     ):
-        Model.from_dict({**GANTRY, "actuators": {"motor": {"joint": "bolts", "gain": 1.0}}})
+        Model.from_dict({**GANTRY, "actuators": {"drive": {"joint": "bolts", "gain": 1.0}}})
 
 
 def test_something_has_to_move() -> None:

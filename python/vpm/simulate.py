@@ -44,9 +44,9 @@ class Setup:
     Attributes
     ----------
     integrator : {"linearly_implicit", "rosenbrock", "rk4", "semi_implicit"}
-            The first two are stable whatever is stiff, of order 2 and 4; the first also stops on dry friction far sharper
+        The first two are stable whatever is stiff, of order 2 and 4; the first also stops on dry friction far sharper
         than a step. The others are explicit, but for the constant stiffness of flexible links in the last.
-        substeps : int
+    substeps : int
         Integration steps per sample of the log.
     horizon : float
         Length of each restart, s.

@@ -57,6 +57,8 @@ pub(crate) struct Link<S> {
     rotation: Matrix3<f64>,
     translation: Vector3<f64>,
     pub(crate) inertia: SpatialInertia<S>,
+    /// Inertia of the rotor, which feels the joint's acceleration alone.
+    pub(crate) rotor: S,
 }
 
 /// What a user sees of one body: its own frame, as described.
@@ -234,7 +236,12 @@ impl<S: Scalar> Wire<S> {
 
 impl<S: Scalar> Link<S> {
     /// A body with its joint, on a frame with that alignment of its own.
-    fn new(joint: &Joint, parent: usize, parent_alignment: Matrix3<f64>, inertia: SpatialInertia<S>) -> Self {
+    fn new(
+        (joint, rotor): (&Joint, S),
+        parent: usize,
+        parent_alignment: Matrix3<f64>,
+        inertia: SpatialInertia<S>,
+    ) -> Self {
         let alignment = joint.alignment();
         let frame: Pose<f64> = joint.frame();
         let to_aligned = Pose::new(lift(alignment).transpose(), Vector3::zero());
@@ -244,6 +251,7 @@ impl<S: Scalar> Link<S> {
             rotation: parent_alignment.transpose() * frame.rotation * alignment,
             translation: parent_alignment.transpose_mul(frame.translation),
             inertia: to_aligned.inertia(inertia),
+            rotor,
         }
     }
 

@@ -34,7 +34,7 @@ pub(super) fn singular_joint<S: Scalar>(
     // Outermost first: a singular joint spoils the inertias that the joints before it feel.
     let slots = model.links().iter().zip(data.aba.iter().skip(1)).enumerate().rev();
     slots.into_iter().find_map(|(number, (link, slot))| {
-        let inertia = link.kind.effort(&slot.unit_wrench).re();
+        let inertia = (link.kind.effort(&slot.unit_wrench) + link.rotor).re();
         let size = |block: Symmetric3<S>| (block.xx + block.yy + block.zz).re();
         let scale = match link.kind {
             JointKind::Prismatic => size(slot.inertia.linear),
@@ -66,7 +66,7 @@ fn inertias<S: Scalar>(model: &Model<S>, data: &mut Data<S>, tau: &[S]) {
         let (before, rest) = slots.split_at_mut(k + 1);
         let slot = &mut rest[0];
         slot.unit_wrench = unit_wrench(link.kind, &slot.inertia);
-        slot.inverse = link.kind.effort(&slot.unit_wrench).recip();
+        slot.inverse = (link.kind.effort(&slot.unit_wrench) + link.rotor).recip();
         slot.effort = tau - link.kind.effort(&slot.bias_wrench);
         if link.parent != 0 {
             // What the parent feels when this joint is free: I^a = I^A - U U^T / D, p^a = p^A + I^a c + U u / D.

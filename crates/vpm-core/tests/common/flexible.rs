@@ -64,7 +64,7 @@ pub fn inertia(random: &mut Random) -> Inertia<f64> {
 /// A body on a random joint.
 pub fn body(random: &mut Random, name: &str, on: Mount, kind: JointKind) -> Body<f64> {
     let joint = joint(random, &format!("{name}.joint"), kind);
-    Body { name: name.to_owned(), on, joint, inertia: Some(inertia(random)) }
+    Body { name: name.to_owned(), on, joint, inertia: Some(inertia(random)), rotor_inertia: None }
 }
 
 /// A soft beam in a random place: it bends visibly at coordinates of the order of one tenth.
