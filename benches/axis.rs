@@ -45,7 +45,7 @@ fn axis() -> Result<Description> {
         "gravity": [0.0, 0.0, 0.0],
         "parameters": parameters,
         "parameter_names": parameter_names,
-        "bodies": [{"name": "carriage", "parent": null, "mass": 0, "center_of_mass": [1, 1, 1], "inertia": [1, 1, 1, 1, 1, 1],
+        "bodies": [{"name": "carriage", "on": "world", "inertia": {"mass": 0, "center_of_mass": [1, 1, 1], "moments": [1, 1, 1, 1, 1, 1]},
             "joint": {"name": "axis", "kind": "prismatic", "axis": [1.0, 0.0, 0.0], "translation": [0.0, 0.0, 0.0],
                 "rotation": [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]}}],
         "effects": [
@@ -53,7 +53,7 @@ fn axis() -> Result<Description> {
             {"type": "coulomb_friction", "joint": 0, "coulomb": 3, "transition_velocity": 4},
             {"type": "stribeck_friction", "joint": 0, "stribeck": 5, "stribeck_velocity": 6, "transition_velocity": 4},
             {"type": "bias_force", "joint": 0, "force": 7}],
-        "actuators": [{"name": "drive", "joint": 0, "gain": 8, "delay": 9}],
+        "actuators": [{"name": "drive", "on": {"joint": 0}, "gain": 8, "delay": 9}],
         "controllers": [{"type": "cascade", "name": "servo", "actuator": 0, "measures": {"kind": "position", "joint": 0},
             "position_gain": 10, "velocity_gain": 11, "limit": 12}],
     });

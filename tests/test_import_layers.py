@@ -17,7 +17,7 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGE = ROOT / "python" / "vpm"
 
-OPTIONAL = {"h5py", "jinja2", "matplotlib", "pandas", "pyarrow", "rosbags"}
+OPTIONAL = {"control", "h5py", "jinja2", "matplotlib", "pandas", "pyarrow", "rosbags"}
 """Libraries of the extras: a plain install has none of them."""
 
 SLOW = OPTIONAL | {"rich", "scipy.signal", "scipy.stats", "typer"}
@@ -142,7 +142,7 @@ import importlib, vpm
 for part in {parts}:
     importlib.import_module("vpm." + part)
 for name in vpm.__all__:
-    if name.islower() and name != "__version__":
+    if name.islower() and name not in {{"__version__", "linkages"}}:
         assert callable(getattr(vpm, name)), name
 """
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)

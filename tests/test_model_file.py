@@ -156,7 +156,7 @@ def test_every_parameter_stands_in_the_description_once(content: dict[str, Any])
     used: list[int] = []
 
     def collect(value: object, key: str = "") -> None:
-        if key in {"gravity", "parameters", "axis", "translation", "rotation", "parent", "body", "channel", "measures"}:
+        if key in {"gravity", "parameters", "axis", "translation", "rotation", "on", "body", "channel", "measures"}:
             return
         if isinstance(value, dict):
             for name, item in value.items():
@@ -173,16 +173,15 @@ def test_every_parameter_stands_in_the_description_once(content: dict[str, Any])
     assert described["parameters"] == model.theta.tolist()
     assert [model.index(name) for name in model.parameter_names] == list(range(len(model.theta)))
     for k, body in enumerate(described["bodies"]):
-        assert body["parent"] is None or body["parent"] < k
+        assert body["on"] == "world" or body["on"]["body"] < k
         entry = content["joints"][body["joint"]["name"]]
-        parent = "world" if body["parent"] is None else described["bodies"][body["parent"]]["name"]
+        parent = "world" if body["on"] == "world" else described["bodies"][body["on"]["body"]]["name"]
         assert (entry["child"], entry["parent"]) == (body["name"], parent)
         expected = Rotation.from_euler("xyz", entry["rotation"]).as_matrix()  # extrinsic: about fixed axes
         assert np.reshape(body["joint"]["rotation"], (3, 3)) == pytest.approx(expected, abs=1e-12)
     for actuator in described["actuators"]:
-        assert (
-            described["bodies"][actuator["joint"]]["joint"]["name"] == content["actuators"][actuator["name"]]["joint"]
-        )
+        driven = described["bodies"][actuator["on"]["joint"]]["joint"]["name"]
+        assert driven == content["actuators"][actuator["name"]]["joint"]
 
 
 @given(machines(), st.data())
@@ -419,7 +418,7 @@ REFUSALS = [
     # unknown and missing keys
     ("mass = {", "mas = {", "bodies.carriage.mas", 'did you mean "mass"?'),
     ("gravity", "gravty", "gravty", 'did you mean "gravity"?'),
-    (END, "[foo]\n[channels]", "foo", "actuators, bodies, channels"),
+    (END, "[foo]\n[channels]", "foo", "actuators, beams, bodies, channels"),
     ("position_gain", "positiongain", "controllers.servo.positiongain", 'did you mean "position_gain"?'),
     ("viscous =", "viscus =", "effects[0].viscus", 'did you mean "viscous"?'),
     ('"q_m", unit', '"q_m", scal = 1, unit', 'channels."axis.position".scal', 'did you mean "scale"?'),

@@ -9,6 +9,8 @@ Each arrow is a function of this module, each result one frozen object.
 
 from importlib.metadata import version
 
+from vpm import linkages
+from vpm.batch import Trial, simulate_batch
 from vpm.budget import BudgetReport, budget
 from vpm.catalogue import EFFECTS
 from vpm.compare import Comparison, compare
@@ -16,10 +18,13 @@ from vpm.discrepancy import Diagnosis, diagnose
 from vpm.errors import VpmError
 from vpm.experiment import Experiment
 from vpm.identify import Fit, identify
-from vpm.model import Model
+from vpm.linear import LinearModel
+from vpm.model import Dynamics, Model
+from vpm.planar import PlanarArm
 from vpm.report import Report, report, write_report
 from vpm.simplify import Ladder, simplify
 from vpm.simulate import Run, Setup, simulate
+from vpm.stepping import Simulation
 
 __version__ = version("vpm-dynamics")
 
@@ -28,21 +33,28 @@ __all__ = [
     "BudgetReport",
     "Comparison",
     "Diagnosis",
+    "Dynamics",
     "Experiment",
     "Fit",
     "Ladder",
+    "LinearModel",
     "Model",
+    "PlanarArm",
     "Report",
     "Run",
     "Setup",
+    "Simulation",
+    "Trial",
     "VpmError",
     "__version__",
     "budget",
     "compare",
     "diagnose",
     "identify",
+    "linkages",
     "report",
     "simplify",
     "simulate",
+    "simulate_batch",
     "write_report",
 ]

@@ -1,12 +1,12 @@
 """The compiled core of vpm: a machine as one object, arrays in and out."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["Diverged", "System"]
+__all__ = ["Diverged", "Dynamics", "Karl", "Leg", "PlanarArm", "Simulation", "System", "hyq_parameters", "stop_when"]
 
 class Diverged(ArithmeticError):
     """A simulation left the finite numbers.
@@ -25,13 +25,89 @@ class Diverged(ArithmeticError):
     outputs: NDArray[np.float64]
     states: NDArray[np.float64]
 
+def stop_when(asked: Callable[[], bool] | None) -> None:
+    """Let long computations of the calling thread stop with ``KeyboardInterrupt`` when ``asked()`` is true.
+
+    Ctrl-C reaches Python's main thread only; this is how it tells the threads that work for it. None ends it.
+    """
+
+@final
+class Dynamics:
+    """Single evaluations of a machine with fixed parameters, as fast as the crossing into Python allows.
+
+    One-dimensional contiguous arrays of double precision are read where they are, others are converted first. n is
+    the number of coordinates. Raises ``ValueError`` for other sizes; numbers that are not finite give results that
+    are not finite.
+
+    Parameters
+    ----------
+    system : System
+    theta : array_like, shape (P,)
+    """
+
+    def __new__(cls, system: System, theta: ArrayLike) -> Dynamics: ...
+    def inverse_dynamics(
+        self, position: ArrayLike, velocity: ArrayLike, acceleration: ArrayLike
+    ) -> NDArray[np.float64]:
+        """Efforts (n,) that accelerations (n,) need: ``M a + h - effects``; what no actuator gives has to be zero."""
+    def forward_dynamics(self, position: ArrayLike, velocity: ArrayLike, effort: ArrayLike) -> NDArray[np.float64]:
+        """Accelerations (n,) under efforts (n,), with all effects."""
+    def mass_matrix(self, position: ArrayLike) -> NDArray[np.float64]:
+        """Mass matrix (n, n), payloads included."""
+    def energy(self, position: ArrayLike, velocity: ArrayLike) -> tuple[float, float]:
+        """Kinetic and potential energy in J: of bodies in gravity, and of effects that have a potential."""
+    def jacobian(self, position: ArrayLike, marker: int) -> NDArray[np.float64]:
+        """Jacobian (6, n) of a marker by number: angular velocity, then velocity of its origin, in world axes."""
+
+@final
+class Simulation:
+    """A simulation that goes on one sample at a time.
+
+    Parameters
+    ----------
+    system : System
+    theta : array_like, shape (P,)
+    state : array_like, shape (n_states,)
+    time_step : float
+        Time between samples, s.
+    substeps : int
+    integrator : str
+    """
+
+    def __new__(
+        cls,
+        system: System,
+        theta: ArrayLike,
+        state: ArrayLike,
+        time_step: float,
+        substeps: int,
+        integrator: str,
+    ) -> Simulation: ...
+    @property
+    def time(self) -> float:
+        """Time since the beginning, s."""
+    @property
+    def state(self) -> NDArray[np.float64]:
+        """State now (n_states,); a copy."""
+    @property
+    def outputs(self) -> NDArray[np.float64]:
+        """What the sensors show now (n_outputs,); a copy."""
+    def step(self, inputs: ArrayLike) -> NDArray[np.float64]:
+        """Hold ``inputs`` (n_inputs,) for one sample; outputs (n_outputs,) at its end, with the inputs still held."""
+    def run(self, inputs: ArrayLike) -> NDArray[np.float64]:
+        """A step for each row of ``inputs`` (N, n_inputs); outputs (N, n_outputs)."""
+    def reset(self, state: ArrayLike) -> None:
+        """Begin again at time zero in ``state`` (n_states,), with nothing remembered."""
+
 @final
 class System:
     """A machine: rigid tree, effects, actuators, sensors and controllers over a flat parameter vector theta.
 
     N samples, n joints, m actuators, P parameters, k requested sensitivities; all numbers SI. The state is
-    ``[positions, velocities, one state per actuator with lag]``, the outputs are position, velocity, acceleration
-    and effort of each joint, then command and force of each actuator; a sensor replaces the channel it measures.
+    ``[coordinates, their rates, one state per actuator with lag]``; coordinates are the joints', then the beams'. The
+    outputs are position, velocity, acceleration and effort of each joint, command and force of each actuator, length,
+    rate and force of each line, strain of each gauge, origin and rotation vector of each marker; a sensor replaces
+    the channel it measures.
     Every function raises ``ValueError``, in one sentence with the repair, for wrong shapes, numbers that are not
     finite, and parameters for which a law is not defined. Ctrl-C raises ``KeyboardInterrupt``.
 
@@ -46,6 +122,15 @@ class System:
     def n_joints(self) -> int:
         """Number of joints n."""
     @property
+    def n_coordinates(self) -> int:
+        """Number of coordinates: joints, then the elastic coordinates of the beams."""
+    @property
+    def n_elastic(self) -> int:
+        """Number of elastic coordinates."""
+    @property
+    def n_beams(self) -> int:
+        """Number of beams."""
+    @property
     def n_states(self) -> int:
         """Length of the state."""
     @property
@@ -56,7 +141,7 @@ class System:
         """Number of inputs: one command per actuator."""
     @property
     def n_outputs(self) -> int:
-        """Number of output channels: 4 n + 2 m."""
+        """Number of output channels."""
     @property
     def n_parameters(self) -> int:
         """Length P of theta."""
@@ -139,11 +224,55 @@ class System:
     def forward_dynamics(
         self, theta: ArrayLike, position: ArrayLike, velocity: ArrayLike, effort: ArrayLike
     ) -> NDArray[np.float64]:
-        """Accelerations (n,) of the rigid tree with its effects under ``effort`` (n,) on the joints."""
+        """Accelerations (n_coordinates,) with all effects under ``effort`` (n,) on the joints."""
     def mass_matrix(self, theta: ArrayLike, position: ArrayLike) -> NDArray[np.float64]:
-        """Mass matrix (n, n), payloads included."""
+        """Mass matrix over all coordinates, payloads included."""
     def energy(self, theta: ArrayLike, position: ArrayLike, velocity: ArrayLike) -> tuple[float, float]:
         """Kinetic and potential energy in J: of bodies in gravity, and of effects that have a potential."""
+    def linearize(
+        self, theta: ArrayLike, state: ArrayLike, inputs: ArrayLike
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Exact derivatives at ``state`` (n_states,) under standing commands ``inputs`` (m,).
+
+        Delays pass their input unchanged; dead zones and saturations have the slope at the command.
+
+        Returns
+        -------
+        A, B, C, D : ndarray, shapes (nx, nx), (nx, m), (ny, nx), (ny, m)
+            Of the rates and of all outputs, sensors' gains included.
+        """
+    def simulate_prescribed(
+        self,
+        theta: ArrayLike,
+        position: ArrayLike,
+        velocity: ArrayLike,
+        acceleration: ArrayLike,
+        time_step: float,
+        substeps: int,
+        integrator: str,
+        sensitivities: Sequence[int] = ...,
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Joints follow a measured motion (N, n), beams respond from rest; position sensors are undone.
+
+        Returns
+        -------
+        outputs, states, jacobian : ndarray
+            As in `simulate`; ``effort`` of a joint is the effort that the motion needs.
+        """
+    def equilibrium(self, theta: ArrayLike, position: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Coordinates (n_coordinates,) at rest with the joints held at ``position`` (n,), and the holding efforts (n,)."""
+    def natural_frequencies(self, theta: ArrayLike, position: ArrayLike) -> NDArray[np.float64]:
+        """Natural frequencies (n_elastic,) in Hz with the joints locked at ``position`` (n,), slowest first.
+
+        A negative one is the rate of growth of a beam that buckles.
+        """
+    def slopes(self, theta: ArrayLike, states: ArrayLike) -> NDArray[np.float64]:
+        """Largest slope (N, n_beams) in rad of each beam; not a number where the kinematics are exact."""
+    @property
+    def slope_limit(self) -> float:
+        """Slope in rad up to which the kinematics of small slopes are right within 1 %."""
+    def jacobian(self, theta: ArrayLike, position: ArrayLike, marker: int) -> NDArray[np.float64]:
+        """Jacobian (6, n_coordinates) of a marker by number: angular velocity, then velocity, in world axes."""
     def time_steps(
         self,
         theta: ArrayLike,
@@ -155,3 +284,123 @@ class System:
         count: int,
     ) -> NDArray[np.float64]:
         """Duration (count,) in s of single steps, on the way through ``inputs`` again and again."""
+
+_Array = NDArray[np.float64]
+_Pair = Sequence[float]
+
+@final
+class Karl:
+    """KARL: a limb of two joints whose two linear actuators sit on its first body; see `vpm.linkages.Karl`.
+
+    Tables have N rows, one configuration each; lengths in m, angles in rad, forces in N, torques in N m.
+    """
+
+    def __new__(
+        cls,
+        medial: float,
+        distal: float,
+        stroke_direction: float,
+        sliders: Sequence[_Pair],
+        ground_anchor: _Pair,
+        distal_anchor: _Pair,
+        rods: _Pair,
+    ) -> Karl: ...
+    @staticmethod
+    def prototype() -> tuple[float, float, float, list[list[float]], list[float], list[float], list[float]]:
+        """Dimensions of the prototype, in the order of the class's arguments."""
+    def direct(self, strokes: _Pair) -> _Array:
+        """Joint angles (4, 2) of all assembly modes at two strokes."""
+    def inverse(self, target: _Pair) -> _Array:
+        """Angles and strokes (8, 4) of all configurations that put the end point at ``target``."""
+    def end_point(self, angles: ArrayLike) -> _Array:
+        """End points (N, 2) at joint angles (N, 2)."""
+    def end_point_determinant(self, angles: ArrayLike) -> _Array:
+        """Determinants (N,) of the end point's Jacobian, m^2."""
+    def transmission(self, angles: ArrayLike, strokes: ArrayLike) -> _Array:
+        """Diagonals (N, 2) of Lambda, rad/m."""
+    def determinants(self, angles: ArrayLike, strokes: ArrayLike) -> _Array:
+        """Determinants (N, 2) of Psi and Omega, m^2."""
+    def stroke_slopes(self, angles: ArrayLike, strokes: ArrayLike) -> _Array:
+        """Derivatives (N, 2) of the constraints by the strokes, m."""
+    def torques(self, angles: ArrayLike, strokes: ArrayLike, forces: ArrayLike) -> _Array:
+        """Joint torques (N, 2) of actuator forces (N, 2)."""
+    def alignments(self, actuator: int) -> _Array:
+        """Rows (stroke, angle, extended) where an actuator loses control of its joint."""
+    def perpendiculars(self, actuator: int) -> _Array:
+        """Rows (stroke, angle) where a rod is perpendicular to its stroke."""
+    def span(self, actuator: int, mode: float) -> float:
+        """Turn of a joint in rad between two alignments, in mode +1 or -1."""
+    def resultant(self, actuator: int, stroke: float) -> list[float]:
+        """Coefficients (5,) of the resultant in s = sin q at one stroke, lowest power first."""
+
+@final
+class Leg:
+    """A leg on a vertical slider with two cylinders, its foot on the ground; see `vpm.linkages.Leg`.
+
+    ``bodies`` (2, 5): length, mass, inertia, centre of mass along and ahead; ``attachments`` (2, 4): base, angle, tip,
+    angle; ``parts`` (4, 3) of hip and knee cylinder: mass, centre of mass, inertia of barrel and rod. Tables have N
+    rows, one state each; all numbers SI.
+    """
+
+    def __new__(
+        cls,
+        slider_mass: float,
+        bodies: Sequence[_Pair],
+        attachments: Sequence[_Pair],
+        parts: Sequence[_Pair],
+        gravity: float,
+    ) -> Leg: ...
+    def strokes(self, angles: ArrayLike) -> _Array:
+        """Lengths (N, 2) of hip and knee cylinder."""
+    def levers(self, angles: ArrayLike) -> _Array:
+        """Lever arms (N, 2) of the cylinders, m/rad."""
+    def points(self, angles: ArrayLike) -> _Array:
+        """Points (N, 7, 2): hip, knee, foot, bases of hip and knee cylinder, their tips."""
+    def terms(self, angles: ArrayLike, rates: ArrayLike, derivation: str) -> tuple[_Array, _Array, _Array]:
+        """Mass matrices (N, 2, 2), velocity terms (N, 2), gravity terms (N, 2); virtual_work or lagrange."""
+    def reactions(self, angles: ArrayLike, rates: ArrayLike, accelerations: ArrayLike) -> _Array:
+        """Rows (N, 23): torques, cylinder forces, ground, guide (2), pins (6 x 2), bearings (2 x 2)."""
+    def cylinder_forces(self, angles: ArrayLike, torques: ArrayLike) -> _Array:
+        """Cylinder forces (N, 2) that give joint torques (N, 2)."""
+    def accelerations(self, angles: ArrayLike, rates: ArrayLike, torques: ArrayLike) -> _Array:
+        """Joint accelerations (N, 2) under joint torques (N, 2)."""
+    def shares(self, angles: ArrayLike, rate: float, acceleration: float, samples: int, definition: str) -> _Array:
+        """Largest shares (N, 3) of inertia, velocity and gravity over all sampled motions."""
+
+def hyq_parameters(
+    data: str, shank: float
+) -> tuple[float, list[list[float]], list[list[float]], list[list[float]], float]:
+    """Parameters of the leg of HyQ in the order of the arguments of `Leg`: table, identified or plausible."""
+
+@final
+class PlanarArm:
+    """One or two flexible links in a plane with servos on the joints; see `vpm.PlanarArm`.
+
+    ``links`` (n, 10): length, bending stiffness, line density, rotary inertia per length, damping time, hub radius, hub
+    mass, hub inertia, tip mass, tip inertia; ``servos`` (n, 2): gains on angle and rate; all numbers SI.
+    """
+
+    def __new__(
+        cls, links: ArrayLike, servos: ArrayLike, gravity: _Pair, coefficients: int, points: int
+    ) -> PlanarArm: ...
+    @property
+    def n_coordinates(self) -> int:
+        """Number of coordinates of all links."""
+    def run(
+        self,
+        duration: float,
+        samples: int,
+        steps: int,
+        gauges: ArrayLike,
+        swing: ArrayLike | None = ...,
+        reference: ArrayLike | None = ...,
+        reference_step: float = ...,
+        start: ArrayLike | None = ...,
+    ) -> tuple[_Array, _Array, _Array, _Array, _Array]:
+        """Tips (N, n, 3), joint angles (N, n), joint rates (N, n), strains (N, gauges), states (N, 2 n_coordinates).
+
+        Raises
+        ------
+        Diverged
+            The state is no longer finite.
+        """

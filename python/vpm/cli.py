@@ -1,4 +1,4 @@
-"""Command line: ``vpm demo | info | simulate | compare | identify | diagnose | report | simplify | budget``."""
+"""Command line: ``vpm demo``, ``simulate``, ``compare``, ``identify``, ``diagnose`` and the others."""
 
 from __future__ import annotations
 
@@ -42,9 +42,14 @@ Cutoff = Annotated[
     float | None, typer.Option(help="Cut-off frequency of the motion filter, Hz; by default chosen from the record.")
 ]
 Mode = Annotated[
-    str, typer.Option(help="free_run, inverse_dynamics, restarts or closed_loop.", metavar="MODE", show_default=True)
+    str,
+    typer.Option(
+        help="free_run, inverse_dynamics, restarts, closed_loop or prescribed_motion.",
+        metavar="MODE",
+        show_default=True,
+    ),
 ]
-Integrator = Annotated[str, typer.Option(help="linearly_implicit, rk4 or semi_implicit.")]
+Integrator = Annotated[str, typer.Option(help="linearly_implicit, rosenbrock, rk4 or semi_implicit.")]
 Plot = Annotated[Path | None, typer.Option(help="Write the plot to this file (PNG, SVG or PDF).")]
 Out = Annotated[Path, typer.Option(help="Folder for report.json, report.html and the repaired model.")]
 
@@ -236,6 +241,21 @@ def budget(
     console.print(str(report), markup=False)
     if not report.holds:
         raise typer.Exit(1)
+
+
+@app.command(epilog="Example:  vpm linkage examples/karl/karl.toml --plot karl.png")
+def linkage(
+    path: Annotated[Path, typer.Argument(metavar="LINKAGE", help="File of a closed linkage (TOML).")],
+    plot: Plot = None,
+) -> None:
+    """Say what a closed linkage can do: singular strokes of KARL, cylinders and shares of dynamics of a leg."""
+    from vpm.linkages import load
+
+    found = load(path)
+    console.print(repr(found), markup=False)
+    for sentence in found.summary:
+        console.print(f"  {sentence}", markup=False)
+    _save_plot(found.plot, plot)
 
 
 @app.command(epilog="Example:  vpm demo --out demo-report")

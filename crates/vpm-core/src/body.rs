@@ -1,84 +1,141 @@
-//! Rigid bodies, each with the joint that carries it.
+//! Rigid bodies, each with the joint that carries it or welded to something.
 
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
 use crate::joint::Joint;
+use crate::mount::Mount;
 use crate::scalar::Scalar;
 use crate::spatial::{SpatialInertia, Symmetric3, Vector3, principal_moments};
 
 /// Slack of the inertia checks relative to the largest principal moment: hand-typed moments of a plate are rounded.
 const MOMENT_TOLERANCE: f64 = 1e-6;
 
-/// A rigid body over any parameter type: `Body<usize>` holds indices into a parameter vector, `Body<S>` numbers.
+/// A body on a joint, over any parameter type: `Body<usize>` holds indices into a parameter vector, `Body<S>` numbers.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Body<P> {
     /// Name, unique in the model.
     pub name: String,
-    /// Number of the body it hangs on; none for the world.
-    pub parent: Option<usize>,
-    /// The joint between parent and body. The body's frame is the joint frame, moved by the joint.
+    /// What the joint sits on.
+    pub on: Mount,
+    /// The joint between mount and body. The body's frame is the joint frame, moved by the joint.
     pub joint: Joint,
+    /// What makes it heavy; without it the body is a massless carrier of the next joint.
+    pub inertia: Option<Inertia<P>>,
+}
+
+/// A rigid body without a joint of its own: a motor, a hub, a load.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Weld<P> {
+    /// Name, unique in the model.
+    pub name: String,
+    /// What it is fixed to.
+    pub on: Mount,
+    /// Its origin in the mount's frame, m.
+    pub translation: [f64; 3],
+    /// Its axes in the mount's frame, row by row.
+    pub rotation: [f64; 9],
+    /// What makes it heavy.
+    pub inertia: Inertia<P>,
+}
+
+/// Mass, centre of mass and moments of inertia of a rigid body.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Inertia<P> {
     /// Mass in kg.
     pub mass: P,
     /// Centre of mass in the body's frame, in m.
     pub center_of_mass: [P; 3],
     /// Rotational inertia xx yy zz xy xz yz about the centre of mass, body axes, in kg m^2; xy is the tensor's entry.
-    pub inertia: [P; 6],
+    pub moments: [P; 6],
 }
 
-/// A mass rigidly attached to a body in one point.
+/// What a point mass sits on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Site {
+    /// The body of that number.
+    Body(usize),
+    /// The weld of that number, in its own frame.
+    Weld(usize),
+    /// The section at the tip of the beam of that number.
+    Tip(usize),
+}
+
+/// A mass rigidly attached to a body, or to the tip of a beam, in one point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PointMass<S> {
-    /// Number of the body.
-    pub body: usize,
+    /// What it sits on.
+    pub on: Site,
     /// Mass in kg.
     pub mass: S,
-    /// Position in the body's frame, in m.
+    /// Position in the body's or section's frame, in m.
     pub position: [S; 3],
+}
+
+impl<P> Inertia<P> {
+    /// The same inertia over another parameter type.
+    pub fn map<T>(&self, f: &mut impl FnMut(&P) -> T) -> Inertia<T> {
+        Inertia {
+            mass: f(&self.mass),
+            center_of_mass: self.center_of_mass.each_ref().map(&mut *f),
+            moments: self.moments.each_ref().map(&mut *f),
+        }
+    }
 }
 
 impl<P> Body<P> {
     /// The same body over another parameter type.
     pub fn map<T>(&self, f: &mut impl FnMut(&P) -> T) -> Body<T> {
-        Body {
-            name: self.name.clone(),
-            parent: self.parent,
-            joint: self.joint.clone(),
-            mass: f(&self.mass),
-            center_of_mass: self.center_of_mass.each_ref().map(&mut *f),
-            inertia: self.inertia.each_ref().map(&mut *f),
-        }
+        let inertia = self.inertia.as_ref().map(|inertia| inertia.map(f));
+        Body { name: self.name.clone(), on: self.on, joint: self.joint.clone(), inertia }
     }
 }
 
-impl<S: Scalar> Body<S> {
-    /// Its spatial inertia in the body's frame.
-    pub fn spatial_inertia(&self) -> SpatialInertia<S> {
-        SpatialInertia::new(self.mass, Vector3::from(self.center_of_mass), Symmetric3::from_array(self.inertia))
+impl<P> Weld<P> {
+    /// The same body over another parameter type.
+    pub fn map<T>(&self, f: &mut impl FnMut(&P) -> T) -> Weld<T> {
+        let Self { name, on, translation, rotation, inertia } = self;
+        Weld { name: name.clone(), on: *on, translation: *translation, rotation: *rotation, inertia: inertia.map(f) }
+    }
+}
+
+impl<S: Scalar> Inertia<S> {
+    /// As a spatial inertia in the body's frame.
+    pub fn spatial(&self) -> SpatialInertia<S> {
+        SpatialInertia::new(self.mass, Vector3::from(self.center_of_mass), Symmetric3::from_array(self.moments))
     }
 
-    /// Whether a real body can have these numbers: finite, positive mass, principal moments that satisfy the triangle
-    /// inequality. That is the same as a non-negative distribution of mass (Wensing, Kim & Slotine 2018, "Linear matrix
-    /// inequalities for physically consistent inertial parameter identification"). Zero inertia passes: a point mass.
-    pub fn check(&self) -> Result<()> {
-        self.check_finite()?;
-        check_physical(&self.name, self.mass.re(), Symmetric3::from_array(self.inertia.map(|entry| entry.re())), 0.0)
+    /// The spatial inertia, if a real body `name` can have these numbers: finite, positive mass, principal moments that satisfy the
+    /// triangle inequality. That is the same as a non-negative distribution of mass (Wensing, Kim & Slotine 2018, "Linear matrix
+    /// inequalities for physically consistent inertial parameter identification"). Zero moments pass: a point mass.
+    pub fn checked(&self, name: &str) -> Result<SpatialInertia<S>> {
+        self.check_finite(name)?;
+        check_physical(name, self.mass.re(), Symmetric3::from_array(self.moments.map(|entry| entry.re())), 0.0)?;
+        Ok(self.spatial())
     }
 
-    fn check_finite(&self) -> Result<()> {
+    fn check_finite(&self, name: &str) -> Result<()> {
         const INERTIA: [&str; 6] = ["inertia.xx", "inertia.yy", "inertia.zz", "inertia.xy", "inertia.xz", "inertia.yz"];
         const CENTER: [&str; 3] = ["center_of_mass.x", "center_of_mass.y", "center_of_mass.z"];
         let named = std::iter::once(("mass", self.mass))
             .chain(CENTER.into_iter().zip(self.center_of_mass))
-            .chain(INERTIA.into_iter().zip(self.inertia));
+            .chain(INERTIA.into_iter().zip(self.moments));
         for (parameter, number) in named {
             if !number.is_finite() {
-                return Err(Error::NonFinite { path: format!("{}.{parameter}", self.name), value: number.re() });
+                return Err(Error::NonFinite { path: format!("{name}.{parameter}"), value: number.re() });
             }
         }
         Ok(())
+    }
+}
+
+impl<S: Scalar> Body<S> {
+    /// Its spatial inertia in its own frame: that of a real body, or none for a massless carrier.
+    pub fn spatial_inertia(&self) -> Result<SpatialInertia<S>> {
+        self.inertia.map_or(Ok(SpatialInertia::zero()), |inertia| inertia.checked(&self.name))
     }
 }
 

@@ -1,8 +1,10 @@
 //! Every buffer the recursions need, allocated once per model.
 
+use crate::algebra::Cholesky;
+use crate::beam::Sections;
 use crate::model::Model;
 use crate::scalar::Scalar;
-use crate::spatial::{ArticulatedInertia, Pose, SpatialInertia, Twist, Wrench};
+use crate::spatial::{ArticulatedInertia, Pose, SpatialInertia, Twist, Vector3, Wrench};
 
 /// Working memory of the algorithms in [`crate::dynamics`], which leave their results here.
 ///
@@ -16,6 +18,59 @@ pub struct Data<S> {
     pub(crate) effort: Vec<S>,
     pub(crate) acceleration: Vec<S>,
     pub(crate) mass_matrix: Vec<S>,
+    pub(crate) composite: Composite<S>,
+}
+
+/// Composite bodies over rigid bodies and beams: everything in the axes of its own frame.
+#[derive(Clone, Debug)]
+pub(crate) struct Composite<S> {
+    /// The frames of the model: world, bodies in aligned frames, stations of elastic beams.
+    pub(crate) frames: Vec<FrameSlot<S>>,
+    /// Sections of each beam relative to its root.
+    pub(crate) sections: Vec<Sections<S>>,
+    /// Wrench per unit acceleration of each coordinate, on its way to the root.
+    pub(crate) columns: Vec<Wrench<S>>,
+    /// Velocity terms and gravity, counted as loads.
+    pub(crate) bias: Vec<S>,
+    pub(crate) factors: Cholesky<S>,
+    pub(crate) lines: Vec<LineSlot<S>>,
+}
+
+/// A frame of the model.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct FrameSlot<S> {
+    /// X_PF, in the frame that it hangs on.
+    pub(crate) across: Pose<S>,
+    /// X_WF.
+    pub(crate) pose: Pose<S>,
+    pub(crate) velocity: Twist<S>,
+    /// Spatial acceleration at zero coordinate accelerations, gravity taken off.
+    pub(crate) acceleration: Twist<S>,
+    /// Inertia of what sits on the frame; on the way inward, of all that it carries.
+    pub(crate) inertia: SpatialInertia<S>,
+    /// What carries that inertia at zero coordinate accelerations.
+    pub(crate) wrench: Wrench<S>,
+}
+
+/// A line in the axes of the world.
+#[derive(Clone, Debug)]
+pub(crate) struct LineSlot<S> {
+    pub(crate) length: S,
+    /// Unit vector from its beginning to its end.
+    pub(crate) direction: Vector3<S>,
+    pub(crate) from: PointSlot<S>,
+    pub(crate) to: PointSlot<S>,
+}
+
+/// A point that moves with the machine, in the axes of the world.
+#[derive(Clone, Debug)]
+pub(crate) struct PointSlot<S> {
+    pub(crate) place: Vector3<S>,
+    pub(crate) velocity: Vector3<S>,
+    /// Acceleration at zero coordinate accelerations, gravity taken off.
+    pub(crate) acceleration: Vector3<S>,
+    /// Velocity per unit rate of each coordinate.
+    pub(crate) columns: Vec<Vector3<S>>,
 }
 
 /// Motion of a body in the frames of its description.
@@ -66,7 +121,7 @@ pub(crate) struct AbaSlot<S> {
 impl<S: Scalar> Data<S> {
     /// Allocates all buffers for `model`.
     pub fn new(model: &Model<S>) -> Self {
-        let n = model.n_joints();
+        let (n, count) = (model.n_joints(), model.n_coordinates());
         let world = KinematicsSlot { pose: Pose::identity(), twist: Twist::zero() };
         Self {
             kinematics: vec![world; n + 1],
@@ -74,8 +129,9 @@ impl<S: Scalar> Data<S> {
             crba: vec![CrbaSlot::default(); n + 1],
             aba: vec![AbaSlot::default(); n + 1],
             effort: vec![S::zero(); n],
-            acceleration: vec![S::zero(); n],
-            mass_matrix: vec![S::zero(); n * n],
+            acceleration: vec![S::zero(); count],
+            mass_matrix: vec![S::zero(); count * count],
+            composite: Composite::new(model),
         }
     }
 
@@ -89,18 +145,58 @@ impl<S: Scalar> Data<S> {
         self.kinematics.get(k + 1).map(|slot| slot.twist)
     }
 
+    /// Factorises the mass matrix of the last [`crate::dynamics::flexible::terms()`].
+    pub(crate) fn factorise(&mut self) {
+        self.composite.factors.factorise(&self.mass_matrix);
+    }
+
+    /// Replaces a load on the coordinates by `M^-1` times it, after [`Data::factorise`].
+    pub(crate) fn solve(&self, load: &mut [S]) {
+        self.composite.factors.solve(load);
+    }
+
+    /// Adds to `loads` what `force` (N) on a line does to the coordinates: `J^T F`.
+    pub(crate) fn line_load(&self, line: usize, force: S, loads: &mut [S]) {
+        let LineSlot { direction, from, to, .. } = &self.composite.lines[line];
+        for (load, (&to, &from)) in loads.iter_mut().zip(to.columns.iter().zip(&from.columns)) {
+            *load += direction.dot(to - from) * force;
+        }
+    }
+
     /// Joint efforts (N or N m) of the last [`crate::dynamics::rnea()`].
     pub fn effort(&self) -> &[S] {
         &self.effort
     }
 
-    /// Joint accelerations (m/s^2 or rad/s^2) of the last [`crate::dynamics::aba()`].
+    /// Accelerations (m/s^2 or rad/s^2) of the last [`crate::dynamics::aba()`] or [`crate::dynamics::flexible::solve()`].
     pub fn acceleration(&self) -> &[S] {
         &self.acceleration
     }
 
-    /// Mass matrix of the last [`crate::dynamics::crba()`], n x n, column by column.
+    /// Mass matrix of the last [`crate::dynamics::crba()`] or [`crate::dynamics::flexible::terms()`], n x n, column by column.
     pub fn mass_matrix(&self) -> &[S] {
         &self.mass_matrix
+    }
+}
+
+impl<S: Scalar> Composite<S> {
+    fn new(model: &Model<S>) -> Self {
+        let n = model.n_coordinates();
+        let world = FrameSlot { pose: Pose::identity(), across: Pose::identity(), ..FrameSlot::default() };
+        let point = || PointSlot {
+            place: Vector3::zero(),
+            velocity: Vector3::zero(),
+            acceleration: Vector3::zero(),
+            columns: vec![Vector3::zero(); n],
+        };
+        let line = || LineSlot { length: S::zero(), direction: Vector3::zero(), from: point(), to: point() };
+        Self {
+            frames: vec![world; model.n_frames()],
+            sections: model.beams().iter().map(|elastic| elastic.beam.sections()).collect(),
+            columns: vec![Wrench::zero(); n],
+            bias: vec![S::zero(); n],
+            factors: Cholesky::new(n),
+            lines: model.lines().iter().map(|_| line()).collect(),
+        }
     }
 }

@@ -10,13 +10,16 @@ use serde::Deserialize;
 pub use entry::{ControllerEntry, EffectEntry};
 
 use crate::actuator::Actuator;
-use crate::body::{Body, PointMass};
+use crate::beam::BeamEntry;
+use crate::body::{Body, PointMass, Weld};
 use crate::data::Data;
 use crate::dynamics::check_regular;
 use crate::error::{Error, Result};
-use crate::model::Model;
+use crate::line::Line;
+use crate::model::{Model, Parts};
+use crate::mount::{Gauge, Marker};
 use crate::scalar::Scalar;
-use crate::sensor::{Channel, Sensor};
+use crate::sensor::{Layout, Sensor};
 use crate::system::{Build, Dynamics, System};
 
 /// The parts of a machine. Every `usize` in a law is a place in [`Description::parameters`]; all numbers are SI.
@@ -29,8 +32,23 @@ pub struct Description {
     pub parameters: Vec<f64>,
     /// Dotted name of each parameter, for messages.
     pub parameter_names: Vec<String>,
-    /// Bodies with their joints, parents first.
+    /// Bodies with their joints. A body, a beam or a part on them may hang on a later one, as long as the whole is a tree.
     pub bodies: Vec<Body<usize>>,
+    /// Bodies without joints.
+    #[serde(default)]
+    pub welds: Vec<Weld<usize>>,
+    /// Beams.
+    #[serde(default)]
+    pub beams: Vec<BeamEntry<usize>>,
+    /// Strain gauges.
+    #[serde(default)]
+    pub gauges: Vec<Gauge>,
+    /// Frames to watch.
+    #[serde(default)]
+    pub markers: Vec<Marker>,
+    /// Straight connections.
+    #[serde(default)]
+    pub lines: Vec<Line<usize>>,
     /// Physical effects.
     #[serde(default)]
     pub effects: Vec<EffectEntry>,
@@ -43,15 +61,21 @@ pub struct Description {
     /// Controllers.
     #[serde(default)]
     pub controllers: Vec<ControllerEntry>,
+    /// Number of elastic coordinates of each beam, known once the beams are built.
+    #[serde(skip)]
+    elastic: Vec<usize>,
 }
 
 impl Description {
     /// Reads a description from JSON and checks that everything it refers to is there and that its values are physical.
     pub fn from_json(text: &str) -> Result<Self> {
-        let description: Self =
+        let mut description: Self =
             serde_json::from_str(text).map_err(|error| Error::Description { message: error.to_string() })?;
         check::references(&description)?;
-        description.check_values(&description.parameters)?;
+        check::parameters(&description, &description.parameters)?;
+        let model = description.model(&description.parameters)?;
+        description.elastic = (0..model.n_beams()).filter_map(|k| model.beam(k)).map(|(beam, _)| beam.len()).collect();
+        check_regular(&model, &mut Data::new(&model))?;
         Ok(description)
     }
 
@@ -60,9 +84,24 @@ impl Description {
         self.bodies.len()
     }
 
-    /// Number of generalised coordinates: those of the joints lead.
+    /// Number of generalised coordinates: those of the joints lead, then the elastic ones, beam by beam.
     pub fn n_coordinates(&self) -> usize {
-        self.n_joints()
+        self.n_joints() + self.n_elastic()
+    }
+
+    /// Number of elastic coordinates.
+    pub fn n_elastic(&self) -> usize {
+        self.elastic.iter().sum()
+    }
+
+    /// Number of elastic coordinates of each beam.
+    pub fn elastic(&self) -> &[usize] {
+        &self.elastic
+    }
+
+    /// Number of beams.
+    pub fn n_beams(&self) -> usize {
+        self.beams.len()
     }
 
     /// Number of actuators, which is the number of inputs.
@@ -77,7 +116,18 @@ impl Description {
 
     /// Number of output channels.
     pub fn n_outputs(&self) -> usize {
-        Channel::count(self.n_joints(), self.n_actuators())
+        self.layout().count()
+    }
+
+    /// Where the outputs are.
+    pub fn layout(&self) -> Layout {
+        Layout {
+            joints: self.bodies.len(),
+            actuators: self.actuators.len(),
+            lines: self.lines.len(),
+            gauges: self.gauges.len(),
+            markers: self.markers.len(),
+        }
     }
 
     /// Number of parameters.
@@ -106,9 +156,17 @@ impl Description {
     }
 
     fn model<S: Scalar>(&self, theta: &[S]) -> Result<Model<S>> {
-        let bodies: Vec<_> = self.bodies.iter().map(|body| body.map(&mut |&index| theta[index])).collect();
-        let payloads: Vec<_> = self.effects.iter().filter_map(|entry| entry.payload(theta)).collect();
-        Model::new(self.gravity, &bodies, &payloads)
+        let number = &mut |&index: &usize| theta[index];
+        Model::assemble(Parts {
+            gravity: self.gravity,
+            bodies: self.bodies.iter().map(|body| body.map(number)).collect(),
+            welds: self.welds.iter().map(|weld| weld.map(number)).collect(),
+            beams: self.beams.iter().map(|beam| beam.map(number)).collect(),
+            point_masses: self.effects.iter().filter_map(|entry| entry.payload(theta)).collect(),
+            lines: self.lines.iter().map(|line| line.map(number)).collect(),
+            markers: self.markers.clone(),
+            gauges: self.gauges.clone(),
+        })
     }
 }
 
@@ -125,9 +183,9 @@ impl Build for &Description {
 impl EffectEntry {
     fn payload<S: Scalar>(&self, theta: &[S]) -> Option<PointMass<S>> {
         match self {
-            Self::Payload { body, law } => {
+            Self::Payload { on, law } => {
                 let payload = law.map(&mut |&index| theta[index]);
-                Some(PointMass { body: *body, mass: payload.mass, position: payload.position })
+                Some(PointMass { on: *on, mass: payload.mass, position: payload.position })
             }
             Self::Joint { .. } => None,
         }

@@ -3,22 +3,26 @@
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
+use crate::mount::{check_finite, placed};
 use crate::scalar::Scalar;
 use crate::spatial::{Matrix3, Pose, Twist, Vector3, Wrench};
 
 /// How far the length of an axis may be from 1 before it counts as a mistake instead of rounding.
 const AXIS_TOLERANCE: f64 = 1e-3;
-/// How far `R R^T` may be from the identity.
-const ROTATION_TOLERANCE: f64 = 1e-6;
 
 /// Which lower pair the joint is. Every kind moves along or about one axis: the z axis of its own aligned frame.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum JointKind {
     /// Slides along the axis; coordinate in m, effort in N.
     Prismatic,
     /// Turns about the axis; coordinate in rad, effort in N m.
     Revolute,
+    /// Turns about the axis and moves along it, as a screw in its nut; coordinate in rad, effort in N m.
+    Helical {
+        /// Advance per angle, m/rad.
+        pitch: f64,
+    },
 }
 
 /// A joint: what moves, and where its frame sits in the parent body.
@@ -44,6 +48,10 @@ impl JointKind {
         match self {
             Self::Prismatic => twist.linear.z += rate,
             Self::Revolute => twist.angular.z += rate,
+            Self::Helical { pitch } => {
+                twist.angular.z += rate;
+                twist.linear.z += rate * pitch;
+            }
         }
     }
 
@@ -53,6 +61,7 @@ impl JointKind {
         match self {
             Self::Prismatic => wrench.linear.z,
             Self::Revolute => wrench.angular.z,
+            Self::Helical { pitch } => wrench.angular.z + wrench.linear.z * pitch,
         }
     }
 
@@ -63,46 +72,33 @@ impl JointKind {
         match self {
             Self::Prismatic => Twist::new(Vector3::zero(), turn(v.angular)),
             Self::Revolute => Twist::new(turn(v.angular), turn(v.linear)),
+            Self::Helical { pitch } => Twist::new(turn(v.angular), turn(v.linear + v.angular * S::from_f64(pitch))),
         }
+    }
+
+    /// The part of a twist that belongs to the joint's own coordinate, S per unit rate, for an axis along z.
+    #[inline]
+    pub(crate) fn unit<S: Scalar>(self) -> Twist<S> {
+        let mut unit = Twist::zero();
+        self.add_rate(&mut unit, S::one());
+        unit
     }
 }
 
 impl Joint {
     /// The joint with an exact unit axis, or what is wrong with its geometry.
     pub fn checked(&self) -> Result<Self> {
-        self.check_finite()?;
+        check_finite(&self.name, "axis", &self.axis)?;
+        if let JointKind::Helical { pitch } = self.kind {
+            check_finite(&self.name, "pitch", &[pitch])?;
+        }
         let [x, y, z] = self.axis;
         let length = x.hypot(y).hypot(z);
         if (length - 1.0).abs() > AXIS_TOLERANCE {
             return Err(Error::Axis { joint: self.name.clone(), axis: self.axis, length });
         }
-        self.check_rotation()?;
+        placed(&self.name, self.translation, self.rotation)?;
         Ok(Self { axis: self.axis.map(|component| component / length), ..self.clone() })
-    }
-
-    fn check_finite(&self) -> Result<()> {
-        let groups: [(&str, &[f64]); 3] =
-            [("axis", &self.axis), ("translation", &self.translation), ("rotation", &self.rotation)];
-        for (group, numbers) in groups {
-            for (index, &value) in numbers.iter().enumerate() {
-                if !value.is_finite() {
-                    return Err(Error::NonFinite { path: format!("{}.{group}[{index}]", self.name), value });
-                }
-            }
-        }
-        Ok(())
-    }
-
-    fn check_rotation(&self) -> Result<()> {
-        let rotation = Matrix3::<f64>::from_rows_f64(self.rotation);
-        let product = rotation.mul_transpose(rotation) - Matrix3::identity();
-        let entries = product.columns.iter().flat_map(|column| column.to_array());
-        let defect = entries.fold(0.0_f64, |largest, entry| largest.max(entry.abs()));
-        let determinant = rotation.determinant();
-        if defect > ROTATION_TOLERANCE || determinant < 0.0 {
-            return Err(Error::Rotation { joint: self.name.clone(), defect, determinant });
-        }
-        Ok(())
     }
 
     /// The pose of the joint frame in the parent's frame, at coordinate zero.
@@ -118,6 +114,7 @@ impl Joint {
         let moved = match self.kind {
             JointKind::Prismatic => Pose::new(Matrix3::identity(), axis * q),
             JointKind::Revolute => Pose::new(Matrix3::rotation(axis, q), Vector3::zero()),
+            JointKind::Helical { pitch } => Pose::new(Matrix3::rotation(axis, q), axis * (q * pitch)),
         };
         self.frame() * moved
     }
@@ -128,6 +125,7 @@ impl Joint {
         match self.kind {
             JointKind::Prismatic => Twist::new(Vector3::zero(), axis),
             JointKind::Revolute => Twist::new(axis, Vector3::zero()),
+            JointKind::Helical { pitch } => Twist::new(axis, axis * S::from_f64(pitch)),
         }
     }
 

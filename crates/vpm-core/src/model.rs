@@ -1,26 +1,56 @@
-//! The immutable description of a rigid tree, in numbers.
+//! The immutable description of a machine's tree, in numbers: rigid bodies, beams, and what sits on them.
 
-use crate::body::{Body, PointMass, check_physical};
-use crate::error::{Error, Result};
+mod assemble;
+mod finish;
+mod order;
+mod place;
+
+pub use assemble::Parts;
+pub(crate) use place::Place;
+
+use crate::beam::{Beam, Gauge};
+use crate::body::{Body, PointMass};
+use crate::error::Result;
 use crate::joint::{Joint, JointKind};
+use crate::line::LinePart;
 use crate::scalar::Scalar;
 use crate::spatial::{Matrix3, Pose, SpatialInertia, Vector3};
 
-/// A tree of rigid bodies. Joint `k` carries body `k`; every parent comes before its children.
+/// A tree of rigid bodies and beams. Joint `k` carries body `k`; the coordinates are those of the joints, then the elastic ones of
+/// each beam.
 ///
 /// The recursive algorithms work in *aligned* frames: body frames turned once, at build, so that z is the joint
 /// axis. A joint motion is then one component of a 6-vector instead of a product with six.
+///
+/// Frames that something can sit on are numbered: 0 is the world, k + 1 is body k, then come the stations of the beams.
 #[derive(Clone, Debug)]
 pub struct Model<S> {
     gravity: [f64; 3],
     links: Vec<Link<S>>,
     frames: Vec<BodyFrame<S>>,
+    beams: Vec<Elastic<S>>,
+    order: Vec<Node>,
+    lines: Vec<Wire<S>>,
+    markers: Vec<Place>,
+    gauges: Vec<Strip>,
+    n_coordinates: usize,
+    n_frames: usize,
+    recursive: bool,
+}
+
+/// A node of the tree, which comes after all that it hangs on.
+#[derive(Clone, Debug)]
+pub(crate) enum Node {
+    /// Body of that number, and the coordinates of all that it carries.
+    Body(usize, Vec<usize>),
+    /// Beam of that number, and the coordinates of all that it carries, each with the station that it hangs on.
+    Beam(usize, Vec<(usize, usize)>),
 }
 
 /// What the recursions need of one body, in aligned frames.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Link<S> {
-    /// Slot of the parent: 0 is the world, k + 1 is body k.
+    /// Number of the frame that it hangs on: 0 is the world, k + 1 is body k.
     pub(crate) parent: usize,
     pub(crate) kind: JointKind,
     /// Pose in the parent's aligned frame at coordinate zero.
@@ -33,49 +63,77 @@ pub(crate) struct Link<S> {
 #[derive(Clone, Debug)]
 pub(crate) struct BodyFrame<S> {
     pub(crate) name: String,
-    pub(crate) parent: Option<usize>,
+    /// Number of the frame that it hangs on.
+    pub(crate) parent: usize,
     pub(crate) joint: Joint,
     pub(crate) inertia: SpatialInertia<S>,
 }
 
+/// A strain gauge, ready to be read.
+#[derive(Clone, Debug)]
+pub(crate) struct Strip {
+    /// First coordinate of its beam.
+    pub(crate) first: usize,
+    /// Number of coordinates of its beam.
+    pub(crate) len: usize,
+    /// The strain of the section.
+    pub(crate) section: Gauge,
+    /// Its point in the section, m.
+    pub(crate) point: [f64; 2],
+}
+
+/// A beam in its place.
+#[derive(Clone, Debug)]
+pub(crate) struct Elastic<S> {
+    pub(crate) beam: Beam<S>,
+    /// Where its root is.
+    pub(crate) root: Place,
+    /// Its first coordinate; a rigid beam has none.
+    pub(crate) coordinate: usize,
+    /// Number of the frame of its first station; none for a rigid beam, whose inertia has gone to what carries it.
+    pub(crate) frame: Option<usize>,
+    /// Inertia at each station, with all that is welded to it.
+    pub(crate) inertias: Vec<SpatialInertia<S>>,
+}
+
+/// A line in its place.
+#[derive(Clone, Debug)]
+pub(crate) struct Wire<S> {
+    pub(crate) from: Place,
+    pub(crate) to: Place,
+    pub(crate) barrel: Option<LinePart<S>>,
+    pub(crate) rod: Option<LinePart<S>>,
+}
+
 impl<S: Scalar> Model<S> {
-    /// Builds the tree from its bodies, parents first, with point masses (payloads) on them and `gravity` in m/s^2 in
-    /// the world frame.
-    ///
-    /// A point mass may be negative (a correction to a mass taken too large) as long as what the body then has is
-    /// physical.
+    /// Builds a tree of rigid bodies with point masses (payloads) on them, under `gravity` in m/s^2 in the world frame.
     pub fn new(gravity: [f64; 3], bodies: &[Body<S>], point_masses: &[PointMass<S>]) -> Result<Self> {
-        check_gravity(gravity)?;
-        let mut inertias = bodies.iter().map(own_inertia).collect::<Result<Vec<_>>>()?;
-        attach(&mut inertias, bodies, point_masses)?;
-        let mut model = Self { gravity, links: Vec::new(), frames: Vec::new() };
-        for (body, inertia) in bodies.iter().zip(inertias) {
-            model.push(body, inertia)?;
-        }
-        Ok(model)
+        let (bodies, point_masses) = (bodies.to_vec(), point_masses.to_vec());
+        Self::assemble(Parts { gravity, bodies, point_masses, ..Parts::default() })
     }
 
-    fn push(&mut self, body: &Body<S>, inertia: SpatialInertia<S>) -> Result<()> {
-        let joint = body.joint.checked()?;
-        let parent_alignment = match body.parent {
-            None => Matrix3::identity(),
-            Some(parent) => match self.frames.get(parent) {
-                Some(frame) => frame.joint.alignment(),
-                None => {
-                    let index = self.frames.len();
-                    return Err(Error::Parent { body: body.name.clone(), index, parent });
-                }
-            },
-        };
-        self.links.push(Link::new(&joint, body.parent, parent_alignment, inertia));
-        self.frames.push(BodyFrame { name: body.name.clone(), parent: body.parent, joint, inertia });
-        Ok(())
-    }
-
-    /// Number of joints, bodies and coordinates.
+    /// Number of joints and bodies.
     #[inline]
     pub fn n_joints(&self) -> usize {
         self.links.len()
+    }
+
+    /// Number of coordinates: joints, then elastic coordinates beam by beam.
+    #[inline]
+    pub fn n_coordinates(&self) -> usize {
+        self.n_coordinates
+    }
+
+    /// Number of elastic coordinates.
+    #[inline]
+    pub fn n_elastic(&self) -> usize {
+        self.n_coordinates - self.links.len()
+    }
+
+    /// Whether the algorithms for rigid trees apply: no elastic beams, no lines with mass, parents listed before their children.
+    #[inline]
+    pub fn is_recursive(&self) -> bool {
+        self.recursive
     }
 
     /// Gravity in m/s^2, in the world frame.
@@ -89,36 +147,99 @@ impl<S: Scalar> Model<S> {
         self.frames.get(k).map(|frame| frame.name.as_str())
     }
 
-    /// Joint `k`, if there is one.
+    /// Joint `k` on the frame that it hangs on, if there is one.
     pub fn joint(&self, k: usize) -> Option<&Joint> {
         self.frames.get(k).map(|frame| &frame.joint)
     }
 
-    /// Spatial inertia of body `k` with its point masses, in the body's frame, if there is one.
+    /// Spatial inertia of body `k` with all that is welded to it, in the body's frame, if there is one.
     pub fn inertia(&self, k: usize) -> Option<SpatialInertia<S>> {
         self.frames.get(k).map(|frame| frame.inertia)
     }
 
-    /// The links, parents first.
+    /// Number of beams, rigid ones included.
+    pub fn n_beams(&self) -> usize {
+        self.beams.len()
+    }
+
+    /// Beam `k` and its first coordinate, if there is one.
+    pub fn beam(&self, k: usize) -> Option<(&Beam<S>, usize)> {
+        self.beams.get(k).map(|elastic| (&elastic.beam, elastic.coordinate))
+    }
+
+    /// The links in the order of their coordinates.
     #[inline]
     pub(crate) fn links(&self) -> &[Link<S>] {
         &self.links
     }
 
-    /// The bodies in their own frames, parents first.
+    /// The bodies in their own frames.
     #[inline]
     pub(crate) fn frames(&self) -> &[BodyFrame<S>] {
         &self.frames
     }
+
+    /// The beams.
+    #[inline]
+    pub(crate) fn beams(&self) -> &[Elastic<S>] {
+        &self.beams
+    }
+
+    /// Bodies and elastic beams, each after all that it hangs on.
+    #[inline]
+    pub(crate) fn order(&self) -> &[Node] {
+        &self.order
+    }
+
+    /// The lines.
+    #[inline]
+    pub(crate) fn lines(&self) -> &[Wire<S>] {
+        &self.lines
+    }
+
+    /// The markers.
+    #[inline]
+    pub(crate) fn markers(&self) -> &[Place] {
+        &self.markers
+    }
+
+    /// The strain gauges.
+    #[inline]
+    pub(crate) fn gauges(&self) -> &[Strip] {
+        &self.gauges
+    }
+
+    /// Beam and station of a frame that belongs to an elastic beam.
+    pub(crate) fn station(&self, frame: usize) -> Option<(usize, usize)> {
+        self.beams.iter().enumerate().find_map(|(number, elastic)| {
+            let station = frame.checked_sub(elastic.frame?)?;
+            (station < elastic.beam.stations()).then_some((number, station))
+        })
+    }
+
+    /// Number of frames that something can sit on.
+    #[inline]
+    pub(crate) fn n_frames(&self) -> usize {
+        self.n_frames
+    }
+}
+
+impl<S: Scalar> Wire<S> {
+    /// Whether it weighs anything.
+    #[inline]
+    pub(crate) fn is_massive(&self) -> bool {
+        self.barrel.is_some() || self.rod.is_some()
+    }
 }
 
 impl<S: Scalar> Link<S> {
-    fn new(joint: &Joint, parent: Option<usize>, parent_alignment: Matrix3<f64>, inertia: SpatialInertia<S>) -> Self {
+    /// A body with its joint, on a frame with that alignment of its own.
+    fn new(joint: &Joint, parent: usize, parent_alignment: Matrix3<f64>, inertia: SpatialInertia<S>) -> Self {
         let alignment = joint.alignment();
         let frame: Pose<f64> = joint.frame();
         let to_aligned = Pose::new(lift(alignment).transpose(), Vector3::zero());
         Self {
-            parent: parent.map_or(0, |index| index + 1),
+            parent,
             kind: joint.kind,
             rotation: parent_alignment.transpose() * frame.rotation * alignment,
             translation: parent_alignment.transpose_mul(frame.translation),
@@ -129,21 +250,24 @@ impl<S: Scalar> Link<S> {
     /// The pose `X_PB` of the body in its parent at coordinate `q`, both in aligned frames.
     #[inline]
     pub(crate) fn pose(&self, q: S) -> Pose<S> {
-        let [x, y, z] = self.rotation.columns;
+        let [.., z] = self.rotation.columns;
+        let translation = Vector3::from_f64(self.translation.to_array());
         match self.kind {
-            JointKind::Prismatic => {
-                Pose::new(lift(self.rotation), Vector3::from_f64(self.translation.to_array()) + scaled(z, q))
-            }
-            JointKind::Revolute => {
-                let (sine, cosine) = q.sin_cos();
-                let rotation = Matrix3::from_columns(
-                    scaled(x, cosine) + scaled(y, sine),
-                    scaled(y, cosine) - scaled(x, sine),
-                    Vector3::from_f64(z.to_array()),
-                );
-                Pose::new(rotation, Vector3::from_f64(self.translation.to_array()))
-            }
+            JointKind::Prismatic => Pose::new(lift(self.rotation), translation + scaled(z, q)),
+            JointKind::Revolute => Pose::new(self.turned(q), translation),
+            JointKind::Helical { pitch } => Pose::new(self.turned(q), translation + scaled(z, q * pitch)),
         }
+    }
+
+    #[inline]
+    fn turned(&self, angle: S) -> Matrix3<S> {
+        let [x, y, z] = self.rotation.columns;
+        let (sine, cosine) = angle.sin_cos();
+        Matrix3::from_columns(
+            scaled(x, cosine) + scaled(y, sine),
+            scaled(y, cosine) - scaled(x, sine),
+            Vector3::from_f64(z.to_array()),
+        )
     }
 }
 
@@ -156,52 +280,4 @@ fn scaled<S: Scalar>(v: Vector3<f64>, factor: S) -> Vector3<S> {
 #[inline]
 fn lift<S: Scalar>(matrix: Matrix3<f64>) -> Matrix3<S> {
     Matrix3 { columns: matrix.columns.map(|column| Vector3::from_f64(column.to_array())) }
-}
-
-fn check_gravity(gravity: [f64; 3]) -> Result<()> {
-    for (axis, value) in ["x", "y", "z"].into_iter().zip(gravity) {
-        if !value.is_finite() {
-            return Err(Error::NonFinite { path: format!("gravity.{axis}"), value });
-        }
-    }
-    Ok(())
-}
-
-fn own_inertia<S: Scalar>(body: &Body<S>) -> Result<SpatialInertia<S>> {
-    body.check()?;
-    Ok(body.spatial_inertia())
-}
-
-/// Adds the point masses and checks that what each body then has is physical.
-fn attach<S: Scalar>(
-    inertias: &mut [SpatialInertia<S>],
-    bodies: &[Body<S>],
-    point_masses: &[PointMass<S>],
-) -> Result<()> {
-    for (payload, point) in point_masses.iter().enumerate() {
-        let Some((inertia, body)) = inertias.get_mut(point.body).zip(bodies.get(point.body)) else {
-            return Err(Error::PayloadBody { payload, body: point.body, bodies: bodies.len() });
-        };
-        check_point_mass(&body.name, point)?;
-        *inertia += SpatialInertia::point_mass(point.mass, Vector3::from(point.position));
-    }
-    let loaded = |k: &usize| point_masses.iter().any(|point| point.body == *k);
-    for (k, (inertia, body)) in inertias.iter().zip(bodies).enumerate() {
-        if loaded(&k) {
-            let total = inertia.value();
-            let [xx, yy, zz, ..] = total.rotational.to_array();
-            check_physical(&body.name, total.mass, total.central(), 1e-12 * (xx + yy + zz))?;
-        }
-    }
-    Ok(())
-}
-
-fn check_point_mass<S: Scalar>(body: &str, point: &PointMass<S>) -> Result<()> {
-    let [x, y, z] = point.position;
-    for (parameter, number) in [("mass", point.mass), ("x", x), ("y", y), ("z", z)] {
-        if !number.is_finite() {
-            return Err(Error::NonFinite { path: format!("{body}.payload.{parameter}"), value: number.re() });
-        }
-    }
-    Ok(())
 }

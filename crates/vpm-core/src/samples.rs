@@ -1,9 +1,10 @@
 //! Named models for tests, benchmarks and examples.
 
-use crate::body::Body;
+use crate::body::{Body, Inertia};
 use crate::error::Result;
 use crate::joint::{Joint, JointKind};
 use crate::model::Model;
+use crate::mount::Mount;
 use crate::scalar::Scalar;
 use crate::spatial::{Matrix3, Vector3};
 
@@ -59,8 +60,8 @@ pub fn arm7() -> Sample {
         let below = if k == 0 { 0.15 } else { 0.175 };
         let joint = joint(&format!("joint{}", k + 1), JointKind::Revolute, axis, [0.0, 0.0, below]);
         let mut link = body(&format!("link{}", k + 1), k.checked_sub(1), joint, mass);
-        link.center_of_mass = [0.01, -0.02, 0.08];
-        link.inertia = [0.012, 0.011, 0.004, 0.000_3, -0.000_2, 0.000_5].map(|moment| moment * mass);
+        let moments = [0.012, 0.011, 0.004, 0.000_3, -0.000_2, 0.000_5].map(|moment| moment * mass);
+        link.inertia = Some(Inertia { mass, center_of_mass: [0.01, -0.02, 0.08], moments });
         bodies.push(link);
     }
     Sample { gravity: GRAVITY, bodies }
@@ -83,20 +84,27 @@ fn random_body(random: &mut Random, k: usize) -> Body<f64> {
     let mut joint = joint(&format!("joint{k}"), kind, random.direction(), random.vector(0.5));
     joint.rotation = turn.transpose().columns.map(Vector3::to_array).as_flattened().try_into().unwrap_or(UPRIGHT);
     let points: [(f64, [f64; 3]); 4] = std::array::from_fn(|_| (0.1 + random.unit(), random.vector(0.3)));
-    let mut link = body(&format!("body{k}"), slot.checked_sub(1), joint, points.iter().map(|point| point.0).sum());
+    let mut link = body(&format!("body{k}"), slot.checked_sub(1), joint, 0.0);
+    link.inertia = Some(cloud(points));
+    link
+}
+
+/// The inertia of a few point masses.
+fn cloud<const N: usize>(points: [(f64, [f64; 3]); N]) -> Inertia<f64> {
+    let mut cloud = Inertia { mass: points.iter().map(|point| point.0).sum(), ..Inertia::default() };
     for (mass, position) in points {
-        for (center, coordinate) in link.center_of_mass.iter_mut().zip(position) {
-            *center += mass * coordinate / link.mass;
+        for (center, coordinate) in cloud.center_of_mass.iter_mut().zip(position) {
+            *center += mass * coordinate / cloud.mass;
         }
     }
     for (mass, position) in points {
-        let [x, y, z] = [0, 1, 2].map(|axis| position[axis] - link.center_of_mass[axis]);
+        let [x, y, z]: [f64; 3] = [0, 1, 2].map(|axis| position[axis] - cloud.center_of_mass[axis]);
         let moments = [y * y + z * z, x * x + z * z, x * x + y * y, -x * y, -x * z, -y * z];
-        for (entry, moment) in link.inertia.iter_mut().zip(moments) {
+        for (entry, moment) in cloud.moments.iter_mut().zip(moments) {
             *entry += mass * moment;
         }
     }
-    link
+    cloud
 }
 
 fn joint(name: &str, kind: JointKind, axis: [f64; 3], translation: [f64; 3]) -> Joint {
@@ -104,12 +112,14 @@ fn joint(name: &str, kind: JointKind, axis: [f64; 3], translation: [f64; 3]) -> 
 }
 
 fn body(name: &str, parent: Option<usize>, joint: Joint, mass: f64) -> Body<f64> {
-    Body { name: name.to_owned(), parent, joint, mass, center_of_mass: [0.0; 3], inertia: [0.0; 6] }
+    let inertia = Some(Inertia { mass, ..Inertia::default() });
+    Body { name: name.to_owned(), on: parent.map_or(Mount::World, Mount::Body), joint, inertia }
 }
 
 fn bob(name: &str, pivot: &str, parent: Option<usize>, at: [f64; 3], mass: f64, length: f64) -> Body<f64> {
     let joint = joint(pivot, JointKind::Revolute, [0.0, 1.0, 0.0], at);
-    Body { center_of_mass: [0.0, 0.0, -length], ..body(name, parent, joint, mass) }
+    let inertia = Some(Inertia { mass, center_of_mass: [0.0, 0.0, -length], ..Inertia::default() });
+    Body { inertia, ..body(name, parent, joint, mass) }
 }
 
 /// A small deterministic generator: SplitMix64 (Steele, Lea & Flood 2014, "Fast splittable pseudorandom number

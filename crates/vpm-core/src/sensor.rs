@@ -40,23 +40,123 @@ pub enum Channel {
         /// Number of the actuator.
         actuator: usize,
     },
+    /// Distance of the ends of a line, m.
+    Length {
+        /// Number of the line.
+        line: usize,
+    },
+    /// How fast a line grows, m/s.
+    Rate {
+        /// Number of the line.
+        line: usize,
+    },
+    /// Force of the actuators on a line, N; positive pushes its ends apart.
+    Tension {
+        /// Number of the line.
+        line: usize,
+    },
+    /// Strain along a beam at a gauge.
+    Strain {
+        /// Number of the gauge.
+        gauge: usize,
+    },
+    /// First coordinate of a marker in the world, m.
+    X {
+        /// Number of the marker.
+        marker: usize,
+    },
+    /// Second coordinate of a marker in the world, m.
+    Y {
+        /// Number of the marker.
+        marker: usize,
+    },
+    /// Third coordinate of a marker in the world, m.
+    Z {
+        /// Number of the marker.
+        marker: usize,
+    },
+    /// First component of the rotation vector of a marker in the world, rad.
+    Rx {
+        /// Number of the marker.
+        marker: usize,
+    },
+    /// Second component of the rotation vector of a marker in the world, rad.
+    Ry {
+        /// Number of the marker.
+        marker: usize,
+    },
+    /// Third component of the rotation vector of a marker in the world, rad.
+    Rz {
+        /// Number of the marker.
+        marker: usize,
+    },
+}
+
+/// How many parts of each kind a model has, which decides where its outputs are.
+///
+/// In this order: position, velocity, acceleration, effort of each joint; command, force of each actuator; length, rate, force of each
+/// line; strain of each gauge; x, y, z, rx, ry, rz of each marker.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Layout {
+    /// Joints.
+    pub joints: usize,
+    /// Actuators.
+    pub actuators: usize,
+    /// Lines.
+    pub lines: usize,
+    /// Strain gauges.
+    pub gauges: usize,
+    /// Markers.
+    pub markers: usize,
+}
+
+impl Layout {
+    /// Where the outputs of the actuators begin.
+    pub fn actuators(self) -> usize {
+        4 * self.joints
+    }
+
+    /// Where the outputs of the lines begin.
+    pub fn lines(self) -> usize {
+        self.actuators() + 2 * self.actuators
+    }
+
+    /// Where the outputs of the gauges begin.
+    pub fn gauges(self) -> usize {
+        self.lines() + 3 * self.lines
+    }
+
+    /// Where the outputs of the markers begin.
+    pub fn markers(self) -> usize {
+        self.gauges() + self.gauges
+    }
+
+    /// Number of all outputs.
+    pub fn count(self) -> usize {
+        self.markers() + 6 * self.markers
+    }
 }
 
 impl Channel {
-    /// Number of outputs: position, velocity, acceleration, effort of each joint, then command and force of each actuator.
-    pub fn count(joints: usize, actuators: usize) -> usize {
-        4 * joints + 2 * actuators
-    }
-
-    /// Its place among the outputs of a model with this many joints.
-    pub fn column(self, joints: usize) -> usize {
+    /// Its place among the outputs of a model.
+    pub fn column(self, layout: Layout) -> usize {
         match self {
             Self::Position { joint } => 4 * joint,
             Self::Velocity { joint } => 4 * joint + 1,
             Self::Acceleration { joint } => 4 * joint + 2,
             Self::Effort { joint } => 4 * joint + 3,
-            Self::Command { actuator } => 4 * joints + 2 * actuator,
-            Self::Force { actuator } => 4 * joints + 2 * actuator + 1,
+            Self::Command { actuator } => layout.actuators() + 2 * actuator,
+            Self::Force { actuator } => layout.actuators() + 2 * actuator + 1,
+            Self::Length { line } => layout.lines() + 3 * line,
+            Self::Rate { line } => layout.lines() + 3 * line + 1,
+            Self::Tension { line } => layout.lines() + 3 * line + 2,
+            Self::Strain { gauge } => layout.gauges() + gauge,
+            Self::X { marker } => layout.markers() + 6 * marker,
+            Self::Y { marker } => layout.markers() + 6 * marker + 1,
+            Self::Z { marker } => layout.markers() + 6 * marker + 2,
+            Self::Rx { marker } => layout.markers() + 6 * marker + 3,
+            Self::Ry { marker } => layout.markers() + 6 * marker + 4,
+            Self::Rz { marker } => layout.markers() + 6 * marker + 5,
         }
     }
 }

@@ -1,25 +1,25 @@
-//! A whole machine as one ordinary differential equation: rigid tree, effects and actuators.
+//! A whole machine as one ordinary differential equation: tree, effects and actuators.
 
-use crate::actuator::Actuator;
+mod answers;
+mod observe;
+mod stiff;
+mod tangent;
+
+use crate::actuator::{Actuator, Target};
 use crate::data::Data;
-use crate::dynamics::aba;
+use crate::dynamics::{aba, flexible, frames, lines, poses};
 use crate::effect::JointEffect;
 use crate::model::Model;
 use crate::ode::Ode;
-use crate::scalar::{Dual, Scalar};
-
-/// Directions in which the state Jacobian is taken at once: the two states of a single axis, and a good fit to the vector registers.
-const LANES: usize = 2;
-
-/// A number with its derivatives along the states.
-type Lifted<S> = Dual<S, LANES>;
+use crate::scalar::Scalar;
+use tangent::Tangent;
 
 /// The right-hand side: everything that acts, in one number type, with its buffers.
 ///
-/// Law: with x = [q, v, s], `dq/dt = v`, `M(q) dv/dt + h(q, v) = sum of actuator and effect efforts`, `T ds/dt = w - s`.
+/// Law: with x = [q, v, s], `dq/dt = v`, `M(q) dv/dt + h(q, v) + K q + D v = sum of actuator and effect efforts`, `T ds/dt = w - s`.
 #[derive(Clone, Debug)]
 pub struct Dynamics<S> {
-    /// The rigid tree with its payloads.
+    /// The tree with its payloads.
     pub model: Model<S>,
     /// Working memory of the tree's algorithms.
     pub data: Data<S>,
@@ -30,17 +30,31 @@ pub struct Dynamics<S> {
     /// What enters each actuator's lag, held constant over a sample interval.
     inputs: Vec<S>,
     forces: Vec<S>,
+    /// Efforts of the actuators on the joints.
     efforts: Vec<S>,
+    /// Forces of the actuators on the lines.
+    tensions: Vec<S>,
+    /// Whether any actuator acts on a line.
+    pulls: bool,
     loads: Vec<S>,
 }
 
 impl<S: Scalar> Dynamics<S> {
-    /// Puts the parts together. The joints that effects and actuators name must exist in the model.
+    /// Puts the parts together. The joints and lines that effects and actuators name must exist in the model.
     pub fn new(model: Model<S>, effects: Vec<(usize, JointEffect<S>)>, actuators: Vec<Actuator<S>>) -> Self {
-        let (n, m, zero) = (model.n_joints(), actuators.len(), S::zero());
-        let data = Data::new(&model);
-        let (inputs, forces) = (vec![zero; m], vec![zero; m]);
-        Self { model, data, effects, actuators, inputs, forces, efforts: vec![zero; n], loads: vec![zero; n] }
+        let zeros = |count: usize| vec![S::zero(); count];
+        Self {
+            data: Data::new(&model),
+            inputs: zeros(actuators.len()),
+            forces: zeros(actuators.len()),
+            efforts: zeros(model.n_joints()),
+            tensions: zeros(model.lines().len()),
+            pulls: actuators.iter().any(|actuator| matches!(actuator.on, Target::Line(_))),
+            loads: zeros(model.n_coordinates()),
+            model,
+            effects,
+            actuators,
+        }
     }
 
     /// Number of joints.
@@ -49,9 +63,15 @@ impl<S: Scalar> Dynamics<S> {
         self.model.n_joints()
     }
 
+    /// Number of coordinates: joints, then elastic ones.
+    #[inline]
+    pub fn coordinates(&self) -> usize {
+        self.model.n_coordinates()
+    }
+
     /// Length of the state: coordinates, rates, one state per lag.
     pub fn dim(&self) -> usize {
-        2 * self.joints() + self.actuators.iter().filter(|actuator| actuator.lag.is_some()).count()
+        2 * self.coordinates() + self.actuators.iter().filter(|actuator| actuator.lag.is_some()).count()
     }
 
     /// Effort that each actuator delivers in the last state evaluated, N or N m.
@@ -66,11 +86,17 @@ impl<S: Scalar> Dynamics<S> {
         &self.efforts
     }
 
-    /// Accelerations at (q, v) under `efforts` of the actuators, with all effects.
+    /// Accelerations of all coordinates at (q, v) under `efforts` of the actuators on the joints, with all effects.
     pub fn accelerations(&mut self, q: &[S], v: &[S], efforts: &[S]) -> &[S] {
-        self.loads.copy_from_slice(efforts);
-        add_effects(&self.effects, q, v, &mut self.loads);
-        aba(&self.model, &mut self.data, q, v, &self.loads)
+        self.tensions.fill(S::zero());
+        self.efforts.copy_from_slice(efforts);
+        self.accelerate(q, v, add_effects, &[]);
+        &self.data.acceleration
+    }
+
+    /// Mass matrix and bias at (q, v), left in the data, by the algorithm for trees of every kind.
+    pub(crate) fn terms(&mut self, q: &[S], v: &[S]) {
+        flexible::terms(&self.model, &mut self.data, q, v);
     }
 
     /// dx/dt at x.
@@ -87,18 +113,49 @@ impl<S: Scalar> Dynamics<S> {
         dxdt: &mut [S],
         add: impl FnOnce(&[(usize, JointEffect<S>)], &[S], &[S], &mut [S]),
     ) {
-        let n = self.joints();
+        let n = self.coordinates();
         let ((q, v), lags) = (x[..2 * n].split_at(n), &x[2 * n..]);
         self.actuate(lags, &mut dxdt[2 * n..]);
         dxdt[..n].copy_from_slice(v);
-        self.loads.copy_from_slice(&self.efforts);
-        add(&self.effects, q, v, &mut self.loads);
-        dxdt[n..2 * n].copy_from_slice(aba(&self.model, &mut self.data, q, v, &self.loads));
+        self.accelerate(q, v, add, &[]);
+        dxdt[n..2 * n].copy_from_slice(&self.data.acceleration);
     }
 
-    /// Forces and joint efforts of the actuators, and the rates of their lags.
+    /// Accelerations under the efforts and tensions that stand, and efforts on the elastic coordinates if any are given, left in the
+    /// data.
+    #[inline]
+    fn accelerate(
+        &mut self,
+        q: &[S],
+        v: &[S],
+        add: impl FnOnce(&[(usize, JointEffect<S>)], &[S], &[S], &mut [S]),
+        on_beams: &[S],
+    ) {
+        let Self { model, data, loads, tensions, .. } = self;
+        let (of_joints, elastic) = loads.split_at_mut(model.n_joints());
+        of_joints.copy_from_slice(&self.efforts);
+        elastic.fill(S::zero());
+        elastic[..on_beams.len()].copy_from_slice(on_beams);
+        add(&self.effects, q, v, of_joints);
+        if model.is_recursive() {
+            if self.pulls {
+                frames(model, data, q, v);
+                poses(model, data);
+                lines(model, data);
+                flexible::add_line_forces(data, tensions, loads);
+            }
+            aba(model, data, q, v, loads);
+        } else {
+            flexible::terms(model, data, q, v);
+            flexible::add_line_forces(data, tensions, loads);
+            flexible::solve(model, data, q, v, loads);
+        }
+    }
+
+    /// Forces, joint efforts and tensions of the actuators, and the rates of their lags.
     fn actuate(&mut self, lags: &[S], rates: &mut [S]) {
         self.efforts.fill(S::zero());
+        self.tensions.fill(S::zero());
         let mut states = lags.iter().zip(rates);
         for ((actuator, &input), force) in self.actuators.iter().zip(&self.inputs).zip(&mut self.forces) {
             *force = match (&actuator.lag, if actuator.lag.is_some() { states.next() } else { None }) {
@@ -108,7 +165,10 @@ impl<S: Scalar> Dynamics<S> {
                 }
                 _ => actuator.motor.effort(input),
             };
-            self.efforts[actuator.joint] += *force;
+            match actuator.on {
+                Target::Joint(joint) => self.efforts[joint] += *force,
+                Target::Line(line) => self.tensions[line] += *force,
+            }
         }
     }
 }
@@ -125,20 +185,20 @@ pub(crate) fn add_effects<S: Scalar>(effects: &[(usize, JointEffect<S>)], q: &[S
 #[derive(Clone, Debug)]
 pub struct System<S> {
     dynamics: Dynamics<S>,
-    tangent: Dynamics<Lifted<S>>,
-    tangent_state: Vec<Lifted<S>>,
-    tangent_rate: Vec<Lifted<S>>,
+    tangent: Tangent<S>,
     resistances: Vec<S>,
+    /// A column of an iteration matrix on its way.
+    column: Vec<S>,
 }
 
 impl<S: Scalar> System<S> {
-    /// From the same machine in both number types; `build` makes it from numbers.
+    /// From the same machine in several number types; `build` makes it from numbers.
     pub fn new<E>(theta: &[S], build: impl Build<Error = E>) -> Result<Self, E> {
-        let lifted: Vec<_> = theta.iter().map(|&value| Dual::constant(value)).collect();
-        let (dynamics, tangent) = (build.dynamics(theta)?, build.dynamics(&lifted)?);
-        let zero = vec![Dual::default(); dynamics.dim()];
+        let dynamics = build.dynamics(theta)?;
+        let tangent = Tangent::new(theta, build, dynamics.dim())?;
         let resistances = vec![S::zero(); dynamics.joints()];
-        Ok(Self { dynamics, tangent, tangent_state: zero.clone(), tangent_rate: zero, resistances })
+        let column = vec![S::zero(); dynamics.coordinates()];
+        Ok(Self { dynamics, tangent, resistances, column })
     }
 
     /// The right-hand side.
@@ -151,7 +211,7 @@ impl<S: Scalar> System<S> {
     #[inline]
     pub fn hold(&mut self, actuator: usize, input: S) {
         self.dynamics.inputs[actuator] = input;
-        self.tangent.inputs[actuator] = Dual::constant(input);
+        self.tangent.hold(actuator, input);
     }
 }
 
@@ -166,12 +226,12 @@ pub trait Build {
 impl<S: Scalar> Ode<S> for System<S> {
     #[inline]
     fn dim(&self) -> usize {
-        self.tangent_state.len()
+        self.dynamics.dim()
     }
 
     #[inline]
     fn coordinates(&self) -> usize {
-        self.dynamics.joints()
+        self.dynamics.coordinates()
     }
 
     #[inline]
@@ -181,10 +241,11 @@ impl<S: Scalar> Ode<S> for System<S> {
 
     /// Columns by forward accumulation; exact also where S itself carries derivatives.
     fn jacobian(&mut self, x: &[S], jacobian: &mut [S]) {
-        self.columns(x, jacobian, |tangent, x, rate, _| tangent.rhs(x, rate));
+        self.tangent.jacobian(x, jacobian);
     }
 
-    /// As df/dx, but with chords from rest in the place of the tangents of friction laws.
+    /// As df/dx, but with chords from rest in the place of the tangents of friction laws; of a machine with elastic beams, all that is
+    /// stiff in it, for the price of one mass matrix.
     ///
     /// The tangent of dry friction is flat beyond the transition velocity, so that a step which crosses it would not see the friction
     /// turn around, and could keep a joint creeping for ever; the chord sees it. At rest, and for viscous friction, they are the same.
@@ -194,40 +255,24 @@ impl<S: Scalar> Ode<S> for System<S> {
         for (joint, effect) in &self.dynamics.effects {
             self.resistances[*joint] += effect.resistance(x[n + joint]);
         }
-        self.columns(x, matrix, |tangent, x, rate, resistances| {
-            tangent.rhs_with(x, rate, |effects, q, v, total| {
-                for (joint, effect) in effects {
-                    total[*joint] += effect.effort_at_rest(q[*joint]);
-                }
-                for ((total, &v), &resistance) in total.iter_mut().zip(v).zip(resistances) {
-                    *total -= Dual::constant(resistance) * v;
-                }
-            });
-        });
-    }
-}
-
-impl<S: Scalar> System<S> {
-    /// The derivative of `rhs` along each state, [`LANES`] at a time, as columns of a matrix stored row by row.
-    #[inline]
-    fn columns(
-        &mut self,
-        x: &[S],
-        matrix: &mut [S],
-        rhs: impl Fn(&mut Dynamics<Lifted<S>>, &[Lifted<S>], &mut [Lifted<S>], &[S]),
-    ) {
-        let dim = x.len();
-        for first in (0..dim).step_by(LANES) {
-            for (column, (state, &value)) in self.tangent_state.iter_mut().zip(x).enumerate() {
-                // A column before `first` wraps around to a lane that does not exist, which gives a constant.
-                *state = Dual::variable(value, column.wrapping_sub(first));
-            }
-            rhs(&mut self.tangent, &self.tangent_state, &mut self.tangent_rate, &self.resistances);
-            for (row, rate) in matrix.chunks_exact_mut(dim).zip(&self.tangent_rate) {
-                for (entry, &slope) in row[first..].iter_mut().zip(&rate.gradient) {
-                    *entry = slope;
-                }
-            }
+        if self.dynamics.model.n_elastic() == 0 {
+            self.tangent.chords(x, matrix, &self.resistances);
+        } else {
+            stiff::iteration_matrix(&mut self.dynamics, x, matrix, &self.resistances, &mut self.column);
         }
+    }
+
+    /// Stiffness and damping of the beams.
+    fn elasticity(&mut self, x: &[S], block: &mut [S]) -> bool {
+        let n = self.coordinates();
+        if self.dynamics.model.n_elastic() == 0 {
+            return false;
+        }
+        let (q, v) = x[..2 * n].split_at(n);
+        self.dynamics.terms(q, v);
+        self.dynamics.data.factorise();
+        block.fill(S::zero());
+        stiff::elasticity(&self.dynamics, block, 2 * n, &mut self.column);
+        true
     }
 }

@@ -8,6 +8,7 @@ use vpm_core::beam::{Basis, Component, Section};
 use vpm_core::data::Data;
 use vpm_core::dynamics::{crba, rnea};
 use vpm_core::joint::Joint;
+use vpm_core::mount::Mount;
 use vpm_core::samples::{Random, random_tree};
 use vpm_core::{Dual, Result, Scalar};
 
@@ -15,15 +16,23 @@ use vpm_core::{Dual, Result, Scalar};
 mod beams;
 use beams::{along_x, body, fields, near, pin, spatial};
 
+/// The body that a body of a rigid tree hangs on.
+fn parent(body: &vpm_core::body::Body<f64>) -> Option<usize> {
+    match body.on {
+        Mount::Body(parent) => Some(parent),
+        _ => None,
+    }
+}
+
 #[test]
 fn without_beams_the_tree_is_the_rigid_one() -> Result<()> {
     for seed in 0..5 {
         let (sample, mut random) = (random_tree(seed, 7), Random::new(seed));
         let bodies = sample.bodies.iter();
         let links = bodies.map(|body| FlexibleLink {
-            parent: body.parent,
+            parent: parent(body),
             joint: Some(body.joint.clone()),
-            hub: body.spatial_inertia(),
+            hub: body.spatial_inertia().unwrap_or_default(),
             ..FlexibleLink::welded()
         });
         let tree = FlexibleTree::new(links.collect(), sample.gravity)?;

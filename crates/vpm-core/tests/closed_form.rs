@@ -2,11 +2,12 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use vpm_core::body::PointMass;
+use vpm_core::body::{Body, Inertia, PointMass, Site};
 use vpm_core::data::Data;
 use vpm_core::dynamics::{aba, check_regular, crba, energy, kinematics, rnea};
 use vpm_core::joint::JointKind;
 use vpm_core::model::Model;
+use vpm_core::mount::Mount;
 use vpm_core::samples::{self, GRAVITY, Random, Sample};
 use vpm_core::spatial::{Twist, Vector3};
 use vpm_core::{Dual, Error, Result};
@@ -88,7 +89,7 @@ fn pendulum_period_is_the_elliptic_integral() -> Result<()> {
 fn payload_adds_its_moment_of_inertia() -> Result<()> {
     let (mass, length, payload, at) = (1.3, 0.7, 0.4, 0.9);
     let sample = samples::pendulum(mass, length);
-    let point = PointMass { body: 0, mass: payload, position: [0.0, 0.0, -at] };
+    let point = PointMass { on: Site::Body(0), mass: payload, position: [0.0, 0.0, -at] };
     let model = Model::new(sample.gravity, &sample.bodies, &[point])?;
     let found = aba(&model, &mut Data::new(&model), &[0.6], &[0.0], &[0.0])[0];
     let inertia = mass * length * length + payload * at * at;
@@ -119,6 +120,11 @@ fn double_pendulum_follows_goldstein() -> Result<()> {
     Ok(())
 }
 
+/// The inertia of a body that has one.
+fn inertia_of(body: &mut Body<f64>) -> &mut Inertia<f64> {
+    body.inertia.get_or_insert_default()
+}
+
 /// A turntable about z (inertia kg m^2) that carries a radial slider (kg) along its x axis.
 fn polar(inertia: f64, mass: f64) -> Sample {
     let mut sample = samples::slider(mass);
@@ -126,8 +132,8 @@ fn polar(inertia: f64, mass: f64) -> Sample {
     table.name = "table".to_owned();
     table.joint.kind = JointKind::Revolute;
     table.joint.axis = [0.0, 0.0, 1.0];
-    table.inertia = [0.5 * inertia, 0.5 * inertia, inertia, 0.0, 0.0, 0.0];
-    sample.bodies[0].parent = Some(0);
+    inertia_of(&mut table).moments = [0.5 * inertia, 0.5 * inertia, inertia, 0.0, 0.0, 0.0];
+    sample.bodies[0].on = Mount::Body(0);
     sample.bodies.insert(0, table);
     sample
 }
@@ -196,20 +202,29 @@ fn refusal(change: impl FnOnce(&mut Sample)) -> Result<()> {
 #[test]
 fn unphysical_bodies_are_refused_with_numbers() {
     assert_eq!(refusal(|_| ()), Ok(()));
-    assert_eq!(refusal(|s| s.bodies[1].inertia = [1.0, 1.0, 2.0, 0.0, 0.0, 0.0]), Ok(()), "a thin plate is physical");
-    assert_eq!(refusal(|s| s.bodies[0].mass = 0.0), Err(Error::Mass { body: "upper".into(), mass: 0.0 }));
-    let refused = refusal(|s| s.bodies[1].inertia = [1.0, 1.0, 2.1, 0.0, 0.0, 0.0]);
+    assert_eq!(
+        refusal(|s| inertia_of(&mut s.bodies[1]).moments = [1.0, 1.0, 2.0, 0.0, 0.0, 0.0]),
+        Ok(()),
+        "a thin plate is physical"
+    );
+    assert_eq!(
+        refusal(|s| inertia_of(&mut s.bodies[0]).mass = 0.0),
+        Err(Error::Mass { body: "upper".into(), mass: 0.0 })
+    );
+    let refused = refusal(|s| inertia_of(&mut s.bodies[1]).moments = [1.0, 1.0, 2.1, 0.0, 0.0, 0.0]);
     assert_eq!(refused, Err(Error::Inertia { body: "lower".into(), moments: [1.0, 1.0, 2.1] }));
-    let refused = refusal(|s| s.bodies[1].inertia = [1.0, 1.0, 1.0, 1.5, 0.0, 0.0]);
+    let refused = refusal(|s| inertia_of(&mut s.bodies[1]).moments = [1.0, 1.0, 1.0, 1.5, 0.0, 0.0]);
     assert!(matches!(refused, Err(Error::Inertia { moments: [low, ..], .. }) if close(low, -0.5, 1e-14)));
-    let refused = refusal(|s| s.bodies[0].center_of_mass[1] = f64::INFINITY);
+    let refused = refusal(|s| inertia_of(&mut s.bodies[0]).center_of_mass[1] = f64::INFINITY);
     assert_eq!(refused, Err(Error::NonFinite { path: "upper.center_of_mass.y".into(), value: f64::INFINITY }));
 }
 
 #[test]
 fn bad_geometry_is_refused_with_numbers() {
-    let refused = refusal(|s| s.bodies[1].parent = Some(1));
-    assert_eq!(refused, Err(Error::Parent { body: "lower".into(), index: 1, parent: 1 }));
+    let refused = refusal(|s| s.bodies[1].on = Mount::Body(1));
+    assert_eq!(refused, Err(Error::Loop { names: vec!["lower".into()] }));
+    let refused = refusal(|s| s.bodies[0].on = Mount::Body(1));
+    assert_eq!(refused, Err(Error::Loop { names: vec!["upper".into(), "lower".into()] }));
     let refused = refusal(|s| s.bodies[1].joint.axis = [0.0, 2.0, 0.0]);
     assert_eq!(refused, Err(Error::Axis { joint: "elbow".into(), axis: [0.0, 2.0, 0.0], length: 2.0 }));
     assert_eq!(refusal(|s| s.bodies[1].joint.axis = [0.0, 1.0005, 0.0]), Ok(()), "rounded axes are normalised");
@@ -220,11 +235,11 @@ fn bad_geometry_is_refused_with_numbers() {
 
 #[test]
 fn joints_without_inertia_are_refused() {
-    let refused = refusal(|s| s.bodies[1].center_of_mass = [0.0; 3]);
+    let refused = refusal(|s| inertia_of(&mut s.bodies[1]).center_of_mass = [0.0; 3]);
     assert!(matches!(refused, Err(Error::SingularJoint { joint, .. }) if joint == "elbow"));
     // Two bodies on one axis: each joint alone moves inertia, both together do not.
     let coaxial = refusal(|s| {
-        s.bodies[0].center_of_mass = [0.0; 3];
+        inertia_of(&mut s.bodies[0]).center_of_mass = [0.0; 3];
         s.bodies[1].joint.translation = [0.0; 3];
     });
     assert!(matches!(coaxial, Err(Error::SingularJoint { joint, .. }) if joint == "shoulder"));
@@ -234,7 +249,8 @@ fn joints_without_inertia_are_refused() {
 fn payloads_must_leave_a_physical_body() {
     let sample = samples::pendulum(1.0, 0.5);
     let build = |body, mass, position| {
-        Model::new(sample.gravity, &sample.bodies, &[PointMass { body, mass, position }]).map(|model| model.n_joints())
+        Model::new(sample.gravity, &sample.bodies, &[PointMass { on: Site::Body(body), mass, position }])
+            .map(|model| model.n_joints())
     };
     assert_eq!(build(0, 0.5, [0.1, 0.2, 0.3]), Ok(1));
     assert_eq!(build(0, -0.5, [0.0, 0.0, -0.5]), Ok(1), "less mass in the same point");

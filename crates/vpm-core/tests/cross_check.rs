@@ -177,13 +177,13 @@ proptest! {
         let case = Case::new(seed, 4);
         let at = |change: f64| -> Result<Vec<f64>> {
             let mut moved = Case::new(seed, 4);
-            moved.tree.bodies[0].mass += change;
+            moved.tree.bodies[0].inertia.get_or_insert_default().mass += change;
             moved.forward()
         };
         let (step, mut lifted) = (1e-5, Vec::new());
         for (k, body) in case.tree.bodies.iter().enumerate() {
             let mut body = body.map(&mut |&number| Dual::<f64, 1>::from_f64(number));
-            body.mass.gradient = [if k == 0 { 1.0 } else { 0.0 }];
+            body.inertia.get_or_insert_default().mass.gradient = [if k == 0 { 1.0 } else { 0.0 }];
             lifted.push(body);
         }
         let model = vpm_core::model::Model::new(case.tree.gravity, &lifted, &[])?;

@@ -251,10 +251,10 @@ fn descriptions_that_cannot_be_right_are_refused() {
     assert!(change("/effects/0", json!({"type": "viscous_friction", "joint": 0, "viscos": 1})).contains("viscos"));
     assert!(change("/effects/0/joint", json!(4)).contains("effect number 0 refers to joint number 4"));
     assert!(change("/effects/0/viscous", json!(99)).contains("parameter number 99"));
-    assert!(change("/actuators/0/joint", json!(1)).contains("actuator `drive0` refers to joint number 1"));
+    assert!(change("/actuators/0/on", json!({"joint": 1})).contains("actuator `drive0` refers to joint number 1"));
     assert!(change("/controllers/0/actuator", json!(1)).contains("actuator number 1"));
     assert!(change("/controllers/0/measures", json!({"kind": "velocity", "joint": 0})).contains("measures a position"));
-    assert!(change("/bodies/0/parent", json!(0)).contains("parent"));
+    assert!(change("/bodies/0/on", json!({"body": 0})).contains("ring"));
     assert!(change("/bodies", json!([])).contains("no body"));
     assert!(change("/parameter_names", json!([])).contains("parameter_names"));
     assert!(change("/gravity", json!([0.0, 0.0])).contains("model description"));

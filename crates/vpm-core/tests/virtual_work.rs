@@ -27,7 +27,8 @@ fn carried(tree: &Sample, q: &[f64], v: &[f64]) -> Result<Vec<Carried<f64, B>>> 
     let mut bodies = Vec::new();
     for (k, body) in tree.bodies.iter().enumerate() {
         let mut jacobian = [Twist::zero(); B];
-        let (center, mut pose) = (Vector3::from_f64(body.center_of_mass), Pose::identity());
+        let inertia = body.inertia.unwrap_or_default();
+        let (center, mut pose) = (Vector3::from_f64(inertia.center_of_mass), Pose::identity());
         for (b, column) in jacobian.iter_mut().enumerate() {
             let unit: Vec<_> = (0..B).map(|joint| Rate::constant(if joint == b { 1.0 } else { 0.0 })).collect();
             kinematics(&model, &mut data, &angles, &unit);
@@ -40,8 +41,8 @@ fn carried(tree: &Sample, q: &[f64], v: &[f64]) -> Result<Vec<Carried<f64, B>>> 
         let [x, y, z] = pose.rotation.columns.map(value);
         let turned = Matrix3::from_columns(x, y, z);
         bodies.push(Carried {
-            mass: body.mass,
-            inertia: Symmetric3::from_array(body.inertia).rotated(turned),
+            mass: inertia.mass,
+            inertia: Symmetric3::from_array(inertia.moments).rotated(turned),
             jacobian,
         });
     }

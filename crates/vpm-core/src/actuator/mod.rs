@@ -17,6 +17,16 @@ pub use saturation::Saturation;
 use crate::effect::Domain;
 use crate::scalar::Scalar;
 
+/// What an actuator acts on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Target {
+    /// The joint of that number, along its coordinate.
+    Joint(usize),
+    /// The line of that number; a positive force pushes its ends apart.
+    Line(usize),
+}
+
 /// An actuator: delay, dead zone, saturation, lag, motor, in this order; links that are not there pass their input on.
 ///
 /// Checked: see each link.
@@ -25,8 +35,8 @@ use crate::scalar::Scalar;
 pub struct Actuator<P> {
     /// Name, unique in the model.
     pub name: String,
-    /// Number of the joint it acts on.
-    pub joint: usize,
+    /// What it acts on.
+    pub on: Target,
     /// From command to effort.
     #[serde(rename = "gain")]
     pub motor: Motor<P>,
@@ -54,7 +64,7 @@ impl<P> Actuator<P> {
     pub fn map<T>(&self, f: &mut impl FnMut(&P) -> T) -> Actuator<T> {
         Actuator {
             name: self.name.clone(),
-            joint: self.joint,
+            on: self.on,
             motor: self.motor.map(f),
             delay: self.delay.as_ref().map(|link| link.map(f)),
             dead_zone: self.dead_zone.as_ref().map(|link| link.map(f)),

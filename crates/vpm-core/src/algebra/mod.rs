@@ -1,9 +1,11 @@
-//! Small dense linear algebra and polynomials, in arrays whose size the type knows.
+//! Small dense linear algebra and polynomials, most of it in arrays whose size the type knows.
 
+mod cholesky;
 mod polynomial;
 mod singular;
 mod solve;
 
+pub use cholesky::Cholesky;
 pub use polynomial::{Conic, degree, quadratic_roots, resultant};
 pub use singular::{SingularValues, determinant, is_definite};
 pub use solve::solve;

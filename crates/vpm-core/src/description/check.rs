@@ -1,6 +1,8 @@
 //! What a description must satisfy before anything is built from it.
 
 use super::{Description, EffectEntry};
+use crate::actuator::Target;
+use crate::body::Site;
 use crate::effect::Domain;
 use crate::error::{Error, Result};
 use crate::sensor::Channel;
@@ -15,8 +17,9 @@ pub(super) fn references(description: &Description) -> Result<()> {
             each: "parameter".to_owned(),
         });
     }
-    if description.bodies.is_empty() {
-        return Err(Error::Description { message: "it has no body, but a machine needs at least one".to_owned() });
+    if description.bodies.is_empty() && description.beams.is_empty() {
+        let message = "it has no body and no beam, but a machine needs at least one".to_owned();
+        return Err(Error::Description { message });
     }
     for (what, index) in used_parameters(description) {
         within(&what, "parameter", index, description.parameters.len())?;
@@ -64,6 +67,15 @@ fn used_parameters(description: &Description) -> Vec<(String, usize)> {
     for body in &description.bodies {
         body.map(&mut |&index| used.push((format!("body `{}`", body.name), index)));
     }
+    for weld in &description.welds {
+        weld.map(&mut |&index| used.push((format!("body `{}`", weld.name), index)));
+    }
+    for beam in &description.beams {
+        beam.map(&mut |&index| used.push((format!("beam `{}`", beam.name), index)));
+    }
+    for line in &description.lines {
+        line.map(&mut |&index| used.push((format!("line `{}`", line.name), index)));
+    }
     for (number, effect) in description.effects.iter().enumerate() {
         used.extend(effect.domains().into_iter().map(|(&index, _)| (format!("effect number {number}"), index)));
     }
@@ -82,13 +94,20 @@ fn used_parameters(description: &Description) -> Vec<(String, usize)> {
 fn sites(description: &Description) -> Result<()> {
     let joints = description.n_joints();
     for (number, effect) in description.effects.iter().enumerate() {
+        let what = format!("effect number {number}");
         match effect {
-            EffectEntry::Joint { joint, .. } => within(&format!("effect number {number}"), "joint", *joint, joints)?,
-            EffectEntry::Payload { body, .. } => within(&format!("effect number {number}"), "body", *body, joints)?,
+            EffectEntry::Joint { joint, .. } => within(&what, "joint", *joint, joints)?,
+            EffectEntry::Payload { on: Site::Body(body), .. } => within(&what, "body", *body, joints)?,
+            EffectEntry::Payload { on: Site::Weld(weld), .. } => within(&what, "weld", *weld, description.welds.len())?,
+            EffectEntry::Payload { on: Site::Tip(beam), .. } => within(&what, "beam", *beam, description.n_beams())?,
         }
     }
     for actuator in &description.actuators {
-        within(&format!("actuator `{}`", actuator.name), "joint", actuator.joint, joints)?;
+        let what = format!("actuator `{}`", actuator.name);
+        match actuator.on {
+            Target::Joint(joint) => within(&what, "joint", joint, joints)?,
+            Target::Line(line) => within(&what, "line", line, description.lines.len())?,
+        }
     }
     for controller in &description.controllers {
         let what = format!("controller `{}`", controller.name);
@@ -121,6 +140,16 @@ fn channel(what: &str, channel: Channel, description: &Description) -> Result<()
         Channel::Command { actuator } | Channel::Force { actuator } => {
             within(what, "actuator", actuator, description.n_actuators())
         }
+        Channel::Length { line } | Channel::Rate { line } | Channel::Tension { line } => {
+            within(what, "line", line, description.lines.len())
+        }
+        Channel::Strain { gauge } => within(what, "gauge", gauge, description.gauges.len()),
+        Channel::X { marker }
+        | Channel::Y { marker }
+        | Channel::Z { marker }
+        | Channel::Rx { marker }
+        | Channel::Ry { marker }
+        | Channel::Rz { marker } => within(what, "marker", marker, description.markers.len()),
     }
 }
 

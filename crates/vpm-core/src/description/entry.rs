@@ -4,6 +4,7 @@ use serde::Deserialize;
 use serde::de::Error as _;
 use serde_json::{Map, Value};
 
+use crate::body::Site;
 use crate::controller::ControlLaw;
 use crate::effect::{Domain, JointEffect, Payload};
 use crate::sensor::Channel;
@@ -19,10 +20,10 @@ pub enum EffectEntry {
         /// Its law.
         law: JointEffect<usize>,
     },
-    /// A payload on a body.
+    /// A payload on a body or at the tip of a beam.
     Payload {
-        /// Number of the body.
-        body: usize,
+        /// What carries it.
+        on: Site,
         /// Its mass and place.
         law: Payload<usize>,
     },
@@ -70,8 +71,14 @@ impl TryFrom<Map<String, Value>> for EffectEntry {
         named(&kind, || {
             if kind == "payload" {
                 table.remove("type");
-                let body = take(&mut table, "body")?;
-                return Ok(Self::Payload { body, law: serde_json::from_value(Value::Object(table))? });
+                let on = if table.contains_key("beam") {
+                    Site::Tip(take(&mut table, "beam")?)
+                } else if table.contains_key("weld") {
+                    Site::Weld(take(&mut table, "weld")?)
+                } else {
+                    Site::Body(take(&mut table, "body")?)
+                };
+                return Ok(Self::Payload { on, law: serde_json::from_value(Value::Object(table))? });
             }
             let joint = take(&mut table, "joint")?;
             Ok(Self::Joint { joint, law: serde_json::from_value(Value::Object(table))? })

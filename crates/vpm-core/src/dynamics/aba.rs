@@ -1,11 +1,10 @@
 //! Forward dynamics by the articulated body algorithm.
 
 use crate::data::Data;
-use crate::error::{Error, Result};
 use crate::joint::JointKind;
 use crate::model::Model;
 use crate::scalar::Scalar;
-use crate::spatial::{ArticulatedInertia, Twist, Vector3, Wrench};
+use crate::spatial::{ArticulatedInertia, Symmetric3, Twist, Vector3, Wrench};
 
 /// A joint counts as moving no inertia below this fraction of the inertia of its body in other directions.
 const SINGULAR: f64 = 1e-12;
@@ -23,31 +22,27 @@ pub fn aba<'d, S: Scalar>(model: &Model<S>, data: &'d mut Data<S>, q: &[S], v: &
     &data.acceleration
 }
 
-/// Whether every joint moves inertia, so that the accelerations exist.
-///
-/// Judged at one generic configuration: a tree that is singular there is singular everywhere. A regular tree can still be
-/// singular in special configurations.
-pub fn check_regular<S: Scalar>(model: &Model<S>, data: &mut Data<S>) -> Result<()> {
-    const GOLDEN_ANGLE: f64 = 2.399_963_229_728_653; // rad: multiples of it are never special to each other
-    let (n, zero) = (model.n_joints(), S::zero());
-    let q: Vec<S> = (1..=n).map(|k| S::from_f64(GOLDEN_ANGLE * k as f64)).collect();
-    let rest = vec![zero; n];
-    velocities(model, data, &q, &rest);
-    inertias(model, data, &rest);
+/// The joint that moves no inertia, and its articulated inertia, at coordinates `q`; if there is one.
+pub(super) fn singular_joint<S: Scalar>(
+    model: &Model<S>,
+    data: &mut Data<S>,
+    q: &[S],
+    rest: &[S],
+) -> Option<(usize, f64)> {
+    velocities(model, data, q, rest);
+    inertias(model, data, rest);
     // Outermost first: a singular joint spoils the inertias that the joints before it feel.
-    for (frame, slot) in model.frames().iter().zip(data.aba.iter().skip(1)).rev() {
-        let kind = frame.joint.kind;
-        let inertia = kind.effort(&slot.unit_wrench).re();
-        let block = match kind {
-            JointKind::Prismatic => slot.inertia.linear,
-            JointKind::Revolute => slot.inertia.angular,
+    let slots = model.links().iter().zip(data.aba.iter().skip(1)).enumerate().rev();
+    slots.into_iter().find_map(|(number, (link, slot))| {
+        let inertia = link.kind.effort(&slot.unit_wrench).re();
+        let size = |block: Symmetric3<S>| (block.xx + block.yy + block.zz).re();
+        let scale = match link.kind {
+            JointKind::Prismatic => size(slot.inertia.linear),
+            JointKind::Revolute => size(slot.inertia.angular),
+            JointKind::Helical { pitch } => size(slot.inertia.angular) + pitch * pitch * size(slot.inertia.linear),
         };
-        let scale = (block.xx + block.yy + block.zz).re();
-        if inertia.is_nan() || inertia <= SINGULAR * scale {
-            return Err(Error::SingularJoint { joint: frame.joint.name.clone(), inertia });
-        }
-    }
-    Ok(())
+        (inertia.is_nan() || inertia <= SINGULAR * scale).then_some((number, inertia))
+    })
 }
 
 fn velocities<S: Scalar>(model: &Model<S>, data: &mut Data<S>, q: &[S], v: &[S]) {
@@ -97,19 +92,25 @@ fn accelerations<S: Scalar>(model: &Model<S>, data: &mut Data<S>) {
     }
 }
 
-/// U = I^A S for a joint axis along z: one column of the 6 x 6 inertia.
+/// U = I^A S for a joint axis along z: one column of the 6 x 6 inertia, or a sum of two.
 #[inline]
 fn unit_wrench<S: Scalar>(kind: JointKind, inertia: &ArticulatedInertia<S>) -> Wrench<S> {
-    let coupling = inertia.coupling;
     match kind {
-        JointKind::Prismatic => {
-            let m = inertia.linear;
-            Wrench::new(coupling.columns[2], Vector3::new(m.xz, m.yz, m.zz))
-        }
-        JointKind::Revolute => {
-            let [x, y, z] = coupling.columns;
-            let j = inertia.angular;
-            Wrench::new(Vector3::new(j.xz, j.yz, j.zz), Vector3::new(x.z, y.z, z.z))
-        }
+        JointKind::Prismatic => sliding(inertia),
+        JointKind::Revolute => turning(inertia),
+        JointKind::Helical { pitch } => turning(inertia) + sliding(inertia) * S::from_f64(pitch),
     }
+}
+
+#[inline]
+fn sliding<S: Scalar>(inertia: &ArticulatedInertia<S>) -> Wrench<S> {
+    let m = inertia.linear;
+    Wrench::new(inertia.coupling.columns[2], Vector3::new(m.xz, m.yz, m.zz))
+}
+
+#[inline]
+fn turning<S: Scalar>(inertia: &ArticulatedInertia<S>) -> Wrench<S> {
+    let [x, y, z] = inertia.coupling.columns;
+    let j = inertia.angular;
+    Wrench::new(Vector3::new(j.xz, j.yz, j.zz), Vector3::new(x.z, y.z, z.z))
 }

@@ -51,15 +51,24 @@ fn columns<S: Scalar>(model: &Model<S>, data: &mut Data<S>) {
     }
 }
 
-/// M S for a joint axis along z: one column of the 6 x 6 inertia.
+/// M S for a joint axis along z: one column of the 6 x 6 inertia, or a sum of two.
 #[inline]
 fn unit_wrench<S: Scalar>(kind: JointKind, body: &SpatialInertia<S>) -> Wrench<S> {
-    let (h, zero) = (body.first_moment, S::zero());
     match kind {
-        JointKind::Prismatic => Wrench::new(Vector3::new(h.y, -h.x, zero), Vector3::new(zero, zero, body.mass)),
-        JointKind::Revolute => {
-            let inertia = body.rotational;
-            Wrench::new(Vector3::new(inertia.xz, inertia.yz, inertia.zz), Vector3::new(-h.y, h.x, zero))
-        }
+        JointKind::Prismatic => sliding(body),
+        JointKind::Revolute => turning(body),
+        JointKind::Helical { pitch } => turning(body) + sliding(body) * S::from_f64(pitch),
     }
+}
+
+#[inline]
+fn sliding<S: Scalar>(body: &SpatialInertia<S>) -> Wrench<S> {
+    let (h, zero) = (body.first_moment, S::zero());
+    Wrench::new(Vector3::new(h.y, -h.x, zero), Vector3::new(zero, zero, body.mass))
+}
+
+#[inline]
+fn turning<S: Scalar>(body: &SpatialInertia<S>) -> Wrench<S> {
+    let (h, inertia) = (body.first_moment, body.rotational);
+    Wrench::new(Vector3::new(inertia.xz, inertia.yz, inertia.zz), Vector3::new(-h.y, h.x, S::zero()))
 }

@@ -12,7 +12,7 @@ pub fn kinematics<S: Scalar>(model: &Model<S>, data: &mut Data<S>, q: &[S], v: &
     debug_assert!(q.len() == model.n_joints() && v.len() == model.n_joints());
     let slots = &mut data.kinematics;
     for (k, ((frame, &q), &v)) in model.frames().iter().zip(q).zip(v).enumerate() {
-        let parent = slots[frame.parent.map_or(0, |index| index + 1)];
+        let parent = slots[frame.parent];
         let across = frame.joint.pose(q);
         let twist = across.inverse_twist(parent.twist) + frame.joint.motion() * v;
         slots[k + 1] = KinematicsSlot { pose: parent.pose * across, twist };

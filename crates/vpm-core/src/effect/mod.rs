@@ -25,7 +25,7 @@ pub use stribeck_friction::StribeckFriction;
 pub use torque_ripple::TorqueRipple;
 pub use viscous_friction::ViscousFriction;
 
-use crate::scalar::Scalar;
+use crate::scalar::{Dual, Scalar};
 
 /// Any effect that puts an effort on a joint as a function of its coordinate and velocity.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
@@ -115,6 +115,12 @@ impl<S: Scalar> JointEffect<S> {
             | Self::AsymmetricFriction(_)
             | Self::StribeckFriction(_) => S::zero(),
         }
+    }
+
+    /// Slope of the effort at rest by the coordinate, N/m or N m/rad.
+    #[inline]
+    pub fn slope_at_rest(&self, q: S) -> S {
+        self.map(&mut |&parameter| Dual::<S, 1>::constant(parameter)).effort_at_rest(Dual::variable(q, 0)).gradient[0]
     }
 
     /// Potential energy in J at coordinate `q`: `effort = -d potential/dq` for effects of the coordinate alone, zero for friction.

@@ -1,5 +1,6 @@
 //! The loop over samples: what happens at a sample, and between two.
 
+use super::names::{output_name, state_name};
 use super::{Setting, Stepping, diverged};
 use crate::controller::{ControlLaw, ControlMemory};
 use crate::description::Description;
@@ -8,7 +9,7 @@ use crate::integrator::Integrator;
 use crate::ode::Ode;
 use crate::scalar::Scalar;
 use crate::sensitivity::{Interrupt, Pair};
-use crate::sensor::{Channel, Sensor};
+use crate::sensor::Sensor;
 use crate::system::System;
 use crate::table::Table;
 
@@ -73,14 +74,14 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         };
         let entries = &description.controllers;
         let law = |law: &ControlLaw<usize>| law.map(&mut |&index| theta[index]);
-        let joints = description.n_joints();
+        let layout = description.layout();
         Ok(Self {
             description,
             plan: *plan,
             stepping: setting.stepping,
             integrator: Integrator::new(setting.stepping.method, dim),
             sensors: description.sensors(theta),
-            controllers: entries.iter().map(|c| (law(&c.law), c.actuator, c.measures.column(joints))).collect(),
+            controllers: entries.iter().map(|c| (law(&c.law), c.actuator, c.measures.column(layout))).collect(),
             memories: vec![ControlMemory::default(); entries.len()],
             system,
             state: vec![zero; dim],
@@ -170,12 +171,8 @@ impl<'a, S: Scalar> Stepper<'a, S> {
     }
 
     fn record_motion(&mut self, row: usize) {
-        let (n, width) = (self.description.n_joints(), self.description.n_outputs());
-        let channels = self.truth[row * width..].chunks_exact_mut(4);
-        for ((channels, &q), &v) in channels.zip(&self.state[..n]).zip(&self.state[n..]) {
-            channels[0] = q;
-            channels[1] = v;
-        }
+        let width = self.description.n_outputs();
+        self.system.dynamics().observe_motion(&self.state, &mut self.truth[row * width..(row + 1) * width]);
     }
 
     /// Lets the controllers command, if there is a loop to close.
@@ -202,38 +199,33 @@ impl<'a, S: Scalar> Stepper<'a, S> {
     }
 
     fn record_efforts(&mut self, row: usize, start: usize) {
-        let (n, width) = (self.description.n_joints(), self.description.n_outputs());
-        let actuators = self.description.n_actuators();
-        let (of_joints, of_actuators) = self.truth[row * width..(row + 1) * width].split_at_mut(4 * n);
-        let dynamics = self.system.dynamics();
-        let accelerations = &self.rate[n..2 * n];
-        for ((channels, &a), &effort) in of_joints.chunks_exact_mut(4).zip(accelerations).zip(dynamics.efforts()) {
-            channels[2] = a;
-            channels[3] = effort;
-        }
+        let (layout, actuators) = (self.description.layout(), self.description.n_actuators());
+        let truth = &mut self.truth[row * layout.count()..(row + 1) * layout.count()];
+        self.system.dynamics().observe_efforts(&self.rate, truth);
         let commands = &self.commands[(row + start) * actuators..];
-        for ((channels, &command), &force) in of_actuators.chunks_exact_mut(2).zip(commands).zip(dynamics.forces()) {
+        for (channels, &command) in truth[layout.actuators()..].chunks_exact_mut(2).zip(commands).take(actuators) {
             channels[0] = command;
-            channels[1] = force;
         }
     }
 
     /// Shows the row as the sensors do.
     fn read(&mut self, row: usize) {
-        let (joints, width) = (self.description.n_joints(), self.description.n_outputs());
+        let layout = self.description.layout();
+        let width = layout.count();
         self.outputs[row * width..(row + 1) * width].copy_from_slice(&self.truth[row * width..(row + 1) * width]);
         for number in 0..self.sensors.len() {
-            let column = self.sensors[number].channel.column(joints);
+            let column = self.sensors[number].channel.column(layout);
             self.outputs[row * width + column] = self.reading(row, column);
         }
     }
 
     /// What is seen of a channel: its sensor's reading, or the truth where there is no sensor.
     fn reading(&self, row: usize, column: usize) -> S {
-        let (joints, width) = (self.description.n_joints(), self.description.n_outputs());
+        let layout = self.description.layout();
+        let width = layout.count();
         let truth = |sample: usize| self.truth[sample * width + column];
         let mut sensors = self.sensors.iter();
-        match sensors.find(|sensor| sensor.channel.column(joints) == column) {
+        match sensors.find(|sensor| sensor.channel.column(layout) == column) {
             Some(sensor) => sensor.read(row, self.stepping.time_step, truth),
             None => truth(row),
         }
@@ -247,35 +239,12 @@ impl<'a, S: Scalar> Stepper<'a, S> {
 
     /// A state in words.
     fn state_name(&self, place: usize) -> String {
-        let n = self.description.n_joints();
-        let joint = |k: usize| self.description.bodies[k].joint.name.as_str();
-        let name = match place {
-            _ if place < n => format!("position of joint `{}`", joint(place)),
-            _ if place < 2 * n => format!("velocity of joint `{}`", joint(place - n)),
-            _ => {
-                let mut lagging = self.description.actuators.iter().filter(|actuator| actuator.lag.is_some());
-                format!("lag of actuator `{}`", lagging.nth(place - 2 * n).map_or("", |actuator| &actuator.name))
-            }
-        };
-        of_what(&name, self.state[place])
+        of_what(&state_name(self.description, place), self.state[place])
     }
 
     /// An output in words, of the row whose numbers begin at `row`.
     fn output_name(&self, column: usize, row: usize) -> String {
-        let Description { bodies, actuators, .. } = self.description;
-        let of_joints = Channel::count(bodies.len(), 0);
-        let name = match bodies.get(column / 4) {
-            Some(body) => {
-                let quantity = ["position", "velocity", "acceleration", "effort"][column % 4];
-                format!("{quantity} of joint `{}`", body.joint.name)
-            }
-            None => {
-                let quantity = ["command", "force"][(column - of_joints) % 2];
-                let actuator = actuators.get((column - of_joints) / 2);
-                format!("{quantity} of actuator `{}`", actuator.map_or("", |actuator| &actuator.name))
-            }
-        };
-        of_what(&name, self.outputs[row + column])
+        of_what(&output_name(self.description, column), self.outputs[row + column])
     }
 }
 

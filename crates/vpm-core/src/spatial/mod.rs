@@ -5,6 +5,7 @@
 
 mod articulated;
 mod inertia;
+mod logarithm;
 mod matrix;
 mod pose;
 mod twist;

@@ -30,6 +30,13 @@ impl<S: Scalar> Pose<S> {
         Self::new(Matrix3::identity(), Vector3::zero())
     }
 
+    /// A constant pose.
+    #[inline]
+    pub fn from_f64(pose: Pose<f64>) -> Self {
+        let columns = pose.rotation.columns.map(|column| Vector3::from_f64(column.to_array()));
+        Self::new(Matrix3 { columns }, Vector3::from_f64(pose.translation.to_array()))
+    }
+
     /// `X_BA` from `X_AB`.
     #[inline]
     pub fn inverse(self) -> Self {

@@ -71,7 +71,7 @@ impl Machine {
     /// An actuator `drive`, `drive1`, ... on a joint.
     pub fn actuator(&mut self, joint: usize, numbers: &[(&str, f64)]) -> &mut Self {
         let name = format!("drive{joint}");
-        self.part("actuators", &name, json!({"name": name, "joint": joint}), numbers)
+        self.part("actuators", &name, json!({"name": name, "on": {"joint": joint}}), numbers)
     }
 
     /// A sensor on a channel, `{"kind": ..., "joint": ...}`.

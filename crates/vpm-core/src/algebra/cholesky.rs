@@ -1,0 +1,62 @@
+//! Symmetric positive definite systems.
+
+use crate::scalar::Scalar;
+
+/// Cholesky factors of a symmetric positive definite matrix, in a buffer that is allocated once.
+///
+/// Law: `A = L L^T` (Golub & Van Loan 2013, "Matrix Computations", algorithm 4.2.1). A matrix that is not positive definite gives
+/// undefined numbers, which the caller finds in its result.
+#[derive(Clone, Debug)]
+pub struct Cholesky<S> {
+    dim: usize,
+    /// L row by row, with the inverses of its diagonal in their places.
+    lower: Vec<S>,
+}
+
+impl<S: Scalar> Cholesky<S> {
+    /// Buffer for matrices of `dim` rows.
+    pub fn new(dim: usize) -> Self {
+        Self { dim, lower: vec![S::zero(); dim * dim] }
+    }
+
+    /// Factorises `matrix`, of which the lower triangle counts, row by row.
+    pub fn factorise(&mut self, matrix: &[S]) {
+        let n = self.dim;
+        for row in 0..n {
+            let (above, rest) = self.lower.split_at_mut(row * n);
+            let own = &mut rest[..n];
+            for column in 0..row {
+                let other = &above[column * n..column * n + column];
+                let sum = dot(&own[..column], other);
+                own[column] = (matrix[row * n + column] - sum) * above[column * n + column];
+            }
+            let square = dot(&own[..row], &own[..row]);
+            own[row] = (matrix[row * n + row] - square).sqrt().recip();
+        }
+    }
+
+    /// Replaces `b` by the solution x of `A x = b`.
+    pub fn solve(&self, b: &mut [S]) {
+        let n = self.dim;
+        for row in 0..n {
+            let (known, rest) = b.split_at_mut(row);
+            rest[0] = (rest[0] - dot(&self.lower[row * n..row * n + row], known)) * self.lower[row * n + row];
+        }
+        for row in (0..n).rev() {
+            let (rest, known) = b.split_at_mut(row + 1);
+            let below = self.lower.chunks_exact(n).skip(row + 1).map(|line| line[row]);
+            let sum: S = below.zip(known.iter()).map(|(entry, &x)| entry * x).sum();
+            rest[row] = (rest[row] - sum) * self.lower[row * n + row];
+        }
+    }
+
+    /// The square of the pivot of a row: what is left of its diagonal entry after the rows before it.
+    pub fn pivot(&self, row: usize) -> S {
+        let inverse = self.lower[row * self.dim + row];
+        (inverse * inverse).recip()
+    }
+}
+
+fn dot<S: Scalar>(left: &[S], right: &[S]) -> S {
+    left.iter().zip(right).map(|(&l, &r)| l * r).sum()
+}

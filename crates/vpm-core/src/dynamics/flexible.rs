@@ -1,0 +1,238 @@
+//! Dynamics of trees with elastic beams and lines that weigh something, by composite bodies.
+//!
+//! `M(q) a + bias(q, v) + K q + D v = tau`, K and D constant. A beam is a joint of many coordinates whose mass is spread over its
+//! stations: virtual work over the stations gives its own block of M, what reaches the root goes on inward as the inertia, the
+//! wrench and the coupling wrenches of one composite body (Featherstone 2008, section 6.2, for rigid bodies; Shabana 2013, "Dynamics of
+//! Multibody Systems", section 5.5, for the inertia coupling of a deformable body).
+
+use super::energy::Energy;
+use super::frames::{frames, lines, poses};
+use crate::data::{Composite, Data, FrameSlot, LineSlot};
+use crate::model::{Elastic, Link, Model, Node, Wire};
+use crate::scalar::Scalar;
+use crate::spatial::{Pose, SpatialInertia, Vector3, Wrench};
+
+/// Mass matrix and bias at coordinates `q` and rates `v`, left in `data`.
+///
+/// Law: `M = sum J^T m J`, `bias = sum J^T (m A + V x* m V)` over bodies, stations and lines, A with gravity taken off.
+/// Checked: against `crba`, `rnea` and `aba` on rigid trees, Lagrange's equations of the energy on flexible ones, a leg with closed
+/// loops on lines.
+pub fn terms<S: Scalar>(model: &Model<S>, data: &mut Data<S>, q: &[S], v: &[S]) {
+    frames(model, data, q, v);
+    let Data { composite, mass_matrix, .. } = data;
+    mass_matrix.fill(S::zero());
+    composite.bias.fill(S::zero());
+    for slot in composite.frames.iter_mut().skip(1) {
+        let momentum = slot.inertia.apply(slot.velocity);
+        slot.wrench = slot.inertia.apply(slot.acceleration) + slot.velocity.cross_wrench(momentum);
+    }
+    for node in model.order().iter().rev() {
+        match node {
+            Node::Body(number, beyond) => body(&model.links()[*number], *number, beyond, composite, mass_matrix),
+            Node::Beam(number, beyond) => beam(&model.beams()[*number], *number, beyond, composite, mass_matrix),
+        }
+    }
+    if !model.lines().is_empty() {
+        poses(model, data);
+        lines(model, data);
+        massive_lines(model, data);
+    }
+    mirror(&mut data.mass_matrix, model.n_coordinates());
+}
+
+/// A joint: its own entries of the mass matrix, and everything it carries one frame further in.
+fn body<S: Scalar>(link: &Link<S>, number: usize, beyond: &[usize], data: &mut Composite<S>, mass: &mut [S]) {
+    let Composite { frames, columns, bias, .. } = data;
+    let n = bias.len();
+    let FrameSlot { across, inertia, wrench, .. } = frames[number + 1];
+    let own = inertia.apply(link.kind.unit());
+    bias[number] = link.kind.effort(&wrench);
+    mass[number * n + number] = link.kind.effort(&own);
+    for &other in beyond {
+        *entry(mass, n, number, other) = link.kind.effort(&columns[other]);
+    }
+    if link.parent != 0 {
+        carry(&mut frames[link.parent], &across, &inertia, &wrench);
+        columns[number] = across.wrench(own);
+        for &other in beyond {
+            columns[other] = across.wrench(columns[other]);
+        }
+    }
+}
+
+/// A beam: its own block of the mass matrix, station by station, and everything it carries to what its root sits on.
+fn beam<S: Scalar>(
+    elastic: &Elastic<S>,
+    number: usize,
+    beyond: &[(usize, usize)],
+    data: &mut Composite<S>,
+    mass: &mut [S],
+) {
+    let Elastic { beam, root, coordinate, frame, .. } = elastic;
+    let (len, first, frame) = (beam.len(), *coordinate, frame.unwrap_or(0));
+    let Composite { frames, sections, columns, bias, .. } = data;
+    let n = bias.len();
+    let jacobian = |station: usize| &sections[number].columns[station * len..(station + 1) * len];
+    columns[first..first + len].fill(Wrench::zero());
+    for station in 0..beam.stations() {
+        let FrameSlot { across, inertia, wrench, .. } = frames[frame + station];
+        if inertia == SpatialInertia::zero() {
+            continue;
+        }
+        for (i, column) in jacobian(station).iter().enumerate() {
+            let momentum = inertia.apply(*column);
+            bias[first + i] += column.power(wrench);
+            columns[first + i] += across.wrench(momentum);
+            let row = &mut mass[(first + i) * n + first..];
+            for (entry, other) in row.iter_mut().zip(&jacobian(station)[..=i]) {
+                *entry += other.power(momentum);
+            }
+        }
+        if root.frame != 0 {
+            carry(&mut frames[root.frame], &across, &inertia, &wrench);
+        }
+    }
+    for &(other, station) in beyond {
+        for (i, column) in jacobian(station).iter().enumerate() {
+            *entry(mass, n, first + i, other) = column.power(columns[other]);
+        }
+        columns[other] = frames[frame + station].across.wrench(columns[other]);
+    }
+}
+
+/// Hands an inertia and the wrench on it to the frame that carries them.
+fn carry<S: Scalar>(parent: &mut FrameSlot<S>, across: &Pose<S>, inertia: &SpatialInertia<S>, wrench: &Wrench<S>) {
+    parent.inertia += across.inertia(*inertia);
+    parent.wrench += across.wrench(*wrench);
+}
+
+/// The entry of two coordinates in the lower triangle.
+fn entry<S>(mass: &mut [S], n: usize, i: usize, j: usize) -> &mut S {
+    &mut mass[i.max(j) * n + i.min(j)]
+}
+
+/// Adds the lines that weigh something: needles between their points.
+///
+/// Law: with u the unit vector of the line and J_u its derivative by the coordinates, a centre at distance c from the beginning has
+/// `J = J_from + c J_u`, one at distance c from the end `J = J_to - c J_u`; `M += m J^T J + I J_u^T J_u`,
+/// `bias += m J^T a + I J_u^T u''` at zero coordinate accelerations. Source: D'Imperio 2016, eqs 2.85 to 2.95, in space.
+fn massive_lines<S: Scalar>(model: &Model<S>, data: &mut Data<S>) {
+    let Data { composite: Composite { lines, bias, .. }, mass_matrix: mass, .. } = data;
+    let n = bias.len();
+    for (Wire { barrel, rod, .. }, slot) in model.lines().iter().zip(lines) {
+        let LineSlot { length, direction: u, from, to } = slot;
+        let turn = |v: Vector3<S>| (v - *u * u.dot(v)) * length.recip();
+        let (rate, change) = (to.velocity - from.velocity, to.acceleration - from.acceleration);
+        let (stretch, spin) = (u.dot(rate), turn(rate));
+        // u'' from d^2/dt^2 (s u), s the length.
+        let swing = turn(change) - (spin * (stretch * length.recip())) * S::from_f64(2.0) - *u * spin.dot(spin);
+        for (part, point, sign) in [(barrel, &*from, 1.0), (rod, &*to, -1.0)] {
+            let Some(part) = part else { continue };
+            let center = part.center * sign;
+            let acceleration = (point.acceleration + swing * center) * part.mass;
+            for i in 0..n {
+                let turning = turn(to.columns[i] - from.columns[i]);
+                let moving = point.columns[i] + turning * center;
+                bias[i] += moving.dot(acceleration) + turning.dot(swing) * part.inertia;
+                for j in 0..=i {
+                    let other = turn(to.columns[j] - from.columns[j]);
+                    let along = moving.dot(point.columns[j] + other * center) * part.mass;
+                    mass[i * n + j] += along + turning.dot(other) * part.inertia;
+                }
+            }
+        }
+    }
+}
+
+/// Copies the lower triangle to the upper one.
+fn mirror<S: Copy>(matrix: &mut [S], n: usize) {
+    for i in 0..n {
+        for j in 0..i {
+            matrix[j * n + i] = matrix[i * n + j];
+        }
+    }
+}
+
+/// Adds to `loads` what forces on the lines do to the coordinates: `J^T F`, after [`terms`] or [`super::observe`].
+pub(crate) fn add_line_forces<S: Scalar>(data: &Data<S>, forces: &[S], loads: &mut [S]) {
+    for (line, &force) in forces.iter().enumerate() {
+        data.line_load(line, force, loads);
+    }
+}
+
+/// Takes off `loads` what the beams' stiffness and damping carry: `K q + D v`.
+pub(crate) fn subtract_elastic<S: Scalar>(model: &Model<S>, q: &[S], v: &[S], loads: &mut [S]) {
+    for Elastic { beam, coordinate, .. } in model.beams() {
+        let len = beam.len();
+        let own = *coordinate..coordinate + len;
+        let (q, v) = (&q[own.clone()], &v[own.clone()]);
+        for ((load, stiffness), damping) in loads[own]
+            .iter_mut()
+            .zip(beam.stiffness().chunks_exact(len.max(1)))
+            .zip(beam.damping().chunks_exact(len.max(1)))
+        {
+            *load -= product(stiffness, q) + product(damping, v);
+        }
+    }
+}
+
+/// Kinetic energy, and potential energy in gravity and in the beams, in J, at coordinates `q` and rates `v`.
+///
+/// Checked: free motion conserves their sum.
+pub fn energy<S: Scalar>(model: &Model<S>, data: &mut Data<S>, q: &[S], v: &[S]) -> Energy<S> {
+    frames(model, data, q, v);
+    poses(model, data);
+    lines(model, data);
+    let gravity = Vector3::from_f64(model.gravity());
+    let mut total = Energy { kinetic: S::zero(), potential: S::zero() };
+    for FrameSlot { pose, velocity, inertia, .. } in data.composite.frames.iter().skip(1) {
+        total.kinetic += inertia.kinetic_energy(*velocity);
+        total.potential -= gravity.dot(pose.rotation * inertia.first_moment + pose.translation * inertia.mass);
+    }
+    for (Wire { barrel, rod, .. }, LineSlot { length, direction: u, from, to }) in
+        model.lines().iter().zip(&data.composite.lines)
+    {
+        let rate = to.velocity - from.velocity;
+        let spin = (rate - *u * u.dot(rate)) * length.recip();
+        for (part, point, sign) in [(barrel, from, 1.0), (rod, to, -1.0)] {
+            let Some(part) = part else { continue };
+            let center = part.center * sign;
+            let velocity = point.velocity + spin * center;
+            total.kinetic += (velocity.dot(velocity) * part.mass + spin.dot(spin) * part.inertia) * 0.5;
+            total.potential -= gravity.dot(point.place + *u * center) * part.mass;
+        }
+    }
+    for Elastic { beam, coordinate, .. } in model.beams() {
+        let q = &q[*coordinate..coordinate + beam.len()];
+        let rows = beam.stiffness().chunks_exact(q.len().max(1));
+        total.potential += rows.zip(q).map(|(row, &own)| own * product(row, q)).sum::<S>() * 0.5;
+    }
+    total
+}
+
+fn product<S: Scalar>(row: &[S], x: &[S]) -> S {
+    row.iter().zip(x).map(|(&entry, &x)| entry * x).sum()
+}
+
+/// Accelerations under `tau` on all coordinates, after [`terms`] at the same `q` and `v`; the factors of M stay in `data`.
+pub fn solve<'d, S: Scalar>(model: &Model<S>, data: &'d mut Data<S>, q: &[S], v: &[S], tau: &[S]) -> &'d [S] {
+    data.factorise();
+    let Data { composite: Composite { bias, factors, .. }, acceleration, .. } = data;
+    for ((entry, &tau), &bias) in acceleration.iter_mut().zip(tau).zip(&*bias) {
+        *entry = tau - bias;
+    }
+    subtract_elastic(model, q, v, acceleration);
+    factors.solve(acceleration);
+    acceleration
+}
+
+/// Efforts on all coordinates that give accelerations `a`: `M a + bias + K q + D v`, after [`terms`] at the same `q` and `v`.
+pub fn required<S: Scalar>(model: &Model<S>, data: &Data<S>, (q, v): (&[S], &[S]), a: &[S], efforts: &mut [S]) {
+    let n = model.n_coordinates();
+    efforts.fill(S::zero());
+    subtract_elastic(model, q, v, efforts);
+    let rows = data.mass_matrix.chunks_exact(n.max(1)).zip(&data.composite.bias);
+    for (effort, (row, &bias)) in efforts.iter_mut().zip(rows) {
+        *effort = product(row, a) + bias - *effort;
+    }
+}

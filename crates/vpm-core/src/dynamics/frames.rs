@@ -1,0 +1,126 @@
+//! Where all frames of a machine are and how they move.
+
+use crate::beam::Sections;
+use crate::data::{Composite, Data, FrameSlot, LineSlot, PointSlot};
+use crate::model::{Elastic, Model, Node, Place, Wire};
+use crate::scalar::Scalar;
+use crate::spatial::{Pose, Twist, Vector3};
+
+/// Motion of every frame at coordinates `q`, rates `v` and zero coordinate accelerations, outward from the world.
+///
+/// Law: `V_F = X^-1 V_P + V_PF`, `A_F = X^-1 A_P + V_F x V_PF + dV_PF/dt` with V_PF the twist of F relative to P in the axes of F
+/// (Featherstone 2008, section 5.3; a station of a beam is a joint of as many coordinates). Gravity is an upward acceleration of the
+/// world.
+pub fn frames<S: Scalar>(model: &Model<S>, data: &mut Data<S>, q: &[S], v: &[S]) {
+    debug_assert!(q.len() == model.n_coordinates() && v.len() == model.n_coordinates());
+    let Composite { frames, sections, .. } = &mut data.composite;
+    frames[0].acceleration = Twist::new(Vector3::zero(), -Vector3::from_f64(model.gravity()));
+    for node in model.order() {
+        match node {
+            Node::Body(number, _) => {
+                let link = &model.links()[*number];
+                let parent = frames[link.parent];
+                let slot = &mut frames[number + 1];
+                slot.across = link.pose(q[*number]);
+                slot.velocity = slot.across.inverse_twist(parent.velocity);
+                link.kind.add_rate(&mut slot.velocity, v[*number]);
+                let across = link.kind.rate_cross(&slot.velocity, v[*number]);
+                slot.acceleration = slot.across.inverse_twist(parent.acceleration) + across;
+                slot.inertia = link.inertia;
+            }
+            Node::Beam(number, _) => {
+                let Elastic { beam, root, coordinate, frame, inertias, .. } = &model.beams()[*number];
+                let (own, parent) = (*coordinate..coordinate + beam.len(), frames[root.frame]);
+                let sections = &mut sections[*number];
+                beam.motion(&q[own.clone()], &v[own], sections);
+                let root = Pose::from_f64(root.pose);
+                let stations = frames.iter_mut().skip(frame.unwrap_or(0)).zip(&sections.at).zip(inertias);
+                for ((slot, section), inertia) in stations {
+                    slot.across = root * section.pose;
+                    slot.velocity = slot.across.inverse_twist(parent.velocity) + section.twist;
+                    let across = slot.velocity.cross(section.twist) + section.acceleration;
+                    slot.acceleration = slot.across.inverse_twist(parent.acceleration) + across;
+                    slot.inertia = *inertia;
+                }
+            }
+        }
+    }
+}
+
+/// Poses `X_WF` of every frame after [`frames`].
+pub(crate) fn poses<S: Scalar>(model: &Model<S>, data: &mut Data<S>) {
+    let frames = &mut data.composite.frames;
+    for node in model.order() {
+        let (parent, own) = match node {
+            Node::Body(number, _) => (model.links()[*number].parent, number + 1..number + 2),
+            Node::Beam(number, _) => {
+                let elastic = &model.beams()[*number];
+                let first = elastic.frame.unwrap_or(0);
+                (elastic.root.frame, first..first + elastic.beam.stations())
+            }
+        };
+        let parent = frames[parent].pose;
+        for slot in &mut frames[own] {
+            slot.pose = parent * slot.across;
+        }
+    }
+}
+
+/// Geometry and motion of every line after [`poses`].
+pub(crate) fn lines<S: Scalar>(model: &Model<S>, data: &mut Data<S>) {
+    let Composite { frames, sections, lines, .. } = &mut data.composite;
+    for (Wire { from, to, .. }, slot) in model.lines().iter().zip(lines) {
+        let LineSlot { length, direction, from: begin, to: end } = slot;
+        for (place, point) in [(from, &mut *begin), (to, &mut *end)] {
+            move_point(&frames[place.frame], place, point);
+            let PointSlot { place: at, columns, .. } = point;
+            columns.fill(Vector3::zero());
+            for_each_column(model, frames, sections, place.frame, |coordinate, column| {
+                columns[coordinate] = column.linear + column.angular.cross(*at);
+            });
+        }
+        let across = end.place - begin.place;
+        *length = across.dot(across).sqrt();
+        *direction = across * length.recip();
+    }
+}
+
+/// A point fixed to a frame: where it is and how it moves.
+fn move_point<S: Scalar>(frame: &FrameSlot<S>, place: &Place, point: &mut PointSlot<S>) {
+    let at = Vector3::from_f64(place.pose.translation.to_array());
+    let FrameSlot { pose, velocity, acceleration, .. } = frame;
+    let speed = velocity.linear + velocity.angular.cross(at);
+    // The conventional acceleration of a point from the spatial one (Featherstone 2008, section 2.11).
+    let change = acceleration.linear + acceleration.angular.cross(at) + velocity.angular.cross(speed);
+    point.place = pose.point(at);
+    point.velocity = pose.rotation * speed;
+    point.acceleration = pose.rotation * change;
+}
+
+/// Hands out, for every coordinate that moves a frame, the twist per unit rate in the axes and at the origin of the world.
+pub(crate) fn for_each_column<S: Scalar>(
+    model: &Model<S>,
+    frames: &[FrameSlot<S>],
+    sections: &[Sections<S>],
+    mut frame: usize,
+    mut visit: impl FnMut(usize, Twist<S>),
+) {
+    while frame != 0 {
+        let pose = frames[frame].pose;
+        match model.links().get(frame - 1) {
+            Some(link) => {
+                visit(frame - 1, pose.twist(link.kind.unit()));
+                frame = link.parent;
+            }
+            None => {
+                let Some((number, station)) = model.station(frame) else { return };
+                let Elastic { beam, root, coordinate, .. } = &model.beams()[number];
+                let columns = &sections[number].columns[station * beam.len()..(station + 1) * beam.len()];
+                for (k, column) in columns.iter().enumerate() {
+                    visit(coordinate + k, pose.twist(*column));
+                }
+                frame = root.frame;
+            }
+        }
+    }
+}

@@ -1,0 +1,113 @@
+//! The last step of an assembly: everything in the frames and the order that the algorithms want.
+
+use super::assemble::Assembly;
+use super::order::Part;
+use super::{BodyFrame, Elastic, Link, Model, Node, Place, Strip, Wire};
+use crate::error::Result;
+use crate::joint::Joint;
+use crate::line::{Line, LineEnd};
+use crate::mount::{Gauge, Marker, placed};
+use crate::scalar::Scalar;
+use crate::spatial::{Matrix3, Pose, Vector3};
+
+impl<S: Scalar> Assembly<'_, S> {
+    /// The tree.
+    pub(super) fn model(mut self, order: &[Part]) -> Result<Model<S>> {
+        let n_joints = self.joints.len();
+        let n_coordinates = n_joints + self.beams.iter().map(|elastic| elastic.beam.len()).sum::<usize>();
+        let (mut links, mut frames) = (Vec::new(), Vec::new());
+        for number in 0..n_joints {
+            let (link, frame) = self.link(number);
+            links.push(link);
+            frames.push(frame);
+        }
+        let lines = self.parts.lines.iter().map(|line| self.wire(line)).collect::<Result<Vec<_>>>()?;
+        let marker = |marker: &Marker| {
+            let pose = placed(&marker.name, marker.translation, marker.rotation)?;
+            Ok(self.aligned(self.resolved(marker.on).beyond(pose)))
+        };
+        let markers = self.parts.markers.iter().map(marker).collect::<Result<_>>()?;
+        for number in 0..self.beams.len() {
+            self.beams[number].root = self.aligned(self.beams[number].root);
+            if let Some(first) = self.beams[number].frame {
+                let stations = self.beams[number].beam.stations();
+                self.beams[number].inertias = self.inertias[first..first + stations].to_vec();
+            }
+        }
+        let sorted = links.iter().enumerate().all(|(number, link)| link.parent <= number);
+        let rigid = n_coordinates == n_joints && self.beams.iter().all(|elastic| elastic.frame.is_none());
+        Ok(Model {
+            gravity: self.parts.gravity,
+            order: self.nodes(order, &links),
+            n_frames: self.inertias.len(),
+            recursive: sorted && rigid && !lines.iter().any(Wire::is_massive),
+            links,
+            frames,
+            lines,
+            markers,
+            gauges: self.parts.gauges.iter().map(|gauge| self.strip(gauge)).collect(),
+            beams: self.beams,
+            n_coordinates,
+        })
+    }
+
+    fn link(&self, number: usize) -> (Link<S>, BodyFrame<S>) {
+        let (body, joint) = (&self.parts.bodies[number], &self.joints[number]);
+        let (on, inertia) = (self.resolved(body.on), self.inertias[number + 1]);
+        let joint = on_frame(joint, on);
+        let link = Link::new(&joint, on.frame, self.alignment(on.frame).rotation, inertia);
+        (link, BodyFrame { name: body.name.clone(), parent: on.frame, joint, inertia })
+    }
+
+    fn wire(&self, line: &Line<S>) -> Result<Wire<S>> {
+        line.check()?;
+        let end = |end: LineEnd| {
+            let point = Pose::new(Matrix3::identity(), Vector3::from_f64(end.point));
+            self.aligned(self.resolved(end.on).beyond(point))
+        };
+        Ok(Wire { from: end(line.from), to: end(line.to), barrel: line.barrel, rod: line.rod })
+    }
+
+    fn strip(&self, gauge: &Gauge) -> Strip {
+        let Elastic { beam, coordinate, .. } = &self.beams[gauge.beam];
+        Strip { first: *coordinate, len: beam.len(), section: beam.gauge(gauge.at), point: [gauge.x, gauge.y] }
+    }
+
+    /// The nodes in their order, each with the coordinates beyond it.
+    fn nodes(&self, order: &[Part], links: &[Link<S>]) -> Vec<Node> {
+        let mut beyond = vec![Vec::new(); self.inertias.len()];
+        let mut nodes = Vec::new();
+        for part in order.iter().rev() {
+            let (parent, carried, node) = match *part {
+                Part::Body(number) => {
+                    let mut carried: Vec<usize> = std::mem::take(&mut beyond[number + 1]);
+                    let node = Node::Body(number, carried.clone());
+                    carried.push(number);
+                    (links[number].parent, carried, node)
+                }
+                Part::Beam(number) => {
+                    let Elastic { beam, root, coordinate, frame, .. } = &self.beams[number];
+                    let Some(first) = *frame else { continue };
+                    let at = |station: usize| beyond[first + station].iter().map(move |&place| (place, station));
+                    let hanging: Vec<_> = (0..beam.stations()).flat_map(at).collect();
+                    let own = *coordinate..coordinate + beam.len();
+                    let carried = hanging.iter().map(|&(place, _)| place).chain(own).collect();
+                    (root.frame, carried, Node::Beam(number, hanging))
+                }
+            };
+            beyond[parent].extend(carried);
+            nodes.push(node);
+        }
+        nodes.reverse();
+        nodes
+    }
+}
+
+/// A joint in the frame that its mount sits on.
+fn on_frame(joint: &Joint, on: Place) -> Joint {
+    let frame = on.pose * joint.frame::<f64>();
+    let rows = frame.rotation.transpose().columns.map(Vector3::to_array);
+    let mut rotation = [0.0; 9];
+    rotation.copy_from_slice(rows.as_flattened());
+    Joint { translation: frame.translation.to_array(), rotation, ..joint.clone() }
+}

@@ -1,0 +1,68 @@
+//! The order in which the parts of a tree hang on each other.
+
+use crate::error::{Error, Result};
+use crate::mount::Mount;
+
+/// A part that others can hang on, by its number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Part {
+    Body(usize),
+    Beam(usize),
+}
+
+/// What bodies and beams sit on, with their names.
+pub(super) struct Hanging<'a> {
+    pub(super) bodies: Vec<(&'a str, Mount)>,
+    pub(super) beams: Vec<(&'a str, Mount)>,
+}
+
+impl Hanging<'_> {
+    /// All bodies and beams, each after what it hangs on; bodies in their own order where that is one.
+    pub(super) fn sorted(&self) -> Result<Vec<Part>> {
+        let all = (0..self.bodies.len()).map(Part::Body).chain((0..self.beams.len()).map(Part::Beam));
+        let (mut waiting, mut order) = (all.collect::<Vec<_>>(), Vec::new());
+        while !waiting.is_empty() {
+            let before = order.len();
+            waiting.retain(|&part| {
+                let ready = self.below(part).is_none_or(|carrier| order.contains(&carrier));
+                if ready {
+                    order.push(part);
+                }
+                !ready
+            });
+            if order.len() == before {
+                return Err(self.ring(waiting[0], waiting.len()));
+            }
+        }
+        Ok(order)
+    }
+
+    /// What a part hangs on, if it is not the world.
+    fn below(&self, part: Part) -> Option<Part> {
+        let (_, mount) = self.entry(part);
+        match mount {
+            Mount::World => None,
+            Mount::Body(body) => Some(Part::Body(body)),
+            Mount::Section { beam, .. } => Some(Part::Beam(beam)),
+        }
+    }
+
+    fn entry(&self, part: Part) -> (&str, Mount) {
+        match part {
+            Part::Body(k) => self.bodies[k],
+            Part::Beam(k) => self.beams[k],
+        }
+    }
+
+    /// The ring that is reached from a part by going down.
+    fn ring(&self, from: Part, steps: usize) -> Error {
+        let down = |part: Part| self.below(part).unwrap_or(part);
+        let start = (0..steps).fold(from, |part, _| down(part));
+        let (mut names, mut part) = (vec![self.entry(start).0.to_owned()], down(start));
+        while part != start {
+            names.push(self.entry(part).0.to_owned());
+            part = down(part);
+        }
+        Error::Loop { names }
+    }
+}

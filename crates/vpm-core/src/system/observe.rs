@@ -1,0 +1,79 @@
+//! What can be seen of a machine in a state: all its outputs, in one place.
+
+use super::Dynamics;
+use crate::dynamics::{frames, lines, poses};
+use crate::scalar::Scalar;
+use crate::sensor::Layout;
+use crate::spatial::Pose;
+
+impl<S: Scalar> Dynamics<S> {
+    /// Where the outputs are.
+    pub fn layout(&self) -> Layout {
+        Layout {
+            joints: self.model.n_joints(),
+            actuators: self.actuators.len(),
+            lines: self.model.lines().len(),
+            gauges: self.model.gauges().len(),
+            markers: self.model.markers().len(),
+        }
+    }
+
+    /// All true outputs in the order of [`Layout`], in state `x` with rate `dxdt`, after [`Dynamics::rhs`] in that state. The command of an
+    /// actuator is what enters its lag.
+    pub fn observe(&mut self, x: &[S], dxdt: &[S], outputs: &mut [S]) {
+        self.observe_motion(x, outputs);
+        self.observe_efforts(dxdt, outputs);
+        let commands = outputs[self.layout().actuators()..].chunks_exact_mut(2);
+        for (channels, &input) in commands.zip(&self.inputs) {
+            channels[0] = input;
+        }
+    }
+
+    /// The outputs that the state alone decides: positions and velocities, lines, strains, markers.
+    pub(crate) fn observe_motion(&mut self, x: &[S], outputs: &mut [S]) {
+        let (n, layout) = (self.coordinates(), self.layout());
+        let (q, v) = x[..2 * n].split_at(n);
+        for ((channels, &q), &v) in outputs[..layout.actuators()].chunks_exact_mut(4).zip(q).zip(v) {
+            channels[0] = q;
+            channels[1] = v;
+        }
+        if layout.lines + layout.gauges + layout.markers == 0 {
+            return;
+        }
+        let Self { model, data, .. } = self;
+        frames(model, data, q, v);
+        poses(model, data);
+        lines(model, data);
+        for (channels, line) in outputs[layout.lines()..].chunks_exact_mut(3).zip(&data.composite.lines) {
+            channels[0] = line.length;
+            channels[1] = line.direction.dot(line.to.velocity - line.from.velocity);
+        }
+        for (output, gauge) in outputs[layout.gauges()..].iter_mut().zip(model.gauges()) {
+            let [kappa_x, kappa_y, .., extension] = gauge.section.strain(&q[gauge.first..gauge.first + gauge.len]);
+            let [x, y] = gauge.point;
+            *output = extension + kappa_x * y - kappa_y * x;
+        }
+        for (channels, place) in outputs[layout.markers()..].chunks_exact_mut(6).zip(model.markers()) {
+            let pose = data.composite.frames[place.frame].pose * Pose::from_f64(place.pose);
+            channels[..3].copy_from_slice(&pose.translation.to_array());
+            channels[3..].copy_from_slice(&pose.rotation.rotation_vector().to_array());
+        }
+    }
+
+    /// The outputs that follow from the efforts: accelerations, efforts, forces, after [`Dynamics::rhs`].
+    pub(crate) fn observe_efforts(&mut self, dxdt: &[S], outputs: &mut [S]) {
+        let (n, layout) = (self.coordinates(), self.layout());
+        let accelerations = &dxdt[n..2 * n];
+        let of_joints = outputs[..layout.actuators()].chunks_exact_mut(4);
+        for ((channels, &a), &effort) in of_joints.zip(accelerations).zip(&self.efforts) {
+            channels[2] = a;
+            channels[3] = effort;
+        }
+        for (channels, &force) in outputs[layout.actuators()..].chunks_exact_mut(2).zip(&self.forces) {
+            channels[1] = force;
+        }
+        for (channels, &tension) in outputs[layout.lines()..].chunks_exact_mut(3).zip(&self.tensions) {
+            channels[2] = tension;
+        }
+    }
+}
