@@ -260,7 +260,7 @@ class System:
             As in `simulate`; ``effort`` of a joint is the effort that the motion needs.
         """
     def equilibrium(self, theta: ArrayLike, position: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Coordinates (n_coordinates,) at rest with the joints held at ``position`` (n,), and the holding efforts (n,)."""
+        """Coordinates (n_coordinates,) at rest with the joints held at ``position``, and the holding efforts (n,)."""
     def natural_frequencies(self, theta: ArrayLike, position: ArrayLike) -> NDArray[np.float64]:
         """Natural frequencies (n_elastic,) in Hz with the joints locked at ``position`` (n,), slowest first.
 

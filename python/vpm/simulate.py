@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from vpm.errors import DivergedError, ExperimentError, SimulationError, ValidityWarning
+from vpm.errors import DivergedError, ExperimentError, SimulationError, ValidityWarning, VpmError
 from vpm.experiment import Experiment, Motion, motion, parallel_filter
 from vpm.initial import initial_state as start
 from vpm.initial import joint_motion, measured_states
@@ -233,6 +233,10 @@ def simulate_arrays(
             error.outputs, np.zeros((*error.outputs.shape, 0)), np.arange(len(error.outputs)), np.zeros(1, np.int64)
         )
         raise DivergedError(str(error), run=_run(model, experiment, mode, partial, setup)) from None
+    except VpmError:
+        raise
+    except ValueError as error:  # of the core: sizes, numbers and steps that no simulation can take
+        raise SimulationError(f"{experiment.name}: {error}") from error
 
 
 def _dispatch(
@@ -273,9 +277,9 @@ def _dispatch(
 
 def _prescribed(model: Model, m: Motion, theta: Array, columns: list[int], setup: Setup) -> SimulatedArrays:
     """Joints on the filtered motion, from behind the filter's settling to before it."""
-    followed = (np.ascontiguousarray(x[m.kept]) for x in (m.position, m.velocity, m.acceleration))
+    q, v, a = (np.ascontiguousarray(x[m.kept]) for x in (m.position, m.velocity, m.acceleration))
     outputs, states, jacobian = model.core.simulate_prescribed(
-        theta, *followed, m.dt, setup.substeps, setup.integrator, columns
+        theta, q, v, a, m.dt, setup.substeps, setup.integrator, columns
     )
     rows = np.arange(len(m.time))[m.kept]
     return SimulatedArrays(outputs, jacobian, rows, np.zeros(1, dtype=np.int64), states)

@@ -2,8 +2,9 @@
 
 use nalgebra::DMatrix;
 use vpm_core::Result;
+use vpm_core::beam::Component;
 use vpm_core::beam::eigen::modes;
-use vpm_core::beam::strain::{FlexibleLink, FlexibleTree, Strain, StrainBeam};
+use vpm_core::beam::strain::{FlexibleLink, FlexibleTree, StrainBeam};
 use vpm_core::beam::{Material, Section, Shape};
 use vpm_core::error::Error;
 use vpm_core::integrator::stability::{LinearSystem, check};
@@ -110,7 +111,7 @@ fn rigid_and_growing_modes_are_no_fault_of_the_step() {
 
 #[test]
 fn a_stiff_beam_on_a_joint_is_limited_by_its_fastest_vibration() -> Result<()> {
-    use Strain::{BendingX, BendingY, Extension, Torsion};
+    use Component::{BendingX, BendingY, Extension, Torsion};
     let steel = Material { young: 206e9, poisson: 0.3, density: 7850.0 };
     let section = Section::new(Shape::Rectangle { width: 0.015, height: 0.004 }, steel)?;
     let list = fields(0.44, &[(BendingX, 4), (BendingY, 3), (Torsion, 2), (Extension, 2)])?;

@@ -9,6 +9,7 @@ use vpm_core::linearize::linearize;
 
 use super::System;
 use crate::arrays::{Numbers, cube, matrix, place, places};
+use crate::interrupt::unbroken;
 
 type Table<'py> = Bound<'py, PyArray2<f64>>;
 type Cube<'py> = Bound<'py, PyArray3<f64>>;
@@ -66,15 +67,16 @@ impl System {
         let theta = Numbers::vector("theta", theta)?;
         let (q, v) = (Numbers::vector("position", position)?, Numbers::vector("velocity", velocity)?);
         let effort = Numbers::vector("effort", effort)?;
-        let result =
-            evaluate::accelerations(&self.description, theta.values(), q.values(), v.values(), effort.values());
+        let result = unbroken(|| {
+            evaluate::accelerations(&self.description, theta.values(), q.values(), v.values(), effort.values())
+        })?;
         Ok(PyArray1::from_vec(py, self.checked(py, result)?))
     }
 
     /// Mass matrix (n, n), payloads included.
     fn mass_matrix<'py>(&self, py: Python<'py>, theta: &Any<'py>, position: &Any<'py>) -> PyResult<Table<'py>> {
         let (theta, q) = (Numbers::vector("theta", theta)?, Numbers::vector("position", position)?);
-        let result = evaluate::mass_matrix(&self.description, theta.values(), q.values());
+        let result = unbroken(|| evaluate::mass_matrix(&self.description, theta.values(), q.values()))?;
         let n = self.description().n_coordinates();
         matrix(py, self.checked(py, result)?, [n, n])
     }
@@ -83,7 +85,8 @@ impl System {
     fn energy(&self, py: Python<'_>, theta: &Any<'_>, position: &Any<'_>, velocity: &Any<'_>) -> PyResult<(f64, f64)> {
         let theta = Numbers::vector("theta", theta)?;
         let (q, v) = (Numbers::vector("position", position)?, Numbers::vector("velocity", velocity)?);
-        self.checked(py, evaluate::energy(&self.description, theta.values(), q.values(), v.values()))
+        let result = unbroken(|| evaluate::energy(&self.description, theta.values(), q.values(), v.values()))?;
+        self.checked(py, result)
     }
 
     /// Exact A (nx, nx), B (nx, nu), C (ny, nx), D (ny, nu) at a state under commands that stand.
@@ -96,8 +99,8 @@ impl System {
     ) -> PyResult<(Table<'py>, Table<'py>, Table<'py>, Table<'py>)> {
         let (theta, state) = (Numbers::vector("theta", theta)?, Numbers::vector("state", state)?);
         let inputs = Numbers::vector("inputs", inputs)?;
-        let result = py.detach(|| linearize(self.description(), theta.values(), state.values(), inputs.values()));
-        let linear = self.checked(py, result)?;
+        let linear =
+            self.compute(py, |_| linearize(self.description(), theta.values(), state.values(), inputs.values()))?;
         let (nx, nu, ny) = (state.values().len(), inputs.values().len(), self.description().n_outputs());
         Ok((
             matrix(py, linear.state, [nx, nx])?,
@@ -115,8 +118,8 @@ impl System {
         position: &Any<'py>,
     ) -> PyResult<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>)> {
         let (theta, q) = (Numbers::vector("theta", theta)?, Numbers::vector("position", position)?);
-        let result = py.detach(|| evaluate::equilibrium(self.description(), theta.values(), q.values()));
-        let (coordinates, efforts) = self.checked(py, result)?;
+        let result = self.compute(py, |_| evaluate::equilibrium(self.description(), theta.values(), q.values()))?;
+        let (coordinates, efforts) = result;
         Ok((PyArray1::from_vec(py, coordinates), PyArray1::from_vec(py, efforts)))
     }
 
@@ -128,8 +131,9 @@ impl System {
         position: &Any<'py>,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let (theta, q) = (Numbers::vector("theta", theta)?, Numbers::vector("position", position)?);
-        let result = py.detach(|| evaluate::natural_frequencies(self.description(), theta.values(), q.values()));
-        Ok(PyArray1::from_vec(py, self.checked(py, result)?))
+        let result =
+            self.compute(py, |_| evaluate::natural_frequencies(self.description(), theta.values(), q.values()))?;
+        Ok(PyArray1::from_vec(py, result))
     }
 
     /// Largest slope in rad of each beam in each of many states (N, n_beams); not a number where the kinematics are exact.
@@ -155,7 +159,7 @@ impl System {
     ) -> PyResult<Table<'py>> {
         let (theta, q) = (Numbers::vector("theta", theta)?, Numbers::vector("position", position)?);
         let number = place("marker", marker)?;
-        let result = evaluate::marker_jacobian(self.description(), theta.values(), q.values(), number);
+        let result = unbroken(|| evaluate::marker_jacobian(self.description(), theta.values(), q.values(), number))?;
         matrix(py, self.checked(py, result)?, [6, self.description().n_coordinates()])
     }
 }
