@@ -166,8 +166,10 @@ pub(crate) fn subtract_elastic<S: Scalar>(model: &Model<S>, q: &[S], v: &[S], lo
         let len = beam.len();
         let own = *coordinate..coordinate + len;
         let (q, v) = (&q[own.clone()], &v[own.clone()]);
-        for ((load, stiffness), damping) in
-            loads[own].iter_mut().zip(beam.stiffness().chunks_exact(len.max(1))).zip(beam.damping().chunks_exact(len.max(1)))
+        for ((load, stiffness), damping) in loads[own]
+            .iter_mut()
+            .zip(beam.stiffness().chunks_exact(len.max(1)))
+            .zip(beam.damping().chunks_exact(len.max(1)))
         {
             *load -= product(stiffness, q) + product(damping, v);
         }
