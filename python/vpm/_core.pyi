@@ -51,7 +51,7 @@ class Dynamics:
     ) -> NDArray[np.float64]:
         """Efforts (n,) that accelerations (n,) need: ``M a + h - effects``; what no actuator gives has to be zero."""
     def forward_dynamics(self, position: ArrayLike, velocity: ArrayLike, effort: ArrayLike) -> NDArray[np.float64]:
-        """Accelerations (n,) under efforts (n_joints,) of the actuators, with all effects."""
+        """Accelerations (n,) under efforts (n,), with all effects."""
     def mass_matrix(self, position: ArrayLike) -> NDArray[np.float64]:
         """Mass matrix (n, n), payloads included."""
     def energy(self, position: ArrayLike, velocity: ArrayLike) -> tuple[float, float]:
@@ -104,8 +104,10 @@ class System:
     """A machine: rigid tree, effects, actuators, sensors and controllers over a flat parameter vector theta.
 
     N samples, n joints, m actuators, P parameters, k requested sensitivities; all numbers SI. The state is
-    ``[positions, velocities, one state per actuator with lag]``, the outputs are position, velocity, acceleration
-    and effort of each joint, then command and force of each actuator; a sensor replaces the channel it measures.
+    ``[coordinates, their rates, one state per actuator with lag]``; coordinates are the joints', then the beams'. The
+    outputs are position, velocity, acceleration and effort of each joint, command and force of each actuator, length,
+    rate and force of each line, strain of each gauge, origin and rotation vector of each marker; a sensor replaces
+    the channel it measures.
     Every function raises ``ValueError``, in one sentence with the repair, for wrong shapes, numbers that are not
     finite, and parameters for which a law is not defined. Ctrl-C raises ``KeyboardInterrupt``.
 
@@ -139,7 +141,7 @@ class System:
         """Number of inputs: one command per actuator."""
     @property
     def n_outputs(self) -> int:
-        """Number of output channels: 4 n + 2 m."""
+        """Number of output channels."""
     @property
     def n_parameters(self) -> int:
         """Length P of theta."""
@@ -222,9 +224,9 @@ class System:
     def forward_dynamics(
         self, theta: ArrayLike, position: ArrayLike, velocity: ArrayLike, effort: ArrayLike
     ) -> NDArray[np.float64]:
-        """Accelerations (n,) of the rigid tree with its effects under ``effort`` (n,) on the joints."""
+        """Accelerations (n_coordinates,) with all effects under ``effort`` (n,) on the joints."""
     def mass_matrix(self, theta: ArrayLike, position: ArrayLike) -> NDArray[np.float64]:
-        """Mass matrix (n, n), payloads included."""
+        """Mass matrix over all coordinates, payloads included."""
     def energy(self, theta: ArrayLike, position: ArrayLike, velocity: ArrayLike) -> tuple[float, float]:
         """Kinetic and potential energy in J: of bodies in gravity, and of effects that have a potential."""
     def linearize(
@@ -239,6 +241,38 @@ class System:
         A, B, C, D : ndarray, shapes (nx, nx), (nx, m), (ny, nx), (ny, m)
             Of the rates and of all outputs, sensors' gains included.
         """
+    def simulate_prescribed(
+        self,
+        theta: ArrayLike,
+        position: ArrayLike,
+        velocity: ArrayLike,
+        acceleration: ArrayLike,
+        time_step: float,
+        substeps: int,
+        integrator: str,
+        sensitivities: Sequence[int] = ...,
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Joints follow a measured motion (N, n), beams respond from rest; position sensors are undone.
+
+        Returns
+        -------
+        outputs, states, jacobian : ndarray
+            As in `simulate`; ``effort`` of a joint is the effort that the motion needs.
+        """
+    def equilibrium(self, theta: ArrayLike, position: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Coordinates (n_coordinates,) at rest with the joints held at ``position``, and the holding efforts (n,)."""
+    def natural_frequencies(self, theta: ArrayLike, position: ArrayLike) -> NDArray[np.float64]:
+        """Natural frequencies (n_elastic,) in Hz with the joints locked at ``position`` (n,), slowest first.
+
+        A negative one is the rate of growth of a beam that buckles.
+        """
+    def slopes(self, theta: ArrayLike, states: ArrayLike) -> NDArray[np.float64]:
+        """Largest slope (N, n_beams) in rad of each beam; not a number where the kinematics are exact."""
+    @property
+    def slope_limit(self) -> float:
+        """Slope in rad up to which the kinematics of small slopes are right within 1 %."""
+    def jacobian(self, theta: ArrayLike, position: ArrayLike, marker: int) -> NDArray[np.float64]:
+        """Jacobian (6, n_coordinates) of a marker by number: angular velocity, then velocity, in world axes."""
     def time_steps(
         self,
         theta: ArrayLike,

@@ -81,6 +81,15 @@ pub enum Error {
         /// Length of the beam, m.
         length: f64,
     },
+    /// Inverse dynamics of a machine whose beams are elastic.
+    #[error(
+        "the motion of the joints alone does not tell the efforts of a machine with the elastic beam `{beam}`, whose own motion counts \
+         too; simulate it with prescribed joint motion, or make its beams rigid"
+    )]
+    Flexible {
+        /// Name of the first such beam.
+        beam: String,
+    },
     /// A payload sits on a body that does not exist.
     #[error(
         "payload number {payload} sits on body number {body}, but the model has {bodies} bodies; use a number below {bodies}"
@@ -180,10 +189,35 @@ pub enum Error {
         value: f64,
     },
     /// No integrator has this name.
-    #[error("there is no integrator `{name}`; use semi_implicit, rk4 or linearly_implicit")]
+    #[error("there is no integrator `{name}`; use semi_implicit, rk4, linearly_implicit or rosenbrock")]
     Integrator {
         /// The name asked for.
         name: String,
+    },
+    /// An explicit step that is too long for the fastest vibration or decay of a system.
+    #[error(
+        "a step of {step:.3e} s is too large for {method}: the mode that moves `{coordinate}` most, at {frequency:.4} Hz, is stable \
+         up to {limit:.3e} s; use more substeps or the integrator linearly_implicit or rosenbrock"
+    )]
+    StepTooLarge {
+        /// Name of the integrator.
+        method: &'static str,
+        /// The step asked for, in s.
+        step: f64,
+        /// The coordinate with the largest part in the mode.
+        coordinate: String,
+        /// Natural frequency of the mode in Hz.
+        frequency: f64,
+        /// Largest stable step in s.
+        limit: f64,
+    },
+    /// The adaptive reference solver gave up.
+    #[error(
+        "the reference solution was not reached: {message}; loosen the tolerance, or check the equations where it stopped"
+    )]
+    ReferenceSolution {
+        /// What the solver says.
+        message: String,
     },
     /// A setting of a computation is out of range.
     #[error("{setting} must {condition}, got {value}; {repair}")]

@@ -1,12 +1,12 @@
-//! A machine in a single state: accelerations, mass matrix, energy.
+//! A machine in a single state: accelerations, mass matrix, energy, rest, vibrations, Jacobians.
 
 use crate::description::Description;
-use crate::dynamics;
-use crate::error::Result;
+use crate::error::{Error, Result};
+use crate::statics::Statics;
 use crate::system::{Build, Dynamics};
 use crate::table::Table;
 
-/// Accelerations (m/s^2 or rad/s^2) under `effort` (N or N m) on the joints, with all effects.
+/// Accelerations of all coordinates under `effort` (N or N m) on the joints, with all effects.
 pub fn accelerations(
     description: &Description,
     theta: &[f64],
@@ -14,35 +14,84 @@ pub fn accelerations(
     velocity: &[f64],
     effort: &[f64],
 ) -> Result<Vec<f64>> {
-    let mut dynamics =
-        prepare(description, theta, [("position", position), ("velocity", velocity), ("effort", effort)])?;
+    Table::vector("effort", effort, description.n_joints(), "joint")?;
+    let mut dynamics = prepare(description, theta, [("position", position), ("velocity", velocity)])?;
     Ok(dynamics.accelerations(position, velocity, effort).to_vec())
 }
 
-/// Mass matrix with payloads, n x n (kg, kg m or kg m^2).
+/// Mass matrix with payloads, n x n over all coordinates.
 pub fn mass_matrix(description: &Description, theta: &[f64], position: &[f64]) -> Result<Vec<f64>> {
-    let Dynamics { model, mut data, .. } = prepare(description, theta, [("position", position)])?;
-    Ok(dynamics::crba(&model, &mut data, position).to_vec())
+    Ok(prepare(description, theta, [("position", position)])?.mass_matrix(position).to_vec())
 }
 
-/// Kinetic and potential energy in J. The potential is that of the bodies in gravity and of the effects that have one.
+/// Kinetic and potential energy in J. The potential is that of gravity, of the beams, and of the effects that have one.
 ///
 /// Checked: with efforts of the actuators and frictions accounted for, the sum is conserved along a simulated run.
 pub fn energy(description: &Description, theta: &[f64], position: &[f64], velocity: &[f64]) -> Result<(f64, f64)> {
-    let Dynamics { model, mut data, effects, .. } =
-        prepare(description, theta, [("position", position), ("velocity", velocity)])?;
-    let total = dynamics::energy(&model, &mut data, position, velocity);
-    let stored: f64 = effects.iter().map(|(joint, effect)| effect.potential(position[*joint])).sum();
-    Ok((total.kinetic, total.potential + stored))
+    let mut dynamics = prepare(description, theta, [("position", position), ("velocity", velocity)])?;
+    let total = dynamics.energy(position, velocity);
+    Ok((total.kinetic, total.potential))
+}
+
+/// All coordinates at rest under gravity with the joints held at `position` (one per joint), and the efforts that hold them.
+pub fn equilibrium(description: &Description, theta: &[f64], position: &[f64]) -> Result<(Vec<f64>, Vec<f64>)> {
+    let mut statics = held(description, theta, position)?;
+    let rest = statics.settle(position)?;
+    let efforts = statics.holding_efforts(&rest);
+    Ok((rest.coordinates, efforts))
+}
+
+/// Natural frequencies in Hz with the joints locked at `position` (one per joint), about rest under gravity, slowest first; negative
+/// for growth instead of vibration.
+///
+/// Checked: against the closed form of a clamped beam.
+pub fn natural_frequencies(description: &Description, theta: &[f64], position: &[f64]) -> Result<Vec<f64>> {
+    let mut statics = held(description, theta, position)?;
+    let rest = statics.settle(position)?;
+    statics.natural_frequencies(&rest)
+}
+
+/// For each state (N x states) and each beam the largest slope of its axis in rad, where its kinematics are right for small slopes only;
+/// not a number where they are exact.
+pub fn slopes(description: &Description, theta: &[f64], states: Table<'_>) -> Result<Vec<f64>> {
+    states.expect("states", states.rows(), description.n_states())?;
+    let dynamics = prepare(description, theta, [])?;
+    let beams: Vec<_> = (0..dynamics.model.n_beams()).filter_map(|number| dynamics.model.beam(number)).collect();
+    let rows = (0..states.rows()).map(|row| &states.numbers()[row * states.columns()..]);
+    let slope = |state: &[f64]| -> Vec<f64> {
+        let of_beam = beams.iter().map(|(beam, first)| beam.slope(&state[*first..first + beam.len()]));
+        of_beam.map(|slope| slope.unwrap_or(f64::NAN)).collect()
+    };
+    Ok(rows.flat_map(slope).collect())
+}
+
+/// Jacobian of a marker, 6 x n row by row: angular velocity, then velocity of its origin, in world axes, per unit rate of each
+/// coordinate.
+pub fn marker_jacobian(description: &Description, theta: &[f64], position: &[f64], marker: usize) -> Result<Vec<f64>> {
+    let count = description.markers.len();
+    if marker >= count {
+        let what = "the request for a Jacobian".to_owned();
+        return Err(Error::Reference { what, target: "marker", index: marker, count });
+    }
+    let mut dynamics = prepare(description, theta, [("position", position)])?;
+    let mut jacobian = vec![0.0; 6 * position.len()];
+    dynamics.jacobian(position, marker, &mut jacobian);
+    Ok(jacobian)
+}
+
+fn held(description: &Description, theta: &[f64], position: &[f64]) -> Result<Statics> {
+    Table::vector("position", position, description.n_joints(), "joint")?;
+    description.check_values(theta)?;
+    Statics::new(description, theta)
 }
 
 fn prepare<const N: usize>(
     description: &Description,
     theta: &[f64],
-    joint_vectors: [(&str, &[f64]); N],
+    vectors: [(&str, &[f64]); N],
 ) -> Result<Dynamics<f64>> {
-    for (name, vector) in joint_vectors {
-        Table::vector(name, vector, description.n_joints(), "joint")?;
+    for (name, vector) in vectors {
+        Table::vector(name, vector, description.n_coordinates(), "coordinate")?;
     }
     description.check_values(theta)?;
     Build::dynamics(&description, theta)

@@ -2,13 +2,13 @@
 
 use crate::actuator::Target;
 use crate::description::Description;
-use crate::dynamics::rnea;
 use crate::error::{Error, Result};
+use crate::motion::{JointMotion, position_sensors};
 use crate::scalar::Scalar;
 use crate::sensitivity::{Interrupt, Job, Pair, differentiate};
-use crate::sensor::{Channel, Sensor};
+use crate::sensor::Sensor;
 use crate::simulate::check_time_step;
-use crate::system::{Build, Dynamics, add_effects};
+use crate::system::{Build, Dynamics};
 use crate::table::Table;
 
 /// Samples between two questions whether to stop.
@@ -55,6 +55,9 @@ pub fn inverse_dynamics(
     sensitivities: &[usize],
     interrupt: Interrupt<'_>,
 ) -> Result<Efforts> {
+    if let Some((beam, _)) = description.beams.iter().zip(description.elastic()).find(|(_, len)| **len > 0) {
+        return Err(Error::Flexible { beam: beam.name.clone() });
+    }
     let (rows, joints) = (motion.position.rows(), description.n_joints());
     motion.position.expect("position", rows, joints)?;
     motion.velocity.expect("velocity", rows, joints)?;
@@ -78,63 +81,49 @@ impl Job for Inverse<'_> {
         let values: Vec<f64> = theta.iter().map(Scalar::re).collect();
         self.description.check_values(&values)?;
         let mut dynamics = Build::dynamics(&self.description, theta)?;
-        let sensors = self.position_sensors(theta);
-        Ok(Pair { first: self.required(&mut dynamics, &sensors)?, second: self.applied(&dynamics) })
+        let sensors = position_sensors(self.description, theta);
+        let (required, levers) = self.required(&mut dynamics, &sensors)?;
+        Ok(Pair { first: required, second: self.applied(&dynamics, &levers) })
     }
 }
 
 impl Inverse<'_> {
-    /// The sensor on the position of each joint, if there is one.
-    fn position_sensors<S: Scalar>(&self, theta: &[S]) -> Vec<Option<Sensor<S>>> {
-        let sensors = self.description.sensors(theta);
-        let on = |joint| sensors.iter().find(|sensor| sensor.channel == Channel::Position { joint }).cloned();
-        (0..self.description.n_joints()).map(on).collect()
-    }
-
-    fn required<S: Scalar>(&self, dynamics: &mut Dynamics<S>, sensors: &[Option<Sensor<S>>]) -> Result<Vec<S>> {
-        let joints = sensors.len();
-        let zero = vec![S::zero(); joints];
-        let (mut q, mut v, mut a, mut effects) = (zero.clone(), zero.clone(), zero.clone(), zero);
-        let mut required = vec![S::zero(); self.motion.position.numbers().len()];
+    /// Efforts that the motion needs, and the lever arms of the lines if actuators act on any: by sample, line and joint.
+    fn required<S: Scalar>(
+        &self,
+        dynamics: &mut Dynamics<S>,
+        sensors: &[Option<Sensor<S>>],
+    ) -> Result<(Vec<S>, Vec<S>)> {
+        let Motion { position, velocity, acceleration, time_step, .. } = self.motion;
+        let (motion, joints) = (JointMotion { position, velocity, acceleration }, sensors.len());
+        let mut moving = [0; 3].map(|_| vec![S::zero(); joints]);
+        let mut required = vec![S::zero(); position.numbers().len()];
+        let (mut levers, mut row_levers) = (Vec::new(), vec![S::zero(); dynamics.layout().lines * joints]);
         for (k, row) in required.chunks_exact_mut(joints).enumerate() {
             if k.is_multiple_of(PATIENCE) && (self.interrupt)() {
                 return Err(Error::Interrupted);
             }
             for (joint, sensor) in sensors.iter().enumerate() {
-                (q[joint], v[joint], a[joint]) = self.true_motion(k, joint, sensor.as_ref());
+                let state = motion.behind(time_step, k, joint, sensor.as_ref());
+                for (numbers, number) in moving.iter_mut().zip(state) {
+                    numbers[joint] = number;
+                }
             }
-            row.copy_from_slice(rnea(&dynamics.model, &mut dynamics.data, &q, &v, &a));
-            effects.fill(S::zero());
-            add_effects(&dynamics.effects, &q, &v, &mut effects);
-            for (effort, &effect) in row.iter_mut().zip(&effects) {
-                *effort -= effect;
+            let [q, v, a] = &moving;
+            dynamics.inverse_dynamics(q, v, a, row);
+            if dynamics.pulls() {
+                dynamics.levers(q, &mut row_levers);
+                levers.extend_from_slice(&row_levers);
             }
         }
-        Ok(required)
+        Ok((required, levers))
     }
 
-    /// Position, velocity and acceleration of a joint behind what was measured.
-    #[inline]
-    fn true_motion<S: Scalar>(&self, k: usize, joint: usize, sensor: Option<&Sensor<S>>) -> (S, S, S) {
-        let Motion { position, velocity, acceleration, time_step, .. } = self.motion;
-        let last = position.rows() - 1;
-        let at = |table: Table<'_>, sample| S::from_f64(table.at(sample, joint));
-        match sensor {
-            Some(sensor) => (
-                sensor.undo(k, last, time_step, |sample| at(position, sample)),
-                sensor.undo_rate(k, last, time_step, |sample| at(velocity, sample)),
-                sensor.undo_rate(k, last, time_step, |sample| at(acceleration, sample)),
-            ),
-            None => (at(position, k), at(velocity, k), at(acceleration, k)),
-        }
-    }
-
-    fn applied<S: Scalar>(&self, dynamics: &Dynamics<S>) -> Vec<S> {
+    fn applied<S: Scalar>(&self, dynamics: &Dynamics<S>, levers: &[S]) -> Vec<S> {
         let Motion { inputs, time_step, .. } = self.motion;
-        let joints = dynamics.joints();
+        let (joints, lines) = (dynamics.joints(), dynamics.layout().lines);
         let mut applied = vec![S::zero(); inputs.rows() * joints];
         for (number, actuator) in dynamics.actuators.iter().enumerate() {
-            let Target::Joint(joint) = actuator.on else { continue };
             let command = |sample: usize| S::from_f64(inputs.at(sample, number));
             let (mut state, mut before) = (None, None);
             for (k, row) in applied.chunks_exact_mut(joints).enumerate() {
@@ -148,7 +137,16 @@ impl Inverse<'_> {
                     None => input,
                 };
                 let effort = actuator.motor.effort(mean);
-                row[joint] += (before.unwrap_or(effort) + effort) * 0.5;
+                let delivered = (before.unwrap_or(effort) + effort) * 0.5;
+                match actuator.on {
+                    Target::Joint(joint) => row[joint] += delivered,
+                    Target::Line(line) => {
+                        let arms = &levers[(k * lines + line) * joints..];
+                        for (entry, &arm) in row.iter_mut().zip(arms) {
+                            *entry += arm * delivered;
+                        }
+                    }
+                }
                 before = Some(effort);
             }
         }

@@ -7,7 +7,7 @@ use crate::error::{Diverged, Error, Result};
 use crate::integrator::Integrator;
 use crate::ode::Ode;
 use crate::sensor::Sensor;
-use crate::simulate::{Stepping, check_state, state_name};
+use crate::simulate::{Stepping, check_state, check_step, state_name};
 use crate::system::System;
 use crate::table::Table;
 
@@ -38,6 +38,8 @@ pub struct Live {
 impl Live {
     /// The machine in `state`, no command given yet.
     pub fn new(description: Arc<Description>, theta: &[f64], state: &[f64], stepping: Stepping) -> Result<Self> {
+        check_state("state", &description, state)?;
+        check_step(&description, theta, stepping, state, false)?;
         let system: System<f64> = description.system(theta)?;
         let (dim, sensors) = (system.dim(), description.sensors(theta));
         let depth = depth(&description, theta, stepping.time_step)?;

@@ -18,4 +18,11 @@ pub trait Ode<S> {
     fn iteration_matrix(&mut self, x: &[S], matrix: &mut [S]) {
         self.jacobian(x, matrix);
     }
+    /// Writes what constant linear stiffness K and damping D add to the accelerations by coordinates and rates, `[-M^-1 K, -M^-1 D]`:
+    /// with n coordinates, n rows of 2 n entries each; tells whether there is any. Without it nothing is written.
+    ///
+    /// A semi-implicit step takes these two implicitly. Everything else that acts stays explicit.
+    fn elasticity(&mut self, _x: &[S], _block: &mut [S]) -> bool {
+        false
+    }
 }

@@ -1,9 +1,13 @@
 //! Simulation of a whole record: free run on commands, closed loop on references, restarts from many samples.
 
 mod names;
+mod prescribed;
+mod stability;
 mod stepper;
 
 pub(crate) use names::state_name;
+pub use prescribed::prescribed;
+pub(crate) use stability::check_step;
 pub(crate) use stepper::{Drive, Plan, Stepper};
 
 use crate::description::Description;
@@ -151,6 +155,10 @@ impl Job for Simulation<'_> {
 }
 
 fn execute(setting: Setting<'_>, plan: Plan<'_>) -> Result<Run> {
+    let dim = setting.description.n_states();
+    if let Some(first) = plan.initial.get(..dim) {
+        check_step(setting.description, setting.theta, setting.stepping, first, false)?;
+    }
     let job = Simulation { setting, plan };
     let output = |pass: &Pair<_>, place: usize| pass.first[place];
     let (pair, jacobian) = differentiate(&job, setting.theta, setting.sensitivities, output)?;
@@ -161,7 +169,9 @@ fn execute(setting: Setting<'_>, plan: Plan<'_>) -> Result<Run> {
 pub(crate) fn diverged<S: Scalar>(stepper: &Stepper<'_, S>, what: String, row: usize, start: usize) -> Error {
     let stepping = stepper.stepping();
     let repair = match stepping.method {
-        Method::LinearlyImplicit => "use more substeps, or check the signs and sizes of the parameters",
+        Method::LinearlyImplicit | Method::Rosenbrock => {
+            "use more substeps, or check the signs and sizes of the parameters"
+        }
         Method::Rk4 | Method::SemiImplicit => "use more substeps or the integrator linearly_implicit",
     };
     let (outputs, states) = stepper.before(row);

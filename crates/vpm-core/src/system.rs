@@ -1,6 +1,8 @@
 //! A whole machine as one ordinary differential equation: tree, effects and actuators.
 
+mod answers;
 mod observe;
+mod stiff;
 mod tangent;
 
 use crate::actuator::{Actuator, Target};
@@ -88,7 +90,7 @@ impl<S: Scalar> Dynamics<S> {
     pub fn accelerations(&mut self, q: &[S], v: &[S], efforts: &[S]) -> &[S] {
         self.tensions.fill(S::zero());
         self.efforts.copy_from_slice(efforts);
-        self.accelerate(q, v, add_effects);
+        self.accelerate(q, v, add_effects, &[]);
         &self.data.acceleration
     }
 
@@ -115,17 +117,25 @@ impl<S: Scalar> Dynamics<S> {
         let ((q, v), lags) = (x[..2 * n].split_at(n), &x[2 * n..]);
         self.actuate(lags, &mut dxdt[2 * n..]);
         dxdt[..n].copy_from_slice(v);
-        self.accelerate(q, v, add);
+        self.accelerate(q, v, add, &[]);
         dxdt[n..2 * n].copy_from_slice(&self.data.acceleration);
     }
 
-    /// Accelerations under the efforts and tensions that stand, left in the data.
+    /// Accelerations under the efforts and tensions that stand, and efforts on the elastic coordinates if any are given, left in the
+    /// data.
     #[inline]
-    fn accelerate(&mut self, q: &[S], v: &[S], add: impl FnOnce(&[(usize, JointEffect<S>)], &[S], &[S], &mut [S])) {
+    fn accelerate(
+        &mut self,
+        q: &[S],
+        v: &[S],
+        add: impl FnOnce(&[(usize, JointEffect<S>)], &[S], &[S], &mut [S]),
+        on_beams: &[S],
+    ) {
         let Self { model, data, loads, tensions, .. } = self;
         let (of_joints, elastic) = loads.split_at_mut(model.n_joints());
         of_joints.copy_from_slice(&self.efforts);
         elastic.fill(S::zero());
+        elastic[..on_beams.len()].copy_from_slice(on_beams);
         add(&self.effects, q, v, of_joints);
         if model.is_recursive() {
             if self.pulls {
@@ -248,66 +258,21 @@ impl<S: Scalar> Ode<S> for System<S> {
         if self.dynamics.model.n_elastic() == 0 {
             self.tangent.chords(x, matrix, &self.resistances);
         } else {
-            self.stiff_part(x, matrix);
+            stiff::iteration_matrix(&mut self.dynamics, x, matrix, &self.resistances, &mut self.column);
         }
     }
-}
 
-impl<S: Scalar> System<S> {
-    /// `[0, 1; -M^-1 K, -M^-1 D]` with the slopes of the effects in K and their chords in D, and the columns and rows of the lags.
-    fn stiff_part(&mut self, x: &[S], matrix: &mut [S]) {
-        let Self { dynamics, resistances, column, .. } = self;
-        let (n, joints, dim) = (dynamics.coordinates(), dynamics.joints(), x.len());
+    /// Stiffness and damping of the beams.
+    fn elasticity(&mut self, x: &[S], block: &mut [S]) -> bool {
+        let n = self.coordinates();
+        if self.dynamics.model.n_elastic() == 0 {
+            return false;
+        }
         let (q, v) = x[..2 * n].split_at(n);
-        dynamics.terms(q, v);
-        let Dynamics { model, data, effects, actuators, .. } = dynamics;
-        data.factorise();
-        matrix.fill(S::zero());
-        for k in 0..n {
-            matrix[k * dim + n + k] = S::one();
-        }
-        let mut put = |column: &mut [S], place: usize| {
-            data.solve(column);
-            for (row, &entry) in column.iter().enumerate() {
-                matrix[(n + row) * dim + place] = entry;
-            }
-        };
-        for joint in 0..joints {
-            let own = effects.iter().filter(|(place, _)| *place == joint);
-            let slope: S = own.map(|(_, effect)| effect.slope_at_rest(q[joint])).sum();
-            for (entry, place) in [(slope, joint), (-resistances[joint], n + joint)] {
-                if entry != S::zero() {
-                    column.fill(S::zero());
-                    column[joint] = entry;
-                    put(column, place);
-                }
-            }
-        }
-        for elastic in model.beams() {
-            let (first, len) = (elastic.coordinate, elastic.beam.len());
-            for (block, stiff) in [(0, elastic.beam.stiffness()), (n, elastic.beam.damping())] {
-                for k in 0..len {
-                    column.fill(S::zero());
-                    for (entry, row) in column[first..first + len].iter_mut().zip(stiff.chunks_exact(len)) {
-                        *entry = -row[k];
-                    }
-                    put(column, block + first + k);
-                }
-            }
-        }
-        let lagging = actuators.iter().filter(|actuator| actuator.lag.is_some());
-        for (place, actuator) in (2 * n..).zip(lagging) {
-            column.fill(S::zero());
-            let force = actuator.motor.effort(S::one());
-            match actuator.on {
-                Target::Joint(joint) => column[joint] = force,
-                Target::Line(line) => data.line_load(line, force, column),
-            }
-            put(column, place);
-        }
-        let lags = actuators.iter().filter_map(|actuator| actuator.lag.as_ref());
-        for (place, lag) in (2 * n..).zip(lags) {
-            matrix[place * dim + place] = lag.rate(S::one(), S::zero());
-        }
+        self.dynamics.terms(q, v);
+        self.dynamics.data.factorise();
+        block.fill(S::zero());
+        stiff::elasticity(&self.dynamics, block, 2 * n, &mut self.column);
+        true
     }
 }

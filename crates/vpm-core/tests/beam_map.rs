@@ -89,3 +89,18 @@ fn accelerations_are_the_derivatives_of_twists() -> Result<()> {
     }
     Ok(())
 }
+
+#[test]
+fn motions_allocate_nothing() -> Result<()> {
+    for entry in levels() {
+        let beam = Beam::new(&entry, &[0.8])?;
+        let (n, mut out, gauge) = (beam.len(), beam.sections(), beam.gauge(0.3));
+        let (q, v) = (vec![0.1; n], vec![0.2; n]);
+        let counted = allocation_counter::measure(|| {
+            beam.motion(&q, &v, &mut out);
+            std::hint::black_box((gauge.strain(&q), beam.slope(&q)));
+        });
+        assert_eq!(counted.count_total, 0, "{:?}", entry.level);
+    }
+    Ok(())
+}

@@ -40,9 +40,12 @@ fn distance(a: &[f64], b: &[f64]) -> f64 {
 #[test]
 fn integrators_converge_with_their_order() {
     let reference = final_state(Method::Rk4, 8192);
-    for (method, order, coarse) in
-        [(Method::SemiImplicit, 1.0, 512), (Method::Rk4, 4.0, 128), (Method::LinearlyImplicit, 2.0, 512)]
-    {
+    for (method, order, coarse) in [
+        (Method::SemiImplicit, 1.0, 512),
+        (Method::Rk4, 4.0, 128),
+        (Method::LinearlyImplicit, 2.0, 512),
+        (Method::Rosenbrock, 4.0, 128),
+    ] {
         let errors = [coarse, 2 * coarse, 4 * coarse].map(|steps| distance(&final_state(method, steps), &reference));
         for pair in errors.windows(2) {
             let found = (pair[0] / pair[1]).log2();
@@ -207,7 +210,12 @@ fn integrators_carry_nested_derivatives() {
             jacobian.copy_from_slice(&[S::zero(), S::one(), -self.0, S::zero()]);
         }
     }
-    for (method, tolerance) in [(Method::SemiImplicit, 2e-3), (Method::Rk4, 1e-9), (Method::LinearlyImplicit, 2e-6)] {
+    for (method, tolerance) in [
+        (Method::SemiImplicit, 2e-3),
+        (Method::Rk4, 1e-9),
+        (Method::LinearlyImplicit, 2e-6),
+        (Method::Rosenbrock, 1e-9),
+    ] {
         let mut ode = Oscillator(Dual::<f64, 1>::variable(4.0, 0));
         let mut state = [Dual::constant(1.0), Dual::constant(0.0)];
         let mut integrator = Integrator::new(method, 2);

@@ -4,14 +4,29 @@ use std::fs;
 use std::io::Result;
 use std::path::{Path, PathBuf};
 
-/// The rigid tree, lowest first: each may import any before it.
-const TREE: [&str; 11] =
-    ["error", "scalar", "algebra", "spatial", "kinematics", "joint", "body", "model", "data", "dynamics", "linkage"];
+/// The tree, lowest first; `beam` steps some of its motions by itself: each may import any before it.
+const TREE: [&str; 16] = [
+    "error",
+    "scalar",
+    "algebra",
+    "spatial",
+    "mount",
+    "joint",
+    "kinematics",
+    "line",
+    "body",
+    "ode",
+    "integrator",
+    "beam",
+    "model",
+    "data",
+    "dynamics",
+    "linkage",
+];
 /// Parts that stand alone, each a rig of its own, and all that they may import besides themselves.
-const ALONE: [(&str, &[&str]); 11] = [
+const ALONE: [(&str, &[&str]); 10] = [
     ("error", &[]),
     ("scalar", &[]),
-    ("mount", &[]),
     ("table", &["error"]),
     ("delay", &["error", "scalar"]),
     ("ode", &["error", "scalar"]),
@@ -22,8 +37,7 @@ const ALONE: [(&str, &[&str]); 11] = [
     ("controller", &["error", "scalar", "effect::Domain", "actuator::Saturation"]),
 ];
 /// What puts the parts together, lowest first: each may import any part, any tree module and any before it.
-const WHOLE: [&str; 12] = [
-    "beam",
+const WHOLE: [&str; 11] = [
     "sensitivity",
     "system",
     "description",
@@ -36,7 +50,7 @@ const WHOLE: [&str; 12] = [
     "timing",
     "samples",
 ];
-const WITNESSES: [&str; 4] = ["aba", "crba", "rnea", "virtual_work"];
+const WITNESSES: [&str; 5] = ["aba", "crba", "rnea", "virtual_work", "flexible"];
 
 fn sources(folder: &Path, found: &mut Vec<PathBuf>) -> Result<()> {
     for entry in fs::read_dir(folder)? {

@@ -9,6 +9,7 @@ use vpm_core::prepared::Prepared;
 
 use crate::arrays::{Numbers, Vector, place, square};
 use crate::errors::exception;
+use crate::interrupt::unbroken;
 use crate::system::System;
 
 type Row<'py> = Bound<'py, PyArray1<f64>>;
@@ -63,11 +64,12 @@ impl Dynamics {
         let (q, v) = (Vector::new("position", position)?, Vector::new("velocity", velocity)?);
         let a = Vector::new("acceleration", acceleration)?;
         let mut prepared = self.prepared()?;
-        let result = prepared.inverse_dynamics(q.values()?, v.values()?, a.values()?);
+        let (q, v, a) = (q.values()?, v.values()?, a.values()?);
+        let result = unbroken(|| prepared.inverse_dynamics(q, v, a))?;
         result.map(|effort| PyArray1::from_slice(py, effort)).map_err(|error| exception(py, error, 0, 0))
     }
 
-    /// Accelerations (n,) that efforts (n,) of the actuators give, with all effects.
+    /// Accelerations (n,) that efforts (n,) give, with all effects.
     fn forward_dynamics<'py>(
         &self,
         py: Python<'py>,
@@ -78,7 +80,8 @@ impl Dynamics {
         let (q, v) = (Vector::new("position", position)?, Vector::new("velocity", velocity)?);
         let effort = Vector::new("effort", effort)?;
         let mut prepared = self.prepared()?;
-        let result = prepared.forward_dynamics(q.values()?, v.values()?, effort.values()?);
+        let (q, v, effort) = (q.values()?, v.values()?, effort.values()?);
+        let result = unbroken(|| prepared.forward_dynamics(q, v, effort))?;
         result.map(|a| PyArray1::from_slice(py, a)).map_err(|error| exception(py, error, 0, 0))
     }
 
@@ -87,7 +90,8 @@ impl Dynamics {
         let q = Vector::new("position", position)?;
         let mut prepared = self.prepared()?;
         let n = prepared.coordinates();
-        match prepared.mass_matrix(q.values()?) {
+        let q = q.values()?;
+        match unbroken(|| prepared.mass_matrix(q))? {
             Ok(matrix) => square(py, matrix, n),
             Err(error) => Err(exception(py, error, 0, 0)),
         }
@@ -96,7 +100,9 @@ impl Dynamics {
     /// Kinetic and potential energy in J: of bodies in gravity, and of effects that have a potential.
     fn energy(&self, py: Python<'_>, position: &Any<'_>, velocity: &Any<'_>) -> PyResult<(f64, f64)> {
         let (q, v) = (Vector::new("position", position)?, Vector::new("velocity", velocity)?);
-        self.prepared()?.energy(q.values()?, v.values()?).map_err(|error| exception(py, error, 0, 0))
+        let (q, v) = (q.values()?, v.values()?);
+        let mut prepared = self.prepared()?;
+        unbroken(|| prepared.energy(q, v))?.map_err(|error| exception(py, error, 0, 0))
     }
 
     /// Jacobian (6, n) of a marker by number: angular velocity, then velocity of its origin, in world axes.
@@ -105,7 +111,8 @@ impl Dynamics {
         let marker = place("marker", marker)?;
         let mut prepared = self.prepared()?;
         let n = prepared.coordinates();
-        match prepared.jacobian(q.values()?, marker) {
+        let q = q.values()?;
+        match unbroken(|| prepared.jacobian(q, marker))? {
             Ok(jacobian) => PyArray1::from_slice(py, jacobian).reshape([6, n]),
             Err(error) => Err(exception(py, error, 0, 0)),
         }

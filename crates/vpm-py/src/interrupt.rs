@@ -1,6 +1,7 @@
 //! Long computations that Ctrl-C can stop.
 
 use std::cell::RefCell;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::thread::Builder;
@@ -65,6 +66,12 @@ pub(crate) fn interruptible<T: Send>(
             worker.join().map_err(|_| crashed())
         })
     })
+}
+
+/// Runs a short `job` on this thread; a panic, which would be a mistake of the core, becomes an ordinary exception.
+#[inline]
+pub(crate) fn unbroken<T>(job: impl FnOnce() -> T) -> PyResult<T> {
+    catch_unwind(AssertUnwindSafe(job)).map_err(|_| crashed())
 }
 
 fn crashed() -> PyErr {

@@ -11,7 +11,7 @@ use vpm_core::live::Live;
 use vpm_core::simulate::Stepping;
 
 use crate::arrays::{Numbers, Vector, matrix};
-use crate::interrupt::interruptible;
+use crate::interrupt::{interruptible, unbroken};
 use crate::system::{System, checked};
 
 type Row<'py> = Bound<'py, PyArray1<f64>>;
@@ -72,7 +72,7 @@ impl Simulation {
     ) -> PyResult<Self> {
         let (theta, state) = (Numbers::vector("theta", theta)?, Numbers::vector("state", state)?);
         let stepping = system.checked(py, stepping((time_step, substeps, integrator))?)?;
-        let live = Live::new(system.description().clone(), theta.values(), state.values(), stepping);
+        let live = unbroken(|| Live::new(system.description().clone(), theta.values(), state.values(), stepping))?;
         Ok(Self { live: Mutex::new(system.checked(py, live)?) })
     }
 
@@ -98,7 +98,8 @@ impl Simulation {
     fn step<'py>(&self, py: Python<'py>, inputs: &Any<'py>) -> PyResult<Row<'py>> {
         let inputs = Vector::new("inputs", inputs)?;
         let mut live = self.live()?;
-        let result = live.step(inputs.values()?).map(|outputs| PyArray1::from_slice(py, outputs));
+        let values = inputs.values()?;
+        let result = unbroken(|| live.step(values).map(|outputs| PyArray1::from_slice(py, outputs)))?;
         checked(py, live.description(), result)
     }
 
@@ -127,7 +128,7 @@ impl Simulation {
     fn reset(&self, py: Python<'_>, state: &Any<'_>) -> PyResult<()> {
         let state = Numbers::vector("state", state)?;
         let mut live = self.live()?;
-        let result = live.reset(state.values());
+        let result = unbroken(|| live.reset(state.values()))?;
         checked(py, live.description(), result)
     }
 

@@ -121,7 +121,7 @@ def _inertia_problems(body: str, parameters: Mapping[str, Parameter]) -> Iterato
         parameters[f"{body}.inertia.{axes}"].value for axes in ("xx", "yy", "zz", "xy", "xz", "yz")
     )
     moments = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    slack = INERTIA_TOLERANCE * float(np.abs(moments).max())
+    slack = INERTIA_TOLERANCE * float(np.abs(moments).max()) + float(np.finfo(np.float64).tiny)
     shown = ", ".join(f"{moment:.4g}" for moment in moments)
     where = place("bodies", body, "inertia")
     if moments[0] < -slack:

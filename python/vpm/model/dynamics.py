@@ -4,8 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
 if TYPE_CHECKING:
     from vpm.model.model import Model
+
+Array = NDArray[np.float64]
 
 
 class Dynamics:
@@ -26,7 +31,7 @@ class Dynamics:
     >>> effort = dynamics.inverse_dynamics(q, v, a)
     """
 
-    __slots__ = ("energy", "forward_dynamics", "inverse_dynamics", "mass_matrix", "model")
+    __slots__ = ("_jacobian", "_numbers", "energy", "forward_dynamics", "inverse_dynamics", "mass_matrix", "model")
 
     def __init__(self, model: Model) -> None:
         from vpm._core import Dynamics as Core
@@ -38,6 +43,13 @@ class Dynamics:
         self.inverse_dynamics = core.inverse_dynamics
         self.forward_dynamics = core.forward_dynamics
         self.energy = core.energy
+        self._jacobian = core.jacobian
+        self._numbers = {name: number for number, name in enumerate(model.markers)}
+
+    def jacobian(self, marker: str, q: ArrayLike) -> Array:
+        """Jacobian (6, n) of a marker; see :meth:`vpm.Model.jacobian`."""
+        number = self._numbers.get(marker)
+        return self.model.jacobian(marker, q) if number is None else self._jacobian(q, number)
 
     def __repr__(self) -> str:
         return f"Dynamics({self.model.name!r}, coordinates={len(self.model.coordinates)})"

@@ -130,6 +130,72 @@ class Evaluations(Components):
         """
         return self.dynamics.energy(q, v)
 
+    def jacobian(self, marker: str, q: ArrayLike) -> Array:
+        """Jacobian of a marker: what the rates of the coordinates do to it.
+
+        Parameters
+        ----------
+        marker : str
+        q : array_like, shape (n,)
+
+        Returns
+        -------
+        ndarray, shape (6, n)
+            Angular velocity (rows 0 to 2) and velocity of its origin, in world axes, per unit rate of each coordinate.
+
+        Raises
+        ------
+        ModelError
+            There is no such marker.
+        ValueError
+            The length is wrong.
+        """
+        return self.dynamics.jacobian(q, self.markers.index(self._known(marker, self.markers, "marker")))
+
+    # ---- rest --------------------------------------------------------------------------------------------------------
+
+    def equilibrium(self, q: ArrayLike) -> tuple[Array, Array]:
+        """Rest under gravity with the joints held: how far flexible links sag, and what holds the joints.
+
+        Parameters
+        ----------
+        q : array_like, shape (joints,)
+            Positions of the joints.
+
+        Returns
+        -------
+        coordinates : ndarray, shape (n,)
+            ``q``, then the elastic coordinates.
+        effort : ndarray, shape (joints,)
+            N or N m; springs and loads of the joints are carried too.
+
+        Raises
+        ------
+        ValueError
+            The length is wrong, or there is no rest: what the links carry buckles them.
+        """
+        return self.core.equilibrium(self.theta, q)
+
+    def natural_frequencies(self, q: ArrayLike) -> Array:
+        """Frequencies of free vibration about rest with the joints locked, without damping.
+
+        Parameters
+        ----------
+        q : array_like, shape (joints,)
+            Positions of the joints.
+
+        Returns
+        -------
+        ndarray, shape (elastic coordinates,)
+            Hz, slowest first; a negative one is the rate of growth of a link that buckles.
+
+        Raises
+        ------
+        ValueError
+            As `equilibrium`.
+        """
+        return self.core.natural_frequencies(self.theta, q)
+
     # ---- linear models -----------------------------------------------------------------------------------------------
 
     def state(self, values: Mapping[str, float] | ArrayLike | None = None) -> Array:
@@ -181,8 +247,8 @@ class Evaluations(Components):
         Parameters
         ----------
         state : mapping of str to float, or array_like of shape (nx,), optional
-            As in `state`; by default all coordinates and velocities are zero. Lags that are not named have settled on
-            their commands.
+            As in `state`; by default all joints are at zero and at rest. Flexible links of which no coordinate is named
+            rest under gravity, lags that are not named have settled on their commands.
         inputs : mapping of str to float, or array_like of shape (nu,), optional
             As in `command`; the commands that stand.
 
@@ -218,10 +284,13 @@ class Evaluations(Components):
         )
 
     def _settled(self, values: Mapping[str, float] | ArrayLike | None, command: Array) -> Array:
-        """State in which lags that are not named hold their command."""
+        """State in which flexible links that are not named rest and lags that are not named hold their command."""
         place = self.state(values)
         if values is None or isinstance(values, Mapping):
             named = values or {}
+            joints, coordinates = len(self.joints), len(self.coordinates)
+            if coordinates > joints and not any(name in named for name in self.state_names[joints:coordinates]):
+                place[:coordinates] = self.equilibrium(place[:joints])[0]
             for column, name in enumerate(self.actuators):
                 if f"{name}.lag" in self.state_names and f"{name}.lag" not in named:
                     place[self.state_names.index(f"{name}.lag")] = command[column]

@@ -8,6 +8,7 @@
 //! coordinates to sections differs ([`strain`], [`deflection`], [`lumped`]).
 //! [`linear`] interpolates the deflection: constant matrices, small deflection, stiffening by the second-order shortening.
 //! [`strain`] interpolates the strain and integrates the pose along the axis: exact at any deflection, in space, in a tree.
+//! [`two_node`] is an independent finite element in absolute coordinates that checks them at large deflection.
 //! [`planar`] is the same for chains of inextensible links that move in one plane, in fixed sizes, made for real time.
 //!
 //! Sources: Selig & Ding 2009, "A screw theory of Timoshenko beams", J. Appl. Mech. 76(3) 031003, for screws and their
@@ -31,6 +32,7 @@ pub mod quadrature;
 pub mod section;
 pub mod shape;
 pub mod strain;
+pub mod two_node;
 
 pub use basis::Basis;
 pub use entry::{BeamEntry, Component, DampingEntry, Level, SectionEntry};

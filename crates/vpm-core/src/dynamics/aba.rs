@@ -1,7 +1,6 @@
 //! Forward dynamics by the articulated body algorithm.
 
 use crate::data::Data;
-use crate::error::{Error, Result};
 use crate::joint::JointKind;
 use crate::model::Model;
 use crate::scalar::Scalar;
@@ -23,32 +22,27 @@ pub fn aba<'d, S: Scalar>(model: &Model<S>, data: &'d mut Data<S>, q: &[S], v: &
     &data.acceleration
 }
 
-/// Whether every joint moves inertia, so that the accelerations exist.
-///
-/// Judged at one generic configuration: a tree that is singular there is singular everywhere. A regular tree can still be
-/// singular in special configurations.
-pub fn check_regular<S: Scalar>(model: &Model<S>, data: &mut Data<S>) -> Result<()> {
-    const GOLDEN_ANGLE: f64 = 2.399_963_229_728_653; // rad: multiples of it are never special to each other
-    let (n, zero) = (model.n_joints(), S::zero());
-    let q: Vec<S> = (1..=n).map(|k| S::from_f64(GOLDEN_ANGLE * k as f64)).collect();
-    let rest = vec![zero; n];
-    velocities(model, data, &q, &rest);
-    inertias(model, data, &rest);
+/// The joint that moves no inertia, and its articulated inertia, at coordinates `q`; if there is one.
+pub(super) fn singular_joint<S: Scalar>(
+    model: &Model<S>,
+    data: &mut Data<S>,
+    q: &[S],
+    rest: &[S],
+) -> Option<(usize, f64)> {
+    velocities(model, data, q, rest);
+    inertias(model, data, rest);
     // Outermost first: a singular joint spoils the inertias that the joints before it feel.
-    for (frame, slot) in model.frames().iter().zip(data.aba.iter().skip(1)).rev() {
-        let kind = frame.joint.kind;
-        let inertia = kind.effort(&slot.unit_wrench).re();
+    let slots = model.links().iter().zip(data.aba.iter().skip(1)).enumerate().rev();
+    slots.into_iter().find_map(|(number, (link, slot))| {
+        let inertia = link.kind.effort(&slot.unit_wrench).re();
         let size = |block: Symmetric3<S>| (block.xx + block.yy + block.zz).re();
-        let scale = match kind {
+        let scale = match link.kind {
             JointKind::Prismatic => size(slot.inertia.linear),
             JointKind::Revolute => size(slot.inertia.angular),
             JointKind::Helical { pitch } => size(slot.inertia.angular) + pitch * pitch * size(slot.inertia.linear),
         };
-        if inertia.is_nan() || inertia <= SINGULAR * scale {
-            return Err(Error::SingularJoint { joint: frame.joint.name.clone(), inertia });
-        }
-    }
-    Ok(())
+        (inertia.is_nan() || inertia <= SINGULAR * scale).then_some((number, inertia))
+    })
 }
 
 fn velocities<S: Scalar>(model: &Model<S>, data: &mut Data<S>, q: &[S], v: &[S]) {

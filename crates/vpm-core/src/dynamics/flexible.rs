@@ -5,6 +5,7 @@
 //! wrench and the coupling wrenches of one composite body (Featherstone 2008, section 6.2, for rigid bodies; Shabana 2013, "Dynamics of
 //! Multibody Systems", section 5.5, for the inertia coupling of a deformable body).
 
+use super::energy::Energy;
 use super::frames::{frames, lines, poses};
 use crate::data::{Composite, Data, FrameSlot, LineSlot};
 use crate::model::{Elastic, Link, Model, Node, Wire};
@@ -165,12 +166,48 @@ pub(crate) fn subtract_elastic<S: Scalar>(model: &Model<S>, q: &[S], v: &[S], lo
         let len = beam.len();
         let own = *coordinate..coordinate + len;
         let (q, v) = (&q[own.clone()], &v[own.clone()]);
-        for ((load, stiffness), damping) in
-            loads[own].iter_mut().zip(beam.stiffness().chunks_exact(len)).zip(beam.damping().chunks_exact(len))
+        for ((load, stiffness), damping) in loads[own]
+            .iter_mut()
+            .zip(beam.stiffness().chunks_exact(len.max(1)))
+            .zip(beam.damping().chunks_exact(len.max(1)))
         {
             *load -= product(stiffness, q) + product(damping, v);
         }
     }
+}
+
+/// Kinetic energy, and potential energy in gravity and in the beams, in J, at coordinates `q` and rates `v`.
+///
+/// Checked: free motion conserves their sum.
+pub fn energy<S: Scalar>(model: &Model<S>, data: &mut Data<S>, q: &[S], v: &[S]) -> Energy<S> {
+    frames(model, data, q, v);
+    poses(model, data);
+    lines(model, data);
+    let gravity = Vector3::from_f64(model.gravity());
+    let mut total = Energy { kinetic: S::zero(), potential: S::zero() };
+    for FrameSlot { pose, velocity, inertia, .. } in data.composite.frames.iter().skip(1) {
+        total.kinetic += inertia.kinetic_energy(*velocity);
+        total.potential -= gravity.dot(pose.rotation * inertia.first_moment + pose.translation * inertia.mass);
+    }
+    for (Wire { barrel, rod, .. }, LineSlot { length, direction: u, from, to }) in
+        model.lines().iter().zip(&data.composite.lines)
+    {
+        let rate = to.velocity - from.velocity;
+        let spin = (rate - *u * u.dot(rate)) * length.recip();
+        for (part, point, sign) in [(barrel, from, 1.0), (rod, to, -1.0)] {
+            let Some(part) = part else { continue };
+            let center = part.center * sign;
+            let velocity = point.velocity + spin * center;
+            total.kinetic += (velocity.dot(velocity) * part.mass + spin.dot(spin) * part.inertia) * 0.5;
+            total.potential -= gravity.dot(point.place + *u * center) * part.mass;
+        }
+    }
+    for Elastic { beam, coordinate, .. } in model.beams() {
+        let q = &q[*coordinate..coordinate + beam.len()];
+        let rows = beam.stiffness().chunks_exact(q.len().max(1));
+        total.potential += rows.zip(q).map(|(row, &own)| own * product(row, q)).sum::<S>() * 0.5;
+    }
+    total
 }
 
 fn product<S: Scalar>(row: &[S], x: &[S]) -> S {

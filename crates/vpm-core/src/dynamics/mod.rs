@@ -15,14 +15,16 @@ mod energy;
 pub mod flexible;
 mod frames;
 mod kinematics;
+mod regular;
 mod rnea;
 mod virtual_work;
 
-pub use aba::{aba, check_regular};
+pub use aba::aba;
 pub use crba::crba;
 pub use energy::{Energy, energy};
 pub use frames::frames;
 pub(crate) use frames::{for_each_column, lines, poses};
 pub use kinematics::kinematics;
+pub use regular::check_regular;
 pub use rnea::rnea;
 pub use virtual_work::{Carried, Rate, Terms, effort_of_wrench, virtual_work};

@@ -1,6 +1,7 @@
 //! A Rosenbrock method: implicit stability for two linear solves a step.
 
 use super::lu::Lu;
+use super::rosenbrock::shift;
 use crate::ode::Ode;
 use crate::scalar::Scalar;
 
@@ -52,12 +53,7 @@ impl<S: Scalar> LinearlyImplicit<S> {
     fn factorise(&mut self, ode: &mut impl Ode<S>, x: &[S], step: f64) {
         let matrix = self.lu.matrix();
         ode.iteration_matrix(x, matrix);
-        for entry in matrix.iter_mut() {
-            *entry = *entry * (-GAMMA * step);
-        }
-        for diagonal in matrix.iter_mut().step_by(x.len() + 1) {
-            *diagonal = *diagonal + 1.0;
-        }
+        shift(matrix, x.len(), GAMMA * step);
         self.lu.factorise();
     }
 }

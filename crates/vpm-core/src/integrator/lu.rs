@@ -20,6 +20,14 @@ impl<S: Scalar> Lu<S> {
         Self { dim, factors: vec![S::zero(); dim * dim], order: (0..dim).collect(), scratch: vec![S::zero(); dim] }
     }
 
+    /// Makes the buffers fit matrices of `dim` rows; allocates only where they were never that large.
+    pub fn resize(&mut self, dim: usize) {
+        self.dim = dim;
+        self.factors.resize(dim * dim, S::zero());
+        self.order.resize(dim, 0);
+        self.scratch.resize(dim, S::zero());
+    }
+
     /// The matrix to factorise next, row by row, overwritten by [`Lu::factorise`].
     pub fn matrix(&mut self) -> &mut [S] {
         &mut self.factors

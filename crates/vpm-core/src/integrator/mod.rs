@@ -2,12 +2,17 @@
 
 mod linearly_implicit;
 mod lu;
+#[cfg(feature = "reference")]
+pub mod reference;
 mod rk4;
+mod rosenbrock;
 mod semi_implicit;
+pub mod stability;
 
 pub use linearly_implicit::LinearlyImplicit;
 pub use lu::Lu;
 pub use rk4::Rk4;
+pub use rosenbrock::{RODASP2, Rosenbrock, Tableau};
 pub use semi_implicit::SemiImplicit;
 
 use crate::error::{Error, Result};
@@ -23,11 +28,13 @@ pub enum Method {
     Rk4,
     /// Rosenbrock, order 2, L-stable.
     LinearlyImplicit,
+    /// Rosenbrock, order 4, L-stable.
+    Rosenbrock,
 }
 
 impl Method {
     /// All of them.
-    pub const ALL: [Self; 3] = [Self::SemiImplicit, Self::Rk4, Self::LinearlyImplicit];
+    pub const ALL: [Self; 4] = [Self::SemiImplicit, Self::Rk4, Self::LinearlyImplicit, Self::Rosenbrock];
 
     /// Its name in options and messages.
     pub fn name(self) -> &'static str {
@@ -35,6 +42,7 @@ impl Method {
             Self::SemiImplicit => "semi_implicit",
             Self::Rk4 => "rk4",
             Self::LinearlyImplicit => "linearly_implicit",
+            Self::Rosenbrock => "rosenbrock",
         }
     }
 
@@ -54,8 +62,10 @@ pub enum Integrator<S> {
     SemiImplicit(SemiImplicit<S>),
     /// Classical Runge-Kutta.
     Rk4(Rk4<S>),
-    /// Rosenbrock.
+    /// Rosenbrock, order 2.
     LinearlyImplicit(LinearlyImplicit<S>),
+    /// Rosenbrock, order 4.
+    Rosenbrock(Rosenbrock<S>),
 }
 
 impl<S: Scalar> Integrator<S> {
@@ -65,6 +75,7 @@ impl<S: Scalar> Integrator<S> {
             Method::SemiImplicit => Self::SemiImplicit(SemiImplicit::new(dim)),
             Method::Rk4 => Self::Rk4(Rk4::new(dim)),
             Method::LinearlyImplicit => Self::LinearlyImplicit(LinearlyImplicit::new(dim)),
+            Method::Rosenbrock => Self::Rosenbrock(Rosenbrock::new(dim)),
         }
     }
 
@@ -74,6 +85,7 @@ impl<S: Scalar> Integrator<S> {
             Self::SemiImplicit(method) => method.step(ode, x, step),
             Self::Rk4(method) => method.step(ode, x, step),
             Self::LinearlyImplicit(method) => method.step(ode, x, step),
+            Self::Rosenbrock(method) => method.step(ode, x, step),
         }
     }
 }

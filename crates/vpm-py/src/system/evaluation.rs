@@ -2,12 +2,14 @@
 
 use numpy::{PyArray1, PyArray2, PyArray3};
 use pyo3::prelude::*;
+use vpm_core::beam::Beam;
 use vpm_core::evaluate;
 use vpm_core::inverse::{Motion, inverse_dynamics};
 use vpm_core::linearize::linearize;
 
 use super::System;
-use crate::arrays::{Numbers, cube, matrix, places};
+use crate::arrays::{Numbers, cube, matrix, place, places};
+use crate::interrupt::unbroken;
 
 type Table<'py> = Bound<'py, PyArray2<f64>>;
 type Cube<'py> = Bound<'py, PyArray3<f64>>;
@@ -65,16 +67,17 @@ impl System {
         let theta = Numbers::vector("theta", theta)?;
         let (q, v) = (Numbers::vector("position", position)?, Numbers::vector("velocity", velocity)?);
         let effort = Numbers::vector("effort", effort)?;
-        let result =
-            evaluate::accelerations(&self.description, theta.values(), q.values(), v.values(), effort.values());
+        let result = unbroken(|| {
+            evaluate::accelerations(&self.description, theta.values(), q.values(), v.values(), effort.values())
+        })?;
         Ok(PyArray1::from_vec(py, self.checked(py, result)?))
     }
 
     /// Mass matrix (n, n), payloads included.
     fn mass_matrix<'py>(&self, py: Python<'py>, theta: &Any<'py>, position: &Any<'py>) -> PyResult<Table<'py>> {
         let (theta, q) = (Numbers::vector("theta", theta)?, Numbers::vector("position", position)?);
-        let result = evaluate::mass_matrix(&self.description, theta.values(), q.values());
-        let n = self.description.n_joints();
+        let result = unbroken(|| evaluate::mass_matrix(&self.description, theta.values(), q.values()))?;
+        let n = self.description().n_coordinates();
         matrix(py, self.checked(py, result)?, [n, n])
     }
 
@@ -82,7 +85,8 @@ impl System {
     fn energy(&self, py: Python<'_>, theta: &Any<'_>, position: &Any<'_>, velocity: &Any<'_>) -> PyResult<(f64, f64)> {
         let theta = Numbers::vector("theta", theta)?;
         let (q, v) = (Numbers::vector("position", position)?, Numbers::vector("velocity", velocity)?);
-        self.checked(py, evaluate::energy(&self.description, theta.values(), q.values(), v.values()))
+        let result = unbroken(|| evaluate::energy(&self.description, theta.values(), q.values(), v.values()))?;
+        self.checked(py, result)
     }
 
     /// Exact A (nx, nx), B (nx, nu), C (ny, nx), D (ny, nu) at a state under commands that stand.
@@ -95,8 +99,8 @@ impl System {
     ) -> PyResult<(Table<'py>, Table<'py>, Table<'py>, Table<'py>)> {
         let (theta, state) = (Numbers::vector("theta", theta)?, Numbers::vector("state", state)?);
         let inputs = Numbers::vector("inputs", inputs)?;
-        let result = py.detach(|| linearize(self.description(), theta.values(), state.values(), inputs.values()));
-        let linear = self.checked(py, result)?;
+        let linear =
+            self.compute(py, |_| linearize(self.description(), theta.values(), state.values(), inputs.values()))?;
         let (nx, nu, ny) = (state.values().len(), inputs.values().len(), self.description().n_outputs());
         Ok((
             matrix(py, linear.state, [nx, nx])?,
@@ -104,5 +108,58 @@ impl System {
             matrix(py, linear.output, [ny, nx])?,
             matrix(py, linear.feedthrough, [ny, nu])?,
         ))
+    }
+
+    /// All coordinates (n,) at rest under gravity with the joints held, and the efforts (n_joints,) that hold them.
+    fn equilibrium<'py>(
+        &self,
+        py: Python<'py>,
+        theta: &Any<'py>,
+        position: &Any<'py>,
+    ) -> PyResult<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>)> {
+        let (theta, q) = (Numbers::vector("theta", theta)?, Numbers::vector("position", position)?);
+        let result = self.compute(py, |_| evaluate::equilibrium(self.description(), theta.values(), q.values()))?;
+        let (coordinates, efforts) = result;
+        Ok((PyArray1::from_vec(py, coordinates), PyArray1::from_vec(py, efforts)))
+    }
+
+    /// Natural frequencies (k,) in Hz about rest with the joints locked, slowest first; negative for growth instead of vibration.
+    fn natural_frequencies<'py>(
+        &self,
+        py: Python<'py>,
+        theta: &Any<'py>,
+        position: &Any<'py>,
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let (theta, q) = (Numbers::vector("theta", theta)?, Numbers::vector("position", position)?);
+        let result =
+            self.compute(py, |_| evaluate::natural_frequencies(self.description(), theta.values(), q.values()))?;
+        Ok(PyArray1::from_vec(py, result))
+    }
+
+    /// Largest slope in rad of each beam in each of many states (N, n_beams); not a number where the kinematics are exact.
+    fn slopes<'py>(&self, py: Python<'py>, theta: &Any<'py>, states: &Any<'py>) -> PyResult<Table<'py>> {
+        let (theta, states) = (Numbers::vector("theta", theta)?, Numbers::table("states", states)?);
+        let slopes = self.compute(py, |_| evaluate::slopes(self.description(), theta.values(), states.as_table()?))?;
+        matrix(py, slopes, [states.rows(), self.description().n_beams()])
+    }
+
+    /// Slope in rad up to which the kinematics of small slopes are right within 1 %.
+    #[getter]
+    fn slope_limit(&self) -> f64 {
+        Beam::<f64>::slope_limit()
+    }
+
+    /// Jacobian (6, n) of a marker by number: angular velocity, then velocity of its origin, in world axes.
+    fn jacobian<'py>(
+        &self,
+        py: Python<'py>,
+        theta: &Any<'py>,
+        position: &Any<'py>,
+        marker: i64,
+    ) -> PyResult<Table<'py>> {
+        let (theta, q) = (Numbers::vector("theta", theta)?, Numbers::vector("position", position)?);
+        let number = place("marker", marker)?;
+        let result = unbroken(|| evaluate::marker_jacobian(self.description(), theta.values(), q.values(), number))?;
+        matrix(py, self.checked(py, result)?, [6, self.description().n_coordinates()])
     }
 }

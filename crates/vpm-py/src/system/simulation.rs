@@ -4,8 +4,9 @@ use numpy::{PyArray1, PyArray2, PyArray3, PyArray4, PyArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use vpm_core::description::Description;
+use vpm_core::motion::JointMotion;
 use vpm_core::sensitivity::Interrupt;
-use vpm_core::simulate::{Run, Setting, Stepping, closed_loop, free_run, restarts};
+use vpm_core::simulate::{Run, Setting, Stepping, closed_loop, free_run, prescribed, restarts};
 use vpm_core::timing::time_steps;
 
 use super::System;
@@ -132,6 +133,36 @@ impl System {
             cube(py, run.outputs, [starts.len(), horizon, outputs])?,
             jacobian.reshape([starts.len(), horizon, outputs, sensitivities.len()])?,
         ))
+    }
+
+    /// Joints follow a motion (N, n_joints), beams respond from rest: outputs, states and derivatives as in `simulate`.
+    #[pyo3(signature = (theta, position, velocity, acceleration, time_step, substeps, integrator, sensitivities=vec![]))]
+    #[expect(clippy::too_many_arguments, reason = "the arguments of the Python function")]
+    fn simulate_prescribed<'py>(
+        &self,
+        py: Python<'py>,
+        theta: &Any<'py>,
+        position: &Any<'py>,
+        velocity: &Any<'py>,
+        acceleration: &Any<'py>,
+        time_step: f64,
+        substeps: i64,
+        integrator: &str,
+        sensitivities: Vec<i64>,
+    ) -> PyResult<(Table<'py>, Table<'py>, Cube<'py>)> {
+        let request = Request::new(self, theta, (time_step, substeps, integrator), &sensitivities)?;
+        let position = Numbers::table("position", position)?;
+        let velocity = Numbers::table("velocity", velocity)?;
+        let acceleration = Numbers::table("acceleration", acceleration)?;
+        let run = self.compute(py, |interrupt| {
+            let motion = JointMotion {
+                position: position.as_table()?,
+                velocity: velocity.as_table()?,
+                acceleration: acceleration.as_table()?,
+            };
+            prescribed(request.setting(&self.description, interrupt), motion)
+        })?;
+        self.run(py, run, sensitivities.len())
     }
 
     /// Duration in s of each of `count` steps, on the way through the inputs again and again.

@@ -93,6 +93,22 @@ impl<'a, D: Drive> TreeMotion<'a, D> {
     pub fn workspace(&self) -> &TreeWorkspace<f64> {
         &self.values.workspace
     }
+
+    /// Writes `[-M^-1 K, -M^-1 D]` of the last evaluation into the first columns of rows of `width`.
+    fn elastic(&mut self, rows: &mut [f64], width: usize) {
+        let (count, all) = (self.free.len(), self.tree.len());
+        for (block, stiff) in [(0, self.tree.stiffness()), (count, self.tree.damping())] {
+            for (k, &j) in self.free.iter().enumerate() {
+                for (load, &i) in self.values.load.iter_mut().zip(&self.free) {
+                    *load = -stiff[i * all + j];
+                }
+                self.values.lu.solve(&mut self.values.load);
+                for (row, &entry) in rows.chunks_mut(width).zip(&self.values.load) {
+                    row[block + k] = entry;
+                }
+            }
+        }
+    }
 }
 
 impl<D: Drive> Ode<f64> for TreeMotion<'_, D> {
@@ -125,23 +141,19 @@ impl<D: Drive> Ode<f64> for TreeMotion<'_, D> {
 
     /// `[0, 1; -M^-1 K, -M^-1 D]`: all that is stiff in a beam, for the price of one mass matrix.
     fn iteration_matrix(&mut self, x: &[f64], matrix: &mut [f64]) {
-        let (n, count, all) = (self.dim(), self.free.len(), self.tree.len());
+        let (n, count) = (self.dim(), self.free.len());
         self.values.evaluate(self.tree, self.drive.as_ref(), &self.free, x);
         matrix.fill(0.0);
-        for (block, stiff) in [(0, self.tree.stiffness()), (count, self.tree.damping())] {
-            for (k, &j) in self.free.iter().enumerate() {
-                for (load, &i) in self.values.load.iter_mut().zip(&self.free) {
-                    *load = -stiff[i * all + j];
-                }
-                self.values.lu.solve(&mut self.values.load);
-                for (row, &entry) in self.values.load.iter().enumerate() {
-                    matrix[(count + row) * n + block + k] = entry;
-                }
-            }
-        }
+        self.elastic(&mut matrix[count * n..], n);
         for k in 0..count {
             matrix[k * n + count + k] = 1.0;
         }
+    }
+
+    fn elasticity(&mut self, x: &[f64], block: &mut [f64]) -> bool {
+        self.values.evaluate(self.tree, self.drive.as_ref(), &self.free, x);
+        self.elastic(block, 2 * self.free.len());
+        true
     }
 }
 

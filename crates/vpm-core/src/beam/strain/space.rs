@@ -14,7 +14,7 @@ pub(in crate::beam) struct SpaceAxis {
     /// The component of each coordinate, 0 to 5.
     components: Vec<usize>,
     pieces: Vec<Piece>,
-    /// Values of all shape functions at both Gauss points of every piece, one after the other.
+    /// Integral of each shape function over a piece, then its first moment about the middle per size of the piece; piece by piece.
     rows: Vec<f64>,
 }
 
@@ -32,7 +32,7 @@ pub(super) struct Crossing<S> {
     pub pose: Pose<S>,
     pub twist: Twist<S>,
     pub acceleration: Twist<S>,
-    strains: [Twist<S>; 2],
+    moments: [Twist<S>; 2],
     tangent: Tangent<S>,
 }
 
@@ -43,9 +43,7 @@ impl SpaceAxis {
         for &place in places {
             let inside = fields.breaks().into_iter().filter(|&at| at > begin && at < place);
             for end in inside.chain(std::iter::once(place)).collect::<Vec<_>>() {
-                for point in gauss(2, begin, end) {
-                    rows.extend(fields.row(point.place, |_| 0));
-                }
+                rows.extend(moments(fields, begin, end).concat());
                 pieces.push(Piece { size: end - begin, section: end == place });
                 begin = end;
             }
@@ -58,7 +56,7 @@ impl SpaceAxis {
         self.pieces.len()
     }
 
-    /// The shape functions at both Gauss points of a piece.
+    /// Integrals and first moments of the shape functions over a piece.
     fn rows(&self, piece: usize) -> [&[f64]; 2] {
         let n = self.components.len();
         [2 * piece, 2 * piece + 1].map(|row| &self.rows[row * n..(row + 1) * n])
@@ -66,40 +64,36 @@ impl SpaceAxis {
 
     /// Crosses a piece with coordinates `c` and rates `rates`.
     ///
-    /// Law: fourth-order Magnus step (Iserles et al. 2000, section 5.3): `Omega = h/2 (e1 + e2) + sqrt(3)/12 h^2 e1 x e2` at the
-    /// two Gauss points; the sign of the bracket is that of a strain that multiplies from the right.
+    /// Law: fourth-order Magnus step with exact moments (Iserles et al. 2000, section 5.3): `Omega = A + A x B`, `A = int e dmu`,
+    /// `B = 1/h int (mu - m) e dmu` with m the middle; the sign of the bracket is that of a strain that multiplies from the right.
     pub(super) fn cross<S: Scalar>(&self, piece: usize, c: &[S], rates: &[S]) -> Crossing<S> {
         let (size, rows) = (self.pieces[piece].size, self.rows(piece));
-        let mut strains = rows.map(|row| self.sum(row, c));
-        for strain in &mut strains {
-            strain.linear.z = strain.linear.z + 1.0;
-        }
-        let [one_rate, two_rate] = rows.map(|row| self.sum(row, rates));
-        let [one, two] = strains;
-        let (half, bracket) = (S::from_f64(0.5 * size), S::from_f64(bracket(size)));
-        let screw = (one + two) * half + one.cross(two) * bracket;
-        let rate = (one_rate + two_rate) * half + (one_rate.cross(two) + one.cross(two_rate)) * bracket;
-        let second = one_rate.cross(two_rate) * (bracket * 2.0);
+        let [mut whole, moment] = rows.map(|row| self.sum(row, c));
+        whole.linear.z = whole.linear.z + size;
+        let [whole_rate, moment_rate] = rows.map(|row| self.sum(row, rates));
+        let screw = whole + whole.cross(moment);
+        let rate = whole_rate + whole_rate.cross(moment) + whole.cross(moment_rate);
+        let second = whole_rate.cross(moment_rate) * S::from_f64(2.0);
         // The exponent as a function of time: its rate and the rate of that make twist and acceleration.
         let moving = Tangent::new(along(screw, rate)).apply(along(rate, second));
         Crossing {
             pose: exponential(screw),
             twist: part(moving, |number| number.value),
             acceleration: part(moving, |number| number.gradient[0]),
-            strains,
+            moments: [whole, moment],
             tangent: Tangent::new(screw),
         }
     }
 
     /// The twist of the end of a piece relative to its begin, per unit rate of coordinate `k`; none where it does nothing.
     pub(super) fn column<S: Scalar>(&self, piece: usize, crossing: &Crossing<S>, k: usize) -> Option<Twist<S>> {
-        let (size, [one, two]) = (self.pieces[piece].size, self.rows(piece).map(|row| row[k]));
-        if one == 0.0 && two == 0.0 {
+        let [whole, moment] = self.rows(piece).map(|row| row[k]);
+        if whole == 0.0 && moment == 0.0 {
             return None;
         }
         let unit = unit(self.components[k]);
-        let turned = crossing.strains[0] * S::from_f64(two) - crossing.strains[1] * S::from_f64(one);
-        let change = unit * S::from_f64((one + two) * 0.5 * size) - unit.cross(turned) * S::from_f64(bracket(size));
+        let turned = crossing.moments[1] * S::from_f64(whole) - crossing.moments[0] * S::from_f64(moment);
+        let change = unit * S::from_f64(whole) + unit.cross(turned);
         Some(crossing.tangent.apply(change))
     }
 
@@ -136,8 +130,17 @@ impl SpaceAxis {
     }
 }
 
-fn bracket(size: f64) -> f64 {
-    3.0_f64.sqrt() / 12.0 * size * size
+/// Integral and first moment about the middle, per size, of the shape functions between two places.
+fn moments(fields: &Fields, begin: f64, end: f64) -> [Vec<f64>; 2] {
+    let mut sums = [vec![0.0; fields.len()], vec![0.0; fields.len()]];
+    let (middle, size) = (0.5 * (begin + end), end - begin);
+    for at in gauss(fields.points() + 1, -0.5, 0.5) {
+        for (k, entry) in fields.row(middle + size * at.place, |_| 0).into_iter().enumerate() {
+            sums[0][k] += at.weight * size * entry;
+            sums[1][k] += at.weight * size * at.place * entry;
+        }
+    }
+    sums
 }
 
 fn unit<S: Scalar>(component: usize) -> Twist<S> {

@@ -1,0 +1,357 @@
+//! Joints that follow a given motion, and beams that answer to it.
+
+use super::{Run, Setting, Stepping, check_step, names};
+use crate::algebra::Cholesky;
+use crate::description::Description;
+use crate::dynamics::flexible;
+use crate::error::{Diverged, Error, Result};
+use crate::integrator::Integrator;
+use crate::motion::{JointMotion, position_sensors};
+use crate::ode::Ode;
+use crate::scalar::{Dual, Scalar};
+use crate::sensitivity::{Interrupt, Job, Pair, differentiate};
+use crate::sensor::Sensor;
+use crate::statics::settled;
+use crate::system::{Build, Dynamics};
+
+/// Derivatives taken in one sweep.
+const LANES: usize = 8;
+/// Integration steps between two questions whether to stop.
+const PATIENCE: usize = 256;
+
+/// Joints follow `motion`, readings of the model's position sensors; the beams move freely.
+///
+/// Law: `M_ee a_e = -(bias + K q + D v)_e - M_ej a_j`, j the joints and e the elastic coordinates. Between samples the joints follow the
+/// polynomial of degree 5 with position, velocity and acceleration of both. The beams begin at rest under gravity. The outputs
+/// `effort` of the joints are the efforts that the motion needs, with those of the effects taken off; the actuators do nothing.
+/// Checked: a motion simulated from efforts gives those efforts back.
+pub fn prescribed(setting: Setting<'_>, motion: JointMotion<'_>) -> Result<Run> {
+    let (rows, joints) = (motion.position.rows(), setting.description.n_joints());
+    for (name, table) in
+        [("position", motion.position), ("velocity", motion.velocity), ("acceleration", motion.acceleration)]
+    {
+        table.expect(name, rows, joints)?;
+    }
+    if rows > 0 {
+        let mut state = motion.position.row(0).to_vec();
+        state.resize(setting.description.n_states(), 0.0);
+        check_step(setting.description, setting.theta, setting.stepping, &state, true)?;
+    }
+    let job = Guided { setting, motion };
+    let output = |pass: &Pair<_>, place: usize| pass.first[place];
+    let (pair, jacobian) = differentiate(&job, setting.theta, setting.sensitivities, output)?;
+    Ok(Run { outputs: pair.first, states: pair.second, jacobian })
+}
+
+struct Guided<'a> {
+    setting: Setting<'a>,
+    motion: JointMotion<'a>,
+}
+
+impl Job for Guided<'_> {
+    fn run<S: Scalar>(&self, theta: &[S]) -> Result<Pair<S>> {
+        let values: Vec<f64> = theta.iter().map(Scalar::re).collect();
+        self.setting.description.check_values(&values)?;
+        Guide::new(self, theta)?.run(self.setting.interrupt)
+    }
+}
+
+/// Position, velocity and acceleration of a joint.
+type State<S> = [S; 3];
+
+/// A guided machine on its way.
+struct Guide<'a, S> {
+    description: &'a Description,
+    motion: JointMotion<'a>,
+    stepping: Stepping,
+    sensors: Vec<Sensor<S>>,
+    of_joints: Vec<Option<Sensor<S>>>,
+    ode: Elastic<S>,
+    integrator: Integrator<S>,
+    /// Elastic coordinates, their rates, time since the last sample.
+    state: Vec<S>,
+    truth: Vec<S>,
+    states: Vec<S>,
+}
+
+impl<'a, S: Scalar> Guide<'a, S> {
+    fn new(job: &Guided<'a>, theta: &[S]) -> Result<Self> {
+        let (description, motion) = (job.setting.description, job.motion);
+        let dynamics = Build::dynamics(&description, theta)?;
+        let of_joints = position_sensors(description, theta);
+        let lifted: Vec<_> = theta.iter().map(|&value| Dual::constant(value)).collect();
+        let joints = dynamics.joints();
+        let ode = Elastic {
+            values: Buffers::new(dynamics),
+            duals: Buffers::new(Build::dynamics(&description, &lifted)?),
+            ends: vec![[[S::zero(); 3]; 2]; joints],
+            interval: job.setting.stepping.time_step,
+        };
+        let dim = ode.dim();
+        let mut guide = Self {
+            description,
+            motion,
+            stepping: job.setting.stepping,
+            sensors: description.sensors(theta),
+            of_joints,
+            integrator: Integrator::new(job.setting.stepping.method, dim),
+            ode,
+            state: vec![S::zero(); dim],
+            truth: vec![S::zero(); motion.position.rows() * description.n_outputs()],
+            states: vec![S::zero(); motion.position.rows() * description.n_states()],
+        };
+        guide.begin(theta)?;
+        Ok(guide)
+    }
+
+    /// Puts the beams to rest with the joints where the motion begins.
+    fn begin(&mut self, theta: &[S]) -> Result<()> {
+        if self.motion.position.rows() == 0 {
+            return Ok(());
+        }
+        let joints: Vec<S> = self.at(0).iter().map(|[position, ..]| *position).collect();
+        let q = settled(self.description, &mut self.ode.values.dynamics, theta, &joints)?;
+        let elastic = &q[joints.len()..];
+        self.state[..elastic.len()].copy_from_slice(elastic);
+        Ok(())
+    }
+
+    /// The true motion of the joints at a sample.
+    fn at(&self, k: usize) -> Vec<State<S>> {
+        let one = |(joint, sensor): (usize, &Option<Sensor<S>>)| {
+            self.motion.behind(self.stepping.time_step, k, joint, sensor.as_ref())
+        };
+        self.of_joints.iter().enumerate().map(one).collect()
+    }
+
+    fn run(mut self, interrupt: Interrupt<'_>) -> Result<Pair<S>> {
+        let (rows, layout) = (self.motion.position.rows(), self.description.layout());
+        let mut steps = 0_usize;
+        for row in 0..rows {
+            let (now, next) = (self.at(row), self.at((row + 1).min(rows - 1)));
+            for ((ends, now), next) in self.ode.ends.iter_mut().zip(now).zip(next) {
+                *ends = [now, next];
+            }
+            self.sample(row)?;
+            for _ in 0..if row + 1 < rows { self.stepping.substeps } else { 0 } {
+                self.integrator.step(&mut self.ode, &mut self.state, self.stepping.step());
+                steps += 1;
+                if steps.is_multiple_of(PATIENCE) && interrupt() {
+                    return Err(Error::Interrupted);
+                }
+            }
+        }
+        let mut outputs = self.truth.clone();
+        for sensor in &self.sensors {
+            let column = sensor.channel.column(layout);
+            let truth = |sample: usize| self.truth[sample * layout.count() + column];
+            for row in 0..rows {
+                outputs[row * layout.count() + column] = sensor.read(row, self.stepping.time_step, truth);
+            }
+        }
+        Ok(Pair { first: outputs, second: self.states })
+    }
+
+    /// Records what is seen and needed at a sample.
+    fn sample(&mut self, row: usize) -> Result<()> {
+        if let Some(time) = self.state.last_mut() {
+            *time = S::zero();
+        }
+        let (width, dim) = (self.description.n_outputs(), self.description.n_states());
+        let buffers = &mut self.ode.values;
+        buffers.evaluate(&self.state, &self.ode.ends, self.ode.interval);
+        let n = buffers.q.len();
+        let state = &mut self.states[row * dim..(row + 1) * dim];
+        state[..n].copy_from_slice(&buffers.q);
+        state[n..2 * n].copy_from_slice(&buffers.v);
+        let outputs = &mut self.truth[row * width..(row + 1) * width];
+        let Buffers { dynamics, q, v, a, load, .. } = buffers;
+        dynamics.inverse_dynamics(q, v, a, load);
+        dynamics.observe_motion(state, outputs);
+        for ((channels, &a), &effort) in outputs.chunks_exact_mut(4).zip(&*a).zip(&*load).take(self.of_joints.len()) {
+            channels[2] = a;
+            channels[3] = effort;
+        }
+        let wrong = |number: &S| !number.is_finite();
+        let place = state.iter().position(wrong).map(|place| names::state_name(self.description, place));
+        let place = place.or_else(|| outputs.iter().position(wrong).map(|c| names::output_name(self.description, c)));
+        place.map_or(Ok(()), |name| Err(self.diverged(&name, row)))
+    }
+
+    fn diverged(&self, name: &str, row: usize) -> Error {
+        let values = |numbers: &[S], width: usize| numbers[..row * width].iter().map(Scalar::re).collect();
+        Error::Diverged(Box::new(Diverged {
+            what: format!("the {name}"),
+            time: row as f64 * self.stepping.time_step,
+            sample_index: row,
+            method: self.stepping.method.name(),
+            step: self.stepping.step(),
+            repair: "use more substeps or the integrator linearly_implicit, and check the motion for jumps",
+            outputs: values(&self.truth, self.description.n_outputs()),
+            states: values(&self.states, self.description.n_states()),
+        }))
+    }
+}
+
+/// The elastic coordinates of a machine whose joints follow a motion, with time as the last state.
+struct Elastic<S> {
+    values: Buffers<S>,
+    duals: Buffers<Dual<S, LANES>>,
+    /// Motion of each joint at the sample before and after.
+    ends: Vec<[State<S>; 2]>,
+    /// Time between samples, s.
+    interval: f64,
+}
+
+struct Buffers<S> {
+    dynamics: Dynamics<S>,
+    q: Vec<S>,
+    v: Vec<S>,
+    a: Vec<S>,
+    load: Vec<S>,
+    rates: Vec<S>,
+    state: Vec<S>,
+    ends: Vec<[State<S>; 2]>,
+    /// The block of the mass matrix of the elastic coordinates, and its factors.
+    mass: Vec<S>,
+    factors: Cholesky<S>,
+}
+
+impl<S: Scalar> Buffers<S> {
+    fn new(dynamics: Dynamics<S>) -> Self {
+        let (n, joints, zero) = (dynamics.coordinates(), dynamics.joints(), S::zero());
+        let elastic = n - joints;
+        let [q, v, a, load] = [0; 4].map(|_| vec![zero; n]);
+        let [rates, state] = [0; 2].map(|_| vec![zero; 2 * elastic + 1]);
+        let (mass, factors) = (vec![zero; elastic * elastic], Cholesky::new(elastic));
+        Self { dynamics, q, v, a, load, rates, state, ends: vec![[[zero; 3]; 2]; joints], mass, factors }
+    }
+
+    /// Motion of all coordinates and rates of the state, at elastic state `x` on the way between `ends`.
+    fn evaluate(&mut self, x: &[S], ends: &[[State<S>; 2]], interval: f64) {
+        let Self { dynamics, q, v, a, load, mass, factors, rates, .. } = self;
+        let (n, joints) = (q.len(), ends.len());
+        let elastic = n - joints;
+        for (joint, ends) in ends.iter().enumerate() {
+            [q[joint], v[joint], a[joint]] = between(ends, x[2 * elastic], interval);
+        }
+        q[joints..].copy_from_slice(&x[..elastic]);
+        v[joints..].copy_from_slice(&x[elastic..2 * elastic]);
+        a[joints..].fill(S::zero());
+        dynamics.terms(q, v);
+        flexible::required(&dynamics.model, &dynamics.data, (q, v), a, load);
+        let matrix = dynamics.data.mass_matrix().chunks_exact(n).skip(joints);
+        for (own, row) in mass.chunks_exact_mut(elastic.max(1)).zip(matrix) {
+            own.copy_from_slice(&row[joints..]);
+        }
+        factors.factorise(mass);
+        for entry in &mut load[joints..] {
+            *entry = -*entry;
+        }
+        factors.solve(&mut load[joints..]);
+        a[joints..].copy_from_slice(&load[joints..]);
+        rates[..elastic].copy_from_slice(&v[joints..]);
+        rates[elastic..2 * elastic].copy_from_slice(&a[joints..]);
+        rates[2 * elastic] = S::one();
+    }
+
+    /// Writes `[-M_ee^-1 K, -M_ee^-1 D]` into rows of `width` entries, with the factors of the last evaluation.
+    fn elasticity(&mut self, rows: &mut [S], width: usize) {
+        let Self { dynamics, load, factors, ends, q, .. } = self;
+        let (joints, elastic) = (ends.len(), q.len() - ends.len());
+        let column = &mut load[joints..];
+        for number in 0..dynamics.model.n_beams() {
+            let Some((beam, first)) = dynamics.model.beam(number) else { continue };
+            let (first, len) = (first - joints, beam.len());
+            for (block, stiff) in [(0, beam.stiffness()), (elastic, beam.damping())] {
+                for k in 0..len {
+                    column.fill(S::zero());
+                    for (entry, row) in column[first..first + len].iter_mut().zip(stiff.chunks_exact(len)) {
+                        *entry = -row[k];
+                    }
+                    factors.solve(column);
+                    for (row, &entry) in rows.chunks_exact_mut(width).zip(&*column) {
+                        row[block + first + k] = entry;
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// The polynomial of degree 5 through position, velocity and acceleration at both ends of an interval (s), and its derivatives, at
+/// `time` (s) after the begin.
+///
+/// Law: the quintic Hermite interpolant (Biagiotti & Melchiorri 2008, "Trajectory Planning for Automatic Machines and Robots", section
+/// 2.1.7). Checked: a polynomial of degree 5 is itself.
+fn between<S: Scalar>(ends: &[State<S>; 2], time: S, interval: f64) -> State<S> {
+    let [[q0, v0, a0], [q1, v1, a1]] = *ends;
+    let (h, s) = (interval, time / interval);
+    // In units of the interval: q0 + s v + s^2 a / 2 + s^3 (c3 + c4 s + c5 s^2).
+    let (v0, v1, a0, a1) = (v0 * h, v1 * h, a0 * (h * h), a1 * (h * h));
+    let (gap, turn, bend) = (q1 - q0 - v0 - a0 * 0.5, v1 - v0 - a0, a1 - a0);
+    let c3 = gap * 10.0 - turn * 4.0 + bend * 0.5;
+    let c4 = gap * -15.0 + turn * 7.0 - bend;
+    let c5 = gap * 6.0 - turn * 3.0 + bend * 0.5;
+    let square = s * s;
+    let q = q0 + v0 * s + a0 * square * 0.5 + square * s * (c3 + c4 * s + c5 * square);
+    let v = v0 + a0 * s + square * (c3 * 3.0 + c4 * s * 4.0 + c5 * square * 5.0);
+    let a = a0 + s * (c3 * 6.0 + c4 * s * 12.0 + c5 * square * 20.0);
+    [q, v / h, a / (h * h)]
+}
+
+impl<S: Scalar> Ode<S> for Elastic<S> {
+    fn dim(&self) -> usize {
+        self.values.rates.len()
+    }
+
+    fn coordinates(&self) -> usize {
+        self.values.rates.len() / 2
+    }
+
+    fn rhs(&mut self, x: &[S], dxdt: &mut [S]) {
+        self.values.evaluate(x, &self.ends, self.interval);
+        dxdt.copy_from_slice(&self.values.rates);
+    }
+
+    /// Exact, by dual numbers.
+    fn jacobian(&mut self, x: &[S], jacobian: &mut [S]) {
+        let dim = x.len();
+        let Buffers { ends, .. } = &mut self.duals;
+        for (lifted, ends) in ends.iter_mut().zip(&self.ends) {
+            *lifted = ends.map(|end| end.map(Dual::constant));
+        }
+        let (lifted, mut state) = (std::mem::take(&mut self.duals.ends), std::mem::take(&mut self.duals.state));
+        for first in (0..dim).step_by(LANES) {
+            for (column, (state, &value)) in state.iter_mut().zip(x).enumerate() {
+                *state = Dual::variable(value, column.wrapping_sub(first));
+            }
+            self.duals.evaluate(&state, &lifted, self.interval);
+            for (row, rate) in jacobian.chunks_exact_mut(dim).zip(&self.duals.rates) {
+                for (entry, &slope) in row[first..].iter_mut().zip(&rate.gradient) {
+                    *entry = slope;
+                }
+            }
+        }
+        (self.duals.ends, self.duals.state) = (lifted, state);
+    }
+
+    /// `[0, 1; -M^-1 K, -M^-1 D]`: all that is stiff, for the price of one mass matrix.
+    fn iteration_matrix(&mut self, x: &[S], matrix: &mut [S]) {
+        let (dim, n) = (x.len(), self.coordinates());
+        matrix.fill(S::zero());
+        for k in 0..n {
+            matrix[k * dim + n + k] = S::one();
+        }
+        self.values.evaluate(x, &self.ends, self.interval);
+        self.values.elasticity(&mut matrix[n * dim..2 * n * dim], dim);
+    }
+
+    fn elasticity(&mut self, x: &[S], block: &mut [S]) -> bool {
+        let n = self.coordinates();
+        block.fill(S::zero());
+        self.values.evaluate(x, &self.ends, self.interval);
+        self.values.elasticity(block, 2 * n);
+        n > 0
+    }
+}

@@ -1,0 +1,96 @@
+//! A machine in a single state, in buffers that stand ready: inverse and forward dynamics, mass matrix, energy, Jacobians.
+
+use super::{Dynamics, add_effects};
+use crate::dynamics::{Energy, crba, energy, flexible, for_each_column, frames, lines, poses, rnea};
+use crate::scalar::Scalar;
+use crate::spatial::{Pose, Twist};
+
+impl<S: Scalar> Dynamics<S> {
+    /// Accelerations of all coordinates at (q, v) under `efforts` on all coordinates, with all effects.
+    pub fn forward_dynamics(&mut self, q: &[S], v: &[S], efforts: &[S]) -> &[S] {
+        let joints = self.joints();
+        self.tensions.fill(S::zero());
+        self.efforts.copy_from_slice(&efforts[..joints]);
+        let elastic = &efforts[joints..];
+        self.accelerate(q, v, |effects, q, v, total| add_effects(effects, q, v, total), elastic);
+        &self.data.acceleration
+    }
+
+    /// Efforts on all coordinates that give accelerations `a` at (q, v), with the efforts of the effects taken off. On the elastic
+    /// coordinates they vanish in free motion.
+    pub fn inverse_dynamics(&mut self, q: &[S], v: &[S], a: &[S], efforts: &mut [S]) {
+        let Self { model, data, loads, .. } = self;
+        if model.is_recursive() {
+            efforts.copy_from_slice(rnea(model, data, q, v, a));
+        } else {
+            flexible::terms(model, data, q, v);
+            flexible::required(model, data, (q, v), a, efforts);
+        }
+        loads.fill(S::zero());
+        add_effects(&self.effects, q, v, loads);
+        for (effort, &effect) in efforts.iter_mut().zip(&*loads) {
+            *effort -= effect;
+        }
+    }
+
+    /// Mass matrix at `q` with payloads, n x n.
+    pub fn mass_matrix(&mut self, q: &[S]) -> &[S] {
+        let Self { model, data, loads, .. } = self;
+        if model.is_recursive() {
+            return crba(model, data, q);
+        }
+        loads.fill(S::zero());
+        flexible::terms(model, data, q, loads);
+        &data.mass_matrix
+    }
+
+    /// Kinetic and potential energy in J. The potential is that of gravity, of the beams, and of the effects that have one.
+    pub fn energy(&mut self, q: &[S], v: &[S]) -> Energy<S> {
+        let Self { model, data, effects, .. } = self;
+        let mut total = match model.is_recursive() {
+            true => energy(model, data, q, v),
+            false => flexible::energy(model, data, q, v),
+        };
+        total.potential += effects.iter().map(|(joint, effect)| effect.potential(q[*joint])).sum();
+        total
+    }
+
+    /// Whether actuators act on lines.
+    pub(crate) fn pulls(&self) -> bool {
+        self.pulls
+    }
+
+    /// Length of each line per unit of each coordinate at `q`: the lever arms of its force, lines x n.
+    pub(crate) fn levers(&mut self, q: &[S], levers: &mut [S]) {
+        let Self { model, data, loads, .. } = self;
+        loads.fill(S::zero());
+        frames(model, data, q, loads);
+        poses(model, data);
+        lines(model, data);
+        levers.fill(S::zero());
+        for (line, row) in levers.chunks_exact_mut(q.len()).enumerate() {
+            data.line_load(line, S::one(), row);
+        }
+    }
+
+    /// Jacobian of a marker at `q`, 6 x n row by row: angular velocity, then velocity of its origin, in world axes per unit rate.
+    ///
+    /// Checked: against the derivative of the marker's pose.
+    pub fn jacobian(&mut self, q: &[S], marker: usize, jacobian: &mut [S]) {
+        let Self { model, data, loads, .. } = self;
+        jacobian.fill(S::zero());
+        let Some(place) = model.markers().get(marker) else { return };
+        loads.fill(S::zero());
+        frames(model, data, q, loads);
+        poses(model, data);
+        let (n, frames) = (model.n_coordinates(), &data.composite.frames);
+        let at = (frames[place.frame].pose * Pose::from_f64(place.pose)).translation;
+        for_each_column(model, frames, &data.composite.sections, place.frame, |coordinate, column: Twist<S>| {
+            let velocity = column.linear + column.angular.cross(at);
+            let entries = column.angular.to_array().into_iter().chain(velocity.to_array());
+            for (row, entry) in jacobian.chunks_exact_mut(n).zip(entries) {
+                row[coordinate] = entry;
+            }
+        });
+    }
+}

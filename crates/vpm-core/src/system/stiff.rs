@@ -1,0 +1,81 @@
+//! What is stiff in a machine with elastic beams, for implicit steps.
+
+use super::Dynamics;
+use crate::actuator::Target;
+use crate::scalar::Scalar;
+
+/// `[0, 1; -M^-1 K, -M^-1 D]` with the slopes of the effects in K and their chords, `resistances`, in D, and the columns and rows of
+/// the lags, for the price of one mass matrix.
+///
+/// What it leaves out, the change of gravity, of velocity terms and of levers with the state, is slow beside the vibrations. Checked:
+/// against the exact Jacobian of a beam at rest without gravity, where nothing is left out.
+pub(super) fn iteration_matrix<S: Scalar>(
+    dynamics: &mut Dynamics<S>,
+    x: &[S],
+    matrix: &mut [S],
+    resistances: &[S],
+    column: &mut [S],
+) {
+    let (n, dim) = (dynamics.coordinates(), x.len());
+    let (q, v) = x[..2 * n].split_at(n);
+    dynamics.terms(q, v);
+    dynamics.data.factorise();
+    matrix.fill(S::zero());
+    for k in 0..n {
+        matrix[k * dim + n + k] = S::one();
+    }
+    let lower = &mut matrix[n * dim..];
+    elasticity(dynamics, lower, dim, column);
+    let Dynamics { data, effects, actuators, .. } = dynamics;
+    for (joint, &resistance) in resistances.iter().enumerate() {
+        let own = effects.iter().filter(|(place, _)| *place == joint);
+        let slope: S = own.map(|(_, effect)| effect.slope_at_rest(q[joint])).sum();
+        for (entry, place) in [(slope, joint), (-resistance, n + joint)] {
+            if entry != S::zero() {
+                column.fill(S::zero());
+                column[joint] = entry;
+                data.solve(column);
+                add_column(lower, dim, place, column);
+            }
+        }
+    }
+    let lagging = actuators.iter().filter_map(|actuator| actuator.lag.as_ref().map(|lag| (actuator, lag)));
+    for (place, (actuator, lag)) in (2 * n..).zip(lagging) {
+        column.fill(S::zero());
+        let force = actuator.motor.effort(S::one());
+        match actuator.on {
+            Target::Joint(joint) => column[joint] = force,
+            Target::Line(line) => data.line_load(line, force, column),
+        }
+        data.solve(column);
+        add_column(lower, dim, place, column);
+        lower[(place - n) * dim + place] = lag.rate(S::one(), S::zero());
+    }
+}
+
+/// `[-M^-1 K, -M^-1 D]` of the beams, added to rows of `width` entries, with the factors of M in the data.
+pub(super) fn elasticity<S: Scalar>(dynamics: &Dynamics<S>, rows: &mut [S], width: usize, column: &mut [S]) {
+    let n = dynamics.coordinates();
+    for elastic in dynamics.model.beams() {
+        let (first, len) = (elastic.coordinate, elastic.beam.len());
+        for (block, stiff) in [(0, elastic.beam.stiffness()), (n, elastic.beam.damping())] {
+            if stiff.iter().all(|&entry| entry == S::zero()) {
+                continue;
+            }
+            for k in 0..len {
+                column.fill(S::zero());
+                for (entry, row) in column[first..first + len].iter_mut().zip(stiff.chunks_exact(len)) {
+                    *entry = -row[k];
+                }
+                dynamics.data.solve(column);
+                add_column(rows, width, block + first + k, column);
+            }
+        }
+    }
+}
+
+fn add_column<S: Scalar>(rows: &mut [S], width: usize, place: usize, column: &[S]) {
+    for (row, &entry) in rows.chunks_exact_mut(width).zip(column) {
+        row[place] += entry;
+    }
+}
