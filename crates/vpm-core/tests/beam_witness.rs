@@ -32,23 +32,47 @@ fn section() -> Result<Section> {
 
 #[test]
 fn in_a_plane_the_closed_map_is_the_product_of_exponentials() -> Result<()> {
-    let mut random = Random::new(8);
+    let (mut random, length) = (Random::new(8), 0.8);
+    let marks: Vec<f64> = (1..=400).map(|k| length * f64::from(k) / 400.0).collect();
     for bending in [BendingX, BendingY] {
-        let beam = Beam::new(&entry(Level::Strain(3), &[bending], 0.8, [0.02, 0.01]), &[0.8])?;
-        let fields = vec![Field { strain: bending, basis: Basis::legendre(0.8, 3)? }];
-        let witness = FlexibleLink {
-            beam: Some((Pose::identity(), StrainBeam::new(section()?, fields, 0.0, 60)?)),
-            ..FlexibleLink::welded()
-        };
-        let tree = FlexibleTree::new(vec![witness], GRAVITY)?;
-        let [q, v] = [0.6, 2.0].map(|size| random.numbers(3, size));
-        let (mut workspace, mut out) = (tree.workspace(), beam.sections());
-        tree.terms(&q, &v, &[], &mut workspace);
-        beam.motion(&q, &v, &mut out);
-        near(&mass(&beam, &out), &workspace.mass, 1e-8);
-        near(&bias(&beam, &q, &v, &Root::resting(GRAVITY), &Load::default()), &workspace.bias, 1e-7);
-        near(beam.stiffness(), tree.stiffness(), 1e-13);
+        for level in [Level::Strain(3), Level::Elements(4)] {
+            let plane = Beam::new(&entry(level, &[bending], length, [0.02, 0.01]), &marks)?;
+            let space = Beam::new(&entry(level, &[bending, Torsion], length, [0.02, 0.01]), &marks)?;
+            let n = plane.len();
+            let [q, v] = [4.0, 5.0].map(|size| random.numbers(n, size));
+            let with_twist = |x: &[f64]| [x, &vec![0.0; n]].concat();
+            let (mut flat, mut full) = (plane.sections(), space.sections());
+            plane.motion(&q, &v, &mut flat);
+            space.motion(&with_twist(&q), &with_twist(&v), &mut full);
+            for (station, (a, b)) in flat.at.iter().zip(&full.at).enumerate() {
+                near(&pose(a.pose), &pose(b.pose), 1e-9);
+                assert!(apart(&[a.twist, a.acceleration], &[b.twist, b.acceleration]) < 1e-8);
+                let columns = &full.columns[station * 2 * n..station * 2 * n + n];
+                assert!(apart(&flat.columns[station * n..(station + 1) * n], columns) < 1e-9);
+            }
+        }
     }
+    Ok(())
+}
+
+#[test]
+fn sums_are_those_of_the_flexible_tree() -> Result<()> {
+    let (mut random, length) = (Random::new(8), 0.8);
+    let beam = Beam::new(&entry(Level::Strain(2), &ALL, length, [0.02, 0.01]), &[length])?;
+    let field = |strain| Ok(Field { strain, basis: Basis::legendre(length, 2)? });
+    let fields = ALL.into_iter().map(field).collect::<Result<_>>()?;
+    // As many stations as the beam has with inertia.
+    let witness = StrainBeam::new(section()?, fields, 0.0, beam.stations() - 1)?;
+    let link = FlexibleLink { beam: Some((Pose::identity(), witness)), ..FlexibleLink::welded() };
+    let tree = FlexibleTree::new(vec![link], GRAVITY)?;
+    let n = beam.len();
+    let [q, v] = [0.6, 2.0].map(|size| random.numbers(n, size));
+    let (mut workspace, mut out) = (tree.workspace(), beam.sections());
+    tree.terms(&q, &v, &[], &mut workspace);
+    beam.motion(&q, &v, &mut out);
+    near(&mass(&beam, &out), &workspace.mass, 1e-13);
+    near(&bias(&beam, &q, &v, &Root::resting(GRAVITY), &Load::default()), &workspace.bias, 1e-13);
+    near(beam.stiffness(), tree.stiffness(), 1e-13);
     Ok(())
 }
 
@@ -120,6 +144,11 @@ fn projected(from: &Beam<f64>, q: &[f64], count: usize, length: f64) -> Result<V
     Ok(found)
 }
 
+/// The entries of a pose.
+fn pose(pose: Pose<f64>) -> Vec<f64> {
+    [pose.rotation.columns.map(Vector3::to_array).concat(), pose.translation.to_array().to_vec()].concat()
+}
+
 /// Largest difference of two motions.
 fn apart(one: &[Twist<f64>], two: &[Twist<f64>]) -> f64 {
     let numbers = |twist: &Twist<f64>| [twist.angular.to_array(), twist.linear.to_array()].concat();
@@ -145,9 +174,6 @@ fn interpolated_deflection_is_the_second_order_of_exact_geometry() -> Result<()>
             let mut most = 0.0_f64;
             for i in 0..marks.len() {
                 let (a, b) = (here.at[bent.mark(i)], there.at[exact.mark(i)]);
-                let pose = |p: Pose<f64>| {
-                    [p.rotation.columns.map(|c| c.to_array()).concat(), p.translation.to_array().to_vec()].concat()
-                };
                 for (a, b) in pose(a.pose).into_iter().zip(pose(b.pose)) {
                     most = most.max((a - b).abs());
                 }

@@ -13,7 +13,7 @@ const STEPS: usize = 3;
 /// `D = beta K + alpha M + sum_k 2 zeta_k omega_k (M a_k)(M a_k)^T`, row by row; `groups` are coordinates that may couple at rest.
 ///
 /// Source: Caughey & O'Kelly 1965, "Classical normal modes in damped linear dynamic systems", J. Appl. Mech. 32, for modal damping with
-/// modes `a_k` of unit modal mass. Checked: no more ratios than coordinates.
+/// modes `a_k` of unit modal mass. Ratios of modes that a coarse level does not have damp nothing, so that a beam can change its level.
 pub(super) fn damping<S: Scalar>(
     entry: &BeamEntry<S>,
     stiffness: &[S],
@@ -22,14 +22,9 @@ pub(super) fn damping<S: Scalar>(
 ) -> Result<Vec<S>> {
     let law = &entry.damping;
     let n = groups.iter().map(Vec::len).sum::<usize>();
-    if law.ratios.len() > n {
-        let path = format!("{}.damping.ratios", entry.name);
-        let condition = "hold no more ratios than the beam has coordinates";
-        return Err(Error::Domain { path, condition, value: law.ratios.len() as f64 });
-    }
     let beta = law.stiffness.unwrap_or_else(S::zero);
     let mut damping: Vec<S> = stiffness.iter().map(|&entry| entry * beta).collect();
-    if law.mass.is_none() && law.ratios.is_empty() {
+    if n == 0 || (law.mass.is_none() && law.ratios.is_empty()) {
         return Ok(damping);
     }
     let mass = mass();
@@ -123,9 +118,9 @@ fn correct<S: Scalar>(mode: &mut Mode<S>, stiffness: &[S], mass: &[S], inverse: 
     residual.push((S::one() - dot(&momentum, &mode.shape)) * 0.5);
     let step = |row: usize| residual.iter().enumerate().map(|(k, &entry)| entry * inverse[(row, k)]).sum::<S>();
     for (row, entry) in mode.shape.iter_mut().enumerate() {
-        *entry = *entry - step(row);
+        *entry -= step(row);
     }
-    mode.square = mode.square - step(n);
+    mode.square -= step(n);
 }
 
 fn rows<S>(matrix: &[S], n: usize) -> impl Iterator<Item = &[S]> {

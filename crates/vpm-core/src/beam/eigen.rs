@@ -24,6 +24,9 @@ pub fn modes(stiffness: &DMatrix<f64>, mass: &DMatrix<f64>) -> Result<Modes> {
     if let Some(&value) = stiffness.iter().find(|entry| !entry.is_finite()) {
         return Err(Error::NonFinite { path: "beam.stiffness".to_owned(), value });
     }
+    if mass.is_empty() {
+        return Ok(Modes { frequencies: Vec::new(), shapes: DMatrix::zeros(0, 0) });
+    }
     let lower = factor(mass)?.l();
     let half = solve_lower(&lower, stiffness.clone());
     let both = solve_lower(&lower, half.transpose());

@@ -2,23 +2,16 @@
 
 use nalgebra::DMatrix;
 
-use super::damping::damping;
-use super::deflection::{DeflectionAxis, modal};
+use super::deflection::DeflectionAxis;
 use super::eigen::{self, Modes};
-use super::entry::{BeamEntry, Component, Level};
-use super::fields::{Field, Fields, Interpolated, basis};
+use super::fields::Fields;
+use super::gauge::Gauge;
 use super::lumped::LumpedAxis;
 use super::motion::Sections;
-use super::profile::Profile;
 use super::strain::{PlaneAxis, SpaceAxis};
 use crate::error::Result;
 use crate::scalar::Scalar;
 use crate::spatial::SpatialInertia;
-
-/// Stations of a smooth strain beam beyond the coefficients of a component.
-const STRAIN_STATIONS: usize = 4;
-/// Stations on each element.
-const ELEMENT_STATIONS: usize = 3;
 
 /// A straight beam along z of its root frame: a map from elastic coordinates to sections, inertia at sections, and constant
 /// matrices of stiffness and damping.
@@ -27,17 +20,17 @@ const ELEMENT_STATIONS: usize = 3;
 /// which differ in the map alone. The numbers of the map are constants, everything that depends on the parameters is in `S`.
 #[derive(Clone, Debug)]
 pub struct Beam<S> {
-    axis: Axis,
-    map: Map,
-    inertia: Vec<SpatialInertia<S>>,
-    marks: Vec<usize>,
-    stiffness: Vec<S>,
-    damping: Vec<S>,
+    pub(super) axis: Axis,
+    pub(super) map: Map,
+    pub(super) inertia: Vec<SpatialInertia<S>>,
+    pub(super) marks: Vec<usize>,
+    pub(super) stiffness: Vec<S>,
+    pub(super) damping: Vec<S>,
 }
 
 /// The map from coordinates to sections.
 #[derive(Clone, Debug)]
-enum Axis {
+pub(super) enum Axis {
     Plane(PlaneAxis),
     Space(SpaceAxis),
     Deflection(DeflectionAxis),
@@ -46,113 +39,12 @@ enum Axis {
 
 /// The map from coordinates to strains.
 #[derive(Clone, Debug)]
-enum Map {
+pub(super) enum Map {
     Fields(Fields),
     Springs(LumpedAxis),
 }
 
-/// The strain at one place of the axis as a linear map of the coordinates, made by [`Beam::gauge`].
-#[derive(Clone, Debug, PartialEq)]
-pub struct Gauge {
-    entries: Vec<(usize, usize, f64)>,
-}
-
-impl Gauge {
-    /// The strain screw (kappa_x, kappa_y, twist, shear_x, shear_y, extension) at coordinates `q`; allocates nothing.
-    pub fn strain<S: Scalar>(&self, q: &[S]) -> [S; 6] {
-        let mut strain = [S::zero(); 6];
-        for &(coordinate, component, entry) in &self.entries {
-            strain[component] += q[coordinate] * entry;
-        }
-        strain
-    }
-}
-
-/// A section that carries inertia, something else, or both.
-#[derive(Clone, Copy, Debug)]
-struct Place {
-    at: f64,
-    /// Length of beam whose inertia is lumped there.
-    weight: f64,
-}
-
 impl<S: Scalar> Beam<S> {
-    /// The beam of an entry with additional stations at the arc lengths `marks` (m). Checked: as by [`BeamEntry::check`], marks on the beam.
-    pub fn new(entry: &BeamEntry<S>, marks: &[f64]) -> Result<Self> {
-        entry.check()?;
-        for &mark in marks {
-            entry.check_place("at", mark)?;
-        }
-        let profile = Profile::new(entry);
-        match entry.level {
-            Level::Rigid => Self::segmented(entry, &profile, (&[], 1), marks),
-            Level::Lumped(n) => Self::segmented(entry, &profile, (&entry.deforms, n), marks),
-            _ => Self::smooth(entry, &profile, marks),
-        }
-    }
-
-    /// A beam whose strain or deflection is interpolated.
-    fn smooth(entry: &BeamEntry<S>, profile: &Profile<S>, marks: &[f64]) -> Result<Self> {
-        let field = |&component| Ok(Field { component, basis: basis(entry.level, component, entry.length)? });
-        let mut list = entry.deforms.iter().map(field).collect::<Result<Vec<_>>>()?;
-        let (interpolated, points) = match entry.level {
-            Level::Strain(n) => (Interpolated::Strain, n + STRAIN_STATIONS),
-            Level::Elements(_) => (Interpolated::Strain, ELEMENT_STATIONS),
-            Level::Hermite(_) => (Interpolated::Deflection, ELEMENT_STATIONS),
-            Level::Modal(count) => {
-                list = modal(profile, list, count)?;
-                (Interpolated::Deflection, 2 * count + STRAIN_STATIONS)
-            }
-            _ => (Interpolated::Deflection, list.iter().map(|field| field.basis.points()).max().unwrap_or(1)),
-        };
-        let fields = Fields::new(interpolated, list);
-        let rule = profile.rule(points, &fields.breaks());
-        let (places, marks) = merged(rule.iter().map(|at| Place { at: at.place, weight: at.weight }).collect(), marks);
-        let at: Vec<f64> = places.iter().map(|place| place.at).collect();
-        let axis = match interpolated {
-            Interpolated::Deflection => Axis::Deflection(DeflectionAxis::new(&fields, &at)),
-            Interpolated::Strain => {
-                PlaneAxis::new(&fields, &at).map_or_else(|| Axis::Space(SpaceAxis::new(&fields, &at)), Axis::Plane)
-            }
-        };
-        let inertia = places.iter().map(|place| profile.slice(place.at, place.weight)).collect::<Result<_>>()?;
-        let stiffness = fields.stiffness(profile)?;
-        let groups = groups(|component| {
-            (0..fields.len()).filter(|&k| fields.components[k] == component as usize).collect::<Vec<_>>()
-        });
-        let beam = Self { axis, map: Map::Fields(fields), inertia, marks, stiffness, damping: Vec::new() };
-        beam.damped(entry, &groups)
-    }
-
-    /// A beam of rigid segments, or a rigid one.
-    fn segmented(
-        entry: &BeamEntry<S>,
-        profile: &Profile<S>,
-        (components, segments): (&[Component], usize),
-        marks: &[f64],
-    ) -> Result<Self> {
-        let middles = LumpedAxis::middles(components, segments, entry.length);
-        let (places, marks) = merged(middles.iter().map(|&at| Place { at, weight: 1.0 }).collect(), marks);
-        let at: Vec<f64> = places.iter().map(|place| place.at).collect();
-        let axis = LumpedAxis::new(components, segments, entry.length, &at);
-        let whole = |place: &Place| match place.weight {
-            0.0 => Ok(SpatialInertia::zero()),
-            _ => LumpedAxis::segment(profile, place.at, segments),
-        };
-        let inertia = places.iter().map(whole).collect::<Result<_>>()?;
-        let (stiffness, each) = (axis.stiffness(profile)?, components.len());
-        let groups =
-            groups(|component| (0..axis.len()).filter(|&k| components[k % each] == component).collect::<Vec<_>>());
-        let map = Map::Springs(axis.clone());
-        let beam = Self { axis: Axis::Lumped(axis), map, inertia, marks, stiffness, damping: Vec::new() };
-        beam.damped(entry, &groups)
-    }
-
-    fn damped(mut self, entry: &BeamEntry<S>, groups: &[Vec<usize>]) -> Result<Self> {
-        self.damping = damping(entry, &self.stiffness, || self.mass(), groups)?;
-        Ok(self)
-    }
-
     /// How many elastic coordinates there are.
     pub fn len(&self) -> usize {
         match &self.map {
@@ -268,27 +160,4 @@ impl<S: Scalar> Beam<S> {
         let values = |matrix: &[S]| DMatrix::from_row_iterator(self.len(), self.len(), matrix.iter().map(Scalar::re));
         eigen::modes(&values(&self.stiffness), &values(&self.mass()))
     }
-}
-
-/// Coordinates that couple in a straight beam at rest: each bending with the shear of its plane.
-fn groups(of: impl Fn(Component) -> Vec<usize>) -> [Vec<usize>; 4] {
-    let both = |bending, shear| [of(bending), of(shear)].concat();
-    [
-        both(Component::BendingX, Component::ShearY),
-        both(Component::BendingY, Component::ShearX),
-        of(Component::Torsion),
-        of(Component::Extension),
-    ]
-}
-
-/// Stations and marks, root to tip, and the place of each mark in the list.
-fn merged(mut places: Vec<Place>, marks: &[f64]) -> (Vec<Place>, Vec<usize>) {
-    for &at in marks {
-        if !places.iter().any(|place| place.at == at) {
-            places.push(Place { at, weight: 0.0 });
-        }
-    }
-    places.sort_by(|a, b| a.at.total_cmp(&b.at));
-    let marks = marks.iter().map(|&at| places.iter().position(|place| place.at == at).unwrap_or(0)).collect();
-    (places, marks)
 }

@@ -4,8 +4,8 @@
 //! `s = [theta; v]`, its strain the screw `e = s' + [0; k x theta]`, its wrench `W = K e` with
 //! `K = diag(EJx, EJy, GJ, ax GA, ay GA, EA)`, its inertia per length `rho diag(Jx, Jy, J, A, A, A)`.
 //!
-//! [`flexible`] is the beam of a machine, over the number type of its parameters: the same sums for every level, only the map from
-//! coordinates to sections differs ([`strain`], [`deflection`], [`lumped`]).
+//! [`Beam`] is the beam of a machine, over the number type of its parameters: the same sums for every level, only the map from
+//! coordinates to sections differs (interpolated strain, interpolated deflection, rigid segments with springs).
 //! [`linear`] interpolates the deflection: constant matrices, small deflection, stiffening by the second-order shortening.
 //! [`strain`] interpolates the strain and integrates the pose along the axis: exact at any deflection, in space, in a tree.
 //! [`two_node`] is an independent finite element in absolute coordinates that checks them at large deflection.
@@ -17,12 +17,14 @@
 
 pub mod basis;
 mod check;
+mod construct;
 mod damping;
 mod deflection;
 pub mod eigen;
 mod entry;
 mod fields;
 mod flexible;
+mod gauge;
 pub mod linear;
 mod lumped;
 mod motion;
@@ -36,7 +38,8 @@ pub mod two_node;
 
 pub use basis::Basis;
 pub use entry::{BeamEntry, Component, DampingEntry, Level, SectionEntry};
-pub use flexible::{Beam, Gauge};
+pub use flexible::Beam;
+pub use gauge::Gauge;
 pub use motion::{SectionMotion, Sections};
 pub use section::{Material, Section};
 pub use shape::{Properties, Shape};

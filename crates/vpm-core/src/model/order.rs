@@ -58,11 +58,16 @@ impl Hanging<'_> {
     fn ring(&self, from: Part, steps: usize) -> Error {
         let down = |part: Part| self.below(part).unwrap_or(part);
         let start = (0..steps).fold(from, |part, _| down(part));
-        let (mut names, mut part) = (vec![self.entry(start).0.to_owned()], down(start));
-        while part != start {
-            names.push(self.entry(part).0.to_owned());
-            part = down(part);
+        let mut ring = vec![start];
+        while down(ring[ring.len() - 1]) != start {
+            ring.push(down(ring[ring.len() - 1]));
         }
-        Error::Loop { names }
+        // Begins with the body that comes first, so that the message does not depend on the way in.
+        let first = (0..ring.len()).min_by_key(|&k| match ring[k] {
+            Part::Body(number) => (0, number),
+            Part::Beam(number) => (1, number),
+        });
+        ring.rotate_left(first.unwrap_or(0));
+        Error::Loop { names: ring.into_iter().map(|part| self.entry(part).0.to_owned()).collect() }
     }
 }

@@ -2,8 +2,10 @@
 
 #![allow(dead_code, reason = "each test uses some of them")]
 
+use serde_json::{Value, json};
 use vpm_core::beam::{BeamEntry, Component, DampingEntry, Level, Material, SectionEntry, Shape};
 use vpm_core::body::{Body, Inertia, PointMass, Site, Weld};
+use vpm_core::description::Description;
 use vpm_core::joint::{Joint, JointKind};
 use vpm_core::line::{Line, LineEnd, LinePart};
 use vpm_core::model::{Model, Parts};
@@ -122,4 +124,69 @@ pub fn everything(seed: u64) -> Parts<f64> {
         parts.markers.push(Marker { name: name.to_owned(), on, translation, rotation });
     }
     parts
+}
+
+/// The description of some parts, every number a parameter of its own; `change` may add to it.
+pub fn description(parts: &Parts<f64>, change: impl FnOnce(&mut Value)) -> Description {
+    let mut numbers = Numbers::default();
+    let bodies: Vec<_> = parts.bodies.iter().map(|body| json!(body.map(&mut numbers.of(&body.name)))).collect();
+    let welds: Vec<_> = parts.welds.iter().map(|weld| json!(weld.map(&mut numbers.of(&weld.name)))).collect();
+    let lines: Vec<_> = parts.lines.iter().map(|line| json!(line.map(&mut numbers.of(&line.name)))).collect();
+    let beams: Vec<_> = parts
+        .beams
+        .iter()
+        .map(|beam| {
+            let indexed = beam.map(&mut numbers.of(&beam.name));
+            BeamEntry::serialize(&indexed, serde_json::value::Serializer).unwrap()
+        })
+        .collect();
+    let mut effects = Vec::new();
+    for point in &parts.point_masses {
+        let mut number = numbers.of("payload");
+        let (mass, position) = (number(&point.mass), point.position.each_ref().map(&mut number));
+        let (site, place) = match point.on {
+            Site::Body(body) => ("body", body),
+            Site::Tip(beam) => ("beam", beam),
+        };
+        effects.push(json!({"type": "payload", site: place, "mass": mass, "position": position}));
+    }
+    let mut content = json!({"gravity": parts.gravity, "bodies": bodies, "welds": welds, "beams": beams, "lines": lines,
+        "markers": parts.markers, "gauges": parts.gauges, "effects": effects,
+        "parameters": numbers.values, "parameter_names": numbers.names});
+    change(&mut content);
+    Description::from_json(&content.to_string()).unwrap()
+}
+
+/// Adds a parameter to a description and returns its place.
+pub fn parameter(content: &mut Value, name: &str, value: f64) -> usize {
+    content["parameter_names"].as_array_mut().unwrap().push(json!(name));
+    let values = content["parameters"].as_array_mut().unwrap();
+    values.push(json!(value));
+    values.len() - 1
+}
+
+/// Adds a part to a list of a description.
+pub fn push(content: &mut Value, list: &str, part: Value) {
+    if content[list].is_null() {
+        content[list] = json!([]);
+    }
+    content[list].as_array_mut().unwrap().push(part);
+}
+
+#[derive(Default)]
+struct Numbers {
+    values: Vec<f64>,
+    names: Vec<String>,
+}
+
+impl Numbers {
+    /// Makes every number of the part `name` a parameter.
+    fn of<'a>(&'a mut self, name: &str) -> impl FnMut(&f64) -> usize + use<'a> {
+        let name = name.to_owned();
+        move |&value| {
+            self.names.push(format!("{name}.{}", self.values.len()));
+            self.values.push(value);
+            self.values.len() - 1
+        }
+    }
 }

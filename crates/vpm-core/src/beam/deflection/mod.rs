@@ -17,7 +17,7 @@ use super::motion::{SectionMotion, Sections};
 use super::strain::rotation;
 use crate::scalar::{Dual, Scalar};
 use crate::spatial::{Matrix3, Pose, Twist, Vector3};
-use forms::{Form, Forms};
+use forms::{Forms, Second};
 
 /// The map from deflection coordinates to sections.
 #[derive(Clone, Debug)]
@@ -26,12 +26,10 @@ pub(super) struct DeflectionAxis {
     components: Vec<Component>,
     /// Arc length of each section in m.
     places: Vec<f64>,
-    /// Displacement and slope (of bending) or rotation (of torsion) per unit of each coordinate, section by section.
+    /// Displacement (of torsion: rotation) and its slope per unit of each coordinate, section by section, and at the tip.
     rows: Vec<[f64; 2]>,
-    /// Which quadratic forms there are.
-    targets: Vec<Form>,
-    /// Their symmetric matrices, section by section, form by form, row by row.
-    matrices: Vec<f64>,
+    /// What is quadratic in the coordinates.
+    forms: Forms,
 }
 
 /// Rotation vector and displacement as functions of time: value, rate, and second rate at constant coordinate rates.
@@ -46,23 +44,26 @@ impl DeflectionAxis {
     pub fn new(fields: &Fields, places: &[f64]) -> Self {
         let components: Vec<Component> = fields.components.iter().map(|&component| Component::ALL[component]).collect();
         let mut rows = Vec::with_capacity(places.len() * components.len());
-        for &place in places {
+        let tip = fields.list.first().map(|field| field.basis.length());
+        for &place in places.iter().chain(&tip) {
             let (values, slopes) = (fields.row(place, |_| 0), fields.row(place, |_| 1));
             rows.extend(values.into_iter().zip(slopes).map(|(value, slope)| [value, slope]));
         }
-        let forms = Forms::new(fields, places);
-        Self { components, places: places.to_vec(), rows, targets: forms.targets, matrices: forms.matrices }
+        Self { components, places: places.to_vec(), rows, forms: Forms::new(fields, places) }
     }
 
     /// Numbers of partial sums that a motion needs.
     pub fn scratch(&self) -> usize {
-        self.targets.len() * self.components.len()
+        self.forms.slopes()
     }
 
     /// Poses, twists, columns and accelerations of all sections.
     pub fn motion<S: Scalar>(&self, q: &[S], v: &[S], out: &mut Sections<S>) {
+        out.scratch.fill(S::zero());
+        let mut second = Second::zero();
         for station in 0..self.places.len() {
-            let screw = self.screw(station, (q, v), &mut out.scratch);
+            self.forms.advance(station, (q, v), &mut second, &mut out.scratch);
+            let screw = self.screw(station, (q, v), &second);
             self.section(station, &screw, out);
         }
     }
@@ -74,9 +75,10 @@ impl DeflectionAxis {
         for rows in self.rows.chunks_exact(n) {
             let mut slope = [S::zero(); 2];
             for ((&component, &[_, entry]), &q) in self.components.iter().zip(rows).zip(q) {
-                if component.bends() {
-                    let across = usize::from(component == Component::BendingX);
-                    slope[across] += q * entry;
+                match component {
+                    Component::BendingY | Component::ShearX => slope[0] += q * entry,
+                    Component::BendingX | Component::ShearY => slope[1] += q * entry,
+                    Component::Torsion | Component::Extension => {}
                 }
             }
             most = most.max(slope[0] * slope[0] + slope[1] * slope[1]);
@@ -98,10 +100,10 @@ impl DeflectionAxis {
         }
     }
 
-    /// Rotation vector and displacement of a section; `scratch` then holds the derivatives of the quadratic forms.
-    fn screw<S: Scalar>(&self, station: usize, (q, v): (&[S], &[S]), scratch: &mut [S]) -> Screw<S> {
-        let (n, zero) = (self.components.len(), S::zero());
-        let (mut value, mut rate, mut second) = ([zero; 6], [zero; 6], [zero; 6]);
+    /// Rotation vector and displacement of a section.
+    fn screw<S: Scalar>(&self, station: usize, (q, v): (&[S], &[S]), forms: &Second<S>) -> Screw<S> {
+        let n = self.components.len();
+        let Second { mut value, mut rate, change: second } = *forms;
         for (k, &component) in self.components.iter().enumerate() {
             for (target, entry) in Self::linear(component, self.rows[station * n + k]) {
                 value[target] += q[k] * entry;
@@ -109,22 +111,6 @@ impl DeflectionAxis {
             }
         }
         value[5] += S::from_f64(self.places[station]);
-        let size = n * n * self.targets.len();
-        let matrices = self.matrices[station * size..(station + 1) * size].chunks_exact(n * n);
-        for ((form, matrix), slopes) in self.targets.iter().zip(matrices).zip(scratch.chunks_exact_mut(n)) {
-            for (i, (row, slope)) in matrix.chunks_exact(n).zip(&mut *slopes).enumerate() {
-                *slope = zero;
-                let Some(partners) = form.partners[i].clone() else { continue };
-                let mut change = zero;
-                for j in partners {
-                    *slope += q[j] * row[j];
-                    change += v[j] * row[j];
-                }
-                value[form.target] += q[i] * *slope * 0.5;
-                rate[form.target] += v[i] * *slope;
-                second[form.target] += v[i] * change;
-            }
-        }
         Screw { value, rate, second }
     }
 
@@ -143,17 +129,17 @@ impl DeflectionAxis {
             acceleration: Twist::new(turning[1], change),
         };
         let rows = Rows { angular: tangent.columns, linear: turn.transpose().columns };
-        for (k, (&component, column)) in
-            self.components.iter().zip(&mut out.columns[station * n..(station + 1) * n]).enumerate()
+        let columns = &mut out.columns[station * n..(station + 1) * n];
+        for ((&component, column), &entries) in self.components.iter().zip(&mut *columns).zip(&self.rows[station * n..])
         {
             *column = Twist::zero();
-            for (target, entry) in Self::linear(component, self.rows[station * n + k]) {
+            for (target, entry) in Self::linear(component, entries) {
                 rows.add(column, target, S::from_f64(entry));
             }
-            for (form, slopes) in self.targets.iter().zip(out.scratch.chunks_exact(n)) {
-                if form.partners[k].is_some() {
-                    rows.add(column, form.target, slopes[k]);
-                }
+        }
+        for (target, first, slopes) in self.forms.rows(&out.scratch) {
+            for (column, &slope) in columns[first..].iter_mut().zip(slopes) {
+                rows.add(column, target, slope);
             }
         }
     }

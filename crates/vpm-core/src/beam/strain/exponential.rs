@@ -24,9 +24,9 @@ const fn series_of(first: usize, factor: f64, slope: f64) -> [f64; TERMS] {
 
 /// `sin(phi) / phi`, `(1 - cos(phi)) / phi^2` and `(phi - sin(phi)) / phi^3` in powers of `x = phi^2`.
 const TURN: [[f64; TERMS]; 3] = [series_of(1, 1.0, 0.0), series_of(2, 1.0, 0.0), series_of(3, 1.0, 0.0)];
-/// The factors of `ad .. ad^4` in [`Tangent`] in powers of `x = phi^2`, their signs included.
+/// `b = (1 - cos(phi)) / phi^2`, `c = (phi - sin(phi)) / phi^3` and their derivatives by `x = phi^2`, in powers of x.
 const TANGENT: [[f64; TERMS]; 4] =
-    [series_of(2, -1.0, 1.0), series_of(3, 1.0, -1.0), series_of(4, -1.0, -1.0), series_of(5, 1.0, 1.0)];
+    [series_of(2, 1.0, 0.0), series_of(3, 1.0, 0.0), series_of(4, -1.0, -1.0), series_of(5, -1.0, -1.0)];
 
 /// Power series at `x`, up to about 40; few terms do for the small turns of a piece of a beam.
 fn powers<S: Scalar, const N: usize>(series: &[[f64; TERMS]; N], x: S) -> [S; N] {
@@ -76,29 +76,40 @@ pub(in crate::beam) fn rotation<S: Scalar>(w: Vector3<S>) -> (Matrix3<S>, Matrix
 
 /// The derivative of [`exponential`] at a twist, prepared for many rates.
 ///
-/// Law: `sum_k (-1)^k / (k + 1)! ad^k`, `ad = twist x` (Iserles et al. 2000, equation 2.46); because of
-/// `ad^5 = -2 phi^2 ad^3 - phi^4 ad` only four powers of `ad` remain (Selig 2005, "Geometric Fundamentals of Robotics", section 4.5),
-/// with factors that are power series in `phi^2`. Checked: against the derivative of [`exponential`].
+/// Law: `f(ad) = sum_k (-1)^k / (k + 1)! ad^k`, `ad = twist x` (Iserles et al. 2000, equation 2.46). With W and V the matrices of `w x`
+/// and `v x`, `ad = [W, 0; V, W]` multiplies like the dual number `W + eps V`, so that `f(ad) = [J, 0; Q, J]` with
+/// `J = f(W) = 1 - b W + c W^2` and Q its derivative along V. Checked: against the derivative of [`exponential`].
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Tangent<S> {
-    twist: Twist<S>,
-    factors: [S; 4],
+    /// J.
+    pub same: Matrix3<S>,
+    /// Q: what an angular rate gives to the linear part.
+    pub across: Matrix3<S>,
 }
 
 impl<S: Scalar> Tangent<S> {
     /// At `twist`.
     pub fn new(twist: Twist<S>) -> Self {
-        Self { twist, factors: powers(&TANGENT, twist.angular.dot(twist.angular)) }
+        let (w, v) = (twist.angular, twist.linear);
+        let x = w.dot(w);
+        let [b, c, b_slope, c_slope] = powers(&TANGENT, x);
+        let s = w.dot(v) * 2.0;
+        // Q = -b V - b' s W + c (W V + V W) + c' s W^2, with W V + V W = w v^T + v w^T - s 1 and W^2 = w w^T - x 1.
+        let skew = v * b + w * (b_slope * s);
+        let (right, left) = (v * c + w * (c_slope * s), w * c);
+        let diagonal = c * s + c_slope * s * x;
+        let column = |right_k: S, left_k: S| w * right_k + v * left_k;
+        let mut columns = [column(right.x, left.x), column(right.y, left.y), column(right.z, left.z)];
+        columns[0] += Vector3::new(-diagonal, -skew.z, skew.y);
+        columns[1] += Vector3::new(skew.z, -diagonal, -skew.x);
+        columns[2] += Vector3::new(-skew.y, skew.x, -diagonal);
+        Self { same: turn(w, -b, c), across: Matrix3 { columns } }
     }
 
     /// The twist, in the moved body's axes, for a `rate` of the exponent.
+    #[inline]
     pub fn apply(&self, rate: Twist<S>) -> Twist<S> {
-        let (mut power, mut sum) = (rate, rate);
-        for factor in self.factors {
-            power = self.twist.cross(power);
-            sum += power * factor;
-        }
-        sum
+        Twist::new(self.same * rate.angular, self.same * rate.linear + self.across * rate.angular)
     }
 }
 

@@ -4,7 +4,7 @@ use crate::beam::fields::Fields;
 use crate::beam::motion::Sections;
 use crate::beam::quadrature::gauss;
 use crate::scalar::{Dual, Scalar};
-use crate::spatial::{Pose, Twist, Vector3};
+use crate::spatial::{Matrix3, Pose, Twist, Vector3};
 
 use super::exponential::{Tangent, exponential};
 
@@ -75,13 +75,14 @@ impl SpaceAxis {
         let rate = whole_rate + whole_rate.cross(moment) + whole.cross(moment_rate);
         let second = whole_rate.cross(moment_rate) * S::from_f64(2.0);
         // The exponent as a function of time: its rate and the rate of that make twist and acceleration.
-        let moving = Tangent::new(along(screw, rate)).apply(along(rate, second));
+        let tangent = Tangent::new(along(screw, rate));
+        let moving = tangent.apply(along(rate, second));
         Crossing {
             pose: exponential(screw),
             twist: part(moving, |number| number.value),
             acceleration: part(moving, |number| number.gradient[0]),
             moments: [whole, moment],
-            tangent: Tangent::new(screw),
+            tangent: Tangent { same: value(tangent.same), across: value(tangent.across) },
         }
     }
 
@@ -157,6 +158,11 @@ fn along<S: Scalar>(value: Twist<S>, rate: Twist<S>) -> Twist<Dual<S, 1>> {
         Vector3::new(dual(v.x, r.x), dual(v.y, r.y), dual(v.z, r.z))
     };
     Twist::new(join(value.angular, rate.angular), join(value.linear, rate.linear))
+}
+
+/// A matrix without its rate.
+fn value<S: Scalar>(matrix: Matrix3<Dual<S, 1>>) -> Matrix3<S> {
+    Matrix3 { columns: matrix.columns.map(|column| Vector3::from(column.to_array().map(|number| number.value))) }
 }
 
 /// One part of a twist over dual numbers.

@@ -1,0 +1,127 @@
+//! From the entry of a beam to its map, its stations and its constant matrices.
+
+use super::damping::damping;
+use super::deflection::{DeflectionAxis, modal};
+use super::entry::{BeamEntry, Component, Level};
+use super::fields::{Field, Fields, Interpolated, basis};
+use super::flexible::{Axis, Beam, Map};
+use super::lumped::LumpedAxis;
+use super::profile::Profile;
+use super::strain::{PlaneAxis, SpaceAxis};
+use crate::error::Result;
+use crate::scalar::Scalar;
+use crate::spatial::SpatialInertia;
+
+/// Stations of a smooth strain beam beyond the coefficients of a component.
+const STRAIN_STATIONS: usize = 4;
+/// Stations on each element.
+const ELEMENT_STATIONS: usize = 3;
+
+/// A section that carries inertia, something else, or both.
+#[derive(Clone, Copy, Debug)]
+struct Place {
+    at: f64,
+    /// Length of beam whose inertia is lumped there.
+    weight: f64,
+}
+
+impl<S: Scalar> Beam<S> {
+    /// The beam of an entry with additional stations at the arc lengths `marks` (m). Checked: as by [`BeamEntry::check`], marks on the beam.
+    pub fn new(entry: &BeamEntry<S>, marks: &[f64]) -> Result<Self> {
+        entry.check()?;
+        for &mark in marks {
+            entry.check_place("at", mark)?;
+        }
+        let profile = Profile::new(entry);
+        match entry.level {
+            Level::Rigid => Self::segmented(entry, &profile, (&[], 1), marks),
+            Level::Lumped(n) => Self::segmented(entry, &profile, (&entry.deforms, n), marks),
+            _ => Self::smooth(entry, &profile, marks),
+        }
+    }
+
+    /// A beam whose strain or deflection is interpolated.
+    fn smooth(entry: &BeamEntry<S>, profile: &Profile<S>, marks: &[f64]) -> Result<Self> {
+        let field = |&component| Ok(Field { component, basis: basis(entry.level, component, entry.length)? });
+        let mut list = entry.deforms.iter().map(field).collect::<Result<Vec<_>>>()?;
+        let (interpolated, points) = match entry.level {
+            Level::Strain(n) => (Interpolated::Strain, n + STRAIN_STATIONS),
+            Level::Elements(_) => (Interpolated::Strain, ELEMENT_STATIONS),
+            Level::Hermite(_) => (Interpolated::Deflection, ELEMENT_STATIONS),
+            Level::Modal(count) => {
+                list = modal(profile, list, count)?;
+                (Interpolated::Deflection, 2 * count + STRAIN_STATIONS)
+            }
+            _ => (Interpolated::Deflection, list.iter().map(|field| field.basis.points()).max().unwrap_or(1)),
+        };
+        let fields = Fields::new(interpolated, list);
+        let rule = profile.rule(points, &fields.breaks());
+        let (places, marks) = merged(rule.iter().map(|at| Place { at: at.place, weight: at.weight }).collect(), marks);
+        let at: Vec<f64> = places.iter().map(|place| place.at).collect();
+        let axis = match interpolated {
+            Interpolated::Deflection => Axis::Deflection(DeflectionAxis::new(&fields, &at)),
+            Interpolated::Strain => {
+                PlaneAxis::new(&fields, &at).map_or_else(|| Axis::Space(SpaceAxis::new(&fields, &at)), Axis::Plane)
+            }
+        };
+        let inertia = places.iter().map(|place| profile.slice(place.at, place.weight)).collect::<Result<_>>()?;
+        let stiffness = fields.stiffness(profile)?;
+        let groups = groups(|component| {
+            (0..fields.len()).filter(|&k| fields.components[k] == component as usize).collect::<Vec<_>>()
+        });
+        let beam = Self { axis, map: Map::Fields(fields), inertia, marks, stiffness, damping: Vec::new() };
+        beam.damped(entry, &groups)
+    }
+
+    /// A beam of rigid segments, or a rigid one.
+    fn segmented(
+        entry: &BeamEntry<S>,
+        profile: &Profile<S>,
+        (components, segments): (&[Component], usize),
+        marks: &[f64],
+    ) -> Result<Self> {
+        let middles = LumpedAxis::middles(components, segments, entry.length);
+        let (places, marks) = merged(middles.iter().map(|&at| Place { at, weight: 1.0 }).collect(), marks);
+        let at: Vec<f64> = places.iter().map(|place| place.at).collect();
+        let axis = LumpedAxis::new(components, segments, entry.length, &at);
+        let whole = |place: &Place| match place.weight {
+            0.0 => Ok(SpatialInertia::zero()),
+            _ => LumpedAxis::segment(profile, place.at, segments),
+        };
+        let inertia = places.iter().map(whole).collect::<Result<_>>()?;
+        let (stiffness, each) = (axis.stiffness(profile)?, components.len());
+        let groups =
+            groups(|component| (0..axis.len()).filter(|&k| components[k % each] == component).collect::<Vec<_>>());
+        let map = Map::Springs(axis.clone());
+        let beam = Self { axis: Axis::Lumped(axis), map, inertia, marks, stiffness, damping: Vec::new() };
+        beam.damped(entry, &groups)
+    }
+
+    fn damped(mut self, entry: &BeamEntry<S>, groups: &[Vec<usize>]) -> Result<Self> {
+        self.damping = damping(entry, &self.stiffness, || self.mass(), groups)?;
+        Ok(self)
+    }
+}
+
+/// Coordinates that couple in a straight beam at rest: each bending with the shear of its plane.
+fn groups(of: impl Fn(Component) -> Vec<usize>) -> [Vec<usize>; 4] {
+    let both = |bending, shear| [of(bending), of(shear)].concat();
+    [
+        both(Component::BendingX, Component::ShearY),
+        both(Component::BendingY, Component::ShearX),
+        of(Component::Torsion),
+        of(Component::Extension),
+    ]
+}
+
+/// Stations and marks, root to tip, and the place of each mark in the list.
+fn merged(mut places: Vec<Place>, marks: &[f64]) -> (Vec<Place>, Vec<usize>) {
+    for &at in marks {
+        if !places.iter().any(|place| place.at == at) {
+            places.push(Place { at, weight: 0.0 });
+        }
+    }
+    places.sort_by(|a, b| a.at.total_cmp(&b.at));
+    let marks = marks.iter().map(|&at| places.iter().position(|place| place.at == at).unwrap_or(0)).collect();
+    (places, marks)
+}
