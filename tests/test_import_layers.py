@@ -17,7 +17,7 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGE = ROOT / "python" / "vpm"
 
-OPTIONAL = {"h5py", "jinja2", "matplotlib", "pandas", "pyarrow", "rosbags"}
+OPTIONAL = {"control", "h5py", "jinja2", "matplotlib", "pandas", "pyarrow", "rosbags"}
 """Libraries of the extras: a plain install has none of them."""
 
 SLOW = OPTIONAL | {"rich", "scipy.signal", "scipy.stats", "typer"}

@@ -180,9 +180,8 @@ def test_every_parameter_stands_in_the_description_once(content: dict[str, Any])
         expected = Rotation.from_euler("xyz", entry["rotation"]).as_matrix()  # extrinsic: about fixed axes
         assert np.reshape(body["joint"]["rotation"], (3, 3)) == pytest.approx(expected, abs=1e-12)
     for actuator in described["actuators"]:
-        assert (
-            described["bodies"][actuator["on"]["joint"]]["joint"]["name"] == content["actuators"][actuator["name"]]["joint"]
-        )
+        driven = described["bodies"][actuator["on"]["joint"]]["joint"]["name"]
+        assert driven == content["actuators"][actuator["name"]]["joint"]
 
 
 @given(machines(), st.data())
@@ -419,7 +418,7 @@ REFUSALS = [
     # unknown and missing keys
     ("mass = {", "mas = {", "bodies.carriage.mas", 'did you mean "mass"?'),
     ("gravity", "gravty", "gravty", 'did you mean "gravity"?'),
-    (END, "[foo]\n[channels]", "foo", "actuators, bodies, channels"),
+    (END, "[foo]\n[channels]", "foo", "actuators, beams, bodies, channels"),
     ("position_gain", "positiongain", "controllers.servo.positiongain", 'did you mean "position_gain"?'),
     ("viscous =", "viscus =", "effects[0].viscus", 'did you mean "viscous"?'),
     ('"q_m", unit', '"q_m", scal = 1, unit', 'channels."axis.position".scal', 'did you mean "scale"?'),

@@ -9,6 +9,7 @@ Each arrow is a function of this module, each result one frozen object.
 
 from importlib.metadata import version
 
+from vpm.batch import Trial, simulate_batch
 from vpm.budget import BudgetReport, budget
 from vpm.catalogue import EFFECTS
 from vpm.compare import Comparison, compare
@@ -16,10 +17,12 @@ from vpm.discrepancy import Diagnosis, diagnose
 from vpm.errors import VpmError
 from vpm.experiment import Experiment
 from vpm.identify import Fit, identify
-from vpm.model import Model
+from vpm.linear import LinearModel
+from vpm.model import Dynamics, Model
 from vpm.report import Report, report, write_report
 from vpm.simplify import Ladder, simplify
 from vpm.simulate import Run, Setup, simulate
+from vpm.stepping import Simulation
 
 __version__ = version("vpm-dynamics")
 
@@ -28,13 +31,17 @@ __all__ = [
     "BudgetReport",
     "Comparison",
     "Diagnosis",
+    "Dynamics",
     "Experiment",
     "Fit",
     "Ladder",
+    "LinearModel",
     "Model",
     "Report",
     "Run",
     "Setup",
+    "Simulation",
+    "Trial",
     "VpmError",
     "__version__",
     "budget",
@@ -44,5 +51,6 @@ __all__ = [
     "report",
     "simplify",
     "simulate",
+    "simulate_batch",
     "write_report",
 ]

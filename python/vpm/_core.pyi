@@ -1,12 +1,12 @@
 """The compiled core of vpm: a machine as one object, arrays in and out."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["Diverged", "System"]
+__all__ = ["Diverged", "Dynamics", "Simulation", "System", "stop_when"]
 
 class Diverged(ArithmeticError):
     """A simulation left the finite numbers.
@@ -25,13 +25,89 @@ class Diverged(ArithmeticError):
     outputs: NDArray[np.float64]
     states: NDArray[np.float64]
 
+def stop_when(asked: Callable[[], bool] | None) -> None:
+    """Let long computations of the calling thread stop with ``KeyboardInterrupt`` when ``asked()`` is true.
+
+    Ctrl-C reaches Python's main thread only; this is how it tells the threads that work for it. None ends it.
+    """
+
+@final
+class Dynamics:
+    """Single evaluations of a machine with fixed parameters, as fast as the crossing into Python allows.
+
+    One-dimensional contiguous arrays of double precision are read where they are, others are converted first. n is
+    the number of coordinates. Raises ``ValueError`` for other sizes; numbers that are not finite give results that
+    are not finite.
+
+    Parameters
+    ----------
+    system : System
+    theta : array_like, shape (P,)
+    """
+
+    def __new__(cls, system: System, theta: ArrayLike) -> Dynamics: ...
+    def inverse_dynamics(
+        self, position: ArrayLike, velocity: ArrayLike, acceleration: ArrayLike
+    ) -> NDArray[np.float64]:
+        """Efforts (n,) that accelerations (n,) need: ``M a + h - effects``; what no actuator gives has to be zero."""
+    def forward_dynamics(self, position: ArrayLike, velocity: ArrayLike, effort: ArrayLike) -> NDArray[np.float64]:
+        """Accelerations (n,) under efforts (n,), with all effects."""
+    def mass_matrix(self, position: ArrayLike) -> NDArray[np.float64]:
+        """Mass matrix (n, n), payloads included."""
+    def energy(self, position: ArrayLike, velocity: ArrayLike) -> tuple[float, float]:
+        """Kinetic and potential energy in J: of bodies in gravity, and of effects that have a potential."""
+    def jacobian(self, position: ArrayLike, marker: int) -> NDArray[np.float64]:
+        """Jacobian (6, n) of a marker by number: angular velocity, then velocity of its origin, in world axes."""
+
+@final
+class Simulation:
+    """A simulation that goes on one sample at a time.
+
+    Parameters
+    ----------
+    system : System
+    theta : array_like, shape (P,)
+    state : array_like, shape (n_states,)
+    time_step : float
+        Time between samples, s.
+    substeps : int
+    integrator : str
+    """
+
+    def __new__(
+        cls,
+        system: System,
+        theta: ArrayLike,
+        state: ArrayLike,
+        time_step: float,
+        substeps: int,
+        integrator: str,
+    ) -> Simulation: ...
+    @property
+    def time(self) -> float:
+        """Time since the beginning, s."""
+    @property
+    def state(self) -> NDArray[np.float64]:
+        """State now (n_states,); a copy."""
+    @property
+    def outputs(self) -> NDArray[np.float64]:
+        """What the sensors show now (n_outputs,); a copy."""
+    def step(self, inputs: ArrayLike) -> NDArray[np.float64]:
+        """Hold ``inputs`` (n_inputs,) for one sample; outputs (n_outputs,) at its end, with the inputs still held."""
+    def run(self, inputs: ArrayLike) -> NDArray[np.float64]:
+        """A step for each row of ``inputs`` (N, n_inputs); outputs (N, n_outputs)."""
+    def reset(self, state: ArrayLike) -> None:
+        """Begin again at time zero in ``state`` (n_states,), with nothing remembered."""
+
 @final
 class System:
     """A machine: rigid tree, effects, actuators, sensors and controllers over a flat parameter vector theta.
 
     N samples, n joints, m actuators, P parameters, k requested sensitivities; all numbers SI. The state is
-    ``[positions, velocities, one state per actuator with lag]``, the outputs are position, velocity, acceleration
-    and effort of each joint, then command and force of each actuator; a sensor replaces the channel it measures.
+    ``[coordinates, their rates, one state per actuator with lag]``; coordinates are the joints', then the beams'. The
+    outputs are position, velocity, acceleration and effort of each joint, command and force of each actuator, length,
+    rate and force of each line, strain of each gauge, origin and rotation vector of each marker; a sensor replaces
+    the channel it measures.
     Every function raises ``ValueError``, in one sentence with the repair, for wrong shapes, numbers that are not
     finite, and parameters for which a law is not defined. Ctrl-C raises ``KeyboardInterrupt``.
 
@@ -46,6 +122,15 @@ class System:
     def n_joints(self) -> int:
         """Number of joints n."""
     @property
+    def n_coordinates(self) -> int:
+        """Number of coordinates: joints, then the elastic coordinates of the beams."""
+    @property
+    def n_elastic(self) -> int:
+        """Number of elastic coordinates."""
+    @property
+    def n_beams(self) -> int:
+        """Number of beams."""
+    @property
     def n_states(self) -> int:
         """Length of the state."""
     @property
@@ -56,7 +141,7 @@ class System:
         """Number of inputs: one command per actuator."""
     @property
     def n_outputs(self) -> int:
-        """Number of output channels: 4 n + 2 m."""
+        """Number of output channels."""
     @property
     def n_parameters(self) -> int:
         """Length P of theta."""
@@ -139,11 +224,55 @@ class System:
     def forward_dynamics(
         self, theta: ArrayLike, position: ArrayLike, velocity: ArrayLike, effort: ArrayLike
     ) -> NDArray[np.float64]:
-        """Accelerations (n,) of the rigid tree with its effects under ``effort`` (n,) on the joints."""
+        """Accelerations (n_coordinates,) with all effects under ``effort`` (n,) on the joints."""
     def mass_matrix(self, theta: ArrayLike, position: ArrayLike) -> NDArray[np.float64]:
-        """Mass matrix (n, n), payloads included."""
+        """Mass matrix over all coordinates, payloads included."""
     def energy(self, theta: ArrayLike, position: ArrayLike, velocity: ArrayLike) -> tuple[float, float]:
         """Kinetic and potential energy in J: of bodies in gravity, and of effects that have a potential."""
+    def linearize(
+        self, theta: ArrayLike, state: ArrayLike, inputs: ArrayLike
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Exact derivatives at ``state`` (n_states,) under standing commands ``inputs`` (m,).
+
+        Delays pass their input unchanged; dead zones and saturations have the slope at the command.
+
+        Returns
+        -------
+        A, B, C, D : ndarray, shapes (nx, nx), (nx, m), (ny, nx), (ny, m)
+            Of the rates and of all outputs, sensors' gains included.
+        """
+    def simulate_prescribed(
+        self,
+        theta: ArrayLike,
+        position: ArrayLike,
+        velocity: ArrayLike,
+        acceleration: ArrayLike,
+        time_step: float,
+        substeps: int,
+        integrator: str,
+        sensitivities: Sequence[int] = ...,
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Joints follow a measured motion (N, n), beams respond from rest; position sensors are undone.
+
+        Returns
+        -------
+        outputs, states, jacobian : ndarray
+            As in `simulate`; ``effort`` of a joint is the effort that the motion needs.
+        """
+    def equilibrium(self, theta: ArrayLike, position: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Coordinates (n_coordinates,) at rest with the joints held at ``position``, and the holding efforts (n,)."""
+    def natural_frequencies(self, theta: ArrayLike, position: ArrayLike) -> NDArray[np.float64]:
+        """Natural frequencies (n_elastic,) in Hz with the joints locked at ``position`` (n,), slowest first.
+
+        A negative one is the rate of growth of a beam that buckles.
+        """
+    def slopes(self, theta: ArrayLike, states: ArrayLike) -> NDArray[np.float64]:
+        """Largest slope (N, n_beams) in rad of each beam; not a number where the kinematics are exact."""
+    @property
+    def slope_limit(self) -> float:
+        """Slope in rad up to which the kinematics of small slopes are right within 1 %."""
+    def jacobian(self, theta: ArrayLike, position: ArrayLike, marker: int) -> NDArray[np.float64]:
+        """Jacobian (6, n_coordinates) of a marker by number: angular velocity, then velocity, in world axes."""
     def time_steps(
         self,
         theta: ArrayLike,

@@ -42,7 +42,12 @@ Cutoff = Annotated[
     float | None, typer.Option(help="Cut-off frequency of the motion filter, Hz; by default chosen from the record.")
 ]
 Mode = Annotated[
-    str, typer.Option(help="free_run, inverse_dynamics, restarts or closed_loop.", metavar="MODE", show_default=True)
+    str,
+    typer.Option(
+        help="free_run, inverse_dynamics, restarts, closed_loop or prescribed_motion.",
+        metavar="MODE",
+        show_default=True,
+    ),
 ]
 Integrator = Annotated[str, typer.Option(help="linearly_implicit, rosenbrock, rk4 or semi_implicit.")]
 Plot = Annotated[Path | None, typer.Option(help="Write the plot to this file (PNG, SVG or PDF).")]

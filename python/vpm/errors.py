@@ -128,6 +128,30 @@ class DivergedError(SimulationError):
         self.time = time
 
 
+class ValidityWarning(UserWarning):
+    """A simulation left the range in which a flexible link's kinematics are right.
+
+    Attributes
+    ----------
+    beam : str
+        The flexible link.
+    slope : float
+        Largest slope of its axis against the tangent at its root (rad).
+    time : float
+        When that was (s).
+    """
+
+    def __init__(self, beam: str, slope: float, time: float, limit: float, level: str) -> None:
+        super().__init__(
+            f"{beam} bends by {slope:.3g} rad at t = {time:.4g} s, but its level {level} is right within 1 % up to "
+            f"{limit:.3g} rad only; use a level that is exact at any deflection, such as "
+            f'model.at({{"{beam}": "strain(3)"}})'
+        )
+        self.beam = beam
+        self.slope = slope
+        self.time = time
+
+
 class MissingExtraError(VpmError, ImportError):
     """A feature needs a package that is an optional extra of vpm.
 

@@ -1,4 +1,4 @@
-"""Simulation of a log in four modes, each with its own question.
+"""Simulation of a log in five modes, each with its own question.
 
 ===================  =====================================================================================
 free_run             Given the measured commands, where does the machine go?
@@ -6,20 +6,25 @@ inverse_dynamics     Given the measured motion, what effort did it take?
 restarts             As free run, begun afresh from the measured state every horizon: for machines that
                      integrate or are unstable, whose free run drifts away for any error however small.
 closed_loop          Given the references, what do controller and machine do together?
+prescribed_motion    Given the measured motion of the joints, how do the flexible links respond: which strains,
+                     which efforts? The counterpart of inverse dynamics for machines with elastic coordinates.
 ===================  =====================================================================================
 """
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vpm.errors import DivergedError, ExperimentError, SimulationError
-from vpm.experiment import Experiment, motion, parallel_filter
+from vpm.errors import DivergedError, ExperimentError, SimulationError, ValidityWarning
+from vpm.experiment import Experiment, Motion, motion, parallel_filter
+from vpm.initial import initial_state as start
+from vpm.initial import joint_motion, measured_states
 from vpm.model import Model
 from vpm.results import Result
 
@@ -28,7 +33,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-MODES = ("free_run", "inverse_dynamics", "restarts", "closed_loop")
+MODES = ("free_run", "inverse_dynamics", "restarts", "closed_loop", "prescribed_motion")
 INTEGRATORS = ("linearly_implicit", "rosenbrock", "rk4", "semi_implicit")
 
 
@@ -39,8 +44,8 @@ class Setup:
     Attributes
     ----------
     integrator : {"linearly_implicit", "rosenbrock", "rk4", "semi_implicit"}
-        The first two are stable whatever is stiff, of order 2 and 4, the first also on dry friction far sharper than a step;
-        the others are explicit, but for the constant stiffness of flexible links in the last.
+        The first two are stable whatever is stiff, of order 2 and 4, the first also on dry friction far sharper than a
+        step; the others are explicit, but for the constant stiffness of flexible links in the last.
     substeps : int
         Integration steps per sample of the log.
     horizon : float
@@ -79,6 +84,8 @@ class Run(Result):
         Rows at which a piece begins.
     settings : dict
         Integrator, substeps, horizon, cut-off.
+    notes : tuple of str
+        What to know before the numbers are trusted: one sentence each, none as a rule.
     """
 
     model_name: str
@@ -91,6 +98,7 @@ class Run(Result):
     measured: Array
     starts: NDArray[np.int64] = field(default_factory=lambda: np.zeros(1, dtype=np.int64))
     settings: dict[str, float | int | str] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
 
     def __getitem__(self, channel: str) -> Array:
         """Simulated values of one channel, shape (N,)."""
@@ -107,6 +115,9 @@ class Run(Result):
             "channels": ", ".join(self.channels),
         }
 
+    def _html_rows(self) -> Mapping[str, object]:
+        return {**self._headline(), **{f"note {i}": note for i, note in enumerate(self.notes, 1)}}
+
     def _frame_columns(self) -> Mapping[str, object]:
         return {"time": self.time, **dict(zip(self.channels, self.values.T, strict=True))}
 
@@ -119,12 +130,16 @@ class Run(Result):
 
 @dataclass(frozen=True)
 class SimulatedArrays:
-    """Outputs (n, outputs), their derivative (n, outputs, columns) and the rows of the log they stand for."""
+    """Outputs (n, outputs), their derivative (n, outputs, columns) and the rows of the log they stand for.
+
+    States (n, states) are there but for restarts.
+    """
 
     outputs: Array
     jacobian: Array
     rows: NDArray[np.int64]
     starts: NDArray[np.int64]
+    states: Array | None = None
 
 
 def judging_mode(model: Model, records: Sequence[Experiment]) -> str:
@@ -154,14 +169,16 @@ def simulate(
     ----------
     model : Model
     experiment : Experiment
-        Holds the commands (free run, restarts), the motion (inverse dynamics) or the references (closed loop).
-    mode : {"free_run", "inverse_dynamics", "restarts", "closed_loop"}
+        Holds the commands (free run, restarts), the motion (inverse dynamics, prescribed motion) or the references
+        (closed loop).
+    mode : {"free_run", "inverse_dynamics", "restarts", "closed_loop", "prescribed_motion"}
     integrator, substeps, horizon
         See :class:`Setup`.
     cutoff : float, optional
-        Cut-off frequency of the motion filter, Hz (inverse dynamics and initial velocities).
+        Cut-off frequency of the motion filter, Hz (inverse dynamics, prescribed motion, initial velocities).
     initial_state : ndarray, shape (states,), optional
-        By default estimated from the first samples of the measured positions; at rest at zero without them.
+        By default estimated from the first samples of the measured positions; at rest at zero without them. Flexible
+        links start from the deflection of their equilibrium there.
 
     Returns
     -------
@@ -173,12 +190,18 @@ def simulate(
         A setting is wrong or a channel that the mode needs is missing.
     DivergedError
         The state left the finite numbers; carries the run up to there.
+
+    Warns
+    -----
+    ValidityWarning
+        A flexible link in displacement coordinates bends more than its kinematics allow.
     """
     if mode == "inverse_dynamics":
         return _inverse_dynamics_run(model, experiment, cutoff)
     setup = Setup(integrator, substeps, horizon)
     arrays = simulate_arrays(model, experiment, mode, setup=setup, cutoff=cutoff, initial_state=initial_state)
-    return _run(model, experiment, mode, arrays, setup)
+    run = _run(model, experiment, mode, arrays, setup)
+    return _judged(model, run, arrays)
 
 
 def simulate_arrays(
@@ -191,13 +214,19 @@ def simulate_arrays(
     setup: Setup | None = None,
     cutoff: float | None = None,
     initial_state: Array | None = None,
+    followed: Motion | None = None,
 ) -> SimulatedArrays:
-    """Outputs of a simulation and their exact derivative by parameters ``columns``, as plain arrays."""
+    """Outputs of a simulation and their exact derivative by parameters ``columns``, as plain arrays.
+
+    ``followed`` is what `joint_motion` gave, for callers that prescribe the same motion again and again.
+    """
     from vpm._core import Diverged
 
     setup = setup or Setup()
     theta = model.theta if theta is None else theta
     try:
+        if mode == "prescribed_motion":
+            return _prescribed(model, followed or joint_motion(experiment, model, cutoff), theta, list(columns), setup)
         return _dispatch(model, experiment, mode, theta, list(columns), setup, cutoff, initial_state)
     except Diverged as error:
         partial = SimulatedArrays(
@@ -221,20 +250,20 @@ def _dispatch(
     stepping = (experiment.dt, setup.substeps, setup.integrator, columns)
     if mode == "free_run":
         inputs = _columns(experiment, [f"{name}.command" for name in model.actuators], mode)
-        state = _initial_state(model, experiment, theta) if initial_state is None else initial_state
-        outputs, _, jacobian = model.core.simulate(theta, state, inputs, *stepping)
-        return SimulatedArrays(outputs, jacobian, rows, begin)
+        state = start(model, experiment, theta) if initial_state is None else initial_state
+        outputs, states, jacobian = model.core.simulate(theta, state, inputs, *stepping)
+        return SimulatedArrays(outputs, jacobian, rows, begin, states)
     if mode == "closed_loop":
         _check_controllers(model)
         references = _columns(experiment, [f"{name}.reference" for name in model.actuators], mode)
         disturbances = _optional(experiment, [f"{name}.disturbance" for name in model.actuators])
-        state = _initial_state(model, experiment, theta) if initial_state is None else initial_state
-        outputs, _, jacobian = model.core.simulate_closed_loop(theta, state, references, disturbances, *stepping)
-        return SimulatedArrays(outputs, jacobian, rows, begin)
+        state = start(model, experiment, theta) if initial_state is None else initial_state
+        outputs, states, jacobian = model.core.simulate_closed_loop(theta, state, references, disturbances, *stepping)
+        return SimulatedArrays(outputs, jacobian, rows, begin, states)
     if mode == "restarts":
         inputs = _columns(experiment, [f"{name}.command" for name in model.actuators], mode)
         starts, length = _restart_grid(experiment, setup.horizon)
-        states = _states(model, experiment, theta, cutoff)[starts]
+        states = measured_states(model, experiment, theta, starts, cutoff)
         outputs, jacobian = model.core.restart(theta, states, starts, length, inputs, *stepping)
         rows = (starts[:, None] + np.arange(length)).ravel()
         flat = outputs.reshape(-1, outputs.shape[-1])
@@ -242,9 +271,49 @@ def _dispatch(
     raise SimulationError(f"unknown mode '{mode}'; choose one of {', '.join(MODES)}")
 
 
+def _prescribed(model: Model, m: Motion, theta: Array, columns: list[int], setup: Setup) -> SimulatedArrays:
+    """Joints on the filtered motion, from behind the filter's settling to before it."""
+    q, v, a = (np.ascontiguousarray(x[m.kept]) for x in (m.position, m.velocity, m.acceleration))
+    outputs, states, jacobian = model.core.simulate_prescribed(
+        theta, q, v, a, m.dt, setup.substeps, setup.integrator, columns
+    )
+    rows = np.arange(len(m.time))[m.kept]
+    return SimulatedArrays(outputs, jacobian, rows, np.zeros(1, dtype=np.int64), states)
+
+
+def copied_channels(model: Model, mode: str) -> frozenset[str]:
+    """Outputs that a mode takes from the log, or does not work out: nothing to compare there."""
+    commands = {f"{name}.command" for name in model.actuators}
+    if mode == "closed_loop":
+        return frozenset()
+    if mode == "prescribed_motion":
+        motions = {f"{name}.{kind}" for name in model.joints for kind in ("position", "velocity", "acceleration")}
+        return frozenset(commands | motions | {f"{name}.force" for name in model.actuators})
+    return frozenset(commands)
+
+
+def _judged(model: Model, run: Run, arrays: SimulatedArrays) -> Run:
+    """The run with a note, and one warning, if a flexible link left the range in which its kinematics are right."""
+    if arrays.states is None or not model.beams or len(arrays.states) == 0:
+        return run
+    slopes = model.core.slopes(model.theta, arrays.states)
+    limit = model.core.slope_limit
+    largest = np.max(np.where(np.isnan(slopes), 0.0, slopes), axis=0)
+    if not np.any(largest > limit):
+        return run
+    beam = int(np.argmax(largest))
+    when = float(run.time[int(np.nanargmax(slopes[:, beam]))])
+    warning = ValidityWarning(model.beams[beam], float(largest[beam]), when, limit, model.levels[model.beams[beam]])
+    warnings.warn(warning, stacklevel=3)
+    return replace(run, notes=(*run.notes, str(warning)))
+
+
 def _run(model: Model, experiment: Experiment, mode: str, arrays: SimulatedArrays, setup: Setup) -> Run:
-    channels = model.output_channels
-    measured = np.full(arrays.outputs.shape, np.nan)
+    left_out = copied_channels(model, mode) if mode == "prescribed_motion" else frozenset()
+    kept = [column for column, channel in enumerate(model.output_channels) if channel not in left_out]
+    channels = tuple(model.output_channels[column] for column in kept)
+    values = arrays.outputs[:, kept]
+    measured = np.full(values.shape, np.nan)
     for column, channel in enumerate(channels):
         if channel in experiment:
             measured[:, column] = experiment[channel][arrays.rows]
@@ -259,14 +328,31 @@ def _run(model: Model, experiment: Experiment, mode: str, arrays: SimulatedArray
         experiment.time[arrays.rows],
         channels,
         tuple(model.channel_unit(channel) for channel in channels),
-        arrays.outputs,
+        values,
         measured,
         np.arange(len(arrays.starts), dtype=np.int64) * length,
         settings,
     )
 
 
+def check_rigid(model: Model) -> None:
+    """Complain, with the way on, if a balance of effort cannot be drawn up: nobody measures elastic coordinates.
+
+    Raises
+    ------
+    SimulationError
+        A flexible link has elastic coordinates.
+    """
+    if model.core.n_elastic:
+        elastic = [name for name in model.beams if model.levels[name] != "rigid"]
+        raise SimulationError(
+            f"mode 'inverse_dynamics' needs the motion of every coordinate, but no log holds the elastic ones of "
+            f"{', '.join(elastic)}; use the mode 'prescribed_motion', or model.at('rigid')"
+        )
+
+
 def _inverse_dynamics_run(model: Model, experiment: Experiment, cutoff: float | None) -> Run:
+    check_rigid(model)
     m = motion(experiment, model, cutoff=cutoff)
     required, applied, _ = model.core.inverse_dynamics(
         model.theta, m.position, m.velocity, m.acceleration, m.inputs, m.dt, []
@@ -319,51 +405,3 @@ def _restart_grid(experiment: Experiment, horizon: float) -> tuple[NDArray[np.in
             "choose a shorter one"
         )
     return np.arange(0, len(experiment) - length + 1, length - 1, dtype=np.int64), length
-
-
-def _states(model: Model, experiment: Experiment, theta: Array, cutoff: float | None) -> Array:
-    """State (N, states) along the measured motion: sensor errors undone, lags settled at the held command."""
-    m = motion(experiment, model, cutoff=cutoff)
-    gain, offset = _sensor_errors(model, theta)
-    lags = [i for i, name in enumerate(model.actuators) if model.has_lag(name)]
-    return np.ascontiguousarray(
-        np.column_stack([(m.position - offset) / gain, m.velocity / gain, m.inputs[:, lags]]), dtype=np.float64
-    )
-
-
-def _initial_state(model: Model, experiment: Experiment, theta: Array) -> Array:
-    """State at the first sample: at rest at zero where the log holds no position, lags settled at the command."""
-    n = len(model.joints)
-    state = np.zeros(model.core.n_states)
-    gain, offset = _sensor_errors(model, theta)
-    lags = [name for name in model.actuators if model.has_lag(name)]
-    for place, name in enumerate(lags):
-        if f"{name}.command" in experiment:
-            state[2 * n + place] = experiment[f"{name}.command"][0]
-    for joint, name in enumerate(model.joints):
-        if f"{name}.position" in experiment:
-            position, velocity = _fit_start(experiment, f"{name}.position")
-            state[joint] = (position - offset[joint]) / gain[joint]
-            state[n + joint] = velocity / gain[joint]
-    return state
-
-
-def _fit_start(experiment: Experiment, channel: str, samples: int = 15) -> tuple[float, float]:
-    """Position and velocity at the first sample from a parabola through the first few."""
-    count = min(samples, len(experiment))
-    time = experiment.time[:count] - experiment.time[0]
-    curve = np.polynomial.Polynomial.fit(time, experiment[channel][:count], min(2, count - 1)).convert()
-    coefficients = np.append(curve.coef, [0.0, 0.0])
-    return float(coefficients[0]), float(coefficients[1])
-
-
-def _sensor_errors(model: Model, theta: Array) -> tuple[Array, Array]:
-    """Gain and offset of the position sensor of each joint (1 and 0 where none is modelled)."""
-    gain, offset = np.ones(len(model.joints)), np.zeros(len(model.joints))
-    for joint, name in enumerate(model.joints):
-        sensor = model.sensor_of(f"{name}.position")
-        for index, key, target in ((joint, "gain.value", gain), (joint, "offset.value", offset)):
-            full = f"{sensor}.{key}"
-            if sensor is not None and full in model.parameters:
-                target[index] = theta[model.index(full)]
-    return gain, offset

@@ -58,6 +58,8 @@ pub struct Inertia<P> {
 pub enum Site {
     /// The body of that number.
     Body(usize),
+    /// The weld of that number, in its own frame.
+    Weld(usize),
     /// The section at the tip of the beam of that number.
     Tip(usize),
 }

@@ -2,9 +2,12 @@
 
 mod names;
 mod prescribed;
+mod stability;
 mod stepper;
 
+pub(crate) use names::state_name;
 pub use prescribed::prescribed;
+pub(crate) use stability::check_step;
 pub(crate) use stepper::{Drive, Plan, Stepper};
 
 use crate::description::Description;
@@ -152,6 +155,10 @@ impl Job for Simulation<'_> {
 }
 
 fn execute(setting: Setting<'_>, plan: Plan<'_>) -> Result<Run> {
+    let dim = setting.description.n_states();
+    if let Some(first) = plan.initial.get(..dim) {
+        check_step(setting.description, setting.theta, setting.stepping, first)?;
+    }
     let job = Simulation { setting, plan };
     let output = |pass: &Pair<_>, place: usize| pass.first[place];
     let (pair, jacobian) = differentiate(&job, setting.theta, setting.sensitivities, output)?;

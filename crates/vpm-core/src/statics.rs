@@ -44,6 +44,9 @@ impl Statics {
         let (first, n) = (joints.len(), self.plain.coordinates());
         let mut coordinates = joints.to_vec();
         coordinates.resize(n, 0.0);
+        if first == n {
+            return Ok(Rest { coordinates, tangent: DMatrix::zeros(0, 0) });
+        }
         let mut residual = self.residual(&coordinates);
         for _ in 0..STEPS {
             let tangent = self.tangent(&coordinates, first);
@@ -65,9 +68,6 @@ impl Statics {
             if step.amax() < 1e-11 * size {
                 return Ok(Rest { coordinates, tangent });
             }
-        }
-        if first == n {
-            return Ok(Rest { coordinates, tangent: DMatrix::zeros(0, 0) });
         }
         let condition = "vanish within 60 Newton steps".to_owned();
         let repair = "check the stiffness of the beams against what they carry";

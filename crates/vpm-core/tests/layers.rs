@@ -37,8 +37,19 @@ const ALONE: [(&str, &[&str]); 10] = [
     ("controller", &["error", "scalar", "effect::Domain", "actuator::Saturation"]),
 ];
 /// What puts the parts together, lowest first: each may import any part, any tree module and any before it.
-const WHOLE: [&str; 8] =
-    ["sensitivity", "system", "description", "simulate", "inverse", "evaluate", "timing", "samples"];
+const WHOLE: [&str; 11] = [
+    "sensitivity",
+    "system",
+    "description",
+    "simulate",
+    "inverse",
+    "evaluate",
+    "linearize",
+    "live",
+    "prepared",
+    "timing",
+    "samples",
+];
 const WITNESSES: [&str; 5] = ["aba", "crba", "rnea", "virtual_work", "flexible"];
 
 fn sources(folder: &Path, found: &mut Vec<PathBuf>) -> Result<()> {

@@ -1,7 +1,7 @@
 //! Arrays between Python and the core.
 
 use numpy::prelude::*;
-use numpy::{AllowTypeChange, PyArray1, PyArray2, PyArray3, PyArrayLikeDyn};
+use numpy::{AllowTypeChange, PyArray1, PyArray2, PyArray3, PyArrayLikeDyn, PyReadonlyArray1};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use vpm_core::table::Table;
@@ -49,6 +49,37 @@ impl Numbers {
     }
 }
 
+/// One dimension, for calls so short that a copy counts: read where it is if it is double precision and without gaps.
+pub(crate) enum Vector<'py> {
+    /// Python's own memory, which nobody may write meanwhile.
+    There(PyReadonlyArray1<'py, f64>),
+    /// A converted copy.
+    Copied(Numbers),
+}
+
+impl<'py> Vector<'py> {
+    /// An array of one dimension.
+    #[inline]
+    pub(crate) fn new(name: &'static str, array: &Bound<'py, PyAny>) -> PyResult<Self> {
+        if let Ok(array) = array.cast::<PyArray1<f64>>()
+            && array.is_contiguous()
+            && let Ok(array) = array.try_readonly()
+        {
+            return Ok(Self::There(array));
+        }
+        Numbers::vector(name, array).map(Self::Copied)
+    }
+
+    /// The numbers.
+    #[inline]
+    pub(crate) fn values(&self) -> PyResult<&[f64]> {
+        match self {
+            Self::There(array) => Ok(array.as_slice()?),
+            Self::Copied(numbers) => Ok(numbers.values()),
+        }
+    }
+}
+
 fn read(name: &str, array: &Bound<'_, PyAny>) -> PyResult<(Vec<f64>, Vec<usize>)> {
     let array: PyArrayLikeDyn<'_, f64, AllowTypeChange> = array.extract().map_err(|_| {
         PyValueError::new_err(format!(
@@ -65,11 +96,13 @@ fn wrong_shape(name: &str, wanted: &str, shape: &[usize]) -> PyErr {
 
 /// Places in a list that Python may have counted from the end or beyond.
 pub(crate) fn places(name: &str, numbers: &[i64]) -> PyResult<Vec<usize>> {
-    let place = |&number: &i64| {
-        usize::try_from(number)
-            .map_err(|_| PyValueError::new_err(format!("`{name}` must not be negative, got {number}; count from 0")))
-    };
-    numbers.iter().map(place).collect()
+    numbers.iter().map(|&number| place(name, number)).collect()
+}
+
+/// A place that Python may have counted from the end or beyond.
+pub(crate) fn place(name: &str, number: i64) -> PyResult<usize> {
+    usize::try_from(number)
+        .map_err(|_| PyValueError::new_err(format!("`{name}` must not be negative, got {number}; count from 0")))
 }
 
 /// A table as an array of shape (rows, columns).
@@ -80,4 +113,10 @@ pub(crate) fn matrix(py: Python<'_>, values: Vec<f64>, shape: [usize; 2]) -> PyR
 /// A table of vectors as an array of shape (rows, columns, entries).
 pub(crate) fn cube(py: Python<'_>, values: Vec<f64>, shape: [usize; 3]) -> PyResult<Bound<'_, PyArray3<f64>>> {
     PyArray1::from_vec(py, values).reshape(shape)
+}
+
+/// A square matrix, row by row, as an array of shape (n, n).
+#[inline]
+pub(crate) fn square<'py>(py: Python<'py>, values: &[f64], n: usize) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    PyArray1::from_slice(py, values).reshape([n, n])
 }

@@ -1,14 +1,41 @@
 //! Long computations that Ctrl-C can stop.
 
+use std::cell::RefCell;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::thread::Builder;
 use std::time::Duration;
 
-use pyo3::exceptions::PyRuntimeError;
+use pyo3::exceptions::{PyKeyboardInterrupt, PyRuntimeError};
 use pyo3::prelude::*;
 use vpm_core::Error;
 use vpm_core::sensitivity::Interrupt;
+
+thread_local! {
+    /// Asked by this thread together with the signals: a Python function that says whether to stop.
+    static WATCH: RefCell<Option<Py<PyAny>>> = const { RefCell::new(None) };
+}
+
+/// Lets long computations of the calling thread also stop when `asked()` is true, or raises: Ctrl-C reaches the main thread alone, and
+/// this is how it tells the threads that work for it. None ends it.
+#[pyfunction]
+#[pyo3(signature = (asked))]
+pub(crate) fn stop_when(asked: Option<Py<PyAny>>) {
+    WATCH.set(asked);
+}
+
+/// Raises if there is a reason to stop: a signal, or what the thread was told to watch.
+fn check(py: Python<'_>) -> PyResult<()> {
+    py.check_signals()?;
+    let watch = WATCH.with_borrow(|watch| watch.as_ref().map(|asked| asked.clone_ref(py)));
+    match watch {
+        Some(asked) if asked.call0(py)?.is_truthy(py)? => {
+            Err(PyKeyboardInterrupt::new_err(Error::Interrupted.to_string()))
+        }
+        _ => Ok(()),
+    }
+}
 
 /// Time between two looks at the signals.
 const PERIOD: Duration = Duration::from_millis(50);
@@ -30,7 +57,7 @@ pub(crate) fn interruptible<T: Send>(
                 job(&|| stop.load(Ordering::Relaxed))
             })?;
             while let Err(RecvTimeoutError::Timeout) = finished.recv_timeout(PERIOD) {
-                if let Err(signal) = Python::attach(|py| py.check_signals()) {
+                if let Err(signal) = Python::attach(check) {
                     stop.store(true, Ordering::Relaxed);
                     // The scope waits for the worker, which looks at the flag within milliseconds.
                     return worker.join().map_or_else(|_| Err(crashed()), |_| Err(signal));
@@ -39,6 +66,12 @@ pub(crate) fn interruptible<T: Send>(
             worker.join().map_err(|_| crashed())
         })
     })
+}
+
+/// Runs a short `job` on this thread; a panic, which would be a mistake of the core, becomes an ordinary exception.
+#[inline]
+pub(crate) fn unbroken<T>(job: impl FnOnce() -> T) -> PyResult<T> {
+    catch_unwind(AssertUnwindSafe(job)).map_err(|_| crashed())
 }
 
 fn crashed() -> PyErr {

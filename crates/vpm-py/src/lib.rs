@@ -5,15 +5,23 @@
 use pyo3::prelude::*;
 
 mod arrays;
+mod dynamics;
 mod errors;
 mod interrupt;
+mod stepping;
 mod system;
 
 /// The compiled core of vpm: a machine as one object, arrays in and out.
 #[pymodule]
 mod _core {
     #[pymodule_export]
+    use crate::dynamics::Dynamics;
+    #[pymodule_export]
     use crate::errors::Diverged;
+    #[pymodule_export]
+    use crate::interrupt::stop_when;
+    #[pymodule_export]
+    use crate::stepping::Simulation;
     #[pymodule_export]
     use crate::system::System;
 }

@@ -12,7 +12,7 @@ from vpm.errors import ModelError, near_match
 SiteKind = Literal["joint", "body", "actuator", "sensor"]
 SITE_KINDS: tuple[SiteKind, ...] = ("joint", "body", "actuator", "sensor")
 
-JointKind = Literal["prismatic", "revolute"]
+JointKind = Literal["prismatic", "revolute", "helical"]
 
 #: What in a record sets the natural size of a parameter; "one" means that the parameter is near 1 by nature.
 Scale = Literal[
@@ -57,7 +57,7 @@ class EffectParameter:
     neutral : float or None
         Value at which the effect is not there (SI); None for a parameter that no value switches off.
     start : float or (float, float) or None
-        Value when none is given (SI); a pair is for a prismatic and a revolute site; None: it has to be given.
+        Value when none is given (SI); a pair is for a site that shifts and one that turns; None: it has to be given.
     physical : (float, float)
         Range outside which the value contradicts physics (SI, closed).
     evaluable : (float, float)
@@ -86,10 +86,10 @@ class EffectParameter:
 
         Parameters
         ----------
-        kind : {"prismatic", "revolute"}, optional
+        kind : {"prismatic", "revolute", "helical"}, optional
         """
         if isinstance(self.start, tuple):
-            return self.start[1] if kind == "revolute" else self.start[0]
+            return self.start[1] if kind in {"revolute", "helical"} else self.start[0]
         return self.start
 
 
@@ -101,7 +101,7 @@ class EffectType:
     ----------
     name : str
     site : {"joint", "body", "actuator", "sensor"}
-        Kind of component that it sits at.
+        Kind of component that it sits at; what sits at a body may sit at a beam too, in the frame of its tip.
     group : str
         First part of the suffix of its parameters.
     parameters : tuple of EffectParameter

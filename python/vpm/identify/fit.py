@@ -304,7 +304,7 @@ def identify(
     experiments : Experiment or sequence of Experiment
     free : sequence of str, optional
         Dotted names; by default every parameter that the model file gives an uncertainty.
-    mode : {"inverse_dynamics", "free_run", "restarts", "closed_loop"}
+    mode : {"inverse_dynamics", "free_run", "restarts", "closed_loop", "prescribed_motion"}
         Inverse dynamics is the linear regression of effort on motion; the others are output-error fits through the
         simulation, with sensitivities exact to rounding.
     cutoff : float, optional

@@ -1,4 +1,4 @@
-"""The residual of a model against data, in any of the four modes, with its exact derivative.
+"""The residual of a model against data, in any of the five modes, with its exact derivative.
 
 A problem fixes the data and how they are compared; the model may change under it. That is what lets one problem judge
 the nominal model, the recalibrated one and every candidate effect on the same samples.
@@ -16,8 +16,9 @@ from scipy.ndimage import maximum_filter1d
 
 from vpm.errors import IdentificationError
 from vpm.experiment import Experiment, Motion, motion, parallel_filter
+from vpm.initial import joint_motion
 from vpm.model import Model
-from vpm.simulate import MODES, Setup, simulate_arrays
+from vpm.simulate import MODES, Setup, check_rigid, copied_channels, simulate_arrays
 
 Array = NDArray[np.float64]
 
@@ -108,6 +109,7 @@ class InverseDynamicsProblem:
     mode = "inverse_dynamics"
 
     def __init__(self, model: Model, experiments: Sequence[Experiment], *, cutoff: float | None = None) -> None:
+        check_rigid(model)
         self.experiments = tuple(experiments)
         self.motions: tuple[Motion, ...] = tuple(motion(e, model, cutoff=cutoff) for e in experiments)
         driven = sorted({model.joints.index(model.joint_of_actuator(name)) for name in model.actuators})
@@ -231,17 +233,19 @@ def _widened(standing: NDArray[np.bool_], m: Motion) -> NDArray[np.bool_]:
 
 
 class OutputErrorProblem:
-    """Measured minus simulated outputs in free run, restarts or closed loop.
+    """Measured minus simulated outputs in free run, restarts, closed loop or on a prescribed motion.
 
     Parameters
     ----------
     model : Model
     experiments : sequence of Experiment
-    mode : {"free_run", "restarts", "closed_loop"}
+    mode : {"free_run", "restarts", "closed_loop", "prescribed_motion"}
     channels : sequence of str, optional
         Compared outputs; by default all measured ones that the simulation does not prescribe.
     setup : Setup, optional
         Integrator, substeps and horizon.
+    cutoff : float, optional
+        Of the motion that the joints follow, Hz.
     """
 
     def __init__(
@@ -252,10 +256,13 @@ class OutputErrorProblem:
         *,
         channels: Sequence[str] | None = None,
         setup: Setup | None = None,
+        cutoff: float | None = None,
     ) -> None:
         self.mode = mode
         self.experiments = tuple(experiments)
         self._setup = setup or Setup()
+        follows = mode == "prescribed_motion"
+        self._followed = [joint_motion(e, model, cutoff) if follows else None for e in self.experiments]
         self._channels = tuple(channels) if channels is not None else _compared(model, experiments, mode)
         if not self._channels:
             raise IdentificationError(
@@ -269,8 +276,10 @@ class OutputErrorProblem:
         residuals, jacobians = [], []
         index = [model.output_channels.index(channel) for channel in self._channels]
         blocks = iter(self.blocks)
-        for experiment in self.experiments:
-            result = simulate_arrays(model, experiment, self.mode, theta=theta, columns=columns, setup=self._setup)
+        for experiment, followed in zip(self.experiments, self._followed, strict=True):
+            result = simulate_arrays(
+                model, experiment, self.mode, theta=theta, columns=columns, setup=self._setup, followed=followed
+            )
             for column, channel in zip(index, self._channels, strict=True):
                 weight = next(blocks).weight
                 residuals.append((experiment[channel][result.rows] - result.outputs[:, column]) * weight)
@@ -280,8 +289,8 @@ class OutputErrorProblem:
     def _lay_out(self, model: Model) -> tuple[Block, ...]:
         blocks, start = [], 0
         spread = {c: float(np.sqrt(np.mean([np.var(e[c]) for e in self.experiments]))) for c in self._channels}
-        for experiment in self.experiments:
-            rows = simulate_arrays(model, experiment, self.mode, setup=self._setup).rows
+        for experiment, followed in zip(self.experiments, self._followed, strict=True):
+            rows = simulate_arrays(model, experiment, self.mode, setup=self._setup, followed=followed).rows
             for channel in self._channels:
                 weight = 1.0 / spread[channel] if spread[channel] > 0.0 else 1.0
                 scale = float(np.sqrt(np.mean(experiment[channel] ** 2)))
@@ -301,19 +310,19 @@ def problem(
     cutoff: float | None = None,
     setup: Setup | None = None,
 ) -> InverseDynamicsProblem | OutputErrorProblem:
-    """Set up the residual of ``model`` against ``experiments`` in one of the four modes."""
+    """Set up the residual of ``model`` against ``experiments`` in one of the five modes."""
     if not experiments:
         raise IdentificationError("no experiment was given; pass at least one")
     if mode not in MODES:
         raise IdentificationError(f"unknown mode '{mode}'; choose one of {', '.join(MODES)}")
     if mode == "inverse_dynamics":
         return InverseDynamicsProblem(model, experiments, cutoff=cutoff)
-    return OutputErrorProblem(model, experiments, mode, setup=setup)
+    return OutputErrorProblem(model, experiments, mode, setup=setup, cutoff=cutoff)
 
 
 def _compared(model: Model, experiments: Sequence[Experiment], mode: str) -> tuple[str, ...]:
     """Outputs that every log holds and that the mode does not simply copy from the log."""
-    prescribed = set() if mode == "closed_loop" else {f"{name}.command" for name in model.actuators}
+    prescribed = copied_channels(model, mode)
     return tuple(
         channel
         for channel in model.output_channels

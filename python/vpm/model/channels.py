@@ -8,56 +8,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from os import PathLike
 from types import MappingProxyType
-from typing import Annotated
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
+from pydantic import TypeAdapter, ValidationError
 
-from vpm.model.messages import raise_first, read_toml, schema_problems
-from vpm.units import parse_unit
-
-_Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
-_Text = Annotated[str, Field(strict=True, min_length=1)]
-
-
-def _not_zero(value: float) -> float:
-    if value == 0.0:
-        raise ValueError("is 0, which would erase the column; give another factor")
-    return value
-
-
-def _readable(unit: str) -> str:
-    parse_unit(unit)
-    return unit
-
-
-class ChannelEntry(BaseModel):
-    """Column of a log that holds one channel.
-
-    Attributes
-    ----------
-    column : str
-        Name of the column.
-    unit : str
-        Unit of ``scale column + offset``.
-    scale : float
-        Factor on the numbers of the column.
-    offset : float
-        Added after the scaling, in `unit`.
-    delay : float
-        How late the samples are stamped (s).
-    optional : bool
-        A log without the column holds zeros here.
-    """
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-    column: _Text
-    unit: Annotated[_Text, AfterValidator(_readable)]
-    scale: Annotated[_Number, AfterValidator(_not_zero)] = 1.0
-    offset: _Number = 0.0
-    delay: _Number = 0.0
-    optional: Annotated[bool, Field(strict=True)] = False
-
+from vpm.model.form import schema_problems
+from vpm.model.messages import raise_first, read_toml
+from vpm.model.schema import ChannelEntry
 
 _TABLE = TypeAdapter(dict[str, ChannelEntry])
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
@@ -10,21 +9,17 @@ import numpy as np
 from pydantic import ValidationError
 
 from vpm.errors import UnitError, near_match
+from vpm.model.beam_check import beam_problems, size_problems
 from vpm.model.effects import complete_effects, effect_problems
-from vpm.model.messages import Problem, place, raise_first, schema_problems
+from vpm.model.form import schema_problems
+from vpm.model.messages import Problem, place, raise_first
 from vpm.model.parameters import Parameter, Slot, slots, table
+from vpm.model.references import gauge_problems, reference_problems
 from vpm.model.schema import Document
-from vpm.model.structure import (
-    Structure,
-    build_structure,
-    name_problems,
-    reference_problems,
-    tree_problems,
-)
+from vpm.model.structure import Structure, build_structure
+from vpm.model.tree import joint_problems, name_problems, tree_problems
 from vpm.units import parse_unit, require_dimension
 
-#: A joint axis may be this far from unit length; it is then normalised.
-AXIS_TOLERANCE = 1e-3
 #: An inertia may break its conditions by this share of its size: numbers in files are rounded.
 INERTIA_TOLERANCE = 1e-6
 
@@ -60,7 +55,8 @@ def check_document(content: Mapping[str, object], path: str | None = None) -> Ch
         document = Document.model_validate(content)
     except ValidationError as error:
         raise_first(schema_problems(error), path)
-    _stop_at([*name_problems(document), *tree_problems(document), *_axis_problems(document)], path)
+    _stop_at([*_empty_problems(document), *name_problems(document), *beam_problems(document)], path)
+    _stop_at([*tree_problems(document), *joint_problems(document), *gauge_problems(document)], path)
     structure = build_structure(document)
     _stop_at([*reference_problems(document, structure), *_command_problems(document)], path)
     _stop_at([*effect_problems(document, structure), *_channel_problems(document, structure)], path)
@@ -69,7 +65,8 @@ def check_document(content: Mapping[str, object], path: str | None = None) -> Ch
     found = tuple(slots(document, structure))
     _stop_at([problem for slot in found for problem in slot.problems()], path)
     parameters = table(list(found))
-    _stop_at([problem for body in structure.bodies for problem in _inertia_problems(body, parameters)], path)
+    inertias = [problem for body in structure.bodies for problem in _inertia_problems(body, parameters)]
+    _stop_at([*inertias, *size_problems(document, parameters)], path)
     return Checked(document, structure, found, parameters)
 
 
@@ -78,14 +75,19 @@ def _stop_at(problems: list[Problem], path: str | None) -> None:
         raise_first(problems, path)
 
 
-def _axis_problems(document: Document) -> Iterator[Problem]:
-    for name, joint in document.joints.items():
-        length = math.hypot(*joint.axis)
-        if abs(length - 1.0) > AXIS_TOLERANCE:
-            shown = ", ".join(f"{component:g}" for component in joint.axis)
-            repair = "divide it by its length" if length > 0.0 else "give it a direction"
-            rest = f"is [{shown}] with length {length:.6g}, but has to have length 1; {repair}"
-            yield Problem(place("joints", name, "axis"), rest)
+def _empty_problems(document: Document) -> Iterator[Problem]:
+    """A machine of nothing; and bodies that nothing carries."""
+    given = document.model_fields_set
+    if not document.bodies and (not document.beams or document.joints):
+        yield Problem(
+            "bodies",
+            f"is {'empty; add' if 'bodies' in given else 'missing; add it, for example'} a table [bodies.link]",
+        )
+    elif document.bodies and not document.joints:
+        yield Problem(
+            "joints",
+            f"is {'empty; add' if 'joints' in given else 'missing; add it, for example'} a table [joints.axis]",
+        )
 
 
 def _command_problems(document: Document) -> Iterator[Problem]:
@@ -119,7 +121,7 @@ def _inertia_problems(body: str, parameters: Mapping[str, Parameter]) -> Iterato
         parameters[f"{body}.inertia.{axes}"].value for axes in ("xx", "yy", "zz", "xy", "xz", "yz")
     )
     moments = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    slack = INERTIA_TOLERANCE * float(np.abs(moments).max())
+    slack = INERTIA_TOLERANCE * float(np.abs(moments).max()) + float(np.finfo(np.float64).tiny)
     shown = ", ".join(f"{moment:.4g}" for moment in moments)
     where = place("bodies", body, "inertia")
     if moments[0] < -slack:

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Mapping
 from typing import Any
 
 from vpm.catalogue import EFFECTS
+from vpm.model.beam import End, Gauge, Line, Marker, Section, sections_of
 from vpm.model.check import Checked
 from vpm.model.effects import Effect, effects_of
 from vpm.model.parameters import INERTIA_AXES
-from vpm.model.schema import Cascade, Controller, Joint
-from vpm.model.structure import Structure
+from vpm.model.pose import Pose, pose
+from vpm.model.schema import Cascade, Controller
+from vpm.model.structure import Axis, Frame, Mount, Structure
 
 
 def description(checked: Checked) -> str:
@@ -34,7 +35,12 @@ def description(checked: Checked) -> str:
         "gravity": list(document.gravity),
         "parameters": [parameter.value for parameter in checked.parameters.values()],
         "parameter_names": list(index),
-        "bodies": [_body(k, structure, index) for k in range(len(structure.bodies))],
+        "bodies": [_body(axis, index) for axis in structure.axes],
+        "welds": [_weld(name, structure.frames[name], index) for name in structure.welds],
+        "beams": [_beam(name, structure, index) for name in structure.beams],
+        "gauges": [_gauge(name, gauge, structure) for name, gauge in document.gauges.items()],
+        "markers": [_marker(name, marker, structure) for name, marker in document.markers.items()],
+        "lines": [_line(name, line, structure, index) for name, line in document.lines.items()],
         "effects": [_effect(e, structure, index) for e in effects if EFFECTS[e.name].site in {"joint", "body"}],
         "actuators": [_actuator(name, structure, index) for name in document.actuators],
         "sensors": [_sensor(name, structure, index) for name in document.sensors],
@@ -43,47 +49,98 @@ def description(checked: Checked) -> str:
     return json.dumps(content, allow_nan=False)
 
 
-def _body(k: int, structure: Structure, index: Mapping[str, int]) -> dict[str, Any]:
-    name, joint = structure.bodies[k], structure.joints[k]
+def _mount(mount: Mount) -> str | dict[str, Any]:
+    match mount.kind:
+        case "world":
+            return "world"
+        case "body":
+            return {"body": mount.index}
+        case "section":
+            return {"section": {"beam": mount.index, "at": mount.at}}
+
+
+def _frame(frame: Frame) -> dict[str, Any]:
+    return {"on": _mount(frame.mount), **_pose(frame.pose)}
+
+
+def _pose(placed: Pose) -> dict[str, Any]:
+    return {"translation": list(placed.translation), "rotation": list(placed.rotation)}
+
+
+def _body(axis: Axis, index: Mapping[str, int]) -> dict[str, Any]:
+    coordinate = axis.coordinate
+    kind = {"helical": {"pitch": coordinate.pitch}} if coordinate.kind == "helical" else coordinate.kind
+    return {
+        "name": axis.carrier,
+        "on": _mount(axis.frame.mount),
+        "joint": {"name": axis.name, "kind": kind, "axis": list(coordinate.direction), **_pose(axis.frame.pose)},
+        "inertia": None if axis.body is None else _inertia(axis.body, index),
+    }
+
+
+def _weld(name: str, frame: Frame, index: Mapping[str, int]) -> dict[str, Any]:
+    return {"name": name, **_frame(frame), "inertia": _inertia(name, index)}
+
+
+def _inertia(body: str, index: Mapping[str, int]) -> dict[str, Any]:
+    return {
+        "mass": index[f"{body}.mass"],
+        "center_of_mass": [index[f"{body}.center_of_mass.{axis}"] for axis in "xyz"],
+        "moments": [index[f"{body}.inertia.{axes}"] for axes in INERTIA_AXES],
+    }
+
+
+def _beam(name: str, structure: Structure, index: Mapping[str, int]) -> dict[str, Any]:
+    beam = structure.document.beams[name]
+    level = beam.detail
+    modes = sum(level.count(component) for component in beam.deforms)
     return {
         "name": name,
-        "on": "world" if structure.parents[k] is None else {"body": structure.parents[k]},
-        "joint": _joint(joint, structure.document.joints[joint]),
-        "inertia": {
-            "mass": index[f"{name}.mass"],
-            "center_of_mass": [index[f"{name}.center_of_mass.{axis}"] for axis in "xyz"],
-            "moments": [index[f"{name}.inertia.{axes}"] for axes in INERTIA_AXES],
+        **_frame(structure.frames[name]),
+        "length": beam.length,
+        "level": level.name if level.name == "rigid" else {level.name: level.number},
+        "deforms": list(beam.deforms),
+        "material": {key: index[f"{name}.{key}"] for key in ("young", "poisson", "density")},
+        "sections": [_section(name, way, section, index) for way, section in sections_of(beam)],
+        "damping": {
+            "stiffness": index.get(f"{name}.damping.stiffness"),
+            "mass": index.get(f"{name}.damping.mass"),
+            # A coarse level has fewer modes than ratios may be given for.
+            "ratios": [index[f"{name}.damping.ratios.{i}"] for i in range(min(modes, len(beam.damping.ratios)))],
         },
     }
 
 
-def _joint(name: str, joint: Joint) -> dict[str, Any]:
-    length = math.hypot(*joint.axis)
-    return {
-        "name": name,
-        "kind": joint.type,
-        "axis": [component / length for component in joint.axis],
-        "translation": list(joint.translation),
-        "rotation": rotation_matrix(*joint.rotation),
+def _section(beam: str, way: tuple[str | int, ...], section: Section, index: Mapping[str, int]) -> dict[str, Any]:
+    prefix = ".".join((beam, *map(str, way)))
+    sizes = {key: index[f"{prefix}.{key}"] for key in section.sizes}
+    return {"at": section.at or 0.0, "shape": {"shape": section.shape, **sizes}}
+
+
+def _gauge(name: str, gauge: Gauge, structure: Structure) -> dict[str, Any]:
+    length = structure.document.beams[gauge.beam].length
+    beam = structure.beams.index(gauge.beam)
+    return {"name": name, "beam": beam, "at": min(gauge.at, length), "x": gauge.x, "y": gauge.y}
+
+
+def _marker(name: str, marker: Marker, structure: Structure) -> dict[str, Any]:
+    placed = pose(marker.translation, marker.rotation)
+    return {"name": name, **_frame(structure.mounted(marker.parent, marker.at, placed))}
+
+
+def _line(name: str, line: Line, structure: Structure, index: Mapping[str, int]) -> dict[str, Any]:
+    parts = {
+        key: None
+        if part is None
+        else {short: index[f"{name}.{key}.{short}"] for short in ("mass", "center", "inertia")}
+        for key, part in (("barrel", line.barrel), ("rod", line.rod))
     }
+    return {"name": name, "from": _end(line.start, structure), "to": _end(line.end, structure), **parts}
 
 
-def rotation_matrix(roll: float, pitch: float, yaw: float) -> list[float]:
-    """Rotation matrix R = Rz(yaw) Ry(pitch) Rx(roll), nine numbers row by row.
-
-    Turns about the fixed axes x, y, z in this order (J. Craig, "Introduction to Robotics", 3rd edition, equation 2.64).
-
-    Parameters
-    ----------
-    roll, pitch, yaw : float
-        rad.
-    """
-    cr, sr, cp, sp, cy, sy = (f(angle) for angle in (roll, pitch, yaw) for f in (math.cos, math.sin))
-    return [
-        *(cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr),
-        *(sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr),
-        *(-sp, cp * sr, cp * cr),
-    ]
+def _end(end: End, structure: Structure) -> dict[str, Any]:
+    frame = structure.mounted(end.parent, end.at, Pose(end.point))
+    return {"on": _mount(frame.mount), "point": list(frame.pose.translation)}
 
 
 def _effect(effect: Effect, structure: Structure, index: Mapping[str, int]) -> dict[str, Any]:
@@ -91,13 +148,25 @@ def _effect(effect: Effect, structure: Structure, index: Mapping[str, int]) -> d
     if effect.type.site == "joint":
         return {"type": effect.name, "joint": structure.joints.index(effect.at), **numbers}
     position = [numbers.pop(axis) for axis in "xyz"]
-    return {"type": effect.name, "body": structure.bodies.index(effect.at), **numbers, "position": position}
+    return {"type": effect.name, **_carrier(effect.at, structure), **numbers, "position": position}
+
+
+def _carrier(site: str, structure: Structure) -> dict[str, int]:
+    """Where a payload sits: at a body of the core, at one that is fixed to something, or at the tip of a beam."""
+    if site in structure.beams:
+        return {"beam": structure.beams.index(site)}
+    if site in structure.welds:
+        return {"weld": structure.welds.index(site)}
+    return {"body": next(k for k, axis in enumerate(structure.axes) if axis.body == site)}
 
 
 def _actuator(name: str, structure: Structure, index: Mapping[str, int]) -> dict[str, Any]:
+    actuator = structure.document.actuators[name]
     return {
         "name": name,
-        "on": {"joint": structure.joints.index(structure.document.actuators[name].joint)},
+        "on": {"line": list(structure.document.lines).index(actuator.line)}
+        if actuator.line is not None
+        else {"joint": structure.joints.index(actuator.joint or "")},
         "gain": index[f"{name}.gain"],
         "delay": index.get(f"{name}.delay.time"),
         "dead_zone": index.get(f"{name}.dead_zone.width"),
@@ -134,6 +203,12 @@ def _controller(name: str, controller: Controller, structure: Structure, index: 
 
 def _channel(channel: str, structure: Structure) -> dict[str, Any]:
     owner, _, kind = channel.partition(".")
-    if owner in structure.joints:
-        return {"kind": kind, "joint": structure.joints.index(owner)}
-    return {"kind": kind, "actuator": list(structure.document.actuators).index(owner)}
+    owners: dict[str, tuple[str, ...]] = {
+        "joint": structure.joints,
+        "actuator": tuple(structure.document.actuators),
+        "line": tuple(structure.document.lines),
+        "gauge": tuple(structure.document.gauges),
+        "marker": tuple(structure.document.markers),
+    }
+    what, names = next((what, names) for what, names in owners.items() if owner in names)
+    return {"kind": kind, what: names.index(owner)}

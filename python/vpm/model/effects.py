@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 from vpm.catalogue import EFFECTS, EffectType
 from vpm.errors import near_match
+from vpm.model.entry import Quantity
 from vpm.model.messages import Problem, place
-from vpm.model.schema import Document, EffectEntry, Quantity
+from vpm.model.schema import Document, EffectEntry
 from vpm.model.structure import COORDINATE_UNIT, EFFORT_UNIT, Structure
 from vpm.units import si_unit
 

@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING, Any, NoReturn, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from vpm.catalogue import SITE_KINDS, JointKind, effect_type
+from vpm.catalogue import SITE_KINDS, effect_type
 from vpm.errors import ModelError, VpmError, near_match
-from vpm.model.channels import ChannelEntry
 from vpm.model.check import Checked, check_document
 from vpm.model.compile import description
 from vpm.model.effects import Effect, effects_of
+from vpm.model.evaluation import Evaluations
 from vpm.model.messages import parse_toml, read_toml
 from vpm.model.parameters import Parameter
 from vpm.model.writer import content_of, plain, toml_of
@@ -28,8 +28,8 @@ if TYPE_CHECKING:
     from vpm._core import System
 
 
-class Model(Storable):
-    """A machine: bodies, joints, actuators, sensors, controllers and effects, with one flat table of parameters.
+class Model(Evaluations, Storable):
+    """A machine: bodies, joints, beams, actuators, sensors, controllers and effects, with one flat table of parameters.
 
     Build it with `load`, `from_toml` or `from_dict`. Numbers that go in and out are SI; the units of a file are
     converted when it is read.
@@ -113,11 +113,6 @@ class Model(Storable):
         target = Path(path)
         target.write_text(self.to_toml(), encoding="utf-8")
         return target
-
-    @property
-    def name(self) -> str:
-        """Name of the machine."""
-        return self._checked.document.name
 
     @property
     def path(self) -> str | None:
@@ -262,97 +257,34 @@ class Model(Storable):
                 return self._checked.structure.sites(known)
         raise ModelError(f'effects do not sit at a "{kind}"; {near_match(kind, SITE_KINDS)}', where=kind)
 
-    # ---- components --------------------------------------------------------------------------------------------------
+    # ---- levels of detail --------------------------------------------------------------------------------------------
 
-    @property
-    def joints(self) -> tuple[str, ...]:
-        """Joints; joint k is coordinate k and moves body k."""
-        return self._checked.structure.joints
+    def at(self, level: str | Mapping[str, str]) -> Self:
+        """Model with another level of detail of its flexible links; everything else is kept, parameters as well.
 
-    @property
-    def bodies(self) -> tuple[str, ...]:
-        """Bodies, parents before children."""
-        return self._checked.structure.bodies
-
-    @property
-    def actuators(self) -> tuple[str, ...]:
-        """Actuators; actuator k is input k."""
-        return tuple(self._checked.document.actuators)
-
-    @property
-    def sensors(self) -> tuple[str, ...]:
-        """Sensors."""
-        return tuple(self._checked.document.sensors)
-
-    @property
-    def controllers(self) -> tuple[str, ...]:
-        """Controllers."""
-        return tuple(self._checked.document.controllers)
-
-    def joint_kind(self, joint: str) -> JointKind:
-        """Kind of a joint, "prismatic" or "revolute"."""
-        return self._checked.structure.joint_kind(self._known(joint, self.joints, "joint"))
-
-    def joint_of_actuator(self, actuator: str) -> str:
-        """Joint that an actuator drives."""
-        return self._checked.document.actuators[self._known(actuator, self.actuators, "actuator")].joint
-
-    @cached_property
-    def controlled_actuators(self) -> tuple[str, ...]:
-        """Actuators that a controller commands, in the order of `actuators`."""
-        controlled = {controller.actuator for controller in self._checked.document.controllers.values()}
-        return tuple(name for name in self.actuators if name in controlled)
-
-    def has_lag(self, actuator: str) -> bool:
-        """Whether an actuator follows its command with a lag, which adds a state."""
-        self._known(actuator, self.actuators, "actuator")
-        return any(effect.name == "actuator_lag" and effect.at == actuator for effect in self.effects)
-
-    def _known(self, name: str, names: tuple[str, ...], what: str) -> str:
-        if name not in names:
-            raise ModelError(
-                f'{self.name} has no {what} "{name}"; {near_match(name, names, what="it has")}', where=name
-            )
-        return name
-
-    # ---- channels ----------------------------------------------------------------------------------------------------
-
-    @cached_property
-    def channel_table(self) -> Mapping[str, ChannelEntry]:
-        """How the columns of logs map on channels, and on ``"time"``; empty if the model does not say."""
-        return MappingProxyType(dict(self._checked.document.channels or {}))
-
-    @cached_property
-    def channels(self) -> tuple[str, ...]:
-        """Every channel that a log may hold."""
-        return self._checked.structure.channels
-
-    @cached_property
-    def input_channels(self) -> tuple[str, ...]:
-        """Commands, one per actuator."""
-        return tuple(f"{name}.command" for name in self.actuators)
-
-    @cached_property
-    def output_channels(self) -> tuple[str, ...]:
-        """What a simulation gives: per joint position, velocity, acceleration, effort; per actuator command, force."""
-        return self._checked.structure.outputs
-
-    def channel_unit(self, channel: str) -> str:
-        """SI unit of a channel.
+        Parameters
+        ----------
+        level : str or mapping of str to str
+            For all beams, ``"bezier(3)"``, or for those that are named, ``{"upper": "rigid"}``.
 
         Raises
         ------
         ModelError
-            There is no such channel; the message names near ones.
-        """
-        return self._checked.structure.unit(channel)
+            A beam or a level is unknown, a number is out of range, or a beam deforms in what the level does not know.
 
-    def sensor_of(self, channel: str) -> str | None:
-        """Sensor that reads a channel, if there is one."""
-        for name, sensor in self._checked.document.sensors.items():
-            if sensor.measures == channel:
-                return name
-        return None
+        Examples
+        --------
+        >>> stiff = model.at("rigid")
+        >>> finer = model.at({"upper": "strain(5)"})
+        """
+        levels = dict.fromkeys(self.beams, level) if isinstance(level, str) else dict(level)
+        if not self.beams:
+            rest = "has no beams, so it has no level of detail; describe its flexible links under [beams]"
+            raise ModelError(f"{self.name} {rest}")
+        content = self.to_dict()
+        for beam, text in levels.items():
+            content["beams"][self._known(beam, self.beams, "beam")]["level"] = text
+        return type(self)(content)
 
     # ---- core --------------------------------------------------------------------------------------------------------
 
@@ -386,12 +318,14 @@ class Model(Storable):
             f"{len(items)} {what}{'' if len(items) == 1 else 's'}"
             for what, items in (
                 ("joint", self.joints),
+                ("beam", self.beams),
                 ("actuator", self.actuators),
                 ("sensor", self.sensors),
                 ("controller", self.controllers),
                 ("effect", self.effects),
                 ("parameter", self.parameters),
             )
+            if items or what != "beam"
         ]
         return f"Model({self.name!r}: {', '.join(counts)}, {free} adjustable)"
 

@@ -1,6 +1,7 @@
 """The parameters of a model: one flat, ordered table with SI values, read from the document and checked.
 
-Order: bodies (mass, centre of mass, inertia), actuators (gain), controllers, then effects as they stand in the file.
+Order: bodies (mass, centre of mass, inertia), beams, lines, actuators (gain), controllers, then effects as they stand
+in the file.
 """
 
 from __future__ import annotations
@@ -12,10 +13,12 @@ from typing import Literal
 
 from vpm.catalogue import EFFECTS, POSITIVE
 from vpm.errors import UnitError
+from vpm.model.beam import Beam, Line, Part, sections_of
 from vpm.model.effects import effect_unit
+from vpm.model.entry import Quantity
 from vpm.model.messages import Problem, place
-from vpm.model.schema import Cascade, Controller, Document, EffectEntry, Quantity
-from vpm.model.structure import EFFORT_UNIT, Structure
+from vpm.model.schema import Cascade, Controller, Document, EffectEntry
+from vpm.model.structure import Structure
 from vpm.units import convert, require_dimension, si_unit
 
 ParameterKind = Literal["linear", "shape"]
@@ -25,6 +28,11 @@ INERTIA_AXES = ("xx", "yy", "zz", "xy", "xz", "yz")
 _ANY = (-math.inf, math.inf)
 _ABOVE_ZERO = (POSITIVE, math.inf)
 _NOT_NEGATIVE = (0.0, math.inf)
+#: As POSITIVE, for areas and second moments.
+_LEAST = 1e-30
+#: Above -1 and not above 0.5, or straining an isotropic solid would set energy free.
+_POISSON = (-0.999, 0.5)
+_FEEDING = "negative damping would feed energy into the motion"
 
 
 @dataclass(frozen=True)
@@ -157,7 +165,7 @@ class Slot:
 def _range_text(low: float, high: float, unit: str) -> str:
     """Physical range in words; the catalogue and this module know ranges with a lower end only."""
     shown = "" if unit == "1" else f" {unit}"
-    if low == POSITIVE:
+    if low in {POSITIVE, _LEAST}:
         return f"more than 0{shown}"
     return f"{low:g}{shown} or more" if math.isinf(high) else f"{low:g} to {high:g}{shown}"
 
@@ -166,9 +174,12 @@ def slots(document: Document, structure: Structure) -> Iterator[Slot]:
     """Every parameter of a document whose references are right and whose effects are complete, in index order."""
     for name in structure.bodies:
         yield from _body_slots(name, document)
+    for name in structure.beams:
+        yield from _beam_slots(name, document.beams[name])
+    for name, line in document.lines.items():
+        yield from _line_slots(name, line)
     for name, actuator in document.actuators.items():
-        kind = structure.joint_kind(actuator.joint)
-        unit = si_unit(f"{EFFORT_UNIT[kind]}/({actuator.command_unit})")
+        unit = si_unit(f"{structure.effort_unit(name)}/({actuator.command_unit})")
         yield Slot(f"{name}.gain", ("actuators", name, "gain"), actuator.gain, unit, _ANY, "linear")
     for name, controller in document.controllers.items():
         yield from _controller_slots(name, controller, document, structure)
@@ -184,6 +195,46 @@ def _body_slots(name: str, document: Document) -> Iterator[Slot]:
     for i, (axes, quantity) in enumerate(zip(INERTIA_AXES, body.inertia, strict=True)):
         bounds = _NOT_NEGATIVE if i < 3 else _ANY
         yield Slot(f"{name}.inertia.{axes}", (*keys, "inertia", i), quantity, "kg m^2", bounds, "linear")
+
+
+def _beam_slots(name: str, beam: Beam) -> Iterator[Slot]:
+    """Material, sections, damping; the effort of a motion is linear in none of them, for they bend the beam."""
+    keys, material, damping = ("beams", name), beam.material, beam.damping
+    for key, unit, bounds in (
+        ("young", "Pa", _ABOVE_ZERO),
+        ("poisson", "1", _POISSON),
+        ("density", "kg/m^3", _ABOVE_ZERO),
+    ):
+        yield Slot(f"{name}.{key}", (*keys, "material", key), getattr(material, key), unit, bounds, "shape")
+    for way, section in sections_of(beam):
+        place_in_file = ("section",) if len(way) == 1 else ("sections", *way[1:])
+        for key, quantity in section.sizes.items():
+            dotted = ".".join((name, *map(str, way), key))
+            unit = section.units[key]
+            yield Slot(dotted, (*keys, *place_in_file, key), quantity, unit, _size_range(unit), "shape")
+    for key, unit in (("stiffness", "s"), ("mass", "1/s")):
+        if (quantity := getattr(damping, key)) is not None:
+            way = (*keys, "damping", key)
+            yield Slot(f"{name}.damping.{key}", way, quantity, unit, _NOT_NEGATIVE, "shape", _FEEDING)
+    for i, quantity in enumerate(damping.ratios):
+        way = (*keys, "damping", "ratios", i)
+        yield Slot(f"{name}.damping.ratios.{i}", way, quantity, "1", _NOT_NEGATIVE, "shape", _FEEDING)
+
+
+def _size_range(unit: str) -> tuple[float, float]:
+    """Range of a size of a section; second moments of thin ones are far below the least length, 1e-12 m^4 and less."""
+    return _ABOVE_ZERO if unit in {"m", "1"} else (_LEAST, math.inf)
+
+
+def _line_slots(name: str, line: Line) -> Iterator[Slot]:
+    for key in ("barrel", "rod"):
+        part: Part | None = getattr(line, key)
+        if part is None:
+            continue
+        keys = ("lines", name, key)
+        yield Slot(f"{name}.{key}.mass", (*keys, "mass"), part.mass, "kg", _NOT_NEGATIVE, "linear")
+        yield Slot(f"{name}.{key}.center", (*keys, "center"), part.center, "m", _ANY, "shape")
+        yield Slot(f"{name}.{key}.inertia", (*keys, "inertia"), part.inertia, "kg m^2", _NOT_NEGATIVE, "linear")
 
 
 def _controller_slots(name: str, controller: Controller, document: Document, structure: Structure) -> Iterator[Slot]:

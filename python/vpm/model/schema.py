@@ -8,70 +8,53 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
-from vpm.model.channels import ChannelEntry
-
-#: A finite number; text and booleans are refused.
-Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
-#: A number that may be infinite: bounds, and the uncertainty of what is not known beforehand. NaN is refused later.
-WideNumber = Annotated[float, Field(strict=True)]
-Text = Annotated[str, Field(strict=True, min_length=1)]
-Vector = Annotated[tuple[Number, ...], Field(min_length=3, max_length=3)]
-
-
-class Entry(BaseModel):
-    """A table of a model file; unknown keys are refused."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True)
-
-
-class Quantity(Entry):
-    """Value of a parameter as it stands in the file; a missing unit means SI."""
-
-    value: Number
-    unit: Text | None = None
-    uncertainty: WideNumber | None = None
-    minimum: WideNumber | None = Field(default=None, alias="min")
-    maximum: WideNumber | None = Field(default=None, alias="max")
-
-
-def _as_table(value: object) -> object:
-    """Turn a bare number into a table with nothing but the value."""
-    if isinstance(value, Mapping | Quantity):
-        return value
-    if isinstance(value, int | float) and not isinstance(value, bool):
-        return {"value": value}
-    raise ValueError('has to be a number or a table like { value = 1.0, unit = "kg" }')
-
-
-ParameterValue = Annotated[Quantity, BeforeValidator(_as_table)]
-_ZERO = Quantity(value=0.0)
+from vpm.model.beam import Beam, Gauge, Line, Marker
+from vpm.model.entry import ORIGIN, ZERO, Entry, Number, ParameterValue, Quantity, Text, Vector
+from vpm.units import parse_unit
 
 
 class Body(Entry):
     """Rigid body: mass, centre of mass in the body frame, inertia about the centre of mass (xx yy zz xy xz yz)."""
 
     mass: ParameterValue
-    center_of_mass: Annotated[tuple[ParameterValue, ...], Field(min_length=3, max_length=3)] = (_ZERO,) * 3
-    inertia: Annotated[tuple[ParameterValue, ...], Field(min_length=6, max_length=6)] = (_ZERO,) * 6
+    center_of_mass: Annotated[tuple[ParameterValue, ...], Field(min_length=3, max_length=3)] = (ZERO,) * 3
+    inertia: Annotated[tuple[ParameterValue, ...], Field(min_length=6, max_length=6)] = (ZERO,) * 6
+
+
+class DenavitHartenberg(Entry):
+    """Place of a joint by four numbers (m, rad), in the standard or in the modified convention."""
+
+    a: Number = 0.0
+    alpha: Number = 0.0
+    d: Number = 0.0
+    theta: Number = 0.0
+    convention: Literal["standard", "modified"] = "standard"
+
+
+JointType = Literal["prismatic", "revolute", "helical", "cylindrical", "planar", "spherical", "fixed"]
 
 
 class Joint(Entry):
-    """Joint between two bodies; its frame is the frame of the child."""
+    """Joint between a body and its parent, a body or a beam; its frame is the frame of the child."""
 
-    type: Literal["prismatic", "revolute"]
+    type: JointType
     parent: Text
     child: Text
-    axis: Vector
-    translation: Vector = (0.0, 0.0, 0.0)
-    rotation: Vector = (0.0, 0.0, 0.0)
+    at: Number | None = None
+    axis: Vector | None = None
+    pitch: Number | None = None
+    translation: Vector = ORIGIN
+    rotation: Vector = ORIGIN
+    dh: DenavitHartenberg | None = None
 
 
 class Actuator(Entry):
-    """Drive of a joint: effort = gain times command."""
+    """Drive of a joint or of a line: effort = gain times command."""
 
-    joint: Text
+    joint: Text | None = None
+    line: Text | None = None
     gain: ParameterValue
     command_unit: Text = "1"
 
@@ -100,8 +83,8 @@ class Pid(Entry):
     actuator: Text
     measures: Text
     proportional: ParameterValue
-    integral: ParameterValue = _ZERO
-    derivative: ParameterValue = _ZERO
+    integral: ParameterValue = ZERO
+    derivative: ParameterValue = ZERO
     limit: ParameterValue | None = None
 
 
@@ -123,13 +106,57 @@ class EffectEntry(BaseModel):
         return dict(self.__pydantic_extra__)
 
 
+def _not_zero(value: float) -> float:
+    if value == 0.0:
+        raise ValueError("is 0, which would erase the column; give another factor")
+    return value
+
+
+def _readable(unit: str) -> str:
+    parse_unit(unit)
+    return unit
+
+
+class ChannelEntry(BaseModel):
+    """Column of a log that holds one channel.
+
+    Attributes
+    ----------
+    column : str
+        Name of the column.
+    unit : str
+        Unit of ``scale column + offset``.
+    scale : float
+        Factor on the numbers of the column.
+    offset : float
+        Added after the scaling, in `unit`.
+    delay : float
+        How late the samples are stamped (s).
+    optional : bool
+        A log without the column holds zeros here.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    column: Text
+    unit: Annotated[Text, AfterValidator(_readable)]
+    scale: Annotated[Number, AfterValidator(_not_zero)] = 1.0
+    offset: Number = 0.0
+    delay: Number = 0.0
+    optional: Annotated[bool, Field(strict=True)] = False
+
+
 class Document(Entry):
     """A whole model file."""
 
     name: Text
     gravity: Vector
-    bodies: dict[str, Body] = Field(min_length=1)
-    joints: dict[str, Joint] = Field(min_length=1)
+    bodies: dict[str, Body] = Field(default_factory=dict)
+    joints: dict[str, Joint] = Field(default_factory=dict)
+    beams: dict[str, Beam] = Field(default_factory=dict)
+    lines: dict[str, Line] = Field(default_factory=dict)
+    gauges: dict[str, Gauge] = Field(default_factory=dict)
+    markers: dict[str, Marker] = Field(default_factory=dict)
     actuators: dict[str, Actuator] = Field(default_factory=dict)
     sensors: dict[str, Sensor] = Field(default_factory=dict)
     controllers: dict[str, Controller] = Field(default_factory=dict)
@@ -141,6 +168,10 @@ class Document(Entry):
 SECTIONS: Mapping[str, tuple[type[BaseModel], ...]] = {
     "bodies": (Body,),
     "joints": (Joint,),
+    "beams": (Beam,),
+    "lines": (Line,),
+    "gauges": (Gauge,),
+    "markers": (Marker,),
     "actuators": (Actuator,),
     "sensors": (Sensor,),
     "controllers": (Cascade, Pid),

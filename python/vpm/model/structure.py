@@ -1,85 +1,184 @@
-"""How the components of a model hang together: names, tree of bodies, references, channels and their units."""
+"""How the components of a model hang together: tree of bodies and beams, coordinates, channels and their units."""
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from typing import Literal
 
 from vpm.catalogue import JointKind, SiteKind
 from vpm.errors import ModelError, near_match
-from vpm.model.messages import Problem, place
-from vpm.model.schema import SECTIONS, Document
+from vpm.model.expand import Coordinate, coordinates
+from vpm.model.pose import Pose, denavit_hartenberg, pose
+from vpm.model.schema import Document, Joint
+from vpm.model.tree import WORLD
 from vpm.units import si_unit
-
-WORLD = "world"
-_RESERVED = {WORLD, "time"}
-_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
 
 JOINT_CHANNELS = ("position", "velocity", "acceleration", "effort")
 ACTUATOR_OUTPUTS = ("command", "force")
 ACTUATOR_CHANNELS = (*ACTUATOR_OUTPUTS, "reference", "disturbance")
+LINE_UNITS: Mapping[str, str] = {"length": "m", "rate": "m/s", "tension": "N"}
+GAUGE_UNITS: Mapping[str, str] = {"strain": "1"}
+MARKER_UNITS: Mapping[str, str] = {"x": "m", "y": "m", "z": "m", "rx": "rad", "ry": "rad", "rz": "rad"}
 
-COORDINATE_UNIT: Mapping[JointKind, str] = {"prismatic": "m", "revolute": "rad"}
-EFFORT_UNIT: Mapping[JointKind, str] = {"prismatic": "N", "revolute": "N m"}
+COORDINATE_UNIT: Mapping[JointKind, str] = {"prismatic": "m", "revolute": "rad", "helical": "rad"}
+EFFORT_UNIT: Mapping[JointKind, str] = {"prismatic": "N", "revolute": "N m", "helical": "N m"}
+
+
+@dataclass(frozen=True)
+class Mount:
+    """What of the core something is fixed to: the world, a body, or a section of a beam.
+
+    Attributes
+    ----------
+    kind : {"world", "body", "section"}
+    index : int
+        Of the body or the beam, in the order of the core.
+    at : float
+        Arc length of the section (m).
+    """
+
+    kind: Literal["world", "body", "section"] = "world"
+    index: int = 0
+    at: float = 0.0
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A frame that is fixed to a mount, at a constant place."""
+
+    mount: Mount
+    pose: Pose
+
+
+@dataclass(frozen=True)
+class Axis:
+    """A joint of the core; axis k moves body k of the core.
+
+    Attributes
+    ----------
+    coordinate : Coordinate
+    frame : Frame
+        Its frame at coordinate zero.
+    joint : str
+        Joint of the file that it is a part of.
+    body : str or None
+        Body of the file that it carries; None for a massless carrier.
+    """
+
+    coordinate: Coordinate
+    frame: Frame
+    joint: str
+    body: str | None
+
+    @property
+    def name(self) -> str:
+        """Name of the joint."""
+        return self.coordinate.name
+
+    @property
+    def carrier(self) -> str:
+        """Name of the body of the core; carriers have a dot, so no body of a file is called like one."""
+        return self.body or f"{self.name}.carrier"
 
 
 @dataclass(frozen=True)
 class Structure:
-    """Components in the order of the core: joint k moves body k.
+    """Components in the order of the core.
 
     Attributes
     ----------
-    joints, bodies : tuple of str
-        Parents come before children.
-    parents : tuple of int or None
-        Index of the parent body; None is the world.
+    axes : tuple of Axis
+        Joints with one coordinate each.
+    bodies : tuple of str
+        Bodies of the file, parents before children.
+    beams : tuple of str
+        Parents before children.
+    frames : mapping of str to Frame
+        Where the frames of bodies and the root frames of beams are.
     document : Document
     """
 
-    joints: tuple[str, ...]
+    axes: tuple[Axis, ...]
     bodies: tuple[str, ...]
-    parents: tuple[int | None, ...]
+    beams: tuple[str, ...]
+    frames: Mapping[str, Frame]
     document: Document
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Joints with one coordinate each; joint k is coordinate k."""
+        return tuple(axis.name for axis in self.axes)
+
+    @property
+    def welds(self) -> tuple[str, ...]:
+        """Bodies whose inertia is fixed to something else, at a constant place."""
+        carried = {axis.body for axis in self.axes}
+        return tuple(body for body in self.bodies if body not in carried)
+
+    @property
+    def coordinates(self) -> tuple[str, ...]:
+        """Every coordinate: those of the joints, then ``beam.component.number`` of each beam."""
+        beams = ((name, self.document.beams[name]) for name in self.beams)
+        elastic = [f"{name}.{own}" for name, beam in beams for own in beam.detail.coordinates(beam.deforms)]
+        return (*self.joints, *elastic)
+
+    def mounted(self, parent: str, at: float | None, placed: Pose) -> Frame:
+        """Frame that is fixed to a body, a beam or the world."""
+        return _mounted(parent, at, placed, self.frames, self.beams, self.document)
 
     def sites(self, kind: SiteKind) -> tuple[str, ...]:
         """Names of the components at which an effect of this kind can sit."""
         sites: dict[SiteKind, tuple[str, ...]] = {
             "joint": self.joints,
-            "body": self.bodies,
+            "body": (*self.bodies, *self.beams),
             "actuator": tuple(self.document.actuators),
             "sensor": tuple(self.document.sensors),
         }
         return sites[kind]
 
     def joint_kind(self, joint: str) -> JointKind:
-        """Kind of a joint."""
-        return self.document.joints[joint].type
+        """Kind of a joint with one coordinate."""
+        return self.axes[self.joints.index(joint)].coordinate.kind
 
     def joint_at(self, kind: SiteKind, site: str) -> str | None:
-        """Joint that a site belongs to; None for a sensor of an actuator's channel."""
+        """Joint that a site belongs to; None for what belongs to none, such as a sensor of an actuator's channel."""
         if kind == "joint":
             return site
         if kind == "body":
-            return self.joints[self.bodies.index(site)]
+            return self._mover(site)
         if kind == "actuator":
             return self.document.actuators[site].joint
         owner = self.document.sensors[site].measures.partition(".")[0]
-        return owner if owner in self.document.joints else None
+        return owner if owner in self.joints else None
+
+    def _mover(self, site: str) -> str | None:
+        """Last joint on the way from the world to a body or a beam."""
+        mount = self.frames[site].mount
+        while mount.kind == "section":
+            mount = self.frames[self.beams[mount.index]].mount
+        return self.joints[mount.index] if mount.kind == "body" else None
 
     @property
     def channels(self) -> tuple[str, ...]:
         """Every channel that a log may hold."""
-        joints = [f"{joint}.{channel}" for joint in self.joints for channel in JOINT_CHANNELS]
-        actuators = [f"{name}.{channel}" for name in self.document.actuators for channel in ACTUATOR_CHANNELS]
-        return (*joints, *actuators)
+        return self._listed(ACTUATOR_CHANNELS)
 
     @property
     def outputs(self) -> tuple[str, ...]:
         """Channels that a simulation gives, in the order of the core."""
-        joints = [f"{joint}.{channel}" for joint in self.joints for channel in JOINT_CHANNELS]
-        actuators = [f"{name}.{channel}" for name in self.document.actuators for channel in ACTUATOR_OUTPUTS]
-        return (*joints, *actuators)
+        return self._listed(ACTUATOR_OUTPUTS)
+
+    def _listed(self, of_actuators: tuple[str, ...]) -> tuple[str, ...]:
+        document = self.document
+        groups: list[tuple[tuple[str, ...], tuple[str, ...]]] = [
+            (self.joints, JOINT_CHANNELS),
+            (tuple(document.actuators), of_actuators),
+            (tuple(document.lines), tuple(LINE_UNITS)),
+            (tuple(document.gauges), tuple(GAUGE_UNITS)),
+            (tuple(document.markers), tuple(MARKER_UNITS)),
+        ]
+        return tuple(f"{owner}.{channel}" for owners, channels in groups for owner in owners for channel in channels)
 
     def unit(self, channel: str) -> str:
         """SI unit of a channel.
@@ -93,125 +192,90 @@ class Structure:
         if channel not in self.channels:
             repair = near_match(channel, self.channels, what="its channels are")
             raise ModelError(f'the model has no channel "{channel}"; {repair}', where=channel)
-        if owner in self.document.joints:
+        if owner in self.joints:
             coordinate = COORDINATE_UNIT[self.joint_kind(owner)]
             units = {"position": coordinate, "velocity": f"{coordinate}/s", "acceleration": f"{coordinate}/s^2"}
             return units.get(name, EFFORT_UNIT[self.joint_kind(owner)])
-        actuator = self.document.actuators[owner]
-        if name == "force":
-            return EFFORT_UNIT[self.joint_kind(actuator.joint)]
-        if name == "reference":  # of what the controller holds, which is a position of some joint
-            held = [c.measures for c in self.document.controllers.values() if c.actuator == owner]
-            return self.unit(held[0]) if held else COORDINATE_UNIT[self.joint_kind(actuator.joint)]
-        return si_unit(actuator.command_unit)
+        if owner in self.document.actuators:
+            return self._actuator_unit(owner, name)
+        return {**LINE_UNITS, **GAUGE_UNITS, **MARKER_UNITS}[name]
 
+    def _actuator_unit(self, actuator: str, channel: str) -> str:
+        if channel == "force":
+            return self.effort_unit(actuator)
+        if channel == "reference":  # of what the controller holds, which is a position of some joint
+            held = [c.measures for c in self.document.controllers.values() if c.actuator == actuator]
+            joint = self.document.actuators[actuator].joint
+            own = "m" if joint is None else COORDINATE_UNIT[self.joint_kind(joint)]
+            return self.unit(held[0]) if held else own
+        return si_unit(self.document.actuators[actuator].command_unit)
 
-def name_problems(document: Document) -> Iterator[Problem]:
-    """Names that cannot be written in a dotted name, that are reserved, or that two components share."""
-    owner: dict[str, str] = {}
-    for section in SECTIONS:
-        if section == "channels":
-            continue
-        for name in getattr(document, section):
-            where = place(section, name)
-            if not _NAME.fullmatch(name):
-                yield Problem(where, "has a name that is not letters, digits, - and _ after a letter; rename it")
-            elif name in _RESERVED:
-                yield Problem(where, f'has the name "{name}", which is reserved; rename it')
-            elif name in owner:
-                yield Problem(
-                    where, f"has the same name as {owner[name]}; all components share one namespace, rename one"
-                )
-            owner.setdefault(name, where)
-
-
-def tree_problems(document: Document) -> Iterator[Problem]:
-    """Joints that name unknown bodies, bodies with no joint or several, and loops."""
-    owner: dict[str, str] = {}
-    for name, joint in document.joints.items():
-        if joint.parent != WORLD and joint.parent not in document.bodies:
-            repair = near_match(joint.parent, [WORLD, *document.bodies], what="it has")
-            yield Problem(
-                place("joints", name, "parent"), f'is "{joint.parent}", which is no body of the model; {repair}'
-            )
-        if joint.child not in document.bodies:
-            repair = near_match(joint.child, document.bodies, what="it has")
-            yield Problem(
-                place("joints", name, "child"), f'is "{joint.child}", which is no body of the model; {repair}'
-            )
-        elif joint.child in owner:
-            rest = f'is "{joint.child}", which joint "{owner[joint.child]}" already carries; a body has one joint'
-            yield Problem(place("joints", name, "child"), rest)
-        owner.setdefault(joint.child, name)
-    for body in document.bodies:
-        if body not in owner:
-            yield Problem(place("bodies", body), f'hangs on no joint; add a joint with child = "{body}", or remove it')
-    yield from _loop_problems(document)
-
-
-def _loop_problems(document: Document) -> Iterator[Problem]:
-    parent = {joint.child: joint.parent for joint in document.joints.values()}
-    settled: set[str] = set()
-    for body in document.bodies:
-        way = [body]
-        while way[-1] in parent and way[-1] not in settled and parent[way[-1]] not in way:
-            way.append(parent[way[-1]])
-        if way[-1] in parent and way[-1] not in settled:  # the last body's parent is already on the way
-            loop = [*way[way.index(parent[way[-1]]) :], parent[way[-1]]]
-            rest = f'is in a loop that never reaches the world: {" -> ".join(loop)}; give one of them parent = "world"'
-            yield Problem(place("bodies", body), rest)
-        settled.update(way)
-
-
-def reference_problems(document: Document, structure: Structure) -> Iterator[Problem]:
-    """Actuators, sensors and controllers that name what is not there, or sit where another one already does."""
-    for name, actuator in document.actuators.items():
-        if actuator.joint not in document.joints:
-            repair = near_match(actuator.joint, document.joints, what="it has")
-            yield Problem(
-                place("actuators", name, "joint"), f'is "{actuator.joint}", which is no joint of the model; {repair}'
-            )
-    seen: dict[str, str] = {}
-    for name, sensor in document.sensors.items():
-        where = place("sensors", name, "measures")
-        if sensor.measures not in structure.outputs:
-            repair = near_match(sensor.measures, structure.outputs, what="it can measure")
-            yield Problem(where, f'is "{sensor.measures}", which is no output of the model; {repair}')
-        elif sensor.measures in seen:
-            yield Problem(
-                where, f'is "{sensor.measures}", which sensor "{seen[sensor.measures]}" already reads; remove one'
-            )
-        seen.setdefault(sensor.measures, name)
-    yield from _controller_problems(document)
-
-
-def _controller_problems(document: Document) -> Iterator[Problem]:
-    seen: dict[str, str] = {}
-    positions = [f"{joint}.position" for joint in document.joints]
-    for name, controller in document.controllers.items():
-        where = place("controllers", name, "actuator")
-        if controller.actuator not in document.actuators:
-            repair = near_match(controller.actuator, document.actuators, what="it has")
-            yield Problem(where, f'is "{controller.actuator}", which is no actuator of the model; {repair}')
-        elif controller.actuator in seen:
-            other = seen[controller.actuator]
-            rest = f'is "{controller.actuator}", which controller "{other}" already commands; remove one'
-            yield Problem(where, rest)
-        seen.setdefault(controller.actuator, name)
-        if controller.measures not in positions:
-            repair = near_match(controller.measures, positions, what="it can measure")
-            where = place("controllers", name, "measures")
-            yield Problem(where, f'is "{controller.measures}", which is no joint position of the model; {repair}')
+    def effort_unit(self, actuator: str) -> str:
+        """SI unit of the effort of an actuator: what its joint takes, or a force along its line."""
+        joint = self.document.actuators[actuator].joint
+        return "N" if joint is None else EFFORT_UNIT[self.joint_kind(joint)]
 
 
 def build_structure(document: Document) -> Structure:
     """Order the tree, parents first, else in the order of the file; the tree has to be free of problems."""
-    joints: list[str] = []
-    placed: dict[str, int] = {}
-    waiting = dict(document.joints)
-    while waiting:
-        ready = next(name for name, joint in waiting.items() if joint.parent == WORLD or joint.parent in placed)
-        placed[waiting.pop(ready).child] = len(joints)
-        joints.append(ready)
-    parents = tuple(placed.get(document.joints[name].parent) for name in joints)
-    return Structure(tuple(joints), tuple(placed), parents, document)
+    axes: list[Axis] = []
+    bodies: list[str] = []
+    beams: list[str] = []
+    frames: dict[str, Frame] = {}
+    for name in _sorted(document):
+        if name in document.beams:
+            beam = document.beams[name]
+            placed = pose(beam.translation, beam.rotation)
+            frames[name] = _mounted(beam.parent, beam.at, placed, frames, tuple(beams), document)
+            beams.append(name)
+        else:
+            joint = document.joints[name]
+            before, after = _places(joint)
+            start = _mounted(joint.parent, joint.at, before, frames, tuple(beams), document)
+            found = list(_chain(name, joint, start, len(axes), carries=after == Pose()))
+            end = Frame(Mount("body", len(axes) + len(found) - 1), Pose()) if found else start
+            axes.extend(found)
+            frames[joint.child] = Frame(end.mount, end.pose @ after)
+            bodies.append(joint.child)
+    return Structure(tuple(axes), tuple(bodies), tuple(beams), frames, document)
+
+
+def _sorted(document: Document) -> Iterator[str]:
+    """Names of joints and beams, each after what it hangs on."""
+    hangs: dict[str, tuple[str, str]] = {name: (joint.parent, joint.child) for name, joint in document.joints.items()}
+    hangs |= {name: (beam.parent, name) for name, beam in document.beams.items()}
+    placed = {WORLD}
+    while hangs:
+        ready = next(name for name, (parent, _) in hangs.items() if parent in placed)
+        placed.add(hangs.pop(ready)[1])
+        yield ready
+
+
+def _places(joint: Joint) -> tuple[Pose, Pose]:
+    """Constant places before and after the motion of a joint."""
+    return (pose(joint.translation, joint.rotation), Pose()) if joint.dh is None else denavit_hartenberg(joint.dh)
+
+
+def _chain(name: str, joint: Joint, start: Frame, first: int, *, carries: bool) -> Iterator[Axis]:
+    """Axes of a joint; the last one carries the child, unless that sits at a constant place away from it."""
+    parts = coordinates(name, joint)
+    for i, part in enumerate(parts):
+        frame = start if i == 0 else Frame(Mount("body", first + i - 1), Pose())
+        yield Axis(part, frame, name, joint.child if carries and i == len(parts) - 1 else None)
+
+
+def _mounted(
+    parent: str,
+    at: float | None,
+    placed: Pose,
+    frames: Mapping[str, Frame],
+    beams: tuple[str, ...],
+    document: Document,
+) -> Frame:
+    if parent == WORLD:
+        return Frame(Mount(), placed)
+    if parent in document.beams:
+        length = document.beams[parent].length
+        return Frame(Mount("section", beams.index(parent), length if at is None else min(at, length)), placed)
+    under = frames[parent]
+    return Frame(under.mount, under.pose @ placed)

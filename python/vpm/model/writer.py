@@ -8,7 +8,8 @@ from typing import Any
 import tomli_w
 from pydantic import BaseModel
 
-from vpm.model.schema import Document, EffectEntry, Quantity
+from vpm.model.entry import Quantity
+from vpm.model.schema import Document, EffectEntry
 
 
 def content_of(document: Document, *, complete: bool = False) -> dict[str, Any]:

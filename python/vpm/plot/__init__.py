@@ -1,6 +1,7 @@
 """Pictures of results. Needs the extra ``plot``; each function returns a matplotlib figure and opens no window."""
 
 from vpm.plot.bars import plot_candidates, plot_gap, plot_ladder, plot_parameters, plot_step_cost
+from vpm.plot.linear import plot_bode, plot_poles
 from vpm.plot.signals import (
     plot_channels,
     plot_correlation,
@@ -14,6 +15,7 @@ from vpm.plot.summaries import plot_comparison, plot_pictures
 
 __all__ = [
     "figure_to_svg",
+    "plot_bode",
     "plot_candidates",
     "plot_channels",
     "plot_comparison",
@@ -22,6 +24,7 @@ __all__ = [
     "plot_ladder",
     "plot_parameters",
     "plot_pictures",
+    "plot_poles",
     "plot_residual_against",
     "plot_residual_time",
     "plot_run",

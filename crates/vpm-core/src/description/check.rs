@@ -97,6 +97,7 @@ fn sites(description: &Description) -> Result<()> {
         match effect {
             EffectEntry::Joint { joint, .. } => within(&what, "joint", *joint, joints)?,
             EffectEntry::Payload { on: Site::Body(body), .. } => within(&what, "body", *body, joints)?,
+            EffectEntry::Payload { on: Site::Weld(weld), .. } => within(&what, "weld", *weld, description.welds.len())?,
             EffectEntry::Payload { on: Site::Tip(beam), .. } => within(&what, "beam", *beam, description.n_beams())?,
         }
     }

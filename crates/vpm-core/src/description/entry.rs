@@ -71,9 +71,12 @@ impl TryFrom<Map<String, Value>> for EffectEntry {
         named(&kind, || {
             if kind == "payload" {
                 table.remove("type");
-                let on = match table.contains_key("beam") {
-                    true => Site::Tip(take(&mut table, "beam")?),
-                    false => Site::Body(take(&mut table, "body")?),
+                let on = if table.contains_key("beam") {
+                    Site::Tip(take(&mut table, "beam")?)
+                } else if table.contains_key("weld") {
+                    Site::Weld(take(&mut table, "weld")?)
+                } else {
+                    Site::Body(take(&mut table, "body")?)
                 };
                 return Ok(Self::Payload { on, law: serde_json::from_value(Value::Object(table))? });
             }

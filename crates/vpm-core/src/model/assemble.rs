@@ -100,6 +100,7 @@ impl<S: Scalar> Parts<S> {
         for (payload, point) in self.point_masses.iter().enumerate() {
             let (body, bodies) = match point.on {
                 Site::Body(body) => (body, self.bodies.len()),
+                Site::Weld(weld) => (weld, self.welds.len()),
                 Site::Tip(beam) => (beam, self.beams.len()),
             };
             if body >= bodies {
@@ -113,6 +114,7 @@ impl<S: Scalar> Parts<S> {
     fn site_name(&self, site: Site) -> &str {
         match site {
             Site::Body(body) => &self.bodies[body].name,
+            Site::Weld(weld) => &self.welds[weld].name,
             Site::Tip(beam) => &self.beams[beam].name,
         }
     }
@@ -206,13 +208,22 @@ impl<'a, S: Scalar> Assembly<'a, S> {
             self.add(place, weld.inertia.checked(&weld.name)?);
         }
         for point in &self.parts.point_masses {
-            let place = self.resolved(match point.on {
-                Site::Body(body) => Mount::Body(body),
-                Site::Tip(beam) => Mount::Section { beam, at: self.parts.beams[beam].length },
-            });
+            let place = self.site(point.on)?;
             self.add(place, SpatialInertia::point_mass(point.mass, Vector3::from(point.position)));
         }
         Ok(())
+    }
+
+    /// The frame of what a point mass sits on.
+    fn site(&self, site: Site) -> Result<Place> {
+        Ok(match site {
+            Site::Body(body) => self.resolved(Mount::Body(body)),
+            Site::Weld(number) => {
+                let weld = &self.parts.welds[number];
+                self.resolved(weld.on).beyond(placed(&weld.name, weld.translation, weld.rotation)?)
+            }
+            Site::Tip(beam) => self.resolved(Mount::Section { beam, at: self.parts.beams[beam].length }),
+        })
     }
 
     fn gather_beam(&mut self, number: usize) {
@@ -238,13 +249,7 @@ impl<'a, S: Scalar> Assembly<'a, S> {
     /// What bodies have with all that is fixed to them is physical, and nothing hangs in the air.
     fn check_bodies(&self) -> Result<()> {
         for point in &self.parts.point_masses {
-            let (name, frame) = match point.on {
-                Site::Body(body) => (&self.parts.bodies[body].name, body + 1),
-                Site::Tip(beam) => {
-                    let tip = self.resolved(Mount::Section { beam, at: self.parts.beams[beam].length });
-                    (&self.parts.beams[beam].name, tip.frame)
-                }
-            };
+            let (name, frame) = (self.parts.site_name(point.on), self.site(point.on)?.frame);
             let total = self.inertias[frame].value();
             let [xx, yy, zz, ..] = total.rotational.to_array();
             check_physical(name, total.mass, total.central(), 1e-12 * (xx + yy + zz))?;

@@ -4,7 +4,7 @@ use crate::description::Description;
 use crate::sensor::Layout;
 
 /// A state in words.
-pub(super) fn state_name(description: &Description, place: usize) -> String {
+pub(crate) fn state_name(description: &Description, place: usize) -> String {
     let n = description.n_coordinates();
     if place < n {
         return coordinate_name(description, "position", place);
@@ -17,17 +17,25 @@ pub(super) fn state_name(description: &Description, place: usize) -> String {
 }
 
 fn coordinate_name(description: &Description, quantity: &str, place: usize) -> String {
+    match description.bodies.get(place) {
+        Some(body) => format!("{quantity} of joint `{}`", body.joint.name),
+        None => format!("{quantity} of {}", coordinate(description, place)),
+    }
+}
+
+/// A coordinate in words.
+pub(super) fn coordinate(description: &Description, place: usize) -> String {
     if let Some(body) = description.bodies.get(place) {
-        return format!("{quantity} of joint `{}`", body.joint.name);
+        return body.joint.name.clone();
     }
     let mut number = place - description.n_joints();
     for (beam, &len) in description.beams.iter().zip(description.elastic()) {
         if number < len {
-            return format!("{quantity} of elastic coordinate {number} of beam `{}`", beam.name);
+            return format!("elastic coordinate {number} of beam {}", beam.name);
         }
         number -= len;
     }
-    format!("{quantity} of coordinate {place}")
+    format!("coordinate {place}")
 }
 
 /// An output in words.

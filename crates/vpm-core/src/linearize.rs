@@ -1,0 +1,156 @@
+//! The linear machine near a state: exact derivatives of its rates and outputs.
+
+use crate::description::Description;
+use crate::error::{Error, Result};
+use crate::ode::Ode;
+use crate::scalar::Dual;
+use crate::sensor::Sensor;
+use crate::simulate::check_state;
+use crate::system::System;
+use crate::table::Table;
+
+/// Directions per pass: the gradient of a number then fills one 256-bit register.
+const LANES: usize = 4;
+
+/// A number with its derivatives along some of the states and inputs.
+type Number = Dual<f64, LANES>;
+
+/// `dx/dt = A x + B u`, `y = C x + D u` for small deviations, each matrix row by row.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Linearization {
+    /// A: derivative of the rates by the states, nx x nx.
+    pub state: Vec<f64>,
+    /// B: derivative of the rates by the inputs, nx x nu.
+    pub input: Vec<f64>,
+    /// C: derivative of the outputs by the states, ny x nx.
+    pub output: Vec<f64>,
+    /// D: derivative of the outputs by the inputs, ny x nu.
+    pub feedthrough: Vec<f64>,
+    /// dx/dt at the point itself: zero where the point is an equilibrium.
+    pub rate: Vec<f64>,
+    /// The outputs at the point itself.
+    pub reading: Vec<f64>,
+}
+
+/// A, B, C and D at `state` under the commands `inputs`, exact to rounding.
+///
+/// The inputs are commands that stand for long: delays of actuators and sensors, which a matrix cannot hold, pass them unchanged.
+/// Dead zones and saturations have the slope they have at the command, zero inside a dead zone and beyond a limit; a lag is a
+/// state. Outputs are all channels as their sensors show them, with gain and offset.
+/// Source: forward accumulation, see [`crate::scalar`]. Checked: the state has to be finite; tested against difference quotients
+/// and against the response of the simulation to small steps.
+pub fn linearize(description: &Description, theta: &[f64], state: &[f64], inputs: &[f64]) -> Result<Linearization> {
+    check_state("state", description, state)?;
+    Table::vector("inputs", inputs, description.n_actuators(), "actuator")?;
+    let mut tangent = Tangent::new(description, theta)?;
+    let (nx, nu, ny) = (state.len(), inputs.len(), description.n_outputs());
+    let zeros = |rows: usize, columns: usize| vec![0.0; rows * columns];
+    let mut result = Linearization {
+        state: zeros(nx, nx),
+        input: zeros(nx, nu),
+        output: zeros(ny, nx),
+        feedthrough: zeros(ny, nu),
+        rate: zeros(nx, 1),
+        reading: zeros(ny, 1),
+    };
+    for first in (0..nx + nu).step_by(LANES) {
+        tangent.evaluate(state, inputs, first);
+        result.take(first, &tangent);
+    }
+    result.checked()
+}
+
+/// The machine in numbers that carry derivatives, with its buffers.
+struct Tangent {
+    system: System<Number>,
+    sensors: Vec<Sensor<Number>>,
+    state: Vec<Number>,
+    commands: Vec<Number>,
+    rate: Vec<Number>,
+    reading: Vec<Number>,
+}
+
+impl Tangent {
+    fn new(description: &Description, theta: &[f64]) -> Result<Self> {
+        let theta: Vec<Number> = theta.iter().map(|&value| Dual::constant(value)).collect();
+        let zeros = |length: usize| vec![Number::default(); length];
+        Ok(Self {
+            system: description.system(&theta)?,
+            sensors: description.sensors(&theta),
+            state: zeros(description.n_states()),
+            commands: zeros(description.n_actuators()),
+            rate: zeros(description.n_states()),
+            reading: zeros(description.n_outputs()),
+        })
+    }
+
+    /// Rates and outputs with their derivatives along [`LANES`] directions, of which `first` is the first: states, then inputs.
+    fn evaluate(&mut self, state: &[f64], inputs: &[f64], first: usize) {
+        // A direction that is not among these wraps around to a lane that does not exist, which gives a constant.
+        let lift = |(place, &value): (usize, &f64)| Dual::variable(value, place.wrapping_sub(first));
+        for (number, lifted) in self.state.iter_mut().zip(state.iter().enumerate().map(lift)) {
+            *number = lifted;
+        }
+        for (number, (place, &value)) in self.commands.iter_mut().zip(inputs.iter().enumerate()) {
+            *number = lift((state.len() + place, &value));
+        }
+        for (actuator, &command) in self.commands.iter().enumerate() {
+            let input = self.system.dynamics().actuators[actuator].input(0, 1.0, |_| command);
+            self.system.hold(actuator, input);
+        }
+        self.system.rhs(&self.state, &mut self.rate);
+        self.observe();
+    }
+
+    /// The outputs as the sensors show them.
+    fn observe(&mut self) {
+        let dynamics = self.system.dynamics();
+        let layout = dynamics.layout();
+        dynamics.observe(&self.state, &self.rate, &mut self.reading);
+        for (channels, &command) in self.reading[layout.actuators()..].chunks_exact_mut(2).zip(&self.commands) {
+            channels[0] = command;
+        }
+        for sensor in &self.sensors {
+            let reading = &mut self.reading[sensor.channel.column(layout)];
+            let truth = *reading;
+            *reading = sensor.read(0, 1.0, |_| truth);
+        }
+    }
+}
+
+impl Linearization {
+    /// Takes over the columns that begin at direction `first`.
+    fn take(&mut self, first: usize, tangent: &Tangent) {
+        let (nx, nu) = (tangent.state.len(), tangent.commands.len());
+        fill(&tangent.rate, first, [(&mut self.state, 0..nx), (&mut self.input, nx..nx + nu)]);
+        fill(&tangent.reading, first, [(&mut self.output, 0..nx), (&mut self.feedthrough, nx..nx + nu)]);
+        let values = |target: &mut [f64], numbers: &[Number]| {
+            target.iter_mut().zip(numbers).for_each(|(value, number)| *value = number.value);
+        };
+        values(&mut self.rate, &tangent.rate);
+        values(&mut self.reading, &tangent.reading);
+    }
+
+    fn checked(self) -> Result<Self> {
+        let parts = [("A", &self.state), ("B", &self.input), ("C", &self.output), ("D", &self.feedthrough)];
+        for (name, matrix) in parts {
+            if let Some(&value) = matrix.iter().find(|entry| !entry.is_finite()) {
+                return Err(Error::NonFinite { path: format!("an entry of {name} at this state"), value });
+            }
+        }
+        Ok(self)
+    }
+}
+
+/// Writes the derivatives of `numbers` along the directions from `first` into matrices that hold ranges of all directions.
+fn fill(numbers: &[Number], first: usize, matrices: [(&mut Vec<f64>, std::ops::Range<usize>); 2]) {
+    for (matrix, range) in matrices {
+        for (row, number) in matrix.chunks_exact_mut(range.len().max(1)).zip(numbers) {
+            for (lane, &slope) in number.gradient.iter().enumerate() {
+                if range.contains(&(first + lane)) {
+                    row[first + lane - range.start] = slope;
+                }
+            }
+        }
+    }
+}

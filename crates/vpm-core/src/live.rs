@@ -1,0 +1,169 @@
+//! A simulation that somebody else drives: one sample at a time, with commands that depend on what was seen.
+
+use std::sync::Arc;
+
+use crate::description::Description;
+use crate::error::{Diverged, Error, Result};
+use crate::integrator::Integrator;
+use crate::ode::Ode;
+use crate::sensor::Sensor;
+use crate::simulate::{Stepping, check_state, check_step, state_name};
+use crate::system::System;
+use crate::table::Table;
+
+/// Samples that a delay may reach back.
+const LONGEST_DELAY: f64 = 1e6;
+
+/// A machine under commands that come one by one, with the memory that its delays need.
+///
+/// At sample k the state is x_k; [`Live::step`] holds a command from there to sample k + 1 and shows what the sensors see at its end,
+/// the command still held. Positions and velocities are those of a free run; a step allocates nothing.
+#[derive(Clone, Debug)]
+pub struct Live {
+    description: Arc<Description>,
+    stepping: Stepping,
+    system: System<f64>,
+    integrator: Integrator<f64>,
+    sensors: Vec<Sensor<f64>>,
+    state: Vec<f64>,
+    rate: Vec<f64>,
+    outputs: Vec<f64>,
+    /// Commands and true channels of the last samples, sample k in row `k % depth`.
+    commands: Vec<f64>,
+    truth: Vec<f64>,
+    depth: usize,
+    sample: usize,
+}
+
+impl Live {
+    /// The machine in `state`, no command given yet.
+    pub fn new(description: Arc<Description>, theta: &[f64], state: &[f64], stepping: Stepping) -> Result<Self> {
+        check_state("state", &description, state)?;
+        check_step(&description, theta, stepping, state)?;
+        let system: System<f64> = description.system(theta)?;
+        let (dim, sensors) = (system.dim(), description.sensors(theta));
+        let depth = depth(&description, theta, stepping.time_step)?;
+        let (outputs, actuators) = (description.n_outputs(), description.n_actuators());
+        let mut live = Self {
+            stepping,
+            system,
+            integrator: Integrator::new(stepping.method, dim),
+            sensors,
+            state: vec![0.0; dim],
+            rate: vec![0.0; dim],
+            outputs: vec![0.0; outputs],
+            commands: vec![0.0; depth * actuators],
+            truth: vec![0.0; depth * outputs],
+            depth,
+            sample: 0,
+            description,
+        };
+        live.reset(state)?;
+        Ok(live)
+    }
+
+    /// The machine.
+    pub fn description(&self) -> &Description {
+        &self.description
+    }
+
+    /// The state now.
+    pub fn state(&self) -> &[f64] {
+        &self.state
+    }
+
+    /// What the sensors show now.
+    pub fn outputs(&self) -> &[f64] {
+        &self.outputs
+    }
+
+    /// Time since the beginning, s.
+    pub fn time(&self) -> f64 {
+        self.sample as f64 * self.stepping.time_step
+    }
+
+    /// Begins again in `state` at time zero, with no command and nothing remembered.
+    pub fn reset(&mut self, state: &[f64]) -> Result<()> {
+        check_state("state", &self.description, state)?;
+        self.state.copy_from_slice(state);
+        self.sample = 0;
+        self.commands.fill(0.0);
+        self.hold();
+        self.observe()
+    }
+
+    /// Holds one command per actuator for the time of one sample, and shows the outputs at its end.
+    pub fn step(&mut self, inputs: &[f64]) -> Result<&[f64]> {
+        Table::vector("inputs", inputs, self.description.n_actuators(), "actuator")?;
+        let actuators = inputs.len();
+        let row = self.sample % self.depth;
+        self.commands[row * actuators..(row + 1) * actuators].copy_from_slice(inputs);
+        self.hold();
+        for _ in 0..self.stepping.substeps {
+            self.integrator.step(&mut self.system, &mut self.state, self.stepping.step());
+        }
+        self.sample += 1;
+        self.observe()?;
+        Ok(&self.outputs)
+    }
+
+    /// Puts on the actuators what the commands until now amount to over the coming interval.
+    fn hold(&mut self) {
+        let Self { system, commands, depth, sample, .. } = self;
+        let actuators = self.description.n_actuators();
+        for number in 0..actuators {
+            let command = |sample: usize| commands[(sample % *depth) * actuators + number];
+            let input = system.dynamics().actuators[number].input(*sample, self.stepping.time_step, command);
+            system.hold(number, input);
+        }
+    }
+
+    fn observe(&mut self) -> Result<()> {
+        if let Some(place) = self.state.iter().position(|state| !state.is_finite()) {
+            return Err(self.diverged(place));
+        }
+        self.system.rhs(&self.state, &mut self.rate);
+        let (layout, width) = (self.description.layout(), self.outputs.len());
+        let row = self.sample % self.depth * width;
+        self.system.dynamics().observe(&self.state, &self.rate, &mut self.truth[row..row + width]);
+        // The command that is still held at the end of its interval; none before the first.
+        let held = self.sample.saturating_sub(1) % self.depth * layout.actuators;
+        let channels = self.truth[row + layout.actuators()..row + layout.lines()].chunks_exact_mut(2);
+        for (channels, &command) in channels.zip(&self.commands[held..]) {
+            channels[0] = command;
+        }
+        self.outputs.copy_from_slice(&self.truth[row..row + width]);
+        for sensor in &self.sensors {
+            let column = sensor.channel.column(layout);
+            let truth = |sample: usize| self.truth[(sample % self.depth) * width + column];
+            self.outputs[column] = sensor.read(self.sample, self.stepping.time_step, truth);
+        }
+        Ok(())
+    }
+
+    #[cold]
+    fn diverged(&self, place: usize) -> Error {
+        Error::Diverged(Box::new(Diverged {
+            what: format!("the {}", state_name(&self.description, place)),
+            time: self.time(),
+            sample_index: self.sample,
+            method: self.stepping.method.name(),
+            step: self.stepping.step(),
+            repair: "reset the simulation and use more substeps, the integrator linearly_implicit, or smaller commands",
+            outputs: Vec::new(),
+            states: Vec::new(),
+        }))
+    }
+}
+
+/// Samples to remember: the longest delay, the interpolation beyond it, and the sample itself.
+fn depth(description: &Description, theta: &[f64], time_step: f64) -> Result<usize> {
+    let of_actuators = description.actuators.iter().filter_map(|actuator| actuator.delay.as_ref().map(|d| d.time));
+    let of_sensors = description.sensors.iter().filter_map(|sensor| sensor.delay);
+    let longest = of_actuators.chain(of_sensors).map(|place| theta[place] / time_step).fold(0.0, f64::max);
+    if longest > LONGEST_DELAY {
+        let condition = format!("be no shorter than a millionth of the longest delay of {} s", longest * time_step);
+        return Err(Error::Setting { setting: "time_step", condition, value: time_step, repair: "shorten the delay" });
+    }
+    Ok(longest.ceil() as usize + 3)
+}

@@ -1,0 +1,94 @@
+//! A machine with fixed parameters and all its buffers, for many fast evaluations: what a controller asks at every sample.
+
+use crate::description::Description;
+use crate::error::{Error, Result};
+use crate::system::{Build, Dynamics};
+
+/// The dynamics of a machine, ready to be evaluated again and again without allocation.
+///
+/// Every method takes one number per coordinate and complains about any other length; numbers that are not finite give results
+/// that are not finite.
+#[derive(Clone, Debug)]
+pub struct Prepared {
+    dynamics: Dynamics<f64>,
+    efforts: Vec<f64>,
+    jacobian: Vec<f64>,
+}
+
+impl Prepared {
+    /// The machine with the parameters `theta`.
+    pub fn new(description: &Description, theta: &[f64]) -> Result<Self> {
+        description.check_values(theta)?;
+        let n = description.n_coordinates();
+        let dynamics = Build::dynamics(&description, theta)?;
+        Ok(Self { dynamics, efforts: vec![0.0; n], jacobian: vec![0.0; 6 * n] })
+    }
+
+    /// Number of coordinates.
+    #[inline]
+    pub fn coordinates(&self) -> usize {
+        self.efforts.len()
+    }
+
+    /// Efforts (N or N m) on all coordinates for accelerations `a` at coordinates `q` and rates `v`, those of the effects taken off.
+    ///
+    /// Law: `M(q) a + h(q, v) + K q + D v - effects(q, v)`; frictions, springs, loads and payloads are carried as well. Inverse of
+    /// [`Prepared::forward_dynamics`].
+    #[inline]
+    pub fn inverse_dynamics(&mut self, q: &[f64], v: &[f64], a: &[f64]) -> Result<&[f64]> {
+        self.expect([("position", q), ("velocity", v), ("acceleration", a)])?;
+        self.dynamics.inverse_dynamics(q, v, a, &mut self.efforts);
+        Ok(&self.efforts)
+    }
+
+    /// Accelerations (m/s^2 or rad/s^2) that efforts `tau` (N or N m) on all coordinates give, with all effects.
+    #[inline]
+    pub fn forward_dynamics(&mut self, q: &[f64], v: &[f64], tau: &[f64]) -> Result<&[f64]> {
+        self.expect([("position", q), ("velocity", v), ("effort", tau)])?;
+        Ok(self.dynamics.forward_dynamics(q, v, tau))
+    }
+
+    /// Mass matrix with payloads, n x n (kg, kg m or kg m^2), symmetric.
+    #[inline]
+    pub fn mass_matrix(&mut self, q: &[f64]) -> Result<&[f64]> {
+        self.expect([("position", q)])?;
+        Ok(self.dynamics.mass_matrix(q))
+    }
+
+    /// Kinetic and potential energy in J. The potential is that of gravity, of the beams, and of the effects that have one.
+    #[inline]
+    pub fn energy(&mut self, q: &[f64], v: &[f64]) -> Result<(f64, f64)> {
+        self.expect([("position", q), ("velocity", v)])?;
+        let total = self.dynamics.energy(q, v);
+        Ok((total.kinetic, total.potential))
+    }
+
+    /// Jacobian of marker `number`, 6 x n row by row: angular velocity and velocity of its origin per unit rate of each coordinate, in
+    /// world axes.
+    #[inline]
+    pub fn jacobian(&mut self, q: &[f64], number: usize) -> Result<&[f64]> {
+        self.expect([("position", q)])?;
+        let count = self.dynamics.layout().markers;
+        if number >= count {
+            let what = "the request for a Jacobian".to_owned();
+            return Err(Error::Reference { what, target: "marker", index: number, count });
+        }
+        self.dynamics.jacobian(q, number, &mut self.jacobian);
+        Ok(&self.jacobian)
+    }
+
+    #[inline]
+    fn expect<const N: usize>(&self, vectors: [(&str, &[f64]); N]) -> Result<()> {
+        for (name, vector) in vectors {
+            if vector.len() != self.coordinates() {
+                return Err(wrong_length(name, self.coordinates(), vector.len()));
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cold]
+fn wrong_length(name: &str, expected: usize, found: usize) -> Error {
+    Error::Dimension { what: name.to_owned(), expected, found, each: "coordinate".to_owned() }
+}

@@ -1,0 +1,138 @@
+//! The class `Simulation`, and how time advances.
+
+use std::sync::{Mutex, MutexGuard};
+
+use numpy::{PyArray1, PyArray2};
+use pyo3::exceptions::{PyRuntimeError, PyValueError};
+use pyo3::prelude::*;
+use vpm_core::Error;
+use vpm_core::integrator::Method;
+use vpm_core::live::Live;
+use vpm_core::simulate::Stepping;
+
+use crate::arrays::{Numbers, Vector, matrix};
+use crate::interrupt::{interruptible, unbroken};
+use crate::system::{System, checked};
+
+type Row<'py> = Bound<'py, PyArray1<f64>>;
+type Any<'py> = Bound<'py, PyAny>;
+
+/// Samples between two questions whether to stop.
+const PATIENCE: usize = 256;
+
+/// Checked settings from what Python gave.
+pub(crate) fn stepping((time_step, substeps, integrator): (f64, i64, &str)) -> PyResult<Result<Stepping, Error>> {
+    let substeps = usize::try_from(substeps).map_err(|_| {
+        PyValueError::new_err(format!("substeps must be at least 1, got {substeps}; use 1 to begin with"))
+    })?;
+    Ok(Method::from_name(integrator).and_then(|method| Stepping::new(time_step, substeps, method)))
+}
+
+/// A simulation that goes on one sample at a time.
+///
+/// Parameters
+/// ----------
+/// system : System
+/// theta : array_like, shape (P,)
+/// state : array_like, shape (n_states,)
+/// time_step : float
+///     Time between samples, s.
+/// substeps : int
+/// integrator : str
+///
+/// Raises
+/// ------
+/// ValueError
+///     A setting, a size or a value is wrong; one sentence with the repair.
+#[pyclass(frozen, module = "vpm._core")]
+pub(crate) struct Simulation {
+    live: Mutex<Live>,
+}
+
+impl Simulation {
+    /// The simulation, if no other thread is at work with it: to wait for that thread here could block the interpreter.
+    fn live(&self) -> PyResult<MutexGuard<'_, Live>> {
+        self.live.try_lock().map_err(|_| {
+            PyRuntimeError::new_err("this simulation is at work in another thread; give each thread its own simulation")
+        })
+    }
+}
+
+#[pymethods]
+impl Simulation {
+    #[new]
+    fn new(
+        py: Python<'_>,
+        system: &System,
+        theta: &Any<'_>,
+        state: &Any<'_>,
+        time_step: f64,
+        substeps: i64,
+        integrator: &str,
+    ) -> PyResult<Self> {
+        let (theta, state) = (Numbers::vector("theta", theta)?, Numbers::vector("state", state)?);
+        let stepping = system.checked(py, stepping((time_step, substeps, integrator))?)?;
+        let live = unbroken(|| Live::new(system.description().clone(), theta.values(), state.values(), stepping))?;
+        Ok(Self { live: Mutex::new(system.checked(py, live)?) })
+    }
+
+    /// Time since the beginning, s.
+    #[getter]
+    fn time(&self) -> PyResult<f64> {
+        Ok(self.live()?.time())
+    }
+
+    /// State now (n_states,); a copy.
+    #[getter]
+    fn state<'py>(&self, py: Python<'py>) -> PyResult<Row<'py>> {
+        Ok(PyArray1::from_slice(py, self.live()?.state()))
+    }
+
+    /// What the sensors show now (n_outputs,); a copy.
+    #[getter]
+    fn outputs<'py>(&self, py: Python<'py>) -> PyResult<Row<'py>> {
+        Ok(PyArray1::from_slice(py, self.live()?.outputs()))
+    }
+
+    /// Holds the commands (n_inputs,) for the time of one sample; outputs (n_outputs,) at its end.
+    fn step<'py>(&self, py: Python<'py>, inputs: &Any<'py>) -> PyResult<Row<'py>> {
+        let inputs = Vector::new("inputs", inputs)?;
+        let mut live = self.live()?;
+        let values = inputs.values()?;
+        let result = unbroken(|| live.step(values).map(|outputs| PyArray1::from_slice(py, outputs)))?;
+        checked(py, live.description(), result)
+    }
+
+    /// A step for each row of the commands (N, n_inputs); outputs (N, n_outputs), each at the end of its step.
+    fn run<'py>(&self, py: Python<'py>, inputs: &Any<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let inputs = Numbers::table("inputs", inputs)?;
+        let mut live = self.live()?;
+        let width = live.description().n_outputs();
+        let guard = &mut *live;
+        let result = interruptible(py, |interrupt| {
+            let table = inputs.as_table()?;
+            let mut rows = Vec::with_capacity(table.rows() * width);
+            for row in 0..table.rows() {
+                if row % PATIENCE == PATIENCE - 1 && interrupt() {
+                    return Err(Error::Interrupted);
+                }
+                rows.extend_from_slice(guard.step(table.row(row))?);
+            }
+            Ok(rows)
+        })?;
+        let outputs = checked(py, live.description(), result)?;
+        matrix(py, outputs, [inputs.rows(), width])
+    }
+
+    /// Begins again at time zero in a state (n_states,), with nothing remembered.
+    fn reset(&self, py: Python<'_>, state: &Any<'_>) -> PyResult<()> {
+        let state = Numbers::vector("state", state)?;
+        let mut live = self.live()?;
+        let result = unbroken(|| live.reset(state.values()))?;
+        checked(py, live.description(), result)
+    }
+
+    fn __repr__(&self) -> PyResult<String> {
+        Ok(format!("Simulation(time={} s)", self.live()?.time()))
+    }
+}

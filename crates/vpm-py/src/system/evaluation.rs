@@ -1,0 +1,165 @@
+//! The machine in a single state, and along a measured motion.
+
+use numpy::{PyArray1, PyArray2, PyArray3};
+use pyo3::prelude::*;
+use vpm_core::beam::Beam;
+use vpm_core::evaluate;
+use vpm_core::inverse::{Motion, inverse_dynamics};
+use vpm_core::linearize::linearize;
+
+use super::System;
+use crate::arrays::{Numbers, cube, matrix, place, places};
+use crate::interrupt::unbroken;
+
+type Table<'py> = Bound<'py, PyArray2<f64>>;
+type Cube<'py> = Bound<'py, PyArray3<f64>>;
+type Any<'py> = Bound<'py, PyAny>;
+
+#[pymethods]
+impl System {
+    /// Effort that a motion needs and effort that the actuators deliver, each (N, n), and the derivative of their difference (N, n, k).
+    #[pyo3(signature = (theta, position, velocity, acceleration, inputs, time_step, sensitivities=vec![]))]
+    #[expect(clippy::too_many_arguments, reason = "the arguments of the Python function")]
+    fn inverse_dynamics<'py>(
+        &self,
+        py: Python<'py>,
+        theta: &Any<'py>,
+        position: &Any<'py>,
+        velocity: &Any<'py>,
+        acceleration: &Any<'py>,
+        inputs: &Any<'py>,
+        time_step: f64,
+        sensitivities: Vec<i64>,
+    ) -> PyResult<(Table<'py>, Table<'py>, Cube<'py>)> {
+        let theta = Numbers::vector("theta", theta)?;
+        let position = Numbers::table("position", position)?;
+        let velocity = Numbers::table("velocity", velocity)?;
+        let acceleration = Numbers::table("acceleration", acceleration)?;
+        let inputs = Numbers::table("inputs", inputs)?;
+        let variables = places("sensitivities", &sensitivities)?;
+        let efforts = self.compute(py, |interrupt| {
+            let motion = Motion {
+                position: position.as_table()?,
+                velocity: velocity.as_table()?,
+                acceleration: acceleration.as_table()?,
+                inputs: inputs.as_table()?,
+                time_step,
+            };
+            inverse_dynamics(&self.description, theta.values(), motion, &variables, interrupt)
+        })?;
+        let (rows, joints) = (position.rows(), self.description.n_joints());
+        Ok((
+            matrix(py, efforts.required, [rows, joints])?,
+            matrix(py, efforts.applied, [rows, joints])?,
+            cube(py, efforts.jacobian, [rows, joints, variables.len()])?,
+        ))
+    }
+
+    /// Accelerations (n,) of the rigid tree with its effects under efforts on the joints.
+    fn forward_dynamics<'py>(
+        &self,
+        py: Python<'py>,
+        theta: &Any<'py>,
+        position: &Any<'py>,
+        velocity: &Any<'py>,
+        effort: &Any<'py>,
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let theta = Numbers::vector("theta", theta)?;
+        let (q, v) = (Numbers::vector("position", position)?, Numbers::vector("velocity", velocity)?);
+        let effort = Numbers::vector("effort", effort)?;
+        let result = unbroken(|| {
+            evaluate::accelerations(&self.description, theta.values(), q.values(), v.values(), effort.values())
+        })?;
+        Ok(PyArray1::from_vec(py, self.checked(py, result)?))
+    }
+
+    /// Mass matrix (n, n), payloads included.
+    fn mass_matrix<'py>(&self, py: Python<'py>, theta: &Any<'py>, position: &Any<'py>) -> PyResult<Table<'py>> {
+        let (theta, q) = (Numbers::vector("theta", theta)?, Numbers::vector("position", position)?);
+        let result = unbroken(|| evaluate::mass_matrix(&self.description, theta.values(), q.values()))?;
+        let n = self.description().n_coordinates();
+        matrix(py, self.checked(py, result)?, [n, n])
+    }
+
+    /// Kinetic and potential energy in J: of bodies in gravity, and of effects that have a potential.
+    fn energy(&self, py: Python<'_>, theta: &Any<'_>, position: &Any<'_>, velocity: &Any<'_>) -> PyResult<(f64, f64)> {
+        let theta = Numbers::vector("theta", theta)?;
+        let (q, v) = (Numbers::vector("position", position)?, Numbers::vector("velocity", velocity)?);
+        let result = unbroken(|| evaluate::energy(&self.description, theta.values(), q.values(), v.values()))?;
+        self.checked(py, result)
+    }
+
+    /// Exact A (nx, nx), B (nx, nu), C (ny, nx), D (ny, nu) at a state under commands that stand.
+    fn linearize<'py>(
+        &self,
+        py: Python<'py>,
+        theta: &Any<'py>,
+        state: &Any<'py>,
+        inputs: &Any<'py>,
+    ) -> PyResult<(Table<'py>, Table<'py>, Table<'py>, Table<'py>)> {
+        let (theta, state) = (Numbers::vector("theta", theta)?, Numbers::vector("state", state)?);
+        let inputs = Numbers::vector("inputs", inputs)?;
+        let linear =
+            self.compute(py, |_| linearize(self.description(), theta.values(), state.values(), inputs.values()))?;
+        let (nx, nu, ny) = (state.values().len(), inputs.values().len(), self.description().n_outputs());
+        Ok((
+            matrix(py, linear.state, [nx, nx])?,
+            matrix(py, linear.input, [nx, nu])?,
+            matrix(py, linear.output, [ny, nx])?,
+            matrix(py, linear.feedthrough, [ny, nu])?,
+        ))
+    }
+
+    /// All coordinates (n,) at rest under gravity with the joints held, and the efforts (n_joints,) that hold them.
+    fn equilibrium<'py>(
+        &self,
+        py: Python<'py>,
+        theta: &Any<'py>,
+        position: &Any<'py>,
+    ) -> PyResult<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>)> {
+        let (theta, q) = (Numbers::vector("theta", theta)?, Numbers::vector("position", position)?);
+        let result = self.compute(py, |_| evaluate::equilibrium(self.description(), theta.values(), q.values()))?;
+        let (coordinates, efforts) = result;
+        Ok((PyArray1::from_vec(py, coordinates), PyArray1::from_vec(py, efforts)))
+    }
+
+    /// Natural frequencies (k,) in Hz about rest with the joints locked, slowest first; negative for growth instead of vibration.
+    fn natural_frequencies<'py>(
+        &self,
+        py: Python<'py>,
+        theta: &Any<'py>,
+        position: &Any<'py>,
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let (theta, q) = (Numbers::vector("theta", theta)?, Numbers::vector("position", position)?);
+        let result =
+            self.compute(py, |_| evaluate::natural_frequencies(self.description(), theta.values(), q.values()))?;
+        Ok(PyArray1::from_vec(py, result))
+    }
+
+    /// Largest slope in rad of each beam in each of many states (N, n_beams); not a number where the kinematics are exact.
+    fn slopes<'py>(&self, py: Python<'py>, theta: &Any<'py>, states: &Any<'py>) -> PyResult<Table<'py>> {
+        let (theta, states) = (Numbers::vector("theta", theta)?, Numbers::table("states", states)?);
+        let slopes = self.compute(py, |_| evaluate::slopes(self.description(), theta.values(), states.as_table()?))?;
+        matrix(py, slopes, [states.rows(), self.description().n_beams()])
+    }
+
+    /// Slope in rad up to which the kinematics of small slopes are right within 1 %.
+    #[getter]
+    fn slope_limit(&self) -> f64 {
+        Beam::<f64>::slope_limit()
+    }
+
+    /// Jacobian (6, n) of a marker by number: angular velocity, then velocity of its origin, in world axes.
+    fn jacobian<'py>(
+        &self,
+        py: Python<'py>,
+        theta: &Any<'py>,
+        position: &Any<'py>,
+        marker: i64,
+    ) -> PyResult<Table<'py>> {
+        let (theta, q) = (Numbers::vector("theta", theta)?, Numbers::vector("position", position)?);
+        let number = place("marker", marker)?;
+        let result = unbroken(|| evaluate::marker_jacobian(self.description(), theta.values(), q.values(), number))?;
+        matrix(py, self.checked(py, result)?, [6, self.description().n_coordinates()])
+    }
+}

@@ -1,0 +1,126 @@
+//! The class `System`.
+
+mod evaluation;
+mod simulation;
+
+use std::sync::Arc;
+
+use pyo3::prelude::*;
+use vpm_core::Error;
+use vpm_core::description::Description;
+use vpm_core::sensitivity::Interrupt;
+
+use crate::errors::exception;
+use crate::interrupt::interruptible;
+
+/// A machine: rigid tree, effects, actuators, sensors and controllers, as one object over a flat parameter vector theta.
+///
+/// Parameters
+/// ----------
+/// description : str
+///     JSON; see the class `vpm.Model`, which writes it.
+///
+/// Raises
+/// ------
+/// ValueError
+///     The description cannot be right; one sentence with the place and the repair.
+#[pyclass(frozen, module = "vpm._core")]
+pub(crate) struct System {
+    description: Arc<Description>,
+}
+
+impl System {
+    /// The description, to be shared.
+    pub(crate) fn description(&self) -> &Arc<Description> {
+        &self.description
+    }
+
+    /// The result, or its error as an exception.
+    pub(crate) fn checked<T>(&self, py: Python<'_>, result: Result<T, Error>) -> PyResult<T> {
+        checked(py, &self.description, result)
+    }
+
+    /// Runs `job` without the interpreter lock.
+    fn compute<T: Send>(
+        &self,
+        py: Python<'_>,
+        job: impl FnOnce(Interrupt<'_>) -> Result<T, Error> + Send,
+    ) -> PyResult<T> {
+        let result = interruptible(py, job)?;
+        self.checked(py, result)
+    }
+}
+
+/// The result of a computation on the machine of `description`, or its error as an exception.
+pub(crate) fn checked<T>(py: Python<'_>, description: &Description, result: Result<T, Error>) -> PyResult<T> {
+    result.map_err(|error| exception(py, error, description.n_outputs(), description.n_states()))
+}
+
+#[pymethods]
+impl System {
+    #[new]
+    fn new(py: Python<'_>, description: &str) -> PyResult<Self> {
+        let description = Description::from_json(description).map_err(|error| exception(py, error, 0, 0))?;
+        Ok(Self { description: Arc::new(description) })
+    }
+
+    /// Number of joints.
+    #[getter]
+    fn n_joints(&self) -> usize {
+        self.description.n_joints()
+    }
+
+    /// Number of coordinates: joints, then the elastic coordinates of the beams.
+    #[getter]
+    fn n_coordinates(&self) -> usize {
+        self.description.n_coordinates()
+    }
+
+    /// Number of elastic coordinates.
+    #[getter]
+    fn n_elastic(&self) -> usize {
+        self.description.n_elastic()
+    }
+
+    /// Number of beams.
+    #[getter]
+    fn n_beams(&self) -> usize {
+        self.description.n_beams()
+    }
+
+    /// Length of the state: positions, velocities, one state per actuator with lag.
+    #[getter]
+    fn n_states(&self) -> usize {
+        self.description.n_states()
+    }
+
+    /// Number of actuators.
+    #[getter]
+    fn n_actuators(&self) -> usize {
+        self.description.n_actuators()
+    }
+
+    /// Number of inputs: one command per actuator.
+    #[getter]
+    fn n_inputs(&self) -> usize {
+        self.description.n_actuators()
+    }
+
+    /// Number of output channels: four per joint, two per actuator.
+    #[getter]
+    fn n_outputs(&self) -> usize {
+        self.description.n_outputs()
+    }
+
+    /// Length of theta.
+    #[getter]
+    fn n_parameters(&self) -> usize {
+        self.description.n_parameters()
+    }
+
+    fn __repr__(&self) -> String {
+        let d = &self.description;
+        let (joints, actuators, parameters) = (d.n_joints(), d.n_actuators(), d.n_parameters());
+        format!("System(joints={joints}, actuators={actuators}, parameters={parameters})")
+    }
+}

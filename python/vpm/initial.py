@@ -1,0 +1,92 @@
+"""The state from which a simulation of a log starts, from what was measured."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vpm.experiment import Experiment, Motion, motion
+from vpm.model import Model
+
+Array = NDArray[np.float64]
+
+
+def measured_states(
+    model: Model, experiment: Experiment, theta: Array, rows: NDArray[np.int64], cutoff: float | None
+) -> Array:
+    """States (len(rows), nx) at some samples of the measured motion.
+
+    Sensor errors are undone, lags have settled at the held command, flexible links are deflected as in equilibrium.
+    """
+    m = motion(experiment, model, cutoff=cutoff)
+    gain, offset = sensor_errors(model, theta)
+    states = np.zeros((len(rows), model.core.n_states))
+    joints, coordinates = len(model.joints), len(model.coordinates)
+    states[:, :joints] = (m.position[rows] - offset) / gain
+    states[:, coordinates : coordinates + joints] = m.velocity[rows] / gain
+    states[:, 2 * coordinates :] = m.inputs[rows][
+        :, [i for i, name in enumerate(model.actuators) if model.has_lag(name)]
+    ]
+    if coordinates > joints:
+        for state in states:
+            state[:coordinates] = model.core.equilibrium(theta, state[:joints])[0]
+    return states
+
+
+def initial_state(model: Model, experiment: Experiment, theta: Array) -> Array:
+    """State at the first sample, lags settled at the command, flexible links deflected as in equilibrium.
+
+    The machine is at rest at zero where the log holds no position.
+    """
+    joints, coordinates = len(model.joints), len(model.coordinates)
+    state = np.zeros(model.core.n_states)
+    gain, offset = sensor_errors(model, theta)
+    lags = [name for name in model.actuators if model.has_lag(name)]
+    for place, name in enumerate(lags):
+        if f"{name}.command" in experiment:
+            state[2 * coordinates + place] = experiment[f"{name}.command"][0]
+    for joint, name in enumerate(model.joints):
+        if f"{name}.position" in experiment:
+            position, velocity = _fit_start(experiment, f"{name}.position")
+            state[joint] = (position - offset[joint]) / gain[joint]
+            state[coordinates + joint] = velocity / gain[joint]
+    if coordinates > joints:
+        state[:coordinates] = model.core.equilibrium(theta, state[:joints])[0]
+    return state
+
+
+@dataclass(frozen=True)
+class _Joints:
+    """A machine of which the joints alone are asked."""
+
+    name: str
+    joints: tuple[str, ...]
+    actuators: tuple[str, ...] = ()
+
+
+def joint_motion(experiment: Experiment, model: Model, cutoff: float | None = None) -> Motion:
+    """Filtered motion of the joints, as `vpm.experiment.motion` gives it, from a log that need not hold commands."""
+    return motion(experiment, _Joints(model.name, model.joints), cutoff=cutoff)
+
+
+def _fit_start(experiment: Experiment, channel: str, samples: int = 15) -> tuple[float, float]:
+    """Position and velocity at the first sample from a parabola through the first few."""
+    count = min(samples, len(experiment))
+    time = experiment.time[:count] - experiment.time[0]
+    curve = np.polynomial.Polynomial.fit(time, experiment[channel][:count], min(2, count - 1)).convert()
+    coefficients = np.append(curve.coef, [0.0, 0.0])
+    return float(coefficients[0]), float(coefficients[1])
+
+
+def sensor_errors(model: Model, theta: Array) -> tuple[Array, Array]:
+    """Gain and offset of the position sensor of each joint (1 and 0 where none is modelled)."""
+    gain, offset = np.ones(len(model.joints)), np.zeros(len(model.joints))
+    for joint, name in enumerate(model.joints):
+        sensor = model.sensor_of(f"{name}.position")
+        for index, key, target in ((joint, "gain.value", gain), (joint, "offset.value", offset)):
+            full = f"{sensor}.{key}"
+            if sensor is not None and full in model.parameters:
+                target[index] = theta[model.index(full)]
+    return gain, offset

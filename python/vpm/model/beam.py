@@ -1,0 +1,186 @@
+"""Form of the tables that have to do with flexible links: beams with their sections, gauges, markers and lines."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, ClassVar, Literal
+
+from pydantic import AfterValidator, Field
+
+from vpm.model.entry import ORIGIN, ZERO, Entry, Number, ParameterValue, Quantity, Text, Vector
+from vpm.model.level import Component, Level, parse_level
+
+
+class Material(Entry):
+    """Isotropic linear elastic material: Young's modulus, Poisson's ratio, density."""
+
+    young: ParameterValue
+    poisson: ParameterValue = Quantity(value=0.3)
+    density: ParameterValue
+
+
+class _Section(Entry):
+    """Sizes of a cross-section; `at` is the arc length it stands at, where there are several."""
+
+    units: ClassVar[Mapping[str, str]]
+    at: Number | None = None
+
+    @property
+    def sizes(self) -> dict[str, Quantity]:
+        """Parameters by key."""
+        return {key: getattr(self, key) for key in self.units}
+
+
+class Rectangle(_Section):
+    """Full rectangle, width along x and height along y."""
+
+    units: ClassVar[Mapping[str, str]] = {"width": "m", "height": "m"}
+    shape: Literal["rectangle"]
+    width: ParameterValue
+    height: ParameterValue
+
+
+class Circle(_Section):
+    """Full circle."""
+
+    units: ClassVar[Mapping[str, str]] = {"diameter": "m"}
+    shape: Literal["circle"]
+    diameter: ParameterValue
+
+
+class Tube(_Section):
+    """Round tube, by its outer and inner diameter."""
+
+    units: ClassVar[Mapping[str, str]] = {"outer": "m", "inner": "m"}
+    shape: Literal["tube"]
+    outer: ParameterValue
+    inner: ParameterValue
+
+
+class IBeam(_Section):
+    """Doubly symmetric I: flanges along x, the web along y."""
+
+    units: ClassVar[Mapping[str, str]] = {"width": "m", "height": "m", "flange": "m", "web": "m"}
+    shape: Literal["i"]
+    width: ParameterValue
+    height: ParameterValue
+    flange: ParameterValue
+    web: ParameterValue
+
+
+class Given(_Section):
+    """Any other section, by its numbers: area, second moments, torsion constant, shear factors."""
+
+    units: ClassVar[Mapping[str, str]] = {
+        "area": "m^2",
+        "moment_x": "m^4",
+        "moment_y": "m^4",
+        "torsion": "m^4",
+        "shear_x": "1",
+        "shear_y": "1",
+    }
+    shape: Literal["given"]
+    area: ParameterValue
+    moment_x: ParameterValue
+    moment_y: ParameterValue
+    torsion: ParameterValue
+    shear_x: ParameterValue = Quantity(value=5 / 6)
+    shear_y: ParameterValue = Quantity(value=5 / 6)
+
+
+Section = Annotated[Rectangle | Circle | Tube | IBeam | Given, Field(discriminator="shape")]
+
+
+class Damping(Entry):
+    """D = stiffness K + mass M, and a ratio for each of the slowest clamped modes."""
+
+    stiffness: ParameterValue | None = None
+    mass: ParameterValue | None = None
+    ratios: tuple[ParameterValue, ...] = ()
+
+
+def _readable(text: str) -> str:
+    parse_level(text)
+    return text
+
+
+def _different(components: tuple[Component, ...]) -> tuple[Component, ...]:
+    twice = [component for i, component in enumerate(components) if component in components[:i]]
+    if twice:
+        raise ValueError(f"has {twice[0]} twice; remove one")
+    return components
+
+
+class Beam(Entry):
+    """Flexible link, fixed to its parent at its root; the axis is z of the root frame."""
+
+    parent: Text
+    at: Number | None = None
+    translation: Vector = ORIGIN
+    rotation: Vector = ORIGIN
+    length: Number
+    level: Annotated[Text, AfterValidator(_readable)]
+    deforms: Annotated[tuple[Component, ...], Field(min_length=1), AfterValidator(_different)] = (
+        "bending_x",
+        "bending_y",
+        "torsion",
+    )
+    material: Material
+    section: Section | None = None
+    sections: Annotated[tuple[Section, ...], Field(min_length=1)] | None = None
+    damping: Damping = Damping()
+
+    @property
+    def detail(self) -> Level:
+        """Level of detail."""
+        return parse_level(self.level)
+
+
+def sections_of(beam: Beam) -> list[tuple[tuple[str | int, ...], Section]]:
+    """Sections with their keys: ``section`` of a uniform beam, else ``section.0``, ``section.1`` and so on."""
+    if beam.section is not None:
+        return [(("section",), beam.section)]
+    return [(("section", i), section) for i, section in enumerate(beam.sections or ())]
+
+
+class Gauge(Entry):
+    """Axial strain of a beam at the point (x, y) of its section at the arc length `at`."""
+
+    beam: Text
+    at: Number
+    x: Number = 0.0
+    y: Number = 0.0
+
+
+class Marker(Entry):
+    """Frame to watch."""
+
+    parent: Text
+    at: Number | None = None
+    translation: Vector = ORIGIN
+    rotation: Vector = ORIGIN
+
+
+class End(Entry):
+    """End of a line: a point of a body, of a beam, or of the world."""
+
+    parent: Text
+    at: Number | None = None
+    point: Vector = ORIGIN
+
+
+class Part(Entry):
+    """Half of a line with mass; `center` counts from the own end toward the other one."""
+
+    mass: ParameterValue
+    center: ParameterValue = ZERO
+    inertia: ParameterValue = ZERO
+
+
+class Line(Entry):
+    """Straight connection between two points that a drive can push apart: a cylinder, a screw, a rope."""
+
+    start: End = Field(alias="from")
+    end: End = Field(alias="to")
+    barrel: Part | None = None
+    rod: Part | None = None

@@ -1,0 +1,174 @@
+"""What a model is made of, by name: components, coordinates, states, channels."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cached_property
+from types import MappingProxyType
+
+from vpm.catalogue import JointKind
+from vpm.errors import ModelError, near_match
+from vpm.model.check import Checked
+from vpm.model.schema import ChannelEntry
+
+
+class Components:
+    """The part of a model that answers by name; it relies on the checked document and changes nothing."""
+
+    _checked: Checked
+
+    @property
+    def name(self) -> str:
+        """Name of the machine."""
+        return self._checked.document.name
+
+    # ---- components --------------------------------------------------------------------------------------------------
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Joints with one coordinate each; joint k is coordinate k.
+
+        A joint of the file with several coordinates stands here with each of them, ``wrist_x``, ``wrist_y``,
+        ``wrist_z``; a fixed one does not.
+        """
+        return self._checked.structure.joints
+
+    @property
+    def bodies(self) -> tuple[str, ...]:
+        """Bodies, parents before children."""
+        return self._checked.structure.bodies
+
+    @property
+    def beams(self) -> tuple[str, ...]:
+        """Flexible links, parents before children."""
+        return self._checked.structure.beams
+
+    @property
+    def lines(self) -> tuple[str, ...]:
+        """Lines between two points."""
+        return tuple(self._checked.document.lines)
+
+    @property
+    def gauges(self) -> tuple[str, ...]:
+        """Strain gauges."""
+        return tuple(self._checked.document.gauges)
+
+    @property
+    def markers(self) -> tuple[str, ...]:
+        """Frames to watch."""
+        return tuple(self._checked.document.markers)
+
+    @cached_property
+    def coordinates(self) -> tuple[str, ...]:
+        """Every coordinate: `joints`, then those of each beam, ``upper.bending_x.0``."""
+        return self._checked.structure.coordinates
+
+    @cached_property
+    def state_names(self) -> tuple[str, ...]:
+        """State of a simulation: position and velocity of every coordinate, then what actuators with a lag hold."""
+        positions = [f"{name}.position" for name in self.coordinates]
+        velocities = [f"{name}.velocity" for name in self.coordinates]
+        return (*positions, *velocities, *(f"{name}.lag" for name in self.actuators if self.has_lag(name)))
+
+    @cached_property
+    def levels(self) -> Mapping[str, str]:
+        """Level of detail of each beam, as `at` takes it."""
+        return MappingProxyType({name: str(self._checked.document.beams[name].detail) for name in self.beams})
+
+    @property
+    def actuators(self) -> tuple[str, ...]:
+        """Actuators; actuator k is input k."""
+        return tuple(self._checked.document.actuators)
+
+    @property
+    def sensors(self) -> tuple[str, ...]:
+        """Sensors."""
+        return tuple(self._checked.document.sensors)
+
+    @property
+    def controllers(self) -> tuple[str, ...]:
+        """Controllers."""
+        return tuple(self._checked.document.controllers)
+
+    def joint_kind(self, joint: str) -> JointKind:
+        """Kind of a joint: "prismatic", "revolute" or "helical"."""
+        return self._checked.structure.joint_kind(self._known(joint, self.joints, "joint"))
+
+    def joint_of_actuator(self, actuator: str) -> str:
+        """Joint that an actuator drives.
+
+        Raises
+        ------
+        ModelError
+            There is no such actuator, or it drives a line.
+        """
+        entry = self._checked.document.actuators[self._known(actuator, self.actuators, "actuator")]
+        if entry.joint is None:
+            rest = f'drives the line "{entry.line}", which moves several joints; ask line_of_actuator'
+            raise ModelError(f"actuator {actuator} {rest}", where=actuator)
+        return entry.joint
+
+    def line_of_actuator(self, actuator: str) -> str | None:
+        """Line that an actuator drives; None if it drives a joint."""
+        return self._checked.document.actuators[self._known(actuator, self.actuators, "actuator")].line
+
+    @cached_property
+    def controlled_actuators(self) -> tuple[str, ...]:
+        """Actuators that a controller commands, in the order of `actuators`."""
+        controlled = {controller.actuator for controller in self._checked.document.controllers.values()}
+        return tuple(name for name in self.actuators if name in controlled)
+
+    def has_lag(self, actuator: str) -> bool:
+        """Whether an actuator follows its command with a lag, which adds a state."""
+        self._known(actuator, self.actuators, "actuator")
+        return any(e.type == "actuator_lag" and e.at == actuator for e in self._checked.document.effects)
+
+    def _known(self, name: str, names: tuple[str, ...], what: str) -> str:
+        if name not in names:
+            raise ModelError(
+                f'{self.name} has no {what} "{name}"; {near_match(name, names, what="it has")}', where=name
+            )
+        return name
+
+    # ---- channels ----------------------------------------------------------------------------------------------------
+
+    @cached_property
+    def channel_table(self) -> Mapping[str, ChannelEntry]:
+        """How the columns of logs map on channels, and on ``"time"``; empty if the model does not say."""
+        return MappingProxyType(dict(self._checked.document.channels or {}))
+
+    @cached_property
+    def channels(self) -> tuple[str, ...]:
+        """Every channel that a log may hold."""
+        return self._checked.structure.channels
+
+    @cached_property
+    def input_channels(self) -> tuple[str, ...]:
+        """Commands, one per actuator."""
+        return tuple(f"{name}.command" for name in self.actuators)
+
+    @cached_property
+    def output_channels(self) -> tuple[str, ...]:
+        """What a simulation gives, in the order of the core.
+
+        Per joint position, velocity, acceleration, effort; per actuator command, force; per line length, rate, tension;
+        per gauge strain; per marker its origin x, y, z and its rotation vector rx, ry, rz in the world.
+        """
+        return self._checked.structure.outputs
+
+    def channel_unit(self, channel: str) -> str:
+        """SI unit of a channel.
+
+        Raises
+        ------
+        ModelError
+            There is no such channel; the message names near ones.
+        """
+        return self._checked.structure.unit(channel)
+
+    def sensor_of(self, channel: str) -> str | None:
+        """Sensor that reads a channel, if there is one."""
+        for name, sensor in self._checked.document.sensors.items():
+            if sensor.measures == channel:
+                return name
+        return None

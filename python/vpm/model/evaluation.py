@@ -1,0 +1,323 @@
+"""What a model answers about a single state: efforts, accelerations, inertia, energy, linear behaviour."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Iterator, Mapping
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from vpm.errors import ModelError, near_match
+from vpm.linear import LinearModel
+from vpm.model.components import Components
+
+if TYPE_CHECKING:
+    from vpm._core import Dynamics, System
+    from vpm.model.parameters import Parameter
+
+Array = NDArray[np.float64]
+
+
+class Evaluations(Components):
+    """The part of a model that asks the core about one state.
+
+    Positions, velocities and so on are arrays of one number per coordinate, in the order of ``model.coordinates``
+    (joints, then the elastic coordinates of flexible links); m or rad, per second, N or N m.
+    """
+
+    @property
+    @abstractmethod
+    def parameters(self) -> Mapping[str, Parameter]:
+        """Parameters by dotted name."""
+
+    @property
+    @abstractmethod
+    def theta(self) -> Array:
+        """Values of all parameters."""
+
+    @property
+    @abstractmethod
+    def core(self) -> System:
+        """Compiled system."""
+
+    # ---- single evaluations ------------------------------------------------------------------------------------------
+
+    @cached_property
+    def dynamics(self) -> Dynamics:
+        """The core's evaluations with this model's parameters, all buffers prepared: the fastest way to call them.
+
+        Its methods are those of the model, without a Python function in between, and take markers by number.
+        """
+        from vpm._core import Dynamics
+
+        return Dynamics(self.core, self.theta)
+
+    def mass_matrix(self, q: ArrayLike) -> Array:
+        """Mass matrix M(q), payloads included.
+
+        Parameters
+        ----------
+        q : array_like, shape (n,)
+
+        Returns
+        -------
+        ndarray, shape (n, n)
+            kg, kg m or kg m^2; symmetric.
+
+        Raises
+        ------
+        ValueError
+            The length is wrong.
+        """
+        return self.dynamics.mass_matrix(q)
+
+    def inverse_dynamics(self, q: ArrayLike, v: ArrayLike, a: ArrayLike) -> Array:
+        """Efforts that the actuators have to give for accelerations ``a``: ``M(q) a + h(q, v) - effects(q, v)``.
+
+        Weight, Coriolis and centrifugal efforts are in h; frictions, springs and loads of the model are carried too.
+
+        Parameters
+        ----------
+        q, v, a : array_like, shape (n,)
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            N or N m. What a flexible link's coordinates need beside zero, no actuator can give.
+
+        Raises
+        ------
+        ValueError
+            A length is wrong.
+        """
+        return self.dynamics.inverse_dynamics(q, v, a)
+
+    def forward_dynamics(self, q: ArrayLike, v: ArrayLike, effort: ArrayLike) -> Array:
+        """Accelerations that efforts of the actuators give, with all effects: the inverse of `inverse_dynamics`.
+
+        Parameters
+        ----------
+        q, v, effort : array_like, shape (n,)
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            m/s^2 or rad/s^2.
+
+        Raises
+        ------
+        ValueError
+            A length is wrong.
+        """
+        return self.dynamics.forward_dynamics(q, v, effort)
+
+    def energy(self, q: ArrayLike, v: ArrayLike) -> tuple[float, float]:
+        """Kinetic and potential energy, J.
+
+        The potential is that of the bodies in gravity and of the effects and flexible links that store energy.
+
+        Parameters
+        ----------
+        q, v : array_like, shape (n,)
+
+        Raises
+        ------
+        ValueError
+            A length is wrong.
+        """
+        return self.dynamics.energy(q, v)
+
+    def jacobian(self, marker: str, q: ArrayLike) -> Array:
+        """Jacobian of a marker: what the rates of the coordinates do to it.
+
+        Parameters
+        ----------
+        marker : str
+        q : array_like, shape (n,)
+
+        Returns
+        -------
+        ndarray, shape (6, n)
+            Angular velocity (rows 0 to 2) and velocity of its origin, in world axes, per unit rate of each coordinate.
+
+        Raises
+        ------
+        ModelError
+            There is no such marker.
+        ValueError
+            The length is wrong.
+        """
+        return self.dynamics.jacobian(q, self.markers.index(self._known(marker, self.markers, "marker")))
+
+    # ---- rest --------------------------------------------------------------------------------------------------------
+
+    def equilibrium(self, q: ArrayLike) -> tuple[Array, Array]:
+        """Rest under gravity with the joints held: how far flexible links sag, and what holds the joints.
+
+        Parameters
+        ----------
+        q : array_like, shape (joints,)
+            Positions of the joints.
+
+        Returns
+        -------
+        coordinates : ndarray, shape (n,)
+            ``q``, then the elastic coordinates.
+        effort : ndarray, shape (joints,)
+            N or N m; springs and loads of the joints are carried too.
+
+        Raises
+        ------
+        ValueError
+            The length is wrong, or there is no rest: what the links carry buckles them.
+        """
+        return self.core.equilibrium(self.theta, q)
+
+    def natural_frequencies(self, q: ArrayLike) -> Array:
+        """Frequencies of free vibration about rest with the joints locked, without damping.
+
+        Parameters
+        ----------
+        q : array_like, shape (joints,)
+            Positions of the joints.
+
+        Returns
+        -------
+        ndarray, shape (elastic coordinates,)
+            Hz, slowest first; a negative one is the rate of growth of a link that buckles.
+
+        Raises
+        ------
+        ValueError
+            As `equilibrium`.
+        """
+        return self.core.natural_frequencies(self.theta, q)
+
+    # ---- linear models -----------------------------------------------------------------------------------------------
+
+    def state(self, values: Mapping[str, float] | ArrayLike | None = None) -> Array:
+        """State of a simulation from names.
+
+        Parameters
+        ----------
+        values : mapping of str to float, or array_like of shape (nx,), optional
+            By name as in ``model.state_names``, ``{"axis.position": 0.1}``; what is not named is zero.
+
+        Returns
+        -------
+        ndarray, shape (nx,)
+
+        Raises
+        ------
+        ModelError
+            A name is unknown, or the array has another length.
+        """
+        return self._filled(values, self.state_names, "state")
+
+    def command(self, values: Mapping[str, float] | ArrayLike | None = None) -> Array:
+        """Commands of all actuators from names, ``{"drive": 1.0}``; what is not named is zero.
+
+        Parameters
+        ----------
+        values : mapping of str to float, or array_like of shape (nu,), optional
+
+        Returns
+        -------
+        ndarray, shape (nu,)
+
+        Raises
+        ------
+        ModelError
+            A name is unknown, or the array has another length.
+        """
+        if isinstance(values, Mapping):
+            values = {name.removesuffix(".command"): value for name, value in values.items()}
+        return self._filled(values, self.actuators, "actuator")
+
+    def linearize(
+        self,
+        state: Mapping[str, float] | ArrayLike | None = None,
+        inputs: Mapping[str, float] | ArrayLike | None = None,
+    ) -> LinearModel:
+        """Linear model of small deviations from a state, by exact derivatives.
+
+        Parameters
+        ----------
+        state : mapping of str to float, or array_like of shape (nx,), optional
+            As in `state`; by default all joints are at zero and at rest. Flexible links of which no coordinate is named
+            rest under gravity, lags that are not named have settled on their commands.
+        inputs : mapping of str to float, or array_like of shape (nu,), optional
+            As in `command`; the commands that stand.
+
+        Returns
+        -------
+        LinearModel
+
+        Raises
+        ------
+        ModelError
+            A name or a length is wrong.
+        ValueError
+            A derivative is not finite there.
+        """
+        command = self.command(inputs)
+        place = self._settled(state, command)
+        A, B, C, D = self.core.linearize(self.theta, place, command)
+        return LinearModel(
+            self.name,
+            A,
+            B,
+            C,
+            D,
+            self.state_names,
+            tuple(f"{name}.command" for name in self.actuators),
+            self.output_channels,
+            tuple(self._state_units()),
+            tuple(self.channel_unit(f"{name}.command") for name in self.actuators),
+            tuple(self.channel_unit(name) for name in self.output_channels),
+            place,
+            command,
+            {name: float(p.value) for name, p in self.parameters.items() if name.endswith(".delay.time")},
+        )
+
+    def _settled(self, values: Mapping[str, float] | ArrayLike | None, command: Array) -> Array:
+        """State in which flexible links that are not named rest and lags that are not named hold their command."""
+        place = self.state(values)
+        if values is None or isinstance(values, Mapping):
+            named = values or {}
+            joints, coordinates = len(self.joints), len(self.coordinates)
+            if coordinates > joints and not any(name in named for name in self.state_names[joints:coordinates]):
+                place[:coordinates] = self.equilibrium(place[:joints])[0]
+            for column, name in enumerate(self.actuators):
+                if f"{name}.lag" in self.state_names and f"{name}.lag" not in named:
+                    place[self.state_names.index(f"{name}.lag")] = command[column]
+        return place
+
+    def _state_units(self) -> Iterator[str]:
+        for rate in ("", "/s"):
+            for name in self.coordinates:
+                unit = self.channel_unit(f"{name}.position") if name in self.joints else "1"
+                yield unit + rate if unit != "1" else "1" + rate
+        yield from (self.channel_unit(f"{n}.command") for n in self.actuators if f"{n}.lag" in self.state_names)
+
+    def _filled(self, values: Mapping[str, float] | ArrayLike | None, names: tuple[str, ...], what: str) -> Array:
+        filled = np.zeros(len(names))
+        if isinstance(values, Mapping):
+            for name, value in values.items():
+                if name not in names:
+                    repair = near_match(name, names, what="it has")
+                    raise ModelError(f'{self.name} has no {what} "{name}"; {repair}', where=name)
+                filled[names.index(name)] = float(value)
+        elif values is not None:
+            given = np.asarray(values, dtype=np.float64)
+            if given.shape != filled.shape and not (given.ndim == 0 and filled.size == 1):
+                listed = ", ".join(names) or "none"
+                raise ModelError(
+                    f"{self.name} has {filled.size} entries of {what} ({listed}), but an array of shape {given.shape} "
+                    "was given; give one number for each, or names with numbers"
+                )
+            filled[:] = given
+        return filled

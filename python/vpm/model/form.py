@@ -1,0 +1,165 @@
+"""What the schema finds in a model file, rewritten as sentences with the repair."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+
+from vpm.errors import near_match
+from vpm.model.beam import Circle, Damping, End, Given, IBeam, Material, Part, Rectangle, Tube
+from vpm.model.entry import Quantity
+from vpm.model.messages import Problem, place
+from vpm.model.schema import SECTIONS, DenavitHartenberg, Document, keys_of
+
+#: How a key is written, for messages about missing ones.
+_EXAMPLES: Mapping[str, str] = {
+    "name": 'name = "my robot"',
+    "gravity": "gravity = [0.0, 0.0, -9.81]",
+    "bodies": "a table [bodies.link]",
+    "joints": "a table [joints.axis]",
+    "mass": 'mass = { value = 1.0, unit = "kg" }',
+    "joints.type": 'type = "prismatic"',
+    "effects.type": 'type = "viscous_friction"',
+    "parent": 'parent = "world"',
+    "child": 'child = "link"',
+    "axis": "axis = [1.0, 0.0, 0.0]",
+    "joint": 'joint = "axis"',
+    "gain": 'gain = { value = 1.0, unit = "N/V" }',
+    "actuator": 'actuator = "drive"',
+    "measures": 'measures = "axis.position"',
+    "at": 'at = "axis"',
+    "value": "value = 1.0",
+    "column": 'column = "q_m"',
+    "unit": 'unit = "m"',
+    "length": "length = 0.5",
+    "level": 'level = "strain(3)"',
+    "material": "material = { young = 206e9, poisson = 0.3, density = 7850 }",
+    "young": 'young = { value = 206, unit = "GPa" }',
+    "density": "density = 7850",
+    "beam": 'beam = "link"',
+    "gauges.at": "at = 0.05",
+    "from": 'from = { parent = "world", point = [0.0, 0.0, 0.0] }',
+    "to": 'to = { parent = "link", point = [0.1, 0.0, 0.0] }',
+}
+
+#: Tables inside of components, by their key.
+_NESTED: Mapping[str, tuple[type[BaseModel], ...]] = {
+    "dh": (DenavitHartenberg,),
+    "material": (Material,),
+    "damping": (Damping,),
+    "section": (Rectangle, Circle, Tube, IBeam, Given),
+    "sections": (Rectangle, Circle, Tube, IBeam, Given),
+    "from": (End,),
+    "to": (End,),
+    "barrel": (Part,),
+    "rod": (Part,),
+}
+
+#: What has to stand at a place, by the kind of error that says it does not.
+_KINDS: Mapping[str, str] = {
+    "float_type": "a number",
+    "float_parsing": "a number",
+    "finite_number": "a finite number",
+    "string_type": "text in quotes",
+    "bool_type": "true or false",
+    "dict_type": "a table",
+    "model_type": "a table",
+    "model_attributes_type": "a table",
+    "list_type": "a list",
+    "tuple_type": "a list",
+}
+
+
+def schema_problems(error: ValidationError, *, within: tuple[str, ...] = ()) -> list[Problem]:
+    """Rewrite what the schema found.
+
+    Parameters
+    ----------
+    error : pydantic.ValidationError
+    within : tuple of str
+        Place of the validated part in the file.
+    """
+    problems = []
+    # Unknown keys come first: the key that is missing is often the one that is misspelt.
+    for detail in sorted(error.errors(include_url=False), key=lambda found: found["type"] != "extra_forbidden"):
+        keys = _without_tags((*within, *detail["loc"]))
+        if keys[-1] == "value" and detail["type"] not in {"missing", "extra_forbidden"}:
+            keys = keys[:-1]  # bare numbers have no such key
+        problems.append(
+            Problem(
+                place(*keys), _sentence(detail["type"], keys, detail["input"], detail.get("ctx", {}), detail["msg"])
+            )
+        )
+    return problems
+
+
+def _without_tags(keys: tuple[str | int, ...]) -> tuple[str | int, ...]:
+    """Place without the type of a controller or the shape of a section, which the schema puts into it."""
+    tags = {("controllers", None): 2, ("beams", "section"): 3, ("beams", "sections"): 4}
+    tag = tags.get((str(keys[0]), str(keys[2]) if keys[0] == "beams" and len(keys) > 2 else None))
+    return keys if tag is None or len(keys) <= tag + 1 else (*keys[:tag], *keys[tag + 1 :])
+
+
+def _sentence(kind: str, keys: tuple[str | int, ...], found: object, context: Mapping[str, Any], fallback: str) -> str:
+    """Rest of the sentence for one error of the schema."""
+    if kind == "extra_forbidden":
+        return f"is not a known key; {near_match(str(keys[-1]), _known_keys(keys))}"
+    if kind == "missing":
+        example = _EXAMPLES.get(f"{keys[0]}.{keys[-1]}", _EXAMPLES.get(str(keys[-1])))
+        return "is missing; add it" + (f", for example {example}" if example else "")
+    if kind in _KINDS:
+        return f"is {_shown(found)}, but has to be {_KINDS[kind]}; correct it"
+    if kind in {"too_short", "too_long"}:
+        needed = context.get("min_length") or context.get("max_length")
+        if isinstance(found, Mapping):
+            return f"is empty; add {_EXAMPLES.get(str(keys[-1]), 'an entry')}"
+        return f"has {context['actual_length']} entries, but has to have {needed}; correct the list"
+    return _choice_sentence(kind, keys, found, context, fallback)
+
+
+def _choice_sentence(
+    kind: str, keys: tuple[str | int, ...], found: object, context: Mapping[str, Any], fallback: str
+) -> str:
+    """Rest of the sentence where one of several things, or something more special, was expected."""
+    if kind == "string_too_short":
+        return "is empty text; give it a content"
+    if kind in {"literal_error", "union_tag_invalid"}:
+        choices = re.findall(r"'([^']*)'", str(context.get("expected") or context.get("expected_tags")))
+        tag = context.get("tag", found)
+        if keys[0] == "beams" and "deforms" in keys:
+            return f"is {_shown(tag)}, which is no deformation; {near_match(str(tag), choices)}"
+        what = "shape" if keys[0] == "beams" else "convention" if keys[-1] == "convention" else "type"
+        return f"has the {what} {_shown(tag)}; {near_match(str(tag), choices)}"
+    if kind == "union_tag_not_found" and keys[0] == "beams":
+        return 'has no shape; add for example shape = "rectangle"'
+    if kind == "union_tag_not_found":
+        return 'has no type; add type = "cascade" or type = "pid"'
+    if kind == "value_error":
+        reason = str(context.get("error", fallback))
+        return reason if reason.startswith(("has ", "is ")) else f"is wrong: {reason}"
+    return f"is {_shown(found)}: {fallback[:1].lower()}{fallback[1:]}"
+
+
+def _known_keys(keys: tuple[str | int, ...]) -> tuple[str, ...]:
+    """Keys that would have been right where an unknown one stands."""
+    if len(keys) == 1:
+        return keys_of(Document)
+    if len(keys) == 3 and keys[0] in SECTIONS:
+        return keys_of(*SECTIONS[str(keys[0])])
+    inside = [key for key in keys[2:-1] if not isinstance(key, int)]
+    return keys_of(*_NESTED[inside[0]]) if len(inside) == 1 and inside[0] in _NESTED else keys_of(Quantity)
+
+
+def _shown(value: object) -> str:
+    if isinstance(value, str):
+        return f'"{value}"'
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, Mapping):
+        return "a table"
+    if isinstance(value, list | tuple):
+        return f"a list of {len(value)}"
+    return str(value)

@@ -1,0 +1,105 @@
+"""What actuators, sensors, controllers, gauges and lines name."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from vpm.errors import near_match
+from vpm.model.messages import Problem, place
+from vpm.model.schema import Actuator, Document
+from vpm.model.structure import Structure
+from vpm.model.tree import outside_problems
+
+
+def reference_problems(document: Document, structure: Structure) -> Iterator[Problem]:
+    """Components that name what is not there, or sit where another one already does."""
+    for name, actuator in document.actuators.items():
+        yield from _actuator_problems(name, actuator, document, structure)
+    seen: dict[str, str] = {}
+    for name, sensor in document.sensors.items():
+        where = place("sensors", name, "measures")
+        if sensor.measures not in structure.outputs:
+            repair = near_match(sensor.measures, structure.outputs, what="it can measure")
+            yield Problem(where, f'is "{sensor.measures}", which is no output of the model; {repair}')
+        elif sensor.measures in seen:
+            yield Problem(
+                where, f'is "{sensor.measures}", which sensor "{seen[sensor.measures]}" already reads; remove one'
+            )
+        seen.setdefault(sensor.measures, name)
+    yield from _controller_problems(document, structure)
+    yield from _line_problems(document)
+
+
+def _actuator_problems(name: str, actuator: Actuator, document: Document, structure: Structure) -> Iterator[Problem]:
+    match actuator.joint, actuator.line:
+        case None, None:
+            rest = 'is missing; add it, for example joint = "axis"'
+            rest += ", or line with the name of a line" if document.lines else ""
+            yield Problem(place("actuators", name, "joint"), rest)
+        case None, str(line):
+            if line not in document.lines:
+                repair = near_match(line, document.lines, what="it has")
+                yield Problem(place("actuators", name, "line"), f'is "{line}", which is no line of the model; {repair}')
+        case str(joint), None:
+            yield from _driven_problems(name, joint, document, structure)
+        case _:
+            yield Problem(place("actuators", name), "drives a joint and a line; remove one of the two keys")
+
+
+def _driven_problems(name: str, joint: str, document: Document, structure: Structure) -> Iterator[Problem]:
+    where = place("actuators", name, "joint")
+    if joint in structure.joints:
+        return
+    if joint in document.joints:
+        parts = [axis.name for axis in structure.axes if axis.joint == joint]
+        repair = f"name one of its coordinates, {', '.join(parts)}" if parts else "name a joint that moves"
+        kind = document.joints[joint].type
+        yield Problem(where, f'is "{joint}", a {kind} joint, which has {len(parts) or "no"} coordinates; {repair}')
+        return
+    repair = near_match(joint, structure.joints, what="it has")
+    yield Problem(where, f'is "{joint}", which is no joint of the model; {repair}')
+
+
+def _controller_problems(document: Document, structure: Structure) -> Iterator[Problem]:
+    seen: dict[str, str] = {}
+    positions = [f"{joint}.position" for joint in structure.joints]
+    for name, controller in document.controllers.items():
+        where = place("controllers", name, "actuator")
+        if controller.actuator not in document.actuators:
+            repair = near_match(controller.actuator, document.actuators, what="it has")
+            yield Problem(where, f'is "{controller.actuator}", which is no actuator of the model; {repair}')
+        elif controller.actuator in seen:
+            other = seen[controller.actuator]
+            rest = f'is "{controller.actuator}", which controller "{other}" already commands; remove one'
+            yield Problem(where, rest)
+        seen.setdefault(controller.actuator, name)
+        if controller.measures not in positions:
+            repair = near_match(controller.measures, positions, what="it can measure")
+            where = place("controllers", name, "measures")
+            yield Problem(where, f'is "{controller.measures}", which is no joint position of the model; {repair}')
+
+
+def _line_problems(document: Document) -> Iterator[Problem]:
+    for name, line in document.lines.items():
+        start, end = line.start, line.end
+        if start.parent == end.parent and (start.at == end.at or start.parent not in document.beams):
+            rest = f'has both ends on "{start.parent}", so its length cannot change; give one end another parent'
+            yield Problem(place("lines", name), rest)
+
+
+def gauge_problems(document: Document) -> Iterator[Problem]:
+    """Gauges on no beam, outside of it, or where nothing that the beam can do strains them."""
+    for name, gauge in document.gauges.items():
+        if gauge.beam not in document.beams:
+            repair = near_match(gauge.beam, document.beams, what="it has")
+            yield Problem(place("gauges", name, "beam"), f'is "{gauge.beam}", which is no beam of the model; {repair}')
+            continue
+        yield from outside_problems(("gauges", name), gauge.at, gauge.beam, document)
+        deforms = document.beams[gauge.beam].deforms
+        arms = {"bending_x": gauge.y, "bending_y": gauge.x, "extension": 1.0}
+        if not any(component in deforms and arm != 0.0 for component, arm in arms.items()):
+            rest = (
+                f'can only read zero: beam "{gauge.beam}" deforms in {", ".join(deforms)}, and the strain at '
+                f"x = {gauge.x:g} m, y = {gauge.y:g} m is extension + y bending_x - x bending_y; move the gauge"
+            )
+            yield Problem(place("gauges", name), rest)

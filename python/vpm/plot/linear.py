@@ -1,0 +1,67 @@
+"""Pictures of linear models."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vpm.plot.style import BLUE, LINE, ORANGE, SOFT, STAGES, label, panels, styled
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+
+@styled
+def plot_poles(poles: Complex) -> Figure:
+    """Poles in the complex plane; those that grow stand out.
+
+    Parameters
+    ----------
+    poles : ndarray, shape (nx,)
+        1/s.
+    """
+    figure, ((axes,),) = panels(1, height=3.5)
+    grows = poles.real > 0.0
+    for chosen, color, meaning in ((~grows, BLUE, "dies out or stays"), (grows, ORANGE, "grows")):
+        if np.any(chosen):
+            axes.plot(poles[chosen].real, poles[chosen].imag / (2.0 * np.pi), "x", color=color, label=meaning)
+    axes.axvline(0.0, color=LINE)
+    axes.axhline(0.0, color=LINE)
+    axes.set_xlabel(label("real part", "1/s"))
+    axes.set_ylabel(label("imaginary part / 2π", "Hz"))
+    axes.set_title("Poles")
+    axes.legend()
+    return figure
+
+
+@styled
+def plot_bode(frequencies: Array, response: Complex, inputs: Sequence[str], outputs: Sequence[str]) -> Figure:
+    """Gain and phase over frequency, a line per pair of input and output.
+
+    Parameters
+    ----------
+    frequencies : ndarray, shape (F,)
+        Hz.
+    response : ndarray, shape (F, ny, nu)
+    inputs, outputs : sequence of str
+        Names of the last two axes of `response`.
+    """
+    figure, ((upper,), (lower,)) = panels(2, height=2.6, share_x=True)
+    pairs = [(row, column) for row in range(len(outputs)) for column in range(len(inputs))]
+    for number, (row, column) in enumerate(pairs):
+        line, color = response[:, row, column], STAGES[1:][number % (len(STAGES) - 1)]
+        upper.loglog(frequencies, np.abs(line), color=color, label=f"{inputs[column]} → {outputs[row]}")
+        lower.semilogx(frequencies, np.degrees(np.unwrap(np.angle(line))), color=color)
+    upper.set_ylabel(label("gain", "SI"))
+    upper.set_title("Frequency response, without delays")
+    upper.legend()
+    lower.set_ylabel(label("phase", "degrees"))
+    lower.set_xlabel(label("frequency", "Hz"))
+    lower.axhline(-180.0, color=SOFT, linewidth=0.6)
+    return figure

@@ -1,0 +1,251 @@
+"""A simulation that somebody else drives, one sample at a time: for controllers, for filters, for games."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from vpm.errors import DivergedError, SimulationError, near_match
+from vpm.model import Model
+from vpm.simulate import Run, Setup
+
+Array = NDArray[np.float64]
+
+#: What drives a simulation: it sees the simulation and gives one command per actuator.
+Controller = Callable[["Simulation"], ArrayLike | Mapping[str, float]]
+
+
+class Simulation:
+    """A machine in simulated time.
+
+    At time ``k time_step`` it is in ``state`` and shows ``outputs``. A step holds one command per actuator until the
+    next sample and shows what the sensors see there, with that command still held. Positions and velocities are those
+    of `vpm.simulate` on the same commands; delays of actuators and sensors count from the beginning. The model's own
+    controllers rest.
+
+    Parameters
+    ----------
+    model : Model
+    time_step : float
+        Time between samples, s.
+    integrator, substeps
+        See :class:`vpm.simulate.Setup`.
+    state : mapping of str to float, or array_like of shape (nx,), optional
+        As ``model.state`` takes it, for example ``{"axis.position": 0.1}``; what is not named is zero.
+
+    Raises
+    ------
+    SimulationError, ModelError
+        A setting, a name or a size is wrong.
+
+    Examples
+    --------
+    >>> sim = Simulation(model, 1e-3, state={"axis.position": 0.1})
+    >>> while sim.time < 2.0:
+    ...     sim.step(-80.0 * sim["axis.position"] - 9.0 * sim["axis.velocity"])
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        time_step: float,
+        *,
+        integrator: str = "linearly_implicit",
+        substeps: int = 1,
+        state: Mapping[str, float] | ArrayLike | None = None,
+    ) -> None:
+        from vpm._core import Simulation as Core
+
+        setup = Setup(integrator, substeps)
+        self._model, self._time_step, self._setup = model, float(time_step), setup
+        self._start = model.state(state)
+        try:
+            self._core = Core(model.core, model.theta, self._start, float(time_step), substeps, integrator)
+        except ValueError as error:
+            raise SimulationError(str(error)) from error
+        self._outputs = self._core.outputs
+
+    # ---- what it is --------------------------------------------------------------------------------------------------
+
+    @property
+    def model(self) -> Model:
+        """The machine."""
+        return self._model
+
+    @property
+    def time_step(self) -> float:
+        """Time between samples, s."""
+        return self._time_step
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Names of the commands, in the order of `step`."""
+        return self._model.actuators
+
+    @cached_property
+    def channels(self) -> tuple[str, ...]:
+        """Names of the outputs."""
+        return self._model.output_channels
+
+    @cached_property
+    def units(self) -> tuple[str, ...]:
+        """SI units of the outputs."""
+        return tuple(self._model.channel_unit(name) for name in self.channels)
+
+    @cached_property
+    def _columns(self) -> dict[str, int]:
+        return {name: column for column, name in enumerate(self.channels)}
+
+    # ---- where it is -------------------------------------------------------------------------------------------------
+
+    @property
+    def time(self) -> float:
+        """Time since the beginning, s."""
+        return self._core.time
+
+    @property
+    def state(self) -> Array:
+        """State, shape (nx,), named by ``model.state_names``; a copy."""
+        return self._core.state
+
+    @property
+    def outputs(self) -> Array:
+        """What the sensors show, shape (ny,), in the order of `channels`."""
+        return self._outputs
+
+    def __getitem__(self, channel: str) -> float:
+        """What the sensors show of one channel."""
+        try:
+            return float(self._outputs[self._columns[channel]])
+        except KeyError:
+            repair = near_match(channel, self.channels, what="it has")
+            raise SimulationError(f"the simulation has no channel '{channel}'; {repair}") from None
+
+    # ---- how it goes on ----------------------------------------------------------------------------------------------
+
+    def step(self, inputs: ArrayLike | Mapping[str, float] = ()) -> Array:
+        """Hold commands for one sample.
+
+        Parameters
+        ----------
+        inputs : array_like, shape (nu,), or mapping of str to float
+            One command per actuator, in command units; a number where there is one actuator. In a mapping, what is not
+            named is zero.
+
+        Returns
+        -------
+        ndarray, shape (ny,)
+            What the sensors show at the end of the sample.
+
+        Raises
+        ------
+        SimulationError
+            The number of commands is wrong or one is not finite.
+        DivergedError
+            The state left the finite numbers; only `reset` leads on.
+        """
+        from vpm._core import Diverged
+
+        command = self._command(inputs)
+        try:
+            self._outputs = self._core.step(command)
+        except Diverged as error:
+            raise DivergedError(str(error), time=self.time) from None
+        except ValueError as error:
+            raise SimulationError(str(error)) from None
+        return self._outputs
+
+    def run(self, inputs: ArrayLike | Controller, duration: float | None = None) -> Run:
+        """Many steps: through a table of commands, or with a controller that is asked before every step.
+
+        Parameters
+        ----------
+        inputs : array_like, shape (N, nu), or callable
+            Commands, row by row; or a function that takes this simulation and gives the commands of the next step.
+        duration : float, optional
+            How long a controller is at work, s; it is rounded to whole samples.
+
+        Returns
+        -------
+        Run
+            Row k is what the sensors show after step k; nothing is measured.
+
+        Raises
+        ------
+        SimulationError
+            A size or a number is wrong.
+        DivergedError
+            The state left the finite numbers.
+        """
+        begin = self.time
+        rows = self._controlled(inputs, duration) if callable(inputs) else self._driven(inputs)
+        time = begin + self._time_step * np.arange(1.0, len(rows) + 1.0)
+        return Run(
+            self._model.name,
+            "simulation",
+            "steps",
+            np.asarray(time, dtype=np.float64),
+            self.channels,
+            self.units,
+            rows,
+            np.full(rows.shape, np.nan),
+            settings={"integrator": self._setup.integrator, "substeps": self._setup.substeps},
+        )
+
+    def reset(self, state: Mapping[str, float] | ArrayLike | None = None) -> None:
+        """Begin again at time zero, with nothing remembered.
+
+        Parameters
+        ----------
+        state : mapping of str to float, or array_like of shape (nx,), optional
+            By default the one that the simulation was made with.
+        """
+        start = self._start if state is None else self._model.state(state)
+        try:
+            self._core.reset(start)
+        except ValueError as error:
+            raise SimulationError(str(error)) from None
+        self._outputs = self._core.outputs
+
+    def _command(self, inputs: ArrayLike | Mapping[str, float]) -> ArrayLike:
+        if isinstance(inputs, np.ndarray) and inputs.ndim == 1:
+            return inputs
+        return self._model.command(inputs) if isinstance(inputs, Mapping) else np.atleast_1d(np.asarray(inputs, float))
+
+    def _driven(self, inputs: ArrayLike) -> Array:
+        from vpm._core import Diverged
+
+        table = np.ascontiguousarray(inputs, dtype=np.float64)
+        if table.ndim == 1 and len(self.inputs) == 1:
+            table = table[:, None]
+        columns = len(self.inputs)
+        if table.ndim != 2 or table.shape[1] != columns:
+            raise SimulationError(
+                f"the commands have shape {table.shape}, but {columns} actuators need (N, {columns}); "
+                "give one row per step"
+            )
+        try:
+            rows = self._core.run(table)
+        except Diverged as error:
+            raise DivergedError(str(error), time=self.time) from None
+        except ValueError as error:
+            raise SimulationError(str(error)) from None
+        self._outputs = self._core.outputs
+        return rows
+
+    def _controlled(self, controller: Controller, duration: float | None) -> Array:
+        if duration is None or not duration > 0.0:
+            raise SimulationError(
+                f"a controller needs a duration, got {duration}; say for how many seconds it is at work"
+            )
+        count = max(1, round(duration / self._time_step))
+        rows = np.empty((count, len(self.channels)))
+        for row in rows:
+            row[:] = self.step(controller(self))
+        return rows
+
+    def __repr__(self) -> str:
+        return f"Simulation({self._model.name!r}, time={self.time:.6g} s, time_step={self._time_step:g} s)"
