@@ -92,6 +92,12 @@ impl<'a, S: Scalar> Places<'a, S> {
         for point in &self.parts.point_masses {
             let on = match point.on {
                 vpm_core::body::Site::Body(k) => Mount::Body(k),
+                vpm_core::body::Site::Weld(weld) => {
+                    let weld = &self.parts.welds[weld];
+                    let pose = self.placed(weld.on, weld.translation, weld.rotation);
+                    all.push(Heavy::Body(pose, SpatialInertia::point_mass(point.mass, Vector3::from(point.position))));
+                    continue;
+                }
                 vpm_core::body::Site::Tip(beam) => Mount::Section { beam, at: self.parts.beams[beam].length },
             };
             all.push(Heavy::Body(

@@ -110,7 +110,7 @@ pub fn everything(seed: u64) -> Parts<f64> {
         let (translation, rotation) = (random.vector(0.1), turn(random));
         parts.welds.push(Weld { name: name.to_owned(), on, translation, rotation, inertia: inertia(random) });
     }
-    for on in [Site::Tip(1), Site::Tip(2), Site::Body(0)] {
+    for on in [Site::Tip(1), Site::Tip(2), Site::Body(0), Site::Weld(1)] {
         parts.point_masses.push(PointMass { on, mass: 0.2 + random.unit(), position: random.vector(0.1) });
     }
     let part = |mass| Some(LinePart { mass, center: 0.1, inertia: 0.01 * mass });
@@ -146,6 +146,7 @@ pub fn description(parts: &Parts<f64>, change: impl FnOnce(&mut Value)) -> Descr
         let (mass, position) = (number(&point.mass), point.position.each_ref().map(&mut number));
         let (site, place) = match point.on {
             Site::Body(body) => ("body", body),
+            Site::Weld(weld) => ("weld", weld),
             Site::Tip(beam) => ("beam", beam),
         };
         effects.push(json!({"type": "payload", site: place, "mass": mass, "position": position}));
