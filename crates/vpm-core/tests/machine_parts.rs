@@ -86,7 +86,7 @@ fn spindle(mass: f64, turning: f64, kind: JointKind) -> Body<f64> {
     let joint = Joint { name: "z".into(), kind, axis: [0.0, 0.0, 1.0], translation: [0.0; 3], rotation: UPRIGHT };
     let moments = [turning, turning, turning, 0.0, 0.0, 0.0];
     let inertia = Some(Inertia { mass, center_of_mass: [0.0; 3], moments });
-    Body { name: "spindle".into(), on: Mount::World, joint, inertia }
+    Body { name: "spindle".into(), on: Mount::World, joint, inertia, rotor_inertia: None }
 }
 
 #[test]
@@ -152,12 +152,14 @@ fn leg_tree(p: &LegParameters) -> Result<Model<f64>> {
         on: Mount::World,
         joint: joint("rail", JointKind::Prismatic, [0.0, 1.0, 0.0], 0.0),
         inertia: flat(p.slider_mass, [0.0, 0.0], 1.0),
+        rotor_inertia: None,
     };
     let limb = |name: &str, on, y, part: &vpm_core::linkage::leg::LegBody| Body {
         name: name.into(),
         on: Mount::Body(on),
         joint: joint(&format!("{name}.joint"), JointKind::Revolute, z, y),
         inertia: flat(part.mass, part.center, part.inertia),
+        rotor_inertia: None,
     };
     let bodies = vec![slider, limb("upper", 0, 0.0, &p.upper), limb("lower", 1, -p.upper.length, &p.lower)];
     let end = |on, point: Vector2<f64>, origin: Vector2<f64>| {
