@@ -15,7 +15,9 @@ sizes = st.floats(1e-3, 0.1)
 def trees(draw: st.DrawFn) -> dict[str, Any]:
     """Content of a model file: a tree of bodies on joints of any type and of beams, in any order."""
     count = draw(st.integers(1, 6))
-    bodies, joints, beams = {}, {}, {}
+    bodies: dict[str, Any] = {}
+    joints: dict[str, Any] = {}
+    beams: dict[str, Any] = {}
     standing: list[str] = ["world"]
     for k in range(count):
         parent = draw(st.sampled_from(standing))

@@ -32,7 +32,7 @@ def described(model: Model) -> Any:
 def transform(axis: str, angle: float, shift: tuple[float, float, float]) -> Matrix:
     """Homogeneous transform: a turn about x or z, and a shift."""
     c, s = math.cos(angle), math.sin(angle)
-    turn = [[1, 0, 0], [0, c, -s], [0, s, c]] if axis == "x" else [[c, -s, 0], [s, c, 0], [0, 0, 1]]
+    turn: list[list[float]] = [[1, 0, 0], [0, c, -s], [0, s, c]] if axis == "x" else [[c, -s, 0], [s, c, 0], [0, 0, 1]]
     matrix = np.eye(4)
     matrix[:3, :3], matrix[:3, 3] = turn, shift
     return matrix
