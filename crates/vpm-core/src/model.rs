@@ -263,8 +263,15 @@ impl<S: Scalar> Link<S> {
         match self.kind {
             JointKind::Prismatic => Pose::new(lift(self.rotation), translation + scaled(z, q)),
             JointKind::Revolute => Pose::new(self.turned(q), translation),
-            JointKind::Helical { pitch } => Pose::new(self.turned(q), translation + scaled(z, q * pitch)),
+            JointKind::Helical { pitch } => self.screwed(q, pitch),
         }
+    }
+
+    /// The pose of a screw; out of the way of the other two kinds, which are in almost every machine.
+    #[cold]
+    fn screwed(&self, q: S, pitch: f64) -> Pose<S> {
+        let along = scaled(self.rotation.columns[2], q * pitch);
+        Pose::new(self.turned(q), Vector3::from_f64(self.translation.to_array()) + along)
     }
 
     #[inline]

@@ -98,8 +98,14 @@ fn unit_wrench<S: Scalar>(kind: JointKind, inertia: &ArticulatedInertia<S>) -> W
     match kind {
         JointKind::Prismatic => sliding(inertia),
         JointKind::Revolute => turning(inertia),
-        JointKind::Helical { pitch } => turning(inertia) + sliding(inertia) * S::from_f64(pitch),
+        JointKind::Helical { pitch } => screwing(inertia, pitch),
     }
+}
+
+/// Out of the way of the other two, which are in almost every machine.
+#[cold]
+fn screwing<S: Scalar>(inertia: &ArticulatedInertia<S>, pitch: f64) -> Wrench<S> {
+    turning(inertia) + sliding(inertia) * S::from_f64(pitch)
 }
 
 #[inline]
