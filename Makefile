@@ -8,7 +8,7 @@
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .SUFFIXES:
-.PHONY: help demo test test-rust test-python lint lint-rust lint-python bench docs package clean
+.PHONY: help demo test test-rust test-python reference lint lint-rust lint-python bench peers bench-counts docs package clean
 
 PYTHON ?= python3
 DEMO_OUT ?= demo-report
@@ -26,7 +26,7 @@ RUST_SOURCES := Cargo.toml $(wildcard Cargo.lock) \
 
 help: ## this list
 	@echo 'vpm: the commands (each does all of its own set-up)'
-	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-9s %s\n", $$1, $$2 }' Makefile
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' Makefile
 
 demo: $(VENV)/.installed ## find the hidden effect in a recorded log; the report goes to demo-report/
 	$(BIN)/vpm demo --out "$(DEMO_OUT)"
@@ -35,6 +35,9 @@ test: test-rust test-python ## all tests, Rust and Python
 
 test-rust: | $(VENV)/.tools-found
 	cargo test $(CARGO_ARGS)
+
+reference: | $(VENV)/.tools-found ## integrators against an adaptive solver, which takes minutes to build
+	cargo test --features reference --test reference $(CARGO_ARGS)
 
 test-python: $(VENV)/.installed
 	$(BIN)/python -m pytest $(PYTEST_ARGS)
@@ -54,6 +57,13 @@ lint-python: $(VENV)/.installed
 
 bench: | $(VENV)/.tools-found ## time the core: one result per line, with its spread
 	cargo bench --bench '*' $(CARGO_ARGS)
+
+bench-counts: $(VENV)/.installed ## count the instructions of one call of the recursions (needs valgrind)
+	$(BIN)/python benches/instruction_counts.py
+
+peers: $(VENV)/.installed ## time vpm beside other engines, which this installs; writes docs/performance.md
+	$(BIN)/python -m pip install --quiet 'exudyn>=1.10' 'mujoco>=3.3' 'pin>=3.0'
+	$(BIN)/python benches/peers.py
 
 docs: $(VENV)/.installed ## run every snippet of the documents; build the Rust documentation
 	$(BIN)/python -m pytest tests/test_docs.py $(PYTEST_ARGS)

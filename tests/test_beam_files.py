@@ -1,7 +1,6 @@
 """Flexible links in a model file: what the file says reaches the core, levels change, and what cannot be is refused."""
 
 import json
-import math
 from typing import Any
 
 import numpy as np
@@ -9,9 +8,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from random_trees import trees
 from vpm.errors import ModelError
 from vpm.model import Model
-from vpm.model.level import COMPONENTS, FORMS, Level, parse_level
+from vpm.model.level import FORMS, Level, parse_level
 
 ARM = """
 name = "arm"
@@ -359,72 +359,6 @@ def test_shapes_do_not_change_along_a_beam() -> None:
 
 
 # ---- random machines -------------------------------------------------------------------------------------------------
-
-sizes = st.floats(1e-3, 0.1)
-
-
-@st.composite
-def trees(draw: st.DrawFn) -> dict[str, Any]:
-    """Content of a model file: a tree of bodies on joints of any type and of beams, in any order."""
-    count = draw(st.integers(1, 6))
-    bodies, joints, beams = {}, {}, {}
-    standing: list[str] = ["world"]
-    for k in range(count):
-        parent = draw(st.sampled_from(standing))
-        where: dict[str, Any] = {"parent": parent}
-        if parent in beams and draw(st.booleans()):
-            where["at"] = draw(st.floats(0.0, beams[parent]["length"]))
-        where["translation"] = draw(st.lists(st.floats(-1.0, 1.0), min_size=3, max_size=3))
-        where["rotation"] = draw(st.lists(st.floats(-3.0, 3.0), min_size=3, max_size=3))
-        if draw(st.booleans()):
-            name = f"beam{k}"
-            beams[name] = where | draw(beam_tables())
-        else:
-            name = f"body{k}"
-            bodies[name] = {"mass": draw(sizes), "inertia": [0.1, 0.1, 0.1, 0.0, 0.0, 0.0]}
-            joints[f"joint{k}"] = where | {"child": name} | draw(joint_tables())
-        standing.append(name)
-    content: dict[str, Any] = {"name": "tree", "gravity": [0.0, 0.0, -9.81]}
-    for key, table in (("bodies", bodies), ("joints", joints), ("beams", beams)):
-        if table:
-            content[key] = dict(draw(st.permutations(list(table.items()))))
-    return content
-
-
-@st.composite
-def joint_tables(draw: st.DrawFn) -> dict[str, Any]:
-    kind = draw(st.sampled_from(["prismatic", "revolute", "helical", "cylindrical", "planar", "spherical", "fixed"]))
-    table: dict[str, Any] = {"type": kind}
-    if kind not in {"spherical", "fixed"}:
-        axis = np.array(draw(st.tuples(*[st.floats(-1.0, 1.0)] * 3).filter(lambda a: math.hypot(*a) > 0.1)))
-        table["axis"] = (axis / np.linalg.norm(axis)).tolist()
-    if kind == "helical":
-        table["pitch"] = draw(sizes)
-    return table
-
-
-@st.composite
-def beam_tables(draw: st.DrawFn) -> dict[str, Any]:
-    name = draw(st.sampled_from(["rigid", *FORMS]))
-    level = name if name == "rigid" else f"{name}({draw(st.integers(FORMS[name].least, 5))})"
-    length, inner, wall = draw(st.floats(0.1, 2.0)), draw(sizes), draw(sizes)
-    shape = st.sampled_from(
-        [
-            {"shape": "rectangle", "width": inner, "height": wall},
-            {"shape": "circle", "diameter": wall},
-            {"shape": "tube", "inner": inner, "outer": inner + wall},
-        ]
-    )
-    section = draw(shape)
-    several = {"sections": [{"at": 0.0, **section}, {"at": length, **section}]}
-    return {
-        "length": length,
-        "level": level,
-        "deforms": draw(st.lists(st.sampled_from(COMPONENTS), min_size=1, max_size=6, unique=True)),
-        "material": {"young": {"value": 70.0, "unit": "GPa", "uncertainty": 1.0}, "density": 2700.0},
-        **(several if draw(st.booleans()) else {"section": section}),
-        "damping": {"ratios": draw(st.lists(st.floats(0.0, 0.1), max_size=3))},
-    }
 
 
 @given(trees())

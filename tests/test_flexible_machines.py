@@ -11,7 +11,8 @@ from scipy.linalg import eigh
 from scipy.optimize import root
 from scipy.spatial.transform import Rotation
 
-from test_beam_files import trees
+from random_trees import trees
+from test_beam_files import ARM
 from vpm._core import Dynamics
 from vpm.model import Model
 
@@ -295,12 +296,41 @@ def test_a_rigid_beam_is_a_body() -> None:
     assert acceleration(model, np.zeros(1), np.zeros(1)) == pytest.approx([expected], rel=1e-9)
 
 
+def test_levels_may_be_mixed() -> None:
+    model = Model.from_toml(ARM).at({"upper": "rigid"})
+    core = Dynamics(model.core, model.theta)
+    n = len(model.coordinates)
+    assert model.coordinates[:3] == ("shoulder", "elbow", "fore.bending_x.0")
+    mass = core.mass_matrix(np.zeros(n))
+    effort = core.inverse_dynamics(np.zeros(n), np.zeros(n), np.ones(n)) - core.inverse_dynamics(*np.zeros((3, n)))
+    assert effort == pytest.approx(mass @ np.ones(n), rel=1e-9)
+
+
+def test_a_beam_alone_vibrates() -> None:
+    strip = {**cantilever("strain(3)", load=0.0).to_dict()["beams"]["strip"], "parent": "world"}
+    model = Model.from_dict({"name": "strip", "gravity": [0.0, 0.0, 0.0], "beams": {"strip": strip}})
+    assert model.joints == ()
+    expected = 1.8751040687**2 * math.sqrt(STIFFNESS / LINE_DENSITY / LENGTH**4)
+    assert first_frequency(model) == pytest.approx(expected, rel=1e-3)
+
+
 @settings(max_examples=40)
 @given(trees())
 def test_random_trees_are_systems_with_the_named_coordinates(content: dict[str, Any]) -> None:
     model = Model.from_dict(content)
-    if not model.coordinates:
+    n = len(model.coordinates)
+    if not n:
         return
     assert model.core.n_joints == len(model.joints)
+    assert model.core.n_coordinates == n
     assert model.core.n_states == len(model.state_names)
     assert model.core.n_outputs == len(model.output_channels)
+    core, rng = Dynamics(model.core, model.theta), np.random.default_rng(0)
+    q, v, a = 0.01 * rng.normal(size=(3, n))
+    mass = core.mass_matrix(q)
+    size = float(np.abs(mass).max())
+    assert mass == pytest.approx(mass.T, rel=1e-9, abs=1e-12 * size)
+    effort = core.inverse_dynamics(q, v, a) - core.inverse_dynamics(q, v, np.zeros(n))
+    # What is lost in the difference goes with what is subtracted.
+    lost = float(np.abs(core.inverse_dynamics(q, v, np.zeros(n))).max())
+    assert effort == pytest.approx(mass @ a, rel=1e-8, abs=1e-12 * (size + lost))

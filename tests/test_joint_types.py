@@ -218,7 +218,6 @@ WRONG: list[tuple[dict[str, Any], str, str]] = [
     ({"type": "planar"}, "joints.planar.axis", "add it, for example axis = [1.0, 0.0, 0.0]"),
     ({"type": "planar", "axis": [0, 0, 2]}, "joints.planar.axis", "with length 2"),
     ({"type": "spherical", "axis": [0, 0, 1]}, "joints.spherical.axis", "a spherical joint has no axis"),
-    ({"type": "fixed", "axis": [0, 0, 1]}, "joints.fixed.axis", "a fixed joint has no axis"),
     ({"type": "helical", "axis": [0, 0, 1]}, "joints.helical.pitch", "for example pitch = 0.0008"),
     ({"type": "helical", "axis": [0, 0, 1], "pitch": 0.0}, "joints.helical.pitch", 'take type = "revolute"'),
     ({"type": "revolute", "axis": [0, 0, 1], "pitch": 0.1}, "joints.revolute.pitch", 'take type = "helical"'),
@@ -245,8 +244,21 @@ def test_a_joint_of_several_coordinates_is_driven_by_one_of_them() -> None:
     motor = {"motor": {"joint": "planar", "gain": 1.0}}
     with pytest.raises(ModelError, match="name one of its coordinates, planar_x, planar_y, planar_rotation"):
         machine({"type": "planar", "axis": [0.0, 0.0, 1.0]}, actuators=motor)
-    with pytest.raises(ModelError, match='is "fixed", a fixed joint, which has no coordinates'):
-        machine({"type": "fixed"}, actuators={"motor": {"joint": "fixed", "gain": 1.0}})
+    with pytest.raises(
+        ModelError, match='is "bolts", a fixed joint, which has no coordinates; name a joint that moves'
+    ):
+        Model.from_dict({**GANTRY, "actuators": {"motor": {"joint": "bolts", "gain": 1.0}}})
+
+
+def test_something_has_to_move() -> None:
+    with pytest.raises(ModelError, match="joints has fixed joints only, so nothing moves"):
+        machine({"type": "fixed"})
+
+
+def test_a_fixed_joint_has_no_axis() -> None:
+    bolts = {**GANTRY["joints"]["bolts"], "axis": [0.0, 0.0, 1.0]}  # type: ignore[index]
+    with pytest.raises(ModelError, match=r"joints.bolts.axis is given, but a fixed joint has no axis; remove it"):
+        Model.from_dict({**GANTRY, "joints": {**GANTRY["joints"], "bolts": bolts}})  # type: ignore[dict-item]
 
 
 def test_coordinates_share_the_namespace() -> None:

@@ -9,6 +9,7 @@ Each arrow is a function of this module, each result one frozen object.
 
 from importlib.metadata import version
 
+from vpm import linkages
 from vpm.batch import Trial, simulate_batch
 from vpm.budget import BudgetReport, budget
 from vpm.catalogue import EFFECTS
@@ -19,6 +20,7 @@ from vpm.experiment import Experiment
 from vpm.identify import Fit, identify
 from vpm.linear import LinearModel
 from vpm.model import Dynamics, Model
+from vpm.planar import PlanarArm
 from vpm.report import Report, report, write_report
 from vpm.simplify import Ladder, simplify
 from vpm.simulate import Run, Setup, simulate
@@ -37,6 +39,7 @@ __all__ = [
     "Ladder",
     "LinearModel",
     "Model",
+    "PlanarArm",
     "Report",
     "Run",
     "Setup",
@@ -48,6 +51,7 @@ __all__ = [
     "compare",
     "diagnose",
     "identify",
+    "linkages",
     "report",
     "simplify",
     "simulate",

@@ -6,7 +6,7 @@ from typing import final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["Diverged", "Dynamics", "Simulation", "System", "stop_when"]
+__all__ = ["Diverged", "Dynamics", "Karl", "Leg", "PlanarArm", "Simulation", "System", "hyq_parameters", "stop_when"]
 
 class Diverged(ArithmeticError):
     """A simulation left the finite numbers.
@@ -284,3 +284,123 @@ class System:
         count: int,
     ) -> NDArray[np.float64]:
         """Duration (count,) in s of single steps, on the way through ``inputs`` again and again."""
+
+_Array = NDArray[np.float64]
+_Pair = Sequence[float]
+
+@final
+class Karl:
+    """KARL: a limb of two joints whose two linear actuators sit on its first body; see `vpm.linkages.Karl`.
+
+    Tables have N rows, one configuration each; lengths in m, angles in rad, forces in N, torques in N m.
+    """
+
+    def __new__(
+        cls,
+        medial: float,
+        distal: float,
+        stroke_direction: float,
+        sliders: Sequence[_Pair],
+        ground_anchor: _Pair,
+        distal_anchor: _Pair,
+        rods: _Pair,
+    ) -> Karl: ...
+    @staticmethod
+    def prototype() -> tuple[float, float, float, list[list[float]], list[float], list[float], list[float]]:
+        """Dimensions of the prototype, in the order of the class's arguments."""
+    def direct(self, strokes: _Pair) -> _Array:
+        """Joint angles (4, 2) of all assembly modes at two strokes."""
+    def inverse(self, target: _Pair) -> _Array:
+        """Angles and strokes (8, 4) of all configurations that put the end point at ``target``."""
+    def end_point(self, angles: ArrayLike) -> _Array:
+        """End points (N, 2) at joint angles (N, 2)."""
+    def end_point_determinant(self, angles: ArrayLike) -> _Array:
+        """Determinants (N,) of the end point's Jacobian, m^2."""
+    def transmission(self, angles: ArrayLike, strokes: ArrayLike) -> _Array:
+        """Diagonals (N, 2) of Lambda, rad/m."""
+    def determinants(self, angles: ArrayLike, strokes: ArrayLike) -> _Array:
+        """Determinants (N, 2) of Psi and Omega, m^2."""
+    def stroke_slopes(self, angles: ArrayLike, strokes: ArrayLike) -> _Array:
+        """Derivatives (N, 2) of the constraints by the strokes, m."""
+    def torques(self, angles: ArrayLike, strokes: ArrayLike, forces: ArrayLike) -> _Array:
+        """Joint torques (N, 2) of actuator forces (N, 2)."""
+    def alignments(self, actuator: int) -> _Array:
+        """Rows (stroke, angle, extended) where an actuator loses control of its joint."""
+    def perpendiculars(self, actuator: int) -> _Array:
+        """Rows (stroke, angle) where a rod is perpendicular to its stroke."""
+    def span(self, actuator: int, mode: float) -> float:
+        """Turn of a joint in rad between two alignments, in mode +1 or -1."""
+    def resultant(self, actuator: int, stroke: float) -> list[float]:
+        """Coefficients (5,) of the resultant in s = sin q at one stroke, lowest power first."""
+
+@final
+class Leg:
+    """A leg on a vertical slider with two cylinders, its foot on the ground; see `vpm.linkages.Leg`.
+
+    ``bodies`` (2, 5): length, mass, inertia, centre of mass along and ahead; ``attachments`` (2, 4): base, angle, tip,
+    angle; ``parts`` (4, 3) of hip and knee cylinder: mass, centre of mass, inertia of barrel and rod. Tables have N
+    rows, one state each; all numbers SI.
+    """
+
+    def __new__(
+        cls,
+        slider_mass: float,
+        bodies: Sequence[_Pair],
+        attachments: Sequence[_Pair],
+        parts: Sequence[_Pair],
+        gravity: float,
+    ) -> Leg: ...
+    def strokes(self, angles: ArrayLike) -> _Array:
+        """Lengths (N, 2) of hip and knee cylinder."""
+    def levers(self, angles: ArrayLike) -> _Array:
+        """Lever arms (N, 2) of the cylinders, m/rad."""
+    def points(self, angles: ArrayLike) -> _Array:
+        """Points (N, 7, 2): hip, knee, foot, bases of hip and knee cylinder, their tips."""
+    def terms(self, angles: ArrayLike, rates: ArrayLike, derivation: str) -> tuple[_Array, _Array, _Array]:
+        """Mass matrices (N, 2, 2), velocity terms (N, 2), gravity terms (N, 2); virtual_work or lagrange."""
+    def reactions(self, angles: ArrayLike, rates: ArrayLike, accelerations: ArrayLike) -> _Array:
+        """Rows (N, 23): torques, cylinder forces, ground, guide (2), pins (6 x 2), bearings (2 x 2)."""
+    def cylinder_forces(self, angles: ArrayLike, torques: ArrayLike) -> _Array:
+        """Cylinder forces (N, 2) that give joint torques (N, 2)."""
+    def accelerations(self, angles: ArrayLike, rates: ArrayLike, torques: ArrayLike) -> _Array:
+        """Joint accelerations (N, 2) under joint torques (N, 2)."""
+    def shares(self, angles: ArrayLike, rate: float, acceleration: float, samples: int, definition: str) -> _Array:
+        """Largest shares (N, 3) of inertia, velocity and gravity over all sampled motions."""
+
+def hyq_parameters(
+    data: str, shank: float
+) -> tuple[float, list[list[float]], list[list[float]], list[list[float]], float]:
+    """Parameters of the leg of HyQ in the order of the arguments of `Leg`: table, identified or plausible."""
+
+@final
+class PlanarArm:
+    """One or two flexible links in a plane with servos on the joints; see `vpm.PlanarArm`.
+
+    ``links`` (n, 10): length, bending stiffness, line density, rotary inertia per length, damping time, hub radius, hub
+    mass, hub inertia, tip mass, tip inertia; ``servos`` (n, 2): gains on angle and rate; all numbers SI.
+    """
+
+    def __new__(
+        cls, links: ArrayLike, servos: ArrayLike, gravity: _Pair, coefficients: int, points: int
+    ) -> PlanarArm: ...
+    @property
+    def n_coordinates(self) -> int:
+        """Number of coordinates of all links."""
+    def run(
+        self,
+        duration: float,
+        samples: int,
+        steps: int,
+        gauges: ArrayLike,
+        swing: ArrayLike | None = ...,
+        reference: ArrayLike | None = ...,
+        reference_step: float = ...,
+        start: ArrayLike | None = ...,
+    ) -> tuple[_Array, _Array, _Array, _Array, _Array]:
+        """Tips (N, n, 3), joint angles (N, n), joint rates (N, n), strains (N, gauges), states (N, 2 n_coordinates).
+
+        Raises
+        ------
+        Diverged
+            The state is no longer finite.
+        """

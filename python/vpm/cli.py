@@ -1,4 +1,4 @@
-"""Command line: ``vpm demo | info | simulate | compare | identify | diagnose | report | simplify | budget``."""
+"""Command line: ``vpm demo``, ``simulate``, ``compare``, ``identify``, ``diagnose`` and the others."""
 
 from __future__ import annotations
 
@@ -241,6 +241,21 @@ def budget(
     console.print(str(report), markup=False)
     if not report.holds:
         raise typer.Exit(1)
+
+
+@app.command(epilog="Example:  vpm linkage examples/karl/karl.toml --plot karl.png")
+def linkage(
+    path: Annotated[Path, typer.Argument(metavar="LINKAGE", help="File of a closed linkage (TOML).")],
+    plot: Plot = None,
+) -> None:
+    """Say what a closed linkage can do: singular strokes of KARL, cylinders and shares of dynamics of a leg."""
+    from vpm.linkages import load
+
+    found = load(path)
+    console.print(repr(found), markup=False)
+    for sentence in found.summary:
+        console.print(f"  {sentence}", markup=False)
+    _save_plot(found.plot, plot)
 
 
 @app.command(epilog="Example:  vpm demo --out demo-report")

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from vpm.errors import DivergedError, ExperimentError, SimulationError, ValidityWarning
+from vpm.errors import DivergedError, ExperimentError, SimulationError, ValidityWarning, VpmError
 from vpm.experiment import Experiment, Motion, motion, parallel_filter
 from vpm.initial import initial_state as start
 from vpm.initial import joint_motion, measured_states
@@ -44,9 +44,9 @@ class Setup:
     Attributes
     ----------
     integrator : {"linearly_implicit", "rosenbrock", "rk4", "semi_implicit"}
-        The first two are stable whatever is stiff, of order 2 and 4, the first also on dry friction far sharper than a
-        step; the others are explicit, but for the constant stiffness of flexible links in the last.
-    substeps : int
+            The first two are stable whatever is stiff, of order 2 and 4; the first also stops on dry friction far sharper
+        than a step. The others are explicit, but for the constant stiffness of flexible links in the last.
+        substeps : int
         Integration steps per sample of the log.
     horizon : float
         Length of each restart, s.
@@ -233,6 +233,10 @@ def simulate_arrays(
             error.outputs, np.zeros((*error.outputs.shape, 0)), np.arange(len(error.outputs)), np.zeros(1, np.int64)
         )
         raise DivergedError(str(error), run=_run(model, experiment, mode, partial, setup)) from None
+    except VpmError:
+        raise
+    except ValueError as error:  # of the core: sizes, numbers and steps that no simulation can take
+        raise SimulationError(f"{experiment.name}: {error}") from error
 
 
 def _dispatch(

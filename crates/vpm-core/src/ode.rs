@@ -18,6 +18,7 @@ pub trait Ode<S> {
     fn iteration_matrix(&mut self, x: &[S], matrix: &mut [S]) {
         self.jacobian(x, matrix);
     }
+
     /// Writes what constant linear stiffness K and damping D add to the accelerations by coordinates and rates, `[-M^-1 K, -M^-1 D]`:
     /// with n coordinates, n rows of 2 n entries each; tells whether there is any. Without it nothing is written.
     ///

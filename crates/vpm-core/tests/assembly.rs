@@ -34,6 +34,28 @@ fn a_rod_across_the_stroke_is_the_inverse_singularity() {
     }
 }
 
+#[test]
+fn every_inverse_singularity_is_found() {
+    for slider in [Slider::OnFrame, Slider::OnRocker] {
+        for (anchor, rod, count) in [([0.2, 0.0], 0.15, 2), ([0.1, -0.35], 0.15, 4), ([0.03, 0.02], 0.25, 0)] {
+            let geometry = StrokeGeometry { slider, start: [-0.3, 0.1], direction: 0.2, anchor, rod };
+            let linkage = StrokeLinkage::new("any", geometry).unwrap();
+            let found = linkage.perpendiculars();
+            assert_eq!(found.len(), count, "{slider:?} {anchor:?}");
+            for at in &found {
+                assert!(linkage.constraint(at.stroke, at.angle).abs() < 1e-15);
+                assert!(linkage.stroke_slope(at.stroke, at.angle).abs() < 1e-15);
+                // Both strokes of an angle close by, on the side that can be assembled, lie around the singular one.
+                let near = [1e-6, -1e-6].iter().filter_map(|off| linkage.strokes(at.angle + off).ok());
+                let pairs: Vec<[f64; 2]> = near.collect();
+                assert!(pairs.len() == 1 && pairs[0][0] > at.stroke && pairs[0][1] < at.stroke, "{pairs:?}");
+            }
+        }
+    }
+    let karl = Karl::new(KarlGeometry::default()).unwrap();
+    assert!(karl.linkages().iter().all(|linkage| linkage.perpendiculars().is_empty()), "rods outreach the arms");
+}
+
 /// A linkage that cannot be closed: x^2 + 1 = 0.
 struct Open;
 

@@ -3,8 +3,9 @@
 use std::f64::consts::TAU;
 
 use vpm_core::Result;
+use vpm_core::beam::Component;
 use vpm_core::beam::Section;
-use vpm_core::beam::strain::{FlexibleLink, FlexibleTree, Strain, StrainBeam, TipLoad};
+use vpm_core::beam::strain::{FlexibleLink, FlexibleTree, StrainBeam, TipLoad};
 use vpm_core::beam::two_node::{ELEMENT, NodeLoad, TwoNode, TwoNodeChain, rotation};
 use vpm_core::error::Error;
 use vpm_core::samples::Random;
@@ -187,7 +188,7 @@ fn in_space_the_chain_tends_to_the_strain_beam() -> Result<()> {
     // Unequal bending, soft twist: a force across, a pull and a moment about all axes give a space curve.
     let section = Section::given([1.0, 2.0, 0.7, 1e9, 1e9, 400.0], MASS)?;
     let (force, moment) = ([1.2, -0.8, 0.5], [0.3, 0.2, 0.6]);
-    let list = [(Strain::BendingX, 8), (Strain::BendingY, 8), (Strain::Torsion, 8), (Strain::Extension, 4)];
+    let list = [(Component::BendingX, 8), (Component::BendingY, 8), (Component::Torsion, 8), (Component::Extension, 4)];
     let beam = StrainBeam::new(section, fields(1.0, &list)?, 0.0, 24)?;
     let link = FlexibleLink { beam: Some((Pose::identity(), beam)), ..FlexibleLink::welded() };
     let tree = FlexibleTree::new(vec![link], [0.0; 3])?;

@@ -1,7 +1,8 @@
 //! Order of convergence on flexible links, where nothing but the integrator errs.
 
+use vpm_core::beam::Component;
 use vpm_core::beam::Section;
-use vpm_core::beam::strain::{Drive, FlexibleLink, FlexibleTree, Strain, StrainBeam, TreeMotion};
+use vpm_core::beam::strain::{Drive, FlexibleLink, FlexibleTree, StrainBeam, TreeMotion};
 use vpm_core::integrator::{Integrator, Method};
 use vpm_core::ode::Ode;
 use vpm_core::{Result, Scalar};
@@ -17,7 +18,7 @@ fn distance(a: &[f64], b: &[f64]) -> f64 {
 /// State of an undamped elastic pendulum of two links in space after 0.1 s from a fall out of the horizontal.
 fn flexible_state(method: Method, steps: usize) -> Result<Vec<f64>> {
     let section = Section::given([3.0, 2.0, 1.5, 200.0, 250.0, 400.0], [0.02, 0.03, 0.05, 1.0, 1.0, 1.0])?;
-    let list = fields(0.7, &[(Strain::BendingX, 2), (Strain::BendingY, 1), (Strain::Torsion, 1)])?;
+    let list = fields(0.7, &[(Component::BendingX, 2), (Component::BendingY, 1), (Component::Torsion, 1)])?;
     let beam = StrainBeam::new(section, list, 0.0, 6)?;
     let link = |parent, axis| FlexibleLink {
         parent,

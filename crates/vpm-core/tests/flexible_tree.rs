@@ -1,6 +1,7 @@
 //! Trees of rigid bodies and beams of every kind against derivations that share nothing with them but the maps of poses.
 
 use vpm_core::beam::Beam;
+use vpm_core::body::Site;
 use vpm_core::data::Data;
 use vpm_core::dynamics::{crba, flexible, rnea};
 use vpm_core::model::Parts;
@@ -91,20 +92,15 @@ impl<'a, S: Scalar> Places<'a, S> {
             }
         }
         for point in &self.parts.point_masses {
-            let on = match point.on {
-                vpm_core::body::Site::Body(k) => Mount::Body(k),
-                vpm_core::body::Site::Weld(weld) => {
-                    let weld = &self.parts.welds[weld];
-                    let pose = self.placed(weld.on, weld.translation, weld.rotation);
-                    all.push(Heavy::Body(pose, SpatialInertia::point_mass(point.mass, Vector3::from(point.position))));
-                    continue;
+            let place = match point.on {
+                Site::Body(k) => self.mount(Mount::Body(k)),
+                Site::Weld(k) => {
+                    let weld = &self.parts.welds[k];
+                    self.placed(weld.on, weld.translation, weld.rotation)
                 }
-                vpm_core::body::Site::Tip(beam) => Mount::Section { beam, at: self.parts.beams[beam].length },
+                Site::Tip(beam) => self.mount(Mount::Section { beam, at: self.parts.beams[beam].length }),
             };
-            all.push(Heavy::Body(
-                self.mount(on),
-                SpatialInertia::point_mass(point.mass, Vector3::from(point.position)),
-            ));
+            all.push(Heavy::Body(place, SpatialInertia::point_mass(point.mass, Vector3::from(point.position))));
         }
         for line in &self.parts.lines {
             let [from, to] = [line.from, line.to].map(|end| self.mount(end.on).point(Vector3::from_f64(end.point)));

@@ -53,6 +53,24 @@ fn percent(shares: Shares) -> Vec<f64> {
 }
 
 #[test]
+fn the_shares_are_the_mean_of_their_map() -> Result<()> {
+    let (leg, study) = (leg()?, ShareStudy::of(DutyCycle::MEDIUM));
+    let mut sum = [0.0; 3];
+    for i in 0..11 {
+        for j in 0..13 {
+            let q = degrees([-40.0 + 10.0 * f64::from(i), -140.0 + 10.0 * f64::from(j)]);
+            let Shares { inertia, velocity, gravity } = leg.shares_at(q, &study)?;
+            sum.iter_mut().zip([inertia, velocity, gravity]).for_each(|(sum, share)| *sum += share / 143.0);
+        }
+    }
+    let mean = leg.shares(&study)?;
+    let apart = [sum[0] - mean.inertia, sum[1] - mean.velocity, sum[2] - mean.gravity];
+    assert!(apart.iter().all(|gap| gap.abs() < 1e-12), "{sum:?} {mean:?}");
+    assert!(leg.shares_at([0.0; 2], &ShareStudy { samples: 1, ..study }).is_err());
+    Ok(())
+}
+
+#[test]
 fn every_value_of_the_leg_is_met() {
     let leg = leg().unwrap();
     let mut found = Vec::new();

@@ -2,8 +2,9 @@
 
 use vpm_core::Result;
 use vpm_core::Scalar;
+use vpm_core::beam::Component;
 use vpm_core::beam::Section;
-use vpm_core::beam::strain::{Drive, FlexibleLink, FlexibleTree, Strain, StrainBeam, TreeMotion};
+use vpm_core::beam::strain::{Drive, FlexibleLink, FlexibleTree, StrainBeam, TreeMotion};
 use vpm_core::error::Error;
 use vpm_core::integrator::reference::{Tolerance, solve};
 use vpm_core::integrator::{Integrator, Method};
@@ -96,7 +97,7 @@ impl Drive for Still {
 #[test]
 fn a_flexible_pendulum_converges_to_the_reference() -> Result<()> {
     let section = Section::given([3.0, 2.0, 1.5, 200.0, 250.0, 400.0], [0.02, 0.03, 0.05, 1.0, 1.0, 1.0])?;
-    let beam = StrainBeam::new(section, fields(0.7, &[(Strain::BendingX, 2), (Strain::Torsion, 1)])?, 1e-3, 6)?;
+    let beam = StrainBeam::new(section, fields(0.7, &[(Component::BendingX, 2), (Component::Torsion, 1)])?, 1e-3, 6)?;
     let link = FlexibleLink {
         parent: None,
         joint: Some(pin([0.0, 0.0, 1.0])),

@@ -1,5 +1,6 @@
 //! The semi-implicit method with constant elasticity taken implicitly: stable at any step, of first order, without energy from nowhere.
 
+use allocation_counter::measure;
 use vpm_core::integrator::{Integrator, Lu, Method};
 use vpm_core::ode::Ode;
 
@@ -138,4 +139,44 @@ fn factors_fit_the_matrix_they_are_resized_to() {
     let mut b = [6.0, 11.0];
     lu.solve(&mut b);
     assert_eq!(b, [2.0, 3.0]);
+}
+
+/// A chain with one more state that is no coordinate.
+struct WithLag(Chain);
+impl Ode<f64> for WithLag {
+    fn dim(&self) -> usize {
+        self.0.dim() + 2
+    }
+    fn coordinates(&self) -> usize {
+        self.0.coordinates()
+    }
+    fn rhs(&mut self, x: &[f64], dxdt: &mut [f64]) {
+        let n = self.0.dim();
+        self.0.rhs(&x[..n], &mut dxdt[..n]);
+        (dxdt[n], dxdt[n + 1]) = (-x[n], 1.0);
+    }
+    fn jacobian(&mut self, _: &[f64], _: &mut [f64]) {}
+    fn elasticity(&mut self, x: &[f64], block: &mut [f64]) -> bool {
+        self.0.elasticity(x, block)
+    }
+}
+
+#[test]
+fn steps_with_elasticity_allocate_nothing_and_leave_other_states_alone() {
+    let mut ode = WithLag(chain(true));
+    let mut x = ode.0.start();
+    x.extend([1.0, 0.0]);
+    let (mut bare, mut alone) = (chain(true), chain(true).start());
+    let [mut method, mut other] = [26, 24].map(|dim| Integrator::new(Method::SemiImplicit, dim));
+    let counted = measure(|| {
+        for _ in 0..10 {
+            method.step(&mut ode, &mut x, 0.05);
+        }
+    });
+    for _ in 0..10 {
+        other.step(&mut bare, &mut alone, 0.05);
+    }
+    assert_eq!(counted.count_total, 0);
+    assert_eq!(x[..24], alone);
+    assert!((x[24] - 0.95_f64.powi(10)).abs() < 1e-15 && (x[25] - 0.5).abs() < 1e-15);
 }

@@ -1,10 +1,19 @@
 //! Stable steps of explicit methods: closed forms, and what the methods then do.
 
+use nalgebra::DMatrix;
 use vpm_core::Result;
+use vpm_core::beam::Component;
+use vpm_core::beam::eigen::modes;
+use vpm_core::beam::strain::{FlexibleLink, FlexibleTree, StrainBeam};
+use vpm_core::beam::{Material, Section, Shape};
 use vpm_core::error::Error;
 use vpm_core::integrator::stability::{LinearSystem, check};
 use vpm_core::integrator::{Integrator, Method};
 use vpm_core::ode::Ode;
+
+#[path = "common/beams.rs"]
+mod beams;
+use beams::{along_x, body, fields, pin};
 
 /// Matrices that own their entries.
 #[derive(Clone)]
@@ -98,6 +107,43 @@ fn rigid_and_growing_modes_are_no_fault_of_the_step() {
     }
     let empty = Owned::new(&[], &[], &[], &[]);
     assert!(empty.check(Method::Rk4, 1.0).is_ok());
+}
+
+#[test]
+fn a_stiff_beam_on_a_joint_is_limited_by_its_fastest_vibration() -> Result<()> {
+    use Component::{BendingX, BendingY, Extension, Torsion};
+    let steel = Material { young: 206e9, poisson: 0.3, density: 7850.0 };
+    let section = Section::new(Shape::Rectangle { width: 0.015, height: 0.004 }, steel)?;
+    let list = fields(0.44, &[(BendingX, 4), (BendingY, 3), (Torsion, 2), (Extension, 2)])?;
+    let link = FlexibleLink {
+        joint: Some(pin([0.0, 0.0, 1.0])),
+        hub: body(0.5, 0.02),
+        beam: Some((along_x(0.1), StrainBeam::new(section, list, 1e-9, 12)?)),
+        ..FlexibleLink::welded()
+    };
+    let tree = FlexibleTree::new(vec![link], [0.0; 3])?;
+    let (n, mut workspace) = (tree.len(), tree.workspace());
+    tree.terms(&vec![0.0; n], &vec![0.0; n], &[], &mut workspace);
+    let names: Vec<String> = (0..n).map(|k| format!("coordinate {k}")).collect();
+    let [mass, stiffness] = [&workspace.mass[..], tree.stiffness()].map(|m| DMatrix::from_row_slice(n, n, m));
+    // The symmetric eigenproblem is solved in another way than the companion form; damping of 1e-9 K shifts little, by a known share.
+    let omega = modes(&stiffness, &mass)?.frequencies[n - 1];
+    let zeta = 0.5 * 1e-9 * omega;
+    let system =
+        LinearSystem { mass: &workspace.mass, stiffness: tree.stiffness(), damping: tree.damping(), names: &names };
+    for (method, reach) in
+        [(Method::SemiImplicit, 2.0 * ((1.0 + zeta * zeta).sqrt() - zeta)), (Method::Rk4, 8.0_f64.sqrt())]
+    {
+        match check(method, 1e-3, &system) {
+            Err(Error::StepTooLarge { coordinate, frequency, limit, .. }) => {
+                relative(frequency, omega / std::f64::consts::TAU, 1e-6);
+                relative(limit, reach / omega, 1e-3);
+                assert!(names[n - 2..].contains(&coordinate), "{coordinate} is no extension");
+            }
+            other => panic!("{other:?}"),
+        }
+    }
+    Ok(())
 }
 
 /// The system in motion.

@@ -38,6 +38,15 @@ impl Numbers {
         &self.values
     }
 
+    /// Rows of exactly `N` numbers each.
+    pub(crate) fn rows_of<const N: usize>(&self) -> PyResult<Vec<[f64; N]>> {
+        if self.columns != N {
+            let wanted = format!("rows of {N}");
+            return Err(wrong_shape(self.name, &wanted, &[self.rows, self.columns]));
+        }
+        Ok(self.values.as_chunks::<N>().0.to_vec())
+    }
+
     /// As the core reads it.
     pub(crate) fn as_table(&self) -> Result<Table<'_>, vpm_core::Error> {
         Table::new(self.name, &self.values, self.rows, self.columns)

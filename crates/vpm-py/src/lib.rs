@@ -8,6 +8,8 @@ mod arrays;
 mod dynamics;
 mod errors;
 mod interrupt;
+mod linkage;
+mod planar;
 mod stepping;
 mod system;
 
@@ -20,6 +22,10 @@ mod _core {
     use crate::errors::Diverged;
     #[pymodule_export]
     use crate::interrupt::stop_when;
+    #[pymodule_export]
+    use crate::linkage::{Karl, Leg, hyq_parameters};
+    #[pymodule_export]
+    use crate::planar::PlanarArm;
     #[pymodule_export]
     use crate::stepping::Simulation;
     #[pymodule_export]

@@ -76,18 +76,18 @@ def _stop_at(problems: list[Problem], path: str | None) -> None:
 
 
 def _empty_problems(document: Document) -> Iterator[Problem]:
-    """A machine of nothing; and bodies that nothing carries."""
-    given = document.model_fields_set
+    """A machine of nothing, bodies that nothing carries, joints that do not move."""
+
+    def missing(section: str, example: str) -> Problem:
+        verb = "is empty; add" if section in document.model_fields_set else "is missing; add it, for example"
+        return Problem(section, f"{verb} a table [{section}.{example}]")
+
     if not document.bodies and (not document.beams or document.joints):
-        yield Problem(
-            "bodies",
-            f"is {'empty; add' if 'bodies' in given else 'missing; add it, for example'} a table [bodies.link]",
-        )
+        yield missing("bodies", "link")
     elif document.bodies and not document.joints:
-        yield Problem(
-            "joints",
-            f"is {'empty; add' if 'joints' in given else 'missing; add it, for example'} a table [joints.axis]",
-        )
+        yield missing("joints", "axis")
+    elif not document.beams and all(joint.type == "fixed" for joint in document.joints.values()):
+        yield Problem("joints", 'has fixed joints only, so nothing moves; add one that does, such as type = "revolute"')
 
 
 def _command_problems(document: Document) -> Iterator[Problem]:

@@ -17,8 +17,9 @@ pub(super) fn references(description: &Description) -> Result<()> {
             each: "parameter".to_owned(),
         });
     }
-    if description.bodies.is_empty() {
-        return Err(Error::Description { message: "it has no body, but a machine needs at least one".to_owned() });
+    if description.bodies.is_empty() && description.beams.is_empty() {
+        let message = "it has no body and no beam, but a machine needs at least one".to_owned();
+        return Err(Error::Description { message });
     }
     for (what, index) in used_parameters(description) {
         within(&what, "parameter", index, description.parameters.len())?;

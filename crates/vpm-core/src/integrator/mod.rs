@@ -12,7 +12,7 @@ pub mod stability;
 pub use linearly_implicit::LinearlyImplicit;
 pub use lu::Lu;
 pub use rk4::Rk4;
-pub use rosenbrock::{RODASP2, Rosenbrock, Tableau};
+pub use rosenbrock::{RODAS4P2, Rosenbrock, Tableau};
 pub use semi_implicit::SemiImplicit;
 
 use crate::error::{Error, Result};

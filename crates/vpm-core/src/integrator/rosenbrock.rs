@@ -18,11 +18,11 @@ pub struct Tableau {
     pub coupling: [[f64; STAGES]; STAGES],
 }
 
-/// RODASP2 (also Rodas4P2): six stages, order 4, L-stable, stiffly accurate, and of order 2 if the Jacobian is not exact.
+/// Rodas4P2: six stages, order 4, L-stable, stiffly accurate, and of order 2 if the Jacobian is not exact.
 ///
 /// Source: Steinebach 2020, "Improvement of Rosenbrock-Wanner method RODASP", in: Progress in Differential-Algebraic Equations II,
 /// Springer, pages 165-184. The last row of the distances is the one before it, with a one: stage 6 stands where stage 5 leads to.
-pub const RODASP2: Tableau = Tableau {
+pub const RODAS4P2: Tableau = Tableau {
     gamma: 0.25,
     distance: [
         [0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
@@ -53,7 +53,7 @@ pub const RODASP2: Tableau = Tableau {
 /// right-hand sides and solves a step, no iteration).
 ///
 /// Law: `(1 - g h J) u_i = g h f(x + sum a_ij u_j) + g sum c_ij u_j` with the exact `J = df/dx`, and `x+ = x + sum a_6j u_j + u_6`,
-/// with the coefficients [`RODASP2`]. Source: Hairer & Wanner 1996, "Solving Ordinary Differential Equations II", section IV.7,
+/// with the coefficients [`RODAS4P2`]. Source: Hairer & Wanner 1996, "Solving Ordinary Differential Equations II", section IV.7,
 /// equation 7.25, and the source of the table. Of the family of RODAS this member is made for fast components that follow slow ones
 /// (Prothero & Robinson's problem), as the stiff coordinates of a beam do, and for Jacobians that are not quite exact.
 /// Checked: its order conditions and stability function; order 4 on a pendulum and on the stiff oscillator of van der Pol; order 3
@@ -75,12 +75,12 @@ impl<S: Scalar> Rosenbrock<S> {
 
     /// Moves `x` on by `step` (s).
     pub fn step(&mut self, ode: &mut impl Ode<S>, x: &mut [S], step: f64) {
-        let (dim, reach) = (x.len(), RODASP2.gamma * step);
+        let (dim, reach) = (x.len(), RODAS4P2.gamma * step);
         let matrix = self.lu.matrix();
         ode.jacobian(x, matrix);
         shift(matrix, dim, reach);
         self.lu.factorise();
-        for (i, (distance, coupling)) in RODASP2.distance.iter().zip(&RODASP2.coupling).enumerate() {
+        for (i, (distance, coupling)) in RODAS4P2.distance.iter().zip(&RODAS4P2.coupling).enumerate() {
             let (known, rest) = self.increments.split_at_mut(i * dim);
             let increment = &mut rest[..dim];
             self.stage.copy_from_slice(x);
@@ -91,7 +91,7 @@ impl<S: Scalar> Rosenbrock<S> {
             }
             add(increment, known, coupling);
             for entry in increment.iter_mut() {
-                *entry = *entry * RODASP2.gamma;
+                *entry = *entry * RODAS4P2.gamma;
             }
             self.lu.solve(increment);
         }

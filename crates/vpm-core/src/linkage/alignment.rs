@@ -1,9 +1,10 @@
-//! Where a stroke loses control of its angle.
+//! Where a stroke loses control of its angle, and an angle of its stroke.
 
 use std::f64::consts::PI;
 
-use super::StrokeLinkage;
 use super::stroke::wrapped;
+use super::{Slider, StrokeLinkage};
+use crate::spatial::Vector2;
 
 /// A stroke at which axis, slider and anchor are in line: there the stroke cannot control the angle.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -16,7 +17,43 @@ pub struct Alignment {
     pub extended: bool,
 }
 
+/// A configuration in which the rod is perpendicular to the stroke: there the angle cannot move the stroke.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Perpendicular {
+    /// The stroke in m.
+    pub stroke: f64,
+    /// The angle in rad, in (-pi, pi].
+    pub angle: f64,
+}
+
 impl StrokeLinkage {
+    /// The configurations with the rod perpendicular to the stroke: zeros of [`StrokeLinkage::stroke_slope`] on the closed
+    /// linkage, where the two strokes of an angle meet. None, two or four; the larger stroke first.
+    ///
+    /// Law: in the axes of the body that carries the slider, the turning anchor is one rod length away from the slider's line,
+    /// on either side: `n . R b = n . start +- l` with n normal to the stroke. Checked: slope and constraint vanish there.
+    pub fn perpendiculars(&self) -> Vec<Perpendicular> {
+        let (start, anchor) = (self.slider(0.0), self.anchor());
+        let normal = self.direction().perpendicular();
+        let turn = if self.slider_on() == Slider::OnRocker { -1.0 } else { 1.0 };
+        let mut found = Vec::with_capacity(4);
+        for side in [1.0, -1.0] {
+            let cosine = (normal.dot(start) + side * self.rod()) / self.arm();
+            if cosine.is_nan() || cosine.abs() > 1.0 {
+                continue;
+            }
+            for half in [cosine.acos(), -cosine.acos()] {
+                let angle = turn * (normal.argument() + half - anchor.argument());
+                let (sine, cosine) = (turn * angle).sin_cos();
+                let target: Vector2<f64> = anchor.rotated((sine, cosine));
+                let stroke = (target - start).dot(self.direction());
+                found.push(Perpendicular { stroke, angle: wrapped(angle) });
+            }
+        }
+        found.sort_by(|a, b| b.stroke.total_cmp(&a.stroke));
+        found
+    }
+
     /// The strokes at which axis, slider and anchor are in line: zeros of [`StrokeLinkage::determinant`] on the
     /// closed linkage. First the two with rod and arm end to end, then the two folded, the larger stroke first.
     pub fn alignments(&self) -> Vec<Alignment> {

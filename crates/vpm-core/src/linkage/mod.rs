@@ -11,7 +11,7 @@ mod line_actuator;
 mod newton;
 mod stroke;
 
-pub use alignment::Alignment;
+pub use alignment::{Alignment, Perpendicular};
 pub use constraint::{ClosedLinkage, LinkageMotion, acceleration, velocity};
 pub use line_actuator::{ActuatorBody, Line, LineActuator, PointMotion};
 pub use newton::{Newton, Solution};

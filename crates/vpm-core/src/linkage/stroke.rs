@@ -198,6 +198,21 @@ impl StrokeLinkage {
         x.hypot(y)
     }
 
+    /// The rod's end that is not the slider, on its own body, in m.
+    pub(super) fn anchor(&self) -> Vector2<f64> {
+        Vector2::from_f64(self.geometry.anchor)
+    }
+
+    /// Unit vector along the stroke, on the body that carries the slider.
+    pub(super) fn direction(&self) -> Vector2<f64> {
+        self.direction
+    }
+
+    /// Which body carries the slider.
+    pub(super) fn slider_on(&self) -> Slider {
+        self.geometry.slider
+    }
+
     fn apart(&self, input: &'static str, value: f64) -> Error {
         let (rod, arm) = (self.geometry.rod, self.arm());
         let gap = self.distance(input, value);

@@ -1,6 +1,6 @@
 //! Joints that follow a given motion, and beams that answer to it.
 
-use super::{Run, Setting, Stepping, names};
+use super::{Run, Setting, Stepping, check_step, names};
 use crate::algebra::Cholesky;
 use crate::description::Description;
 use crate::dynamics::flexible;
@@ -31,6 +31,11 @@ pub fn prescribed(setting: Setting<'_>, motion: JointMotion<'_>) -> Result<Run> 
         [("position", motion.position), ("velocity", motion.velocity), ("acceleration", motion.acceleration)]
     {
         table.expect(name, rows, joints)?;
+    }
+    if rows > 0 {
+        let mut state = motion.position.row(0).to_vec();
+        state.resize(setting.description.n_states(), 0.0);
+        check_step(setting.description, setting.theta, setting.stepping, &state, true)?;
     }
     let job = Guided { setting, motion };
     let output = |pass: &Pair<_>, place: usize| pass.first[place];

@@ -7,37 +7,47 @@ use crate::error::Result;
 use crate::integrator::Method;
 use crate::integrator::stability::{LinearSystem, check};
 use crate::ode::Ode;
-use crate::scalar::Scalar;
 use crate::system::System;
 
-/// Complains, with the mode and the largest stable step, if the flexible links cannot be stepped so from `state`.
+/// Complains, with the mode and the largest stable step, if the flexible links cannot be stepped so from `state`; `locked` if the
+/// joints follow a motion of their own.
 ///
 /// Judged at the mass matrix of that state and the constant stiffness and damping of the beams; friction and springs of joints, whose
 /// slopes change with the state, are left to the run itself.
-pub(crate) fn check_step(description: &Description, theta: &[f64], stepping: Stepping, state: &[f64]) -> Result<()> {
+pub(crate) fn check_step(
+    description: &Description,
+    theta: &[f64],
+    stepping: Stepping,
+    state: &[f64],
+    locked: bool,
+) -> Result<()> {
     let explicit = matches!(stepping.method, Method::Rk4 | Method::SemiImplicit);
-    if !explicit || description.n_elastic() == 0 {
+    if !explicit || description.n_elastic() == 0 || state.iter().any(|number| !number.is_finite()) {
         return Ok(());
     }
     let mut system: System<f64> = description.system(theta)?;
     let n = description.n_coordinates();
-    let implicit = stepping.method == Method::SemiImplicit && system.elasticity(state, &mut vec![0.0; 2 * n * n]);
-    if implicit || state.iter().any(|number| !number.is_finite()) {
-        return Ok(());
+    if stepping.method == Method::SemiImplicit && system.elasticity(state, &mut vec![0.0; 2 * n * n]) {
+        return Ok(()); // beams are taken implicitly
     }
     let dynamics = system.dynamics();
     dynamics.terms(&state[..n], &vec![0.0; n]);
     let (mut stiffness, mut damping) = (vec![0.0; n * n], vec![0.0; n * n]);
-    for beam in dynamics.model.beams() {
-        let (first, len) = (beam.coordinate, beam.beam.len());
-        for (whole, own) in [(&mut stiffness, beam.beam.stiffness()), (&mut damping, beam.beam.damping())] {
+    for elastic in dynamics.model.beams() {
+        let (first, len) = (elastic.coordinate, elastic.beam.len());
+        for (whole, own) in [(&mut stiffness, elastic.beam.stiffness()), (&mut damping, elastic.beam.damping())] {
             for (row, entries) in own.chunks_exact(len.max(1)).enumerate() {
                 let place = (first + row) * n + first;
-                whole[place..place + len].iter_mut().zip(entries).for_each(|(entry, own)| *entry = own.re());
+                whole[place..place + len].copy_from_slice(entries);
             }
         }
     }
-    let names: Vec<String> = (0..n).map(|place| coordinate(description, place)).collect();
-    let (mass, names) = (dynamics.data.mass_matrix(), &names);
-    check(stepping.method, stepping.step(), &LinearSystem { mass, stiffness: &stiffness, damping: &damping, names })
+    let free = if locked { description.n_joints() } else { 0 };
+    let moving = |matrix: &[f64]| -> Vec<f64> {
+        matrix.chunks_exact(n).skip(free).flat_map(|row| row[free..].iter().copied()).collect()
+    };
+    let names: Vec<String> = (free..n).map(|place| coordinate(description, place)).collect();
+    let [mass, stiffness, damping] = [dynamics.data.mass_matrix(), &stiffness, &damping].map(moving);
+    let system = LinearSystem { mass: &mass, stiffness: &stiffness, damping: &damping, names: &names };
+    check(stepping.method, stepping.step(), &system)
 }

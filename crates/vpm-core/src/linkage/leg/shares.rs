@@ -84,7 +84,7 @@ impl Leg {
         let mut total = [0.0; 3];
         for i in 0..rows {
             for j in 0..columns {
-                let largest = self.largest_shares([spread(first, rows, i), spread(second, columns, j)], study);
+                let largest = self.largest([spread(first, rows, i), spread(second, columns, j)], study);
                 total.iter_mut().zip(largest).for_each(|(sum, share)| *sum += share);
             }
         }
@@ -92,8 +92,15 @@ impl Leg {
         Ok(Shares { inertia, velocity, gravity })
     }
 
-    /// The largest of each share over all sampled motions in one configuration.
-    fn largest_shares(&self, q: [f64; 2], study: &ShareStudy) -> [f64; 3] {
+    /// The largest of each share over all sampled motions in one configuration `q` (rad): a point of the map whose mean is
+    /// [`Leg::shares`]. Ranges and counts of the study are not used.
+    pub fn shares_at(&self, q: [f64; 2], study: &ShareStudy) -> Result<Shares> {
+        check(study)?;
+        let [inertia, velocity, gravity] = self.largest(q, study);
+        Ok(Shares { inertia, velocity, gravity })
+    }
+
+    fn largest(&self, q: [f64; 2], study: &ShareStudy) -> [f64; 3] {
         let DutyCycle { rate, acceleration } = study.duty;
         let grid = |limit: f64| {
             let value = move |k| spread([-limit, limit], study.samples, k);

@@ -1,0 +1,168 @@
+"""Error and time of a flexible two-link arm, side by side with other engines.
+
+    python benches/flexible_arm.py [--repeats 5] [--quick] [--markdown FILE]
+
+24 s of two motions; the error is that against converged motions, at 10 Hz. Other engines take part where they are
+installed: pip install "vpm-dynamics[peers]".
+"""
+
+from __future__ import annotations
+
+import argparse
+import statistics
+import sys
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+ROOT = Path(__file__).resolve().parent.parent
+sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "benches")]
+
+import markdown  # noqa: E402
+from reference_arm import DURATION, MOTIONS, errors, planar_arm  # noqa: E402
+
+Array = NDArray[np.float64]
+Run = Callable[[], tuple[Array, Array]]
+
+#: Curvature coefficients, stations and steps in 0.1 s of vpm's arm.
+OWN = ((2, 4, 50), (3, 4, 50), (3, 4, 100), (3, 4, 125), (4, 5, 50), (4, 5, 60), (4, 5, 100))
+#: Elements per link and step (s).
+EXUDYN = ((2, 2e-3), (2, 1e-3), (4, 2e-3), (4, 1e-3))
+#: Steps (s).
+MUJOCO = (1e-3, 5e-4)
+#: What the arm has to reach with 24 s in 45 ms.
+GOAL = {"tip": 3e-5, "strains": (4e-4, 2.5e-3), "ms": 45.0}
+
+
+@dataclass(frozen=True)
+class Row:
+    """One engine with one setting on one motion: errors, and seconds of each repeat."""
+
+    engine: str
+    setting: str
+    motion: str
+    tip: float
+    strains: tuple[float, float]
+    wall: tuple[float, ...]
+    cpu: tuple[float, ...]
+
+    def no_worse_than(self, other: Row) -> bool:
+        pairs = zip((self.tip, *self.strains), (other.tip, *other.strains), strict=True)
+        return all(own <= theirs for own, theirs in pairs)
+
+    @property
+    def meets_goal(self) -> bool:
+        strains = all(found <= allowed for found, allowed in zip(self.strains, GOAL["strains"], strict=True))
+        return self.tip <= GOAL["tip"] and strains and 1e3 * min(self.cpu) <= GOAL["ms"]
+
+
+def measure(engine: str, setting: str, motion: str, prepare: Callable[[], Run], repeats: int) -> Row:
+    """Time the runs alone; what is built before is not counted."""
+    wall, cpu = [], []
+    for _ in range(repeats):
+        run = prepare()
+        begin, busy = time.perf_counter(), time.process_time()
+        tip, strains = run()
+        cpu.append(time.process_time() - busy)
+        wall.append(time.perf_counter() - begin)
+    distance, strain = errors(motion, tip, strains)
+    return Row(engine, setting, motion, distance, (float(strain[0]), float(strain[1])), tuple(wall), tuple(cpu))
+
+
+def own(motion: str, coefficients: int, points: int, steps: int) -> Callable[[], Run]:
+    arm = planar_arm(motion, coefficients, points)
+
+    def run() -> tuple[Array, Array]:
+        found = arm.run(DURATION, samples=241, steps=steps)
+        return found.tip[1:], found.strains[1:]
+
+    return lambda: run
+
+
+def rows(repeats: int, quick: bool) -> Iterator[Row]:
+    for motion in MOTIONS:
+        for coefficients, points, steps in OWN:
+            setting = f"{coefficients} coefficients, {100 / steps:.3g} ms"
+            yield measure("vpm", setting, motion, own(motion, coefficients, points, steps), 4 * repeats)
+        if find_spec("exudyn"):
+            from exudyn_arm import ExudynArm, fastest_solver
+
+            for elements, step in EXUDYN[:1] if quick else EXUDYN:
+                solver = fastest_solver(elements, step)
+
+                def prepare(arguments: tuple[str, int, float, str] = (motion, elements, step, solver)) -> Run:
+                    return ExudynArm(*arguments).run
+
+                yield measure("Exudyn", f"{elements} elements, {1e3 * step:g} ms, {solver}", motion, prepare, repeats)
+        if find_spec("mujoco"):
+            from mujoco_arm import SEGMENTS, MujocoArm
+
+            for step in MUJOCO[:1] if quick else MUJOCO:
+                arm = MujocoArm(motion, step)
+                setting = f"{SEGMENTS} segments, {1e3 * step:g} ms"
+                yield measure("MuJoCo", setting, motion, lambda arm=arm: arm.run, repeats)
+
+
+def table(found: list[Row]) -> str:
+    """All rows, and for each peer how much faster the fastest of our settings is that is no worse in any error."""
+    head = (
+        "motion",
+        "engine",
+        "per link",
+        "tip, m",
+        "strain 1",
+        "strain 2",
+        "wall, ms",
+        "median, spread",
+        "CPU, ms",
+        "ratio",
+    )
+    lines = []
+    for row in found:
+        ours = [own for own in found if own.engine == "vpm" and own.motion == row.motion and own.no_worse_than(row)]
+        ratio = "" if row.engine == "vpm" else "none as good"
+        if row.engine != "vpm" and ours:
+            best = min(ours, key=lambda own: min(own.cpu))
+            ratio = f"{min(row.cpu) / min(best.cpu):.0f} ({best.setting})"
+        wall = [1e3 * each for each in row.wall]
+        spread = f"{statistics.median(wall):.1f}, {max(wall) - min(wall):.1f}"
+        numbers = (f"{row.tip:.1e}", *(f"{strain:.1e}" for strain in row.strains), f"{min(wall):.1f}", spread)
+        lines.append((row.motion, row.engine, row.setting, *numbers, f"{1e3 * min(row.cpu):.1f}", ratio))
+    return markdown.table(head, lines)
+
+
+def goal(found: list[Row]) -> str:
+    """Which settings reach the goal on every motion."""
+    settings = {row.setting for row in found if row.engine == "vpm"}
+    good = sorted(
+        setting
+        for setting in settings
+        if all(row.meets_goal for row in found if row.engine == "vpm" and row.setting == setting)
+    )
+    return (
+        f"Within {GOAL['ms']:g} ms of CPU time for 24 s, tip errors of {GOAL['tip']:g} m and strain errors of "
+        f"{GOAL['strains'][0]:g} and {GOAL['strains'][1]:g} are reached on both motions by: "
+        f"{'; '.join(good) or 'none'}."
+    )
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("--repeats", type=int, default=5, help="runs of each peer; ours runs four times as often")
+    parser.add_argument("--quick", action="store_true", help="one setting of each peer")
+    parser.add_argument("--markdown", type=Path, help="write the section of the performance page here")
+    options = parser.parse_args()
+    found = list(rows(options.repeats, options.quick))
+    text = f"{table(found)}\n\n{goal(found)}\n"
+    print(text)
+    if options.markdown:
+        options.markdown.write_text(text, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,84 @@
+"""Write docs/performance.md: run the benchmarks beside other engines and put their tables into one page."""
+
+from __future__ import annotations
+
+import platform
+import shutil
+import subprocess
+import sys
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+ROOT = Path(__file__).resolve().parent.parent
+
+PAGE = """# Performance beside other engines
+
+Written by `make peers`; do not edit. Times depend on the machine and on what else runs on it, ratios less so.
+
+```console
+$ make peers
+$ make bench-counts
+```
+
+Measured on {cpu}, {system}, with {versions}. Wall time is the least of all repeats, then median and spread (largest
+less least); CPU time is that of the process, the least of all repeats, and ratios are ratios of CPU time.
+
+## A flexible arm
+
+Two flexible links under control, 24 s of a slow and a fast motion; one call from Python that runs the whole motion,
+with results at 10 Hz. Errors are root mean squares over all samples against converged motions: of the tip in m, of the
+strains beside the clamps relative to their own root mean square. The last column says how many times faster the
+fastest setting of vpm is that is no worse than this row in the tip and in both strains.
+
+{flexible_arm}
+Exudyn runs geometrically exact beam elements of three nodes, compiled without range checks, with symbolic functions for
+the references, a modified Newton method, one thread and the fastest of three linear solvers. Its beams can stretch and
+shear and their sections have rotary inertia, which is not so in the reference and in vpm: a part of its error. MuJoCo
+runs rigid segments with elastic hinges, implicit in the damping. vpm runs `vpm.PlanarArm`.
+
+## A rigid arm of seven joints
+
+One call from Python, on prepared buffers and ready arrays.
+
+{rigid_chain}
+Instructions of one call inside the core, counted by valgrind, which no other load on the machine disturbs:
+
+{instruction_counts}"""
+
+
+def installed(package: str) -> str:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return "not installed"
+
+
+def processor() -> str:
+    lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines() if Path("/proc/cpuinfo").exists() else []
+    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    return f"{names[0]}, {len(names)} threads" if names else platform.processor()
+
+
+def section(name: str, folder: Path) -> str:
+    if name == "instruction_counts" and shutil.which("valgrind") is None:
+        return "valgrind is not installed, so nothing was counted.\n"
+    target = folder / f"{name}.md"
+    command = [sys.executable, str(ROOT / "benches" / f"{name}.py"), "--markdown", str(target)]
+    subprocess.run(command, check=True, cwd=ROOT)  # noqa: S603
+    return target.read_text(encoding="utf-8")
+
+
+def main() -> None:
+    with TemporaryDirectory() as folder:
+        names = ("flexible_arm", "rigid_chain", "instruction_counts")
+        sections = {name: section(name, Path(folder)) for name in names}
+    engines = {"vpm": "vpm-dynamics", "Exudyn": "exudyn", "MuJoCo": "mujoco", "Pinocchio": "pin"}
+    versions = ", ".join(f"{name} {installed(package)}" for name, package in engines.items())
+    system = f"{platform.system()}, Python {platform.python_version()}"
+    page = PAGE.format(cpu=processor(), system=system, versions=versions, **sections)
+    (ROOT / "docs" / "performance.md").write_text(page, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,37 @@
+"""Closed linkages: KARL, a limb driven by two strokes, and the leg of HyQ, driven by two cylinders.
+
+Both are described by a TOML file or by numbers, and answer with frozen results that print, plot and become tables::
+
+    from vpm import linkages
+
+    karl = linkages.load("examples/karl/karl.toml")
+    print(karl.direct((0.20, 0.18)).to_frame())
+
+The laws are those of the core, see ``docs/linkages.md``. Angles in rad, lengths in m, all numbers SI.
+"""
+
+from vpm.linkages.karl import Karl, KarlGeometry
+from vpm.linkages.karl_results import KarlPoses, KarlSingularities, KarlWorkspace
+from vpm.linkages.leg import Leg
+from vpm.linkages.leg_parameters import Attachment, Cylinder, LegParameters, LegPart, Segment
+from vpm.linkages.leg_results import LegReactions, LegStrokes, LegTerms, ShareMap
+from vpm.linkages.load import load
+
+__all__ = [
+    "Attachment",
+    "Cylinder",
+    "Karl",
+    "KarlGeometry",
+    "KarlPoses",
+    "KarlSingularities",
+    "KarlWorkspace",
+    "Leg",
+    "LegParameters",
+    "LegPart",
+    "LegReactions",
+    "LegStrokes",
+    "LegTerms",
+    "Segment",
+    "ShareMap",
+    "load",
+]

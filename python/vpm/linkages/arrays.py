@@ -1,0 +1,45 @@
+"""One configuration or many: the core takes tables, people also give single rows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from vpm.errors import ModelError
+
+Array = NDArray[np.float64]
+
+
+def rowwise(question: Callable[..., Array], *tables: ArrayLike, what: str) -> Array:
+    """Ask the core about rows of two numbers; a single row gives a single answer.
+
+    Parameters
+    ----------
+    question : callable
+        Takes as many tables (N, 2) as are given.
+    *tables : array_like, shape (2,) or (N, 2)
+        Single rows are repeated where others are tables.
+    what : str
+        Name for messages.
+
+    Returns
+    -------
+    ndarray, shape (...) or (N, ...)
+
+    Raises
+    ------
+    ModelError
+        Shapes do not fit, or the core refuses.
+    """
+    arrays = [np.asarray(table, dtype=float) for table in tables]
+    for array in arrays:
+        if array.ndim not in {1, 2} or array.shape[-1] != 2:
+            raise ModelError(f"{what}: needs the shape (2,) or (N, 2), got {array.shape}; give two numbers per row")
+    single = all(array.ndim == 1 for array in arrays)
+    try:
+        answer = question(*np.broadcast_arrays(*(np.atleast_2d(array) for array in arrays)))
+    except ValueError as error:
+        raise ModelError(f"{what}: {error}") from error
+    return answer[0] if single else answer

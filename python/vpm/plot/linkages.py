@@ -1,0 +1,169 @@
+"""Pictures of closed linkages."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vpm.plot.style import BLUE, GREEN, INK, LINE, ORANGE, SOFT, panels, styled
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Array = NDArray[np.float64]
+
+
+@styled
+def plot_limbs(elbows: Array, tips: Array, names: Sequence[str]) -> Figure:
+    """Draw limbs of two bodies as lines from the origin.
+
+    Parameters
+    ----------
+    elbows, tips : ndarray, shape (N, 2)
+        In m.
+    names : sequence of str
+    """
+    figure, [[axes]] = panels(1, height=4.5, width=6.0)
+    for elbow, tip, name in zip(elbows, tips, names, strict=True):
+        axes.plot([0.0, elbow[0], tip[0]], [0.0, elbow[1], tip[1]], marker="o", markersize=3, label=name)
+    axes.plot(0.0, 0.0, "s", color=INK)
+    axes.set_aspect("equal")
+    axes.set_xlabel("x [m]")
+    axes.set_ylabel("y [m]")
+    figure.legend(loc="outside right upper", title="q1, q2")
+    return figure
+
+
+@styled
+def plot_stroke_workspace(
+    strokes: tuple[Array, Array], angles: Array, tips: Array, transmission: Array, singular: Sequence[Array]
+) -> Figure:
+    """Draw the reach of a limb of two strokes, and its angles and transmission up to the singular strokes.
+
+    Parameters
+    ----------
+    strokes : (ndarray, ndarray), shape (N,) and (M,)
+        In m.
+    angles, tips, transmission : ndarray, shape (N, M, 2)
+        In rad, m and rad/m.
+    singular : sequence of ndarray
+        Singular strokes of each actuator (m).
+    """
+    figure, rows = panels(1, 3, height=3.6, width=13.0)
+    reach, turn, ratio = rows[0]
+    # Lines of one constant stroke each, so that the borders of the reach are seen.
+    reach.plot(tips[::4, :, 0].T, tips[::4, :, 1].T, color=BLUE, linewidth=0.6)
+    reach.plot(tips[:, ::4, 0], tips[:, ::4, 1], color=ORANGE, linewidth=0.6)
+    reach.plot(0.0, 0.0, "s", color=INK)
+    reach.set_aspect("equal")
+    reach.set_xlabel("x [m]")
+    reach.set_ylabel("y [m]")
+    reach.set_title("end point, lines of constant stroke")
+    for k, colour in enumerate((BLUE, ORANGE)):
+        # Each angle depends on its own stroke alone.
+        pick = (slice(None), _filled(angles[..., 0].T)) if k == 0 else (_filled(angles[..., 1]), slice(None))
+        turn.plot(strokes[k], np.degrees(np.unwrap(angles[pick][..., k])), color=colour, label=f"joint {k + 1}")
+        ratio.plot(strokes[k], transmission[pick][..., k], color=colour, label=f"joint {k + 1}")
+        near = singular[k][(singular[k] > strokes[k].min() - 0.02) & (singular[k] < strokes[k].max() + 0.02)]
+        for axes in (turn, ratio):
+            for stroke in near:
+                axes.axvline(stroke, color=colour, linestyle=":", linewidth=1.0)
+    turn.set_title("joint angle [deg]; dotted: singular strokes")
+    ratio.set_title("transmission [rad/m]")
+    ratio.set_ylim(-150.0, 150.0)
+    for axes in (turn, ratio):
+        axes.set_xlabel("stroke [m]")
+    turn.legend()
+    return figure
+
+
+def _filled(table: Array) -> int:
+    """Row with the most numbers."""
+    return int(np.isfinite(table).sum(axis=1).argmax())
+
+
+@styled
+def plot_strokes(angles: Array, strokes: Array, levers: Array, names: Sequence[str]) -> Figure:
+    """Draw lengths and lever arms of cylinders over the angles of their joints.
+
+    Parameters
+    ----------
+    angles, strokes, levers : ndarray, shape (N, K)
+        In rad, m and m/rad.
+    names : sequence of str
+    """
+    figure, rows = panels(2, len(names), width=9.0, share_x=True)
+    for k, name in enumerate(names):
+        degrees = np.degrees(angles[:, k])
+        rows[0][k].plot(degrees, strokes[:, k], color=BLUE)
+        rows[1][k].plot(degrees, levers[:, k], color=GREEN)
+        rows[0][k].set_title(f"{name} cylinder")
+        rows[0][k].set_ylabel("length [m]")
+        rows[1][k].set_ylabel("lever arm [m/rad]")
+        rows[1][k].set_xlabel(f"{name} angle [deg]")
+    return figure
+
+
+@styled
+def plot_shares(first: Array, second: Array, maps: Mapping[str, Array], title: str) -> Figure:
+    """Draw shares of the effort over two joint angles.
+
+    Parameters
+    ----------
+    first, second : ndarray, shape (R,) and (C,)
+        Joint angles (rad).
+    maps : mapping of str to ndarray, shape (R, C)
+        Fractions.
+    title : str
+    """
+    figure, rows = panels(1, len(maps), height=3.4, width=12.0)
+    for axes, (name, table) in zip(rows[0], maps.items(), strict=True):
+        mesh = axes.pcolormesh(np.degrees(second), np.degrees(first), 100.0 * table, shading="nearest", cmap="viridis")
+        mesh.set_clim(0.0, max(100.0, float(np.nanpercentile(100.0 * table, 95))))
+        axes.grid(visible=False)
+        axes.set_title(f"{name}: {100.0 * table.mean():.2f} % on average")
+        axes.set_xlabel("knee angle [deg]")
+    rows[0][0].set_ylabel("hip angle [deg]")
+    figure.colorbar(mesh, ax=rows[0], label="largest share [%]", shrink=0.9)
+    figure.suptitle(title, fontsize=11, x=0.01, ha="left")
+    return figure
+
+
+@styled
+def plot_planar_motion(
+    time: Array, angles: Array, reference: Array, tips: Array, strains: Array, gauges: Sequence[str]
+) -> Figure:
+    """Draw the motion of a planar arm: path of the tip, joint angles with their references, strains.
+
+    Parameters
+    ----------
+    time : ndarray, shape (N,)
+        In s.
+    angles, reference : ndarray, shape (N, n)
+        In rad.
+    tips : ndarray, shape (N, 2)
+        In m.
+    strains : ndarray, shape (N, G)
+    gauges : sequence of str
+    """
+    figure, rows = panels(1, 3, height=3.2, width=13.0)
+    path, turn, strain = rows[0]
+    path.plot(tips[:, 0], tips[:, 1], color=BLUE)
+    path.set_aspect("equal")
+    path.set_xlabel("x [m]")
+    path.set_ylabel("y [m]")
+    path.set_title("tip")
+    for k, colour in zip(range(angles.shape[1]), (BLUE, ORANGE), strict=False):
+        turn.plot(time, np.degrees(reference[:, k]), color=SOFT if k else LINE, linestyle="--")
+        turn.plot(time, np.degrees(angles[:, k]), color=colour, label=f"joint {k + 1}")
+    turn.set_title("joint angle [deg]; dashed: reference")
+    for k, name in enumerate(gauges):
+        strain.plot(time, 1e6 * strains[:, k], label=name)
+    strain.set_title("strain [1e-6]")
+    for axes in (turn, strain):
+        axes.set_xlabel("time [s]")
+        axes.legend()
+    return figure
