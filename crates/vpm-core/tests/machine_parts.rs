@@ -15,6 +15,7 @@ use vpm_core::samples::{Random, random_tree};
 use vpm_core::spatial::{Matrix3, SpatialInertia, Vector2, Vector3};
 use vpm_core::{Dual, Result};
 
+#[cfg(test)]
 #[path = "common/flexible.rs"]
 mod trees;
 use trees::{UPRIGHT, body, inertia, turn};
