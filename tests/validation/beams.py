@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 import vpm
+from reference_arm import P
 from validation.machines import arm, cantilever, rectangle, rotor, strip
 from validation.observe import at_rest
 from validation.row import Array, Row, accepted, against, row, values
-from reference_arm import P
 
 
 def omega(model: vpm.Model, count: int) -> Array:
@@ -133,7 +133,9 @@ def shear(wanted: dict[str, dict[str, object]]) -> Row:
     }
     force = 1e-3
     seen = at_rest(cantilever("bezier(4)", 0.44, first, deforms=("bending_y", "shear_x"), tip=1.0, gravity=force))
-    return against(wanted["screw.cantilever.tip_force_1N"], [-seen["tip.z"] / force, (seen["tip.ry"] - 0.5 * np.pi) / force])
+    return against(
+        wanted["screw.cantilever.tip_force_1N"], [-seen["tip.z"] / force, (seen["tip.ry"] - 0.5 * np.pi) / force]
+    )
 
 
 def two_links() -> list[Row]:

@@ -41,7 +41,7 @@ def cantilever(
     tip: float = 0.0,
     gravity: float = 0.0,
 ) -> vpm.Model:
-    """A horizontal beam clamped to the world, with a point mass (kg) at its tip; a gauge 1 m above the axis at the root."""
+    """A horizontal beam clamped to the world, with a point mass (kg) at its tip."""
     content: dict[str, object] = {
         "name": "cantilever",
         "gravity": [0.0, 0.0, -gravity],

@@ -51,7 +51,9 @@ class Row:
         tolerance = f"{self.relative:.0e} rel." if self.relative else f"{self.absolute:.0e}"
         difference = abs(found - expected) / (abs(expected) if self.relative else 1.0)
         name = f"{self.name}{count}"
-        return f"| {name} | {found:.7g} | {expected:.7g} | {self.unit} | {difference:.1e} | {tolerance} | {self.source} |"
+        return (
+            f"| {name} | {found:.7g} | {expected:.7g} | {self.unit} | {difference:.1e} | {tolerance} | {self.source} |"
+        )
 
 
 def row(
@@ -65,7 +67,10 @@ def row(
     absolute: float = 0.0,
 ) -> Row:
     """Make a row; the shapes have to agree."""
-    a, b = np.atleast_1d(np.asarray(found, dtype=float)).ravel(), np.atleast_1d(np.asarray(expected, dtype=float)).ravel()
+    a, b = (
+        np.atleast_1d(np.asarray(found, dtype=float)).ravel(),
+        np.atleast_1d(np.asarray(expected, dtype=float)).ravel(),
+    )
     if a.shape != b.shape:
         raise ValueError(f"{name}: found {a.size} numbers, but the reference has {b.size}")
     return Row(name, a, b, unit, source, relative, absolute)

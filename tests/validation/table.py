@@ -35,7 +35,9 @@ is a test (`tests/test_validation.py`); `make validation` computes all of them a
 several numbers shows the one that comes nearest to its tolerance.
 """
 
-_COLUMNS = "| what | vpm | reference | unit | difference | allowed | source |\n| --- | --- | --- | --- | --- | --- | --- |\n"
+_COLUMNS = (
+    "| what | vpm | reference | unit | difference | allowed | source |\n| --- | --- | --- | --- | --- | --- | --- |\n"
+)
 
 
 def core_rows() -> list[Row]:
@@ -44,7 +46,9 @@ def core_rows() -> list[Row]:
     lines = subprocess.run(command, cwd=ROOT, check=True, capture_output=True, text=True).stdout.splitlines()
     entries = [json.loads(line) for line in lines]
     return [
-        row(e["name"], e["found"], e["expected"], e["unit"], e["source"], absolute=e["absolute"], relative=e["relative"])
+        row(
+            e["name"], e["found"], e["expected"], e["unit"], e["source"], absolute=e["absolute"], relative=e["relative"]
+        )
         for e in entries
     ]
 
