@@ -96,9 +96,9 @@ def statics() -> list[Row]:
         rows.append(row(f"load at the tip, {level}", tips, loads[:, 1:], "m, rad", source, absolute=tolerance))
     weights = np.array(cases["self_weight_cantilever_static"]["rows"])
     sags = [at_rest(cantilever("strain(10)", 1.0, strip(), gravity=weight)) for weight in weights[:, 0]]
-    tips = [(seen["tip.x"], seen["tip.z"]) for seen in sags]
+    places = [(seen["tip.x"], seen["tip.z"]) for seen in sags]
     source = "14 terms of curvature, converged"
-    rows.append(row("own weight, strain(10)", tips, weights[:, 1:], "m", source, absolute=1e-7))
+    rows.append(row("own weight, strain(10)", places, weights[:, 1:], "m", source, absolute=1e-7))
     return [*rows, *low_degrees(curves), shear(curves)]
 
 
@@ -133,9 +133,8 @@ def shear(wanted: dict[str, dict[str, object]]) -> Row:
     }
     force = 1e-3
     seen = at_rest(cantilever("bezier(4)", 0.44, first, deforms=("bending_y", "shear_x"), tip=1.0, gravity=force))
-    return against(
-        wanted["screw.cantilever.tip_force_1N"], [-seen["tip.z"] / force, (seen["tip.ry"] - 0.5 * np.pi) / force]
-    )
+    tip = np.array([-seen["tip.z"], seen["tip.ry"] - 0.5 * np.pi])
+    return against(wanted["screw.cantilever.tip_force_1N"], tip / force)
 
 
 def two_links() -> list[Row]:

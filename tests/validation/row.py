@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -50,10 +49,8 @@ class Row:
         count = f" ({self.found.size} values, the worst)" if self.found.size > 1 else ""
         tolerance = f"{self.relative:.0e} rel." if self.relative else f"{self.absolute:.0e}"
         difference = abs(found - expected) / (abs(expected) if self.relative else 1.0)
-        name = f"{self.name}{count}"
-        return (
-            f"| {name} | {found:.7g} | {expected:.7g} | {self.unit} | {difference:.1e} | {tolerance} | {self.source} |"
-        )
+        cells = [f"{self.name}{count}", f"{found:.7g}", f"{expected:.7g}", self.unit, f"{difference:.1e}", tolerance]
+        return "| " + " | ".join([*cells, self.source]) + " |"
 
 
 def row(
@@ -67,10 +64,7 @@ def row(
     absolute: float = 0.0,
 ) -> Row:
     """Make a row; the shapes have to agree."""
-    a, b = (
-        np.atleast_1d(np.asarray(found, dtype=float)).ravel(),
-        np.atleast_1d(np.asarray(expected, dtype=float)).ravel(),
-    )
+    a, b = (np.ravel(np.asarray(numbers, dtype=float)) for numbers in (found, expected))
     if a.shape != b.shape:
         raise ValueError(f"{name}: found {a.size} numbers, but the reference has {b.size}")
     return Row(name, a, b, unit, source, relative, absolute)
@@ -99,9 +93,3 @@ def against(entry: dict[str, Any], found: ArrayLike) -> Row:
         relative=tolerance.get("rel", 0.0),
         absolute=tolerance.get("abs", 0.0),
     )
-
-
-def flat(groups: list[list[Row]]) -> Iterator[Row]:
-    """All rows of some groups."""
-    for group in groups:
-        yield from group

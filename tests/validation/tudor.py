@@ -38,9 +38,8 @@ def static() -> list[Row]:
     outputs = at_rest(model, np.zeros(3))
     _, effort = model.equilibrium(np.zeros(3))
     elbow = at_rest(with_marker(model), np.zeros(3))["first_tip.z"]
-    along = np.array(
-        [[at_rest(model, [0.0, q, 0.0])[name] for name in GAUGES] for q in slow(np.linspace(0.0, 6.0, 61))]
-    )
+    swing = [at_rest(model, [0.0, q, 0.0]) for q in slow(np.linspace(0.0, 6.0, 61))]
+    along = np.array([[seen[name] for name in GAUGES] for seen in swing])
     high, low = along.max(axis=0), along.min(axis=0)
     rows = [
         against(wanted["tudor.EI"], bending),
