@@ -37,17 +37,23 @@ class Row:
 
     @property
     def error(self) -> float:
-        """Largest difference, as a share of what is allowed."""
+        """Largest difference, as a share of what is allowed; a count has to be met exactly."""
+        return float(self._shares().max())
+
+    def _shares(self) -> Array:
+        """Difference of each number, as a share of what is allowed."""
         allowed = self.absolute + self.relative * np.abs(self.expected)
-        return float(np.max(np.abs(self.found - self.expected) / allowed))
+        difference = np.abs(self.found - self.expected)
+        return np.where(difference == 0.0, 0.0, difference / np.maximum(allowed, np.finfo(float).tiny))
 
     def markdown(self) -> str:
         """Row of the table; of a long list the number that is worst."""
-        allowed = self.absolute + self.relative * np.abs(self.expected)
-        worst = int(np.argmax(np.abs(self.found - self.expected) / allowed))
+        worst = int(np.argmax(self._shares()))
         found, expected = self.found[worst], self.expected[worst]
         count = f" ({self.found.size} values, the worst)" if self.found.size > 1 else ""
-        tolerance = f"{self.relative:.0e} rel." if self.relative else f"{self.absolute:.0e}"
+        tolerance = (
+            f"{self.relative:.0e} rel." if self.relative else f"{self.absolute:.0e}" if self.absolute else "none"
+        )
         difference = abs(found - expected) / (abs(expected) if self.relative else 1.0)
         cells = [f"{self.name}{count}", f"{found:.7g}", f"{expected:.7g}", self.unit, f"{difference:.1e}", tolerance]
         return "| " + " | ".join([*cells, self.source]) + " |"
