@@ -8,7 +8,7 @@
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .SUFFIXES:
-.PHONY: help demo test test-rust test-python reference lint lint-rust lint-python bench peers bench-counts docs package clean
+.PHONY: help demo test test-rust test-python reference validation lint lint-rust lint-python bench peers bench-counts docs package clean
 
 PYTHON ?= python3
 DEMO_OUT ?= demo-report
@@ -54,6 +54,9 @@ lint-python: $(VENV)/.installed
 	$(BIN)/python -m mypy
 	$(BIN)/python -m mypy.stubtest --mypy-config-file pyproject.toml vpm._core
 	$(BIN)/lint-imports
+
+validation: $(VENV)/.installed ## compute the validation table anew, into docs/validation.md
+	cd tests && ../$(BIN)/python -m validation
 
 bench: | $(VENV)/.tools-found ## time the core: one result per line, with its spread
 	cargo bench --bench '*' $(CARGO_ARGS)

@@ -31,8 +31,8 @@ Run = Callable[[], tuple[Array, Array]]
 
 #: Curvature coefficients, stations and steps in 0.1 s of vpm's arm.
 OWN = ((2, 4, 50), (3, 4, 50), (3, 4, 100), (3, 4, 125), (4, 5, 50), (4, 5, 60), (4, 5, 100))
-#: Elements per link and step (s).
-EXUDYN = ((2, 2e-3), (2, 1e-3), (4, 2e-3), (4, 1e-3))
+#: Elements per link, step (s), and whether each step renews the Jacobian.
+EXUDYN = ((2, 2e-3, False), (2, 1e-3, False), (2, 1e-3, True), (4, 2e-3, False), (4, 1e-3, False), (4, 1e-3, True))
 #: Steps (s).
 MUJOCO = (1e-3, 5e-4)
 #: What the arm has to reach with 24 s in 45 ms.
@@ -92,13 +92,16 @@ def rows(repeats: int, quick: bool) -> Iterator[Row]:
         if find_spec("exudyn"):
             from exudyn_arm import ExudynArm, fastest_solver
 
-            for elements, step in EXUDYN[:1] if quick else EXUDYN:
-                solver = fastest_solver(elements, step)
+            for elements, step, renew in EXUDYN[:1] if quick else EXUDYN:
+                solver = fastest_solver(elements, step, renew)
 
-                def prepare(arguments: tuple[str, int, float, str] = (motion, elements, step, solver)) -> Run:
-                    return ExudynArm(*arguments).run
+                def prepare(
+                    arguments: tuple[str, int, float, str] = (motion, elements, step, solver), renew: bool = renew
+                ) -> Run:
+                    return ExudynArm(*arguments, renew=renew).run
 
-                yield measure("Exudyn", f"{elements} elements, {1e3 * step:g} ms, {solver}", motion, prepare, repeats)
+                setting = f"{elements} elements, {1e3 * step:g} ms{', new Jacobian' if renew else ''}, {solver}"
+                yield measure("Exudyn", setting, motion, prepare, repeats)
         if find_spec("mujoco"):
             from mujoco_arm import SEGMENTS, MujocoArm
 

@@ -15,7 +15,9 @@ sizes = st.floats(1e-3, 0.1)
 def trees(draw: st.DrawFn) -> dict[str, Any]:
     """Content of a model file: a tree of bodies on joints of any type and of beams, in any order."""
     count = draw(st.integers(1, 6))
-    bodies, joints, beams = {}, {}, {}
+    bodies: dict[str, Any] = {}
+    joints: dict[str, Any] = {}
+    beams: dict[str, Any] = {}
     standing: list[str] = ["world"]
     for k in range(count):
         parent = draw(st.sampled_from(standing))
@@ -30,7 +32,7 @@ def trees(draw: st.DrawFn) -> dict[str, Any]:
         else:
             name = f"body{k}"
             bodies[name] = {"mass": draw(sizes), "inertia": [0.1, 0.1, 0.1, 0.0, 0.0, 0.0]}
-            joints[f"joint{k}"] = where | {"child": name} | draw(joint_tables())
+            joints[f"joint{k}"] = where | {"child": name} | draw(joint_tables(fixed=k > 0))
         standing.append(name)
     content: dict[str, Any] = {"name": "tree", "gravity": [0.0, 0.0, -9.81]}
     for key, table in (("bodies", bodies), ("joints", joints), ("beams", beams)):
@@ -40,8 +42,10 @@ def trees(draw: st.DrawFn) -> dict[str, Any]:
 
 
 @st.composite
-def joint_tables(draw: st.DrawFn) -> dict[str, Any]:
-    kind = draw(st.sampled_from(["prismatic", "revolute", "helical", "cylindrical", "planar", "spherical", "fixed"]))
+def joint_tables(draw: st.DrawFn, *, fixed: bool) -> dict[str, Any]:
+    """A joint of any type; of one that moves, unless `fixed` ones are allowed."""
+    moving = ["prismatic", "revolute", "helical", "cylindrical", "planar", "spherical"]
+    kind = draw(st.sampled_from([*moving, "fixed"] if fixed else moving))
     table: dict[str, Any] = {"type": kind}
     if kind not in {"spherical", "fixed"}:
         axis = np.array(draw(st.tuples(*[st.floats(-1.0, 1.0)] * 3).filter(lambda a: math.hypot(*a) > 0.1)))

@@ -32,7 +32,7 @@ def described(model: Model) -> Any:
 def transform(axis: str, angle: float, shift: tuple[float, float, float]) -> Matrix:
     """Homogeneous transform: a turn about x or z, and a shift."""
     c, s = math.cos(angle), math.sin(angle)
-    turn = [[1, 0, 0], [0, c, -s], [0, s, c]] if axis == "x" else [[c, -s, 0], [s, c, 0], [0, 0, 1]]
+    turn: list[list[float]] = [[1, 0, 0], [0, c, -s], [0, s, c]] if axis == "x" else [[c, -s, 0], [s, c, 0], [0, 0, 1]]
     matrix = np.eye(4)
     matrix[:3, :3], matrix[:3, 3] = turn, shift
     return matrix
@@ -247,7 +247,7 @@ def test_a_joint_of_several_coordinates_is_driven_by_one_of_them() -> None:
     with pytest.raises(
         ModelError, match='is "bolts", a fixed joint, which has no coordinates; name a joint that moves'
     ):
-        Model.from_dict({**GANTRY, "actuators": {"motor": {"joint": "bolts", "gain": 1.0}}})
+        Model.from_dict({**GANTRY, "actuators": {"drive": {"joint": "bolts", "gain": 1.0}}})
 
 
 def test_something_has_to_move() -> None:

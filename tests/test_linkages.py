@@ -1,4 +1,4 @@
-"""Closed linkages from Python: every published and recomputed value, files, errors, examples."""
+"""Closed linkages from Python: files, errors, examples; their published values are in the validation table."""
 
 import runpy
 from dataclasses import replace
@@ -6,10 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import ArrayLike
 from typer.testing import CliRunner
 
-from published import check_all
+from validation.linkages import disagreement
 from vpm import linkages
 from vpm.cli import app
 from vpm.errors import ModelError
@@ -18,8 +17,6 @@ from vpm.linkages import Karl, KarlGeometry, KarlPoses, Leg, LegParameters, Shar
 ROOT = Path(__file__).resolve().parent.parent
 KARL_FILE = ROOT / "examples" / "karl" / "karl.toml"
 LEG_FILE = ROOT / "examples" / "hyq_leg" / "leg.toml"
-
-Found = dict[str, ArrayLike]
 
 
 def load_karl() -> Karl:
@@ -32,79 +29,6 @@ def load_leg() -> Leg:
     leg = linkages.load(LEG_FILE)
     assert isinstance(leg, Leg)
     return leg
-
-
-def distinct(rows: np.ndarray) -> int:
-    return len(np.unique(np.round(rows, 6), axis=0))
-
-
-def test_every_value_of_karl_is_met_by_the_file() -> None:
-    karl = load_karl()
-    singular = karl.singularities()
-    poses = karl.direct((0.20, 0.18))
-    target = karl.end_point(np.radians([20.0, 90.0]))
-    ways = karl.inverse(target)
-    found: Found = {
-        "karl.alpha_deg": np.degrees(karl.geometry.stroke_direction),
-        "karl.L1": karl.geometry.medial,
-        "karl.count.direct": distinct(np.hstack([poses.angles, poses.strokes])),
-        "karl.count.inverse": distinct(np.hstack([ways.angles, ways.strokes])),
-        "karl.sylvester_degree": np.flatnonzero(np.abs(karl.resultant(0, 0.2)) > 1e-15).max(),
-        "karl.inverse.target": target,
-        "karl.inverse.solutions": np.hstack([np.degrees(ways.angles), ways.strokes]),
-        "karl.q1_span_between_singularities_deg": np.degrees(karl.span(0)),
-    }
-    arrangements = [
-        ("karl.singular_delta1.outer", 0, "extended"),
-        ("karl.singular_delta1.inner", 0, "folded"),
-        ("karl.singular_delta2.extended", 1, "extended"),
-        ("karl.singular_delta2.folded", 1, "folded"),
-    ]
-    for name, actuator, arrangement in arrangements:
-        strokes = singular.of(actuator, arrangement=arrangement)
-        found |= {name: strokes, f"{name}.published": strokes}
-    for strokes_mm in ((200, 180), (210, 160), (190, 220)):
-        name = f"d1_{strokes_mm[0]}_d2_{strokes_mm[1]}"
-        poses = karl.direct(np.array(strokes_mm) / 1000.0)
-        for joint in (0, 1):
-            degrees = np.degrees(poses.angles[:, joint])
-            found[f"karl.direct.{name}.q{joint + 1}_deg"] = np.unique(degrees.round(9))
-        built = (np.abs(poses.angles[:, 0]) < np.pi / 2) & (poses.angles[:, 1] > 0.0)
-        found[f"karl.lambda.{name}"] = poses.transmission[built]
-    check_all("karl.json", found)
-
-
-def test_every_value_of_the_leg_is_met_by_the_file() -> None:
-    leg = load_leg()
-    found: Found = {}
-    for name, degrees in {"q-40_-140": (-40, -140), "q20_-80": (20, -80), "q60_-20": (60, -20)}.items():
-        found[f"hyq.stroke.{name}"] = leg.strokes(np.radians(degrees))
-        found[f"hyq.lever.{name}"] = leg.levers(np.radians(degrees))
-    hip, knee = leg.stroke_table().range
-    found |= {"hyq.stroke_range.hip": hip, "hyq.stroke_range.knee": knee}
-    q, v, a = np.radians([20.0, -80.0]), [2.0, -3.0], [4.0, -5.0]
-    terms, torques = leg.terms(q, v), leg.torques(q, v, a)
-    found |= {"hyq.M": terms.mass_matrix, "hyq.V": terms.velocity, "hyq.G": terms.gravity, "hyq.tau": torques}
-    found["hyq.cylinder_force"] = leg.cylinder_forces(q, torques)
-    found["hyq.ground_reaction"] = leg.reactions(q, v, a).ground
-    found["hyq.three_way_agreement"] = disagreement(leg)
-    for shank in (0.341, 0.375):
-        for short, duty in {"LD": "low", "MD": "medium", "HD": "high"}.items():
-            shares = 100.0 * Leg.hyq("table", shank=shank).shares(duty).mean
-            found[f"hyq.index.LLL{1000 * shank:.0f}.{short}"] = shares
-            found[f"hyq.index.published.{short}"] = shares
-    check_all("hyq.json", found)
-
-
-def disagreement(leg: Leg) -> float:
-    """Largest difference of three derivations in 400 states, relative to the torque."""
-    random = np.random.default_rng(1)
-    q = np.radians(random.uniform((-40.0, -140.0), (60.0, -20.0), (400, 2)))
-    v, a = random.uniform(-10.0, 10.0, (400, 2)), random.uniform(-5.0, 5.0, (400, 2))
-    work = leg.torques(q, v, a)
-    others = [leg.torques(q, v, a, "lagrange"), leg.torques(q, v, a, "newton_euler")]
-    scale = np.abs(work).max(axis=1, keepdims=True)
-    return float(max(np.abs((work - other) / scale).max() for other in others))
 
 
 @pytest.mark.parametrize("data", ["table", "identified", "plausible"])

@@ -229,8 +229,8 @@ class PlanarArm:
     gravity : (float, float)
         In m/s^2.
     coefficients : {2, 3, 4}
-        Curvature coefficients per link. Three resolve two bending modes of a link, four follow a light and fast arm to
-        1e-5 m; see ``docs/performance.md``.
+        Curvature coefficients per link. On a light, fast arm two follow the tip, three also the strains to some 1e-3,
+        four to some 1e-4 of their size; see ``docs/performance.md``.
     points : int
         Gauss stations over each link, 2 to 40; coefficients + 1 is enough.
 

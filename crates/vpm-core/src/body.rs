@@ -23,6 +23,17 @@ pub struct Body<P> {
     pub joint: Joint,
     /// What makes it heavy; without it the body is a massless carrier of the next joint.
     pub inertia: Option<Inertia<P>>,
+    /// Inertia of the drive's rotor as the joint feels it, ratio squared times its own, in kg m^2 (kg on a sliding joint).
+    ///
+    /// It resists the joint's acceleration and nothing else, which leaves out what the turning rotor does to the body that carries it:
+    /// right for ratios well above 1 (Spong 1987, "Modeling and control of elastic joint robots", assumption A2).
+    #[serde(default = "none")]
+    pub rotor_inertia: Option<P>,
+}
+
+/// A missing rotor (the derive would ask for `P: Default`).
+fn none<T>() -> Option<T> {
+    None
 }
 
 /// A rigid body without a joint of its own: a motor, a hub, a load.
@@ -90,7 +101,8 @@ impl<P> Body<P> {
     /// The same body over another parameter type.
     pub fn map<T>(&self, f: &mut impl FnMut(&P) -> T) -> Body<T> {
         let inertia = self.inertia.as_ref().map(|inertia| inertia.map(f));
-        Body { name: self.name.clone(), on: self.on, joint: self.joint.clone(), inertia }
+        let rotor_inertia = self.rotor_inertia.as_ref().map(f);
+        Body { name: self.name.clone(), on: self.on, joint: self.joint.clone(), inertia, rotor_inertia }
     }
 }
 
@@ -136,6 +148,19 @@ impl<S: Scalar> Body<S> {
     /// Its spatial inertia in its own frame: that of a real body, or none for a massless carrier.
     pub fn spatial_inertia(&self) -> Result<SpatialInertia<S>> {
         self.inertia.map_or(Ok(SpatialInertia::zero()), |inertia| inertia.checked(&self.name))
+    }
+
+    /// The inertia of the rotor of its joint, zero without one. Checked: finite and not negative.
+    pub fn rotor(&self) -> Result<S> {
+        let rotor = self.rotor_inertia.unwrap_or(S::zero());
+        let path = || format!("{}.rotor_inertia", self.joint.name);
+        if !rotor.is_finite() {
+            return Err(Error::NonFinite { path: path(), value: rotor.re() });
+        }
+        if rotor.re() < 0.0 {
+            return Err(Error::Domain { path: path(), condition: "be zero or positive", value: rotor.re() });
+        }
+        Ok(rotor)
     }
 }
 

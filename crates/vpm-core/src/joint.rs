@@ -72,7 +72,7 @@ impl JointKind {
         match self {
             Self::Prismatic => Twist::new(Vector3::zero(), turn(v.angular)),
             Self::Revolute => Twist::new(turn(v.angular), turn(v.linear)),
-            Self::Helical { pitch } => Twist::new(turn(v.angular), turn(v.linear + v.angular * S::from_f64(pitch))),
+            Self::Helical { pitch } => screw_cross(v, rate, pitch),
         }
     }
 
@@ -83,6 +83,13 @@ impl JointKind {
         self.add_rate(&mut unit, S::one());
         unit
     }
+}
+
+/// `V x (S rate)` of a screw along z; out of the way of the other two kinds, which are in almost every machine.
+#[cold]
+fn screw_cross<S: Scalar>(v: &Twist<S>, rate: S, pitch: f64) -> Twist<S> {
+    let turn = |w: Vector3<S>| Vector3::new(w.y * rate, -(w.x * rate), S::zero());
+    Twist::new(turn(v.angular), turn(v.linear + v.angular * S::from_f64(pitch)))
 }
 
 impl Joint {

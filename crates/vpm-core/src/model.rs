@@ -57,6 +57,8 @@ pub(crate) struct Link<S> {
     rotation: Matrix3<f64>,
     translation: Vector3<f64>,
     pub(crate) inertia: SpatialInertia<S>,
+    /// Inertia of the rotor, which feels the joint's acceleration alone.
+    pub(crate) rotor: S,
 }
 
 /// What a user sees of one body: its own frame, as described.
@@ -234,7 +236,12 @@ impl<S: Scalar> Wire<S> {
 
 impl<S: Scalar> Link<S> {
     /// A body with its joint, on a frame with that alignment of its own.
-    fn new(joint: &Joint, parent: usize, parent_alignment: Matrix3<f64>, inertia: SpatialInertia<S>) -> Self {
+    fn new(
+        (joint, rotor): (&Joint, S),
+        parent: usize,
+        parent_alignment: Matrix3<f64>,
+        inertia: SpatialInertia<S>,
+    ) -> Self {
         let alignment = joint.alignment();
         let frame: Pose<f64> = joint.frame();
         let to_aligned = Pose::new(lift(alignment).transpose(), Vector3::zero());
@@ -244,6 +251,7 @@ impl<S: Scalar> Link<S> {
             rotation: parent_alignment.transpose() * frame.rotation * alignment,
             translation: parent_alignment.transpose_mul(frame.translation),
             inertia: to_aligned.inertia(inertia),
+            rotor,
         }
     }
 
@@ -255,8 +263,15 @@ impl<S: Scalar> Link<S> {
         match self.kind {
             JointKind::Prismatic => Pose::new(lift(self.rotation), translation + scaled(z, q)),
             JointKind::Revolute => Pose::new(self.turned(q), translation),
-            JointKind::Helical { pitch } => Pose::new(self.turned(q), translation + scaled(z, q * pitch)),
+            JointKind::Helical { pitch } => self.screwed(q, pitch),
         }
+    }
+
+    /// The pose of a screw; out of the way of the other two kinds, which are in almost every machine.
+    #[cold]
+    fn screwed(&self, q: S, pitch: f64) -> Pose<S> {
+        let along = scaled(self.rotation.columns[2], q * pitch);
+        Pose::new(self.turned(q), Vector3::from_f64(self.translation.to_array()) + along)
     }
 
     #[inline]

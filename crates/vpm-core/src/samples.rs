@@ -113,7 +113,7 @@ fn joint(name: &str, kind: JointKind, axis: [f64; 3], translation: [f64; 3]) -> 
 
 fn body(name: &str, parent: Option<usize>, joint: Joint, mass: f64) -> Body<f64> {
     let inertia = Some(Inertia { mass, ..Inertia::default() });
-    Body { name: name.to_owned(), on: parent.map_or(Mount::World, Mount::Body), joint, inertia }
+    Body { name: name.to_owned(), on: parent.map_or(Mount::World, Mount::Body), joint, inertia, rotor_inertia: None }
 }
 
 fn bob(name: &str, pivot: &str, parent: Option<usize>, at: [f64; 3], mass: f64, length: f64) -> Body<f64> {

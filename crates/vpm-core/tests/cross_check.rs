@@ -20,7 +20,11 @@ impl Case {
     fn new(seed: u64, n: usize) -> Self {
         let mut random = Random::new(!seed);
         let (q, v, tau) = (random.numbers(n, 3.0), random.numbers(n, 2.0), random.numbers(n, 20.0));
-        Self { tree: random_tree(seed, n), q, v, tau }
+        let mut tree = random_tree(seed, n);
+        for body in tree.bodies.iter_mut().step_by(2) {
+            body.rotor_inertia = Some(random.unit());
+        }
+        Self { tree, q, v, tau }
     }
 
     fn forward(&self) -> Result<Vec<f64>> {

@@ -16,6 +16,7 @@ use vpm_core::simulate::{Run, Setting, Stepping, free_run, prescribed};
 use vpm_core::table::Table;
 use vpm_core::{Dual, Error, Result};
 
+#[cfg(test)]
 #[path = "common/flexible.rs"]
 mod trees;
 use trees::{UPRIGHT, beam, body, description, everything, parameter, push, section};

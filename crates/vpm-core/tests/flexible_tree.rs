@@ -10,6 +10,7 @@ use vpm_core::samples::{Random, random_tree};
 use vpm_core::spatial::{Matrix3, Pose, SpatialInertia, Twist, Vector3};
 use vpm_core::{Dual, Result, Scalar};
 
+#[cfg(test)]
 #[path = "common/flexible.rs"]
 mod trees;
 use trees::{everything, lift, model};
@@ -57,7 +58,7 @@ impl<'a, S: Scalar> Places<'a, S> {
             }
             Mount::Section { beam, at } => {
                 let share = [0.1, 0.25, 0.4, 0.5, 0.6, 0.7, 1.0];
-                let mark = share.iter().position(|share| share * self.parts.beams[beam].length == at).unwrap();
+                let mark = share.iter().position(|share| share * self.parts.beams[beam].length == at).unwrap_or(0);
                 self.stations(beam)[self.beams[beam].0.mark(mark)]
             }
         }

@@ -37,10 +37,12 @@ const ALONE: [(&str, &[&str]); 10] = [
     ("controller", &["error", "scalar", "effect::Domain", "actuator::Saturation"]),
 ];
 /// What puts the parts together, lowest first: each may import any part, any tree module and any before it.
-const WHOLE: [&str; 11] = [
+const WHOLE: [&str; 13] = [
     "sensitivity",
     "system",
     "description",
+    "statics",
+    "motion",
     "simulate",
     "inverse",
     "evaluate",

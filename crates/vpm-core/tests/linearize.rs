@@ -10,6 +10,7 @@ use vpm_core::linearize::{Linearization, linearize};
 use vpm_core::ode::Ode;
 use vpm_core::samples::{arm7, double_pendulum, pendulum};
 
+#[cfg(test)]
 fn at(description: &Description, state: &[f64], inputs: &[f64]) -> Linearization {
     linearize(description, &description.parameters, state, inputs).unwrap()
 }

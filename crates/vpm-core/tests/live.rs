@@ -26,6 +26,7 @@ fn machine() -> Machine {
 
 const START: [f64; 5] = [0.4, -0.3, 0.5, 0.2, 0.7];
 
+#[cfg(test)]
 fn live(machine: &Machine, method: Method) -> Live {
     let description = machine.build();
     let theta = description.parameters.clone();

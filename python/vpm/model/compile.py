@@ -75,6 +75,7 @@ def _body(axis: Axis, index: Mapping[str, int]) -> dict[str, Any]:
         "on": _mount(axis.frame.mount),
         "joint": {"name": axis.name, "kind": kind, "axis": list(coordinate.direction), **_pose(axis.frame.pose)},
         "inertia": None if axis.body is None else _inertia(axis.body, index),
+        "rotor_inertia": index.get(f"{axis.name}.rotor_inertia"),
     }
 
 

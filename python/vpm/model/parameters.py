@@ -1,7 +1,7 @@
 """The parameters of a model: one flat, ordered table with SI values, read from the document and checked.
 
-Order: bodies (mass, centre of mass, inertia), beams, lines, actuators (gain), controllers, then effects as they stand
-in the file.
+Order: bodies (mass, centre of mass, inertia), rotors, beams, lines, actuators (gain), controllers, then
+effects as they stand in the file.
 """
 
 from __future__ import annotations
@@ -174,6 +174,9 @@ def slots(document: Document, structure: Structure) -> Iterator[Slot]:
     """Every parameter of a document whose references are right and whose effects are complete, in index order."""
     for name in structure.bodies:
         yield from _body_slots(name, document)
+    for name, joint in document.joints.items():
+        if joint.rotor_inertia is not None:
+            yield _rotor_slot(name, joint.rotor_inertia, structure)
     for name in structure.beams:
         yield from _beam_slots(name, document.beams[name])
     for name, line in document.lines.items():
@@ -195,6 +198,13 @@ def _body_slots(name: str, document: Document) -> Iterator[Slot]:
     for i, (axes, quantity) in enumerate(zip(INERTIA_AXES, body.inertia, strict=True)):
         bounds = _NOT_NEGATIVE if i < 3 else _ANY
         yield Slot(f"{name}.inertia.{axes}", (*keys, "inertia", i), quantity, "kg m^2", bounds, "linear")
+
+
+def _rotor_slot(name: str, rotor: Quantity, structure: Structure) -> Slot:
+    """Inertia that a drive's rotor adds to its joint, ratio squared times its own."""
+    unit = "kg" if structure.joint_kind(name) == "prismatic" else "kg m^2"
+    keys = ("joints", name, "rotor_inertia")
+    return Slot(f"{name}.rotor_inertia", keys, rotor, unit, _NOT_NEGATIVE, "linear")
 
 
 def _beam_slots(name: str, beam: Beam) -> Iterator[Slot]:

@@ -45,6 +45,7 @@ class Joint(Entry):
     at: Number | None = None
     axis: Vector | None = None
     pitch: Number | None = None
+    rotor_inertia: ParameterValue | None = None
     translation: Vector = ORIGIN
     rotation: Vector = ORIGIN
     dh: DenavitHartenberg | None = None

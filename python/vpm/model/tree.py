@@ -130,6 +130,7 @@ def joint_problems(document: Document) -> Iterator[Problem]:
         yield from _place_problems(name, joint)
         yield from _axis_problems(name, joint)
         yield from _pitch_problems(name, joint)
+        yield from _rotor_problems(name, joint)
 
 
 def _place_problems(name: str, joint: Joint) -> Iterator[Problem]:
@@ -165,3 +166,9 @@ def _pitch_problems(name: str, joint: Joint) -> Iterator[Problem]:
         yield Problem(where, "is missing; add the travel in m per rad, for example pitch = 0.0008 for 5 mm per turn")
     elif joint.pitch == 0.0:
         yield Problem(where, 'is 0, but a helical joint travels as it turns; give m per rad, or take type = "revolute"')
+
+
+def _rotor_problems(name: str, joint: Joint) -> Iterator[Problem]:
+    if joint.rotor_inertia is not None and joint.type not in {"prismatic", "revolute", "helical"}:
+        rest = f"is given, but a {joint.type} joint has no single coordinate that a rotor could turn with; remove it"
+        yield Problem(place("joints", name, "rotor_inertia"), rest)

@@ -34,7 +34,7 @@ pub(super) fn singular_joint<S: Scalar>(
     // Outermost first: a singular joint spoils the inertias that the joints before it feel.
     let slots = model.links().iter().zip(data.aba.iter().skip(1)).enumerate().rev();
     slots.into_iter().find_map(|(number, (link, slot))| {
-        let inertia = link.kind.effort(&slot.unit_wrench).re();
+        let inertia = (link.kind.effort(&slot.unit_wrench) + link.rotor).re();
         let size = |block: Symmetric3<S>| (block.xx + block.yy + block.zz).re();
         let scale = match link.kind {
             JointKind::Prismatic => size(slot.inertia.linear),
@@ -66,7 +66,7 @@ fn inertias<S: Scalar>(model: &Model<S>, data: &mut Data<S>, tau: &[S]) {
         let (before, rest) = slots.split_at_mut(k + 1);
         let slot = &mut rest[0];
         slot.unit_wrench = unit_wrench(link.kind, &slot.inertia);
-        slot.inverse = link.kind.effort(&slot.unit_wrench).recip();
+        slot.inverse = (link.kind.effort(&slot.unit_wrench) + link.rotor).recip();
         slot.effort = tau - link.kind.effort(&slot.bias_wrench);
         if link.parent != 0 {
             // What the parent feels when this joint is free: I^a = I^A - U U^T / D, p^a = p^A + I^a c + U u / D.
@@ -98,8 +98,14 @@ fn unit_wrench<S: Scalar>(kind: JointKind, inertia: &ArticulatedInertia<S>) -> W
     match kind {
         JointKind::Prismatic => sliding(inertia),
         JointKind::Revolute => turning(inertia),
-        JointKind::Helical { pitch } => turning(inertia) + sliding(inertia) * S::from_f64(pitch),
+        JointKind::Helical { pitch } => screwing(inertia, pitch),
     }
+}
+
+/// Out of the way of the other two, which are in almost every machine.
+#[cold]
+fn screwing<S: Scalar>(inertia: &ArticulatedInertia<S>, pitch: f64) -> Wrench<S> {
+    turning(inertia) + sliding(inertia) * S::from_f64(pitch)
 }
 
 #[inline]

@@ -39,7 +39,7 @@ fn columns<S: Scalar>(model: &Model<S>, data: &mut Data<S>) {
     let matrix = &mut data.mass_matrix;
     for (j, link) in links.iter().enumerate() {
         let mut wrench = unit_wrench(link.kind, &slots[j + 1].composite);
-        matrix[j * n + j] = link.kind.effort(&wrench);
+        matrix[j * n + j] = link.kind.effort(&wrench) + link.rotor;
         let mut slot = j + 1;
         while links[slot - 1].parent != 0 {
             wrench = slots[slot].pose.wrench(wrench);

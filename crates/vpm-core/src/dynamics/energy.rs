@@ -21,7 +21,7 @@ pub struct Energy<S> {
 pub fn energy<S: Scalar>(model: &Model<S>, data: &mut Data<S>, q: &[S], v: &[S]) -> Energy<S> {
     kinematics(model, data, q, v);
     let gravity = Vector3::from_f64(model.gravity());
-    let mut total = Energy { kinetic: S::zero(), potential: S::zero() };
+    let mut total = Energy { kinetic: of_rotors(model, v), potential: S::zero() };
     for (frame, slot) in model.frames().iter().zip(data.kinematics.iter().skip(1)) {
         let body = frame.inertia;
         let first_moment_in_world = slot.pose.rotation * body.first_moment + slot.pose.translation * body.mass;
@@ -29,4 +29,9 @@ pub fn energy<S: Scalar>(model: &Model<S>, data: &mut Data<S>, q: &[S], v: &[S])
         total.potential -= gravity.dot(first_moment_in_world);
     }
     total
+}
+
+/// Kinetic energy of the drives' rotors, whose speed is the joint's.
+pub(super) fn of_rotors<S: Scalar>(model: &Model<S>, v: &[S]) -> S {
+    model.links().iter().zip(v).map(|(link, &v)| link.rotor * v * v * 0.5).sum()
 }

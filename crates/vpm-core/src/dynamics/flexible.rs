@@ -5,7 +5,7 @@
 //! wrench and the coupling wrenches of one composite body (Featherstone 2008, section 6.2, for rigid bodies; Shabana 2013, "Dynamics of
 //! Multibody Systems", section 5.5, for the inertia coupling of a deformable body).
 
-use super::energy::Energy;
+use super::energy::{Energy, of_rotors};
 use super::frames::{frames, lines, poses};
 use crate::data::{Composite, Data, FrameSlot, LineSlot};
 use crate::model::{Elastic, Link, Model, Node, Wire};
@@ -47,7 +47,7 @@ fn body<S: Scalar>(link: &Link<S>, number: usize, beyond: &[usize], data: &mut C
     let FrameSlot { across, inertia, wrench, .. } = frames[number + 1];
     let own = inertia.apply(link.kind.unit());
     bias[number] = link.kind.effort(&wrench);
-    mass[number * n + number] = link.kind.effort(&own);
+    mass[number * n + number] = link.kind.effort(&own) + link.rotor;
     for &other in beyond {
         *entry(mass, n, number, other) = link.kind.effort(&columns[other]);
     }
@@ -184,7 +184,7 @@ pub fn energy<S: Scalar>(model: &Model<S>, data: &mut Data<S>, q: &[S], v: &[S])
     poses(model, data);
     lines(model, data);
     let gravity = Vector3::from_f64(model.gravity());
-    let mut total = Energy { kinetic: S::zero(), potential: S::zero() };
+    let mut total = Energy { kinetic: of_rotors(model, v), potential: S::zero() };
     for FrameSlot { pose, velocity, inertia, .. } in data.composite.frames.iter().skip(1) {
         total.kinetic += inertia.kinetic_energy(*velocity);
         total.potential -= gravity.dot(pose.rotation * inertia.first_moment + pose.translation * inertia.mass);

@@ -13,7 +13,7 @@ use crate::spatial::{Twist, Vector3};
 pub fn rnea<'d, S: Scalar>(model: &Model<S>, data: &'d mut Data<S>, q: &[S], v: &[S], a: &[S]) -> &'d [S] {
     debug_assert!(q.len() == model.n_joints() && v.len() == model.n_joints() && a.len() == model.n_joints());
     outward(model, data, q, v, a);
-    inward(model, data);
+    inward(model, data, a);
     &data.effort
 }
 
@@ -34,12 +34,12 @@ fn outward<S: Scalar>(model: &Model<S>, data: &mut Data<S>, q: &[S], v: &[S], a:
     }
 }
 
-fn inward<S: Scalar>(model: &Model<S>, data: &mut Data<S>) {
+fn inward<S: Scalar>(model: &Model<S>, data: &mut Data<S>, a: &[S]) {
     let slots = &mut data.rnea;
-    for (k, (link, effort)) in model.links().iter().zip(&mut data.effort).enumerate().rev() {
+    for (k, ((link, effort), &a)) in model.links().iter().zip(&mut data.effort).zip(a).enumerate().rev() {
         let (before, rest) = slots.split_at_mut(k + 1);
         let slot = &rest[0];
-        *effort = link.kind.effort(&slot.wrench);
+        *effort = link.kind.effort(&slot.wrench) + link.rotor * a;
         if link.parent != 0 {
             before[link.parent].wrench += slot.pose.wrench(slot.wrench);
         }

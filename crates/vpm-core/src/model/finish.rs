@@ -17,7 +17,7 @@ impl<S: Scalar> Assembly<'_, S> {
         let n_coordinates = n_joints + self.beams.iter().map(|elastic| elastic.beam.len()).sum::<usize>();
         let (mut links, mut frames) = (Vec::new(), Vec::new());
         for number in 0..n_joints {
-            let (link, frame) = self.link(number);
+            let (link, frame) = self.link(number)?;
             links.push(link);
             frames.push(frame);
         }
@@ -51,12 +51,12 @@ impl<S: Scalar> Assembly<'_, S> {
         })
     }
 
-    fn link(&self, number: usize) -> (Link<S>, BodyFrame<S>) {
+    fn link(&self, number: usize) -> Result<(Link<S>, BodyFrame<S>)> {
         let (body, joint) = (&self.parts.bodies[number], &self.joints[number]);
         let (on, inertia) = (self.resolved(body.on), self.inertias[number + 1]);
         let joint = on_frame(joint, on);
-        let link = Link::new(&joint, on.frame, self.alignment(on.frame).rotation, inertia);
-        (link, BodyFrame { name: body.name.clone(), parent: on.frame, joint, inertia })
+        let link = Link::new((&joint, body.rotor()?), on.frame, self.alignment(on.frame).rotation, inertia);
+        Ok((link, BodyFrame { name: body.name.clone(), parent: on.frame, joint, inertia }))
     }
 
     fn wire(&self, line: &Line<S>) -> Result<Wire<S>> {

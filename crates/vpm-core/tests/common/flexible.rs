@@ -64,7 +64,7 @@ pub fn inertia(random: &mut Random) -> Inertia<f64> {
 /// A body on a random joint.
 pub fn body(random: &mut Random, name: &str, on: Mount, kind: JointKind) -> Body<f64> {
     let joint = joint(random, &format!("{name}.joint"), kind);
-    Body { name: name.to_owned(), on, joint, inertia: Some(inertia(random)) }
+    Body { name: name.to_owned(), on, joint, inertia: Some(inertia(random)), rotor_inertia: None }
 }
 
 /// A soft beam in a random place: it bends visibly at coordinates of the order of one tenth.
@@ -110,7 +110,7 @@ pub fn everything(seed: u64) -> Parts<f64> {
         let (translation, rotation) = (random.vector(0.1), turn(random));
         parts.welds.push(Weld { name: name.to_owned(), on, translation, rotation, inertia: inertia(random) });
     }
-    for on in [Site::Tip(1), Site::Tip(2), Site::Body(0)] {
+    for on in [Site::Tip(1), Site::Tip(2), Site::Body(0), Site::Weld(1)] {
         parts.point_masses.push(PointMass { on, mass: 0.2 + random.unit(), position: random.vector(0.1) });
     }
     let part = |mass| Some(LinePart { mass, center: 0.1, inertia: 0.01 * mass });

@@ -11,6 +11,7 @@ use super::System;
 use crate::arrays::{Numbers, cube, matrix, place, places};
 use crate::interrupt::unbroken;
 
+type Row<'py> = Bound<'py, PyArray1<f64>>;
 type Table<'py> = Bound<'py, PyArray2<f64>>;
 type Cube<'py> = Bound<'py, PyArray3<f64>>;
 type Any<'py> = Bound<'py, PyAny>;
@@ -63,7 +64,7 @@ impl System {
         position: &Any<'py>,
         velocity: &Any<'py>,
         effort: &Any<'py>,
-    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    ) -> PyResult<Row<'py>> {
         let theta = Numbers::vector("theta", theta)?;
         let (q, v) = (Numbers::vector("position", position)?, Numbers::vector("velocity", velocity)?);
         let effort = Numbers::vector("effort", effort)?;
@@ -116,7 +117,7 @@ impl System {
         py: Python<'py>,
         theta: &Any<'py>,
         position: &Any<'py>,
-    ) -> PyResult<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>)> {
+    ) -> PyResult<(Row<'py>, Row<'py>)> {
         let (theta, q) = (Numbers::vector("theta", theta)?, Numbers::vector("position", position)?);
         let result = self.compute(py, |_| evaluate::equilibrium(self.description(), theta.values(), q.values()))?;
         let (coordinates, efforts) = result;
@@ -124,12 +125,7 @@ impl System {
     }
 
     /// Natural frequencies (k,) in Hz about rest with the joints locked, slowest first; negative for growth instead of vibration.
-    fn natural_frequencies<'py>(
-        &self,
-        py: Python<'py>,
-        theta: &Any<'py>,
-        position: &Any<'py>,
-    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    fn natural_frequencies<'py>(&self, py: Python<'py>, theta: &Any<'py>, position: &Any<'py>) -> PyResult<Row<'py>> {
         let (theta, q) = (Numbers::vector("theta", theta)?, Numbers::vector("position", position)?);
         let result =
             self.compute(py, |_| evaluate::natural_frequencies(self.description(), theta.values(), q.values()))?;

@@ -1,0 +1,4 @@
+"""What the package computes beside numbers that it did not make: closed forms, published values, other codes.
+
+`make validation` writes the table of `docs/validation.md`; `tests/test_validation.py` holds every row of it.
+"""
