@@ -82,11 +82,20 @@ def machine(places: Mapping[str, float] | None = None, *, play: bool = True) -> 
     return Model.from_dict(content)
 
 
-def fitted(record: Experiment, *, play: bool = True) -> Fitted:
-    """Fit to one record: first the places of the second gauges from the strains at rest, then everything that is free."""
+def fitted(record: Experiment, *, without_play: Fitted | None = None) -> Fitted:
+    """Fit to one record: first the places of the second gauges from the strains at rest, then everything that is free.
+
+    The model with play starts from the fitted one without.
+    """
+    play = without_play is not None
     places = places_at_rest(record)
     free = (*FREE, *(PLAY if play else ()), *_offsets())
-    model = started(machine(places, play=play), record)
+    if without_play is None:
+        model = started(machine(places, play=False), record)
+    else:
+        known = without_play.model.parameters
+        values = {name: known[name].value for name in (*FREE, *TIES, *_offsets())}
+        model = machine(places).with_parameters(values)
     setup = Setup(substeps=SUBSTEPS[play])
     mode = "prescribed_motion"
     fit = identify(model, record, free, mode=mode, cutoff=CUTOFF, setup=setup, ties=TIES, tolerance=TOLERANCE)
@@ -226,7 +235,8 @@ class Judged:
 
 def judge(train: Experiment, test: Experiment) -> Judged:
     """Fit everything to ``train``, predict ``test``."""
-    flexible = {"flexible": fitted(train, play=False), "flexible with play": fitted(train)}
+    stiff = fitted(train)
+    flexible = {"flexible": stiff, "flexible with play": fitted(train, without_play=stiff)}
     runs = {name: strains(result.model, test) for name, result in flexible.items()}
     _, measured, clock = runs["flexible"]
     rows = np.searchsorted(test.time, clock - 0.5 * test.dt)
