@@ -11,8 +11,19 @@ use vpm_core::{Result, Scalar};
 
 use super::trees::lift;
 
-/// Shares of a beam's length where something may sit.
-const SHARES: [f64; 7] = [0.1, 0.25, 0.4, 0.5, 0.6, 0.7, 1.0];
+/// Arc lengths on a beam where something sits: the same as in the model, as beams of exact geometry are integrated from one to the next.
+fn marks(parts: &Parts<f64>, beam: usize) -> Vec<f64> {
+    let bodies = parts.bodies.iter().map(|body| body.on);
+    let parents = bodies.chain(parts.welds.iter().map(|weld| weld.on)).chain(parts.beams.iter().map(|other| other.on));
+    let ends = parts.lines.iter().flat_map(|line| [line.from.on, line.to.on]);
+    let all = parents.chain(ends).chain(parts.markers.iter().map(|marker| marker.on));
+    let tips = parts.point_masses.iter().filter(|point| point.on == Site::Tip(beam)).map(|_| parts.beams[beam].length);
+    let own = |mount| match mount {
+        Mount::Section { beam: other, at } if other == beam => Some(at),
+        _ => None,
+    };
+    all.filter_map(own).chain(tips).collect()
+}
 
 /// Whatever has mass: an inertia in a frame, or a needle at a point with a direction.
 pub enum Heavy<S> {
@@ -26,7 +37,14 @@ pub enum Heavy<S> {
 pub struct Places<'a, S> {
     parts: &'a Parts<f64>,
     lifted: Parts<S>,
-    beams: Vec<(Beam<S>, usize)>,
+    beams: Vec<Placed<S>>,
+}
+
+/// A beam, the arc lengths of its marks and its first coordinate.
+struct Placed<S> {
+    beam: Beam<S>,
+    marks: Vec<f64>,
+    first: usize,
 }
 
 impl<'a, S: Scalar> Places<'a, S> {
@@ -35,12 +53,11 @@ impl<'a, S: Scalar> Places<'a, S> {
         let (lifted, mut first) = (lift::<S>(parts), parts.bodies.len());
         let mut beams = Vec::new();
         for entry in &lifted.beams {
-            // Everything sits at one of these shares of the length.
-            let marks = SHARES.map(|share| share * entry.length);
+            let marks = marks(parts, beams.len());
             let beam = Beam::new(entry, &marks)?;
             let own = first;
             first += beam.len();
-            beams.push((beam, own));
+            beams.push(Placed { beam, marks, first: own });
         }
         Ok(Self { parts, lifted, beams })
     }
@@ -53,8 +70,9 @@ impl<'a, S: Scalar> Places<'a, S> {
                 self.mount(q, body.on) * body.joint.pose(q[k])
             }
             Mount::Section { beam, at } => {
-                let mark = SHARES.iter().position(|share| share * self.parts.beams[beam].length == at).unwrap_or(0);
-                self.stations(q, beam)[self.beams[beam].0.mark(mark)]
+                let Placed { beam: own, marks, .. } = &self.beams[beam];
+                let mark = marks.iter().position(|&mark| mark == at).unwrap_or(0);
+                self.stations(q, beam)[own.mark(mark)]
             }
         }
     }
@@ -64,7 +82,7 @@ impl<'a, S: Scalar> Places<'a, S> {
     }
 
     fn stations(&self, q: &[S], number: usize) -> Vec<Pose<S>> {
-        let (entry, (beam, first)) = (&self.parts.beams[number], &self.beams[number]);
+        let (entry, Placed { beam, first, .. }) = (&self.parts.beams[number], &self.beams[number]);
         let root = self.placed(q, entry.on, entry.translation, entry.rotation);
         let (mut sections, rest) = (beam.sections(), vec![S::zero(); beam.len()]);
         beam.motion(&q[*first..first + beam.len()], &rest, &mut sections);
@@ -82,7 +100,7 @@ impl<'a, S: Scalar> Places<'a, S> {
         for weld in &self.parts.welds {
             all.push(Heavy::Body(self.placed(q, weld.on, weld.translation, weld.rotation), weld.inertia.spatial()));
         }
-        for (number, (beam, _)) in self.beams.iter().enumerate() {
+        for (number, Placed { beam, .. }) in self.beams.iter().enumerate() {
             for (station, pose) in self.stations(q, number).into_iter().enumerate() {
                 all.push(Heavy::Body(pose, beam.inertia(station).value()));
             }

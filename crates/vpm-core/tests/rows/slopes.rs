@@ -58,7 +58,7 @@ fn jacobian(d: &Description, level: Level) -> Result<Row> {
     let system = std::cell::RefCell::new(system);
     let mut worst = Vec::new();
     for k in 0..n {
-        let found = slope(3e-4, |change| {
+        let found = slope(1e-3, |change| {
             let (mut moved, mut rate) = (x.clone(), vec![0.0; n]);
             moved[k] += change;
             system.borrow_mut().rhs(&moved, &mut rate);
