@@ -42,7 +42,7 @@ pub fn rows() -> Result<Vec<Row>> {
 
 fn agreement((machine, frequencies): (&str, Frequencies), level: Level, tolerance: f64) -> Result<Row> {
     Ok(Row {
-        name: format!("Four frequencies of a {machine} with {}", name(level)),
+        name: format!("Slowest frequencies of a {machine} with {}", name(level)),
         found: frequencies(level)?,
         expected: frequencies(EXACT)?,
         unit: "Hz",
@@ -88,7 +88,9 @@ fn strip(level: Level) -> Result<Vec<f64>> {
 }
 
 fn bare(level: Level) -> Result<Vec<f64>> {
-    clamped(level, None)
+    let mut found = clamped(level, None)?;
+    found.truncate(COUNT / 2);
+    Ok(found)
 }
 
 /// A beam that bends in one plane, on a joint.
