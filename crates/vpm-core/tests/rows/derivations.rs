@@ -19,8 +19,8 @@ use super::{Row, difference, larger, trees, vanishing};
 type Terms = [Vec<f64>; 3];
 /// The inner number follows the time, the lanes around it one rate and its coordinate.
 type Number = Dual<Dual<f64, 1>, 2>;
-/// Seeds of the random trees.
-const SEEDS: std::ops::Range<u64> = 0..5;
+/// Random trees without beams, and of each level with beams.
+const TREES: [u64; 2] = [5, 2];
 const SOURCE: &str = "Lagrange's equations of the energy by dual numbers";
 
 /// Levels of the beams; every one has its coordinates in space.
@@ -66,7 +66,7 @@ fn worst(so_far: &mut [f64], found: &Terms, expected: &Terms) {
 
 fn rigid() -> Result<Vec<Row>> {
     let (mut recursive, mut composite, mut forward) = ([0.0; 3], [0.0; 3], 0.0_f64);
-    for seed in SEEDS {
+    for seed in 0..TREES[0] {
         let (sample, random, n) = (random_tree(seed, 6), &mut Random::new(!seed), 6);
         let (q, v, tau) = (random.numbers(n, 3.0), random.numbers(n, 2.0), random.numbers(n, 20.0));
         let parts = Parts { gravity: sample.gravity, bodies: sample.bodies.clone(), ..Parts::default() };
@@ -91,7 +91,7 @@ fn rigid() -> Result<Vec<Row>> {
 
 fn flexible_trees(level: Level) -> Result<Row> {
     let mut most = [0.0; 4];
-    for seed in SEEDS {
+    for seed in 0..TREES[1] {
         let (parts, random) = (tree(seed, level), &mut Random::new(seed + 100));
         let model = trees::model::<f64>(&parts)?;
         let n = model.n_coordinates();
