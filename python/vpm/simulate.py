@@ -232,7 +232,8 @@ def simulate_arrays(
         partial = SimulatedArrays(
             error.outputs, np.zeros((*error.outputs.shape, 0)), np.arange(len(error.outputs)), np.zeros(1, np.int64)
         )
-        raise DivergedError(str(error), run=_run(model, experiment, mode, partial, setup)) from None
+        run = _run(model, experiment, mode, partial, setup)
+        raise DivergedError(str(error), run=run, time=float(experiment.time[0]) + len(run.time) * experiment.dt) from None
     except VpmError:
         raise
     except ValueError as error:  # of the core: sizes, numbers and steps that no simulation can take

@@ -122,7 +122,7 @@ class Slot:
     def _range_problems(self, where: str, unit: str) -> Iterator[Problem]:
         parameter = self.parameter()
         possible = _range_text(*self.physical, self.unit)
-        shown = f"{self.quantity.value:g} {unit}"
+        shown = f"{self.quantity.value:g}" + ("" if unit == "1" else f" {unit}")
         if not self.physical[0] <= parameter.value <= self.physical[1]:
             reason = f" ({self.impossible})" if self.impossible else ""
             yield Problem(where, f"is {shown}, but only {possible} is physically possible{reason}; correct the value")
@@ -166,7 +166,7 @@ def _range_text(low: float, high: float, unit: str) -> str:
     """Physical range in words; the catalogue and this module know ranges with a lower end only."""
     shown = "" if unit == "1" else f" {unit}"
     if low in {POSITIVE, _LEAST}:
-        return f"more than 0{shown}"
+        return f"more than 0{shown} (at least {low:g})"
     return f"{low:g}{shown} or more" if math.isinf(high) else f"{low:g} to {high:g}{shown}"
 
 
