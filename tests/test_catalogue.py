@@ -107,7 +107,7 @@ def law_of(effect: EffectType) -> str:
     """Right-hand side of a law as a Python expression in q, v and the parameters."""
     text = effect.law.removeprefix("tau = ").replace("2 pi q", "2*pi*q").replace("1/2 ", "0.5*").replace("^", "**")
     text = re.sub(r"(?<=[\w)]) (?=[\w(])", "*", text)
-    return re.sub(r"\b(tanh|exp|cos|sin)\*\(", r"\1(", text)
+    return re.sub(r"\b(tanh|exp|cos|sin|sqrt)\*\(", r"\1(", text)
 
 
 @pytest.mark.parametrize("kind", ["prismatic", "revolute"])
@@ -115,7 +115,7 @@ def law_of(effect: EffectType) -> str:
 def test_the_core_computes_the_law_as_it_is_written(effect: EffectType, kind: str) -> None:
     values = {parameter.name: 0.9 - 0.2 * i for i, parameter in enumerate(effect.parameters)}
     model = machine(kind).with_effect(effect.name, at="axis", **values)
-    functions = {"tanh": math.tanh, "exp": math.exp, "cos": math.cos, "sin": math.sin, "pi": math.pi}
+    functions = {"tanh": math.tanh, "exp": math.exp, "cos": math.cos, "sin": math.sin, "sqrt": math.sqrt, "pi": math.pi}
     seen = []
     for q, v in [(0.4, -0.9), (-0.2, 0.05), (1.3, 0.7), (0.1, 0.0)]:
         expected = eval(law_of(effect), {"q": q, "v": v, **values, **functions})
@@ -128,7 +128,7 @@ def test_the_core_computes_the_law_as_it_is_written(effect: EffectType, kind: st
 @pytest.mark.parametrize("effect", effects_for_site("joint"), ids=name_of)
 def test_the_physical_range_is_where_friction_takes_energy_out(effect: EffectType) -> None:
     values = {parameter.name: 0.5 for parameter in effect.parameters}
-    functions = {"tanh": math.tanh, "exp": math.exp, "cos": math.cos, "sin": math.sin, "pi": math.pi}
+    functions = {"tanh": math.tanh, "exp": math.exp, "cos": math.cos, "sin": math.sin, "sqrt": math.sqrt, "pi": math.pi}
     signed = [p for p in effect.parameters if p.linear and p.physical[0] == 0.0 and effect.group == "friction"]
     for parameter in signed:
         powers = {

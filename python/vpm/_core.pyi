@@ -251,8 +251,11 @@ class System:
         substeps: int,
         integrator: str,
         sensitivities: Sequence[int] = ...,
+        passive: Sequence[int] = ...,
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """Joints follow a measured motion (N, n), beams respond from rest; position sensors are undone.
+
+        Joints in ``passive`` move freely with their effects, from rest; their columns of the motion mean nothing.
 
         Returns
         -------

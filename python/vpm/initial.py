@@ -66,9 +66,25 @@ class _Joints:
     actuators: tuple[str, ...] = ()
 
 
+def passive_joints(experiment: Experiment, model: Model) -> tuple[str, ...]:
+    """Joints that nobody drives and nobody measures: without an actuator and without a position in the log.
+
+    In prescribed motion they move freely with their effects. A joint with an actuator is never one of them; that its
+    position is missing is a mistake of the log.
+    """
+    on_joints = [name for name in model.actuators if model.line_of_actuator(name) is None]
+    driven = {model.joint_of_actuator(name) for name in on_joints}
+    return tuple(name for name in model.joints if f"{name}.position" not in experiment and name not in driven)
+
+
 def joint_motion(experiment: Experiment, model: Model, cutoff: float | None = None) -> Motion:
-    """Filtered motion of the joints, as `vpm.experiment.motion` gives it, from a log that need not hold commands."""
-    return motion(experiment, _Joints(model.name, model.joints), cutoff=cutoff)
+    """Filtered motion of the joints, as `vpm.experiment.motion` gives it, from a log that need not hold commands.
+
+    Of joints that are passive there (see `passive_joints`) it has no columns, as long as any joint is measured.
+    """
+    passive = passive_joints(experiment, model)
+    followed = tuple(name for name in model.joints if name not in passive)
+    return motion(experiment, _Joints(model.name, followed or model.joints), cutoff=cutoff)
 
 
 def _fit_start(experiment: Experiment, channel: str, samples: int = 15) -> tuple[float, float]:

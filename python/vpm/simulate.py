@@ -8,6 +8,8 @@ restarts             As free run, begun afresh from the measured state every hor
 closed_loop          Given the references, what do controller and machine do together?
 prescribed_motion    Given the measured motion of the joints, how do the flexible links respond: which strains,
                      which efforts? The counterpart of inverse dynamics for machines with elastic coordinates.
+                     A joint without an actuator whose position the log does not hold is passive: it moves freely
+                     with its effects, from its rest under gravity.
 ===================  =====================================================================================
 """
 
@@ -24,7 +26,7 @@ from numpy.typing import NDArray
 from vpm.errors import DivergedError, ExperimentError, SimulationError, ValidityWarning, VpmError
 from vpm.experiment import Experiment, Motion, motion, parallel_filter
 from vpm.initial import initial_state as start
-from vpm.initial import joint_motion, measured_states
+from vpm.initial import joint_motion, measured_states, passive_joints
 from vpm.model import Model
 from vpm.results import Result
 
@@ -44,8 +46,8 @@ class Setup:
     Attributes
     ----------
     integrator : {"linearly_implicit", "rosenbrock", "rk4", "semi_implicit"}
-        The first two are stable whatever is stiff, of order 2 and 4; the first also stops on dry friction far sharper
-        than a step. The others are explicit, but for the constant stiffness of flexible links in the last.
+        The first two are stable whatever is stiff, of order 2 and 4; the first also stops on dry friction far
+        sharper than a step. The others are explicit, but for the constant stiffness of flexible links in the last.
     substeps : int
         Integration steps per sample of the log.
     horizon : float
@@ -277,22 +279,31 @@ def _dispatch(
 
 
 def _prescribed(model: Model, m: Motion, theta: Array, columns: list[int], setup: Setup) -> SimulatedArrays:
-    """Joints on the filtered motion, from behind the filter's settling to before it."""
-    q, v, a = (np.ascontiguousarray(x[m.kept]) for x in (m.position, m.velocity, m.acceleration))
+    """Joints on the filtered motion, from behind the filter's settling to before it; those it lacks are passive."""
+    followed = [place for place, joint in enumerate(model.joints) if joint in m.joints]
+    passive = [place for place in range(len(model.joints)) if place not in followed]
+    motion = np.zeros((3, len(m.time[m.kept]), len(model.joints)))
+    for order, values in enumerate((m.position, m.velocity, m.acceleration)):
+        motion[order][:, followed] = values[m.kept]
+    q, v, a = motion
     outputs, states, jacobian = model.core.simulate_prescribed(
-        theta, q, v, a, m.dt, setup.substeps, setup.integrator, columns
+        theta, q, v, a, m.dt, setup.substeps, setup.integrator, columns, passive
     )
     rows = np.arange(len(m.time))[m.kept]
     return SimulatedArrays(outputs, jacobian, rows, np.zeros(1, dtype=np.int64), states)
 
 
-def copied_channels(model: Model, mode: str) -> frozenset[str]:
-    """Outputs that a mode takes from the log, or does not work out: nothing to compare there."""
+def copied_channels(model: Model, mode: str, passive: Sequence[str] = ()) -> frozenset[str]:
+    """Outputs that a mode takes from the log, or does not work out: nothing to compare there.
+
+    The motion of ``passive`` joints is worked out.
+    """
     commands = {f"{name}.command" for name in model.actuators}
     if mode == "closed_loop":
         return frozenset()
     if mode == "prescribed_motion":
-        motions = {f"{name}.{kind}" for name in model.joints for kind in ("position", "velocity", "acceleration")}
+        followed = [name for name in model.joints if name not in passive]
+        motions = {f"{name}.{kind}" for name in followed for kind in ("position", "velocity", "acceleration")}
         return frozenset(commands | motions | {f"{name}.force" for name in model.actuators})
     return frozenset(commands)
 
@@ -314,7 +325,9 @@ def _judged(model: Model, run: Run, arrays: SimulatedArrays) -> Run:
 
 
 def _run(model: Model, experiment: Experiment, mode: str, arrays: SimulatedArrays, setup: Setup) -> Run:
-    left_out = copied_channels(model, mode) if mode == "prescribed_motion" else frozenset()
+    guided = mode == "prescribed_motion"
+    passive = passive_joints(experiment, model) if guided else ()
+    left_out = copied_channels(model, mode, passive) if guided else frozenset()
     kept = [column for column, channel in enumerate(model.output_channels) if channel not in left_out]
     channels = tuple(model.output_channels[column] for column in kept)
     values = arrays.outputs[:, kept]

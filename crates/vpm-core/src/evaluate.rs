@@ -82,7 +82,7 @@ pub fn marker_jacobian(description: &Description, theta: &[f64], position: &[f64
 fn held(description: &Description, theta: &[f64], position: &[f64]) -> Result<Statics> {
     Table::vector("position", position, description.n_joints(), "joint")?;
     description.check_values(theta)?;
-    Statics::new(description, theta)
+    Statics::new(description, theta, &[])
 }
 
 fn prepare<const N: usize>(

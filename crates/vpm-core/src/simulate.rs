@@ -157,7 +157,7 @@ impl Job for Simulation<'_> {
 fn execute(setting: Setting<'_>, plan: Plan<'_>) -> Result<Run> {
     let dim = setting.description.n_states();
     if let Some(first) = plan.initial.get(..dim) {
-        check_step(setting.description, setting.theta, setting.stepping, first, false)?;
+        check_step(setting.description, setting.theta, setting.stepping, first, &[])?;
     }
     let job = Simulation { setting, plan };
     let output = |pass: &Pair<_>, place: usize| pass.first[place];

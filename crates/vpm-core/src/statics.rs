@@ -1,4 +1,4 @@
-//! Machines at rest with their joints held: how far beams sag, and how they vibrate about that.
+//! Machines at rest with their joints held, or some of them free: how far beams sag, where springs hold, and how beams vibrate about that.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -13,87 +13,172 @@ use crate::system::{Build, Dynamics};
 const LANES: usize = 8;
 /// Newton steps before the search counts as lost.
 const STEPS: usize = 60;
+/// Into how many stages the weight is cut, until the way from the straight beams to rest is smooth.
+const STAGES: [usize; 6] = [1, 2, 4, 8, 16, 32];
 /// Halvings of a Newton step that does not bring the beams closer to rest.
 const HALVINGS: usize = 12;
 
-/// A machine whose joints are held.
+/// Bisections on the way to the place where the load of a free joint changes its sign.
+const BISECTIONS: usize = 60;
+/// The first and the longest way in which that place is sought, m or rad.
+const WAYS: [f64; 2] = [1e-6, 10.0];
+
+/// A machine whose joints are held, but for passive ones.
 pub(crate) struct Statics {
     plain: Dynamics<f64>,
     dual: Dynamics<Dual<f64, LANES>>,
+    /// The coordinates that find their rest themselves: passive joints, then elastic coordinates.
+    free: Vec<usize>,
+    passive: Vec<String>,
 }
 
 /// A machine at rest.
 pub(crate) struct Rest {
     /// All coordinates.
     pub(crate) coordinates: Vec<f64>,
-    /// Derivative of the load that the elastic coordinates miss by themselves: stiffness with that of gravity.
+    /// Derivative of the load that the free coordinates miss by themselves: stiffness with that of gravity.
     pub(crate) tangent: DMatrix<f64>,
 }
 
+/// How Newton's method ended.
+enum Newton {
+    /// Every step led closer.
+    Smooth(Rest),
+    /// Some steps had to be halved: this may be another rest than the one that the weight bends the beams to.
+    Rough(Rest),
+    /// What was missing when it gave up.
+    Lost(f64),
+}
+
 impl Statics {
-    pub(crate) fn new(description: &Description, theta: &[f64]) -> Result<Self> {
+    /// With the joints `passive` free, beside the beams.
+    pub(crate) fn new(description: &Description, theta: &[f64], passive: &[usize]) -> Result<Self> {
         let lifted: Vec<_> = theta.iter().map(|&value| Dual::constant(value)).collect();
-        Ok(Self { plain: description.dynamics(theta)?, dual: description.dynamics(&lifted)? })
+        let (plain, dual) = (description.dynamics(theta)?, description.dynamics(&lifted)?);
+        let free = free_coordinates(&plain, passive);
+        let names = passive.iter().map(|&joint| description.bodies[joint].joint.name.clone()).collect();
+        Ok(Self { plain, dual, free, passive: names })
     }
 
-    /// The elastic coordinates at rest under gravity with the joints held at `joints`.
+    /// The free coordinates at rest under gravity with the other joints held at `joints`; passive ones are sought from there.
     ///
-    /// Law: `bias(q, 0) + K q = 0` on the elastic coordinates, by Newton's method from the straight beams with exact derivatives (dual
-    /// numbers); a step that leads away is halved. Checked: converged to rounding.
+    /// Law: `bias(q, 0) + K q = effects(q, 0)` on the free coordinates, by Newton's method from the straight beams with exact
+    /// derivatives (dual numbers). Where that goes astray the weight is put on in stages, so that of several places at rest it is the
+    /// one that the beams sag to. Passive joints are first moved to where their own load changes its sign: from the flat middle of a
+    /// play Newton's first step would lead anywhere. Checked: converged to rounding.
     pub(crate) fn settle(&mut self, joints: &[f64]) -> Result<Rest> {
-        let (first, n) = (joints.len(), self.plain.coordinates());
+        let n = self.plain.coordinates();
         let mut coordinates = joints.to_vec();
         coordinates.resize(n, 0.0);
-        if first == n {
+        if self.free.is_empty() {
             return Ok(Rest { coordinates, tangent: DMatrix::zeros(0, 0) });
         }
-        let mut residual = self.residual(&coordinates);
+        for place in 0..self.passive.len() {
+            self.push(&mut coordinates, place);
+        }
+        for &stages in &STAGES {
+            if let Some(rest) = self.staged(&coordinates, stages) {
+                return Ok(rest);
+            }
+        }
+        match self.newton(coordinates.clone(), 1.0) {
+            Newton::Smooth(rest) | Newton::Rough(rest) => Ok(rest),
+            Newton::Lost(missing) => Err(self.unsettled(missing)),
+        }
+    }
+
+    /// Rest under a weight that grows in equal stages, if each stage leads smoothly to a stable one.
+    fn staged(&mut self, start: &[f64], stages: usize) -> Option<Rest> {
+        let mut last = None;
+        let mut coordinates = start.to_vec();
+        for stage in 1..=stages {
+            let Newton::Smooth(rest) = self.newton(coordinates, stage as f64 / stages as f64) else { return None };
+            let stiffness = (&rest.tangent + rest.tangent.transpose()) * 0.5;
+            stiffness.cholesky()?;
+            coordinates = rest.coordinates.clone();
+            last = Some(rest);
+        }
+        last
+    }
+
+    /// Newton's method under a share of the weight; a step that leads away is halved.
+    fn newton(&mut self, mut coordinates: Vec<f64>, weight: f64) -> Newton {
+        let mut smooth = true;
+        let mut residual = self.residual(&coordinates, weight);
         for _ in 0..STEPS {
-            let tangent = self.tangent(&coordinates, first);
+            let tangent = self.tangent(&coordinates, weight);
             let step = tangent.clone().lu().solve(&residual).filter(|step| step.iter().all(|entry| entry.is_finite()));
             let Some(step) = step else { break };
-            let size = coordinates[first..].iter().fold(1.0_f64, |most, entry| most.max(entry.abs()));
+            let size = self.free.iter().fold(1.0_f64, |most, &place| most.max(coordinates[place].abs()));
             let mut share = 1.0;
             for _ in 0..HALVINGS {
                 let mut moved = coordinates.clone();
-                moved[first..].iter_mut().zip(step.iter()).for_each(|(entry, step)| *entry -= share * step);
-                let found = self.residual(&moved);
+                self.free.iter().zip(step.iter()).for_each(|(&place, step)| moved[place] -= share * step);
+                let found = self.residual(&moved, weight);
                 let closer = found.norm() <= residual.norm() || share * step.amax() < 1e-11 * size;
                 if closer || share < 1e-3 {
                     (coordinates, residual) = (moved, found);
                     break;
                 }
-                share *= 0.5;
+                (share, smooth) = (share * 0.5, false);
             }
             if step.amax() < 1e-11 * size {
-                return Ok(Rest { coordinates, tangent });
+                let rest = Rest { coordinates, tangent };
+                return if smooth { Newton::Smooth(rest) } else { Newton::Rough(rest) };
             }
         }
-        let condition = "vanish within 60 Newton steps".to_owned();
-        let repair = "check the stiffness of the beams against what they carry";
-        Err(Error::Setting {
-            setting: "the load that the beams at rest miss",
-            condition,
-            value: residual.amax(),
-            repair,
-        })
+        Newton::Lost(residual.amax())
     }
 
-    fn residual(&mut self, q: &[f64]) -> DVector<f64> {
-        let first = self.plain.joints();
-        DVector::from_vec(unbalance(&mut self.plain, q)[first..].to_vec())
+    fn unsettled(&self, value: f64) -> Error {
+        let condition = "vanish within 60 Newton steps".to_owned();
+        if self.passive.is_empty() {
+            let repair = "check the stiffness of the beams against what they carry";
+            return Error::Setting { setting: "the load that the beams at rest miss", condition, value, repair };
+        }
+        let condition = format!("{condition} with the joints `{}` free", self.passive.join("`, `"));
+        let repair = "hold them by a spring or a backlash with stiffness, or prescribe their motion";
+        Error::Setting { setting: "the load that the machine at rest misses", condition, value, repair }
+    }
+
+    /// Moves a passive joint to where its load changes its sign, the other coordinates standing still; nowhere if it does not.
+    fn push(&mut self, coordinates: &mut [f64], place: usize) {
+        let joint = self.free[place];
+        let start = coordinates[joint];
+        let mut load = |way: f64| {
+            coordinates[joint] = start + way;
+            unbalance(&mut self.plain, coordinates, 1.0)[joint]
+        };
+        let first = load(0.0);
+        let (mut near, mut far) = (0.0, -WAYS[0] * first.signum());
+        while load(far) * first > 0.0 && far.abs() < WAYS[1] {
+            (near, far) = (far, 2.0 * far);
+        }
+        if first == 0.0 || load(far) * first > 0.0 {
+            load(0.0);
+            return;
+        }
+        for _ in 0..BISECTIONS {
+            let middle = 0.5 * (near + far);
+            if load(middle) * first > 0.0 { near = middle } else { far = middle }
+        }
+        load(far);
+    }
+
+    fn residual(&mut self, q: &[f64], weight: f64) -> DVector<f64> {
+        let load = unbalance(&mut self.plain, q, weight);
+        DVector::from_iterator(self.free.len(), self.free.iter().map(|&place| load[place]))
     }
 
     /// The derivative of the residual.
-    fn tangent(&mut self, q: &[f64], first: usize) -> DMatrix<f64> {
-        let n = q.len();
-        let mut tangent = DMatrix::zeros(n - first, n - first);
-        let elastic: Vec<usize> = (first..n).collect();
-        for lanes in elastic.chunks(LANES) {
-            let residual = unbalance(&mut self.dual, &seed(q, lanes));
-            for (row, entry) in residual[first..].iter().enumerate() {
-                for (&column, slope) in lanes.iter().zip(entry.gradient) {
-                    tangent[(row, column - first)] = slope;
+    fn tangent(&mut self, q: &[f64], weight: f64) -> DMatrix<f64> {
+        let count = self.free.len();
+        let mut tangent = DMatrix::zeros(count, count);
+        for (sweep, lanes) in self.free.chunks(LANES).enumerate() {
+            let load = unbalance(&mut self.dual, &seed(q, lanes), weight);
+            for (row, &place) in self.free.iter().enumerate() {
+                for (lane, &slope) in load[place].gradient[..lanes.len()].iter().enumerate() {
+                    tangent[(row, sweep * LANES + lane)] = slope;
                 }
             }
         }
@@ -125,32 +210,48 @@ impl Statics {
     }
 }
 
-/// What the coordinates miss at rest: `bias(q, 0) + K q`.
-fn unbalance<S: Scalar>(dynamics: &mut Dynamics<S>, q: &[S]) -> Vec<S> {
+/// Passive joints, then elastic coordinates.
+pub(crate) fn free_coordinates<S: Scalar>(dynamics: &Dynamics<S>, passive: &[usize]) -> Vec<usize> {
+    passive.iter().copied().chain(dynamics.joints()..dynamics.coordinates()).collect()
+}
+
+/// What the coordinates miss at rest under a share of the weight: `weight bias(q, 0) + K q - effects(q, 0)`.
+fn unbalance<S: Scalar>(dynamics: &mut Dynamics<S>, q: &[S], weight: f64) -> Vec<S> {
     let zero = vec![S::zero(); q.len()];
     dynamics.terms(q, &zero);
     let mut load = zero.clone();
     flexible::required(&dynamics.model, &dynamics.data, (q, &zero), &zero, &mut load);
+    for (load, &bias) in load.iter_mut().zip(&dynamics.data.composite.bias) {
+        *load -= bias * (1.0 - weight);
+    }
+    for (joint, effect) in &dynamics.effects {
+        load[*joint] -= effect.effort_at_rest(q[*joint]);
+    }
     load
 }
 
-/// All coordinates at rest with the joints held at `joints`, with exact derivatives: one Newton step over the number type from the
-/// solution in plain numbers (the implicit function theorem).
+/// All coordinates at rest with the joints held at `joints` but for `passive` ones, with exact derivatives: one Newton step over the
+/// number type from the solution in plain numbers (the implicit function theorem).
 pub(crate) fn settled<S: Scalar>(
     description: &Description,
     dynamics: &mut Dynamics<S>,
     theta: &[S],
     joints: &[S],
+    passive: &[usize],
 ) -> Result<Vec<S>> {
     let values = |numbers: &[S]| numbers.iter().map(Scalar::re).collect::<Vec<f64>>();
-    let Rest { coordinates, tangent } = Statics::new(description, &values(theta))?.settle(&values(joints))?;
+    let mut statics = Statics::new(description, &values(theta), passive)?;
+    let Rest { coordinates, tangent } = statics.settle(&values(joints))?;
     let mut q: Vec<S> = joints.to_vec();
     q.extend(coordinates[joints.len()..].iter().map(|&value| S::from_f64(value)));
+    for &joint in passive {
+        q[joint] = S::from_f64(coordinates[joint]);
+    }
     let Some(inverse) = tangent.try_inverse() else { return Ok(q) };
-    let missing = unbalance(dynamics, &q);
-    for (row, entry) in inverse.row_iter().zip(&mut q[joints.len()..]) {
-        let step: S = row.iter().zip(&missing[joints.len()..]).map(|(&entry, &load)| load * entry).sum();
-        *entry -= step;
+    let missing = unbalance(dynamics, &q, 1.0);
+    for (row, &place) in inverse.row_iter().zip(&statics.free) {
+        let step: S = row.iter().zip(&statics.free).map(|(&entry, &column)| missing[column] * entry).sum();
+        q[place] -= step;
     }
     Ok(q)
 }

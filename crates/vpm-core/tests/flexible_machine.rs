@@ -244,7 +244,7 @@ fn guided(d: &Description, stepping: Stepping, motion: &[Vec<f64>; 3], by: &[usi
     let (joints, rows) = (d.n_joints(), motion[0].len() / d.n_joints());
     let table = |k: usize| Table::new("motion", &motion[k], rows, joints);
     let setting = Setting { description: d, theta: &d.parameters, stepping, sensitivities: by, interrupt: &|| false };
-    prescribed(setting, JointMotion { position: table(0)?, velocity: table(1)?, acceleration: table(2)? })
+    prescribed(setting, JointMotion { position: table(0)?, velocity: table(1)?, acceleration: table(2)? }, &[])
 }
 
 #[test]

@@ -14,6 +14,8 @@ from vpm.catalogue.kinds import ANY, NOT_NEGATIVE, EffectParameter, EffectType, 
 _TRANSITION = (1e-3, 1e-2)
 #: Stribeck velocity where none is given: prismatic (m/s), revolute (rad/s).
 _STRIBECK = (1e-2, 1e-1)
+#: Way over which a contact closes where none is given: prismatic (m), revolute (rad).
+_CONTACT = (1e-5, 1e-4)
 
 
 def _transition(suffix: str) -> EffectParameter:
@@ -231,6 +233,47 @@ TORQUE_RIPPLE = EffectType(
     },
 )
 
+BACKLASH = EffectType(
+    name="backlash",
+    site="joint",
+    group="backlash",
+    parameters=(
+        shape(
+            "gap",
+            "backlash.gap",
+            "{C}",
+            "coordinate",
+            "free way from contact to contact",
+            start=None,
+            bounds=NOT_NEGATIVE,
+        ),
+        size(
+            "stiffness",
+            "backlash.stiffness",
+            "{E}/{C}",
+            "effort_per_coordinate",
+            "effort per way beyond the play",
+            physical=NOT_NEGATIVE,
+        ),
+        size(
+            "damping",
+            "backlash.damping",
+            "{E} s/{C}",
+            "effort_per_speed",
+            "resistance per speed, within the play and beyond",
+            physical=NOT_NEGATIVE,
+        ),
+        shape("width", "backlash.width", "{C}", "coordinate", "way over which a contact closes", start=_CONTACT),
+    ),
+    law=(
+        "tau = -stiffness (q + 1/2 sqrt((q - 1/2 gap)^2 + width^2) - 1/2 sqrt((q + 1/2 gap)^2 + width^2)) - damping v"
+    ),
+    sentence="{at} has a play of {gap} between contacts of {stiffness}, damped with {damping}.",
+    impossible="a negative stiffness would pull the contacts into each other, a negative damping would feed energy in",
+    confused_with={},
+    screened=False,
+)
+
 JOINT_EFFECTS = (
     VISCOUS_FRICTION,
     COULOMB_FRICTION,
@@ -239,4 +282,5 @@ JOINT_EFFECTS = (
     BIAS_FORCE,
     SPRING,
     TORQUE_RIPPLE,
+    BACKLASH,
 )

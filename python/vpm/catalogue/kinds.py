@@ -115,6 +115,8 @@ class EffectType:
         Effects that records may not tell from this one, and what tells them apart.
     requires : str or None
         Effect that has to be at the same site before this one is worth looking for: it is a correction of that one.
+    screened : bool
+        Whether a diagnosis tries it; not one that asks for a joint of its own.
     """
 
     name: str
@@ -126,6 +128,7 @@ class EffectType:
     impossible: str
     confused_with: Mapping[str, str]
     requires: str | None = None
+    screened: bool = True
 
     @property
     def title(self) -> str:

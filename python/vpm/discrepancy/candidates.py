@@ -1,4 +1,4 @@
-"""Every effect of the catalogue at every place it can sit, with start values read off the data."""
+"""Every effect of the catalogue that is screened, at every place it can sit, with start values read off the data."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ def candidates(
     present = {(effect.name, effect.at) for effect in model.effects}
     found = []
     for effect in EFFECTS.values():
-        if effects is not None and effect.name not in effects:
+        if not effect.screened or (effects is not None and effect.name not in effects):
             continue
         for site in model.sites(effect.site):
             needed = effect.requires is None or (effect.requires, site) in present

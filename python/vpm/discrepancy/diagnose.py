@@ -140,6 +140,11 @@ def _check_effects(effects: Sequence[str] | None) -> None:
     for name in effects or ():
         if name not in EFFECTS:
             raise DiagnosisError(f'the catalogue has no effect "{name}"; {near_match(name, EFFECTS)}')
+        if not EFFECTS[name].screened:
+            raise DiagnosisError(
+                f'"{name}" is not among the effects that a diagnosis tries, because it asks for a joint of its own; '
+                "give the model that joint with the effect and compare, or leave it out of effects="
+            )
 
 
 def _records(

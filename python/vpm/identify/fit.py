@@ -15,6 +15,7 @@ from vpm.experiment import Experiment
 from vpm.identify.identifiability import Combination, column_lengths, unseen_combinations
 from vpm.identify.problem import InverseDynamicsProblem, OutputErrorProblem, gaps, problem, segments
 from vpm.identify.statistics import NORMAL_95, robust_covariance
+from vpm.identify.ties import TiedProblem, check_ties
 from vpm.model import Model
 from vpm.results import Result
 from vpm.simulate import Setup
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
-AnyProblem = InverseDynamicsProblem | OutputErrorProblem
+AnyProblem = InverseDynamicsProblem | OutputErrorProblem | TiedProblem
 
 #: Evaluations after which a fit is ended as it stands.
 MOST_EVALUATIONS = 40
@@ -294,6 +295,8 @@ def identify(
     mode: str = "inverse_dynamics",
     cutoff: float | None = None,
     setup: Setup | None = None,
+    ties: Mapping[str, str] | None = None,
+    tolerance: float = 1e-8,
     progress: Progress | None = None,
 ) -> Fit:
     """Fit parameters of ``model`` to one or several experiments at once.
@@ -311,6 +314,11 @@ def identify(
         Cut-off frequency of the motion filter, Hz.
     setup : Setup, optional
         Integrator, substeps and horizon of the simulated modes.
+    ties : mapping of str to str, optional
+        Parameters that take the value of another: ``{"gauge_2.gain.value": "gauge_1.gain.value"}`` fits one gain for
+        two gauges. The other may be free or not; the fitted model holds the common value in both.
+    tolerance : float
+        Relative change of parameters or of the sum of squares at which to stop.
     progress : callable, optional
         Called with the number of evaluations and the weighted residual.
 
@@ -321,7 +329,7 @@ def identify(
     Raises
     ------
     IdentificationError
-        Nothing is free, a name is unknown, or a channel that the mode needs is missing.
+        Nothing is free, a name is unknown, a channel that the mode needs is missing, or a tie has no single meaning.
     """
     records = [experiments] if isinstance(experiments, Experiment) else list(experiments)
     names = tuple(free) if free is not None else tuple(p.name for p in model.parameters.values() if p.adjustable)
@@ -329,13 +337,23 @@ def identify(
         raise IdentificationError(
             f"{model.name}: no parameter is free; give some an uncertainty in the model file or name them in free="
         )
-    data = problem(model, records, mode, cutoff=cutoff, setup=setup)
+    data: AnyProblem = problem(model, records, mode, cutoff=cutoff, setup=setup)
+    if ties:
+        check_ties(model, ties, names)
+        data = TiedProblem(data, ties)
     before, _ = data.evaluate(model, model.theta)
-    result = estimate(model, data, names, progress=progress)
-    return fit_of(model, data, result, before, [e.name for e in records])
+    result = estimate(model, data, names, tolerance=tolerance, progress=progress)
+    return fit_of(model, data, result, before, [e.name for e in records], ties or {})
 
 
-def fit_of(model: Model, data: AnyProblem, result: Estimate, before: Array, experiments: Sequence[str]) -> Fit:
+def fit_of(
+    model: Model,
+    data: AnyProblem,
+    result: Estimate,
+    before: Array,
+    experiments: Sequence[str],
+    ties: Mapping[str, str] | None = None,
+) -> Fit:
     """Dress an estimate as a result.
 
     Parameters
@@ -349,8 +367,12 @@ def fit_of(model: Model, data: AnyProblem, result: Estimate, before: Array, expe
         Residual of the model that the fit is to be compared with.
     experiments : sequence of str
         Names of the records.
+    ties : mapping of str to str, optional
+        Parameters that take the value of another.
     """
-    fitted = model.with_parameters(dict(zip(result.names, map(float, result.values), strict=True)))
+    values = dict(zip(result.names, map(float, result.values), strict=True))
+    shared = {follower: values.get(leader, model.parameters[leader].value) for follower, leader in (ties or {}).items()}
+    fitted = model.with_parameters({**values, **shared})
     seen = np.isfinite(result.std)
     std = np.where(seen & (result.std > 0.0), result.std, 1.0)
     correlation = np.where(np.outer(seen, seen), result.covariance / np.outer(std, std), 0.0)

@@ -4,6 +4,7 @@
 //! vector), with `P: Scalar` it is the law itself, numbers in, effort out. `map` goes from one to the other.
 
 mod asymmetric_friction;
+mod backlash;
 mod bias_force;
 mod coulomb_friction;
 mod domain;
@@ -16,6 +17,7 @@ mod viscous_friction;
 use serde::Deserialize;
 
 pub use asymmetric_friction::AsymmetricFriction;
+pub use backlash::Backlash;
 pub use bias_force::BiasForce;
 pub use coulomb_friction::CoulombFriction;
 pub use domain::Domain;
@@ -45,6 +47,8 @@ pub enum JointEffect<P> {
     Spring(Spring<P>),
     /// Effort periodic in the coordinate.
     TorqueRipple(TorqueRipple<P>),
+    /// Spring with a dead band.
+    Backlash(Backlash<P>),
 }
 
 impl<P> JointEffect<P> {
@@ -58,6 +62,7 @@ impl<P> JointEffect<P> {
             Self::BiasForce(law) => JointEffect::BiasForce(law.map(f)),
             Self::Spring(law) => JointEffect::Spring(law.map(f)),
             Self::TorqueRipple(law) => JointEffect::TorqueRipple(law.map(f)),
+            Self::Backlash(law) => JointEffect::Backlash(law.map(f)),
         }
     }
 
@@ -71,6 +76,7 @@ impl<P> JointEffect<P> {
             Self::BiasForce(law) => law.domains(),
             Self::Spring(law) => law.domains(),
             Self::TorqueRipple(law) => law.domains(),
+            Self::Backlash(law) => law.domains(),
         }
     }
 }
@@ -87,6 +93,7 @@ impl<S: Scalar> JointEffect<S> {
             Self::BiasForce(law) => law.effort(),
             Self::Spring(law) => law.effort(q),
             Self::TorqueRipple(law) => law.effort(q),
+            Self::Backlash(law) => law.effort(q, v),
         }
     }
 
@@ -99,6 +106,7 @@ impl<S: Scalar> JointEffect<S> {
             Self::CoulombFriction(law) => law.resistance(v),
             Self::AsymmetricFriction(law) => law.resistance(v),
             Self::StribeckFriction(law) => law.resistance(v),
+            Self::Backlash(law) => law.resistance(),
             Self::BiasForce(_) | Self::Spring(_) | Self::TorqueRipple(_) => S::zero(),
         }
     }
@@ -110,6 +118,7 @@ impl<S: Scalar> JointEffect<S> {
             Self::BiasForce(law) => law.effort(),
             Self::Spring(law) => law.effort(q),
             Self::TorqueRipple(law) => law.effort(q),
+            Self::Backlash(law) => law.effort_at_rest(q),
             Self::ViscousFriction(_)
             | Self::CoulombFriction(_)
             | Self::AsymmetricFriction(_)
@@ -130,6 +139,7 @@ impl<S: Scalar> JointEffect<S> {
             Self::BiasForce(law) => law.potential(q),
             Self::Spring(law) => law.potential(q),
             Self::TorqueRipple(law) => law.potential(q),
+            Self::Backlash(law) => law.potential(q),
             Self::ViscousFriction(_)
             | Self::CoulombFriction(_)
             | Self::AsymmetricFriction(_)

@@ -1,4 +1,4 @@
-//! Joints that follow a given motion, and beams that answer to it.
+//! Joints that follow a given motion, and what answers to it: beams, and joints that nobody drives.
 
 use super::{Run, Setting, Stepping, check_step, names};
 use crate::algebra::Cholesky;
@@ -11,7 +11,7 @@ use crate::ode::Ode;
 use crate::scalar::{Dual, Scalar};
 use crate::sensitivity::{Interrupt, Job, Pair, differentiate};
 use crate::sensor::Sensor;
-use crate::statics::settled;
+use crate::statics::{free_coordinates, settled};
 use crate::system::{Build, Dynamics};
 
 /// Derivatives taken in one sweep.
@@ -19,25 +19,34 @@ const LANES: usize = 8;
 /// Integration steps between two questions whether to stop.
 const PATIENCE: usize = 256;
 
-/// Joints follow `motion`, readings of the model's position sensors; the beams move freely.
+/// Joints follow `motion`, readings of the model's position sensors, but for `passive` ones, whose columns mean nothing; these and the
+/// beams move freely.
 ///
-/// Law: `M_ee a_e = -(bias + K q + D v)_e - M_ej a_j`, j the joints and e the elastic coordinates. Between samples the joints follow the
-/// polynomial of degree 5 with position, velocity and acceleration of both. The beams begin at rest under gravity. The outputs
-/// `effort` of the joints are the efforts that the motion needs, with those of the effects taken off; the actuators do nothing.
-/// Checked: a motion simulated from efforts gives those efforts back.
-pub fn prescribed(setting: Setting<'_>, motion: JointMotion<'_>) -> Result<Run> {
+/// Law: `M_ff a_f = (effects - bias - K q - D v)_f - M_fj a_j`, j the joints that follow and f the free coordinates. Between samples the
+/// joints follow the polynomial of degree 5 with position, velocity and acceleration of both. The free coordinates begin at rest under
+/// gravity. The outputs `effort` of the joints are the efforts that the motion needs, with those of the effects taken off; the actuators
+/// do nothing. Checked: a motion simulated from efforts gives those efforts back, with all joints or some of them following.
+pub fn prescribed(setting: Setting<'_>, motion: JointMotion<'_>, passive: &[usize]) -> Result<Run> {
     let (rows, joints) = (motion.position.rows(), setting.description.n_joints());
     for (name, table) in
         [("position", motion.position), ("velocity", motion.velocity), ("acceleration", motion.acceleration)]
     {
         table.expect(name, rows, joints)?;
     }
+    let mut passive = passive.to_vec();
+    passive.sort_unstable();
+    passive.dedup();
+    if let Some(&index) = passive.iter().find(|&&joint| joint >= joints) {
+        let what = "the list of passive joints".to_owned();
+        return Err(Error::Reference { what, target: "joint", index, count: joints });
+    }
     if rows > 0 {
         let mut state = motion.position.row(0).to_vec();
         state.resize(setting.description.n_states(), 0.0);
-        check_step(setting.description, setting.theta, setting.stepping, &state, true)?;
+        let driven: Vec<usize> = (0..joints).filter(|joint| !passive.contains(joint)).collect();
+        check_step(setting.description, setting.theta, setting.stepping, &state, &driven)?;
     }
-    let job = Guided { setting, motion };
+    let job = Guided { setting, motion, passive: &passive };
     let output = |pass: &Pair<_>, place: usize| pass.first[place];
     let (pair, jacobian) = differentiate(&job, setting.theta, setting.sensitivities, output)?;
     Ok(Run { outputs: pair.first, states: pair.second, jacobian })
@@ -46,6 +55,7 @@ pub fn prescribed(setting: Setting<'_>, motion: JointMotion<'_>) -> Result<Run> 
 struct Guided<'a> {
     setting: Setting<'a>,
     motion: JointMotion<'a>,
+    passive: &'a [usize],
 }
 
 impl Job for Guided<'_> {
@@ -63,12 +73,13 @@ type State<S> = [S; 3];
 struct Guide<'a, S> {
     description: &'a Description,
     motion: JointMotion<'a>,
+    passive: &'a [usize],
     stepping: Stepping,
     sensors: Vec<Sensor<S>>,
     of_joints: Vec<Option<Sensor<S>>>,
-    ode: Elastic<S>,
+    ode: Free<S>,
     integrator: Integrator<S>,
-    /// Elastic coordinates, their rates, time since the last sample.
+    /// Free coordinates, their rates, time since the last sample.
     state: Vec<S>,
     truth: Vec<S>,
     states: Vec<S>,
@@ -81,9 +92,9 @@ impl<'a, S: Scalar> Guide<'a, S> {
         let of_joints = position_sensors(description, theta);
         let lifted: Vec<_> = theta.iter().map(|&value| Dual::constant(value)).collect();
         let joints = dynamics.joints();
-        let ode = Elastic {
-            values: Buffers::new(dynamics),
-            duals: Buffers::new(Build::dynamics(&description, &lifted)?),
+        let ode = Free {
+            values: Buffers::new(dynamics, job.passive),
+            duals: Buffers::new(Build::dynamics(&description, &lifted)?, job.passive),
             ends: vec![[[S::zero(); 3]; 2]; joints],
             interval: job.setting.stepping.time_step,
         };
@@ -91,6 +102,7 @@ impl<'a, S: Scalar> Guide<'a, S> {
         let mut guide = Self {
             description,
             motion,
+            passive: job.passive,
             stepping: job.setting.stepping,
             sensors: description.sensors(theta),
             of_joints,
@@ -104,15 +116,20 @@ impl<'a, S: Scalar> Guide<'a, S> {
         Ok(guide)
     }
 
-    /// Puts the beams to rest with the joints where the motion begins.
+    /// Puts the free coordinates to rest with the joints where the motion begins.
     fn begin(&mut self, theta: &[S]) -> Result<()> {
         if self.motion.position.rows() == 0 {
             return Ok(());
         }
-        let joints: Vec<S> = self.at(0).iter().map(|[position, ..]| *position).collect();
-        let q = settled(self.description, &mut self.ode.values.dynamics, theta, &joints)?;
-        let elastic = &q[joints.len()..];
-        self.state[..elastic.len()].copy_from_slice(elastic);
+        let mut joints: Vec<S> = self.at(0).iter().map(|[position, ..]| *position).collect();
+        for &joint in self.passive {
+            joints[joint] = S::zero();
+        }
+        let Buffers { dynamics, free, .. } = &mut self.ode.values;
+        let q = settled(self.description, dynamics, theta, &joints, self.passive)?;
+        for (entry, &place) in self.state.iter_mut().zip(&*free) {
+            *entry = q[place];
+        }
         Ok(())
     }
 
@@ -193,8 +210,8 @@ impl<'a, S: Scalar> Guide<'a, S> {
     }
 }
 
-/// The elastic coordinates of a machine whose joints follow a motion, with time as the last state.
-struct Elastic<S> {
+/// The free coordinates of a machine whose other joints follow a motion, with time as the last state.
+struct Free<S> {
     values: Buffers<S>,
     duals: Buffers<Dual<S, LANES>>,
     /// Motion of each joint at the sample before and after.
@@ -205,6 +222,10 @@ struct Elastic<S> {
 
 struct Buffers<S> {
     dynamics: Dynamics<S>,
+    /// The joints that follow.
+    driven: Vec<usize>,
+    /// Passive joints, then elastic coordinates.
+    free: Vec<usize>,
     q: Vec<S>,
     v: Vec<S>,
     a: Vec<S>,
@@ -212,70 +233,101 @@ struct Buffers<S> {
     rates: Vec<S>,
     state: Vec<S>,
     ends: Vec<[State<S>; 2]>,
-    /// The block of the mass matrix of the elastic coordinates, and its factors.
+    /// A load on the free coordinates on its way.
+    column: Vec<S>,
+    /// The block of the mass matrix of the free coordinates, and its factors.
     mass: Vec<S>,
     factors: Cholesky<S>,
 }
 
 impl<S: Scalar> Buffers<S> {
-    fn new(dynamics: Dynamics<S>) -> Self {
+    fn new(dynamics: Dynamics<S>, passive: &[usize]) -> Self {
         let (n, joints, zero) = (dynamics.coordinates(), dynamics.joints(), S::zero());
-        let elastic = n - joints;
+        let free = free_coordinates(&dynamics, passive);
+        let driven = (0..joints).filter(|joint| !passive.contains(joint)).collect();
+        let count = free.len();
         let [q, v, a, load] = [0; 4].map(|_| vec![zero; n]);
-        let [rates, state] = [0; 2].map(|_| vec![zero; 2 * elastic + 1]);
-        let (mass, factors) = (vec![zero; elastic * elastic], Cholesky::new(elastic));
-        Self { dynamics, q, v, a, load, rates, state, ends: vec![[[zero; 3]; 2]; joints], mass, factors }
+        let [rates, state] = [0; 2].map(|_| vec![zero; 2 * count + 1]);
+        let (column, mass, factors) = (vec![zero; count], vec![zero; count * count], Cholesky::new(count));
+        let ends = vec![[[zero; 3]; 2]; joints];
+        Self { dynamics, driven, free, q, v, a, load, rates, state, ends, column, mass, factors }
     }
 
-    /// Motion of all coordinates and rates of the state, at elastic state `x` on the way between `ends`.
+    /// Motion of all coordinates and rates of the state, at state `x` on the way between `ends`.
     fn evaluate(&mut self, x: &[S], ends: &[[State<S>; 2]], interval: f64) {
-        let Self { dynamics, q, v, a, load, mass, factors, rates, .. } = self;
-        let (n, joints) = (q.len(), ends.len());
-        let elastic = n - joints;
-        for (joint, ends) in ends.iter().enumerate() {
-            [q[joint], v[joint], a[joint]] = between(ends, x[2 * elastic], interval);
+        let Self { dynamics, driven, free, q, v, a, load, column, mass, factors, rates, .. } = self;
+        let (n, count) = (q.len(), free.len());
+        for &joint in &*driven {
+            [q[joint], v[joint], a[joint]] = between(&ends[joint], x[2 * count], interval);
         }
-        q[joints..].copy_from_slice(&x[..elastic]);
-        v[joints..].copy_from_slice(&x[elastic..2 * elastic]);
-        a[joints..].fill(S::zero());
+        for (k, &place) in free.iter().enumerate() {
+            (q[place], v[place], a[place]) = (x[k], x[count + k], S::zero());
+        }
         dynamics.terms(q, v);
         flexible::required(&dynamics.model, &dynamics.data, (q, v), a, load);
-        let matrix = dynamics.data.mass_matrix().chunks_exact(n).skip(joints);
-        for (own, row) in mass.chunks_exact_mut(elastic.max(1)).zip(matrix) {
-            own.copy_from_slice(&row[joints..]);
+        for (joint, effect) in &dynamics.effects {
+            load[*joint] -= effect.effort(q[*joint], v[*joint]);
+        }
+        let matrix = dynamics.data.mass_matrix();
+        for (own, &row) in mass.chunks_exact_mut(count.max(1)).zip(&*free) {
+            for (entry, &place) in own.iter_mut().zip(&*free) {
+                *entry = matrix[row * n + place];
+            }
         }
         factors.factorise(mass);
-        for entry in &mut load[joints..] {
-            *entry = -*entry;
+        for (entry, &place) in column.iter_mut().zip(&*free) {
+            *entry = -load[place];
         }
-        factors.solve(&mut load[joints..]);
-        a[joints..].copy_from_slice(&load[joints..]);
-        rates[..elastic].copy_from_slice(&v[joints..]);
-        rates[elastic..2 * elastic].copy_from_slice(&a[joints..]);
-        rates[2 * elastic] = S::one();
+        factors.solve(column);
+        for (k, &place) in free.iter().enumerate() {
+            a[place] = column[k];
+            (rates[k], rates[count + k]) = (v[place], column[k]);
+        }
+        rates[2 * count] = S::one();
     }
 
-    /// Writes `[-M_ee^-1 K, -M_ee^-1 D]` into rows of `width` entries, with the factors of the last evaluation.
+    /// Writes `[-M_ff^-1 K, -M_ff^-1 D]` of the beams into rows of `width` entries, with the factors of the last evaluation.
     fn elasticity(&mut self, rows: &mut [S], width: usize) {
-        let Self { dynamics, load, factors, ends, q, .. } = self;
-        let (joints, elastic) = (ends.len(), q.len() - ends.len());
-        let column = &mut load[joints..];
+        let Self { dynamics, factors, driven, free, column, .. } = self;
+        let count = free.len();
         for number in 0..dynamics.model.n_beams() {
             let Some((beam, first)) = dynamics.model.beam(number) else { continue };
-            let (first, len) = (first - joints, beam.len());
-            for (block, stiff) in [(0, beam.stiffness()), (elastic, beam.damping())] {
+            // The elastic coordinates are the last of all and of the free ones.
+            let (first, len) = (first - driven.len(), beam.len());
+            for (block, stiff) in [(0, beam.stiffness()), (count, beam.damping())] {
                 for k in 0..len {
                     column.fill(S::zero());
                     for (entry, row) in column[first..first + len].iter_mut().zip(stiff.chunks_exact(len)) {
                         *entry = -row[k];
                     }
                     factors.solve(column);
-                    for (row, &entry) in rows.chunks_exact_mut(width).zip(&*column) {
-                        row[block + first + k] = entry;
-                    }
+                    set_column(rows, width, block + first + k, column);
                 }
             }
         }
+    }
+
+    /// Writes the columns of the passive joints: slopes of their effects, and chords from rest in the place of the tangents of friction.
+    fn joint_effects(&mut self, rows: &mut [S], width: usize) {
+        let Self { dynamics, factors, free, q, v, column, .. } = self;
+        let (count, joints) = (free.len(), dynamics.joints());
+        for (k, &joint) in free.iter().enumerate().take_while(|(_, place)| **place < joints) {
+            let own = || dynamics.effects.iter().filter(|(place, _)| *place == joint).map(|(_, effect)| effect);
+            let slope: S = own().map(|effect| effect.slope_at_rest(q[joint])).sum();
+            let resistance: S = own().map(|effect| effect.resistance(v[joint])).sum();
+            for (place, entry) in [(k, slope), (count + k, -resistance)] {
+                column.fill(S::zero());
+                column[k] = entry;
+                factors.solve(column);
+                set_column(rows, width, place, column);
+            }
+        }
+    }
+}
+
+fn set_column<S: Scalar>(rows: &mut [S], width: usize, place: usize, column: &[S]) {
+    for (row, &entry) in rows.chunks_exact_mut(width).zip(column) {
+        row[place] = entry;
     }
 }
 
@@ -300,7 +352,7 @@ fn between<S: Scalar>(ends: &[State<S>; 2], time: S, interval: f64) -> State<S> 
     [q, v / h, a / (h * h)]
 }
 
-impl<S: Scalar> Ode<S> for Elastic<S> {
+impl<S: Scalar> Ode<S> for Free<S> {
     fn dim(&self) -> usize {
         self.values.rates.len()
     }
@@ -344,7 +396,9 @@ impl<S: Scalar> Ode<S> for Elastic<S> {
             matrix[k * dim + n + k] = S::one();
         }
         self.values.evaluate(x, &self.ends, self.interval);
-        self.values.elasticity(&mut matrix[n * dim..2 * n * dim], dim);
+        let lower = &mut matrix[n * dim..2 * n * dim];
+        self.values.elasticity(lower, dim);
+        self.values.joint_effects(lower, dim);
     }
 
     fn elasticity(&mut self, x: &[S], block: &mut [S]) -> bool {

@@ -9,8 +9,8 @@ use crate::integrator::stability::{LinearSystem, check};
 use crate::ode::Ode;
 use crate::system::System;
 
-/// Complains, with the mode and the largest stable step, if the flexible links cannot be stepped so from `state`; `locked` if the
-/// joints follow a motion of their own.
+/// Complains, with the mode and the largest stable step, if the flexible links cannot be stepped so from `state`; the
+/// joints `driven` follow a motion of their own.
 ///
 /// Judged at the mass matrix of that state and the constant stiffness and damping of the beams; friction and springs of joints, whose
 /// slopes change with the state, are left to the run itself.
@@ -19,7 +19,7 @@ pub(crate) fn check_step(
     theta: &[f64],
     stepping: Stepping,
     state: &[f64],
-    locked: bool,
+    driven: &[usize],
 ) -> Result<()> {
     let explicit = matches!(stepping.method, Method::Rk4 | Method::SemiImplicit);
     if !explicit || description.n_elastic() == 0 || state.iter().any(|number| !number.is_finite()) {
@@ -42,11 +42,11 @@ pub(crate) fn check_step(
             }
         }
     }
-    let free = if locked { description.n_joints() } else { 0 };
+    let free: Vec<usize> = (0..n).filter(|place| !driven.contains(place)).collect();
     let moving = |matrix: &[f64]| -> Vec<f64> {
-        matrix.chunks_exact(n).skip(free).flat_map(|row| row[free..].iter().copied()).collect()
+        free.iter().flat_map(|row| free.iter().map(move |column| matrix[row * n + column])).collect()
     };
-    let names: Vec<String> = (free..n).map(|place| coordinate(description, place)).collect();
+    let names: Vec<String> = free.iter().map(|&place| coordinate(description, place)).collect();
     let [mass, stiffness, damping] = [dynamics.data.mass_matrix(), &stiffness, &damping].map(moving);
     let system = LinearSystem { mass: &mass, stiffness: &stiffness, damping: &damping, names: &names };
     check(stepping.method, stepping.step(), &system)

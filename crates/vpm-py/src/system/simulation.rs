@@ -135,8 +135,9 @@ impl System {
         ))
     }
 
-    /// Joints follow a motion (N, n_joints), beams respond from rest: outputs, states and derivatives as in `simulate`.
-    #[pyo3(signature = (theta, position, velocity, acceleration, time_step, substeps, integrator, sensitivities=vec![]))]
+    /// Joints but for `passive` ones follow a motion (N, n_joints), these and beams respond from rest: outputs, states and derivatives
+    /// as in `simulate`.
+    #[pyo3(signature = (theta, position, velocity, acceleration, time_step, substeps, integrator, sensitivities=vec![], passive=vec![]))]
     #[expect(clippy::too_many_arguments, reason = "the arguments of the Python function")]
     fn simulate_prescribed<'py>(
         &self,
@@ -149,18 +150,20 @@ impl System {
         substeps: i64,
         integrator: &str,
         sensitivities: Vec<i64>,
+        passive: Vec<i64>,
     ) -> PyResult<(Table<'py>, Table<'py>, Cube<'py>)> {
         let request = Request::new(self, theta, (time_step, substeps, integrator), &sensitivities)?;
         let position = Numbers::table("position", position)?;
         let velocity = Numbers::table("velocity", velocity)?;
         let acceleration = Numbers::table("acceleration", acceleration)?;
+        let passive = places("passive", &passive)?;
         let run = self.compute(py, |interrupt| {
             let motion = JointMotion {
                 position: position.as_table()?,
                 velocity: velocity.as_table()?,
                 acceleration: acceleration.as_table()?,
             };
-            prescribed(request.setting(&self.description, interrupt), motion)
+            prescribed(request.setting(&self.description, interrupt), motion, &passive)
         })?;
         self.run(py, run, sensitivities.len())
     }
