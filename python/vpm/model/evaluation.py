@@ -217,8 +217,10 @@ class Evaluations(Components):
             yield f"warning: no rest with all joints at zero: {error}"
             return
         more = ", ..." if frequencies.size > 4 else ""
-        yield "natural frequencies with all joints locked at zero: " + ", ".join(f"{f:.4g}" for f in frequencies[:4]) + (
-            f"{more} Hz"
+        yield (
+            "natural frequencies with all joints locked at zero: "
+            + ", ".join(f"{f:.4g}" for f in frequencies[:4])
+            + (f"{more} Hz")
         )
         if frequencies[0] < 0.0:
             yield "warning: a link buckles under its load there; make it stiffer, or lighter what it carries"
