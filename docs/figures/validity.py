@@ -135,6 +135,12 @@ def draw_validity(limit: float) -> Figure:
         axis.axhline(1.0, color="k", linewidth=0.8)
         axis.set_title(name)
         axis.set_xlabel(label("largest slope", "rad"))
+        axis.set_xticks([0.03, 0.1, 0.3], ["0.03", "0.1", "0.3"])
+        axis.set_xticks([], minor=True)
+        axis.set_xlim(0.013, 0.8)
+        axis.set_yticks([0.01, 0.1, 1.0, 10.0], ["0.01", "0.1", "1", "10"])
+        axis.set_yticks([], minor=True)
+        axis.set_ylim(0.01, 40.0)
     axes[0][0].set_ylabel(label("error over deflection", "%"))
     axes[0][0].legend()
     return figure
@@ -148,6 +154,7 @@ def draw_frequencies() -> Figure:
         coordinates, *both = frequencies(kind).T
         for axis, error in zip(axes[0], both, strict=True):
             axis.semilogy(coordinates, 100.0 * np.maximum(error, 1e-9), marker=marker, markersize=4, label=kind)
+            axis.set_yticks([], minor=True)
     for axis, name in zip(axes[0], ("first", "second"), strict=True):
         axis.set_title(f"{name} frequency of a clamped beam")
         axis.set_xlabel("coordinates")
