@@ -71,11 +71,13 @@ fn passive_joints_move_as_in_the_free_machine() -> Result<()> {
     let rest = guided(&d, stepping, &still, &[PLAY, 2], &[])?;
     let efforts: Vec<f64> = rest.outputs[..12].chunks(4).map(|channels| channels[3]).collect();
     assert!(efforts[0].abs() > 0.1 && efforts[1].abs() < 1e-8 && efforts[2].abs() < 1e-8, "{efforts:?}");
-    assert!(rest.states[PLAY].abs() > 0.009, "gravity lays the play to one side: {} rad", rest.states[PLAY]);
+    assert!(rest.states[PLAY].abs() > 0.005, "gravity lays the play to one side: {} rad", rest.states[PLAY]);
     let setting = Setting { description: &d, theta: &d.parameters, stepping, sensitivities: &[], interrupt: &|| false };
-    let run = free_run(setting, &rest.states, Table::new("inputs", &[], 201, 0)?)?;
+    let mut start = rest.states;
+    start[d.n_coordinates()] = 4.0;
+    let run = free_run(setting, &start, Table::new("inputs", &[], 601, 0)?)?;
     let column = |offset: usize| -> Vec<f64> {
-        run.outputs.chunks(d.n_outputs()).flat_map(|row| [row[offset], f64::NAN, f64::NAN]).collect()
+        run.outputs.chunks(d.n_outputs()).flat_map(|row| [row[offset], 7.0, -3.0]).collect()
     };
     let followed = guided(&d, stepping, &[column(0), column(1), column(2)], &[2, PLAY], &[])?;
     let state = followed.states.iter().zip(&run.states).fold(0.0_f64, |most, (a, b)| most.max((a - b).abs()));
@@ -83,7 +85,7 @@ fn passive_joints_move_as_in_the_free_machine() -> Result<()> {
     assert!(state < 2e-3 && effort < 2e-2, "state {state}, effort {effort} N m");
     let play: Vec<f64> = run.states.chunks(d.n_states()).map(|state| state[PLAY]).collect();
     let span = play.iter().fold(0.0_f64, |most, q| most.max((q - play[0]).abs()));
-    assert!(span > 0.02, "the play must be crossed: {span} rad");
+    assert!(span > 0.01, "the play must be crossed: {span} rad");
     Ok(())
 }
 
@@ -93,9 +95,8 @@ fn sensitivities_of_partly_prescribed_motion_are_slopes() -> Result<()> {
     let stepping = Stepping::new(0.005, 8, Method::LinearlyImplicit)?;
     let motion = turning(30, 0.005);
     let names = ["gap", "contact", "grease", "spring", "rest"];
-    let by: Vec<usize> = (0..d.n_parameters())
-        .filter(|&k| names.contains(&d.parameter_names[k].as_str()) || d.parameter_names[k].contains("young"))
-        .collect();
+    let named = (0..d.n_parameters()).filter(|&k| names.contains(&d.parameter_names[k].as_str()));
+    let by: Vec<usize> = named.chain([d.beams[0].material.young]).collect();
     assert!(by.len() > names.len());
     let run = guided(&d, stepping, &motion, &[PLAY, 2], &by)?;
     let moved = |place: usize, sign: f64| {
