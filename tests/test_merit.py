@@ -33,7 +33,8 @@ def merit() -> ModuleType:
     sys.path.insert(0, str(folder))
     try:
         spec = importlib.util.spec_from_file_location("merit", folder / "merit.py")
-        assert spec is not None and spec.loader is not None
+        assert spec is not None
+        assert spec.loader is not None
         module = importlib.util.module_from_spec(spec)
         sys.modules["merit"] = module
         spec.loader.exec_module(module)
@@ -71,10 +72,8 @@ def test_the_record_has_the_published_static_map_scale_and_first_mode(merit: Mod
     power = np.abs(np.fft.rfft(vibration * np.hanning(vibration.size))) ** 2
     frequency = np.fft.rfftfreq(vibration.size, record.dt)
     band = (frequency > 1.5) & (frequency < 6.0)
-    mean = np.sum(frequency[band] * power[band]) / np.sum(power[band])
-    low, high = VALUES["tudor.merit.first_mode"]["value"]
-    assert 0.97 * low < mean < 1.03 * high
     peak = frequency[band][np.argmax(power[band])]
+    low, high = VALUES["tudor.merit.first_mode"]["value"]
     assert 0.97 * low < peak < 1.03 * high
 
 
@@ -101,7 +100,6 @@ def arm_with_play(merit: ModuleType) -> tuple[Model, Experiment]:
         "play_2.backlash.gap": 0.02,
         "play_2.backlash.damping": 0.5,
         "elbow_drive.mass": 0.9,
-        "encoder_2.offset.value": 0.01,
         **{f"bridge_{name}.gain.value": 0.6 for name in merit.GAUGES},
         **{f"strip_{k}.damping.stiffness": 2e-3 for k in (1, 2)},
     }
@@ -123,7 +121,7 @@ def arm_with_play(merit: ModuleType) -> tuple[Model, Experiment]:
 
 def test_the_whole_way_finds_the_play_of_a_simulated_arm(merit: ModuleType) -> None:
     truth, record = arm_with_play(merit)
-    free = (*merit.FREE[:4], *merit.PLAY, *(f"bridge_{name}.offset.value" for name in merit.GAUGES))
+    free = (*merit.FREE[:3], *merit.PLAY)
     fit = identify(
         merit.machine().with_parameters({"bridge_21.gain.value": 0.7, "play_2.backlash.gap": 0.012}),
         record,
@@ -138,7 +136,6 @@ def test_the_whole_way_finds_the_play_of_a_simulated_arm(merit: ModuleType) -> N
         ("play_2.backlash.gap", 0.05),
         ("bridge_21.gain.value", 0.02),
         ("elbow_drive.mass", 0.03),
-        ("encoder_2.offset.value", 0.2),
         ("strip_1.damping.stiffness", 0.2),
     ):
         assert fit[name] == pytest.approx(truth.parameters[name].value, rel=share), (name, fit[name])
@@ -150,7 +147,9 @@ def test_the_whole_way_finds_the_play_of_a_simulated_arm(merit: ModuleType) -> N
 def test_joints_without_measurement_or_actuator_move_freely(merit: ModuleType) -> None:
     _, record = arm_with_play(merit)
     run = simulate(merit.machine(), record, "prescribed_motion", cutoff=30.0, substeps=8)
-    assert "play_2.position" in run.channels and "joint_2.position" not in run.channels
+    assert "play_2.position" in run.channels
+    assert "joint_2.position" not in run.channels
     play = run["play_2.position"]
-    assert play.max() > 0.004 and play.min() < -0.004
+    assert play.max() > 0.004
+    assert play.min() < -0.004
     assert np.abs(run["play_2.effort"]).max() < 1e-6 * np.abs(run["joint_2.effort"]).max()

@@ -2,9 +2,9 @@
 
 python examples/tudor/table.py
 
-The arm is the model file as it is. Sought are the mean and the amplitude of slow swings of joints 2 and 3 with the printed
-period of 12 s, and one factor common to both gauges, which no physics of the arm gives: it stands for whatever scale the
-published strains were written in. The same search is made without the factor, and with joint 3 held in line.
+The arm is the model file as it is. Sought are the mean and the amplitude of slow swings of joints 2 and 3 with the
+printed period of 12 s, and one factor common to both gauges, which no physics of the arm gives: it stands for whatever
+scale the published strains were written in. The same search is made without the factor, and with joint 3 held in line.
 """
 
 from __future__ import annotations
