@@ -1,4 +1,4 @@
-"""TUDOR against its public record MERIt: fitted on one half, judged on the other, with and without play in the gear of joint 2.
+"""TUDOR against its public record MERIt: fitted on one half, judged on the other, with and without play in a gear.
 
 python examples/tudor/merit.py RECORD.csv [--out FOLDER]
 """
@@ -31,6 +31,11 @@ CHANNELS = tuple(f"gauge_{name}.strain" for name in GAUGES)
 CUTOFF = 30.0
 #: Steps per sample of 10 ms: contacts of the play close within milliseconds, the modes of the strips are slower.
 SUBSTEPS = {True: 6, False: 2}
+#: The arm is never at rest in the middle of the record: simulations of the second half begin this much earlier, s,
+#: three times the decay time of the first mode, and only the joints' angles of that time are used.
+LEAD = 10.0
+#: Zeros of joint 2 from which the fit of the play may start, rad.
+ZEROS = (-0.02, -0.01, 0.0, 0.01, 0.02)
 #: Relative change of the sum of squares at which a fit ends; its statistical uncertainty is a hundred times larger.
 TOLERANCE = 1e-4
 #: Fitted beside the gauges' offsets; one gain for all gauges and one damping for both strips.
@@ -45,6 +50,19 @@ PLAY = ("play_2.backlash.gap", "play_2.backlash.damping")
 TIES = {f"bridge_{name}.gain.value": "bridge_21.gain.value" for name in GAUGES[1:]} | {
     "strip_2.damping.stiffness": "strip_1.damping.stiffness"
 }
+
+
+@dataclass(frozen=True)
+class Half:
+    """A half of the record: what is simulated, of which the first `lead` s do not count, and what counts."""
+
+    record: Experiment
+    lead: float
+
+    @property
+    def counted(self) -> Experiment:
+        """The part that is fitted or judged."""
+        return self.record.trim(start=self.record.time[0] + self.lead)
 
 
 @dataclass(frozen=True)
@@ -82,29 +100,40 @@ def machine(places: Mapping[str, float] | None = None, *, play: bool = True) -> 
     return Model.from_dict(content)
 
 
-def fitted(record: Experiment, *, without_play: Fitted | None = None) -> Fitted:
+def fitted(half: Half, *, without_play: Fitted | None = None) -> Fitted:
     """Fit to one record: first the places of the second gauges from the strains at rest, then everything that is free.
 
     The model with play starts from the fitted one without.
     """
     play = without_play is not None
-    places = places_at_rest(record)
+    places = places_at_rest(half.counted)
     free = (*FREE, *(PLAY if play else ()), *_offsets())
     if without_play is None:
-        model = started(machine(places, play=False), record)
+        model = started(machine(places, play=False), half)
     else:
         known = without_play.model.parameters
         values = {name: known[name].value for name in (*FREE, *TIES, *_offsets())}
-        model = machine(places).with_parameters(values)
-    setup = Setup(substeps=SUBSTEPS[play])
+        model = best_zero(machine(places).with_parameters(values), half)
+    setup = Setup(substeps=SUBSTEPS[play], settling=half.lead)
     mode = "prescribed_motion"
-    fit = identify(model, record, free, mode=mode, cutoff=CUTOFF, setup=setup, ties=TIES, tolerance=TOLERANCE)
+    fit = identify(model, half.record, free, mode=mode, cutoff=CUTOFF, setup=setup, ties=TIES, tolerance=TOLERANCE)
     return Fitted(fit, places)
 
 
-def started(model: Model, record: Experiment) -> Model:
+def best_zero(model: Model, half: Half) -> Model:
+    """The zero of joint 2, among some, with which the arm comes closest: gravity lays the play to either side of it."""
+
+    def misfit(candidate: Model) -> float:
+        predicted, measured, _ = strains(candidate, half)
+        return float(np.sum(np.var(measured - predicted, axis=0) / np.var(measured, axis=0)))
+
+    zeros = ({"encoder_2.offset.value": zero} for zero in ZEROS)
+    return min((started(model.with_parameters(zero), half) for zero in zeros), key=misfit)
+
+
+def started(model: Model, half: Half) -> Model:
     """One gain of all gauges and an offset of each, by linear regression on a first simulation."""
-    predicted, measured, _ = strains(model, record)
+    predicted, measured, _ = strains(model, half)
     weight = 1.0 / measured.std(axis=0)
     centred = (predicted - predicted.mean(axis=0)) * weight
     gain = float(np.sum(centred * (measured * weight)) / np.sum(centred**2))
@@ -113,12 +142,13 @@ def started(model: Model, record: Experiment) -> Model:
     return model.with_parameters(values | dict(zip(_offsets(), map(float, offsets), strict=True)))
 
 
-def strains(model: Model, record: Experiment) -> tuple[Array, Array, Array]:
-    """Predicted and measured strains (N, gauges) and their time (s), the joints following the record."""
+def strains(model: Model, half: Half) -> tuple[Array, Array, Array]:
+    """Predicted and measured strains (N, gauges) and their time (s) where they count, on the measured motion."""
     substeps = SUBSTEPS["play_2" in model.joints]
-    run = simulate(model, record, "prescribed_motion", cutoff=CUTOFF, substeps=substeps)
+    run = simulate(model, half.record, "prescribed_motion", cutoff=CUTOFF, substeps=substeps)
     columns = [run.channels.index(name) for name in CHANNELS]
-    return run.values[:, columns], run.measured[:, columns], run.time
+    counts = run.time >= half.counted.time[0] - 1e-6
+    return run.values[counts][:, columns], run.measured[counts][:, columns], run.time[counts]
 
 
 def _offsets() -> tuple[str, ...]:
@@ -181,24 +211,24 @@ def filtered(signal: Array, frequency: float, damping: float, interval: float) -
     return np.column_stack([lfilter(b, a, x, zi=start * x[0])[0] for x in signal.T])
 
 
-def static_map(train: Experiment) -> Callable[[Experiment], Array]:
-    """Strains that the pose alone predicts."""
-    coefficients = static_coefficients(train)
-    return lambda record: angles(record) @ coefficients.T
+def static_map(train: Half) -> Callable[[Half], Array]:
+    """Strains that the pose alone predicts, over the whole of a half's record."""
+    coefficients = static_coefficients(train.counted)
+    return lambda half: angles(half.record) @ coefficients.T
 
 
-def one_mode(train: Experiment) -> Callable[[Experiment], Array]:
+def one_mode(train: Half) -> Callable[[Half], Array]:
     """The static map through one mode common to all gauges, fitted from several starts."""
-    static, measured = static_map(train), measured_strains(train)
-    weight = 1.0 / measured.std(axis=0)
+    static, measured = static_map(train)(train), measured_strains(train.counted)
+    weight, count = 1.0 / measured.std(axis=0), len(measured)
 
     def misfit(x: Array) -> Array:
-        return ((filtered(static(train), x[0], x[1], train.dt) - measured) * weight).ravel()
+        return ((filtered(static, x[0], x[1], train.record.dt)[-count:] - measured) * weight).ravel()
 
     starts = ((2.8, 0.05), (3.0, 0.05), (3.2, 0.05))
     fits = [least_squares(misfit, x, x_scale=[0.1, 0.02], bounds=([0.5, 1e-3], [20.0, 2.0])) for x in starts]
     frequency, damping = min(fits, key=lambda fit: fit.cost).x
-    return lambda record: filtered(static(record), frequency, damping, record.dt)
+    return lambda half: filtered(static_map(train)(half), frequency, damping, half.record.dt)
 
 
 # ---- judgement -------------------------------------------------------------------------------------------------------
@@ -233,28 +263,30 @@ class Judged:
     predicted: dict[str, Array]
 
 
-def judge(train: Experiment, test: Experiment) -> Judged:
+def judge(train: Half, test: Half) -> Judged:
     """Fit everything to ``train``, predict ``test``."""
     stiff = fitted(train)
     flexible = {"flexible": stiff, "flexible with play": fitted(train, without_play=stiff)}
     runs = {name: strains(result.model, test) for name, result in flexible.items()}
     _, measured, clock = runs["flexible"]
-    rows = np.searchsorted(test.time, clock - 0.5 * test.dt)
+    rows = np.searchsorted(test.record.time, clock - 0.5 * test.record.dt)
     predicted = {"static map": static_map(train)(test)[rows], "one mode": one_mode(train)(test)[rows]}
     predicted |= {name: run[0] for name, run in runs.items()}
     return Judged({n: score(measured, p) for n, p in predicted.items()}, flexible, clock, measured, predicted)
 
 
-def load(path: Path) -> tuple[Experiment, Experiment]:
-    """The two halves of the record."""
-    return Experiment.load(path, model=machine()).split(0.5)
+def load(path: Path) -> tuple[Half, Half]:
+    """The two halves of the record; the first begins with the arm at rest."""
+    record = Experiment.load(path, model=machine())
+    middle = record.time[0] + 0.5 * record.duration
+    return Half(record.trim(stop=middle), 0.0), Half(record.trim(start=middle - LEAD), LEAD)
 
 
 def main(path: Path, folder: Path) -> None:
     """Fit both halves, print the table, write the report."""
     began = time.perf_counter()
     first, second = load(path)
-    print(f"{first.name}: {first.duration:.0f} s, {second.name}: {second.duration:.0f} s")
+    print(f"halves of {first.counted.duration:.1f} s and {second.counted.duration:.1f} s")
     results = {"first -> second": judge(first, second), "second -> first": judge(second, first)}
     for way, result in results.items():
         print(f"{way}: fit of the gauges {', '.join(GAUGES)} on the half that was not fitted, %")

@@ -64,12 +64,13 @@ def write_report(folder: Path, results: Mapping[str, Judged]) -> list[Path]:
 
 def _words(results: Mapping[str, Judged]) -> str:
     gains = [
-        result.fits[PLAY] - np.maximum(result.fits["static map"], result.fits["one mode"]) for result in results.values()
+        result.fits[PLAY] - np.maximum(result.fits["static map"], result.fits["one mode"])
+        for result in results.values()
     ]
     return (
-        "Every method was fitted to one half of the record and predicts the other. The flexible arm with play in the gear of "
-        f"joint 2 beats the better baseline by {np.min(gains):.1f} to {np.max(gains):.1f} points per gauge. The last gauge "
-        "sits where the second strip is hardly strained: most of its signal is noise."
+        "Every method was fitted to one half of the record and predicts the other. The flexible arm with play in "
+        f"the gear of joint 2 is {np.min(gains):.1f} to {np.max(gains):.1f} points above the better baseline per gauge. "
+        "The last gauge sits where the second strip is hardly strained: most of its signal is noise."
     )
 
 

@@ -52,11 +52,15 @@ class Setup:
         Integration steps per sample of the log.
     horizon : float
         Length of each restart, s.
+    settling : float
+        Time at the beginning of each record, s, that a fit simulates but does not compare: until what nobody knows of
+        the first state, such as vibrations, has died away. Restarts have none.
     """
 
     integrator: str = "linearly_implicit"
     substeps: int = 1
     horizon: float = 0.25
+    settling: float = 0.0
 
     def __post_init__(self) -> None:
         """Check the choices."""
@@ -66,6 +70,8 @@ class Setup:
             raise SimulationError(f"substeps is {self.substeps}; give a whole number of at least 1")
         if not self.horizon > 0.0:
             raise SimulationError(f"horizon is {self.horizon} s; give a positive time")
+        if not self.settling >= 0.0:
+            raise SimulationError(f"settling is {self.settling} s; give a time that is not negative")
 
 
 @dataclass(frozen=True, repr=False, eq=False)

@@ -337,10 +337,9 @@ def identify(
         raise IdentificationError(
             f"{model.name}: no parameter is free; give some an uncertainty in the model file or name them in free="
         )
-    data: AnyProblem = problem(model, records, mode, cutoff=cutoff, setup=setup)
-    if ties:
-        check_ties(model, ties, names)
-        data = TiedProblem(data, ties)
+    untied = problem(model, records, mode, cutoff=cutoff, setup=setup)
+    check_ties(model, ties or {}, names)
+    data = TiedProblem(untied, ties) if ties else untied
     before, _ = data.evaluate(model, model.theta)
     result = estimate(model, data, names, tolerance=tolerance, progress=progress)
     return fit_of(model, data, result, before, [e.name for e in records], ties or {})

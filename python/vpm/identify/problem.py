@@ -281,25 +281,41 @@ class OutputErrorProblem:
                 model, experiment, self.mode, theta=theta, columns=columns, setup=self._setup, followed=followed
             )
             for column, channel in zip(index, self._channels, strict=True):
-                weight = next(blocks).weight
+                block = next(blocks)
+                weight = block.weight * block.moving
                 residuals.append((experiment[channel][result.rows] - result.outputs[:, column]) * weight)
-                jacobians.append(-result.jacobian[:, column, :] * weight)
+                jacobians.append(-result.jacobian[:, column, :] * weight[:, None])
         return np.concatenate(residuals), np.concatenate(jacobians)
 
     def _lay_out(self, model: Model) -> tuple[Block, ...]:
         blocks, start = [], 0
-        spread = {c: float(np.sqrt(np.mean([np.var(e[c]) for e in self.experiments]))) for c in self._channels}
-        for experiment, followed in zip(self.experiments, self._followed, strict=True):
+        counted = [self._counted(experiment) for experiment in self.experiments]
+        parts = list(zip(self.experiments, counted, strict=True))
+        spread = {c: float(np.sqrt(np.mean([np.var(e[c][n]) for e, n in parts]))) for c in self._channels}
+        for (experiment, counts), followed in zip(parts, self._followed, strict=True):
             rows = simulate_arrays(model, experiment, self.mode, setup=self._setup, followed=followed).rows
+            moving = counts[rows].astype(np.float64)
             for channel in self._channels:
                 weight = 1.0 / spread[channel] if spread[channel] > 0.0 else 1.0
-                scale = float(np.sqrt(np.mean(experiment[channel] ** 2)))
+                scale = float(np.sqrt(np.mean(experiment[channel][counts] ** 2)))
                 samples = slice(start, start + rows.size)
                 unit = model.channel_unit(channel)
-                time = experiment.time[rows]
-                blocks.append(Block(experiment.name, channel, unit, samples, time, scale, weight, np.ones(rows.size)))
+                blocks.append(
+                    Block(experiment.name, channel, unit, samples, experiment.time[rows], scale, weight, moving)
+                )
                 start += rows.size
         return tuple(blocks)
+
+    def _counted(self, experiment: Experiment) -> NDArray[np.bool_]:
+        """Samples that count: not those while the first state settles."""
+        settling = 0.0 if self.mode == "restarts" else self._setup.settling
+        counted = experiment.time - experiment.time[0] >= settling - 0.5 * experiment.dt
+        if settling > 0.0 and counted.sum() < FEWEST_SAMPLES:
+            raise IdentificationError(
+                f"{experiment.name}: {int(counted.sum())} samples are left after {settling:g} s of settling; "
+                "give a longer record or less settling"
+            )
+        return np.asarray(counted)
 
 
 def problem(
