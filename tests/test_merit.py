@@ -128,9 +128,9 @@ def test_the_whole_way_finds_the_play_of_a_simulated_arm(merit: ModuleType) -> N
         free,
         mode="prescribed_motion",
         cutoff=30.0,
-        setup=Setup(substeps=8, settling=1.0),
+        setup=Setup(substeps=12, settling=1.0),
         ties=merit.TIES,
-        tolerance=1e-5,
+        tolerance=1e-7,
     )
     for name, share in (
         ("play_2.backlash.gap", 0.05),
