@@ -86,6 +86,7 @@ def test_files_are_refused_in_one_sentence(old: str, new: str, where: str, words
             r"initial_state\[0\]` must be a finite",
         ),
         (lambda arm: simulate(arm, push(1.0), "inverse_dynamics"), "use the mode 'prescribed_motion', or model.at"),
+        (lambda arm: arm.mass_matrix([np.nan] * len(arm.coordinates)), r"position\[0\]` must be a finite number"),
         (lambda arm: Simulation(arm, 1e-3).step([np.nan]), r"`inputs\[0\]` must be a finite number"),
         (lambda arm: arm.at({"uper": "rigid"}), 'did you mean "upper"'),
     ],

@@ -34,8 +34,6 @@ SUBSTEPS = {True: 6, False: 2}
 #: The arm is never at rest in the middle of the record: simulations of the second half begin this much earlier, s,
 #: three times the decay time of the first mode, and only the joints' angles of that time are used.
 LEAD = 10.0
-#: Zeros of joint 2 from which the fit of the play may start, rad.
-ZEROS = (-0.02, -0.01, 0.0, 0.01, 0.02)
 #: Relative change of the sum of squares at which a fit ends; its statistical uncertainty is a hundred times larger.
 TOLERANCE = 1e-4
 #: Fitted beside the gauges' offsets; one gain for all gauges and one damping for both strips.
@@ -113,22 +111,11 @@ def fitted(half: Half, *, without_play: Fitted | None = None) -> Fitted:
     else:
         known = without_play.model.parameters
         values = {name: known[name].value for name in (*FREE, *TIES, *_offsets())}
-        model = best_zero(machine(places).with_parameters(values), half)
+        model = machine(places).with_parameters(values)
     setup = Setup(substeps=SUBSTEPS[play], settling=half.lead)
     mode = "prescribed_motion"
     fit = identify(model, half.record, free, mode=mode, cutoff=CUTOFF, setup=setup, ties=TIES, tolerance=TOLERANCE)
     return Fitted(fit, places)
-
-
-def best_zero(model: Model, half: Half) -> Model:
-    """The zero of joint 2, among some, with which the arm comes closest: gravity lays the play to either side of it."""
-
-    def misfit(candidate: Model) -> float:
-        predicted, measured, _ = strains(candidate, half)
-        return float(np.sum(np.var(measured - predicted, axis=0) / np.var(measured, axis=0)))
-
-    zeros = ({"encoder_2.offset.value": zero} for zero in ZEROS)
-    return min((started(model.with_parameters(zero), half) for zero in zeros), key=misfit)
 
 
 def started(model: Model, half: Half) -> Model:

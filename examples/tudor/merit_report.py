@@ -69,8 +69,8 @@ def _words(results: Mapping[str, Judged]) -> str:
     ]
     return (
         "Every method was fitted to one half of the record and predicts the other. The flexible arm with play in "
-        f"the gear of joint 2 is {np.min(gains):.1f} to {np.max(gains):.1f} points above the better baseline per gauge. "
-        "The last gauge sits where the second strip is hardly strained: most of its signal is noise."
+        f"the gear of joint 2 is {np.min(gains):.1f} to {np.max(gains):.1f} points above the better baseline per "
+        "gauge. The last gauge sits where the second strip is hardly strained: most of its signal is noise."
     )
 
 

@@ -36,8 +36,8 @@ class Dynamics:
     """Single evaluations of a machine with fixed parameters, as fast as the crossing into Python allows.
 
     One-dimensional contiguous arrays of double precision are read where they are, others are converted first. n is
-    the number of coordinates. Raises ``ValueError`` for other sizes; numbers that are not finite give results that
-    are not finite.
+    the number of coordinates. Raises ``ValueError`` for other sizes and for numbers
+    that are not finite.
 
     Parameters
     ----------

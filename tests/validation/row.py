@@ -52,7 +52,7 @@ class Row:
         found, expected = self.found[worst], self.expected[worst]
         count = f" ({self.found.size} values, the worst)" if self.found.size > 1 else ""
         tolerance = (
-            f"{self.relative:.0e} rel." if self.relative else f"{self.absolute:.0e}" if self.absolute else "none"
+            f"{self.relative:.2g} rel." if self.relative else f"{self.absolute:.2g}" if self.absolute else "none"
         )
         difference = abs(found - expected) / (abs(expected) if self.relative else 1.0)
         cells = [f"{self.name}{count}", f"{found:.7g}", f"{expected:.7g}", self.unit, f"{difference:.1e}", tolerance]

@@ -6,8 +6,7 @@ use crate::system::{Build, Dynamics};
 
 /// The dynamics of a machine, ready to be evaluated again and again without allocation.
 ///
-/// Every method takes one number per coordinate and complains about any other length; numbers that are not finite give results
-/// that are not finite.
+/// Every method takes one finite number per coordinate and complains about anything else.
 #[derive(Clone, Debug)]
 pub struct Prepared {
     dynamics: Dynamics<f64>,
@@ -83,9 +82,17 @@ impl Prepared {
             if vector.len() != self.coordinates() {
                 return Err(wrong_length(name, self.coordinates(), vector.len()));
             }
+            if let Some(place) = vector.iter().position(|number| !number.is_finite()) {
+                return Err(not_finite(name, place, vector[place]));
+            }
         }
         Ok(())
     }
+}
+
+#[cold]
+fn not_finite(name: &str, place: usize, value: f64) -> Error {
+    Error::NonFinite { path: format!("{name}[{place}]"), value }
 }
 
 #[cold]
