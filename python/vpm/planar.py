@@ -235,8 +235,8 @@ class PlanarArm:
         Gauss stations over each link, 2 to 40; coefficients + 1 is enough.
     order : {2, 4}
         Of the steps. Order 2 takes two evaluations of the equations of motion in each step and is the robust choice for
-        short steps, such as a controller's period. Order 4 takes six, and allows steps of 10 ms where order 2 needs 1 ms,
-        if the reference is smooth.
+        short steps, such as a controller's period. Order 4 takes six, and allows steps of 10 ms where order 2 needs
+        1 ms, if the reference is smooth.
 
     Raises
     ------
@@ -247,8 +247,8 @@ class PlanarArm:
     -----
     Source: Simo & Vu-Quoc 1986, "On the dynamics of flexible beams under large overall motions", J. Appl. Mech. 53,
     without shear and extension, discretised in the curvature. Steps of order 2: Rosenbrock method, Verwer, Spee, Blom &
-    Hundsdorfer 1999. Steps of order 4: additive Runge-Kutta method, Kennedy & Carpenter 2003, used semi-implicitly as in
-    Boscarino, Filbet & Russo 2016.
+    Hundsdorfer 1999. Steps of order 4: additive Runge-Kutta method, Kennedy & Carpenter 2003, used semi-implicitly as
+    in Boscarino, Filbet & Russo 2016.
 
     Examples
     --------
