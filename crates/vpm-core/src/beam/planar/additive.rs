@@ -63,7 +63,7 @@ const IMPLICIT: [[f64; STAGES]; STAGES] = [
 
 /// Fourth order in fixed steps on second-order equations; L-stable for the linear forces, explicit in all others.
 ///
-/// Law (ARK4(3)6L\[2\]SA, used semi-implicitly): `M(x_E) a = force(x_E, v_E) - K (x_I - x_E) - D (v_I - v_E)` in six stages, where the
+/// Law (ARK4(3)6L\[2\]SA, used semi-implicitly): `M(x_E) a = force(x_E, v_E) - K x_I - D v_I` in six stages, where the
 /// explicit table makes `(x_E, v_E)` and the implicit one `(x_I, v_I)`, whose own derivative counts by 1/4 of the step. Both
 /// tables have the same weights, so the order is that of the additive method whichever argument stands where. Each stage
 /// factorises `M + h/4 D + (h/4)^2 K` once. Where a fast component follows a slow motion the order may fall to 2, that of the stages.
@@ -72,8 +72,6 @@ const IMPLICIT: [[f64; STAGES]; STAGES] = [
 #[derive(Clone, Debug)]
 pub struct Additive<const ALL: usize> {
     step: f64,
-    stiffness: [[f64; ALL]; ALL],
-    damping: [[f64; ALL]; ALL],
     /// `h/4 D + (h/4)^2 K`.
     shift: [[f64; ALL]; ALL],
 }
@@ -84,46 +82,34 @@ impl<const ALL: usize> Additive<ALL> {
         let reach = GAMMA * step;
         let shift =
             std::array::from_fn(|i| std::array::from_fn(|j| reach * damping[i][j] + reach * reach * stiffness[i][j]));
-        Self { step, stiffness, damping, shift }
+        Self { step, shift }
     }
 
     /// Moves the state on by one step from time `t` (s).
     pub fn step<S: Scalar>(&self, mechanism: &mut impl Mechanism<S, ALL>, motion: &mut Motion<S, ALL>, t: f64) {
         let h = self.step;
-        let (mass, force) = mechanism.evaluate(motion, t);
+        let (mass, force) = mechanism.evaluate(motion, motion, t);
         let mut slopes = [Motion { position: [S::zero(); ALL], velocity: [S::zero(); ALL] }; STAGES];
         slopes[0] = Motion { position: motion.velocity, velocity: Cholesky::new(&mass).solve(&force) };
         for stage in 1..STAGES {
             let (known, rest) = slopes.split_at_mut(stage);
             let seen = ahead(motion, known, &EXPLICIT[stage], h);
-            let start = ahead(motion, known, &IMPLICIT[stage], h);
-            let (mass, force) = mechanism.evaluate(&seen, t + PLACES[stage] * h);
-            rest[0] = self.stage(mass, force, &seen, &start);
+            let mut start = ahead(motion, known, &IMPLICIT[stage], h);
+            // The linear forces act where the stage would end without acceleration; the shift adds what this one changes.
+            for (place, &rate) in start.position.iter_mut().zip(&start.velocity) {
+                *place += rate * (GAMMA * h);
+            }
+            let (mut mass, force) = mechanism.evaluate(&seen, &start, t + PLACES[stage] * h);
+            for (row, shift) in mass.iter_mut().zip(&self.shift) {
+                for (entry, &shift) in row.iter_mut().zip(shift) {
+                    *entry = *entry + shift;
+                }
+            }
+            let rate = Cholesky::new(&mass).solve(&force);
+            let position = std::array::from_fn(|k| start.velocity[k] + rate[k] * (GAMMA * h));
+            rest[0] = Motion { position, velocity: rate };
         }
         *motion = ahead(motion, &slopes, &IMPLICIT[STAGES - 1], h);
-    }
-
-    /// The slopes of a stage whose stiff forces act at `start` plus a quarter step along these very slopes.
-    #[inline]
-    fn stage<S: Scalar>(
-        &self,
-        mut mass: [[S; ALL]; ALL],
-        mut force: [S; ALL],
-        seen: &Motion<S, ALL>,
-        start: &Motion<S, ALL>,
-    ) -> Motion<S, ALL> {
-        let reach = GAMMA * self.step;
-        let velocity: [S; ALL] = std::array::from_fn(|k| start.velocity[k] - seen.velocity[k]);
-        let position: [S; ALL] =
-            std::array::from_fn(|k| start.position[k] + start.velocity[k] * reach - seen.position[k]);
-        for i in 0..ALL {
-            for j in 0..ALL {
-                force[i] -= position[j] * self.stiffness[i][j] + velocity[j] * self.damping[i][j];
-                mass[i][j] += S::from_f64(self.shift[i][j]);
-            }
-        }
-        let rate = Cholesky::new(&mass).solve(&force);
-        Motion { position: std::array::from_fn(|k| start.velocity[k] + rate[k] * reach), velocity: rate }
     }
 }
 

@@ -153,7 +153,7 @@ impl<const LINKS: usize, const EACH: usize, const ALL: usize> Arm<LINKS, EACH, A
         motion: &Motion<f64, ALL>,
         reference: &[Reference; LINKS],
     ) -> ([[f64; ALL]; ALL], [f64; ALL]) {
-        self.plant.evaluate(motion, reference)
+        self.plant.evaluate(motion, motion, reference)
     }
 }
 
@@ -162,13 +162,14 @@ impl<const LINKS: usize, const EACH: usize, const ALL: usize> Plant<LINKS, EACH,
     fn evaluate(
         &mut self,
         motion: &Motion<f64, ALL>,
+        linear: &Motion<f64, ALL>,
         reference: &[Reference; LINKS],
     ) -> ([[f64; ALL]; ALL], [f64; ALL]) {
         let Terms { mass, bias } = self.chain.terms(motion, &Load::default(), &mut self.workspace);
         let mut force = bias.map(|entry| -entry);
         for (i, force) in force.iter_mut().enumerate() {
             for j in 0..ALL {
-                *force -= self.stiffness[i][j] * motion.position[j] + self.damping[i][j] * motion.velocity[j];
+                *force -= self.stiffness[i][j] * linear.position[j] + self.damping[i][j] * linear.velocity[j];
             }
         }
         for ((servo, row), aim) in self.servos.iter().zip(&self.joints).zip(reference) {
@@ -186,8 +187,13 @@ where
     F: Fn(f64) -> [Reference; LINKS],
 {
     #[inline]
-    fn evaluate(&mut self, motion: &Motion<f64, ALL>, t: f64) -> ([[f64; ALL]; ALL], [f64; ALL]) {
-        self.plant.evaluate(motion, &(self.reference)(t))
+    fn evaluate(
+        &mut self,
+        motion: &Motion<f64, ALL>,
+        linear: &Motion<f64, ALL>,
+        t: f64,
+    ) -> ([[f64; ALL]; ALL], [f64; ALL]) {
+        self.plant.evaluate(motion, linear, &(self.reference)(t))
     }
 }
 
