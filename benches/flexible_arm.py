@@ -29,8 +29,17 @@ from reference_arm import DURATION, MOTIONS, errors, planar_arm  # noqa: E402
 Array = NDArray[np.float64]
 Run = Callable[[], tuple[Array, Array]]
 
-#: Curvature coefficients, stations and steps in 0.1 s of vpm's arm.
-OWN = ((2, 4, 50), (3, 4, 50), (3, 4, 100), (3, 4, 125), (4, 5, 50), (4, 5, 60), (4, 5, 100))
+#: Curvature coefficients, stations, order and steps in 0.1 s of vpm's arm.
+OWN = (
+    (2, 4, 2, 50),
+    (3, 4, 2, 50),
+    (3, 4, 2, 100),
+    (4, 5, 2, 50),
+    (4, 5, 2, 100),
+    (3, 4, 4, 10),
+    (4, 5, 4, 10),
+    (4, 5, 4, 20),
+)
 #: Elements per link, step (s), and whether each step renews the Jacobian.
 EXUDYN = ((2, 2e-3, False), (2, 1e-3, False), (2, 1e-3, True), (4, 2e-3, False), (4, 1e-3, False), (4, 1e-3, True))
 #: Steps (s).
@@ -74,8 +83,8 @@ def measure(engine: str, setting: str, motion: str, prepare: Callable[[], Run], 
     return Row(engine, setting, motion, distance, (float(strain[0]), float(strain[1])), tuple(wall), tuple(cpu))
 
 
-def own(motion: str, coefficients: int, points: int, steps: int) -> Callable[[], Run]:
-    arm = planar_arm(motion, coefficients, points)
+def own(motion: str, coefficients: int, points: int, order: int, steps: int) -> Callable[[], Run]:
+    arm = planar_arm(motion, coefficients, points, order)
 
     def run() -> tuple[Array, Array]:
         found = arm.run(DURATION, samples=241, steps=steps)
@@ -86,9 +95,9 @@ def own(motion: str, coefficients: int, points: int, steps: int) -> Callable[[],
 
 def rows(repeats: int, quick: bool) -> Iterator[Row]:
     for motion in MOTIONS:
-        for coefficients, points, steps in OWN:
-            setting = f"{coefficients} coefficients, {100 / steps:.3g} ms"
-            yield measure("vpm", setting, motion, own(motion, coefficients, points, steps), 4 * repeats)
+        for coefficients, points, order, steps in OWN:
+            setting = f"{coefficients} coefficients, order {order}, {100 / steps:.3g} ms"
+            yield measure("vpm", setting, motion, own(motion, coefficients, points, order, steps), 4 * repeats)
         if find_spec("exudyn"):
             from exudyn_arm import ExudynArm, fastest_solver
 

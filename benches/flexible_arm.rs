@@ -5,19 +5,23 @@ use std::time::{Duration, Instant};
 
 use criterion::Criterion;
 use vpm_core::Result;
-use vpm_core::beam::planar::State;
+use vpm_core::beam::planar::{Order, State};
 use vpm_core::error::Error;
 
 #[path = "../crates/vpm-core/tests/common/flexible_arm.rs"]
 mod flexible_arm;
-use flexible_arm::{Case, arm};
+use flexible_arm::{Case, Errors, arm};
 
 /// Length of the motion in s.
 const MOTION: f64 = 24.0;
 
 /// The whole fast motion with `EACH - 1` curvature coordinates per link in steps of `step` (s).
-fn motion<const EACH: usize, const ALL: usize>(case: &Case, step: f64) -> Result<impl FnMut() + use<EACH, ALL>> {
-    let (mut arm, reference) = (arm::<EACH, ALL>(5, step)?, case.reference());
+fn motion<const EACH: usize, const ALL: usize>(
+    order: Order,
+    case: &Case,
+    step: f64,
+) -> Result<impl FnMut() + use<EACH, ALL>> {
+    let (mut arm, reference) = (arm::<EACH, ALL>(order, 5, step)?, case.reference());
     let steps = (MOTION / step).round() as usize;
     Ok(move || {
         let mut state = State::default();
@@ -34,20 +38,26 @@ fn main() -> Result<()> {
         .sample_size(30)
         .configure_from_args();
     let case = Case::load("fast").ok_or(Error::Interrupted)?;
-    let mut usual = motion::<5, 10>(&case, 2e-3)?;
+    let mut usual = motion::<5, 10>(Order::Second, &case, 2e-3)?;
     criterion.bench_function("flexible_arm/24s_four_coordinates_2ms", |bencher| bencher.iter(&mut usual));
-    let mut small = motion::<4, 8>(&case, 2e-3)?;
+    let mut small = motion::<4, 8>(Order::Second, &case, 2e-3)?;
     criterion.bench_function("flexible_arm/24s_three_coordinates_2ms", |bencher| bencher.iter(&mut small));
-    let mut close = motion::<5, 10>(&case, 1e-3)?;
+    let mut close = motion::<5, 10>(Order::Second, &case, 1e-3)?;
     criterion.bench_function("flexible_arm/24s_four_coordinates_1ms", |bencher| bencher.iter(&mut close));
+    let mut high = motion::<5, 10>(Order::Fourth, &case, 1e-2)?;
+    criterion.bench_function("flexible_arm/24s_four_coordinates_fourth_order_10ms", |bencher| bencher.iter(&mut high));
     criterion.final_summary();
-    let begin = Instant::now();
-    usual();
-    let (wall, errors) = (begin.elapsed(), case.run::<5, 10>(5, 2e-3)?);
-    println!(
-        "24 s of the fast motion take {wall:?} in steps of 2 ms: {:.0} times real time",
-        MOTION / wall.as_secs_f64()
-    );
-    println!("tip error {:.1e} m, strain errors {:.1e} and {:.1e}", errors.tip, errors.strain[0], errors.strain[1]);
+    report("2 ms, second order", &mut usual, &case.run::<5, 10>(Order::Second, 5, 2e-3)?);
+    report("10 ms, fourth order", &mut high, &case.run::<5, 10>(Order::Fourth, 5, 1e-2)?);
     Ok(())
+}
+
+/// Prints speed and errors of one motion.
+fn report(steps: &str, motion: &mut impl FnMut(), errors: &Errors) {
+    let begin = Instant::now();
+    motion();
+    let wall = begin.elapsed();
+    let times = MOTION / wall.as_secs_f64();
+    println!("24 s of the fast motion take {wall:?} in steps of {steps}: {times:.0} times real time");
+    println!("tip error {:.1e} m, strain errors {:.1e} and {:.1e}", errors.tip, errors.strain[0], errors.strain[1]);
 }

@@ -31,8 +31,8 @@ def swing(motion: str) -> Swing:
     return Swing(case["amp"], case["T"])
 
 
-def planar_arm(motion: str, coefficients: int, points: int) -> PlanarArm:
-    """The arm with so many curvature coefficients per link."""
+def planar_arm(motion: str, coefficients: int, points: int, order: int = 2) -> PlanarArm:
+    """The arm with so many curvature coefficients per link, in steps of that order."""
     strip = {"young": P["E"], "density": P["rho"], "damping": P["beta"]}
     first = FlexibleLink.strip(
         P["l1"], P["b"], P["h"], **strip, hub_inertia=P["Jh1"], tip_mass=P["me"], tip_inertia=P["Je"]
@@ -48,6 +48,7 @@ def planar_arm(motion: str, coefficients: int, points: int) -> PlanarArm:
         gravity=(0.0, -P["g"]),
         coefficients=coefficients,
         points=points,
+        order=order,
     )
 
 

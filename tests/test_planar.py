@@ -27,6 +27,15 @@ def test_four_coefficients_and_2_ms_track_the_reference(motion: str) -> None:
     assert strain[1] <= 2.5e-3
 
 
+@pytest.mark.parametrize("motion", MOTIONS)
+def test_order_4_tracks_the_reference_in_steps_of_10_ms(motion: str) -> None:
+    run = planar_arm(motion, 4, 5, order=4).run(DURATION, samples=241, steps=10)
+    tip, strain = errors(motion, run.tip[1:], run.strains[1:])
+    assert tip <= 1e-6
+    assert strain[0] <= 4e-4
+    assert strain[1] <= 2.5e-3
+
+
 def test_more_coefficients_come_nearer() -> None:
     found = [errors("fast", *_tip_and_strains(coefficients))[0] for coefficients in (2, 3, 4)]
     assert found[0] > 3.0 * found[1] > 0.0
@@ -102,6 +111,8 @@ def test_what_cannot_be_is_refused_in_one_sentence() -> None:
         PlanarArm([link] * 3, [(1.0, 0.0)] * 3, still)
     with pytest.raises(ModelError, match="not 1 with 5"):
         PlanarArm([link], [(1.0, 0.0)], still, coefficients=5)
+    with pytest.raises(ModelError, match="order 2 or 4, not 3"):
+        PlanarArm([link], [(1.0, 0.0)], still, order=3)
     with pytest.raises(ModelError, match="there are 1 servos for 2 links"):
         PlanarArm([link] * 2, [(1.0, 0.0)], still)
     with pytest.raises(ModelError, match=r"link\.bending"):

@@ -384,7 +384,7 @@ class PlanarArm:
     """
 
     def __new__(
-        cls, links: ArrayLike, servos: ArrayLike, gravity: _Pair, coefficients: int, points: int
+        cls, links: ArrayLike, servos: ArrayLike, gravity: _Pair, coefficients: int, points: int, order: int
     ) -> PlanarArm: ...
     @property
     def n_coordinates(self) -> int:

@@ -6,7 +6,7 @@
 use serde_json::Value;
 use vpm_core::Result;
 use vpm_core::beam::linear::{Plane, TipBody};
-use vpm_core::beam::planar::{Arm, Hub, LinkParameters, PlanarChain, Reference, Servo, State};
+use vpm_core::beam::planar::{Arm, Hub, LinkParameters, Order, PlanarChain, Reference, Servo, State};
 use vpm_core::beam::{Basis, Material, Section, Shape};
 
 const STEEL: Material = Material { young: 210e9, poisson: 0.3, density: 7850.0 };
@@ -58,8 +58,8 @@ impl Case {
     }
 
     /// Runs the arm over the whole record in steps of `step` and compares.
-    pub fn run<const EACH: usize, const ALL: usize>(&self, points: usize, step: f64) -> Result<Errors> {
-        let mut arm = arm::<EACH, ALL>(points, step)?;
+    pub fn run<const EACH: usize, const ALL: usize>(&self, order: Order, points: usize, step: f64) -> Result<Errors> {
+        let mut arm = arm::<EACH, ALL>(order, points, step)?;
         let (reference, steps) = (self.reference(), (0.1 / step).round() as usize);
         let gauges = [0, 1].map(|link| arm.chain().curvature_row(link, GAUGE));
         let (mut state, mut tip_sum, mut error, mut size) = (State::default(), 0.0, [0.0; 2], [0.0; 2]);
@@ -81,7 +81,7 @@ impl Case {
 }
 
 /// The arm with `EACH - 1` curvature coordinates per link.
-pub fn arm<const EACH: usize, const ALL: usize>(points: usize, step: f64) -> Result<Arm<2, EACH, ALL>> {
+pub fn arm<const EACH: usize, const ALL: usize>(order: Order, points: usize, step: f64) -> Result<Arm<2, EACH, ALL>> {
     let strip = Section::new(Shape::Rectangle { width: 0.015, height: 0.004 }, STEEL)?;
     let link = LinkParameters { damping: 5e-4, ..LinkParameters::new(&strip, Plane::Y) };
     let hubs = [0.02, 0.002].map(|inertia| Hub { inertia, ..Hub::default() });
@@ -92,5 +92,5 @@ pub fn arm<const EACH: usize, const ALL: usize>(points: usize, step: f64) -> Res
         (LinkParameters { hub: hubs[1], tip: tips[1], ..link }, basis(LENGTHS[1])?),
     ];
     let servos = [Servo { stiffness: 400.0, damping: 10.0 }, Servo { stiffness: 50.0, damping: 0.5 }];
-    Arm::new(PlanarChain::new(links, [0.0, -9.81], points)?, servos, step)
+    Arm::of_order(order, PlanarChain::new(links, [0.0, -9.81], points)?, servos, step)
 }

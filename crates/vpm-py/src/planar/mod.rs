@@ -5,7 +5,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use vpm_core::beam::Basis;
 use vpm_core::beam::linear::TipBody;
-use vpm_core::beam::planar::{Arm, Hub, LinkParameters, PlanarChain, Servo, State};
+use vpm_core::beam::planar::{Arm, Hub, LinkParameters, Order, PlanarChain, Servo, State};
 use vpm_core::error::Error;
 use vpm_core::sensitivity::Interrupt;
 
@@ -35,6 +35,7 @@ const BLOCK: usize = 20_000;
 /// gravity : sequence of two float
 /// coefficients : int
 /// points : int
+/// order : {2, 4}
 ///
 /// Raises
 /// ------
@@ -47,6 +48,7 @@ pub(crate) struct PlanarArm {
     gravity: [f64; 2],
     size: Size,
     points: usize,
+    order: Order,
 }
 
 /// The sizes that are compiled: links, then curvature coefficients of each.
@@ -112,6 +114,7 @@ impl Size {
 #[pymethods]
 impl PlanarArm {
     #[new]
+    #[expect(clippy::too_many_arguments, reason = "the arguments of the Python class")]
     fn new(
         py: Python<'_>,
         links: &Any<'_>,
@@ -119,6 +122,7 @@ impl PlanarArm {
         gravity: [f64; 2],
         coefficients: i64,
         points: i64,
+        order: i64,
     ) -> PyResult<Self> {
         let links = Numbers::table("links", links)?.rows_of::<10>()?;
         let servos = Numbers::table("servos", servos)?.rows_of::<2>()?;
@@ -128,7 +132,15 @@ impl PlanarArm {
             return Err(PyValueError::new_err(text));
         }
         let (size, points) = (Size::of(links.len(), coefficients)?, usize::try_from(points).unwrap_or(0));
-        let arm = Self { links, servos, gravity, size, points };
+        let order = match order {
+            2 => Order::Second,
+            4 => Order::Fourth,
+            _ => {
+                let text = format!("the steps of a planar arm have order 2 or 4, not {order}; choose one of them");
+                return Err(PyValueError::new_err(text));
+            }
+        };
+        let arm = Self { links, servos, gravity, size, points, order };
         let checked = match size {
             Size::One2 => arm.build::<1, 3, 3>(1.0).map(|_| ()),
             Size::One3 => arm.build::<1, 4, 4>(1.0).map(|_| ()),
@@ -213,7 +225,7 @@ impl PlanarArm {
             (LinkParameters { bending, line, rotary, damping, hub, tip }, bases[i].clone())
         });
         let servos = std::array::from_fn(|i| Servo { stiffness: self.servos[i][0], damping: self.servos[i][1] });
-        Arm::new(PlanarChain::new(links, self.gravity, self.points)?, servos, step)
+        Arm::of_order(self.order, PlanarChain::new(links, self.gravity, self.points)?, servos, step)
     }
 
     fn record<const LINKS: usize, const EACH: usize, const ALL: usize>(

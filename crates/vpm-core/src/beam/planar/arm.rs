@@ -1,5 +1,6 @@
 //! A flexible arm whose joints follow a reference under proportional-derivative control.
 
+use super::additive::Additive;
 use super::chain::PlanarChain;
 use super::dynamics::{Load, Motion, Terms, Workspace};
 use super::rosenbrock::{Mechanism, Rosenbrock};
@@ -40,11 +41,28 @@ impl<const ALL: usize> Default for State<ALL> {
     }
 }
 
+/// How an arm steps.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Order {
+    /// [`Rosenbrock`]: two evaluations in each step. Robust at any step, and right where a step is a controller's short period.
+    #[default]
+    Second,
+    /// [`Additive`]: six evaluations in each step, which pay off by far as soon as the reference is smooth over a step.
+    Fourth,
+}
+
+/// The method of an order.
+#[derive(Clone, Debug)]
+enum Method<const ALL: usize> {
+    Second(Rosenbrock<ALL>),
+    Fourth(Additive<ALL>),
+}
+
 /// A planar chain with servos, ready to run in fixed steps. Nothing is allocated after [`Arm::new`].
 #[derive(Clone, Debug)]
 pub struct Arm<const LINKS: usize, const EACH: usize, const ALL: usize> {
     plant: Plant<LINKS, EACH, ALL>,
-    method: Rosenbrock<ALL>,
+    method: Method<ALL>,
     step: f64,
 }
 
@@ -67,8 +85,18 @@ struct Driven<'a, F, const LINKS: usize, const EACH: usize, const ALL: usize> {
 }
 
 impl<const LINKS: usize, const EACH: usize, const ALL: usize> Arm<LINKS, EACH, ALL> {
-    /// An arm that runs in steps of `step` (s). A joint without gains is free.
+    /// An arm of the second order that runs in steps of `step` (s). A joint without gains is free.
     pub fn new(chain: PlanarChain<LINKS, EACH, ALL>, servos: [Servo; LINKS], step: f64) -> Result<Self> {
+        Self::of_order(Order::Second, chain, servos, step)
+    }
+
+    /// The same, of any order.
+    pub fn of_order(
+        order: Order,
+        chain: PlanarChain<LINKS, EACH, ALL>,
+        servos: [Servo; LINKS],
+        step: f64,
+    ) -> Result<Self> {
         positive("arm.step", step)?;
         let joints = std::array::from_fn(|i| chain.joint_row(i));
         let [mut stiffness, mut damping] = chain.elasticity();
@@ -76,9 +104,20 @@ impl<const LINKS: usize, const EACH: usize, const ALL: usize> Arm<LINKS, EACH, A
             add_square(&mut stiffness, not_negative("servo.stiffness", servo.stiffness)?, row);
             add_square(&mut damping, not_negative("servo.damping", servo.damping)?, row);
         }
-        let method = Rosenbrock::new([stiffness, damping], step);
+        let method = match order {
+            Order::Second => Method::Second(Rosenbrock::new([stiffness, damping], step)),
+            Order::Fourth => Method::Fourth(Additive::new([stiffness, damping], step)),
+        };
         let workspace = chain.workspace();
         Ok(Self { plant: Plant { chain, workspace, servos, joints, stiffness, damping }, method, step })
+    }
+
+    /// The order of its method.
+    pub fn order(&self) -> Order {
+        match self.method {
+            Method::Second(_) => Order::Second,
+            Method::Fourth(_) => Order::Fourth,
+        }
     }
 
     /// The chain.
@@ -100,7 +139,10 @@ impl<const LINKS: usize, const EACH: usize, const ALL: usize> Arm<LINKS, EACH, A
     #[inline]
     pub fn step(&mut self, state: &mut State<ALL>, reference: impl Fn(f64) -> [Reference; LINKS]) {
         let mut driven = Driven { plant: &mut self.plant, reference };
-        self.method.step(&mut driven, &mut state.motion, state.time);
+        match &self.method {
+            Method::Second(method) => method.step(&mut driven, &mut state.motion, state.time),
+            Method::Fourth(method) => method.step(&mut driven, &mut state.motion, state.time),
+        }
         state.time += self.step;
     }
 
@@ -111,7 +153,7 @@ impl<const LINKS: usize, const EACH: usize, const ALL: usize> Arm<LINKS, EACH, A
         motion: &Motion<f64, ALL>,
         reference: &[Reference; LINKS],
     ) -> ([[f64; ALL]; ALL], [f64; ALL]) {
-        self.plant.evaluate(motion, reference)
+        self.plant.evaluate(motion, motion, reference)
     }
 }
 
@@ -120,13 +162,14 @@ impl<const LINKS: usize, const EACH: usize, const ALL: usize> Plant<LINKS, EACH,
     fn evaluate(
         &mut self,
         motion: &Motion<f64, ALL>,
+        linear: &Motion<f64, ALL>,
         reference: &[Reference; LINKS],
     ) -> ([[f64; ALL]; ALL], [f64; ALL]) {
         let Terms { mass, bias } = self.chain.terms(motion, &Load::default(), &mut self.workspace);
         let mut force = bias.map(|entry| -entry);
         for (i, force) in force.iter_mut().enumerate() {
             for j in 0..ALL {
-                *force -= self.stiffness[i][j] * motion.position[j] + self.damping[i][j] * motion.velocity[j];
+                *force -= self.stiffness[i][j] * linear.position[j] + self.damping[i][j] * linear.velocity[j];
             }
         }
         for ((servo, row), aim) in self.servos.iter().zip(&self.joints).zip(reference) {
@@ -144,8 +187,13 @@ where
     F: Fn(f64) -> [Reference; LINKS],
 {
     #[inline]
-    fn evaluate(&mut self, motion: &Motion<f64, ALL>, t: f64) -> ([[f64; ALL]; ALL], [f64; ALL]) {
-        self.plant.evaluate(motion, &(self.reference)(t))
+    fn evaluate(
+        &mut self,
+        motion: &Motion<f64, ALL>,
+        linear: &Motion<f64, ALL>,
+        t: f64,
+    ) -> ([[f64; ALL]; ALL], [f64; ALL]) {
+        self.plant.evaluate(motion, linear, &(self.reference)(t))
     }
 }
 

@@ -16,6 +16,7 @@
 //! 53, without shear and extension, discretised in the curvature. Checked against closed forms, converged series and the derivatives
 //! of the energies.
 
+mod additive;
 mod arm;
 mod chain;
 mod cholesky;
@@ -25,7 +26,8 @@ mod record;
 mod rosenbrock;
 mod statics;
 
-pub use arm::{Arm, Reference, Servo, State};
+pub use additive::Additive;
+pub use arm::{Arm, Order, Reference, Servo, State};
 pub use chain::{Hub, LinkParameters, PlanarChain};
 pub use cholesky::Cholesky;
 pub use dynamics::{Load, Motion, Terms, Workspace};

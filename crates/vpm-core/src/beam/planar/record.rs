@@ -1,6 +1,6 @@
 //! Whole motions of an arm.
 
-use super::arm::{Arm, Reference, State};
+use super::arm::{Arm, Order, Reference, State};
 use crate::error::{Diverged, Error, Result};
 
 impl<const ALL: usize> State<ALL> {
@@ -40,7 +40,10 @@ impl<const LINKS: usize, const EACH: usize, const ALL: usize> Arm<LINKS, EACH, A
             what: "the motion of the flexible arm".to_owned(),
             time,
             sample_index: sample,
-            method: "linearly_implicit",
+            method: match self.order() {
+                Order::Second => "linearly_implicit",
+                Order::Fourth => "additive",
+            },
             step: self.step_size(),
             repair: "use a smaller step, and check gains, masses and stiffnesses with their units",
             outputs: Vec::new(),

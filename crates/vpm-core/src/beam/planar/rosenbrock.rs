@@ -6,8 +6,8 @@ use crate::scalar::Scalar;
 
 /// A mechanism `M(x) a = force(x, v, t)` whose stiff forces are linear.
 pub trait Mechanism<S, const ALL: usize> {
-    /// Mass matrix (lower triangle) and total force at time `t` (s).
-    fn evaluate(&mut self, motion: &Motion<S, ALL>, t: f64) -> ([[S; ALL]; ALL], [S; ALL]);
+    /// Mass matrix (lower triangle) and total force at time `t` (s), of which the linear part is that at `linear`.
+    fn evaluate(&mut self, motion: &Motion<S, ALL>, linear: &Motion<S, ALL>, t: f64) -> ([[S; ALL]; ALL], [S; ALL]);
 }
 
 /// The diagonal coefficient: 1 - 1/sqrt(2), which makes the method L-stable.
@@ -41,7 +41,7 @@ impl<const ALL: usize> Rosenbrock<ALL> {
     /// Moves the state on by one step from time `t` (s).
     pub fn step<S: Scalar>(&self, mechanism: &mut impl Mechanism<S, ALL>, motion: &mut Motion<S, ALL>, t: f64) {
         let h = self.step;
-        let (mass, force) = mechanism.evaluate(motion, t);
+        let (mass, force) = mechanism.evaluate(motion, motion, t);
         let mut shifted = mass;
         for (row, extra) in shifted.iter_mut().zip(&self.shift) {
             for (entry, &extra) in row.iter_mut().zip(extra) {
@@ -51,7 +51,7 @@ impl<const ALL: usize> Rosenbrock<ALL> {
         let left = Cholesky::new(&shifted);
         let (x1, v1) = self.stage(&left, &motion.velocity, force);
         let next = Motion { position: ahead(&motion.position, &x1, h), velocity: ahead(&motion.velocity, &v1, h) };
-        let (next_mass, force) = mechanism.evaluate(&next, t + h);
+        let (next_mass, force) = mechanism.evaluate(&next, &next, t + h);
         let mut rest = Cholesky::new(&next_mass).solve(&force);
         for (rest, &v1) in rest.iter_mut().zip(&v1) {
             *rest -= v1 * 2.0;
