@@ -40,6 +40,7 @@ class Run:
     model_name: str = "slide"
     experiment_name: str = "log"
     mode: str = "free_run"
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

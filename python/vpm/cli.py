@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
@@ -13,7 +14,7 @@ import typer
 from rich.console import Console
 
 from vpm import __version__
-from vpm.errors import VpmError
+from vpm.errors import ValidityWarning, VpmError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -65,7 +66,7 @@ def main() -> None:
 
 @app.command(epilog="Example:  vpm info examples/emps/model.toml")
 def info(model: Annotated[Path | None, typer.Argument(metavar="[MODEL]", help="Model file to list.")] = None) -> None:
-    """Version, or the parameters of a model with units and bounds."""
+    """Version, or a model's flexible links, and its parameters with units and bounds."""
     if model is None:
         console.print(f"vpm {__version__}")
         return
@@ -73,6 +74,8 @@ def info(model: Annotated[Path | None, typer.Argument(metavar="[MODEL]", help="M
 
     loaded = Model.load(model)
     console.print(repr(loaded), markup=False)
+    for sentence in loaded.beam_summary:
+        console.print(f"  {sentence}", markup=False)
     for p in loaded.parameters.values():
         spread = "known" if p.uncertainty is None else f"± {p.uncertainty:g}"
         console.print(
@@ -95,9 +98,13 @@ def simulate(
     from vpm.simulate import simulate as simulate_log
 
     machine, record = _load(model, log, channels)
-    run = simulate_log(machine, record, mode, integrator=integrator)
+    with _warnings_told():
+        run = simulate_log(machine, record, mode, integrator=integrator)
     console.print(repr(run), markup=False)
-    console.print(str(compare_run(run, record)), markup=False)
+    try:
+        console.print(str(compare_run(run, record)), markup=False)
+    except VpmError as error:  # commands alone are enough to simulate
+        console.print(f"not compared: {error}", markup=False)
     if out is not None:
         run.save(out)
     _save_plot(run.plot, plot)
@@ -117,7 +124,9 @@ def compare(
     from vpm.simulate import simulate as simulate_log
 
     machine, record = _load(model, log, channels)
-    comparison = compare_run(simulate_log(machine, record, mode, cutoff=cutoff), record)
+    with _warnings_told():
+        run = simulate_log(machine, record, mode, cutoff=cutoff)
+    comparison = compare_run(run, record)
     console.print(str(comparison), markup=False)
     for channel in comparison.channels:
         for sentence in channel.where.sentences:
@@ -297,6 +306,18 @@ def _progress() -> Iterator[Callable[[str], None]]:
         return
     with errors.status("starting") as status:
         yield status.update
+
+
+@contextmanager
+def _warnings_told() -> Iterator[None]:
+    """Warnings as one sentence each, without the line of the program that they come from."""
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always", ValidityWarning)
+        try:
+            yield
+        finally:
+            for warning in told:
+                errors.print(f"warning: {warning.message}", markup=False)
 
 
 def _save_plot(draw: Callable[[], Figure], path: Path | None) -> None:

@@ -144,8 +144,8 @@ class ValidityWarning(UserWarning):
     def __init__(self, beam: str, slope: float, time: float, limit: float, level: str) -> None:
         super().__init__(
             f"{beam} bends by {slope:.3g} rad at t = {time:.4g} s, but its level {level} is right within 1 % up to "
-            f"{limit:.3g} rad only; use a level that is exact at any deflection, such as "
-            f'model.at({{"{beam}": "strain(3)"}})'
+            f"{limit:.3g} rad only; use a level that is exact at any deflection: "
+            f'level = "strain(3)" in the model file, or model.at({{"{beam}": "strain(3)"}})'
         )
         self.beam = beam
         self.slope = slope

@@ -209,7 +209,7 @@ def simulate(
     setup = Setup(integrator, substeps, horizon)
     arrays = simulate_arrays(model, experiment, mode, setup=setup, cutoff=cutoff, initial_state=initial_state)
     run = _run(model, experiment, mode, arrays, setup)
-    return _judged(model, run, arrays)
+    return run if arrays.states is None else judged(model, run, arrays.states)
 
 
 def simulate_arrays(
@@ -240,7 +240,10 @@ def simulate_arrays(
         partial = SimulatedArrays(
             error.outputs, np.zeros((*error.outputs.shape, 0)), np.arange(len(error.outputs)), np.zeros(1, np.int64)
         )
-        raise DivergedError(str(error), run=_run(model, experiment, mode, partial, setup)) from None
+        run = _run(model, experiment, mode, partial, setup)
+        raise DivergedError(
+            str(error), run=run, time=float(experiment.time[0]) + len(run.time) * experiment.dt
+        ) from None
     except VpmError:
         raise
     except ValueError as error:  # of the core: sizes, numbers and steps that no simulation can take
@@ -313,11 +316,14 @@ def copied_channels(model: Model, mode: str, passive: Sequence[str] = ()) -> fro
     return frozenset(commands)
 
 
-def _judged(model: Model, run: Run, arrays: SimulatedArrays) -> Run:
-    """The run with a note, and one warning, if a flexible link left the range in which its kinematics are right."""
-    if arrays.states is None or not model.beams or len(arrays.states) == 0:
+def judged(model: Model, run: Run, states: Array) -> Run:
+    """The run with a note, and one warning, if a flexible link left the range in which its kinematics are right.
+
+    ``states``, shape (N, nx), are those of the run's rows.
+    """
+    if not model.beams or len(states) == 0:
         return run
-    slopes = model.core.slopes(model.theta, arrays.states)
+    slopes = model.core.slopes(model.theta, states)
     limit = model.core.slope_limit
     largest = np.max(np.where(np.isnan(slopes), 0.0, slopes), axis=0)
     if not np.any(largest > limit):

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from vpm.errors import DivergedError, SimulationError, near_match
 from vpm.model import Model
-from vpm.simulate import Run, Setup
+from vpm.simulate import Run, Setup, judged
 
 Array = NDArray[np.float64]
 
@@ -67,6 +67,9 @@ class Simulation:
         except ValueError as error:
             raise SimulationError(str(error)) from error
         self._outputs = self._core.outputs
+        # States that a run passed, for links whose kinematics hold up to a slope only; empty where there are none.
+        self._passed: list[Array] = []
+        self._limited = self._has_limited_links()
 
     # ---- what it is --------------------------------------------------------------------------------------------------
 
@@ -179,11 +182,17 @@ class Simulation:
             A size or a number is wrong.
         DivergedError
             The state left the finite numbers.
+
+        Warns
+        -----
+        ValidityWarning
+            A flexible link in displacement coordinates bends more than its kinematics allow.
         """
         begin = self.time
+        self._passed.clear()
         rows = self._controlled(inputs, duration) if callable(inputs) else self._driven(inputs)
         time = begin + self._time_step * np.arange(1.0, len(rows) + 1.0)
-        return Run(
+        run = Run(
             self._model.name,
             "simulation",
             "steps",
@@ -194,6 +203,7 @@ class Simulation:
             np.full(rows.shape, np.nan),
             settings={"integrator": self._setup.integrator, "substeps": self._setup.substeps},
         )
+        return judged(self._model, run, np.array(self._passed)) if self._passed else run
 
     def reset(self, state: Mapping[str, float] | ArrayLike | None = None) -> None:
         """Begin again at time zero, with nothing remembered.
@@ -227,6 +237,8 @@ class Simulation:
                 f"the commands have shape {table.shape}, but {columns} actuators need (N, {columns}); "
                 "give one row per step"
             )
+        if self._limited:
+            return np.array([self._kept(self.step(command)) for command in table]).reshape(-1, len(self.channels))
         try:
             rows = self._core.run(table)
         except Diverged as error:
@@ -244,8 +256,19 @@ class Simulation:
         count = max(1, round(duration / self._time_step))
         rows = np.empty((count, len(self.channels)))
         for row in rows:
-            row[:] = self.step(controller(self))
+            row[:] = self._kept(self.step(controller(self)))
         return rows
+
+    def _kept(self, outputs: Array) -> Array:
+        if self._limited:
+            self._passed.append(self.state)
+        return outputs
+
+    def _has_limited_links(self) -> bool:
+        if not self._model.core.n_elastic:
+            return False
+        slopes = self._model.core.slopes(self._model.theta, self._start[None, :])
+        return not bool(np.isnan(slopes).all())
 
     def __repr__(self) -> str:
         return f"Simulation({self._model.name!r}, time={self.time:.6g} s, time_step={self._time_step:g} s)"

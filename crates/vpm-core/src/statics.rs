@@ -13,6 +13,8 @@ use crate::system::{Build, Dynamics};
 const LANES: usize = 8;
 /// Newton steps before the search counts as lost.
 const STEPS: usize = 60;
+/// Into how many stages the weight is cut, until the way from the straight beams to rest is smooth.
+const STAGES: [usize; 6] = [1, 2, 4, 8, 16, 32];
 /// Halvings of a Newton step that does not bring the beams closer to rest.
 const HALVINGS: usize = 12;
 
@@ -38,6 +40,16 @@ pub(crate) struct Rest {
     pub(crate) tangent: DMatrix<f64>,
 }
 
+/// How Newton's method ended.
+enum Newton {
+    /// Every step led closer.
+    Smooth(Rest),
+    /// Some steps had to be halved: this may be another rest than the one that the weight bends the beams to.
+    Rough(Rest),
+    /// What was missing when it gave up.
+    Lost(f64),
+}
+
 impl Statics {
     /// With the joints `passive` free, beside the beams.
     pub(crate) fn new(description: &Description, theta: &[f64], passive: &[usize]) -> Result<Self> {
@@ -51,8 +63,9 @@ impl Statics {
     /// The free coordinates at rest under gravity with the other joints held at `joints`; passive ones are sought from there.
     ///
     /// Law: `bias(q, 0) + K q = effects(q, 0)` on the free coordinates, by Newton's method from the straight beams with exact
-    /// derivatives (dual numbers); a step that leads away is halved. Passive joints are first moved to where their own load changes its
-    /// sign: from the flat middle of a play Newton's first step would lead anywhere. Checked: converged to rounding.
+    /// derivatives (dual numbers). Where that goes astray the weight is put on in stages, so that of several places at rest it is the
+    /// one that the beams sag to. Passive joints are first moved to where their own load changes its sign: from the flat middle of a
+    /// play Newton's first step would lead anywhere. Checked: converged to rounding.
     pub(crate) fn settle(&mut self, joints: &[f64]) -> Result<Rest> {
         let n = self.plain.coordinates();
         let mut coordinates = joints.to_vec();
@@ -63,9 +76,37 @@ impl Statics {
         for place in 0..self.passive.len() {
             self.push(&mut coordinates, place);
         }
-        let mut residual = self.residual(&coordinates);
+        for &stages in &STAGES {
+            if let Some(rest) = self.staged(&coordinates, stages) {
+                return Ok(rest);
+            }
+        }
+        match self.newton(coordinates.clone(), 1.0) {
+            Newton::Smooth(rest) | Newton::Rough(rest) => Ok(rest),
+            Newton::Lost(missing) => Err(self.unsettled(missing)),
+        }
+    }
+
+    /// Rest under a weight that grows in equal stages, if each stage leads smoothly to a stable one.
+    fn staged(&mut self, start: &[f64], stages: usize) -> Option<Rest> {
+        let mut last = None;
+        let mut coordinates = start.to_vec();
+        for stage in 1..=stages {
+            let Newton::Smooth(rest) = self.newton(coordinates, stage as f64 / stages as f64) else { return None };
+            let stiffness = (&rest.tangent + rest.tangent.transpose()) * 0.5;
+            stiffness.cholesky()?;
+            coordinates = rest.coordinates.clone();
+            last = Some(rest);
+        }
+        last
+    }
+
+    /// Newton's method under a share of the weight; a step that leads away is halved.
+    fn newton(&mut self, mut coordinates: Vec<f64>, weight: f64) -> Newton {
+        let mut smooth = true;
+        let mut residual = self.residual(&coordinates, weight);
         for _ in 0..STEPS {
-            let tangent = self.tangent(&coordinates);
+            let tangent = self.tangent(&coordinates, weight);
             let step = tangent.clone().lu().solve(&residual).filter(|step| step.iter().all(|entry| entry.is_finite()));
             let Some(step) = step else { break };
             let size = self.free.iter().fold(1.0_f64, |most, &place| most.max(coordinates[place].abs()));
@@ -73,19 +114,20 @@ impl Statics {
             for _ in 0..HALVINGS {
                 let mut moved = coordinates.clone();
                 self.free.iter().zip(step.iter()).for_each(|(&place, step)| moved[place] -= share * step);
-                let found = self.residual(&moved);
+                let found = self.residual(&moved, weight);
                 let closer = found.norm() <= residual.norm() || share * step.amax() < 1e-11 * size;
                 if closer || share < 1e-3 {
                     (coordinates, residual) = (moved, found);
                     break;
                 }
-                share *= 0.5;
+                (share, smooth) = (share * 0.5, false);
             }
             if step.amax() < 1e-11 * size {
-                return Ok(Rest { coordinates, tangent });
+                let rest = Rest { coordinates, tangent };
+                return if smooth { Newton::Smooth(rest) } else { Newton::Rough(rest) };
             }
         }
-        Err(self.unsettled(residual.amax()))
+        Newton::Lost(residual.amax())
     }
 
     fn unsettled(&self, value: f64) -> Error {
@@ -105,7 +147,7 @@ impl Statics {
         let start = coordinates[joint];
         let mut load = |way: f64| {
             coordinates[joint] = start + way;
-            unbalance(&mut self.plain, coordinates)[joint]
+            unbalance(&mut self.plain, coordinates, 1.0)[joint]
         };
         let first = load(0.0);
         let (mut near, mut far) = (0.0, -WAYS[0] * first.signum());
@@ -123,17 +165,17 @@ impl Statics {
         load(far);
     }
 
-    fn residual(&mut self, q: &[f64]) -> DVector<f64> {
-        let load = unbalance(&mut self.plain, q);
+    fn residual(&mut self, q: &[f64], weight: f64) -> DVector<f64> {
+        let load = unbalance(&mut self.plain, q, weight);
         DVector::from_iterator(self.free.len(), self.free.iter().map(|&place| load[place]))
     }
 
     /// The derivative of the residual.
-    fn tangent(&mut self, q: &[f64]) -> DMatrix<f64> {
+    fn tangent(&mut self, q: &[f64], weight: f64) -> DMatrix<f64> {
         let count = self.free.len();
         let mut tangent = DMatrix::zeros(count, count);
         for (sweep, lanes) in self.free.chunks(LANES).enumerate() {
-            let load = unbalance(&mut self.dual, &seed(q, lanes));
+            let load = unbalance(&mut self.dual, &seed(q, lanes), weight);
             for (row, &place) in self.free.iter().enumerate() {
                 for (lane, &slope) in load[place].gradient[..lanes.len()].iter().enumerate() {
                     tangent[(row, sweep * LANES + lane)] = slope;
@@ -173,12 +215,15 @@ pub(crate) fn free_coordinates<S: Scalar>(dynamics: &Dynamics<S>, passive: &[usi
     passive.iter().copied().chain(dynamics.joints()..dynamics.coordinates()).collect()
 }
 
-/// What the coordinates miss at rest: `bias(q, 0) + K q - effects(q, 0)`.
-fn unbalance<S: Scalar>(dynamics: &mut Dynamics<S>, q: &[S]) -> Vec<S> {
+/// What the coordinates miss at rest under a share of the weight: `weight bias(q, 0) + K q - effects(q, 0)`.
+fn unbalance<S: Scalar>(dynamics: &mut Dynamics<S>, q: &[S], weight: f64) -> Vec<S> {
     let zero = vec![S::zero(); q.len()];
     dynamics.terms(q, &zero);
     let mut load = zero.clone();
     flexible::required(&dynamics.model, &dynamics.data, (q, &zero), &zero, &mut load);
+    for (load, &bias) in load.iter_mut().zip(&dynamics.data.composite.bias) {
+        *load -= bias * (1.0 - weight);
+    }
     for (joint, effect) in &dynamics.effects {
         load[*joint] -= effect.effort_at_rest(q[*joint]);
     }
@@ -203,7 +248,7 @@ pub(crate) fn settled<S: Scalar>(
         q[joint] = S::from_f64(coordinates[joint]);
     }
     let Some(inverse) = tangent.try_inverse() else { return Ok(q) };
-    let missing = unbalance(dynamics, &q);
+    let missing = unbalance(dynamics, &q, 1.0);
     for (row, &place) in inverse.row_iter().zip(&statics.free) {
         let step: S = row.iter().zip(&statics.free).map(|(&entry, &column)| missing[column] * entry).sum();
         q[place] -= step;

@@ -1,121 +1,23 @@
 //! Trees of rigid bodies and beams of every kind against derivations that share nothing with them but the maps of poses.
 
-use vpm_core::beam::Beam;
-use vpm_core::body::Site;
 use vpm_core::data::Data;
 use vpm_core::dynamics::{crba, flexible, rnea};
-use vpm_core::model::Parts;
-use vpm_core::mount::Mount;
 use vpm_core::samples::{Random, random_tree};
-use vpm_core::spatial::{Matrix3, Pose, SpatialInertia, Twist, Vector3};
+use vpm_core::spatial::{SpatialInertia, Twist, Vector3};
 use vpm_core::{Dual, Result, Scalar};
 
+#[path = "common/places.rs"]
+mod places;
 #[cfg(test)]
 #[path = "common/flexible.rs"]
 mod trees;
-use trees::{everything, lift, model};
+use places::{Heavy, Places};
+use trees::{everything, model};
 
 /// Coordinates of the tree of everything: five joints, three and five elastic ones.
 const N: usize = 13;
 type First = Dual<f64, N>;
 type Second = Dual<First, N>;
-
-/// Whatever has mass: an inertia in a frame, or a needle at a point with a direction.
-enum Heavy<S> {
-    Body(Pose<S>, SpatialInertia<f64>),
-    Needle { center: Vector3<S>, direction: Vector3<S>, mass: f64, inertia: f64 },
-}
-
-/// Frames of the machine in the world, from the parts alone: the recursion over mounts as they are written.
-struct Places<'a, S> {
-    parts: &'a Parts<f64>,
-    lifted: Parts<S>,
-    q: &'a [S],
-    beams: Vec<(Beam<S>, usize)>,
-}
-
-impl<'a, S: Scalar> Places<'a, S> {
-    fn new(parts: &'a Parts<f64>, q: &'a [S]) -> Result<Self> {
-        let (lifted, mut first) = (lift::<S>(parts), parts.bodies.len());
-        let mut beams = Vec::new();
-        for entry in &lifted.beams {
-            // Everything sits at one of these shares of the length.
-            let marks = [0.1, 0.25, 0.4, 0.5, 0.6, 0.7, 1.0].map(|share| share * entry.length);
-            let beam = Beam::new(entry, &marks)?;
-            let own = first;
-            first += beam.len();
-            beams.push((beam, own));
-        }
-        Ok(Self { parts, lifted, q, beams })
-    }
-
-    fn mount(&self, mount: Mount) -> Pose<S> {
-        match mount {
-            Mount::World => Pose::identity(),
-            Mount::Body(k) => {
-                let body = &self.parts.bodies[k];
-                self.mount(body.on) * body.joint.pose(self.q[k])
-            }
-            Mount::Section { beam, at } => {
-                let share = [0.1, 0.25, 0.4, 0.5, 0.6, 0.7, 1.0];
-                let mark = share.iter().position(|share| share * self.parts.beams[beam].length == at).unwrap_or(0);
-                self.stations(beam)[self.beams[beam].0.mark(mark)]
-            }
-        }
-    }
-
-    fn placed(&self, on: Mount, translation: [f64; 3], rotation: [f64; 9]) -> Pose<S> {
-        self.mount(on) * Pose::new(Matrix3::from_rows_f64(rotation), Vector3::from_f64(translation))
-    }
-
-    fn stations(&self, number: usize) -> Vec<Pose<S>> {
-        let (entry, (beam, first)) = (&self.parts.beams[number], &self.beams[number]);
-        let root = self.placed(entry.on, entry.translation, entry.rotation);
-        let (mut sections, rest) = (beam.sections(), vec![S::zero(); beam.len()]);
-        beam.motion(&self.q[*first..first + beam.len()], &rest, &mut sections);
-        sections.at.iter().map(|section| root * section.pose).collect()
-    }
-
-    fn heavy(&self) -> Vec<Heavy<S>> {
-        let mut all = Vec::new();
-        for (k, body) in self.parts.bodies.iter().enumerate() {
-            if let Some(inertia) = body.inertia {
-                all.push(Heavy::Body(self.mount(Mount::Body(k)), inertia.spatial()));
-            }
-        }
-        for weld in &self.parts.welds {
-            all.push(Heavy::Body(self.placed(weld.on, weld.translation, weld.rotation), weld.inertia.spatial()));
-        }
-        for (number, (beam, _)) in self.beams.iter().enumerate() {
-            for (station, pose) in self.stations(number).into_iter().enumerate() {
-                all.push(Heavy::Body(pose, beam.inertia(station).value()));
-            }
-        }
-        for point in &self.parts.point_masses {
-            let place = match point.on {
-                Site::Body(k) => self.mount(Mount::Body(k)),
-                Site::Weld(k) => {
-                    let weld = &self.parts.welds[k];
-                    self.placed(weld.on, weld.translation, weld.rotation)
-                }
-                Site::Tip(beam) => self.mount(Mount::Section { beam, at: self.parts.beams[beam].length }),
-            };
-            all.push(Heavy::Body(place, SpatialInertia::point_mass(point.mass, Vector3::from(point.position))));
-        }
-        for line in &self.parts.lines {
-            let [from, to] = [line.from, line.to].map(|end| self.mount(end.on).point(Vector3::from_f64(end.point)));
-            let across = to - from;
-            let direction = across * across.dot(across).sqrt().recip();
-            let at = |point: Vector3<S>, center: f64| point + direction * S::from_f64(center);
-            let barrel = line.barrel.map(|part| (at(from, part.center), part));
-            for (center, part) in barrel.into_iter().chain(line.rod.map(|part| (at(to, -part.center), part))) {
-                all.push(Heavy::Needle { center, direction, mass: part.mass, inertia: part.inertia });
-            }
-        }
-        assert_eq!(self.lifted.bodies.len(), self.parts.bodies.len());
-        all
-    }
-}
 
 fn value(v: Vector3<Second>) -> Vector3<First> {
     Vector3::from(v.to_array().map(|number| number.value))
@@ -194,9 +96,9 @@ fn mass_matrix_and_bias_are_those_of_lagranges_equations() -> Result<()> {
         let [mut q, v] = [0.5, 1.0].map(|size| random.numbers(N, size));
         q.iter_mut().take(5).for_each(|angle| *angle *= 4.0);
         let second: Vec<Second> = (0..N).map(|k| Dual::variable(Dual::variable(q[k], k), k)).collect();
-        let mass = witness_mass(&Places::new(&parts, &second)?.heavy());
+        let mass = witness_mass(&Places::new(&parts)?.heavy(&second));
         let first: Vec<First> = (0..N).map(|k| Dual::variable(q[k], k)).collect();
-        let potential = witness_potential(&Places::new(&parts, &first)?.heavy(), parts.gravity);
+        let potential = witness_potential(&Places::new(&parts)?.heavy(&first), parts.gravity);
         let bias: Vec<f64> = (0..N)
             .map(|i| {
                 let mut sum = potential.gradient[i];

@@ -196,6 +196,44 @@ class Evaluations(Components):
         """
         return self.core.natural_frequencies(self.theta, q)
 
+    @property
+    def beam_summary(self) -> tuple[str, ...]:
+        """Flexible links in sentences: levels and coordinates, frequencies and sag with all joints held at zero."""
+        sentences = []
+        for beam in self.beams:
+            own = [name for name in self.coordinates if name.startswith(f"{beam}.")]
+            shapes = ", ".join(dict.fromkeys(name.split(".")[-2] for name in own)) or "none"
+            sentences.append(f"beam {beam}: level {self.levels[beam]}, {len(own)} elastic coordinates ({shapes})")
+        if self.core.n_elastic:
+            sentences += self._locked_summary()
+        return tuple(sentences)
+
+    def _locked_summary(self) -> Iterator[str]:
+        rest = np.zeros(len(self.joints))
+        try:
+            coordinates, _ = self.equilibrium(rest)
+            frequencies = self.natural_frequencies(rest)
+        except ValueError as error:
+            yield f"warning: no rest with all joints at zero: {error}"
+            return
+        more = ", ..." if frequencies.size > 4 else ""
+        yield (
+            "natural frequencies with all joints locked at zero: "
+            + ", ".join(f"{f:.4g}" for f in frequencies[:4])
+            + (f"{more} Hz")
+        )
+        if frequencies[0] < 0.0:
+            yield "warning: a link buckles under its load there; make it stiffer, or lighter what it carries"
+        states = np.zeros((1, self.core.n_states))
+        states[0, : coordinates.size] = coordinates
+        limit = self.core.slope_limit
+        for beam, slope in zip(self.beams, self.core.slopes(self.theta, states)[0], strict=True):
+            if slope > limit:
+                yield (
+                    f"warning: {beam} sags by {slope:.3g} rad at rest, but its level {self.levels[beam]} is right "
+                    f'within 1 % up to {limit:.3g} rad only; use level = "strain(3)"'
+                )
+
     # ---- linear models -----------------------------------------------------------------------------------------------
 
     def state(self, values: Mapping[str, float] | ArrayLike | None = None) -> Array:

@@ -116,7 +116,8 @@ def _sentence(kind: str, keys: tuple[str | int, ...], found: object, context: Ma
         needed = context.get("min_length") or context.get("max_length")
         if isinstance(found, Mapping):
             return f"is empty; add {_EXAMPLES.get(str(keys[-1]), 'an entry')}"
-        return f"has {context['actual_length']} entries, but has to have {needed}; correct the list"
+        bound = "at least one" if needed == 1 else needed
+        return f"has {context['actual_length']} entries, but has to have {bound}; correct the list"
     return _choice_sentence(kind, keys, found, context, fallback)
 
 

@@ -121,8 +121,8 @@ class Slot:
 
     def _range_problems(self, where: str, unit: str) -> Iterator[Problem]:
         parameter = self.parameter()
-        possible = _range_text(*self.physical, self.unit)
-        shown = f"{self.quantity.value:g} {unit}"
+        possible = _range_text(*self.physical, self.unit, parameter.value)
+        shown = f"{self.quantity.value:g}" + ("" if unit == "1" else f" {unit}")
         if not self.physical[0] <= parameter.value <= self.physical[1]:
             reason = f" ({self.impossible})" if self.impossible else ""
             yield Problem(where, f"is {shown}, but only {possible} is physically possible{reason}; correct the value")
@@ -162,11 +162,12 @@ class Slot:
         )
 
 
-def _range_text(low: float, high: float, unit: str) -> str:
+def _range_text(low: float, high: float, unit: str, value: float) -> str:
     """Physical range in words; the catalogue and this module know ranges with a lower end only."""
     shown = "" if unit == "1" else f" {unit}"
     if low in {POSITIVE, _LEAST}:
-        return f"more than 0{shown}"
+        # A value above zero is below the least that is taken for a number with a meaning.
+        return f"{low:g}{shown} or more" if value > 0.0 else f"more than 0{shown}"
     return f"{low:g}{shown} or more" if math.isinf(high) else f"{low:g} to {high:g}{shown}"
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import pairwise
+from textwrap import fill
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
@@ -63,6 +64,10 @@ class RunLike(Protocol):
     def starts(self) -> NDArray[np.int64]:
         """Rows at which a piece begins."""
 
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What to know before the numbers are trusted."""
+
 
 @styled
 def plot_channels(
@@ -90,9 +95,16 @@ def plot_channels(
 
 @styled
 def plot_run(run: RunLike) -> Figure:
-    """Draw simulated over measured, a panel per channel that was measured (all channels if none was)."""
+    """Draw simulated over measured, a panel per channel that was measured.
+
+    Commands that were only copied do not count as measured. Where nothing was, all channels are drawn but what never
+    moves: places and turns of markers out of a machine's plane. Notes of the run stand below.
+    """
     measured = [bool(np.isfinite(column).all()) for column in run.measured.T]
-    shown = [at for at in range(len(run.channels)) if measured[at]] or list(range(len(run.channels)))
+    copied = [name.endswith(".command") for name in run.channels]
+    shown = [at for at in range(len(run.channels)) if measured[at] and not copied[at]]
+    shown = shown or [at for at, values in enumerate(run.values.T) if np.ptp(values) > 1e-12 * abs(values).max()]
+    shown = shown or list(range(len(run.channels)))
     figure, axes = panels(len(shown), height=1.9, share_x=True)
     for row, at in enumerate(shown):
         axis = axes[row][0]
@@ -102,6 +114,8 @@ def plot_run(run: RunLike) -> Figure:
         axis.set_title(run.channels[at])
     legend_above(axes[0][0], 2, right=True)
     _finish_time(figure, axes[-1][0], f"{run.model_name} on {run.experiment_name}, {run.mode.replace('_', ' ')}")
+    if run.notes:
+        figure.supxlabel("\n".join(fill("note: " + note, 110) for note in run.notes), fontsize=8, color=ORANGE)
     return figure
 
 

@@ -12,7 +12,7 @@ use vpm_core::model::{Model, Parts};
 use vpm_core::mount::{Marker, Mount};
 use vpm_core::samples::Random;
 use vpm_core::spatial::{Matrix3, Vector3};
-use vpm_core::{Result, Scalar};
+use vpm_core::{Error, Result, Scalar};
 
 /// No rotation.
 pub const UPRIGHT: [f64; 9] = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
@@ -127,19 +127,22 @@ pub fn everything(seed: u64) -> Parts<f64> {
 }
 
 /// The description of some parts, every number a parameter of its own; `change` may add to it.
+#[cfg(test)]
 pub fn description(parts: &Parts<f64>, change: impl FnOnce(&mut Value)) -> Description {
+    try_description(parts, change).unwrap()
+}
+
+/// The same, with what is wrong in the parts.
+pub fn try_description(parts: &Parts<f64>, change: impl FnOnce(&mut Value)) -> Result<Description> {
     let mut numbers = Numbers::default();
     let bodies: Vec<_> = parts.bodies.iter().map(|body| json!(body.map(&mut numbers.of(&body.name)))).collect();
     let welds: Vec<_> = parts.welds.iter().map(|weld| json!(weld.map(&mut numbers.of(&weld.name)))).collect();
     let lines: Vec<_> = parts.lines.iter().map(|line| json!(line.map(&mut numbers.of(&line.name)))).collect();
-    let beams: Vec<_> = parts
-        .beams
-        .iter()
-        .map(|beam| {
-            let indexed = beam.map(&mut numbers.of(&beam.name));
-            BeamEntry::serialize(&indexed, serde_json::value::Serializer).unwrap()
-        })
-        .collect();
+    let mut beams = Vec::new();
+    for beam in &parts.beams {
+        let indexed = BeamEntry::serialize(&beam.map(&mut numbers.of(&beam.name)), serde_json::value::Serializer);
+        beams.push(indexed.map_err(|error| Error::Description { message: error.to_string() })?);
+    }
     let mut effects = Vec::new();
     for point in &parts.point_masses {
         let mut number = numbers.of("payload");
@@ -155,10 +158,11 @@ pub fn description(parts: &Parts<f64>, change: impl FnOnce(&mut Value)) -> Descr
         "markers": parts.markers, "gauges": parts.gauges, "effects": effects,
         "parameters": numbers.values, "parameter_names": numbers.names});
     change(&mut content);
-    Description::from_json(&content.to_string()).unwrap()
+    Description::from_json(&content.to_string())
 }
 
 /// Adds a parameter to a description and returns its place.
+#[cfg(test)]
 pub fn parameter(content: &mut Value, name: &str, value: f64) -> usize {
     content["parameter_names"].as_array_mut().unwrap().push(json!(name));
     let values = content["parameters"].as_array_mut().unwrap();
@@ -167,6 +171,7 @@ pub fn parameter(content: &mut Value, name: &str, value: f64) -> usize {
 }
 
 /// Adds a part to a list of a description.
+#[cfg(test)]
 pub fn push(content: &mut Value, list: &str, part: Value) {
     if content[list].is_null() {
         content[list] = json!([]);

@@ -1,0 +1,33 @@
+"""The scripts of flexible machines run, print their tables and plot."""
+
+import runpy
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+
+
+@pytest.mark.parametrize(
+    ("script", "pictures", "words"),
+    [
+        # 0.5738 m: largest deflection of two independent codes, values/beams.json, spin_up_manoeuvre.
+        ("spinning_beam", {"spin_up.png"}, ("strain(6)                 0.5738", "beyond the arm's own length")),
+        # 0.9963 m and -0.0447 m at 0.1 s: the same, falling_flexible_pendulum, printed to 1e-4 m.
+        ("flexible_pendulum", {"strobe.png", "energies.png"}, ("0.1      0.9963", "largest kinetic energy")),
+    ],
+)
+def test_examples_run_and_plot(
+    script: str,
+    pictures: set[str],
+    words: tuple[str, ...],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setattr("sys.argv", ["run.py", str(tmp_path)])
+    runpy.run_path(str(ROOT / "examples" / script / "run.py"), run_name="__main__")
+    assert {path.name for path in tmp_path.iterdir()} == pictures
+    assert all(path.stat().st_size > 5000 for path in tmp_path.iterdir())
+    printed = capsys.readouterr().out
+    assert all(word in printed for word in words), printed

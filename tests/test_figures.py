@@ -1,0 +1,62 @@
+"""What the pictures of docs/ show is so: not pixel by pixel, but the numbers they are drawn from."""
+
+import json
+import runpy
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+FIGURES = ROOT / "docs" / "figures"
+
+
+@pytest.fixture(scope="module")
+def drawn() -> SimpleNamespace:
+    return SimpleNamespace(**runpy.run_path(str(FIGURES / "validity.py")))
+
+
+def test_the_exact_level_is_the_elastica(drawn: SimpleNamespace) -> None:
+    """Rows of load, deflection down, shortening and angle of the tip, from elliptic integrals."""
+    cases = json.loads((ROOT / "tests" / "values" / "beams.json").read_text(encoding="utf-8"))
+    for load, down, shortening, _ in cases["tip_loaded_cantilever_elastica"]["rows"][:3]:
+        place, _ = drawn.resting(drawn.EXACT, line=1e-9, tip=1.0, gravity=load)
+        np.testing.assert_allclose(place, (1.0 - shortening, -down), atol=2e-6)
+
+
+@pytest.mark.parametrize("level", ["bezier(4)", "hermite(2)", "modal(3)"])
+@pytest.mark.parametrize("case", ["force at the tip", "own weight"])
+def test_loads_at_rest_stay_within_a_percent_up_to_the_limit(drawn: SimpleNamespace, level: str, case: str) -> None:
+    limit = drawn.cantilever(drawn.EXACT).core.slope_limit
+    solve, loads = drawn.CASES[case]
+    slope, error = drawn.validity(level, solve, loads[[3, 6, 9]]).T
+    assert slope[0] < limit < slope[1]
+    at_limit = np.exp(np.interp(np.log(limit), np.log(slope), np.log(error)))
+    # Three modes are off by 0.1 % of their own, to the other side.
+    assert at_limit < 0.0105
+    assert at_limit > (0.007 if level.startswith("modal") else 0.0095)
+    # With the square of the slope, when the level's own error is left behind.
+    order = np.diff(np.log(error[1:])) / np.diff(np.log(slope[1:]))
+    np.testing.assert_allclose(order, 2.0, atol=0.15)
+
+
+def test_a_quick_turn_reaches_a_percent_at_a_slope_of_a_tenth(drawn: SimpleNamespace) -> None:
+    (slope, error), *_ = drawn.validity("bezier(4)", drawn.spun, np.array([4.5]))
+    assert slope == pytest.approx(0.10, abs=0.005)
+    assert error == pytest.approx(0.0105, abs=0.002)
+
+
+def test_a_coordinate_buys_what_the_picture_shows(drawn: SimpleNamespace) -> None:
+    found = {kind: drawn.frequencies(kind) for kind in drawn.COUNTS}
+    # Small deflections: polynomials of the strain and of the deflection are the same space.
+    np.testing.assert_allclose(found["strain"], found["bezier"], rtol=1e-3, atol=1e-8)
+    for rows in found.values():
+        assert np.all(np.diff(rows[:, 1]) < 1e-7)
+    assert found["bezier"][3, 2] < 1e-4 < found["lumped"][-1, 2]
+
+
+@pytest.mark.parametrize("name", ["validity.svg", "levels.svg"])
+def test_the_pictures_are_there(name: str) -> None:
+    assert "<svg" in (FIGURES / name).read_text(encoding="utf-8")
+    assert f"figures/{name}" in (ROOT / "docs" / "beams.md").read_text(encoding="utf-8")
