@@ -114,7 +114,6 @@ impl Size {
 #[pymethods]
 impl PlanarArm {
     #[new]
-    #[expect(clippy::too_many_arguments, reason = "the arguments of the Python class")]
     fn new(
         py: Python<'_>,
         links: &Any<'_>,
