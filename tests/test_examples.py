@@ -15,6 +15,12 @@ ROOT = Path(__file__).resolve().parent.parent
         ("spinning_beam", {"spin_up.png"}, ("strain(6)                 0.5738", "beyond the arm's own length")),
         # 0.9963 m and -0.0447 m at 0.1 s: the same, falling_flexible_pendulum, printed to 1e-4 m.
         ("flexible_pendulum", {"strobe.png", "energies.png"}, ("0.1      0.9963", "largest kinetic energy")),
+        # The first gauge shows 633 µm/m at rest in the horizontal (values/tudor.json); the swing begins there.
+        (
+            "tudor",
+            {f"motion_{name}.png" for name in "abcdef"},
+            ("a both joints slow: gauge_1 mean 50", "f opposite, fast"),
+        ),
     ],
 )
 def test_examples_run_and_plot(
@@ -31,3 +37,14 @@ def test_examples_run_and_plot(
     assert all(path.stat().st_size > 5000 for path in tmp_path.iterdir())
     printed = capsys.readouterr().out
     assert all(word in printed for word in words), printed
+
+
+def test_the_published_table_is_sought_by_a_command(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("sys.argv", ["table.py"])
+    runpy.run_path(str(ROOT / "examples" / "tudor" / "table.py"), run_name="__main__")
+    printed = capsys.readouterr().out
+    # Two rows of docs/tudor.md: the published means, and what the arm reaches without a factor on its gauges.
+    assert "1470.0" in printed
+    assert "-76.9" in printed

@@ -3,7 +3,7 @@
 python examples/flexible_pendulum/run.py [FOLDER]
 """
 
-import sys
+import argparse
 from pathlib import Path
 
 import numpy as np
@@ -74,4 +74,6 @@ def main(folder: Path, points: int = 21) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1] if len(sys.argv) > 1 else "pendulum-plots"))
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", type=Path, nargs="?", default=Path("pendulum-plots"), help="where the pictures go")
+    main(parser.parse_args().folder)

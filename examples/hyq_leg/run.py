@@ -3,7 +3,7 @@
 python examples/hyq_leg/run.py [FOLDER]
 """
 
-import sys
+import argparse
 from dataclasses import replace
 from pathlib import Path
 
@@ -46,4 +46,6 @@ def save(result: linkages.LegStrokes | linkages.ShareMap, path: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1] if len(sys.argv) > 1 else "hyq-leg-plots"))
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", type=Path, nargs="?", default=Path("hyq-leg-plots"), help="where the pictures go")
+    main(parser.parse_args().folder)

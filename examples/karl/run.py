@@ -3,7 +3,7 @@
 python examples/karl/run.py [FOLDER]
 """
 
-import sys
+import argparse
 from pathlib import Path
 
 import numpy as np
@@ -36,4 +36,6 @@ def main(folder: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1] if len(sys.argv) > 1 else "karl-plots"))
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", type=Path, nargs="?", default=Path("karl-plots"), help="where the pictures go")
+    main(parser.parse_args().folder)

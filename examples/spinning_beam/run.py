@@ -3,7 +3,7 @@
 python examples/spinning_beam/run.py [FOLDER]
 """
 
-import sys
+import argparse
 from pathlib import Path
 
 import numpy as np
@@ -73,4 +73,8 @@ def main(folder: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1] if len(sys.argv) > 1 else "spinning-beam-plots"))
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument(
+        "folder", type=Path, nargs="?", default=Path("spinning-beam-plots"), help="where the pictures go"
+    )
+    main(parser.parse_args().folder)

@@ -5,7 +5,7 @@ python examples/tudor/run.py [FOLDER]
 
 from __future__ import annotations
 
-import sys
+import argparse
 from collections.abc import Callable
 from pathlib import Path
 
@@ -108,4 +108,6 @@ def draw(run: Run, title: str, path: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1] if len(sys.argv) > 1 else "tudor-plots"))
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", type=Path, nargs="?", default=Path("tudor-plots"), help="where the pictures go")
+    main(parser.parse_args().folder)

@@ -9,7 +9,7 @@ scale the published strains were written in. The same search is made without the
 
 from __future__ import annotations
 
-import sys
+import argparse
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -137,4 +137,6 @@ def deviations(numbers: Array) -> str:
 
 
 if __name__ == "__main__":
-    main(Model.load(Path(sys.argv[1]) if len(sys.argv) > 1 else HERE / "tudor.toml"))
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("model", type=Path, nargs="?", default=HERE / "tudor.toml", help="the model file of the arm")
+    main(Model.load(parser.parse_args().model))
