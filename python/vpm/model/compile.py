@@ -46,7 +46,19 @@ def description(checked: Checked) -> str:
         "sensors": [_sensor(name, structure, index) for name in document.sensors],
         "controllers": [_controller(name, c, structure, index) for name, c in document.controllers.items()],
     }
-    return json.dumps(content, allow_nan=False)
+    return json.dumps(_unsigned(content), allow_nan=False)
+
+
+def _unsigned(value: object) -> object:
+    """Content without minus zeros, which mean the same as zeros: two models are equal when their descriptions are."""
+    match value:
+        case float():
+            return value + 0.0
+        case list():
+            return [_unsigned(item) for item in value]
+        case dict():
+            return {key: _unsigned(item) for key, item in value.items()}
+    return value
 
 
 def _mount(mount: Mount) -> str | dict[str, Any]:
