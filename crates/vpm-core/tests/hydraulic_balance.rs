@@ -34,7 +34,7 @@ fn complete() -> ServoCylinder<f64> {
 
 #[test]
 fn the_chirp_helper_is_an_ordinary_rig() {
-    // Held at its peak for one short step both give the same.
+    // Without amplitude it rests as the rig does, while its clock runs.
     let chirp = Chirp { amplitude: 0.0, start: 1.0, slope: 0.0 };
     let (mut with_time, mut rates) = (Chirped::new(nominal(), chirp), [0.0; 7]);
     with_time.rhs(&with_time.rest(), &mut rates);

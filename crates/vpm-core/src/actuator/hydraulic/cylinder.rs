@@ -24,8 +24,8 @@ pub struct Chambers<S> {
 /// `pb' = beta_e/vb (-qb + alpha A v + leak - leak_b)` (4.11, 4.12 with the sign of A v corrected), `leak = C_i (pa - pb)`,
 /// `leak_k = C_e (pk - pt)`. Force on the piston `A pa - alpha A pb` (N), friction of the seals and stops apart.
 /// Beyond an end the closed chamber's volume stays that of its line, and does not change with v.
-/// Source: D'Imperio 2016, section 4.1 and appendix A. Checked: bore, rod, stroke, lines and stiffness of the stop are positive, leakages and
-/// damping not negative; the rod is thinner than the bore.
+/// Source: D'Imperio 2016, section 4.1 and appendix A. Checked: bore, rod, stroke, lines and stiffness of the stop are positive,
+/// leakages and damping not negative; the rod is thinner than the bore.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Cylinder<P> {
