@@ -188,6 +188,19 @@ pub enum Error {
         /// The value found.
         value: f64,
     },
+    /// A step control that does not arrive.
+    #[error(
+        "the step control came to {reached} s of {duration} s within {most} steps; allow more steps or a larger error, or look for a \
+         state that grows without limit"
+    )]
+    Steps {
+        /// How many steps were allowed.
+        most: usize,
+        /// How far they led, s.
+        reached: f64,
+        /// How far they had to lead, s.
+        duration: f64,
+    },
     /// No integrator has this name.
     #[error("there is no integrator `{name}`; use semi_implicit, rk4, linearly_implicit or rosenbrock")]
     Integrator {

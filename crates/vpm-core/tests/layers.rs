@@ -32,7 +32,19 @@ const ALONE: [(&str, &[&str]); 10] = [
     ("ode", &["error", "scalar"]),
     ("integrator", &["error", "scalar", "ode"]),
     ("effect", &["error", "scalar"]),
-    ("actuator", &["error", "scalar", "delay", "effect::Domain"]),
+    (
+        "actuator",
+        &[
+            "error",
+            "scalar",
+            "delay",
+            "ode",
+            "effect::Domain",
+            "effect::CoulombFriction",
+            "effect::StribeckFriction",
+            "effect::ViscousFriction",
+        ],
+    ),
     ("sensor", &["error", "scalar", "delay", "effect::Domain"]),
     ("controller", &["error", "scalar", "effect::Domain", "actuator::Saturation"]),
 ];

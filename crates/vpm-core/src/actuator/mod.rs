@@ -1,6 +1,7 @@
 //! Actuators: the chain from a command to the effort on a joint, each link a file and a rig of its own.
 
 mod dead_zone;
+pub mod hydraulic;
 mod input_delay;
 mod lag;
 mod motor;

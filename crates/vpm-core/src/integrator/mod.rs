@@ -1,5 +1,6 @@
-//! Fixed-step time integration, in bounded work and without allocation. It knows a system only as an [`Ode`].
+//! Time integration without allocation: fixed steps in bounded work, and steps of controlled error. It knows a system only as an [`Ode`].
 
+mod adaptive;
 mod linearly_implicit;
 mod lu;
 #[cfg(feature = "reference")]
@@ -9,6 +10,7 @@ mod rosenbrock;
 mod semi_implicit;
 pub mod stability;
 
+pub use adaptive::{Adaptive, StepControl, Steps};
 pub use linearly_implicit::LinearlyImplicit;
 pub use lu::Lu;
 pub use rk4::Rk4;

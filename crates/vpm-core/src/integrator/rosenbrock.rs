@@ -75,6 +75,12 @@ impl<S: Scalar> Rosenbrock<S> {
 
     /// Moves `x` on by `step` (s).
     pub fn step(&mut self, ode: &mut impl Ode<S>, x: &mut [S], step: f64) {
+        self.attempt(ode, x, step);
+        self.accept(x);
+    }
+
+    /// Computes the stages of a step from `x`, and leaves x where it is.
+    pub(super) fn attempt(&mut self, ode: &mut impl Ode<S>, x: &[S], step: f64) {
         let (dim, reach) = (x.len(), RODAS4P2.gamma * step);
         let matrix = self.lu.matrix();
         ode.jacobian(x, matrix);
@@ -95,11 +101,19 @@ impl<S: Scalar> Rosenbrock<S> {
             }
             self.lu.solve(increment);
         }
+    }
+
+    /// Moves `x` to the end of the step that was computed last.
+    pub(super) fn accept(&self, x: &mut [S]) {
         // The last stage stands at x + sum a_6j u_j already.
-        let last = &self.increments[(STAGES - 1) * dim..];
-        for ((state, &stage), &increment) in x.iter_mut().zip(&self.stage).zip(last) {
+        for ((state, &stage), &increment) in x.iter_mut().zip(&self.stage).zip(self.last_increment()) {
             *state = stage + increment;
         }
+    }
+
+    /// What the last stage adds: the difference between the step and its companion of third order, `x + sum a_6j u_j`.
+    pub(super) fn last_increment(&self) -> &[S] {
+        &self.increments[(STAGES - 1) * self.stage.len()..]
     }
 }
 

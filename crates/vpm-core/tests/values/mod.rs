@@ -1,4 +1,4 @@
-//! Published and recomputed values of the linkages, each with its unit, tolerance and source, and how near the core
+//! Published and recomputed values of linkages and hydraulics, each with its unit, tolerance and source, and how near the core
 //! comes.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -55,7 +55,8 @@ impl Value {
 
 /// Compares what was found with every value whose name begins with `prefix`: none may be missing, none may be off.
 pub fn check_all(prefix: &str, found: &[(&str, Vec<f64>)]) -> serde_json::Result<()> {
-    let values: Vec<Value> = serde_json::from_str(include_str!("linkages.json"))?;
+    let mut values: Vec<Value> = serde_json::from_str(include_str!("linkages.json"))?;
+    values.extend(serde_json::from_str::<Vec<Value>>(include_str!("hydraulic.json"))?);
     let wanted: BTreeMap<&str, &Value> =
         values.iter().filter(|value| value.id.starts_with(prefix)).map(|value| (value.id.as_str(), value)).collect();
     let names: BTreeSet<&str> = found.iter().map(|(name, _)| *name).collect();

@@ -1,0 +1,176 @@
+//! The cylinder: two chambers of oil with a piston between them.
+
+use std::f64::consts::FRAC_PI_4;
+
+use serde::Deserialize;
+
+use super::{EndStop, Fluid, NamedDomain, SealFriction};
+use crate::effect::Domain;
+use crate::scalar::Scalar;
+
+/// One quantity of both chambers of a cylinder.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Chambers<S> {
+    /// On the side of the full area.
+    pub a: S,
+    /// On the side of the rod.
+    pub b: S,
+}
+
+/// Cylinder with a rod on one side; x is the piston's place from mid-stroke, positive where chamber a is large.
+///
+/// Law: areas `A = pi/4 bore^2` and `alpha A = pi/4 (bore^2 - rod^2)`; volumes `va = line_a + A (L/2 + x)` and
+/// `vb = line_b + alpha A (L/2 - x)`, never below those of the lines; `pa' = beta_e/va (qa - A v - leak - leak_a)` and
+/// `pb' = beta_e/vb (-qb + alpha A v + leak - leak_b)` (4.11, 4.12 with the sign of A v corrected), `leak = C_i (pa - pb)`,
+/// `leak_k = C_e (pk - pt)`. Force on the piston `A pa - alpha A pb` (N), friction of the seals and stops apart.
+/// Beyond an end the closed chamber's volume stays that of its line, and does not change with v.
+/// Source: D'Imperio 2016, section 4.1 and appendix A. Checked: bore, rod, stroke, lines and stiffness of the stop are positive,
+/// leakages and damping not negative; the rod is thinner than the bore.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Cylinder<P> {
+    /// Diameter of the piston, m.
+    pub bore: P,
+    /// Diameter of the rod, m.
+    pub rod: P,
+    /// Way of the piston, m.
+    pub stroke: P,
+    /// Volume of the line to chamber a and of what the piston leaves there at its end, m^3.
+    pub line_a: P,
+    /// The same of chamber b, m^3.
+    pub line_b: P,
+    /// Laminar leakage past the piston, m^3/(s Pa).
+    pub internal_leakage: P,
+    /// Laminar leakage of each chamber to the tank, m^3/(s Pa).
+    pub external_leakage: P,
+    /// The ends of the stroke.
+    pub stop: EndStop<P>,
+    /// Friction of the seals.
+    pub seal: SealFriction<P>,
+}
+
+impl<P> Cylinder<P> {
+    /// The same cylinder over another number type.
+    pub fn map<T>(&self, f: &mut impl FnMut(&P) -> T) -> Cylinder<T> {
+        Cylinder {
+            bore: f(&self.bore),
+            rod: f(&self.rod),
+            stroke: f(&self.stroke),
+            line_a: f(&self.line_a),
+            line_b: f(&self.line_b),
+            internal_leakage: f(&self.internal_leakage),
+            external_leakage: f(&self.external_leakage),
+            stop: EndStop { stiffness: f(&self.stop.stiffness), damping: f(&self.stop.damping) },
+            seal: self.seal.map(f),
+        }
+    }
+
+    /// The parameters and where each is defined.
+    pub fn domains(&self) -> Vec<NamedDomain<'_, P>> {
+        let mut domains = vec![
+            ("cylinder.bore", &self.bore, Domain::Positive),
+            ("cylinder.rod", &self.rod, Domain::Positive),
+            ("cylinder.stroke", &self.stroke, Domain::Positive),
+            ("cylinder.line_a", &self.line_a, Domain::Positive),
+            ("cylinder.line_b", &self.line_b, Domain::Positive),
+            ("cylinder.internal_leakage", &self.internal_leakage, Domain::NonNegative),
+            ("cylinder.external_leakage", &self.external_leakage, Domain::NonNegative),
+            ("cylinder.stop.stiffness", &self.stop.stiffness, Domain::Positive),
+            ("cylinder.stop.damping", &self.stop.damping, Domain::NonNegative),
+        ];
+        domains.extend(self.seal.domains());
+        domains
+    }
+}
+
+impl<S: Scalar> Cylinder<S> {
+    /// Areas in m^2 on which the pressures act.
+    #[inline]
+    pub fn areas(&self) -> Chambers<S> {
+        let full = self.bore * self.bore * FRAC_PI_4;
+        Chambers { a: full, b: full - self.rod * self.rod * FRAC_PI_4 }
+    }
+
+    /// Volumes in m^3 with the piston at `x`.
+    #[inline]
+    pub fn volumes(&self, x: S) -> Chambers<S> {
+        let (areas, half) = (self.areas(), self.stroke * 0.5);
+        Chambers {
+            a: self.line_a + areas.a * (half + x).max(S::zero()),
+            b: self.line_b + areas.b * (half - x).max(S::zero()),
+        }
+    }
+
+    /// Volume rates in m^3/s with the piston at `x` and moving with `v`.
+    #[inline]
+    pub fn volume_rates(&self, x: S, v: S) -> Chambers<S> {
+        let (areas, half) = (self.areas(), self.stroke * 0.5);
+        Chambers {
+            a: if x < -half { S::zero() } else { areas.a * v },
+            b: if x > half { S::zero() } else { -(areas.b * v) },
+        }
+    }
+
+    /// Force of the oil on the piston in N under `pressures` (Pa).
+    #[inline]
+    pub fn force(&self, pressures: Chambers<S>) -> S {
+        let areas = self.areas();
+        areas.a * pressures.a - areas.b * pressures.b
+    }
+
+    /// Force of the seals and the stops on the piston in N.
+    #[inline]
+    pub fn resistance(&self, x: S, v: S) -> S {
+        self.seal.force(v) + self.stop.force(x, v, self.stroke * 0.5)
+    }
+
+    /// What leaves each chamber past piston and rod in m^3/s.
+    #[inline]
+    pub fn leakage(&self, pressures: Chambers<S>, tank: S) -> Chambers<S> {
+        let inside = self.internal_leakage * (pressures.a - pressures.b);
+        Chambers {
+            a: inside + self.external_leakage * (pressures.a - tank),
+            b: -inside + self.external_leakage * (pressures.b - tank),
+        }
+    }
+
+    /// Rates in Pa/s of the chambers' `states` (see [`Fluid`]) with the piston at `x` and moving with `v`, and the flows `inflow`
+    /// (m^3/s) into each from the valve.
+    #[inline]
+    pub fn rates(
+        &self,
+        fluid: &Fluid<S>,
+        states: Chambers<S>,
+        [x, v]: [S; 2],
+        inflow: Chambers<S>,
+        tank: S,
+    ) -> Chambers<S> {
+        let pressures = Chambers { a: fluid.pressure(states.a), b: fluid.pressure(states.b) };
+        let (leakage, volumes, change) = (self.leakage(pressures, tank), self.volumes(x), self.volume_rates(x, v));
+        Chambers {
+            a: fluid.effective_bulk_modulus(states.a) / volumes.a * (inflow.a - change.a - leakage.a),
+            b: fluid.effective_bulk_modulus(states.b) / volumes.b * (inflow.b - change.b - leakage.b),
+        }
+    }
+
+    /// Stiffness of the enclosed oil in N/m with the piston at `x` and both chambers full.
+    ///
+    /// Law: `beta_a A^2 / va + beta_b (alpha A)^2 / vb`, the factor of the velocity in 4.20 and 4.21.
+    #[inline]
+    pub fn oil_stiffness(&self, fluid: &Fluid<S>, states: Chambers<S>, x: S) -> S {
+        let (areas, volumes) = (self.areas(), self.volumes(x));
+        fluid.effective_bulk_modulus(states.a) * areas.a * areas.a / volumes.a
+            + fluid.effective_bulk_modulus(states.b) * areas.b * areas.b / volumes.b
+    }
+
+    /// Rate of the force in N/s, inside the stroke and with both chambers full, in the form without pressure rates.
+    ///
+    /// Law: `F' = -K v + A (beta_a (qa - leak_a) / va + alpha beta_b (qb + leak_b) / vb)` with the oil's stiffness K, qa into a and qb
+    /// out of b (4.19 with its missing alpha; 4.20 and 4.21 with leakage), a witness of [`Cylinder::rates`].
+    pub fn force_rate(&self, fluid: &Fluid<S>, states: Chambers<S>, [x, v]: [S; 2], inflow: Chambers<S>, tank: S) -> S {
+        let (areas, volumes, leakage) = (self.areas(), self.volumes(x), self.leakage(states, tank));
+        let net_into_a = (inflow.a - leakage.a) * fluid.effective_bulk_modulus(states.a) / volumes.a;
+        let net_out_of_b = (leakage.b - inflow.b) * fluid.effective_bulk_modulus(states.b) / volumes.b;
+        areas.a * (net_into_a + areas.b / areas.a * net_out_of_b) - self.oil_stiffness(fluid, states, x) * v
+    }
+}

@@ -1,0 +1,93 @@
+//! What resists a piston besides oil: the ends of its stroke and its seals.
+
+use serde::Deserialize;
+
+use super::NamedDomain;
+use crate::effect::CoulombFriction;
+use crate::effect::StribeckFriction;
+use crate::effect::ViscousFriction;
+use crate::scalar::Scalar;
+
+/// A stop at both ends of a stroke: a spring and a damper that push and never pull.
+///
+/// Law: beyond an end by e > 0, moving out with v: `-max(stiffness e + damping v, 0)`, N, m, m/s; nothing inside.
+/// Source: Kelvin-Voigt contact, cut where it would stick, as in Gilardi & Sharf 2002, "Literature survey of contact dynamics
+/// modelling", Mechanism and Machine Theory 37(10), section 4.1. Checked: the stiffness is positive, the damping not negative.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct EndStop<P> {
+    /// Force per distance beyond the end, N/m.
+    pub stiffness: P,
+    /// Force per velocity beyond the end, N s/m.
+    pub damping: P,
+}
+
+impl<S: Scalar> EndStop<S> {
+    /// Force at `x` from the middle of a stroke of half length `reach`, moving with `v`.
+    #[inline]
+    pub fn force(&self, x: S, v: S, reach: S) -> S {
+        if x > reach {
+            -self.push(x - reach, v)
+        } else if x < -reach {
+            self.push(-x - reach, -v)
+        } else {
+            S::zero()
+        }
+    }
+
+    #[inline]
+    fn push(&self, beyond: S, outward: S) -> S {
+        (self.stiffness * beyond + self.damping * outward).max(S::zero())
+    }
+}
+
+/// Friction of a piston's seals: any of the laws of joints, added up.
+///
+/// Checked: see each law.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SealFriction<P> {
+    /// Resistance proportional to speed.
+    #[serde(default = "crate::actuator::none")]
+    pub viscous: Option<ViscousFriction<P>>,
+    /// Constant resistance.
+    #[serde(default = "crate::actuator::none")]
+    pub coulomb: Option<CoulombFriction<P>>,
+    /// Extra friction at low speed.
+    #[serde(default = "crate::actuator::none")]
+    pub stribeck: Option<StribeckFriction<P>>,
+}
+
+impl<P> SealFriction<P> {
+    /// The same friction over another number type.
+    pub fn map<T>(&self, f: &mut impl FnMut(&P) -> T) -> SealFriction<T> {
+        SealFriction {
+            viscous: self.viscous.as_ref().map(|law| law.map(f)),
+            coulomb: self.coulomb.as_ref().map(|law| law.map(f)),
+            stribeck: self.stribeck.as_ref().map(|law| law.map(f)),
+        }
+    }
+
+    /// The parameters and where each is defined.
+    pub fn domains(&self) -> Vec<NamedDomain<'_, P>> {
+        let viscous = self.viscous.iter().flat_map(ViscousFriction::domains);
+        let coulomb = self.coulomb.iter().flat_map(CoulombFriction::domains);
+        let stribeck = self.stribeck.iter().flat_map(StribeckFriction::domains);
+        let named = |name: &'static str| move |(parameter, domain)| (name, parameter, domain);
+        viscous
+            .map(named("cylinder.seal.viscous"))
+            .chain(coulomb.map(named("cylinder.seal.coulomb")))
+            .chain(stribeck.map(named("cylinder.seal.stribeck")))
+            .collect()
+    }
+}
+
+impl<S: Scalar> SealFriction<S> {
+    /// Force in N on a piston moving with `v` (m/s).
+    #[inline]
+    pub fn force(&self, v: S) -> S {
+        let viscous = self.viscous.map_or(S::zero(), |law| law.effort(v));
+        let coulomb = self.coulomb.map_or(S::zero(), |law| law.effort(v));
+        viscous + coulomb + self.stribeck.map_or(S::zero(), |law| law.effort(v))
+    }
+}

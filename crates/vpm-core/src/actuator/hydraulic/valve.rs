@@ -1,0 +1,103 @@
+//! The servovalve: a spool that follows a current and opens four edges.
+
+use serde::Deserialize;
+
+use super::{NamedDomain, Orifice};
+use crate::actuator::{DeadZone, Saturation};
+use crate::effect::Domain;
+use crate::scalar::Scalar;
+
+/// Flows through a 4-way valve, m^3/s.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Flows<S> {
+    /// Into port a.
+    pub into_a: S,
+    /// Out of port b.
+    pub out_of_b: S,
+    /// Out of the supply.
+    pub supply: S,
+    /// Into the tank.
+    pub tank: S,
+}
+
+/// 4-way servovalve with a spool of second order.
+///
+/// Law: `z'' = w^2 (sat(gain i) - z) - 2 D w z'`, i the current in A, z the spool's place in a unit of the user's choice (`gain` units
+/// of z per A), sat the limit `±stroke`. What opens is `u = dead_zone(sat(z))`: an overshoot beyond the stroke, at most
+/// `e^(-pi D / sqrt(1 - D^2))` of a step, opens no more. u > 0: supply to a, b to tank; u < 0: a to tank, supply to b (4.1, 4.2, both
+/// directions of each edge): `qa = flow(u, ps - pa)` and `qb = flow(u, pb - pt)`, or `qa = -flow(-u, pa - pt)` and
+/// `qb = -flow(-u, ps - pb)`, qa into a and qb out of b.
+/// Source: D'Imperio 2016, section 4.1 and appendix A; Merritt 1967, "Hydraulic Control Systems", section 5-3 (overlap). The stroke
+/// as a limit of what drives and of what opens, not as an impact that would need steps of its own, is an assumption.
+/// Checked: frequency and stroke are positive, damping and overlap not negative.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Valve<P> {
+    /// Place of the spool per current, spool unit/A.
+    pub gain: P,
+    /// Natural frequency of the spool, rad/s.
+    pub frequency: P,
+    /// Damping ratio of the spool.
+    pub damping: P,
+    /// Largest place of the spool, spool unit.
+    pub stroke: P,
+    /// How far the spool moves before it opens, spool unit.
+    pub overlap: DeadZone<P>,
+    /// Each of the four edges; its opening is in spool units.
+    pub orifice: Orifice<P>,
+}
+
+impl<P> Valve<P> {
+    /// The same valve over another number type.
+    pub fn map<T>(&self, f: &mut impl FnMut(&P) -> T) -> Valve<T> {
+        Valve {
+            gain: f(&self.gain),
+            frequency: f(&self.frequency),
+            damping: f(&self.damping),
+            stroke: f(&self.stroke),
+            overlap: self.overlap.map(f),
+            orifice: self.orifice.map(f),
+        }
+    }
+
+    /// The parameters and where each is defined.
+    pub fn domains(&self) -> Vec<NamedDomain<'_, P>> {
+        let mut domains = vec![
+            ("valve.gain", &self.gain, Domain::Any),
+            ("valve.frequency", &self.frequency, Domain::Positive),
+            ("valve.damping", &self.damping, Domain::NonNegative),
+            ("valve.stroke", &self.stroke, Domain::Positive),
+            ("valve.overlap", &self.overlap.width, Domain::NonNegative),
+        ];
+        domains.extend(self.orifice.domains());
+        domains
+    }
+}
+
+impl<S: Scalar> Valve<S> {
+    /// Acceleration of a spool at `place` with `rate` under a `current` (A), spool unit/s^2.
+    #[inline]
+    pub fn spool_acceleration(&self, place: S, rate: S, current: S) -> S {
+        let square = self.frequency * self.frequency;
+        let target = Saturation { limit: self.stroke }.apply(self.gain * current);
+        square * (target - place) - self.damping * self.frequency * rate * 2.0
+    }
+
+    /// What a spool at `place` opens, in spool units: positive from supply to a.
+    #[inline]
+    pub fn opening(&self, place: S) -> S {
+        self.overlap.apply(Saturation { limit: self.stroke }.apply(place))
+    }
+
+    /// Flows with the spool at `place` between the pressures of the `supply`, the `tank` and the ports `[a, b]`, all in Pa.
+    #[inline]
+    pub fn flows(&self, place: S, supply: S, tank: S, [a, b]: [S; 2]) -> Flows<S> {
+        let opening = self.opening(place);
+        if opening.re() > 0.0 {
+            let (into_a, out_of_b) = (self.orifice.flow(opening, supply - a), self.orifice.flow(opening, b - tank));
+            return Flows { into_a, out_of_b, supply: into_a, tank: out_of_b };
+        }
+        let (out_of_a, into_b) = (self.orifice.flow(-opening, a - tank), self.orifice.flow(-opening, supply - b));
+        Flows { into_a: -out_of_a, out_of_b: -into_b, supply: into_b, tank: out_of_a }
+    }
+}
