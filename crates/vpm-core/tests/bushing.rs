@@ -145,6 +145,24 @@ proptest! {
 }
 
 #[test]
+fn rates_are_those_of_the_displacement() {
+    let random = &mut Random::new(7);
+    // Around the end of the series (a^2 = 0.1) to rounding, where its last terms count; farther out as the closed form allows.
+    for (angle, tolerance) in
+        [(1e-9, 1e-15), (0.1, 1e-15), (0.3162, 3e-15), (0.3163, 3e-14), (1.5, 1e-14), (3.1, 1e-13)]
+    {
+        for _ in 0..50 {
+            let (relative, motion) = (pose(random, angle), twist(random));
+            let d = Bushing::displacement(&moving(&relative, &[motion]));
+            for (entry, rate) in d.into_iter().zip(Bushing::displacement_rate(&relative, motion)) {
+                let gap = (entry.gradient[0] - rate).abs();
+                assert!(gap < tolerance, "{gap:e} at {angle}");
+            }
+        }
+    }
+}
+
+#[test]
 fn single_directions_have_closed_forms() {
     let stiffness = [10.0, 20.0, 30.0, 100.0, 200.0, 300.0];
     let law = Bushing::diagonal(stiffness, stiffness.map(|k| 0.1 * k));
