@@ -7,6 +7,8 @@ pub mod actuator;
 pub mod algebra;
 pub mod beam;
 pub mod body;
+pub mod bushing;
+pub mod contact;
 pub mod controller;
 pub mod data;
 pub mod delay;

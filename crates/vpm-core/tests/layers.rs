@@ -24,7 +24,7 @@ const TREE: [&str; 16] = [
     "linkage",
 ];
 /// Parts that stand alone, each a rig of its own, and all that they may import besides themselves.
-const ALONE: [(&str, &[&str]); 10] = [
+const ALONE: [(&str, &[&str]); 12] = [
     ("error", &[]),
     ("scalar", &[]),
     ("table", &["error"]),
@@ -45,6 +45,8 @@ const ALONE: [(&str, &[&str]); 10] = [
             "effect::ViscousFriction",
         ],
     ),
+    ("contact", &["error", "scalar", "spatial", "effect::Domain"]),
+    ("bushing", &["error", "scalar", "spatial", "effect::Domain"]),
     ("sensor", &["error", "scalar", "delay", "effect::Domain"]),
     ("controller", &["error", "scalar", "effect::Domain", "actuator::Saturation"]),
 ];

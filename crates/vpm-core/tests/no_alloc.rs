@@ -1,6 +1,8 @@
 //! The algorithms allocate nothing once their buffers exist.
 
 use allocation_counter::measure;
+use vpm_core::bushing::Bushing;
+use vpm_core::contact::{Contact, ContactFriction, NormalContact, Plane};
 use vpm_core::data::Data;
 use vpm_core::dynamics::{aba, crba, energy, rnea};
 use vpm_core::kinematics::{LowerPair, SerialChain};
@@ -63,6 +65,28 @@ fn linkages_allocate_nothing() -> Result<()> {
         solved = moved && Newton::default().solve(&karl, start, &strokes).is_ok() && karl.direct(strokes).is_ok();
     });
     assert!(solved);
+    assert_eq!(counted.count_total, 0);
+    Ok(())
+}
+
+#[test]
+fn connections_allocate_nothing() -> Result<()> {
+    let normal = NormalContact { stiffness: 5e6, exponent: 1.1, damping: 1e3, damping_depth: 1e-4 };
+    let friction = ContactFriction {
+        static_coefficient: 0.7,
+        static_velocity: 0.1,
+        dynamic_coefficient: 0.5,
+        dynamic_velocity: 1.0,
+    };
+    let contact = Contact { normal, friction: Some(friction) };
+    let plane = Plane::new(Vector3::zero(), Vector3::new(0.0, 1.0, 2.0))?;
+    let bushing = Bushing::diagonal([1e3; 6], [1.0; 6]);
+    let pose = Pose::new(Matrix3::rotation(Vector3::new(1.0, 0.0, 0.0), 0.7), Vector3::new(0.1, 0.2, 0.3));
+    let counted = measure(|| {
+        std::hint::black_box(contact.force(&plane, Vector3::new(0.0, 0.0, -1e-3), pose.translation));
+        std::hint::black_box(bushing.wrenches(&pose, Twist::new(pose.translation, pose.translation)));
+        std::hint::black_box(bushing.potential(&pose));
+    });
     assert_eq!(counted.count_total, 0);
     Ok(())
 }

@@ -4,16 +4,20 @@ mod dead_zone;
 pub mod hydraulic;
 mod input_delay;
 mod lag;
+mod maxwell;
 mod motor;
 mod saturation;
+mod spring_damper;
 
 use serde::Deserialize;
 
 pub use dead_zone::DeadZone;
 pub use input_delay::InputDelay;
 pub use lag::Lag;
+pub use maxwell::Maxwell;
 pub use motor::Motor;
 pub use saturation::Saturation;
+pub use spring_damper::SpringDamper;
 
 use crate::effect::Domain;
 use crate::scalar::Scalar;
