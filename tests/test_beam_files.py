@@ -1,6 +1,5 @@
 """Flexible links in a model file: what the file says reaches the core, levels change, and what cannot be is refused."""
 
-import json
 from typing import Any
 
 import numpy as np
@@ -8,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from model_texts import changed, described
 from random_trees import trees
 from vpm.errors import ModelError
 from vpm.model import Model
@@ -80,15 +80,7 @@ parent = "fore"
 
 
 def arm(*changes: tuple[str, str]) -> Model:
-    text = ARM
-    for old, new in changes:
-        assert old in text
-        text = text.replace(old, new, 1)
-    return Model.from_toml(text)
-
-
-def described(model: Model) -> Any:
-    return json.loads(model.description())
+    return changed(ARM, *changes)
 
 
 # ---- what a file says ------------------------------------------------------------------------------------------------

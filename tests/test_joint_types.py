@@ -1,6 +1,5 @@
 """Joints of every type in a model file: how they are expanded, what hangs on fixed ones, and what is refused."""
 
-import json
 import math
 from typing import Any
 
@@ -10,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from model_texts import described
 from vpm.errors import ModelError
 from vpm.model import Model
 from vpm.model.expand import plane, unit
@@ -23,10 +23,6 @@ def machine(joint: dict[str, Any], **more: Any) -> Model:
     body = {"mass": 2.0, "center_of_mass": [0.1, 0.0, 0.0], "inertia": [0.02, 0.03, 0.04, 0.0, 0.0, 0.0]}
     content = {"name": "joint", "gravity": [0.0, 0.0, -9.81], "bodies": {"body": body}, "joints": joints}
     return Model.from_dict({**content, **more})
-
-
-def described(model: Model) -> Any:
-    return json.loads(model.description())
 
 
 def transform(axis: str, angle: float, shift: tuple[float, float, float]) -> Matrix:

@@ -1,10 +1,8 @@
 """Lines between two points in a model file: ends, masses, drives, channels, and what is refused."""
 
-import json
-from typing import Any
-
 import pytest
 
+from model_texts import changed, described
 from vpm.errors import ModelError
 from vpm.model import Model
 
@@ -55,15 +53,7 @@ measures = "cylinder.length"
 
 
 def leg(*changes: tuple[str, str]) -> Model:
-    text = LEG
-    for old, new in changes:
-        assert old in text
-        text = text.replace(old, new, 1)
-    return Model.from_toml(text)
-
-
-def described(model: Model) -> Any:
-    return json.loads(model.description())
+    return changed(LEG, *changes)
 
 
 def test_a_line_reaches_the_core_as_it_is_written() -> None:

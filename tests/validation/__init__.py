@@ -1,4 +1,5 @@
 """What the package computes beside numbers that it did not make: closed forms, published values, other codes.
 
-`make validation` writes the table of `docs/validation.md`; `tests/test_validation.py` holds every row of it.
+`make validation` writes the table of `docs/validation.md`; `tests/test_validation.py` and the core's own tests hold
+every row.
 """
