@@ -1,10 +1,10 @@
-"""The HyL leg solved without vpm: plane vectors as complex numbers, Kane's equations, implicit Runge-Kutta steps of SciPy.
+"""The HyL leg solved without vpm: plane vectors as complex numbers, Kane's equations, implicit steps of SciPy.
 
-A leg on a vertical slider with a foot that may leave the ground: seven bodies (slider, upper and lower leg, barrel and rod of
-two cylinders), hip and knee as revolute joints or on bushings, driven by joint controllers, by springs with dampers along the
-cylinders, or by hydraulic cylinders under force control. Equations of motion: partial velocities J of every centre of mass
-and every angle (T. Kane, D. Levinson, *Dynamics*, 1985, section 6.1), ``sum J^T m (J z'' + b - g) = Q`` with b what
-accelerates at z'' = 0. Nothing here is shared with the package: neither code nor data files.
+A leg on a vertical slider with a foot that may leave the ground: seven bodies (slider, upper and lower leg, barrel and
+rod of two cylinders), hip and knee as revolute joints or on bushings, driven by joint controllers, by springs with
+dampers along the cylinders, or by hydraulic cylinders under force control. Equations of motion: partial velocities J of
+every centre of mass and every angle (T. Kane, D. Levinson, "Dynamics", 1985, section 6.1),
+``sum J^T m (J z'' + b - g) = Q`` with b what accelerates at z'' = 0. Nothing is shared with the package.
 
 Masses: M. D'Imperio 2016, table 5.1, CAD column; geometry: IIT 2017, HyQ standard definition, V4.0.
 ``python tests/hyl_witness.py`` writes `values/hyl_witness.json`.
@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 
@@ -23,8 +23,10 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.optimize import fsolve
 
+from hyl_laws import Ground, Hydraulics
+from hyl_plane import Frame, Point, Rod
+
 Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 GRAVITY = 9.81
 UPPER, LOWER = 0.350, 0.341
@@ -38,162 +40,16 @@ DESIRED = np.radians([40.0, -80.0])
 DAMPING = 6.0
 MASS = 7.360 + 0.885 + 0.876 + 1.216 + 0.215 + 1.214 + 0.215
 
-Drive = Literal["pd", "springs", "hydraulic"]
+#: Radial stiffness and damping of hip and knee (N/m, N s/m).
+Bushings = tuple[float, float, float, float]
+STIFF: Bushings = (1e8, 188.0, 1e8, 187.0)
+#: Stiffness P / l^2 (N/m), free length (m), damping D / l^2 (N s/m) of the cylinders as springs, at the desired pose.
+SPRINGS = (
+    (92613.45275980336, 0.2992406736841064, 3704.538110392134),
+    (74432.4715784517, 0.3217759833552673, 2977.298863138068),
+)
 
-
-@dataclass(frozen=True)
-class Ground:
-    """Normal force ``k d^n + c step(d/d_c) d'`` and friction with two speeds; eqs 3.41, 3.42 in SI."""
-
-    stiffness: float = 2855.0 * 1000.0**1.1
-    exponent: float = 1.1
-    damping: float = 1000.0
-    ramp: float = 1e-4
-    static: float = 0.7
-    dynamic: float = 0.55
-    speeds: tuple[float, float] = (0.1, 1.0)
-
-    def force(self, place: Complex, velocity: Complex) -> Complex:
-        """Force on the foot."""
-        depth, rate = np.maximum(-place.imag, 0.0), -velocity.imag
-        spring = self.stiffness * depth**self.exponent
-        normal = np.maximum(spring + self.damping * smooth(depth / self.ramp) * rate, 0.0) * (depth > 0.0)
-        speed, (slow, fast) = np.abs(velocity.real), self.speeds
-        fall = smooth((speed - slow) / (fast - slow))
-        share = self.static * smooth(speed / slow) + (self.dynamic - self.static) * fall
-        return np.asarray(-np.sign(velocity.real) * share * normal + 1j * normal)
-
-
-@dataclass(frozen=True)
-class Hydraulics:
-    """Valve and cylinder of each actuator, and the force loop on it; section 7.2 of the nominal data."""
-
-    supply: float = 16e6
-    tank: float = 1e5
-    bulk: float = 1.2e9
-    vapour: float = 2000.0
-    bore: float = 0.016
-    rod: float = 0.010
-    stroke: float = 0.080
-    retracted: float = 0.281
-    lines: tuple[float, float] = (2.9e-6, 1.7e-6)
-    leakage: float = 1.7e-13
-    flow_gain: float = 7.5 / 60e3 / (0.010 * np.sqrt(70e5 / 2.0))
-    frequency: float = 2.0 * np.pi * 250.0
-    damping: float = 0.7
-    current: float = 0.010
-    transition: float = 1e4
-    viscous: float = 700.0
-    stop: tuple[float, float] = (5e8, 2e4)
-    force_gain: float = 1.5e-7
-    velocity_gain: float = 0.008
-
-    @property
-    def areas(self) -> tuple[float, float]:
-        """Areas of both sides of the piston."""
-        return np.pi / 4.0 * self.bore**2, np.pi / 4.0 * (self.bore**2 - self.rod**2)
-
-    def at_rest(self) -> tuple[float, float]:
-        """Pressures without net force: ``A pa = alpha A pb``, ``pa + pb = ps + pt``."""
-        full, ring = self.areas
-        total = self.supply + self.tank
-        return total * ring / (full + ring), total * full / (full + ring)
-
-    def root(self, drop: Array) -> Array:
-        """Signed root of a pressure drop, a cubic through zero below the transition."""
-        share = drop / self.transition
-        near = np.sqrt(self.transition) * share * (3.0 - np.abs(share)) / 2.0
-        return np.where(np.abs(share) < 1.0, near, np.sign(drop) * np.sqrt(np.abs(drop)))
-
-    def flows(self, spool: Array, a: Array, b: Array) -> tuple[Array, Array]:
-        """Into chamber a, out of chamber b."""
-        opening = self.flow_gain * np.clip(spool, -self.current, self.current)
-        forward = spool > 0.0
-        into = np.where(forward, self.root(self.supply - a), self.root(a - self.tank))
-        out = np.where(forward, self.root(b - self.tank), self.root(self.supply - b))
-        return opening * into, opening * out
-
-    def force(self, length: Array, rate: Array, states: Array) -> Array:
-        """Force that pushes the ends apart: oil, seal and stops; states are spool, spool rate, chambers a and b."""
-        full, ring = self.areas
-        a, b = np.maximum(states[2], self.vapour), np.maximum(states[3], self.vapour)
-        way = length - self.retracted
-        stiffness, damping = self.stop
-        low = np.where(way < 0.0, np.maximum(-stiffness * way - damping * rate, 0.0), 0.0)
-        out = way - self.stroke
-        high = np.where(out > 0.0, np.maximum(stiffness * out + damping * rate, 0.0), 0.0)
-        return full * a - ring * b - self.viscous * rate + low - high
-
-    def rates(self, length: Array, rate: Array, states: Array, current: float) -> list[Array]:
-        """Rates of spool, spool rate and chambers, inside the stroke."""
-        full, ring = self.areas
-        spool, spool_rate, a, b = states[0], states[1], *(np.maximum(p, self.vapour) for p in states[2:4])
-        target = np.clip(current, -self.current, self.current)
-        acceleration = self.frequency**2 * (target - spool) - 2.0 * self.damping * self.frequency * spool_rate
-        into, out = self.flows(spool, a, b)
-        way, leak = length - self.retracted, self.leakage * (a - b)
-        return [
-            spool_rate,
-            acceleration,
-            self.bulk / (self.lines[0] + full * way) * (into - full * rate - leak),
-            self.bulk / (self.lines[1] + ring * (self.stroke - way)) * (-out + ring * rate + leak),
-        ]
-
-
-@dataclass
-class Point:
-    """A point: place, partial velocities by the coordinates, acceleration without z''."""
-
-    place: Complex
-    partial: Complex
-    bias: Complex
-
-    def velocity(self, rates: Array) -> Complex:
-        """Velocity."""
-        return np.asarray((self.partial * rates).sum(axis=0))
-
-
-@dataclass
-class Frame:
-    """A body's origin, angle, and the coordinates that its angle is the sum of."""
-
-    origin: Point
-    angle: Array
-    spin: Array
-    partial: Array
-
-    def point(self, local: complex) -> Point:
-        """Point that is fixed to the body."""
-        arm = local * np.exp(1j * self.angle)
-        turned = self.origin.partial + 1j * arm * self.partial
-        return Point(self.origin.place + arm, turned, self.origin.bias - self.spin**2 * arm)
-
-
-@dataclass
-class Rod:
-    """A straight line between two points: length, angle, and points along it."""
-
-    start: Point
-    end: Point
-    rates: Array
-
-    def __post_init__(self) -> None:
-        span = self.end.place - self.start.place
-        partial, bias = self.end.partial - self.start.partial, self.end.bias - self.start.bias
-        self.length = np.abs(span)
-        self.along = span / self.length
-        across = 1j * self.along
-        self.lever = (np.conj(self.along) * partial).real
-        self.turn = (np.conj(across) * partial).real / self.length
-        self.rate = (self.lever * self.rates).sum(axis=0)
-        self.spin = (self.turn * self.rates).sum(axis=0)
-        self.turn_bias = ((np.conj(across) * bias).real - 2.0 * self.rate * self.spin) / self.length
-
-    def point(self, end: Point, distance: float) -> Point:
-        """Point at a distance from one end, along the line."""
-        way, across = distance * self.along, 1j * distance * self.along
-        bias = end.bias + across * self.turn_bias - way * self.spin**2
-        return Point(end.place + way, end.partial + across * self.turn, bias)
+Drive = Literal["torques", "pistons", "springs", "hydraulic"]
 
 
 @dataclass
@@ -216,7 +72,8 @@ class Leg:
         On the slider (kg).
     bushings : tuple of float or None
         Stiffness and damping of hip and knee in the plane, (N/m, N s/m, N/m, N s/m); None for revolute joints.
-    drive : {"pd", "springs", "hydraulic"}
+    drive : {"torques", "pistons", "springs", "hydraulic"}
+        Of the joint controllers: torques on the joints, forces of the cylinders, or currents of their valves.
     proportional : float
         Of the joint controllers (N m/rad).
     period : float or None
@@ -226,17 +83,17 @@ class Leg:
     """
 
     payload: float = 0.0
-    bushings: tuple[float, float, float, float] | None = None
-    drive: Drive = "pd"
+    bushings: Bushings | None = None
+    drive: Drive = "torques"
     proportional: float = 150.0
     period: float | None = None
-    springs: tuple[tuple[float, float, float], tuple[float, float, float]] = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    springs: tuple[tuple[float, float, float], tuple[float, float, float]] = SPRINGS
     ground: Ground = field(default_factory=Ground)
     oil: Hydraulics = field(default_factory=Hydraulics)
 
     @property
     def size(self) -> int:
-        """Coordinates: height of the slider, hip (x, y), its angle, knee (x, y), its angle; x and y on bushings only."""
+        """Coordinates: height of the slider, angles of hip and knee; on bushings (x, y, angle) of each."""
         return 3 if self.bushings is None else 7
 
     @property
@@ -290,12 +147,14 @@ class Leg:
         return Motion(mass, load, rods, shank.point(LOWER))
 
     def commands(self, state: Array) -> Array:
-        """What the controllers command in a state: torques, or currents of the valves."""
+        """What the controllers command in a state: torques, forces, or currents of the valves."""
         motion, z, v, inner = self._split(state)
         joints = self.joints
         torques = self.proportional * (DESIRED[:, None] - z[joints]) - DAMPING * v[joints]
-        if self.drive == "pd":
+        if self.drive == "torques":
             return torques
+        if self.drive == "pistons":
+            return np.array([torques[k] / rod.lever[joints[k]] for k, rod in enumerate(motion.cylinders)])
         commands = []
         for k, rod in enumerate(motion.cylinders):
             states = inner[4 * k : 4 * k + 4]
@@ -312,7 +171,7 @@ class Leg:
     def rate(self, state: Array, held: Array | None = None) -> Array:
         """Rates of states of shape (size, n): coordinates, rates, cylinders, impulse of the ground."""
         motion, z, v, inner = self._split(state)
-        effort, inner_rates = self._drive(motion, z, v, inner, state, held)
+        effort, inner_rates = self._drive(motion, inner, state, held)
         ground = self.ground.force(motion.foot.place, motion.foot.velocity(v))
         effort = effort + (np.conj(motion.foot.partial) * ground).real - motion.load
         if self.bushings is not None:
@@ -323,17 +182,19 @@ class Leg:
         acceleration = np.moveaxis(np.linalg.solve(mass, right)[..., 0], 0, -1)
         return np.concatenate([v, acceleration, inner_rates, ground.imag[None]])
 
-    def _drive(
-        self, motion: Motion, z: Array, v: Array, inner: Array, state: Array, held: Array | None
-    ) -> tuple[Array, Array]:
-        effort = np.zeros(z.shape)
+    def _drive(self, motion: Motion, inner: Array, state: Array, held: Array | None) -> tuple[Array, Array]:
+        effort = np.zeros(motion.load.shape)
         if self.drive == "springs":
             for rod, (k, free, c) in zip(motion.cylinders, self.springs, strict=True):
                 effort += rod.lever * (k * (free - rod.length) - c * rod.rate)
             return effort, inner
         commands = self.commands(state) if held is None else held[:, None]
-        if self.drive == "pd":
+        if self.drive == "torques":
             effort[self.joints] = commands
+            return effort, inner
+        if self.drive == "pistons":
+            for rod, force in zip(motion.cylinders, commands, strict=True):
+                effort += rod.lever * force
             return effort, inner
         rates: list[Array] = []
         for k, rod in enumerate(motion.cylinders):
@@ -430,10 +291,8 @@ class Leg:
             for name, rod, (k_s, free, c) in zip(("hip", "knee"), (hip, knee), self.springs, strict=True):
                 seen[f"{name}_force"] = k_s * (free - rod.length) - c * rod.rate
         else:
-            torques = self.commands(states.T)
-            for k, (name, rod) in enumerate((("hip", hip), ("knee", knee))):
-                seen[f"{name}_torque"] = torques[k]
-                seen[f"{name}_force"] = torques[k] / rod.lever[self.joints[k]]
+            forces = replace(self, drive="pistons").commands(states.T)
+            seen |= {"hip_force": forces[0], "knee_force": forces[1]}
         return seen
 
     def rest(self) -> tuple[Array, Array]:
@@ -453,7 +312,30 @@ class Leg:
         return q, self.proportional * (DESIRED - q) / levers
 
 
-def smooth(t: Array) -> Array:
-    """Cubic step from 0 to 1."""
-    t = np.clip(t, 0.0, 1.0)
-    return np.asarray(t * t * (3.0 - 2.0 * t))
+VALUES = Path(__file__).parent / "values" / "hyl_witness.json"
+#: Machines that stand in the file of values.
+CASES: dict[str, Leg] = {
+    "rigid, low gain": Leg(drive="pistons", period=1e-3),
+    "rigid, high gain": Leg(drive="pistons", period=1e-3, proportional=300.0),
+    "bushings, low gain": Leg(drive="pistons", period=1e-3, bushings=STIFF),
+    "springs": Leg(drive="springs"),
+    "hydraulic, low gain": Leg(drive="hydraulic", period=1e-3),
+    "hydraulic, high gain": Leg(drive="hydraulic", period=1e-3, proportional=300.0),
+    "hydraulic, bushings": Leg(drive="hydraulic", period=1e-3, bushings=STIFF),
+}
+#: Multiples of 1 ms: the impact finely, the rest coarsely.
+TIMES = np.concatenate([np.arange(0, 100, 50), np.arange(100, 130, 2), np.arange(130, 405, 15)]) / 1000.0
+
+
+def main() -> None:
+    """Write the file of values: the drop from 50 mm of every case, to a relative tolerance of 1e-10."""
+    content = {}
+    for name, leg in CASES.items():
+        seen = leg.observe(leg.simulate(TIMES, 1e-10), TIMES)
+        content[name] = {key: [float(f"{number:.12g}") for number in column] for key, column in seen.items()}
+        print(name, content[name]["height"][-1])
+    VALUES.write_text(json.dumps(content, indent=None).replace("}, ", "},\n") + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
