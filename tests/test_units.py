@@ -154,7 +154,7 @@ def test_a_minute_is_no_milli_inch() -> None:
         ("m^100", "beyond 99"),
         ("m^99.5", "beyond 99"),
         ("m^0.33333333", "too many digits"),
-        ("m^0.", "\".\" is not part of a unit"),
+        ("m^0.", '"." is not part of a unit'),
         ("GPa^99", "too large"),
         ("nm^99", "too small"),
         ("3 m", '"3" stands where a symbol is needed'),

@@ -45,7 +45,9 @@ _PREFIXES = {
     "G": 1e9,
 }
 
-_TOKEN = re.compile(r"\s*(?:(?P<name>[^\W\d_]+|[°%])|(?P<power>\^|\*\*)|(?P<number>[+-]?\d+(?:\.\d+)?)|(?P<mark>[*·/()]))")
+_TOKEN = re.compile(
+    r"\s*(?:(?P<name>[^\W\d_]+|[°%])|(?P<power>\^|\*\*)|(?P<number>[+-]?\d+(?:\.\d+)?)|(?P<mark>[*·/()]))"
+)
 
 
 #: Power of a unit; a whole one is an int.
@@ -378,7 +380,8 @@ def _write(terms: tuple[tuple[str, Power], ...]) -> str:
     """Symbols and powers as text that `parse_unit` reads back."""
 
     def product(sign: int) -> list[str]:
-        return [name if abs(power) == 1 else f"{name}^{_digits(abs(power))}" for name, power in terms if power * sign > 0]
+        found = [(name, sign * Fraction(power)) for name, power in terms if power * sign > 0]
+        return [name if power == 1 else f"{name}^{_digits(power)}" for name, power in found]
 
     above, below = product(1), product(-1)
     if not below:
@@ -387,6 +390,6 @@ def _write(terms: tuple[tuple[str, Power], ...]) -> str:
     return f"{' '.join(above) or '1'}/{divisor}"
 
 
-def _digits(power: Power) -> str:
+def _digits(power: Fraction) -> str:
     """A positive power as decimal digits; powers are sums and products of decimal numbers, so they have an end."""
     return format(Decimal(power.numerator) / Decimal(power.denominator), "f")
