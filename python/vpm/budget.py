@@ -137,11 +137,12 @@ def budget(
 
 def _commands(model: Model, rate: float, experiment: Experiment | None) -> Array:
     if experiment is not None:
-        columns = [experiment[f"{name}.command"] for name in model.actuators]
+        columns = [experiment[name] for name in model.input_channels]
     else:
         time = np.arange(SWEEP_SAMPLES) / rate
         wave = np.mean([np.sin(2.0 * np.pi * f * time) for f in SWEEP_FREQUENCIES], axis=0)
         columns = [wave for _ in model.actuators]
+        columns += [np.full(time.size, model.parameters[name].value) for name in model.inputs[len(columns) :]]
     return np.ascontiguousarray(np.column_stack(columns)) if columns else np.zeros((1, 0))
 
 
