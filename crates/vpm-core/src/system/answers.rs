@@ -12,6 +12,7 @@ impl<S: Scalar> Dynamics<S> {
         self.tensions.fill(S::zero());
         self.efforts.copy_from_slice(&efforts[..joints]);
         let elastic = &efforts[joints..];
+        self.locate(q, v);
         self.accelerate(q, v, |effects, q, v, total| add_effects(effects, q, v, total), elastic);
         &self.data.acceleration
     }
