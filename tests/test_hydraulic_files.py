@@ -90,7 +90,7 @@ def test_the_speed_without_load(current: float, wanted: tuple[float, float, floa
 @pytest.mark.parametrize(("current", "force", "end"), [(10e-3, STALL_OUT, 0.04), (-10e-3, -STALL_IN, -0.04)])
 def test_a_piston_rests_at_the_end_of_its_stroke(current: float, force: float, end: float) -> None:
     model = Model.from_toml(BARE)
-    run = simulate(model, held(model, 1e-4, np.full(3000, current)))
+    run = simulate(model, held(model, 1e-4, np.full(3000, current)), integrator="rosenbrock")
     assert np.all(np.isfinite(run.values))
     assert run["axis.position"][-1] == pytest.approx(end + force / 5e8, abs=1e-9)
     assert abs(force) == pytest.approx(3204.7 if current > 0 else 1940.2, abs=0.1)
@@ -190,11 +190,12 @@ def test_a_piston_outside_of_its_stroke_is_refused(rig: Model) -> None:
     ):
         with pytest.raises(SimulationError) as caught:
             start()
-        for part in ("servo", "axis", "-0.04", "0.04", "0.05"):
+        for part in ("servo", "axis", "starts 0.0", "-0.04 m and 0.04 m", "retracted_length"):
             assert part in str(caught.value)
 
 
-def test_delays_and_limits_of_the_command(rig: Model) -> None:
+def test_delays_and_limits_of_the_command() -> None:
+    rig = changed(RIG, ("internal_leakage = 1.7e-13", ""))  # nothing moves before the command comes through
     command = chirp(1e-3 * np.arange(300), 2e-3)
     late = rig.with_effect("input_delay", at="servo", time=5e-3)
     plain, after = simulate(rig, held(rig, 1e-3, command)), simulate(late, held(rig, 1e-3, command))
@@ -216,7 +217,7 @@ def test_steps_batches_and_runs_agree(rig: Model) -> None:
     assert all(isinstance(each, Run) for each in batch)
     assert isinstance(batch[0], Run)
     assert np.array_equal(batch[0].values, run.values)
-    assert vpm.budget(rig, 1000.0, steps=1000).steps == 1000
+    assert vpm.budget(rig, rate=1000.0, steps=1000).steps == 1000
 
 
 def test_closed_loops_take_supplies_as_disturbances() -> None:
