@@ -1,7 +1,9 @@
 //! What can go wrong, as data: which part, the failing condition, the numbers and the repair, in one sentence each.
 
+pub use connection::ConnectionError;
 pub use linkage::LinkageError;
 
+mod connection;
 mod linkage;
 
 /// An input or a computation that has no physical meaning.
@@ -252,6 +254,9 @@ pub enum Error {
         /// Name of the actuator.
         actuator: String,
     },
+    /// A contact, a bushing or a load cell that has no physical meaning.
+    #[error("{0}")]
+    Connection(#[from] ConnectionError),
     /// A linkage that cannot be closed, or not be solved for its motion.
     #[error("{0}")]
     Linkage(#[from] LinkageError),

@@ -1,11 +1,16 @@
 //! A whole machine as one ordinary differential equation: tree, effects and actuators.
 
 mod answers;
+mod connections;
 mod observe;
+mod slopes;
 mod stiff;
 mod tangent;
 
+pub use connections::Connections;
+
 use crate::actuator::{Actuator, Target};
+use crate::contact::ContactFriction;
 use crate::data::Data;
 use crate::dynamics::{aba, flexible, frames, lines, poses};
 use crate::effect::JointEffect;
@@ -37,6 +42,8 @@ pub struct Dynamics<S> {
     /// Whether any actuator acts on a line.
     pulls: bool,
     loads: Vec<S>,
+    /// Contacts, bushings and load cells.
+    pub(crate) connections: Connections<S>,
 }
 
 impl<S: Scalar> Dynamics<S> {
@@ -51,10 +58,17 @@ impl<S: Scalar> Dynamics<S> {
             tensions: zeros(model.lines().len()),
             pulls: actuators.iter().any(|actuator| matches!(actuator.on, Target::Line(_))),
             loads: zeros(model.n_coordinates()),
+            connections: Connections::default(),
             model,
             effects,
             actuators,
         }
+    }
+
+    /// With contacts, bushings and load cells.
+    #[must_use]
+    pub fn connected(self, connections: Connections<S>) -> Self {
+        Self { connections, ..self }
     }
 
     /// Number of joints.
@@ -90,7 +104,7 @@ impl<S: Scalar> Dynamics<S> {
     pub fn accelerations(&mut self, q: &[S], v: &[S], efforts: &[S]) -> &[S] {
         self.tensions.fill(S::zero());
         self.efforts.copy_from_slice(efforts);
-        self.accelerate(q, v, add_effects, &[]);
+        self.accelerate(q, v, (add_effects, ContactFriction::resistance), &[]);
         &self.data.acceleration
     }
 
@@ -102,22 +116,22 @@ impl<S: Scalar> Dynamics<S> {
     /// dx/dt at x.
     #[inline]
     pub fn rhs(&mut self, x: &[S], dxdt: &mut [S]) {
-        self.rhs_with(x, dxdt, add_effects);
+        self.rhs_with(x, dxdt, (add_effects, ContactFriction::resistance));
     }
 
-    /// dx/dt at x, with the efforts of the effects at (q, v) added by `add`.
+    /// dx/dt at x, with the efforts of the effects at (q, v) and the resistances of contacts by `laws`.
     #[inline]
     fn rhs_with(
         &mut self,
         x: &[S],
         dxdt: &mut [S],
-        add: impl FnOnce(&[(usize, JointEffect<S>)], &[S], &[S], &mut [S]),
+        laws: (impl FnOnce(&[(usize, JointEffect<S>)], &[S], &[S], &mut [S]), impl Fn(&ContactFriction<S>, S, S) -> S),
     ) {
         let n = self.coordinates();
         let ((q, v), lags) = (x[..2 * n].split_at(n), &x[2 * n..]);
         self.actuate(lags, &mut dxdt[2 * n..]);
         dxdt[..n].copy_from_slice(v);
-        self.accelerate(q, v, add, &[]);
+        self.accelerate(q, v, laws, &[]);
         dxdt[n..2 * n].copy_from_slice(&self.data.acceleration);
     }
 
@@ -128,26 +142,34 @@ impl<S: Scalar> Dynamics<S> {
         &mut self,
         q: &[S],
         v: &[S],
-        add: impl FnOnce(&[(usize, JointEffect<S>)], &[S], &[S], &mut [S]),
+        (add, resistance): (
+            impl FnOnce(&[(usize, JointEffect<S>)], &[S], &[S], &mut [S]),
+            impl Fn(&ContactFriction<S>, S, S) -> S,
+        ),
         on_beams: &[S],
     ) {
-        let Self { model, data, loads, tensions, .. } = self;
+        let Self { model, data, loads, tensions, connections, .. } = self;
         let (of_joints, elastic) = loads.split_at_mut(model.n_joints());
         of_joints.copy_from_slice(&self.efforts);
         elastic.fill(S::zero());
         elastic[..on_beams.len()].copy_from_slice(on_beams);
         add(&self.effects, q, v, of_joints);
         if model.is_recursive() {
-            if self.pulls {
+            if self.pulls || !connections.is_free() {
                 frames(model, data, q, v);
                 poses(model, data);
                 lines(model, data);
                 flexible::add_line_forces(data, tensions, loads);
+                connections.add_loads(model, data, resistance, loads);
             }
             aba(model, data, q, v, loads);
         } else {
             flexible::terms(model, data, q, v);
             flexible::add_line_forces(data, tensions, loads);
+            if !connections.is_free() {
+                poses(model, data);
+                connections.add_loads(model, data, resistance, loads);
+            }
             flexible::solve(model, data, q, v, loads);
         }
     }
@@ -255,7 +277,7 @@ impl<S: Scalar> Ode<S> for System<S> {
         for (joint, effect) in &self.dynamics.effects {
             self.resistances[*joint] += effect.resistance(x[n + joint]);
         }
-        if self.dynamics.model.n_elastic() == 0 {
+        if self.dynamics.model.n_elastic() == 0 || !self.dynamics.connections.is_free() {
             self.tangent.chords(x, matrix, &self.resistances);
         } else {
             stiff::iteration_matrix(&mut self.dynamics, x, matrix, &self.resistances, &mut self.column);

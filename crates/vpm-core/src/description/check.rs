@@ -1,6 +1,6 @@
 //! What a description must satisfy before anything is built from it.
 
-use super::{Description, EffectEntry};
+use super::{Description, EffectEntry, connections};
 use crate::actuator::Target;
 use crate::body::Site;
 use crate::effect::Domain;
@@ -25,6 +25,9 @@ pub(super) fn references(description: &Description) -> Result<()> {
         within(&what, "parameter", index, description.parameters.len())?;
     }
     sites(description)?;
+    for cell in &description.load_cells {
+        within(&format!("load cell `{}`", cell.name), "joint", cell.joint, description.n_joints())?;
+    }
     channels(description)?;
     unique_claims(description)
 }
@@ -58,7 +61,9 @@ fn domains(description: &Description) -> impl Iterator<Item = (usize, Domain)> {
     let actuators = description.actuators.iter().flat_map(|actuator| actuator.domains());
     let sensors = description.sensors.iter().flat_map(|sensor| sensor.domains());
     let controllers = description.controllers.iter().flat_map(|controller| controller.law.domains());
-    effects.chain(actuators).chain(sensors).chain(controllers).map(|(&index, domain)| (index, domain))
+    let connections = connections::domains(description);
+    let domains = effects.chain(actuators).chain(sensors).chain(controllers).chain(connections);
+    domains.map(|(&index, domain)| (index, domain))
 }
 
 /// Every place in the parameter vector that is used, and by what.
@@ -88,6 +93,7 @@ fn used_parameters(description: &Description) -> Vec<(String, usize)> {
     for controller in &description.controllers {
         controller.law.map(&mut |&index| used.push((format!("controller `{}`", controller.name), index)));
     }
+    used.extend(connections::used(description));
     used
 }
 
@@ -150,6 +156,9 @@ fn channel(what: &str, channel: Channel, description: &Description) -> Result<()
         | Channel::Rx { marker }
         | Channel::Ry { marker }
         | Channel::Rz { marker } => within(what, "marker", marker, description.markers.len()),
+        Channel::Contact { contact, .. } => within(what, "contact", contact, description.contacts.len()),
+        Channel::Bushing { bushing, .. } => within(what, "bushing", bushing, description.bushings.len()),
+        Channel::LoadCell { load_cell, .. } => within(what, "load cell", load_cell, description.load_cells.len()),
     }
 }
 

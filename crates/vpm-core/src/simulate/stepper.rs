@@ -201,7 +201,7 @@ impl<'a, S: Scalar> Stepper<'a, S> {
     fn record_efforts(&mut self, row: usize, start: usize) {
         let (layout, actuators) = (self.description.layout(), self.description.n_actuators());
         let truth = &mut self.truth[row * layout.count()..(row + 1) * layout.count()];
-        self.system.dynamics().observe_efforts(&self.rate, truth);
+        self.system.dynamics().observe_efforts(&self.state, &self.rate, truth);
         let commands = &self.commands[(row + start) * actuators..];
         for (channels, &command) in truth[layout.actuators()..].chunks_exact_mut(2).zip(commands).take(actuators) {
             channels[0] = command;
