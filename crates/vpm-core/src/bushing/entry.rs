@@ -59,7 +59,7 @@ impl<P> BushingEntry<P> {
 
     /// The parameters and where each is defined.
     pub fn domains(&self) -> Vec<(&P, Domain)> {
-        let of = |place: usize| if place % 7 == 0 { Domain::NonNegative } else { Domain::Any };
+        let of = |place: usize| if place.is_multiple_of(7) { Domain::NonNegative } else { Domain::Any };
         let matrices = [&self.stiffness, &self.damping].into_iter();
         let entries = matrices.flat_map(|matrix| matrix.as_flattened().iter().enumerate());
         let matrices = entries.filter_map(|(place, entry)| entry.as_ref().map(|entry| (entry, of(place))));
@@ -81,13 +81,12 @@ impl BushingEntry<usize> {
     pub fn check(&self, theta: &[f64]) -> Result<()> {
         let law: Bushing<f64> = self.law(&mut |&index| theta[index]);
         let largest = law.stiffness.as_flattened().iter().fold(0.0_f64, |most, entry| most.max(entry.abs()));
-        for row in 0..6 {
-            for column in row + 1..6 {
-                let (above, below) = (law.stiffness[row][column], law.stiffness[column][row]);
-                if (above - below).abs() > SYMMETRY * largest {
-                    let (bushing, row, column) = (self.name.clone(), DIRECTIONS[row], DIRECTIONS[column]);
-                    return Err(ConnectionError::NotSymmetric { bushing, row, column, above, below }.into());
-                }
+        let pairs = (0..36).map(|place| (place / 6, place % 6)).filter(|(row, column)| row < column);
+        for (row, column) in pairs {
+            let (above, below) = (law.stiffness[row][column], law.stiffness[column][row]);
+            if (above - below).abs() > SYMMETRY * largest {
+                let (bushing, row, column) = (self.name.clone(), DIRECTIONS[row], DIRECTIONS[column]);
+                return Err(ConnectionError::NotSymmetric { bushing, row, column, above, below }.into());
             }
         }
         for (matrix, entries) in [("stiffness", &law.stiffness), ("damping", &law.damping)] {
