@@ -1,8 +1,10 @@
 //! What can go wrong, as data: which part, the failing condition, the numbers and the repair, in one sentence each.
 
+pub use connection::ConnectionError;
 pub use drive::DriveError;
 pub use linkage::LinkageError;
 
+mod connection;
 mod drive;
 mod linkage;
 
@@ -257,6 +259,9 @@ pub enum Error {
     /// A drive or a supply that cannot be as described.
     #[error("{0}")]
     Drive(#[from] DriveError),
+    /// A contact, a bushing or a load cell that has no physical meaning.
+    #[error("{0}")]
+    Connection(#[from] ConnectionError),
     /// A linkage that cannot be closed, or not be solved for its motion.
     #[error("{0}")]
     Linkage(#[from] LinkageError),

@@ -8,7 +8,7 @@ mod stepper;
 
 pub(crate) use names::state_name;
 pub use prescribed::prescribed;
-pub(crate) use stability::{check_beams, check_step};
+pub(crate) use stability::{check_step, check_structure};
 pub(crate) use start::check_pistons;
 pub(crate) use stepper::{Drive, Plan, Stepper};
 

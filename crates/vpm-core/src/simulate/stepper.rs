@@ -204,7 +204,7 @@ impl<'a, S: Scalar> Stepper<'a, S> {
     fn record_efforts(&mut self, row: usize, start: usize) {
         let (layout, inputs) = (self.description.layout(), self.description.n_inputs());
         let truth = &mut self.truth[row * layout.count()..(row + 1) * layout.count()];
-        self.system.dynamics().observe_efforts(&self.rate, truth);
+        self.system.dynamics().observe_efforts(&self.state, &self.rate, truth);
         let commands = &self.commands[(row + start) * inputs..];
         for (channels, &command) in truth[layout.actuators()..].chunks_exact_mut(2).zip(commands).take(layout.actuators)
         {
