@@ -26,4 +26,9 @@ pub trait Ode<S> {
     fn elasticity(&mut self, _x: &[S], _block: &mut [S]) -> bool {
         false
     }
+
+    /// Writes the size of each state, in its unit, below which its error counts as that of a state of this size.
+    fn scales(&self, scales: &mut [f64]) {
+        scales.fill(1.0);
+    }
 }
