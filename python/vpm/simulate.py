@@ -402,6 +402,8 @@ def _inverse_dynamics_run(model: Model, experiment: Experiment, cutoff: float | 
 
 
 def _columns(experiment: Experiment, channels: Sequence[str], mode: str) -> Array:
+    if not channels:  # a machine that nobody drives
+        return np.zeros((len(experiment), 0))
     missing = [channel for channel in channels if channel not in experiment]
     if missing:
         raise ExperimentError(

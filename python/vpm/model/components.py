@@ -118,6 +118,18 @@ class Components:
         controlled = {controller.actuator for controller in self._checked.document.controllers.values()}
         return tuple(name for name in self.actuators if name in controlled)
 
+    def held_channel(self, actuator: str) -> str:
+        """Channel that the controller of an actuator holds at its reference.
+
+        Raises
+        ------
+        ModelError
+            There is no such actuator, or no controller commands it.
+        """
+        name = self._known(actuator, self.controlled_actuators, "actuator with a controller")
+        controllers = self._checked.document.controllers.values()
+        return next(controller.measures for controller in controllers if controller.actuator == name)
+
     def has_lag(self, actuator: str) -> bool:
         """Whether an actuator follows its command with a lag, which adds a state."""
         self._known(actuator, self.actuators, "actuator")

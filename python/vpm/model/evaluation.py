@@ -255,6 +255,11 @@ class Evaluations(Components):
         """
         return self._filled(values, self.state_names, "state")
 
+    @property
+    def state_units(self) -> tuple[str, ...]:
+        """SI units of the states, in the order of ``state_names``."""
+        return tuple(self._state_units())
+
     def command(self, values: Mapping[str, float] | ArrayLike | None = None) -> Array:
         """Commands of all actuators from names, ``{"drive": 1.0}``; what is not named is zero.
 
