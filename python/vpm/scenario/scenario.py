@@ -28,7 +28,7 @@ from vpm.scenario.messages import in_file, raise_first, refuse
 from vpm.scenario.outcome import ScenarioRun
 from vpm.scenario.panels import checked_panels
 from vpm.scenario.schema import Document
-from vpm.scenario.start import held_references, start_state
+from vpm.scenario.start import held_inputs, start_state
 from vpm.simulate import Run, Setup, simulate
 
 Array = NDArray[np.float64]
@@ -170,7 +170,7 @@ class Scenario:
         owner, machine = self._named(model)
         with in_file(self._path):
             given = dict(given_inputs(self._document, owner, machine, self._clock))
-        held = held_references(machine, self.initial_state(model), tuple(given))
+        held = held_inputs(machine, self.initial_state(model), given)
         rest = np.zeros(self._clock.steps + 1)
         values = given | {channel: np.full(len(rest), level) for channel, (level, _) in held.items()}
         looped = bool(machine.controlled_actuators)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vpm.errors import near_match
 from vpm.model import Model
+from vpm.scenario.inputs import logged_supplies
 from vpm.scenario.messages import refuse
 from vpm.scenario.schema import Document
 from vpm.scenario.values import si_value
@@ -59,23 +60,37 @@ def _deflect(state: Array, joints: int, coordinates: int, owner: str, model: Mod
         refuse("initial", f"{rest}; name another position, or states of the links")
 
 
-def held_references(model: Model, state: Array, given: tuple[str, ...]) -> Mapping[str, tuple[float, str]]:
-    """References that a scenario does not give: each holds what its controller measures at the beginning.
+def held_inputs(model: Model, state: Array, given: Collection[str]) -> Mapping[str, tuple[float, str]]:
+    """Inputs that a scenario does not give and that are not zero: references and pressures of logged supplies.
+
+    A reference holds what its controller measures at the beginning, a pressure is that of the model file.
+
+    Parameters
+    ----------
+    model : Model
+    state : ndarray, shape (nx,)
+        At the beginning.
+    given : collection of str
+        Channels that the scenario gives.
 
     Returns
     -------
     mapping of str to (float, str)
         Channel to its value (SI) and to a sentence that says so.
     """
+    held: dict[str, tuple[float, str]] = {}
     missing = [name for name in model.controlled_actuators if f"{name}.reference" not in given]
-    if not missing:
-        return {}
     # What the sensors show before anything moves; it depends on no step.
-    seen = Simulation(model, 1e-3, state=state)
-    held = {}
+    seen = Simulation(model, 1e-3, state=state) if missing else {}
     for actuator in missing:
         channel = model.held_channel(actuator)
-        unit = model.channel_unit(channel)
-        sentence = f"{actuator} has no reference, so it holds {channel} at its initial {seen[channel]:.6g} {unit}."
-        held[f"{actuator}.reference"] = (float(seen[channel]), sentence)
+        value = float(seen[channel])
+        shown = f"{value:.6g} {model.channel_unit(channel)}"
+        sentence = f"{actuator} has no reference, so it holds {channel} at its initial {shown}."
+        held[f"{actuator}.reference"] = (value, sentence)
+    for supply in logged_supplies(model):
+        if f"{supply}.pressure" not in given:
+            value = model.parameters[f"{supply}.pressure"].value
+            sentence = f"{supply} has no pressure over time, so it keeps the {value:.6g} Pa of the model file."
+            held[f"{supply}.pressure"] = (value, sentence)
     return held
