@@ -78,19 +78,31 @@ def held_inputs(model: Model, state: Array, given: Collection[str]) -> Mapping[s
     mapping of str to (float, str)
         Channel to its value (SI) and to a sentence that says so.
     """
+    return {**_held_references(model, state, given), **_kept_pressures(model, given)}
+
+
+def _held_references(model: Model, state: Array, given: Collection[str]) -> dict[str, tuple[float, str]]:
     held: dict[str, tuple[float, str]] = {}
     missing = [name for name in model.controlled_actuators if f"{name}.reference" not in given]
-    # What the sensors show before anything moves; it depends on no step.
-    seen = Simulation(model, 1e-3, state=state) if missing else {}
+    if not missing:
+        return held
+    seen = Simulation(model, 1e-3, state=state)  # what the sensors show before anything moves; it depends on no step
     for actuator in missing:
         channel = model.held_channel(actuator)
-        value = float(seen[channel])
+        value = seen[channel]
         shown = f"{value:.6g} {model.channel_unit(channel)}"
-        sentence = f"{actuator} has no reference, so it holds {channel} at its initial {shown}."
-        held[f"{actuator}.reference"] = (value, sentence)
-    for supply in logged_supplies(model):
-        if f"{supply}.pressure" not in given:
-            value = model.parameters[f"{supply}.pressure"].value
-            sentence = f"{supply} has no pressure over time, so it keeps the {value:.6g} Pa of the model file."
-            held[f"{supply}.pressure"] = (value, sentence)
+        held[f"{actuator}.reference"] = (
+            value,
+            f"{actuator} has no reference, so it holds {channel} at its initial {shown}.",
+        )
     return held
+
+
+def _kept_pressures(model: Model, given: Collection[str]) -> dict[str, tuple[float, str]]:
+    kept = {}
+    for supply in logged_supplies(model):
+        channel = f"{supply}.pressure"
+        if channel not in given:
+            value = model.parameters[channel].value
+            kept[channel] = (value, f"{supply} has no pressure over time, so it keeps the {value:.6g} Pa of its model.")
+    return kept
