@@ -355,7 +355,7 @@ SERVED = [{"name": "servo", "model": "servo.toml"}]
             "commands.drive.time goes back from 0.1 s to 0 s",
         ),
         ({"commands": {"drive": POINTS | {"time": 0.1}}}, "commands.drive.time has to be a list of numbers"),
-        ({"commands": {"drive": POINTS | {"value": [0.0, "a"]}}}, 'commands.drive.value.value[1] is "a"'),
+        ({"commands": {"drive": POINTS | {"value": [0.0, "a"]}}}, 'commands.drive.value[1] is "a", but has to be a number'),
         ({"initial": {"axis.positon": 0.1}}, 'initial."axis.positon" is no state of run "bare"'),
         (
             {"initial": {"axis.position": {"value": 3.0, "unit": "deg"}}},

@@ -14,7 +14,7 @@ from vpm.scenario.schema import Document
 from vpm.scenario.values import si_value
 
 #: Samples that a scenario may have: more do not fit into a memory.
-MOST_SAMPLES = 50_000_000
+MOST_SAMPLES = 10_000_000
 
 #: Share of a step by which the duration may miss a whole number of steps: decimal fractions are rounded.
 DIVISION_TOLERANCE = 1e-6

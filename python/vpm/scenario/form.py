@@ -62,7 +62,8 @@ def schema_problems(error: ValidationError) -> list[Problem]:
 def _without_type(keys: Keys) -> tuple[Keys, str | None]:
     """Place without what the schema puts into it: the type of a signal, the branch of a level."""
     if keys[0] in INPUTS and len(keys) > 2:
-        return (*keys[:2], *keys[3:]), str(keys[2])
+        place_of_number = keys[5:] if len(keys) == 6 and keys[4] == "value" else keys[4:]  # bare lists have no such key
+        return (*keys[:2], *keys[3:4], *place_of_number), str(keys[2])
     if keys[0] == "runs" and len(keys) > 3 and keys[2] == "level":
         return keys[:3], None
     return keys, None
