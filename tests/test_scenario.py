@@ -18,6 +18,7 @@ from hypothesis.extra.numpy import arrays
 
 import vpm
 from vpm.errors import ModelError, ScenarioError
+from vpm.plot.scenarios import readable_unit
 from vpm.scenario import Scenario, ScenarioRun, signals
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -268,6 +269,24 @@ def test_the_result_has_the_manners_of_results(folder: Path, tmp_path: Path) -> 
         result["bear"]
 
 
+def test_columns_of_the_picture_stand_side_by_side_on_one_scale(folder: Path) -> None:
+    runs = [{"name": "bare", "model": "sled.toml"}, {"name": "servo", "model": "servo.toml"}]
+    plot = {"panels": [["axis.position"], ["drive.force"]], "columns": {"open": ["bare"], "closed": ["servo"]}}
+    figure = scenario(folder, runs=runs, plot=plot).run().plot()
+    assert [len(axis.lines) for axis in figure.axes] == [1, 1, 1, 1]
+    assert figure.axes[0].get_ylim() == figure.axes[1].get_ylim()
+    assert figure.axes[0].lines[0].get_color() != figure.axes[1].lines[0].get_color()
+    assert {text.get_text() for axis in figure.axes for text in axis.texts} == {"open", "closed"}
+
+
+@pytest.mark.parametrize(
+    ("unit", "largest", "shown"),
+    [("Pa", 1.6e7, "bar"), ("m", 0.05, "mm"), ("m", 0.5, "m"), ("N", 5e4, "kN"), ("rad", 1e-3, "rad"), ("m", 0.0, "m")],
+)
+def test_pictures_use_units_that_people_read(unit: str, largest: float, shown: str) -> None:
+    assert readable_unit(unit, largest) == shown
+
+
 def test_without_panels_positions_and_forces_are_shown(folder: Path) -> None:
     assert scenario(folder).panels == (("axis.position",), ("drive.force",))
 
@@ -355,7 +374,10 @@ SERVED = [{"name": "servo", "model": "servo.toml"}]
             "commands.drive.time goes back from 0.1 s to 0 s",
         ),
         ({"commands": {"drive": POINTS | {"time": 0.1}}}, "commands.drive.time has to be a list of numbers"),
-        ({"commands": {"drive": POINTS | {"value": [0.0, "a"]}}}, 'commands.drive.value[1] is "a", but has to be a number'),
+        (
+            {"commands": {"drive": POINTS | {"value": [0.0, "a"]}}},
+            'commands.drive.value[1] is "a", but has to be a number',
+        ),
         ({"initial": {"axis.positon": 0.1}}, 'initial."axis.positon" is no state of run "bare"'),
         (
             {"initial": {"axis.position": {"value": 3.0, "unit": "deg"}}},
@@ -370,6 +392,10 @@ SERVED = [{"name": "servo", "model": "servo.toml"}]
             "plot.panels[0] mixes channels in N and m",
         ),
         ({"plot": {"panels": []}}, "plot.panels is empty"),
+        (
+            {"plot": {"panels": [["axis.position"]], "columns": {"all": ["bear"]}}},
+            'plot.columns.all[0] is "bear", which is no run of the scenario; did you mean "bare"?',
+        ),
     ],
 )
 def test_refusals_say_where_why_and_what_to_do(folder: Path, changes: dict[str, Any], sentence: str) -> None:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import chain, cycle
 from math import inf
 from textwrap import fill
 from typing import TYPE_CHECKING, Literal, Protocol
@@ -53,6 +55,10 @@ class ScenarioLike(Protocol):
     def failures(self) -> Mapping[str, str]:
         """What went wrong, by the name of the run."""
 
+    @property
+    def columns(self) -> Mapping[str, Sequence[str]]:
+        """Runs of each column, by its heading; none where all share one."""
+
     def traces(self, channel: str) -> Mapping[str, tuple[Array, Array]]:
         """Time and values in each run that has the channel."""
 
@@ -60,54 +66,96 @@ class ScenarioLike(Protocol):
         """SI unit of a channel."""
 
 
+@dataclass(frozen=True)
+class _Row:
+    """A panel of each column: channels, what the runs show of them, and the unit in which that is drawn."""
+
+    channels: Sequence[str]
+    traces: Mapping[str, Mapping[str, tuple[Array, Array]]]
+    unit: str
+    factor: float
+    largest: float
+
+
 @styled
 def plot_scenario(result: ScenarioLike) -> Figure:
     """Draw all runs over time: a colour for each run, a style of line for each channel of a panel.
+
+    Columns of the scenario stand side by side with common axes.
 
     Parameters
     ----------
     result : ScenarioRun
     """
-    from matplotlib.lines import Line2D
-
-    figure, axes = panels(max(1, len(result.panels)), height=1.9, share_x=True)
+    columns = result.columns or {"": tuple(result.runs)}
+    width = 8.0 if len(columns) == 1 else 5.0 * len(columns)
+    rows = max(1, len(result.panels))
+    figure, axes = panels(rows, len(columns), height=1.6 + 1.2 / rows, width=width, share_x=True)
     colors = {name: RUNS[place % len(RUNS)] for place, name in enumerate(result.runs)}
-    for (axis,), channels in zip(axes, result.panels, strict=False):
-        _draw_panel(axis, result, channels, colors)
-    axes[-1][0].set_xlabel("time [s]")
-    axes[-1][0].margins(x=0.01)
-    figure.suptitle(result.name, fontsize=11, x=0.02, ha="left")
-    if len(colors) > 1:
-        handles = [Line2D([], [], color=color, linewidth=2.0, label=name) for name, color in colors.items()]
-        figure.legend(handles=handles, loc="outside upper right", ncols=min(len(handles), 3))
-    told = "\n".join(fill(f"{name} failed: {reason}", 110) for name, reason in result.failures.items())
-    if told:
-        figure.supxlabel(told, fontsize=8, color=ORANGE)
+    for row, channels in zip(axes, result.panels, strict=False):
+        _draw_row(row, _row(result, channels), list(columns.values()), colors)
+    for axis, heading in zip(axes[0], columns, strict=True):
+        at, shift = (0.5, 1.0), (0.0, 20.0)
+        axis.annotate(heading, at, shift, "axes fraction", "offset points", ha="center", fontsize=10)
+    for axis in axes[-1]:
+        axis.set_xlabel("time [s]")
+    for axis in chain.from_iterable(axes):
+        axis.margins(x=0.01)
+    _finish(figure, result, colors, len(columns))
     return figure
 
 
-def _draw_panel(axis: Axes, result: ScenarioLike, channels: Sequence[str], colors: Mapping[str, str]) -> None:
+def _finish(figure: Figure, result: ScenarioLike, colors: Mapping[str, str], columns: int) -> None:
+    """Title, names of the runs, and what failed."""
     from matplotlib.lines import Line2D
 
-    styles = {channel: CHANNELS[place % len(CHANNELS)] for place, channel in enumerate(channels)}
-    found = {channel: result.traces(channel) for channel in channels}
-    largest = max((float(np.abs(values).max(initial=0.0)) for each in found.values() for _, values in each.values()))
-    unit = next((result.unit(channel) for channel in channels if found[channel]), "1")
+    figure.suptitle(result.name, fontsize=11, x=0.02, ha="left")
+    if len(colors) > 1:
+        handles = [Line2D([], [], color=color, linewidth=2.0, label=name) for name, color in colors.items()]
+        figure.legend(handles=handles, loc="outside upper right", ncols=min(len(handles), 2 * columns + 1))
+    told = "\n".join(fill(f"{name} failed: {reason}", 110) for name, reason in result.failures.items())
+    if told:
+        figure.supxlabel(told, fontsize=8, color=ORANGE)
+
+
+def _row(result: ScenarioLike, channels: Sequence[str]) -> _Row:
+    traces = {channel: result.traces(channel) for channel in channels}
+    largest = max(float(np.abs(values).max(initial=0.0)) for each in traces.values() for _, values in each.values())
+    unit = next(result.unit(channel) for channel in channels if traces[channel])
     shown = readable_unit(unit, largest)
     factor = convert(1.0, unit, shown)
-    for channel, traces in found.items():
-        shared = len(traces) > 1 and _alike([values for _, values in traces.values()])
-        for name, (time, values) in list(traces.items())[: 1 if shared else None]:
-            color = INK if shared else colors[name]
-            axis.plot(*thinned(time, factor * values), styles[channel], color=color, linewidth=1.1)
-    quantities = {channel.rpartition(".")[2] for channel in channels}
-    axis.set_ylabel(label(quantities.pop().replace("_", " ") if len(quantities) == 1 else "", shown).strip())
-    if len(channels) == 1:
-        axis.set_title(channels[0])
+    return _Row(channels, traces, shown, factor, factor * largest)
+
+
+def _draw_row(axes: Sequence[Axes], row: _Row, columns: Sequence[Sequence[str]], colors: Mapping[str, str]) -> None:
+    """A panel for each column of runs, all of one scale."""
+    for axis, names in zip(axes, columns, strict=True):
+        if axis is not axes[0]:
+            axis.sharey(axes[0])
+            axis.tick_params(labelleft=False)
+        for style, traces in zip(cycle(CHANNELS), row.traces.values(), strict=False):
+            here = [(name, *traces[name]) for name in names if name in traces]
+            shared = len(traces) > 1 and _alike([values for _, values in traces.values()])
+            for name, time, values in here[: 1 if shared else None]:
+                color = INK if shared else colors[name]
+                axis.plot(*thinned(time, row.factor * values), style, color=color, linewidth=1.1)
+    _name_channels(axes[0], row)
+
+
+def _name_channels(axis: Axes, row: _Row) -> None:
+    from matplotlib.lines import Line2D
+
+    quantities = {channel.rpartition(".")[2] for channel in row.channels}
+    axis.set_ylabel(label(quantities.pop().replace("_", " ") if len(quantities) == 1 else "", row.unit).strip())
+    if len(row.channels) == 1:
+        axis.set_title(row.channels[0])
         return
-    handles = [Line2D([], [], color=SOFT, linestyle=style, label=channel) for channel, style in styles.items()]
+    handles = [
+        Line2D([], [], color=SOFT, linestyle=style, label=channel)
+        for style, channel in zip(cycle(CHANNELS), row.channels, strict=False)
+    ]
     # A power of ten of the axis stands in the corner, where the legend would hide it.
-    corner = 0.0 if 1e-3 <= factor * largest < 1e4 else 0.06
+    corner = 0.0 if 1e-3 <= row.largest < 1e4 else 0.06
     axis.legend(handles=handles, loc="lower left", bbox_to_anchor=(corner, 1.0), ncols=4, borderaxespad=0.2)
 
 

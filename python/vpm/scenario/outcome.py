@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -48,6 +48,8 @@ class ScenarioRun(Result):
         What went wrong, by the name of the run; empty as a rule.
     panels : tuple of tuple of str
         Channels of each panel of the picture.
+    columns : dict of str to tuple of str
+        Names of the runs of each column of the picture, by its heading; empty where all runs share one.
     """
 
     name: str
@@ -56,6 +58,7 @@ class ScenarioRun(Result):
     inputs: dict[str, Experiment]
     failures: dict[str, str]
     panels: tuple[tuple[str, ...], ...]
+    columns: dict[str, tuple[str, ...]] = field(default_factory=dict)
 
     def __getitem__(self, name: str) -> Run:
         """A run by its name."""

@@ -43,6 +43,23 @@ def checked_panels(document: Document, models: Mapping[str, Model]) -> Panels:
     return document.plot.panels
 
 
+def checked_columns(document: Document, models: Mapping[str, Model]) -> Mapping[str, tuple[str, ...]]:
+    """Runs of each column of the picture, by its heading; empty where all runs share one.
+
+    Raises
+    ------
+    ScenarioError
+        A run is unknown.
+    """
+    columns = {} if document.plot is None else document.plot.columns
+    for heading, names in columns.items():
+        for entry, name in enumerate(names):
+            if name not in models:
+                repair = near_match(name, models, what="it has")
+                refuse(("plot", "columns", heading, entry), f'is "{name}", which is no run of the scenario; {repair}')
+    return columns
+
+
 def _usual(units: Mapping[str, str], models: Mapping[str, Model]) -> Panels:
     joints = dict.fromkeys(f"{name}.position" for model in models.values() for name in model.joints)
     forces = dict.fromkeys(f"{name}.force" for model in models.values() for name in model.actuators)

@@ -26,7 +26,7 @@ from vpm.scenario.inputs import given_inputs
 from vpm.scenario.machine import machines
 from vpm.scenario.messages import in_file, raise_first, refuse
 from vpm.scenario.outcome import ScenarioRun
-from vpm.scenario.panels import checked_panels
+from vpm.scenario.panels import checked_columns, checked_panels
 from vpm.scenario.schema import Document
 from vpm.scenario.start import held_inputs, start_state
 from vpm.simulate import Run, Setup, simulate
@@ -66,6 +66,7 @@ class Scenario:
                 given_inputs(self._document, f'run "{name}"', model, self._clock)
             self._starts = {n: start_state(self._document, f'run "{n}"', m) for n, m in self._models.items()}
             self._panels = checked_panels(self._document, self._models)
+            self._columns = checked_columns(self._document, self._models)
 
     # ---- ways in -----------------------------------------------------------------------------------------------------
 
@@ -234,7 +235,7 @@ class Scenario:
         found = dict(zip(self._models, side_by_side(jobs, workers, progress), strict=True))
         runs = dict(_finished(found, inputs))
         failures = {name: str(error) for name, error in found.items() if isinstance(error, VpmError)}
-        return ScenarioRun(self.name, self._clock.time, runs, inputs, failures, self._panels)
+        return ScenarioRun(self.name, self._clock.time, runs, inputs, failures, self._panels, dict(self._columns))
 
     def _one(self, name: str, inputs: Experiment) -> Run:
         return simulate(

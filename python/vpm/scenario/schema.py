@@ -100,9 +100,10 @@ class RunEntry(Entry):
 
 
 class PlotEntry(Entry):
-    """What the picture shows: one list of channels for each panel."""
+    """What the picture shows: one list of channels for each panel; columns of runs stand side by side."""
 
     panels: Annotated[tuple[Annotated[tuple[Text, ...], Field(min_length=1)], ...], Field(min_length=1)]
+    columns: dict[str, Annotated[tuple[Text, ...], Field(min_length=1)]] = Field(default_factory=dict)
 
 
 class Document(Entry):
