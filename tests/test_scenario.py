@@ -235,6 +235,10 @@ def test_a_run_that_fails_leaves_the_others(folder: Path) -> None:
     assert result["bare"].time.size == 2001
     assert 0 < result["mad"].time.size < 2001
     assert told[-1] == (2, 2)
+    # The picture shows the whole of the one that went well, whatever numbers the other came to.
+    low, high = result.plot().axes[0].get_ylim()
+    assert low < result["bare"]["axis.position"].min() < -19.0
+    assert high - low < 25.0
     assert "failed:" in str(result)
     assert result.to_frame()["run"].value_counts()["bare"] == 2001
 

@@ -68,13 +68,17 @@ class ScenarioLike(Protocol):
 
 @dataclass(frozen=True)
 class _Row:
-    """A panel of each column: channels, what the runs show of them, and the unit in which that is drawn."""
+    """A panel of each column: channels, what the runs show of them, and the unit in which that is drawn.
+
+    The range is that of the runs that did not fail, if there are any; None where nothing failed.
+    """
 
     channels: Sequence[str]
     traces: Mapping[str, Mapping[str, tuple[Array, Array]]]
     unit: str
     factor: float
     largest: float
+    limits: tuple[float, float] | None
 
 
 @styled
@@ -120,11 +124,16 @@ def _finish(figure: Figure, result: ScenarioLike, colors: Mapping[str, str], col
 
 def _row(result: ScenarioLike, channels: Sequence[str]) -> _Row:
     traces = {channel: result.traces(channel) for channel in channels}
-    largest = max(float(np.abs(values).max(initial=0.0)) for each in traces.values() for _, values in each.values())
-    unit = next(result.unit(channel) for channel in channels if traces[channel])
-    shown = readable_unit(unit, largest)
+    pieces = [(name, values) for each in traces.values() for name, (_, values) in each.items() if values.size]
+    sound = [values for name, values in pieces if name not in result.failures] or [values for _, values in pieces]
+    low = min((float(values.min()) for values in sound), default=0.0)
+    high = max((float(values.max()) for values in sound), default=0.0)
+    unit = next((result.unit(channel) for channel in channels if traces[channel]), "1")
+    shown = readable_unit(unit, max(-low, high))
     factor = convert(1.0, unit, shown)
-    return _Row(channels, traces, shown, factor, factor * largest)
+    margin = 0.05 * factor * (high - low)
+    limits = (factor * low - margin, factor * high + margin) if result.failures and high > low else None
+    return _Row(channels, traces, shown, factor, factor * max(-low, high), limits)
 
 
 def _draw_row(axes: Sequence[Axes], row: _Row, columns: Sequence[Sequence[str]], colors: Mapping[str, str]) -> None:
@@ -139,6 +148,8 @@ def _draw_row(axes: Sequence[Axes], row: _Row, columns: Sequence[Sequence[str]],
             for name, time, values in here[: 1 if shared else None]:
                 color = INK if shared else colors[name]
                 axis.plot(*thinned(time, row.factor * values), style, color=color, linewidth=1.1)
+    if row.limits is not None:
+        axes[0].set_ylim(row.limits)
     _name_channels(axes[0], row)
 
 

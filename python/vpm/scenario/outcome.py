@@ -128,7 +128,7 @@ class ScenarioRun(Result):
         return "\n".join(self._lines())
 
     def _lines(self) -> Iterator[str]:
-        yield f"{self.name}: {len(self.runs)} of {len(self.inputs)} runs, {self.time[-1]:g} s"
+        yield f"{self.name}: {len(self.inputs) - len(self.failures)} of {len(self.inputs)} runs, {self.time[-1]:g} s"
         for name in self.inputs:
             yield f"{name}:"
             if name in self.runs:
