@@ -112,12 +112,6 @@ class Components:
         """Line that an actuator drives; None if it drives a joint."""
         return self._checked.document.actuators[self._known(actuator, self.actuators, "actuator")].line
 
-    @cached_property
-    def controlled_actuators(self) -> tuple[str, ...]:
-        """Actuators that a controller commands, in the order of `actuators`."""
-        controlled = {controller.actuator for controller in self._checked.document.controllers.values()}
-        return tuple(name for name in self.actuators if name in controlled)
-
     def held_channel(self, actuator: str) -> str:
         """Channel that the controller of an actuator holds at its reference.
 
@@ -129,6 +123,12 @@ class Components:
         name = self._known(actuator, self.controlled_actuators, "actuator with a controller")
         controllers = self._checked.document.controllers.values()
         return next(controller.measures for controller in controllers if controller.actuator == name)
+
+    @cached_property
+    def controlled_actuators(self) -> tuple[str, ...]:
+        """Actuators that a controller commands, in the order of `actuators`."""
+        controlled = {controller.actuator for controller in self._checked.document.controllers.values()}
+        return tuple(name for name in self.actuators if name in controlled)
 
     def has_lag(self, actuator: str) -> bool:
         """Whether an actuator follows its command with a lag, which adds a state."""
