@@ -433,3 +433,10 @@ def test_frequencies_in_radians_per_second_are_turned_into_hertz(folder: Path) -
 
     assert sine({"value": 2.0 * math.pi * 5.0, "unit": "rad/s"}) == pytest.approx(sine(5.0), abs=1e-12)
     assert sine({"value": 300.0, "unit": "rpm"}) == pytest.approx(sine(5.0), abs=1e-12)
+
+
+def test_the_page_shows_the_example_as_it_is() -> None:
+    page = (ROOT / "docs" / "scenarios.md").read_text(encoding="utf-8")
+    shown = page.partition("```toml\n")[2].partition("```")[0]
+    example = (ROOT / "examples" / "emps" / "step.toml").read_text(encoding="utf-8")
+    assert tomllib.loads(shown) == tomllib.loads(example)
