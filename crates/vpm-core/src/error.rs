@@ -1,7 +1,9 @@
 //! What can go wrong, as data: which part, the failing condition, the numbers and the repair, in one sentence each.
 
+pub use drive::DriveError;
 pub use linkage::LinkageError;
 
+mod drive;
 mod linkage;
 
 /// An input or a computation that has no physical meaning.
@@ -252,6 +254,9 @@ pub enum Error {
         /// Name of the actuator.
         actuator: String,
     },
+    /// A drive or a supply that cannot be as described.
+    #[error("{0}")]
+    Drive(#[from] DriveError),
     /// A linkage that cannot be closed, or not be solved for its motion.
     #[error("{0}")]
     Linkage(#[from] LinkageError),
