@@ -445,13 +445,18 @@ def _columns(experiment: Experiment, channels: Sequence[str], mode: str) -> Arra
             f"{experiment.name}: mode '{mode}' needs channel '{missing[0]}', but the log holds "
             f"{', '.join(experiment.channels)}; map a column to it in the channel table"
         )
-    return np.ascontiguousarray(np.column_stack([experiment[channel] for channel in channels]))
+    return _stacked(experiment, [experiment[channel] for channel in channels])
 
 
 def _optional(experiment: Experiment, channels: Sequence[str]) -> Array:
     zero = np.zeros(len(experiment))
     known = {channel: experiment[channel] for channel in channels if channel in experiment}
-    return np.ascontiguousarray(np.column_stack([known.get(channel, zero) for channel in channels]))
+    return _stacked(experiment, [known.get(channel, zero) for channel in channels])
+
+
+def _stacked(experiment: Experiment, columns: Sequence[Array]) -> Array:
+    """Columns side by side, shape (N, len(columns)); none for a machine that nobody drives."""
+    return np.ascontiguousarray(np.column_stack([np.empty((len(experiment), 0)), *columns]))
 
 
 def _inputs(model: Model, experiment: Experiment, mode: str) -> Array:
