@@ -4,14 +4,17 @@
 
 mod check;
 mod connections;
+mod drives;
 mod entry;
 
 use serde::Deserialize;
 
 pub use connections::LoadCell;
+pub(crate) use drives::piston_outside;
 pub use entry::{ControllerEntry, EffectEntry};
 
-use crate::actuator::Actuator;
+use crate::actuator::hydraulic::Supply;
+use crate::actuator::{Actuator, Drive, Target};
 use crate::beam::BeamEntry;
 use crate::body::{Body, PointMass, Weld};
 use crate::bushing::BushingEntry;
@@ -56,6 +59,9 @@ pub struct Description {
     /// Physical effects.
     #[serde(default)]
     pub effects: Vec<EffectEntry>,
+    /// Hydraulic supplies.
+    #[serde(default)]
+    pub supplies: Vec<Supply<usize>>,
     /// Actuators.
     #[serde(default)]
     pub actuators: Vec<Actuator<usize>>,
@@ -118,14 +124,20 @@ impl Description {
         self.beams.len()
     }
 
-    /// Number of actuators, which is the number of inputs.
+    /// Number of actuators.
     pub fn n_actuators(&self) -> usize {
         self.actuators.len()
     }
 
-    /// Length of the state: coordinates, rates, one state per lag in the order of the actuators.
+    /// Number of inputs: a command for each actuator, then a pressure for each logged supply.
+    pub fn n_inputs(&self) -> usize {
+        self.actuators.len() + self.supplies.iter().filter(|supply| supply.is_logged()).count()
+    }
+
+    /// Length of the state: coordinates, rates, the states of each actuator (lag, then drive), pressures of supplies that sag.
     pub fn n_states(&self) -> usize {
-        2 * self.n_coordinates() + self.actuators.iter().filter(|actuator| actuator.lag.is_some()).count()
+        let sagging = self.supplies.iter().filter(|supply| supply.is_sagging()).count();
+        2 * self.n_coordinates() + self.actuators.iter().map(Actuator::n_states).sum::<usize>() + sagging
     }
 
     /// Number of output channels.
@@ -135,12 +147,17 @@ impl Description {
 
     /// Where the outputs are.
     pub fn layout(&self) -> Layout {
+        let count =
+            |kind: fn(&Drive<usize>) -> bool| self.actuators.iter().filter(|actuator| kind(&actuator.drive)).count();
         Layout {
             joints: self.bodies.len(),
             actuators: self.actuators.len(),
             lines: self.lines.len(),
             gauges: self.gauges.len(),
             markers: self.markers.len(),
+            hydraulics: count(|drive| matches!(drive, Drive::Hydraulic(_))),
+            dc_motors: count(|drive| matches!(drive, Drive::DcMotor(_))),
+            supplies: self.supplies.len(),
             contacts: self.contacts.len(),
             bushings: self.bushings.len(),
             load_cells: self.load_cells.len(),
@@ -175,9 +192,16 @@ impl Description {
 
     fn model<S: Scalar>(&self, theta: &[S]) -> Result<Model<S>> {
         let number = &mut |&index: &usize| theta[index];
+        let mut bodies: Vec<_> = self.bodies.iter().map(|body| body.map(number)).collect();
+        for actuator in &self.actuators {
+            if let (Target::Joint(joint), Drive::DcMotor(motor)) = (actuator.on, &actuator.drive) {
+                let (rotor, own) = (&mut bodies[joint].rotor_inertia, motor.map(number).reflected_inertia());
+                *rotor = Some(rotor.map_or(own, |rotor| rotor + own));
+            }
+        }
         Model::assemble(Parts {
             gravity: self.gravity,
-            bodies: self.bodies.iter().map(|body| body.map(number)).collect(),
+            bodies,
             welds: self.welds.iter().map(|weld| weld.map(number)).collect(),
             beams: self.beams.iter().map(|beam| beam.map(number)).collect(),
             point_masses: self.effects.iter().filter_map(|entry| entry.payload(theta)).collect(),
@@ -195,9 +219,10 @@ impl Build for &Description {
     fn dynamics<S: Scalar>(&self, theta: &[S]) -> Result<Dynamics<S>> {
         let effects = self.effects.iter().filter_map(|entry| entry.on_joint(theta)).collect();
         let actuators = self.actuators.iter().map(|actuator| actuator.map(&mut |&index| theta[index])).collect();
+        let supplies = self.supplies.iter().map(|supply| supply.map(&mut |&index| theta[index])).collect();
         let model = self.model(theta)?;
         let connections = self.connections(theta, &model)?;
-        Ok(Dynamics::new(model, effects, actuators).connected(connections))
+        Ok(Dynamics::new(model, effects, actuators, supplies).connected(connections))
     }
 }
 

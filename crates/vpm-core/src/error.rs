@@ -1,9 +1,11 @@
 //! What can go wrong, as data: which part, the failing condition, the numbers and the repair, in one sentence each.
 
 pub use connection::ConnectionError;
+pub use drive::DriveError;
 pub use linkage::LinkageError;
 
 mod connection;
+mod drive;
 mod linkage;
 
 /// An input or a computation that has no physical meaning.
@@ -254,6 +256,9 @@ pub enum Error {
         /// Name of the actuator.
         actuator: String,
     },
+    /// A drive or a supply that cannot be as described.
+    #[error("{0}")]
+    Drive(#[from] DriveError),
     /// A contact, a bushing or a load cell that has no physical meaning.
     #[error("{0}")]
     Connection(#[from] ConnectionError),

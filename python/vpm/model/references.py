@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from vpm.errors import near_match
+from vpm.model.drives import Actuator
 from vpm.model.messages import Problem, place
-from vpm.model.schema import Actuator, Document
+from vpm.model.schema import Document
 from vpm.model.structure import Structure
 from vpm.model.tree import outside_problems
 

@@ -11,7 +11,9 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 from vpm.model.beam import Beam, Gauge, Line, Marker
+from vpm.model.drives import ACTUATOR_TYPES, Actuator
 from vpm.model.entry import ORIGIN, ZERO, Entry, Number, ParameterValue, Quantity, Text, Vector
+from vpm.model.hydraulic import Supply
 from vpm.units import parse_unit
 
 
@@ -49,15 +51,6 @@ class Joint(Entry):
     translation: Vector = ORIGIN
     rotation: Vector = ORIGIN
     dh: DenavitHartenberg | None = None
-
-
-class Actuator(Entry):
-    """Drive of a joint or of a line: effort = gain times command."""
-
-    joint: Text | None = None
-    line: Text | None = None
-    gain: ParameterValue
-    command_unit: Text = "1"
 
 
 class Sensor(Entry):
@@ -158,6 +151,7 @@ class Document(Entry):
     lines: dict[str, Line] = Field(default_factory=dict)
     gauges: dict[str, Gauge] = Field(default_factory=dict)
     markers: dict[str, Marker] = Field(default_factory=dict)
+    supplies: dict[str, Supply] = Field(default_factory=dict)
     actuators: dict[str, Actuator] = Field(default_factory=dict)
     sensors: dict[str, Sensor] = Field(default_factory=dict)
     controllers: dict[str, Controller] = Field(default_factory=dict)
@@ -173,7 +167,8 @@ SECTIONS: Mapping[str, tuple[type[BaseModel], ...]] = {
     "lines": (Line,),
     "gauges": (Gauge,),
     "markers": (Marker,),
-    "actuators": (Actuator,),
+    "supplies": (Supply,),
+    "actuators": tuple(ACTUATOR_TYPES.values()),
     "sensors": (Sensor,),
     "controllers": (Cascade, Pid),
     "channels": (ChannelEntry,),

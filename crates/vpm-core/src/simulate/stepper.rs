@@ -53,7 +53,7 @@ pub(crate) struct Stepper<'a, S> {
     rate: Vec<S>,
     /// Integration steps so far.
     steps: usize,
-    /// Commands of the whole record, row by row; given ones from the beginning, a controller's as time goes by.
+    /// Inputs of the whole record, row by row; given ones from the beginning, a controller's as time goes by.
     commands: Vec<S>,
     /// True channels of the piece, row by row.
     truth: Vec<S>,
@@ -178,32 +178,36 @@ impl<'a, S: Scalar> Stepper<'a, S> {
     /// Lets the controllers command, if there is a loop to close.
     fn control(&mut self, row: usize) {
         let Drive::Loop { references, disturbances } = self.plan.drive else { return };
-        let (time_step, actuators) = (self.stepping.time_step, self.description.n_actuators());
+        let (time_step, inputs) = (self.stepping.time_step, self.description.n_inputs());
         for (number, (law, actuator, column)) in self.controllers.iter().enumerate() {
             let reference = S::from_f64(references.at(row, *actuator));
             let measured = self.reading(row, *column);
             let command = law.command(&mut self.memories[number], reference, measured, time_step);
-            self.commands[row * actuators + actuator] = command + disturbances.at(row, *actuator);
+            self.commands[row * inputs + actuator] = command + disturbances.at(row, *actuator);
+        }
+        for supply in self.description.n_actuators()..inputs {
+            self.commands[row * inputs + supply] = S::from_f64(disturbances.at(row, supply));
         }
     }
 
-    /// Holds on each actuator what its command amounts to over the interval that begins at sample `k` of the record.
+    /// Holds what every input amounts to over the interval that begins at sample `k` of the record.
     fn hold(&mut self, k: usize) {
         let Self { system, commands, stepping, description, .. } = self;
-        let actuators = description.n_actuators();
-        for number in 0..actuators {
-            let command = |sample: usize| commands[sample * actuators + number];
-            let input = system.dynamics().actuators[number].input(k, stepping.time_step, command);
+        let inputs = description.n_inputs();
+        for number in 0..inputs {
+            let command = |sample: usize| commands[sample * inputs + number];
+            let input = system.dynamics().input(number, k, stepping.time_step, command);
             system.hold(number, input);
         }
     }
 
     fn record_efforts(&mut self, row: usize, start: usize) {
-        let (layout, actuators) = (self.description.layout(), self.description.n_actuators());
+        let (layout, inputs) = (self.description.layout(), self.description.n_inputs());
         let truth = &mut self.truth[row * layout.count()..(row + 1) * layout.count()];
         self.system.dynamics().observe_efforts(&self.state, &self.rate, truth);
-        let commands = &self.commands[(row + start) * actuators..];
-        for (channels, &command) in truth[layout.actuators()..].chunks_exact_mut(2).zip(commands).take(actuators) {
+        let commands = &self.commands[(row + start) * inputs..];
+        for (channels, &command) in truth[layout.actuators()..].chunks_exact_mut(2).zip(commands).take(layout.actuators)
+        {
             channels[0] = command;
         }
     }

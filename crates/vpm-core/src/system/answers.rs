@@ -13,6 +13,7 @@ impl<S: Scalar> Dynamics<S> {
         self.tensions.fill(S::zero());
         self.efforts.copy_from_slice(&efforts[..joints]);
         let elastic = &efforts[joints..];
+        self.locate(q, v);
         self.accelerate(q, v, (add_effects, ContactFriction::resistance), elastic);
         &self.data.acceleration
     }

@@ -16,6 +16,9 @@ impl<S: Scalar> Dynamics<S> {
             lines: self.model.lines().len(),
             gauges: self.model.gauges().len(),
             markers: self.model.markers().len(),
+            hydraulics: self.shown.hydraulics.len(),
+            dc_motors: self.shown.currents.len(),
+            supplies: self.supplies.len(),
             contacts: self.connections.contacts.len(),
             bushings: self.connections.bushings.len(),
             load_cells: self.connections.cells.len(),
@@ -27,7 +30,8 @@ impl<S: Scalar> Dynamics<S> {
     pub fn observe(&mut self, x: &[S], dxdt: &[S], outputs: &mut [S]) {
         self.observe_motion(x, outputs);
         self.observe_efforts(x, dxdt, outputs);
-        let commands = outputs[self.layout().actuators()..].chunks_exact_mut(2);
+        let layout = self.layout();
+        let commands = outputs[layout.actuators()..layout.lines()].chunks_exact_mut(2);
         for (channels, &input) in commands.zip(&self.inputs) {
             channels[0] = input;
         }
@@ -50,7 +54,7 @@ impl<S: Scalar> Dynamics<S> {
         lines(model, data);
         for (channels, line) in outputs[layout.lines()..].chunks_exact_mut(3).zip(&data.composite.lines) {
             channels[0] = line.length;
-            channels[1] = line.direction.dot(line.to.velocity - line.from.velocity);
+            channels[1] = line.rate();
         }
         for (output, gauge) in outputs[layout.gauges()..].iter_mut().zip(model.gauges()) {
             let [kappa_x, kappa_y, .., extension] = gauge.section.strain(&q[gauge.first..gauge.first + gauge.len]);
@@ -83,7 +87,7 @@ impl<S: Scalar> Dynamics<S> {
         }
     }
 
-    /// The outputs that follow from the efforts: accelerations, efforts, forces, reactions, in state `x` after [`Dynamics::rhs`].
+    /// The outputs that follow from the efforts: accelerations, efforts, forces, what drives and supplies show, reactions, in state `x` after [`Dynamics::rhs`].
     pub(crate) fn observe_efforts(&mut self, x: &[S], dxdt: &[S], outputs: &mut [S]) {
         let (n, layout) = (self.coordinates(), self.layout());
         let accelerations = &dxdt[n..2 * n];
@@ -97,6 +101,14 @@ impl<S: Scalar> Dynamics<S> {
         }
         for (channels, &tension) in outputs[layout.lines()..].chunks_exact_mut(3).zip(&self.tensions) {
             channels[2] = tension;
+        }
+        let shown = &self.shown;
+        for (channels, values) in outputs[layout.hydraulics()..].chunks_exact_mut(5).zip(&shown.hydraulics) {
+            channels.copy_from_slice(values);
+        }
+        outputs[layout.dc_motors()..layout.supplies()].copy_from_slice(&shown.currents);
+        for (channels, values) in outputs[layout.supplies()..].chunks_exact_mut(2).zip(&shown.supplies) {
+            channels.copy_from_slice(values);
         }
         self.observe_reactions([&x[..n], &x[n..2 * n], accelerations], outputs);
     }

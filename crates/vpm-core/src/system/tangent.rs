@@ -35,10 +35,10 @@ impl<S: Scalar> Tangent<S> {
     }
 
     #[inline]
-    pub(super) fn hold(&mut self, actuator: usize, input: S) {
+    pub(super) fn hold(&mut self, number: usize, input: S) {
         match self {
-            Self::Narrow(lanes) => lanes.dynamics.inputs[actuator] = Dual::constant(input),
-            Self::Wide(lanes) => lanes.dynamics.inputs[actuator] = Dual::constant(input),
+            Self::Narrow(lanes) => lanes.dynamics.inputs[number] = Dual::constant(input),
+            Self::Wide(lanes) => lanes.dynamics.inputs[number] = Dual::constant(input),
         }
     }
 
@@ -50,11 +50,11 @@ impl<S: Scalar> Tangent<S> {
         }
     }
 
-    /// df/dx with the friction laws replaced by `resistances` on the joints.
-    pub(super) fn chords(&mut self, x: &[S], matrix: &mut [S], resistances: &[S]) {
+    /// df/dx with the friction laws replaced by `resistances` on the joints and by those of the `seals`.
+    pub(super) fn chords(&mut self, x: &[S], matrix: &mut [S], resistances: &[S], seals: &[Option<S>]) {
         match self {
-            Self::Narrow(lanes) => lanes.columns(x, matrix, |d, x, rate| chords(d, x, rate, resistances)),
-            Self::Wide(lanes) => lanes.columns(x, matrix, |d, x, rate| chords(d, x, rate, resistances)),
+            Self::Narrow(lanes) => lanes.chords(x, matrix, resistances, seals),
+            Self::Wide(lanes) => lanes.chords(x, matrix, resistances, seals),
         }
     }
 }
@@ -86,6 +86,14 @@ impl<S: Scalar, const N: usize> Lanes<S, N> {
         let lifted: Vec<_> = theta.iter().map(|&value| Dual::constant(value)).collect();
         let zero = vec![Dual::default(); dim];
         Ok(Self { dynamics: build.dynamics(&lifted)?, state: zero.clone(), rate: zero })
+    }
+
+    fn chords(&mut self, x: &[S], matrix: &mut [S], resistances: &[S], seals: &[Option<S>]) {
+        for (seal, chord) in self.dynamics.seals.iter_mut().zip(seals) {
+            *seal = chord.map(Dual::constant);
+        }
+        self.columns(x, matrix, |d, x, rate| chords(d, x, rate, resistances));
+        self.dynamics.seals.fill(None);
     }
 
     /// The derivative of `rhs` along each state, `N` at a time, as columns of a matrix stored row by row.
