@@ -1,6 +1,7 @@
 //! A machine in a single state, in buffers that stand ready: inverse and forward dynamics, mass matrix, energy, Jacobians.
 
 use super::{Dynamics, add_effects};
+use crate::actuator::{Actuator, Drive, Target};
 use crate::contact::ContactFriction;
 use crate::dynamics::{Energy, crba, energy, flexible, for_each_column, frames, lines, poses, rnea};
 use crate::scalar::Scalar;
@@ -51,8 +52,8 @@ impl<S: Scalar> Dynamics<S> {
         &data.mass_matrix
     }
 
-    /// Kinetic and potential energy in J. The potential is that of gravity, of the beams, of contacts and bushings, and of the effects that
-    /// have one.
+    /// Kinetic and potential energy in J. The potential is that of gravity, of the beams, of contacts and bushings, of the effects that have
+    /// one, and of springs along lines without command, visco-elastic ones settled.
     pub fn energy(&mut self, q: &[S], v: &[S]) -> Energy<S> {
         let Self { model, data, effects, connections, .. } = self;
         let mut total = match model.is_recursive() {
@@ -65,6 +66,7 @@ impl<S: Scalar> Dynamics<S> {
             poses(model, data);
             total.potential += connections.potential(data);
         }
+        total.potential += self.springs(q, v);
         total
     }
 
@@ -78,6 +80,24 @@ impl<S: Scalar> Dynamics<S> {
         own.fill(S::zero());
         connections.add_loads(model, data, ContactFriction::resistance, own);
         loads.iter_mut().zip(&*own).for_each(|(load, &own)| *load -= own);
+    }
+
+    /// Energy of the springs along lines, J.
+    fn springs(&mut self, q: &[S], v: &[S]) -> S {
+        let spring = |drive: &Drive<S>| matches!(drive, Drive::SpringDamper(_) | Drive::Maxwell(_));
+        if !self.actuators.iter().any(|actuator| spring(&actuator.drive)) {
+            return S::zero();
+        }
+        self.locate(q, v);
+        let lines = &self.data.composite.lines;
+        let potential = |actuator: &Actuator<S>| match (&actuator.drive, actuator.on) {
+            (Drive::SpringDamper(law), Target::Line(line)) => law.potential(lines[line].length),
+            (Drive::Maxwell(law), Target::Line(line)) => {
+                law.potential(lines[line].length, law.settled(lines[line].length))
+            }
+            _ => S::zero(),
+        };
+        self.actuators.iter().map(potential).sum()
     }
 
     /// Whether actuators act on lines.
