@@ -161,13 +161,16 @@ impl<S: Scalar> Dynamics<S> {
         dxdt[n..2 * n].copy_from_slice(&self.data.acceleration);
     }
 
-    /// Moves the lines and frames to (q, v), as far as anything acts on them, and of a machine that is no rigid tree all that its dynamics need.
+    /// Moves lines and frames to (q, v), as far as anything acts on them, and of a machine that is no rigid tree all that its dynamics need.
     #[inline]
     fn locate(&mut self, q: &[S], v: &[S]) {
         let Self { model, data, connections, .. } = self;
         if !model.is_recursive() {
             flexible::terms(model, data, q, v);
-        } else if self.pulls || !connections.is_free() {
+            if !self.connections.is_free() {
+                poses(model, data);
+            }
+        } else if self.pulls || !self.connections.is_free() {
             frames(model, data, q, v);
             poses(model, data);
             lines(model, data);
@@ -196,14 +199,12 @@ impl<S: Scalar> Dynamics<S> {
         if self.pulls {
             flexible::add_line_forces(data, tensions, loads);
         }
-        if model.is_recursive() {
+        if !connections.is_free() {
             connections.add_loads(model, data, resistance, loads);
+        }
+        if model.is_recursive() {
             aba(model, data, q, v, loads);
         } else {
-            if !connections.is_free() {
-                poses(model, data);
-                connections.add_loads(model, data, resistance, loads);
-            }
             flexible::solve(model, data, q, v, loads);
         }
     }
@@ -307,8 +308,7 @@ impl<S: Scalar> Ode<S> for System<S> {
         for (joint, effect) in &self.dynamics.effects {
             self.resistances[*joint] += effect.resistance(x[n + joint]);
         }
-        let free = self.dynamics.connections.is_free();
-        if self.dynamics.model.n_elastic() == 0 || !self.ideal || !free {
+        if self.dynamics.model.n_elastic() == 0 || !self.ideal || !self.dynamics.connections.is_free() {
             let (q, v) = x[..2 * n].split_at(n);
             self.dynamics.seal_chords(q, v, &mut self.seals);
             self.tangent.chords(x, matrix, &self.resistances, &self.seals);

@@ -70,6 +70,18 @@ impl<S: Scalar> Dynamics<S> {
         total
     }
 
+    /// Takes off `loads` what contacts and bushings do, after [`Dynamics::terms`] at the same coordinates and rates.
+    pub(crate) fn subtract_connections(&mut self, loads: &mut [S]) {
+        let Self { model, data, loads: own, connections, .. } = self;
+        if connections.is_free() {
+            return;
+        }
+        poses(model, data);
+        own.fill(S::zero());
+        connections.add_loads(model, data, ContactFriction::resistance, own);
+        loads.iter_mut().zip(&*own).for_each(|(load, &own)| *load -= own);
+    }
+
     /// Energy of the springs along lines, J.
     fn springs(&mut self, q: &[S], v: &[S]) -> S {
         let spring = |drive: &Drive<S>| matches!(drive, Drive::SpringDamper(_) | Drive::Maxwell(_));
@@ -86,18 +98,6 @@ impl<S: Scalar> Dynamics<S> {
             _ => S::zero(),
         };
         self.actuators.iter().map(potential).sum()
-    }
-
-    /// Takes off `loads` what contacts and bushings do, after [`Dynamics::terms`] at the same coordinates and rates.
-    pub(crate) fn subtract_connections(&mut self, loads: &mut [S]) {
-        let Self { model, data, loads: own, connections, .. } = self;
-        if connections.is_free() {
-            return;
-        }
-        poses(model, data);
-        own.fill(S::zero());
-        connections.add_loads(model, data, ContactFriction::resistance, own);
-        loads.iter_mut().zip(&*own).for_each(|(load, &own)| *load -= own);
     }
 
     /// Whether actuators act on lines.
