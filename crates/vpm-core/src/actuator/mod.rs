@@ -1,5 +1,6 @@
 //! Actuators: the chain from a command to the effort on a joint, each link a file and a rig of its own.
 
+mod dc_motor;
 mod dead_zone;
 pub mod hydraulic;
 mod input_delay;
@@ -11,6 +12,7 @@ mod spring_damper;
 
 use serde::Deserialize;
 
+pub use dc_motor::DcMotor;
 pub use dead_zone::DeadZone;
 pub use input_delay::InputDelay;
 pub use lag::Lag;
