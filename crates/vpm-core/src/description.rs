@@ -3,6 +3,7 @@
 //! The same description is built over any number type: values, or values with exact derivatives with respect to the parameters.
 
 mod check;
+mod controllers;
 mod entry;
 
 use serde::Deserialize;
@@ -75,6 +76,7 @@ impl Description {
         check::parameters(&description, &description.parameters)?;
         let model = description.model(&description.parameters)?;
         description.elastic = (0..model.n_beams()).filter_map(|k| model.beam(k)).map(|(beam, _)| beam.len()).collect();
+        controllers::check_rigid(&description)?;
         check_regular(&model, &mut Data::new(&model))?;
         Ok(description)
     }

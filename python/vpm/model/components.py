@@ -115,7 +115,8 @@ class Components:
     @cached_property
     def controlled_actuators(self) -> tuple[str, ...]:
         """Actuators that a controller commands, in the order of `actuators`."""
-        controlled = {controller.actuator for controller in self._checked.document.controllers.values()}
+        pairs = [pair for controller in self._checked.document.controllers.values() for pair in controller.pairs]
+        controlled = {actuator for actuator, _ in pairs}
         return tuple(name for name in self.actuators if name in controlled)
 
     def has_lag(self, actuator: str) -> bool:
