@@ -266,6 +266,21 @@ pub enum Error {
     /// A contact, a bushing or a load cell that has no physical meaning.
     #[error("{0}")]
     Connection(#[from] ConnectionError),
+    /// A controller whose samples fall between those of the record.
+    #[error(
+        "controller `{controller}` samples every {sample_time} s, which is no whole multiple of the record's time step of {time_step} s; \
+         give it the sample_time {nearest} s, or resample the record"
+    )]
+    SampleTime {
+        /// Name of the controller.
+        controller: String,
+        /// Time between its samples, s.
+        sample_time: f64,
+        /// Time between the samples of the record, s.
+        time_step: f64,
+        /// The multiple next to it, s.
+        nearest: f64,
+    },
     /// A linkage that cannot be closed, or not be solved for its motion.
     #[error("{0}")]
     Linkage(#[from] LinkageError),

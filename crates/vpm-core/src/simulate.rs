@@ -1,5 +1,6 @@
 //! Simulation of a whole record: free run on commands, closed loop on references, restarts from many samples.
 
+mod control;
 mod names;
 mod prescribed;
 mod stability;
@@ -108,7 +109,7 @@ pub fn closed_loop(
     disturbances.expect("disturbances", rows, inputs)?;
     check_state("initial_state", description, initial_state)?;
     for (number, actuator) in description.actuators.iter().enumerate() {
-        if !description.controllers.iter().any(|controller| controller.actuator == number) {
+        if !description.controllers.iter().any(|controller| controller.actuators.contains(&number)) {
             return Err(Error::OpenLoop { actuator: actuator.name.clone() });
         }
     }

@@ -164,7 +164,7 @@ impl<S: Scalar> Dynamics<S> {
     /// Moves lines and frames to (q, v), as far as anything acts on them, and of a machine that is no rigid tree all that its dynamics need.
     #[inline]
     fn locate(&mut self, q: &[S], v: &[S]) {
-        let Self { model, data, connections, .. } = self;
+        let Self { model, data, .. } = self;
         if !model.is_recursive() {
             flexible::terms(model, data, q, v);
             if !self.connections.is_free() {

@@ -121,14 +121,17 @@ class Components(DriveComponents):
             There is no such actuator, or no controller commands it.
         """
         name = self._known(actuator, self.controlled_actuators, "actuator with a controller")
-        controllers = self._checked.document.controllers.values()
-        return next(controller.measures for controller in controllers if controller.actuator == name)
+        return self._controlled[name]
 
     @cached_property
     def controlled_actuators(self) -> tuple[str, ...]:
         """Actuators that a controller commands, in the order of `actuators`."""
-        controlled = {controller.actuator for controller in self._checked.document.controllers.values()}
-        return tuple(name for name in self.actuators if name in controlled)
+        return tuple(name for name in self.actuators if name in self._controlled)
+
+    @property
+    def _controlled(self) -> Mapping[str, str]:
+        """Channel that is held for each actuator with a controller."""
+        return dict(pair for controller in self._checked.document.controllers.values() for pair in controller.pairs)
 
     # ---- channels ----------------------------------------------------------------------------------------------------
 
