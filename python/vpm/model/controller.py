@@ -86,16 +86,17 @@ class Pd(OneAxis):
 
 
 class ForceLoop(OneAxis):
-    """tau = kp (r - q) - kd dq, u = kf (tau / (ds/dq) - F) + kv ds/dt."""
+    """tau = kp (r - q) - kd dq, u = kff tau / (ds/dq) + kf (tau / (ds/dq) - F) + kv ds/dt."""
 
     type: Literal["force_loop"]
     proportional: ParameterValue
     derivative: ParameterValue = ZERO
-    force_gain: ParameterValue
+    feed_forward: ParameterValue = ZERO
+    force_gain: ParameterValue = ZERO
     velocity_gain: ParameterValue = ZERO
     limit: ParameterValue | None = None
 
-    GAINS: ClassVar[tuple[str, ...]] = ("proportional", "derivative", "force_gain", "velocity_gain")
+    GAINS: ClassVar[tuple[str, ...]] = ("proportional", "derivative", "feed_forward", "force_gain", "velocity_gain")
 
 
 _Several = Annotated[tuple[ParameterValue, ...], Field(min_length=1)]
@@ -176,6 +177,7 @@ def _units(controller: Cascade | Pid | Pd | ForceLoop, command: str, structure: 
         return {
             "proportional": f"({effort})/({held})",
             "derivative": f"({effort}) s/({held})",
+            "feed_forward": f"({command})/({structure.effort_unit(controller.actuator)})",
             "force_gain": f"({command})/({structure.effort_unit(controller.actuator)})",
             "velocity_gain": f"({command}) s/({stroke})",
         }
