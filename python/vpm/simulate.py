@@ -412,32 +412,35 @@ def _inverse_dynamics_run(model: Model, experiment: Experiment, cutoff: float | 
     )
 
 
-def _columns(experiment: Experiment, channels: Sequence[str], mode: str) -> Array:
+def _require(experiment: Experiment, channels: Sequence[str], mode: str) -> None:
+    """Complain about the first channel that a mode needs and the log does not hold."""
     missing = [channel for channel in channels if channel not in experiment]
     if missing:
         raise ExperimentError(
             f"{experiment.name}: mode '{mode}' needs channel '{missing[0]}', but the log holds "
             f"{', '.join(experiment.channels)}; map a column to it in the channel table"
         )
-    return np.ascontiguousarray(np.column_stack([experiment[channel] for channel in channels]))
 
 
 def _optional(experiment: Experiment, channels: Sequence[str]) -> Array:
-    zero = np.zeros(len(experiment))
-    known = {channel: experiment[channel] for channel in channels if channel in experiment}
-    return np.ascontiguousarray(np.column_stack([known.get(channel, zero) for channel in channels]))
+    """Columns of a log, zero where it does not hold one."""
+    table = np.zeros((len(experiment), len(channels)))
+    for column, channel in enumerate(channels):
+        if channel in experiment:
+            table[:, column] = experiment[channel]
+    return table
 
 
 def _inputs(model: Model, experiment: Experiment, mode: str) -> Array:
     """Commands and pressures of logged supplies, one column each; springs without a command keep their length."""
-    _columns(experiment, [name for name in model.input_channels if name not in model.optional_inputs], mode)
+    _require(experiment, [name for name in model.input_channels if name not in model.optional_inputs], mode)
     return _optional(experiment, model.input_channels)
 
 
 def _references(model: Model, experiment: Experiment, mode: str) -> tuple[Array, Array]:
     """References and disturbances, one column per input; pressures of logged supplies are disturbances."""
     held, logged = list(model.controlled_actuators), [f"{name}.pressure" for name in model.logged_supplies]
-    _columns(experiment, [f"{name}.reference" for name in held] + logged, mode)
+    _require(experiment, [f"{name}.reference" for name in held] + logged, mode)
     references = _optional(experiment, [f"{name}.reference" for name in model.inputs])
     return references, _optional(experiment, [*(f"{name}.disturbance" for name in model.actuators), *logged])
 
