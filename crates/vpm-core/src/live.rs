@@ -42,7 +42,7 @@ impl Live {
     /// The machine in `state`, no command given yet.
     pub fn new(description: Arc<Description>, theta: &[f64], state: &[f64], stepping: Stepping) -> Result<Self> {
         check_state("state", &description, state)?;
-        check_step(&description, theta, stepping, state, &[])?;
+        check_step(&description, theta, stepping, state)?;
         let system: System<f64> = description.system(theta)?;
         let (dim, sensors) = (system.dim(), description.sensors(theta));
         let depth = depth(&description, theta, stepping.time_step)?;

@@ -8,7 +8,7 @@ mod stepper;
 
 pub(crate) use names::state_name;
 pub use prescribed::prescribed;
-pub(crate) use stability::check_step;
+pub(crate) use stability::{check_beams, check_step};
 pub(crate) use start::check_pistons;
 pub(crate) use stepper::{Drive, Plan, Stepper};
 
@@ -167,7 +167,7 @@ impl Job for Simulation<'_> {
 fn execute(setting: Setting<'_>, plan: Plan<'_>) -> Result<Run> {
     let dim = setting.description.n_states();
     if let Some(first) = plan.initial.get(..dim) {
-        check_step(setting.description, setting.theta, setting.stepping, first, &[])?;
+        check_step(setting.description, setting.theta, setting.stepping, first)?;
         check_starts(setting, plan.initial)?;
     }
     let job = Simulation { setting, plan };

@@ -235,6 +235,16 @@ impl<S: Scalar> System<S> {
     }
 }
 
+impl<S: Scalar> System<S> {
+    /// As df/dx, without the friction of joints and seals, row by row.
+    pub(crate) fn without_friction(&mut self, x: &[S], matrix: &mut [S]) {
+        self.resistances.fill(S::zero());
+        self.seals.fill(Some(S::zero()));
+        self.tangent.chords(x, matrix, &self.resistances, &self.seals);
+        self.seals.fill(None);
+    }
+}
+
 /// Makes the right-hand side of one machine over any number type.
 pub trait Build {
     /// What can go wrong.

@@ -1,6 +1,6 @@
 //! Joints that follow a given motion, and what answers to it: beams, and joints that nobody drives.
 
-use super::{Run, Setting, Stepping, check_step, names};
+use super::{Run, Setting, Stepping, check_beams, names};
 use crate::algebra::Cholesky;
 use crate::description::Description;
 use crate::dynamics::flexible;
@@ -44,7 +44,7 @@ pub fn prescribed(setting: Setting<'_>, motion: JointMotion<'_>, passive: &[usiz
         let mut state = motion.position.row(0).to_vec();
         state.resize(setting.description.n_states(), 0.0);
         let driven: Vec<usize> = (0..joints).filter(|joint| !passive.contains(joint)).collect();
-        check_step(setting.description, setting.theta, setting.stepping, &state, &driven)?;
+        check_beams(setting.description, setting.theta, setting.stepping, &state, &driven)?;
     }
     let job = Guided { setting, motion, passive: &passive };
     let output = |pass: &Pair<_>, place: usize| pass.first[place];

@@ -1,20 +1,44 @@
-//! Whether the steps of an explicit method are short enough for the flexible links of a machine.
+//! Whether the steps of an explicit method are short enough for the flexible links and the drives of a machine.
 
 use super::Stepping;
-use super::names::coordinate;
+use super::names::{coordinate, state_name};
+use crate::actuator::Drive;
 use crate::description::Description;
 use crate::error::Result;
 use crate::integrator::Method;
+use crate::integrator::growth::{Rates, check_rates};
 use crate::integrator::stability::{LinearSystem, check};
 use crate::ode::Ode;
 use crate::system::System;
+
+/// Complains, with the mode and the largest stable step, if flexible links and drives cannot be stepped so from `state`.
+///
+/// Judged with the drives where they stand in that state; what friction, end stops and opening valves add later is left to the run.
+pub(crate) fn check_step(description: &Description, theta: &[f64], stepping: Stepping, state: &[f64]) -> Result<()> {
+    if description.actuators.iter().all(|actuator| matches!(actuator.drive, Drive::Ideal(_))) {
+        return check_beams(description, theta, stepping, state, &[]);
+    }
+    let explicit = matches!(stepping.method, Method::Rk4 | Method::SemiImplicit);
+    if !explicit || state.iter().any(|number| !number.is_finite()) {
+        return Ok(());
+    }
+    let mut system: System<f64> = description.system(theta)?;
+    let (n, dim) = (description.n_coordinates(), description.n_states());
+    let (mut jacobian, mut elastic, mut sizes) = (vec![0.0; dim * dim], vec![0.0; 2 * n * n], vec![0.0; dim]);
+    system.without_friction(state, &mut jacobian);
+    system.scales(&mut sizes);
+    let elasticity = system.elasticity(state, &mut elastic).then_some(&*elastic);
+    let names: Vec<String> = (0..dim).map(|place| state_name(description, place)).collect();
+    let rates = Rates { jacobian: &jacobian, coordinates: n, elasticity, sizes: &sizes, names: &names };
+    check_rates(stepping.method, stepping.step(), &rates)
+}
 
 /// Complains, with the mode and the largest stable step, if the flexible links cannot be stepped so from `state`; the
 /// joints `driven` follow a motion of their own.
 ///
 /// Judged at the mass matrix of that state and the constant stiffness and damping of the beams; friction and springs of joints, whose
 /// slopes change with the state, are left to the run itself.
-pub(crate) fn check_step(
+pub(crate) fn check_beams(
     description: &Description,
     theta: &[f64],
     stepping: Stepping,

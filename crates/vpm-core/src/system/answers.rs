@@ -1,6 +1,7 @@
 //! A machine in a single state, in buffers that stand ready: inverse and forward dynamics, mass matrix, energy, Jacobians.
 
 use super::{Dynamics, add_effects};
+use crate::actuator::{Actuator, Drive, Target};
 use crate::dynamics::{Energy, crba, energy, flexible, for_each_column, frames, lines, poses, rnea};
 use crate::scalar::Scalar;
 use crate::spatial::{Pose, Twist};
@@ -45,7 +46,8 @@ impl<S: Scalar> Dynamics<S> {
         &data.mass_matrix
     }
 
-    /// Kinetic and potential energy in J. The potential is that of gravity, of the beams, and of the effects that have one.
+    /// Kinetic and potential energy in J. The potential is that of gravity, of the beams, of the effects that have one, and of springs along
+    /// lines without command, visco-elastic ones settled.
     pub fn energy(&mut self, q: &[S], v: &[S]) -> Energy<S> {
         let Self { model, data, effects, .. } = self;
         let mut total = match model.is_recursive() {
@@ -53,7 +55,26 @@ impl<S: Scalar> Dynamics<S> {
             false => flexible::energy(model, data, q, v),
         };
         total.potential += effects.iter().map(|(joint, effect)| effect.potential(q[*joint])).sum();
+        total.potential += self.springs(q, v);
         total
+    }
+
+    /// Energy of the springs along lines, J.
+    fn springs(&mut self, q: &[S], v: &[S]) -> S {
+        let spring = |drive: &Drive<S>| matches!(drive, Drive::SpringDamper(_) | Drive::Maxwell(_));
+        if !self.actuators.iter().any(|actuator| spring(&actuator.drive)) {
+            return S::zero();
+        }
+        self.locate(q, v);
+        let lines = &self.data.composite.lines;
+        let potential = |actuator: &Actuator<S>| match (&actuator.drive, actuator.on) {
+            (Drive::SpringDamper(law), Target::Line(line)) => law.potential(lines[line].length),
+            (Drive::Maxwell(law), Target::Line(line)) => {
+                law.potential(lines[line].length, law.settled(lines[line].length))
+            }
+            _ => S::zero(),
+        };
+        self.actuators.iter().map(potential).sum()
     }
 
     /// Whether actuators act on lines.
