@@ -130,7 +130,7 @@ def test_a_visco_elastic_drive_relaxes() -> None:
 
 def test_springs_carry_a_leg_in_its_rest() -> None:
     """What the springs push in the end holds the leg: force times slope of the length is the effort of the rest."""
-    model = changed(SPRUNG).with_effect("viscous_friction", at="knee", viscous=20.0)
+    model = changed(SPRUNG).with_effect("viscous_friction", at="knee", viscous=10.0)
     time = 1e-3 * np.arange(6000)
     start = model.state({"hip.position": 0.1, "knee.position": 0.2})
     run = simulate(
