@@ -438,7 +438,8 @@ def _inverse_dynamics_run(model: Model, experiment: Experiment, cutoff: float | 
     )
 
 
-def _columns(experiment: Experiment, channels: Sequence[str], mode: str) -> Array:
+def _require(experiment: Experiment, channels: Sequence[str], mode: str) -> None:
+    """Complain about the first channel that a mode needs and the log does not hold."""
     missing = [channel for channel in channels if channel not in experiment]
     if missing:
         raise ExperimentError(
@@ -461,14 +462,14 @@ def _stacked(experiment: Experiment, columns: Sequence[Array]) -> Array:
 
 def _inputs(model: Model, experiment: Experiment, mode: str) -> Array:
     """Commands and pressures of logged supplies, one column each; springs without a command keep their length."""
-    _columns(experiment, [name for name in model.input_channels if name not in model.optional_inputs], mode)
+    _require(experiment, [name for name in model.input_channels if name not in model.optional_inputs], mode)
     return _optional(experiment, model.input_channels)
 
 
 def _references(model: Model, experiment: Experiment, mode: str) -> tuple[Array, Array]:
     """References and disturbances, one column per input; pressures of logged supplies are disturbances."""
     held, logged = list(model.controlled_actuators), [f"{name}.pressure" for name in model.logged_supplies]
-    _columns(experiment, [f"{name}.reference" for name in held] + logged, mode)
+    _require(experiment, [f"{name}.reference" for name in held] + logged, mode)
     references = _optional(experiment, [f"{name}.reference" for name in model.inputs])
     return references, _optional(experiment, [*(f"{name}.disturbance" for name in model.actuators), *logged])
 
