@@ -128,7 +128,7 @@ def budget(
         raise SimulationError(f"{steps} steps are too few for a 99.9 % quantile; time at least 1000")
     setup = Setup(integrator, substeps)
     inputs = _commands(model, rate, experiment)
-    state = np.zeros(model.core.n_states)
+    state = model.state()
     seconds = model.core.time_steps(model.theta, state, inputs, 1.0 / rate, setup.substeps, setup.integrator, steps)
     quantiles = {name: float(np.quantile(seconds, q)) for name, q in QUANTILES.items()}
     overruns = int(np.count_nonzero(seconds > 1.0 / rate))

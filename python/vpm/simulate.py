@@ -36,7 +36,9 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 MODES = ("free_run", "inverse_dynamics", "restarts", "closed_loop", "prescribed_motion")
-INTEGRATORS = ("linearly_implicit", "rosenbrock", "rk4", "semi_implicit")
+#: Integrators of fixed steps, whose work is bounded.
+FIXED_STEP = ("linearly_implicit", "rosenbrock", "rk4", "semi_implicit")
+INTEGRATORS = (*FIXED_STEP, "adaptive")
 
 
 @dataclass(frozen=True)
@@ -45,11 +47,14 @@ class Setup:
 
     Attributes
     ----------
-    integrator : {"linearly_implicit", "rosenbrock", "rk4", "semi_implicit"}
+    integrator : {"linearly_implicit", "rosenbrock", "rk4", "semi_implicit", "adaptive"} or ``"adaptive(1e-8)"``
         The first two are stable whatever is stiff, of order 2 and 4; the first also stops on dry friction far
-        sharper than a step. The others are explicit, but for the constant stiffness of flexible links in the last.
+        sharper than a step. The next two are explicit, but for the constant stiffness of flexible links in the last.
+        ``adaptive`` takes as many steps of ``rosenbrock`` as keep the error of each within a tolerance, 1e-6 or the
+        one in brackets, relative to each state and its natural size: for impacts, oil and other things that change
+        between microseconds and seconds. Its time is not bounded.
     substeps : int
-        Integration steps per sample of the log.
+        Integration steps per sample of the log; with ``adaptive`` pieces of a sample that take one step at least.
     horizon : float
         Length of each restart, s.
     settling : float
@@ -64,14 +69,35 @@ class Setup:
 
     def __post_init__(self) -> None:
         """Check the choices."""
-        if self.integrator not in INTEGRATORS:
-            raise SimulationError(f"unknown integrator '{self.integrator}'; choose one of {', '.join(INTEGRATORS)}")
+        _check_integrator(self.integrator)
         if self.substeps < 1:
             raise SimulationError(f"substeps is {self.substeps}; give a whole number of at least 1")
         if not self.horizon > 0.0:
             raise SimulationError(f"horizon is {self.horizon} s; give a positive time")
         if not self.settling >= 0.0:
             raise SimulationError(f"settling is {self.settling} s; give a time that is not negative")
+
+
+def _check_integrator(name: str) -> None:
+    """Complain about a name that is none, or a tolerance that means nothing.
+
+    Raises
+    ------
+    SimulationError
+    """
+    from vpm._core import check_integrator
+
+    if name in INTEGRATORS:
+        return
+    if not name.startswith("adaptive("):
+        choice = ", ".join(INTEGRATORS)
+        raise SimulationError(
+            f"unknown integrator '{name}'; choose one of {choice} or, with a tolerance, adaptive(1e-8)"
+        )
+    try:
+        check_integrator(name)
+    except ValueError as error:
+        raise SimulationError(str(error)) from None
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -197,7 +223,7 @@ def simulate(
     SimulationError, ExperimentError
         A setting is wrong or a channel that the mode needs is missing.
     DivergedError
-        The state left the finite numbers; carries the run up to there.
+        The state left the finite numbers, or no step of ``adaptive`` can follow it; carries the run up to there.
 
     Warns
     -----
@@ -419,13 +445,18 @@ def _columns(experiment: Experiment, channels: Sequence[str], mode: str) -> Arra
             f"{experiment.name}: mode '{mode}' needs channel '{missing[0]}', but the log holds "
             f"{', '.join(experiment.channels)}; map a column to it in the channel table"
         )
-    return np.ascontiguousarray(np.column_stack([experiment[channel] for channel in channels]))
+    return _stacked(experiment, [experiment[channel] for channel in channels])
 
 
 def _optional(experiment: Experiment, channels: Sequence[str]) -> Array:
     zero = np.zeros(len(experiment))
     known = {channel: experiment[channel] for channel in channels if channel in experiment}
-    return np.ascontiguousarray(np.column_stack([known.get(channel, zero) for channel in channels]))
+    return _stacked(experiment, [known.get(channel, zero) for channel in channels])
+
+
+def _stacked(experiment: Experiment, columns: Sequence[Array]) -> Array:
+    """Columns side by side, shape (N, len(columns)); none for a machine that nobody drives."""
+    return np.ascontiguousarray(np.column_stack([np.empty((len(experiment), 0)), *columns]))
 
 
 def _inputs(model: Model, experiment: Experiment, mode: str) -> Array:

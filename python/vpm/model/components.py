@@ -112,6 +112,18 @@ class Components(DriveComponents):
         """Line that an actuator drives; None if it drives a joint."""
         return self._checked.document.actuators[self._known(actuator, self.actuators, "actuator")].line
 
+    def held_channel(self, actuator: str) -> str:
+        """Channel that the controller of an actuator holds at its reference.
+
+        Raises
+        ------
+        ModelError
+            There is no such actuator, or no controller commands it.
+        """
+        name = self._known(actuator, self.controlled_actuators, "actuator with a controller")
+        controllers = self._checked.document.controllers.values()
+        return next(controller.measures for controller in controllers if controller.actuator == name)
+
     @cached_property
     def controlled_actuators(self) -> tuple[str, ...]:
         """Actuators that a controller commands, in the order of `actuators`."""
