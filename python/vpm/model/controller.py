@@ -1,18 +1,12 @@
-"""Controllers of a model file: what each type is made of, and the units of its gains."""
+"""Controllers of a model file: what each type is made of."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import AfterValidator, Field
 
-from vpm.catalogue import EFFORT_UNIT
-from vpm.model.entry import ZERO, Entry, Number, ParameterValue, Quantity, Text
-
-if TYPE_CHECKING:
-    from vpm.model.structure import Structure
+from vpm.model.entry import ZERO, Entry, Number, ParameterValue, Text
 
 
 def _period(value: float) -> float:
@@ -128,63 +122,3 @@ Controller = Annotated[Cascade | Pid | Pd | ForceLoop | ComputedTorque, Field(di
 
 #: Types of controllers, as a model file names them.
 TYPES: tuple[type[Sampled], ...] = (Cascade, Pid, Pd, ForceLoop, ComputedTorque)
-
-
-@dataclass(frozen=True)
-class Gain:
-    """A number of a controller: the end of its dotted name, the way to it in the table, what stands there, its unit."""
-
-    suffix: str
-    way: tuple[str | int, ...]
-    quantity: Quantity
-    unit: str
-    is_limit: bool = False
-
-
-def gains(controller: Controller, structure: Structure) -> Iterator[Gain]:
-    """Every number of a controller that is a parameter, limits last.
-
-    Parameters
-    ----------
-    controller : Controller
-        Its references have to be right.
-    structure : Structure
-
-    Yields
-    ------
-    Gain
-    """
-    commands = [structure.document.actuators[actuator].command_unit for actuator, _ in controller.pairs]
-    if isinstance(controller, ComputedTorque):
-        for key, unit in (("proportional", "1/s^2"), ("derivative", "1/s")):
-            for i, (joint, quantity) in enumerate(zip(controller.joints, getattr(controller, key), strict=True)):
-                yield Gain(f"{key}.{joint}", (key, i), quantity, unit)
-        for i, (joint, quantity) in enumerate(zip(controller.joints, controller.limit or (), strict=False)):
-            yield Gain(f"limit.{joint}", ("limit", i), quantity, commands[i], is_limit=True)
-        return
-    units = _units(controller, commands[0], structure)
-    for key in controller.GAINS:
-        yield Gain(key, (key,), getattr(controller, key), units[key])
-    if controller.limit is not None:
-        yield Gain("limit", ("limit",), controller.limit, commands[0], is_limit=True)
-
-
-def _units(controller: Cascade | Pid | Pd | ForceLoop, command: str, structure: Structure) -> dict[str, str]:
-    held = structure.unit(controller.measures)
-    if isinstance(controller, ForceLoop):
-        effort = EFFORT_UNIT[structure.joint_kind(controller.measures.partition(".")[0])]
-        stroke = "m" if structure.document.actuators[controller.actuator].line is not None else held
-        return {
-            "proportional": f"({effort})/({held})",
-            "derivative": f"({effort}) s/({held})",
-            "feed_forward": f"({command})/({structure.effort_unit(controller.actuator)})",
-            "force_gain": f"({command})/({structure.effort_unit(controller.actuator)})",
-            "velocity_gain": f"({command}) s/({stroke})",
-        }
-    return {
-        "position_gain": "1/s",
-        "velocity_gain": f"({command}) s/({held})",
-        "proportional": f"({command})/({held})",
-        "integral": f"({command})/({held} s)",
-        "derivative": f"({command}) s/({held})",
-    }

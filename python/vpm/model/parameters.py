@@ -14,10 +14,11 @@ from typing import Literal
 from vpm.catalogue import EFFECTS, POSITIVE
 from vpm.errors import UnitError
 from vpm.model.beam import Beam, Line, Part, sections_of
-from vpm.model.controller import Controller, gains
+from vpm.model.controller import Controller
 from vpm.model.drive_parameters import Row, actuator_rows, supply_rows
 from vpm.model.effects import effect_unit
 from vpm.model.entry import Quantity
+from vpm.model.gains import gains
 from vpm.model.messages import Problem, place
 from vpm.model.schema import Document, EffectEntry
 from vpm.model.structure import Structure
