@@ -30,7 +30,7 @@ def close(name: str, found: object) -> None:
     )
 
 
-# ---- the witness itself ------------------------------------------------------------------------------------------------
+# ---- the witness itself ----------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("payload", [0, 3, 7])
@@ -69,7 +69,7 @@ def test_the_stored_values_are_those_of_an_implicit_method_too(case: str) -> Non
         np.testing.assert_allclose(column, expected, rtol=0.0, atol=1e-6 * max(np.abs(expected).max(), 1e-9))
 
 
-# ---- the package -------------------------------------------------------------------------------------------------------
+# ---- the package -----------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("case", list(hyl.CASES))

@@ -59,7 +59,7 @@ def spectrum(run: vpm.Run, channel: str, start: float, seconds: float) -> tuple[
 
 
 def dominant(run: vpm.Run, channel: str = "foot.normal_force") -> tuple[float, float]:
-    """Frequency (Hz) above 100 Hz and amplitude of the strongest oscillation in the 40 ms after the peak of the impact."""
+    """Frequency (Hz) above 100 Hz and amplitude of the strongest oscillation in the 40 ms after the impact."""
     start = run.time[int(run["foot.normal_force"].argmax())] + 0.002
     frequency, amplitude = spectrum(run, channel, float(start), 0.04)
     high = frequency > 100.0
@@ -78,7 +78,7 @@ def study() -> Iterator[tuple[str, vpm.Run]]:
 
 @styled
 def draw_impact() -> Figure:
-    """Ground force in the first milliseconds, and the knee's cylinder, for rigid joints and softer and softer bearings."""
+    """Forces of ground and knee cylinder after the impact, for rigid joints and softer and softer bearings."""
     figure, axes = panels(1, 2, height=2.8, width=9.0)
     for name, run in study():
         if name not in {"rigid", "1e+06 N/m", "1e+07 N/m", "1e+08 N/m"}:
