@@ -340,7 +340,8 @@ def copied_channels(model: Model, mode: str, passive: Sequence[str] = ()) -> fro
     if mode == "prescribed_motion":
         followed = [name for name in model.joints if name not in passive]
         motions = {f"{name}.{kind}" for name in followed for kind in ("position", "velocity", "acceleration")}
-        return frozenset(commands | motions | {f"{name}.force" for name in model.actuators})
+        resting = {*model.actuators, *model.supplies}
+        return frozenset(motions | {name for name in model.output_channels if name.partition(".")[0] in resting})
     return frozenset(commands)
 
 
@@ -407,9 +408,9 @@ def check_balance(model: Model) -> None:
         kind = model.actuator_type(name)
         if kind != "ideal":
             raise SimulationError(
-                f"mode 'inverse_dynamics' and a diagnosis balance efforts sample by sample, but that of {name}, a "
-                f"{kind}, does not follow from its command alone; use the mode 'free_run' or 'restarts', and identify "
-                f"instead of diagnose, or describe it as an ideal actuator"
+                f"mode 'inverse_dynamics' and a diagnosis balance efforts sample by sample, but that of {name} (type "
+                f"{kind}) does not follow from its command alone; use the mode 'free_run' or 'restarts', and identify "
+                "instead of diagnose, or describe it as an ideal actuator"
             )
     if model.core.n_elastic:
         elastic = [name for name in model.beams if model.levels[name] != "rigid"]

@@ -134,6 +134,23 @@ fn a_force_loop_turns_torque_into_force_and_measures_both() {
 }
 
 #[test]
+fn a_feed_forward_gives_an_ideal_drive_the_torque_of_the_joint_at_once() {
+    let gains: [(&str, &[f64]); 5] = [
+        ("proportional", &[150.0]),
+        ("derivative", &[6.0]),
+        ("feed_forward", &[0.25]),
+        ("force_gain", &[0.0]),
+        ("velocity_gain", &[0.0]),
+    ];
+    let bench = swing(3.0, 4.0, None, &gains).bench(1e-3, 4);
+    let (q, dq, step) = (0.7, -1.1, 1e-6);
+    let run = bench.closed(&[q, dq], &[0.9], &[0.0]);
+    let arm = (length(q + step) - length(q - step)) / (2.0 * step);
+    let torque = 150.0 * (0.9 - q) - 6.0 * dq;
+    close(run.outputs[5] * arm, torque, 1e-7);
+}
+
+#[test]
 fn a_force_loop_reaches_its_fixed_point_as_the_sampled_lag_does() {
     // A joint that stands: 100 N m/rad times 0.2 rad ask for 20 N m, around a loop gain of 4 N/V times 10 V/N.
     let gains: [(&str, &[f64]); 4] =

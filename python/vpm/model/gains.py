@@ -57,6 +57,7 @@ def _units(controller: Cascade | Pid | Pd | ForceLoop, command: str, structure: 
         return {
             "proportional": f"({effort})/({held})",
             "derivative": f"({effort}) s/({held})",
+            "feed_forward": f"({command})/({structure.effort_unit(controller.actuator)})",
             "force_gain": f"({command})/({structure.effort_unit(controller.actuator)})",
             "velocity_gain": f"({command}) s/({stroke})",
         }
