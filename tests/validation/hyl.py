@@ -61,11 +61,9 @@ def scenario(file: str, runs: list[dict[str, Any]], **changes: object) -> vpm.Sc
 
 def drop(model: str, parameters: dict[str, float], **changes: object) -> vpm.Run:
     """The leg falls from 50 mm."""
-    content = tomllib.loads((HYL / "drop.toml").read_text(encoding="utf-8"))
     if model == "rcm_springs.toml":
         changes = {"references": {}, **changes}
-    entry = {"name": "drop", "model": model, "set": parameters}
-    return scenario("drop.toml", [entry], **{**content, **changes, "runs": [entry]})["drop"]
+    return scenario("drop.toml", [{"name": "drop", "model": model, "set": parameters}], **changes)["drop"]
 
 
 def reference() -> list[Row]:
