@@ -322,6 +322,7 @@ CASES: dict[str, Leg] = {
     "rigid, high gain": Leg(drive="pistons", period=1e-3, proportional=300.0),
     "bushings, low gain": Leg(drive="pistons", period=1e-3, bushings=STIFF),
     "springs": Leg(drive="springs"),
+    "springs, bushings": Leg(drive="springs", bushings=STIFF),
     "hydraulic, low gain": Leg(drive="hydraulic", period=1e-3),
     "hydraulic, high gain": Leg(drive="hydraulic", period=1e-3, proportional=300.0),
     "hydraulic, bushings": Leg(drive="hydraulic", period=1e-3, bushings=STIFF),
