@@ -84,7 +84,7 @@ def reference() -> list[Row]:
 def standing() -> dict[str, ArrayLike]:
     """Force of the ground, angles (deg) and height of the hip axis above the foot, with a foot without friction."""
     cases = [(p, mass) for p in (150, 300) for mass in (0, 3, 7)]
-    runs = [
+    runs: list[dict[str, Any]] = [
         {
             "name": f"P{p}.payload{mass}",
             "model": "rcm.toml",
