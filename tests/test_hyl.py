@@ -50,7 +50,7 @@ def test_the_witness_falls_as_the_reference() -> None:
     peaks, heights = [], []
     for gain in (150.0, 300.0):
         leg = Leg(proportional=gain)
-        seen = leg.observe(leg.simulate(times, 1e-8), times)
+        seen = leg.observe(leg.simulate(times, 1e-6), times)
         peaks.append(seen["normal_force"].max())
         heights.append(seen["height"][-4:])
         lost = seen["impulse"][-1] - MASS * GRAVITY * times[-1] - seen["momentum"][-1]
@@ -76,6 +76,7 @@ def test_forces_beside_soft_joints_take_energy_from_nowhere_and_torques_and_spri
     drives: tuple[Drive, ...] = ("pistons", "torques", "springs")
     for drive in drives:
         poles = Leg(drive=drive, bushings=STIFF).poles()
+        poles = poles[poles.imag > 1.0]  # those that oscillate
         damping = -poles.real / np.abs(poles)
         worst[drive] = damping.min()
         if drive == "pistons":
