@@ -39,11 +39,7 @@ fn on_joint(machine: &mut Machine, drive: Value) -> &mut Machine {
 }
 
 /// A line from the world to a body, with what acts on it.
-fn on_line<'m>(
-    machine: &'m mut Machine,
-    (from, body, at): ([f64; 3], usize, [f64; 3]),
-    drive: Value,
-) -> &'m mut Machine {
+fn on_line(machine: &mut Machine, (from, body, at): ([f64; 3], usize, [f64; 3]), drive: Value) -> &mut Machine {
     let line = json!({"name": "strut", "from": {"on": "world", "point": from}, "to": {"on": {"body": body}, "point": at},
         "barrel": null, "rod": null});
     machine.add("lines", line, json!({}));

@@ -1,4 +1,4 @@
-//! Whether the steps of an explicit method are short enough for the flexible links, the drives, the contacts and the bushings of a machine.
+//! Whether the steps of an explicit method are short enough for the flexible links, drives, contacts and bushings of a machine.
 
 use super::Stepping;
 use super::names::{coordinate, state_name};
@@ -17,7 +17,7 @@ use crate::system::System;
 /// are open add later is left to the run.
 pub(crate) fn check_step(description: &Description, theta: &[f64], stepping: Stepping, state: &[f64]) -> Result<()> {
     if description.actuators.iter().all(|actuator| matches!(actuator.drive, Drive::Ideal(_))) {
-        return check_beams(description, theta, stepping, state, &[]);
+        return check_structure(description, theta, stepping, state, &[]);
     }
     let explicit = matches!(stepping.method, Method::Rk4 | Method::SemiImplicit);
     if !explicit || state.iter().any(|number| !number.is_finite()) {
@@ -40,7 +40,7 @@ pub(crate) fn check_step(description: &Description, theta: &[f64], stepping: Ste
 /// Judged at the mass matrix of that state, the constant stiffness and damping of the beams, and those of contacts and bushings where
 /// they are; friction and springs of joints, whose slopes change with the state, are left to the run itself, and so is a contact that is
 /// open at the start.
-pub(crate) fn check_beams(
+pub(crate) fn check_structure(
     description: &Description,
     theta: &[f64],
     stepping: Stepping,

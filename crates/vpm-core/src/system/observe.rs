@@ -103,11 +103,14 @@ impl<S: Scalar> Dynamics<S> {
             channels[2] = tension;
         }
         let shown = &self.shown;
-        for (channels, values) in outputs[layout.hydraulics()..].chunks_exact_mut(5).zip(&shown.hydraulics) {
+        for (channels, values) in
+            outputs[layout.hydraulics()..layout.dc_motors()].chunks_exact_mut(5).zip(&shown.hydraulics)
+        {
             channels.copy_from_slice(values);
         }
         outputs[layout.dc_motors()..layout.supplies()].copy_from_slice(&shown.currents);
-        for (channels, values) in outputs[layout.supplies()..].chunks_exact_mut(2).zip(&shown.supplies) {
+        for (channels, values) in outputs[layout.supplies()..layout.contacts()].chunks_exact_mut(2).zip(&shown.supplies)
+        {
             channels.copy_from_slice(values);
         }
         self.observe_reactions([&x[..n], &x[n..2 * n], accelerations], outputs);
