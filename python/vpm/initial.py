@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from vpm.experiment import Experiment, Motion, motion
 from vpm.model import Model
+from vpm.model.settled import follow, rest
 
 Array = NDArray[np.float64]
 
@@ -18,7 +19,8 @@ def measured_states(
 ) -> Array:
     """States (len(rows), nx) at some samples of the measured motion.
 
-    Sensor errors are undone, lags have settled at the held command, flexible links are deflected as in equilibrium.
+    Sensor errors are undone; flexible links are deflected as in equilibrium; lags, spools and currents have settled on
+    the held command, and chambers are without net force, unless the log holds what is inside of a drive.
     """
     m = motion(experiment, model, cutoff=cutoff)
     gain, offset = sensor_errors(model, theta)
@@ -26,27 +28,24 @@ def measured_states(
     joints, coordinates = len(model.joints), len(model.coordinates)
     states[:, :joints] = (m.position[rows] - offset) / gain
     states[:, coordinates : coordinates + joints] = m.velocity[rows] / gain
-    states[:, 2 * coordinates :] = m.inputs[rows][
-        :, [i for i, name in enumerate(model.actuators) if model.has_lag(name)]
-    ]
-    if coordinates > joints:
-        for state in states:
+    for state, row in zip(states, rows, strict=True):
+        if coordinates > joints:
             state[:coordinates] = model.core.equilibrium(theta, state[:joints])[0]
+        internal = _internal(model, experiment, theta, state[:coordinates], int(row))
+        follow(model, theta, internal, m.inputs[row], state[coordinates : coordinates + joints])
+        state[2 * coordinates :] = _seen(model, experiment, internal, int(row))
     return states
 
 
 def initial_state(model: Model, experiment: Experiment, theta: Array) -> Array:
     """State at the first sample, lags settled at the command, flexible links deflected as in equilibrium.
 
-    The machine is at rest at zero where the log holds no position.
+    The machine is at rest at zero where the log holds no position. Drives have stood without commands, but for what the
+    log holds of them: pressures of both chambers, current, place of the spool.
     """
     joints, coordinates = len(model.joints), len(model.coordinates)
     state = np.zeros(model.core.n_states)
     gain, offset = sensor_errors(model, theta)
-    lags = [name for name in model.actuators if model.has_lag(name)]
-    for place, name in enumerate(lags):
-        if f"{name}.command" in experiment:
-            state[2 * coordinates + place] = experiment[f"{name}.command"][0]
     for joint, name in enumerate(model.joints):
         if f"{name}.position" in experiment:
             position, velocity = _fit_start(experiment, f"{name}.position")
@@ -54,7 +53,34 @@ def initial_state(model: Model, experiment: Experiment, theta: Array) -> Array:
             state[coordinates + joint] = velocity / gain[joint]
     if coordinates > joints:
         state[:coordinates] = model.core.equilibrium(theta, state[:joints])[0]
+    internal = _internal(model, experiment, theta, state[:coordinates], 0)
+    for place, name in enumerate(model.internal_names):
+        command = f"{name.removesuffix('.lag')}.command"
+        if name.endswith(".lag") and command in experiment:
+            internal[place] = experiment[command][0]
+    state[2 * coordinates :] = _seen(model, experiment, internal, 0)
     return state
+
+
+def _internal(model: Model, experiment: Experiment, theta: Array, coordinates: Array, row: int) -> Array:
+    """What drives and supplies hold after a rest at the pressures that the log holds of supplies."""
+    known = [name for name in model.supplies if f"{name}.pressure" in experiment]
+    if known:
+        theta = theta.copy()
+        for name in known:
+            theta[model.index(f"{name}.pressure")] = experiment[f"{name}.pressure"][row]
+    return rest(model, theta, coordinates)
+
+
+def _seen(model: Model, experiment: Experiment, internal: Array, row: int) -> Array:
+    """Internal states with what the log holds of them; of a cylinder both pressures, for one alone is no balance."""
+    for place, name in enumerate(model.internal_names):
+        owner, _, state = name.partition(".")
+        if state in {"spool", "current"} and name in experiment:
+            internal[place] = experiment[name][row]
+        elif state.startswith("chamber_") and all(f"{owner}.pressure_{side}" in experiment for side in "ab"):
+            internal[place] = experiment[f"{owner}.{state.replace('chamber', 'pressure')}"][row]
+    return internal
 
 
 @dataclass(frozen=True)
@@ -63,7 +89,8 @@ class _Joints:
 
     name: str
     joints: tuple[str, ...]
-    actuators: tuple[str, ...] = ()
+    input_channels: tuple[str, ...] = ()
+    optional_inputs: tuple[str, ...] = ()
 
 
 def passive_joints(experiment: Experiment, model: Model) -> tuple[str, ...]:

@@ -26,4 +26,10 @@ pub trait Ode<S> {
     fn elasticity(&mut self, _x: &[S], _block: &mut [S]) -> bool {
         false
     }
+
+    /// Writes a natural size of every state, in its unit: what a change of the state is small beside. Step control takes it for absolute
+    /// tolerances.
+    fn scales(&self, scales: &mut [f64]) {
+        scales.fill(1.0);
+    }
 }

@@ -4,18 +4,21 @@ mod control;
 mod names;
 mod prescribed;
 mod stability;
+mod start;
 mod stepper;
 
 pub(crate) use names::state_name;
 pub use prescribed::prescribed;
-pub(crate) use stability::check_step;
+pub(crate) use stability::{check_step, check_structure};
+pub(crate) use start::check_pistons;
 pub(crate) use stepper::{Drive, Plan, Stepper};
 
 use crate::description::Description;
 use crate::error::{Diverged, Error, Result};
-use crate::integrator::Method;
+use crate::integrator::{Halt, Method};
 use crate::scalar::Scalar;
 use crate::sensitivity::{Interrupt, Job, Pair, differentiate};
+use crate::system::Build;
 use crate::table::Table;
 
 /// How time advances.
@@ -23,7 +26,7 @@ use crate::table::Table;
 pub struct Stepping {
     /// Time between samples, s.
     pub time_step: f64,
-    /// Integration steps per sample.
+    /// Integration steps per sample; with controlled errors, pieces of a sample that take one step at least.
     pub substeps: usize,
     /// The integrator.
     pub method: Method,
@@ -33,6 +36,7 @@ impl Stepping {
     /// Checked settings.
     pub fn new(time_step: f64, substeps: usize, method: Method) -> Result<Self> {
         check_time_step(time_step)?;
+        method.check()?;
         if substeps == 0 {
             let condition = "be at least 1".to_owned();
             return Err(Error::Setting { setting: "substeps", condition, value: 0.0, repair: "use 1 to begin with" });
@@ -81,16 +85,18 @@ pub struct Setting<'a> {
     pub interrupt: Interrupt<'a>,
 }
 
-/// Free run: row k of `inputs` (N x actuators, command units) is held from sample k to sample k + 1, from `initial_state`.
+/// Free run: row k of `inputs` (N x inputs: commands, then pressures of logged supplies) is held from sample k to sample k + 1, from
+/// `initial_state`.
 pub fn free_run(setting: Setting<'_>, initial_state: &[f64], inputs: Table<'_>) -> Result<Run> {
-    inputs.expect("inputs", inputs.rows(), setting.description.n_actuators())?;
+    inputs.expect("inputs", inputs.rows(), setting.description.n_inputs())?;
     check_state("initial_state", setting.description, initial_state)?;
     let starts = [0];
     let plan = Plan { drive: Drive::Commands(inputs), initial: initial_state, starts: &starts, horizon: inputs.rows() };
     execute(setting, plan)
 }
 
-/// Closed loop: the controllers follow `references`; `disturbances` are added to their commands (both N x actuators).
+/// Closed loop: the controllers follow `references`; `disturbances` are added to their commands (both N x inputs). The pressures of logged
+/// supplies stand among the disturbances.
 pub fn closed_loop(
     setting: Setting<'_>,
     initial_state: &[f64],
@@ -98,7 +104,7 @@ pub fn closed_loop(
     disturbances: Table<'_>,
 ) -> Result<Run> {
     let description = setting.description;
-    let (rows, inputs) = (references.rows(), description.n_actuators());
+    let (rows, inputs) = (references.rows(), description.n_inputs());
     references.expect("references", rows, inputs)?;
     disturbances.expect("disturbances", rows, inputs)?;
     check_state("initial_state", description, initial_state)?;
@@ -121,7 +127,7 @@ pub fn restarts(
     inputs: Table<'_>,
 ) -> Result<Run> {
     let description = setting.description;
-    inputs.expect("inputs", inputs.rows(), description.n_actuators())?;
+    inputs.expect("inputs", inputs.rows(), description.n_inputs())?;
     initial_states.expect("initial_states", starts.len(), description.n_states())?;
     if horizon == 0 || horizon > inputs.rows() {
         let condition = format!("lie between 1 and the {} samples of the inputs", inputs.rows());
@@ -140,7 +146,12 @@ pub fn restarts(
 }
 
 pub(crate) fn check_state(name: &str, description: &Description, state: &[f64]) -> Result<()> {
-    Table::vector(name, state, description.n_states(), "state of the model: positions, velocities, lags of actuators")?;
+    Table::vector(
+        name,
+        state,
+        description.n_states(),
+        "state of the model: positions, velocities, states of drives and supplies",
+    )?;
     Ok(())
 }
 
@@ -158,7 +169,8 @@ impl Job for Simulation<'_> {
 fn execute(setting: Setting<'_>, plan: Plan<'_>) -> Result<Run> {
     let dim = setting.description.n_states();
     if let Some(first) = plan.initial.get(..dim) {
-        check_step(setting.description, setting.theta, setting.stepping, first, &[])?;
+        check_step(setting.description, setting.theta, setting.stepping, first)?;
+        check_starts(setting, plan.initial)?;
     }
     let job = Simulation { setting, plan };
     let output = |pass: &Pair<_>, place: usize| pass.first[place];
@@ -166,23 +178,65 @@ fn execute(setting: Setting<'_>, plan: Plan<'_>) -> Result<Run> {
     Ok(Run { outputs: pair.first, states: pair.second, jacobian })
 }
 
+/// Complains about a piston that starts outside of its stroke in one of the `initial` states.
+fn check_starts(setting: Setting<'_>, initial: &[f64]) -> Result<()> {
+    let Setting { description, theta, .. } = setting;
+    if description.layout().hydraulics == 0 {
+        return Ok(());
+    }
+    description.check_values(theta)?;
+    let mut dynamics = Build::dynamics(&description, theta)?;
+    initial
+        .chunks_exact(description.n_states().max(1))
+        .try_for_each(|state| check_pistons(description, theta, &mut dynamics, state))
+}
+
 /// What stopped being finite, in the words of the model.
 pub(crate) fn diverged<S: Scalar>(stepper: &Stepper<'_, S>, what: String, row: usize, start: usize) -> Error {
     let stepping = stepper.stepping();
-    let repair = match stepping.method {
-        Method::LinearlyImplicit | Method::Rosenbrock => {
-            "use more substeps, or check the signs and sizes of the parameters"
-        }
-        Method::Rk4 | Method::SemiImplicit => "use more substeps or the integrator linearly_implicit",
-    };
     let (outputs, states) = stepper.before(row);
     Error::Diverged(Box::new(Diverged {
         what,
+        event: Diverged::NOT_FINITE.to_owned(),
         time: (start + row) as f64 * stepping.time_step,
         sample_index: start + row,
-        method: stepping.method.name(),
+        method: stepping.method.to_string(),
         step: stepping.step(),
-        repair,
+        repair: repair(stepping.method),
+        outputs,
+        states,
+    }))
+}
+
+/// What helps against a state that is not finite.
+fn repair(method: Method) -> &'static str {
+    match method {
+        Method::LinearlyImplicit | Method::Rosenbrock => {
+            "use more substeps or the integrator adaptive, or check the signs and sizes of the parameters"
+        }
+        Method::Rk4 | Method::SemiImplicit => "use more substeps or the integrator linearly_implicit",
+        Method::Adaptive { .. } => "check the signs and sizes of the parameters",
+    }
+}
+
+/// What the step control could not follow on the way from a sample (number `sample`, counted with its time from the beginning), in the
+/// words of the model; `tables` are the outputs and states of the samples until then.
+pub(crate) fn halted(
+    description: &Description,
+    stepping: Stepping,
+    sample: usize,
+    halt: Halt,
+    (outputs, states): (Vec<f64>, Vec<f64>),
+) -> Error {
+    let Halt::Stuck(stuck) = halt else { return Error::Interrupted };
+    Error::Diverged(Box::new(Diverged {
+        what: format!("the {}", state_name(description, stuck.state)),
+        event: stuck.event(),
+        time: sample as f64 * stepping.time_step + stuck.reached,
+        sample_index: sample + 1,
+        method: stepping.method.to_string(),
+        step: stuck.step,
+        repair: stuck.repair(),
         outputs,
         states,
     }))

@@ -10,7 +10,7 @@ use crate::table::Table;
 ///
 /// A step is what a real-time loop does between two samples: hold the command, evaluate and record the sample, integrate all substeps.
 pub fn time_steps(setting: Setting<'_>, initial_state: &[f64], inputs: Table<'_>, count: usize) -> Result<Vec<f64>> {
-    inputs.expect("inputs", inputs.rows(), setting.description.n_actuators())?;
+    inputs.expect("inputs", inputs.rows(), setting.description.n_inputs())?;
     check_state("initial_state", setting.description, initial_state)?;
     if inputs.rows() == 0 {
         let (what, each) = ("inputs".to_owned(), "sample, at least one".to_owned());
@@ -26,7 +26,7 @@ pub fn time_steps(setting: Setting<'_>, initial_state: &[f64], inputs: Table<'_>
         }
         let begin = Instant::now();
         stepper.sample(row, 0)?;
-        stepper.advance(setting.interrupt)?;
+        stepper.advance(row, 0, setting.interrupt)?;
         durations.push(begin.elapsed().as_secs_f64());
     }
     Ok(durations)

@@ -156,6 +156,25 @@ fn a_force_loop_reaches_its_fixed_point_as_the_sampled_lag_does() {
 }
 
 #[test]
+fn with_its_feed_forward_an_ideal_actuator_gives_the_torque_itself() {
+    let gains: [(&str, &[f64]); 5] = [
+        ("proportional", &[150.0]),
+        ("derivative", &[6.0]),
+        ("feed_forward", &[0.25]),
+        ("force_gain", &[0.0]),
+        ("velocity_gain", &[0.0]),
+    ];
+    let (rows, bench) = (300, swing(3.0, 4.0, None, &gains).bench(1e-3, 4));
+    let run = bench.closed(&[0.7, -1.1], &vec![0.9; rows], &vec![0.0; rows]);
+    let width = bench.description.n_outputs();
+    for k in 0..rows {
+        let (q, dq) = (run.states[2 * k], run.states[2 * k + 1]);
+        let arm = (length(q + 1e-6) - length(q - 1e-6)) / 2e-6;
+        close(run.outputs[k * width + 5] * arm, 150.0 * (0.9 - q) - 6.0 * dq, 1e-6);
+    }
+}
+
+#[test]
 fn a_force_loop_on_the_joint_itself_has_the_arm_one() {
     let mut machine = Machine::new(&slider(2.0));
     machine.actuator(0, &[("gain", 4.0)]);

@@ -10,10 +10,11 @@ from vpm.catalogue import EFFECTS
 from vpm.model.beam import End, Gauge, Line, Marker, Section, sections_of
 from vpm.model.check import Checked
 from vpm.model.controller import ComputedTorque, Controller
+from vpm.model.drive_compile import drive_json, supply_json
 from vpm.model.effects import Effect, effects_of
 from vpm.model.parameters import INERTIA_AXES
 from vpm.model.pose import Pose, pose
-from vpm.model.structure import Axis, Frame, Mount, Structure
+from vpm.model.structure import HYDRAULIC_CHANNELS, SUPPLY_CHANNELS, Axis, Frame, Mount, Structure
 
 
 def description(checked: Checked) -> str:
@@ -42,6 +43,7 @@ def description(checked: Checked) -> str:
         "markers": [_marker(name, marker, structure) for name, marker in document.markers.items()],
         "lines": [_line(name, line, structure, index) for name, line in document.lines.items()],
         "effects": [_effect(e, structure, index) for e in effects if EFFECTS[e.name].site in {"joint", "body"}],
+        "supplies": [supply_json(name, supply, index) for name, supply in document.supplies.items()],
         "actuators": [_actuator(name, structure, index) for name in document.actuators],
         "sensors": [_sensor(name, structure, index) for name in document.sensors],
         "controllers": [_controller(name, c, structure, index) for name, c in document.controllers.items()],
@@ -180,7 +182,7 @@ def _actuator(name: str, structure: Structure, index: Mapping[str, int]) -> dict
         "on": {"line": list(structure.document.lines).index(actuator.line)}
         if actuator.line is not None
         else {"joint": structure.joints.index(actuator.joint or "")},
-        "gain": index[f"{name}.gain"],
+        "drive": drive_json(name, actuator, tuple(structure.document.supplies), index),
         "delay": index.get(f"{name}.delay.time"),
         "dead_zone": index.get(f"{name}.dead_zone.width"),
         "saturation": index.get(f"{name}.saturation.limit"),
@@ -233,5 +235,12 @@ def _channel(channel: str, structure: Structure) -> dict[str, Any]:
         "gauge": tuple(structure.document.gauges),
         "marker": tuple(structure.document.markers),
     }
+    drives = {"hydraulic": (structure.driven_by("hydraulic"), HYDRAULIC_CHANNELS)}
+    drives |= {"supply": (tuple(structure.document.supplies), SUPPLY_CHANNELS)}
+    for what, (names, quantities) in drives.items():
+        if owner in names and kind in quantities:
+            return {"kind": what, what: names.index(owner), "quantity": kind}
+    if kind == "current":
+        return {"kind": kind, "dc_motor": structure.driven_by("dc_motor").index(owner)}
     what, names = next((what, names) for what, names in owners.items() if owner in names)
     return {"kind": kind, what: names.index(owner)}

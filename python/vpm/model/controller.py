@@ -80,16 +80,17 @@ class Pd(OneAxis):
 
 
 class ForceLoop(OneAxis):
-    """tau = kp (r - q) - kd dq, u = kf (tau / (ds/dq) - F) + kv ds/dt."""
+    """tau = kp (r - q) - kd dq, F_d = tau / (ds/dq), u = k F_d + kf (F_d - F) + kv ds/dt."""
 
     type: Literal["force_loop"]
     proportional: ParameterValue
     derivative: ParameterValue = ZERO
+    feed_forward: ParameterValue = ZERO
     force_gain: ParameterValue
     velocity_gain: ParameterValue = ZERO
     limit: ParameterValue | None = None
 
-    GAINS: ClassVar[tuple[str, ...]] = ("proportional", "derivative", "force_gain", "velocity_gain")
+    GAINS: ClassVar[tuple[str, ...]] = ("proportional", "derivative", "feed_forward", "force_gain", "velocity_gain")
 
 
 _Several = Annotated[tuple[ParameterValue, ...], Field(min_length=1)]

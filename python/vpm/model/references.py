@@ -6,8 +6,9 @@ from collections.abc import Iterator
 
 from vpm.errors import near_match
 from vpm.model.controller_check import controller_problems
+from vpm.model.drives import Actuator
 from vpm.model.messages import Problem, place
-from vpm.model.schema import Actuator, Document
+from vpm.model.schema import Document
 from vpm.model.structure import Structure
 from vpm.model.tree import outside_problems
 

@@ -12,7 +12,9 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 from vpm.model.beam import Beam, Gauge, Line, Marker
 from vpm.model.controller import TYPES, Controller
+from vpm.model.drives import ACTUATOR_TYPES, Actuator
 from vpm.model.entry import ORIGIN, ZERO, Entry, Number, ParameterValue, Quantity, Text, Vector
+from vpm.model.hydraulic import Supply
 from vpm.units import parse_unit
 
 
@@ -50,15 +52,6 @@ class Joint(Entry):
     translation: Vector = ORIGIN
     rotation: Vector = ORIGIN
     dh: DenavitHartenberg | None = None
-
-
-class Actuator(Entry):
-    """Drive of a joint or of a line: effort = gain times command."""
-
-    joint: Text | None = None
-    line: Text | None = None
-    gain: ParameterValue
-    command_unit: Text = "1"
 
 
 class Sensor(Entry):
@@ -133,6 +126,7 @@ class Document(Entry):
     lines: dict[str, Line] = Field(default_factory=dict)
     gauges: dict[str, Gauge] = Field(default_factory=dict)
     markers: dict[str, Marker] = Field(default_factory=dict)
+    supplies: dict[str, Supply] = Field(default_factory=dict)
     actuators: dict[str, Actuator] = Field(default_factory=dict)
     sensors: dict[str, Sensor] = Field(default_factory=dict)
     controllers: dict[str, Controller] = Field(default_factory=dict)
@@ -148,7 +142,8 @@ SECTIONS: Mapping[str, tuple[type[BaseModel], ...]] = {
     "lines": (Line,),
     "gauges": (Gauge,),
     "markers": (Marker,),
-    "actuators": (Actuator,),
+    "supplies": (Supply,),
+    "actuators": tuple(ACTUATOR_TYPES.values()),
     "sensors": (Sensor,),
     "controllers": TYPES,
     "channels": (ChannelEntry,),

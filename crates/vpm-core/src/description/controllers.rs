@@ -3,7 +3,7 @@
 use super::Description;
 use super::check::{channel, within};
 use super::entry::ControllerEntry;
-use crate::actuator::Target;
+use crate::actuator::{Drive, Target};
 use crate::controller::ControlLaw;
 use crate::error::{Error, Result};
 use crate::sensor::Channel;
@@ -93,7 +93,10 @@ fn acts(what: &str, controller: &ControllerEntry, description: &Description, pla
         ControlLaw::ForceLoop(_) => {
             (!own && matches!(actuator.on, Target::Joint(_)), "a line or the joint it measures")
         }
-        ControlLaw::ComputedTorque(_) => (!own, "the joint it measures in the same place"),
+        ControlLaw::ComputedTorque(_) => (
+            !own || !matches!(actuator.drive, Drive::Ideal(_)),
+            "the joint it measures in the same place, by a drive of type ideal",
+        ),
         _ => (false, ""),
     };
     if !bad {

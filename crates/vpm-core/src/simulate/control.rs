@@ -1,7 +1,7 @@
 //! Controllers at work: what they see at a sample, what they hold until their next one, and when it arrives.
 
 use super::Setting;
-use crate::actuator::Target;
+use crate::actuator::{Drive, Target};
 use crate::controller::{ControlLaw, ControlMemory, Differences, Stroke, samples_between};
 use crate::delay::SampleDelay;
 use crate::description::{ControllerEntry, Description};
@@ -168,8 +168,9 @@ impl<S: Scalar> Loop<S> {
             }
             machine.invert(dynamics);
             for (place, port) in ports.iter().enumerate() {
-                let command = machine.efforts[port.joint] / dynamics.actuators[port.actuator].motor.gain;
-                commands[port.actuator] = law.limited(place, command);
+                // The checks let drives of no other kind come here.
+                let Drive::Ideal(drive) = &dynamics.actuators[port.actuator].drive else { continue };
+                commands[port.actuator] = law.limited(place, machine.efforts[port.joint] / drive.gain);
             }
             return;
         }
@@ -232,7 +233,7 @@ impl<S: Scalar> Machine<S> {
 
     /// Efforts for the accelerations that were asked for; those that nobody asked for are zero, for the next controller too.
     fn invert(&mut self, dynamics: &mut Dynamics<S>) {
-        dynamics.inverse_dynamics(&self.position, &self.rate, &self.acceleration, &mut self.efforts);
+        dynamics.inverse_dynamics_of_tree(&self.position, &self.rate, &self.acceleration, &mut self.efforts);
         self.acceleration.fill(S::zero());
     }
 

@@ -2,9 +2,9 @@
 
 use super::control::{Control, reading};
 use super::names::{output_name, state_name};
-use super::{Setting, Stepping, diverged};
+use super::{Setting, Stepping, diverged, halted};
 use crate::description::Description;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::integrator::Integrator;
 use crate::ode::Ode;
 use crate::scalar::Scalar;
@@ -12,9 +12,6 @@ use crate::sensitivity::{Interrupt, Pair};
 use crate::sensor::Sensor;
 use crate::system::System;
 use crate::table::Table;
-
-/// Integration steps between two questions whether to stop.
-const PATIENCE: usize = 256;
 
 /// Where the commands come from.
 #[derive(Clone, Copy)]
@@ -51,9 +48,7 @@ pub(crate) struct Stepper<'a, S> {
     control: Option<Control<S>>,
     state: Vec<S>,
     rate: Vec<S>,
-    /// Integration steps so far.
-    steps: usize,
-    /// Commands of the whole record, row by row; given ones from the beginning, a controller's as time goes by.
+    /// Inputs of the whole record, row by row; given ones from the beginning, a controller's as time goes by.
     commands: Vec<S>,
     /// True channels of the piece, row by row.
     truth: Vec<S>,
@@ -87,7 +82,6 @@ impl<'a, S: Scalar> Stepper<'a, S> {
             system,
             state: vec![zero; dim],
             rate: vec![zero; dim],
-            steps: 0,
             commands: given.numbers().iter().map(|&command| S::from_f64(command)).collect(),
             truth: vec![zero; rows * description.n_outputs()],
             states: vec![zero; rows * dim],
@@ -123,7 +117,7 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         for row in 0..self.plan.horizon {
             self.sample(row, start)?;
             if row + 1 < self.plan.horizon {
-                self.advance(interrupt)?;
+                self.advance(row, start, interrupt)?;
             }
         }
         Ok(())
@@ -135,6 +129,7 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         for (state, &value) in self.state.iter_mut().zip(initial) {
             *state = S::from_f64(value);
         }
+        self.integrator.reset();
         if let Some(control) = &mut self.control {
             control.restart();
         }
@@ -160,17 +155,13 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         Ok(())
     }
 
-    /// Carries the state to the next sample.
-    pub(crate) fn advance(&mut self, interrupt: Interrupt<'_>) -> Result<()> {
-        let step = self.stepping.step();
-        for _ in 0..self.stepping.substeps {
-            self.integrator.step(&mut self.system, &mut self.state, step);
-            self.steps = self.steps.wrapping_add(1);
-            if self.steps.is_multiple_of(PATIENCE) && interrupt() {
-                return Err(Error::Interrupted);
-            }
-        }
-        Ok(())
+    /// Carries the state from sample `row` of the piece that begins at `start` to the next.
+    pub(crate) fn advance(&mut self, row: usize, start: usize, interrupt: Interrupt<'_>) -> Result<()> {
+        let (stepping, Self { integrator, system, state, .. }) = (self.stepping, &mut *self);
+        let pieces = (stepping.time_step, stepping.substeps);
+        integrator
+            .advance(system, state, pieces, interrupt)
+            .map_err(|halt| halted(self.description, stepping, start + row, halt, self.before(row + 1)))
     }
 
     fn record_motion(&mut self, row: usize) {
@@ -193,23 +184,24 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         control.arrive(row, |actuator, command| commands[first + actuator] += command);
     }
 
-    /// Holds on each actuator what its command amounts to over the interval that begins at sample `k` of the record.
+    /// Holds what every input amounts to over the interval that begins at sample `k` of the record.
     fn hold(&mut self, k: usize) {
         let Self { system, commands, stepping, description, .. } = self;
-        let actuators = description.n_actuators();
-        for number in 0..actuators {
-            let command = |sample: usize| commands[sample * actuators + number];
-            let input = system.dynamics().actuators[number].input(k, stepping.time_step, command);
+        let inputs = description.n_inputs();
+        for number in 0..inputs {
+            let command = |sample: usize| commands[sample * inputs + number];
+            let input = system.dynamics().input(number, k, stepping.time_step, command);
             system.hold(number, input);
         }
     }
 
     fn record_efforts(&mut self, row: usize, start: usize) {
-        let (layout, actuators) = (self.description.layout(), self.description.n_actuators());
+        let (layout, inputs) = (self.description.layout(), self.description.n_inputs());
         let truth = &mut self.truth[row * layout.count()..(row + 1) * layout.count()];
-        self.system.dynamics().observe_efforts(&self.rate, truth);
-        let commands = &self.commands[(row + start) * actuators..];
-        for (channels, &command) in truth[layout.actuators()..].chunks_exact_mut(2).zip(commands).take(actuators) {
+        self.system.dynamics().observe_efforts(&self.state, &self.rate, truth);
+        let commands = &self.commands[(row + start) * inputs..];
+        for (channels, &command) in truth[layout.actuators()..].chunks_exact_mut(2).zip(commands).take(layout.actuators)
+        {
             channels[0] = command;
         }
     }
