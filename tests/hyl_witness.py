@@ -1,4 +1,4 @@
-"""The HyL leg solved without vpm: plane vectors as complex numbers, Kane's equations, implicit steps of SciPy.
+"""The HyL leg solved without vpm: plane vectors as complex numbers, Kane's equations, solved by SciPy.
 
 A leg on a vertical slider with a foot that may leave the ground: seven bodies (slider, upper and lower leg, barrel and
 rod of two cylinders), hip and knee as revolute joints or on bushings, driven by joint controllers, by springs with
@@ -78,6 +78,8 @@ class Leg:
         Of the joint controllers (N m/rad).
     period : float or None
         Sample time of the controllers (s); None is without sampling.
+    method : {"Radau", "DOP853"}
+        Of SciPy: implicit, or explicit of order 8.
     springs : tuple
         Stiffness, free length and damping of the hip's and the knee's cylinder.
     """
@@ -88,6 +90,7 @@ class Leg:
     proportional: float = 150.0
     period: float | None = None
     springs: tuple[tuple[float, float, float], tuple[float, float, float]] = SPRINGS
+    method: Literal["Radau", "DOP853"] = "DOP853"
     ground: Ground = field(default_factory=Ground)
     oil: Hydraulics = field(default_factory=Hydraulics)
 
@@ -233,11 +236,11 @@ class Leg:
                 self._rate_of(held),
                 (begin, ends[-1]),
                 now,
-                method="Radau",
+                method=self.method,
                 t_eval=ends,
                 rtol=tolerance,
                 atol=tolerance * self.scales(),
-                jac=self._slopes_of(held),
+                **({"jac": self._slopes_of(held)} if self.method == "Radau" else {}),
             )
             if not solved.success:
                 raise RuntimeError(solved.message)

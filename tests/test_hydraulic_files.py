@@ -235,7 +235,7 @@ def test_closed_loops_take_supplies_as_disturbances() -> None:
 def test_balances_of_effort_are_refused_in_one_sentence(rig: Model) -> None:
     time = 1e-3 * np.arange(2000)
     record = held(rig, 1e-3, chirp(time), axis__position=1e-3 * np.sin(6.0 * time))
-    with pytest.raises(SimulationError, match=r"that of servo, a hydraulic, does not follow from its command"):
+    with pytest.raises(SimulationError, match=r"that of servo \(type hydraulic\) does not follow from its command"):
         simulate(rig, record, "inverse_dynamics")
     with pytest.raises((SimulationError, DiagnosisError), match=r"identify instead of diagnose"):
         vpm.diagnose(rig, record)

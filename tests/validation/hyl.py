@@ -34,13 +34,13 @@ CASES: Mapping[str, tuple[str, dict[str, float]]] = {
 #: Channels of the package by those of the witness.
 CHANNELS = {
     "height": "slider.position",
-    "hip_force": "hip.force",
-    "knee_force": "knee.force",
+    "hip_force": "hip_drive.force",
+    "knee_force": "knee_drive.force",
     "normal_force": "foot.normal_force",
-    "hip_pressure_a": "hip.pressure_a",
-    "hip_pressure_b": "hip.pressure_b",
-    "knee_pressure_a": "knee.pressure_a",
-    "knee_pressure_b": "knee.pressure_b",
+    "hip_pressure_a": "hip_drive.pressure_a",
+    "hip_pressure_b": "hip_drive.pressure_b",
+    "knee_pressure_a": "knee_drive.pressure_a",
+    "knee_pressure_b": "knee_drive.pressure_b",
 }
 
 
@@ -90,7 +90,7 @@ def standing() -> dict[str, ArrayLike]:
             "name": f"P{p}.payload{mass}",
             "model": "rcm.toml",
             "set": {**SMOOTH, **gain(p)},
-            "with_effects": [{"type": "payload", "at": "slider", "mass": float(mass)}],
+            "with_effects": [{"type": "payload", "at": "carriage", "mass": float(mass)}],
         }
         for p, mass in cases
     ]

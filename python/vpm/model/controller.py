@@ -80,13 +80,13 @@ class Pd(OneAxis):
 
 
 class ForceLoop(OneAxis):
-    """tau = kp (r - q) - kd dq, F_d = tau / (ds/dq), u = k F_d + kf (F_d - F) + kv ds/dt."""
+    """tau = kp (r - q) - kd dq, u = kff tau / (ds/dq) + kf (tau / (ds/dq) - F) + kv ds/dt."""
 
     type: Literal["force_loop"]
     proportional: ParameterValue
     derivative: ParameterValue = ZERO
     feed_forward: ParameterValue = ZERO
-    force_gain: ParameterValue
+    force_gain: ParameterValue = ZERO
     velocity_gain: ParameterValue = ZERO
     limit: ParameterValue | None = None
 

@@ -10,6 +10,7 @@ mod rk4;
 mod rosenbrock;
 mod semi_implicit;
 pub mod stability;
+mod stage;
 
 pub use adaptive::{Adaptive, Halt, MOST_STEPS, Steps, Stuck};
 pub use linearly_implicit::LinearlyImplicit;
