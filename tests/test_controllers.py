@@ -9,6 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 import two_link_arm
+from drive_texts import RIG
 from model_texts import changed, described
 from vpm.errors import ModelError, SimulationError
 from vpm.experiment import Experiment
@@ -208,12 +209,33 @@ def test_with_a_feed_forward_an_ideal_actuator_gives_the_torque_itself() -> None
     )
     model = changed(LEG, *changes)
     time = grid(400, 1e-3)
-    log = record(time, model, {"motor": np.full(400, 0.3), "valve": 0.6 + 0.1 * np.sin(5.0 * time)})
-    run = simulate(model, log, "closed_loop", initial_state=np.array([0.1, 0.6, 0.5, -0.4]))
+    log = record(time, model, {"motor": np.full(400, 0.3), "valve": 0.1 * np.sin(5.0 * time) - 0.5})
+    run = simulate(model, log, "closed_loop", initial_state=np.array([0.1, -0.5, 0.5, -0.4]))
     # The power of the force along the line is that of the torque at the joint: tau dq = F ds/dt.
     torque = 150.0 * (log["valve.reference"] - run["knee.position"]) - 6.0 * run["knee.velocity"]
     power = run["valve.force"] * run["cylinder.rate"]
     np.testing.assert_allclose(torque * run["knee.velocity"], power, atol=1e-9 * np.max(np.abs(power)))
+
+
+def test_a_cylinder_in_a_force_loop_comes_to_rest_at_the_force_that_is_asked_for() -> None:
+    """The valve integrates: without leakage no current is left at rest, and the spring k takes F = p (r - q) = k q."""
+    loop = """
+[controllers.stroke]
+type = "force_loop"
+actuator = "servo"
+measures = "axis.position"
+proportional = { value = 100.0, unit = "kN/m" }
+force_gain = { value = 0.1, unit = "mA/kN" }
+velocity_gain = { value = 8.0, unit = "mA s/m" }
+delay = 0.0005
+"""
+    changes = (("internal_leakage = 1.7e-13", "internal_leakage = 0.0"), ("value = 589.927", "value = 50000.0"))
+    model = changed(RIG + loop, *changes)
+    run = simulate(model, record(grid(1500, 1e-3), model, {"servo": np.full(1500, 0.010)}), "closed_loop", substeps=4)
+    place = 1e5 * 0.010 / (1e5 + 5e4)
+    assert run["axis.position"][-1] == pytest.approx(place, rel=1e-6)
+    assert run["servo.force"][-1] == pytest.approx(5e4 * place, rel=1e-6)
+    assert np.max(np.abs(run["servo.command"])) > 1e-6
 
 
 def test_a_pd_holds_the_length_of_a_line() -> None:

@@ -209,6 +209,7 @@ fn a_sample_time_has_to_fit_the_record() {
         "controller `of 0` samples every 0.0025 s, which is no whole multiple of the record's time step of 0.001 s; give it the \
          sample_time 0.003 s, or resample the record"
     );
+    assert!(closed(0.33, 0.1).unwrap_err().contains("sample_time 0.3 s,"));
     assert!(closed(0.001, 0.002).unwrap_err().contains("sample_time 0.002 s"));
     assert!(closed(0.001 * (1.0 + 1e-8), 0.001).is_err() && closed(0.001 * (1.0 + 1e-10), 0.001).is_ok());
 }
