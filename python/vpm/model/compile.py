@@ -9,11 +9,12 @@ from typing import Any
 from vpm.catalogue import EFFECTS
 from vpm.model.beam import End, Gauge, Line, Marker, Section, sections_of
 from vpm.model.check import Checked
+from vpm.model.controller import ComputedTorque, Controller
+from vpm.model.drive_compile import drive_json, supply_json
 from vpm.model.effects import Effect, effects_of
 from vpm.model.parameters import INERTIA_AXES
 from vpm.model.pose import Pose, pose
-from vpm.model.schema import Cascade, Controller
-from vpm.model.structure import Axis, Frame, Mount, Structure
+from vpm.model.structure import HYDRAULIC_CHANNELS, SUPPLY_CHANNELS, Axis, Frame, Mount, Structure
 
 
 def description(checked: Checked) -> str:
@@ -42,6 +43,7 @@ def description(checked: Checked) -> str:
         "markers": [_marker(name, marker, structure) for name, marker in document.markers.items()],
         "lines": [_line(name, line, structure, index) for name, line in document.lines.items()],
         "effects": [_effect(e, structure, index) for e in effects if EFFECTS[e.name].site in {"joint", "body"}],
+        "supplies": [supply_json(name, supply, index) for name, supply in document.supplies.items()],
         "actuators": [_actuator(name, structure, index) for name in document.actuators],
         "sensors": [_sensor(name, structure, index) for name in document.sensors],
         "controllers": [_controller(name, c, structure, index) for name, c in document.controllers.items()],
@@ -180,7 +182,7 @@ def _actuator(name: str, structure: Structure, index: Mapping[str, int]) -> dict
         "on": {"line": list(structure.document.lines).index(actuator.line)}
         if actuator.line is not None
         else {"joint": structure.joints.index(actuator.joint or "")},
-        "drive": {"type": "ideal", "gain": index[f"{name}.gain"], "limit": None},
+        "drive": drive_json(name, actuator, tuple(structure.document.supplies), index),
         "delay": index.get(f"{name}.delay.time"),
         "dead_zone": index.get(f"{name}.dead_zone.width"),
         "saturation": index.get(f"{name}.saturation.limit"),
@@ -199,17 +201,27 @@ def _sensor(name: str, structure: Structure, index: Mapping[str, int]) -> dict[s
 
 
 def _controller(name: str, controller: Controller, structure: Structure, index: Mapping[str, int]) -> dict[str, Any]:
-    keys = (
-        ("position_gain", "velocity_gain")
-        if isinstance(controller, Cascade)
-        else ("proportional", "integral", "derivative")
-    )
-    return {
+    actuators = [list(structure.document.actuators).index(actuator) for actuator, _ in controller.pairs]
+    channels = [_channel(channel, structure) for _, channel in controller.pairs]
+    common = {
         "type": controller.type,
         "name": name,
-        "actuator": list(structure.document.actuators).index(controller.actuator),
-        "measures": _channel(controller.measures, structure),
-        **{key: index[f"{name}.{key}"] for key in keys},
+        "sample_time": controller.sample_time,
+        "delay": controller.delay or None,
+    }
+    if isinstance(controller, ComputedTorque):
+
+        def of_joints(key: str) -> list[int]:
+            return [index[f"{name}.{key}.{joint}"] for joint in controller.joints]
+
+        numbers = {key: of_joints(key) for key in ("proportional", "derivative")}
+        limit = None if controller.limit is None else of_joints("limit")
+        return {**common, "actuators": actuators, "measures": channels, **numbers, "limit": limit}
+    return {
+        **common,
+        "actuator": actuators[0],
+        "measures": channels[0],
+        **{key: index[f"{name}.{key}"] for key in controller.GAINS},
         "limit": index.get(f"{name}.limit"),
     }
 
@@ -223,5 +235,12 @@ def _channel(channel: str, structure: Structure) -> dict[str, Any]:
         "gauge": tuple(structure.document.gauges),
         "marker": tuple(structure.document.markers),
     }
+    drives = {"hydraulic": (structure.driven_by("hydraulic"), HYDRAULIC_CHANNELS)}
+    drives |= {"supply": (tuple(structure.document.supplies), SUPPLY_CHANNELS)}
+    for what, (names, quantities) in drives.items():
+        if owner in names and kind in quantities:
+            return {"kind": what, what: names.index(owner), "quantity": kind}
+    if kind == "current":
+        return {"kind": kind, "dc_motor": structure.driven_by("dc_motor").index(owner)}
     what, names = next((what, names) for what, names in owners.items() if owner in names)
     return {"kind": kind, what: names.index(owner)}
