@@ -177,7 +177,7 @@ fn execute(setting: Setting<'_>, plan: Plan<'_>) -> Result<Run> {
 }
 
 /// Complains about a piston that starts outside of its stroke in one of the `initial` states.
-fn check_starts(setting: Setting<'_>, initial: &[f64]) -> Result<()> {
+pub(crate) fn check_starts(setting: Setting<'_>, initial: &[f64]) -> Result<()> {
     let Setting { description, theta, .. } = setting;
     if description.layout().hydraulics == 0 {
         return Ok(());
