@@ -327,3 +327,20 @@ def test_a_change_that_crosses_another_value_is_refused() -> None:
     assert limits["pump.oil.bulk_modulus"].minimum == 1e5  # no fit tries an oil that is softer than air
     assert 0.0 < limits["servo.valve.flow_gain"].minimum < 1e-12
     assert limits["servo.cylinder.internal_leakage"].minimum == 0.0
+
+
+@pytest.mark.parametrize("text", [RIG, MOTOR, SPRUNG + LEG_CYLINDER])
+def test_the_core_takes_every_value_that_a_file_may_give(text: str) -> None:
+    """Also at the ends of the physical ranges: both sides have to agree on what a parameter may be."""
+    model = Model.from_toml(text)
+    components = (*model.actuators, *model.supplies)
+    for name in [name for name in model.parameter_names if name.partition(".")[0] in components]:
+        parameter = model.parameters[name]
+        ends = [end for end in (parameter.minimum, parameter.maximum) if math.isfinite(end)]
+        for value in (0.5 * parameter.value, 2.0 * parameter.value, *ends):
+            try:
+                changed_model = model.with_parameters({name: value})
+            except ModelError:
+                continue  # outside of its range, or against another value
+            internal = model.core.internal_state(changed_model.theta, [0.0] * len(model.coordinates))
+            assert len(internal) == len(model.internal_names), name
