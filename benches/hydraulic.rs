@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use criterion::Criterion;
 use vpm_core::Result;
-use vpm_core::integrator::{Adaptive, Integrator, Method, StepControl};
+use vpm_core::integrator::{Adaptive, Integrator, Method};
 
 #[path = "../crates/vpm-core/tests/common/hydraulics.rs"]
 mod hydraulics;
@@ -30,11 +30,10 @@ fn fixed(ode: &mut Chirped, method: Method, steps: usize, mut row: impl FnMut(&[
 
 /// Controlled steps; they are cut short at every row, or only at the end.
 fn controlled(ode: &mut Chirped, tolerance: f64, rows: usize, mut row: impl FnMut(&[f64; 7])) -> Result<usize> {
-    let absolute = [1e-3, 5e-4, 0.1, 0.1, 1e7, 1e7, 1.0].map(|size| tolerance * size).to_vec();
-    let mut adaptive = Adaptive::new(StepControl { relative: tolerance, absolute, most_steps: 100_000 })?;
+    let mut adaptive = Adaptive::new(tolerance, 7)?;
     let (mut x, mut taken) = (ode.rest(), 0);
     for _ in 0..rows {
-        let steps = adaptive.advance(ode, &mut x, 1.0 / rows as f64)?;
+        let steps = adaptive.advance(ode, &mut x, 1.0 / rows as f64, &|| false)?;
         taken += steps.accepted + steps.refused;
         row(&x);
     }

@@ -119,6 +119,9 @@ def test_horizon_longer_than_the_log_is_refused(record: Experiment) -> None:
     ("arguments", "sentence"),
     [
         ({"integrator": "euler"}, "unknown integrator 'euler'"),
+        ({"integrator": "adaptive(x)"}, r"no integrator `adaptive\(x\)`"),
+        ({"integrator": "adaptive(0)"}, "tolerance of adaptive must lie between 1e-12 and 0.1, got 0"),
+        ({"integrator": "adaptive(2)"}, "tolerance of adaptive must lie between 1e-12 and 0.1, got 2"),
         ({"substeps": 0}, "substeps is 0"),
         ({"horizon": float("nan")}, "horizon is nan"),
     ],

@@ -6,15 +6,26 @@ from typing import final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["Diverged", "Dynamics", "Karl", "Leg", "PlanarArm", "Simulation", "System", "hyq_parameters", "stop_when"]
+__all__ = [
+    "Diverged",
+    "Dynamics",
+    "Karl",
+    "Leg",
+    "PlanarArm",
+    "Simulation",
+    "System",
+    "check_integrator",
+    "hyq_parameters",
+    "stop_when",
+]
 
 class Diverged(ArithmeticError):
-    """A simulation left the finite numbers.
+    """A simulation left the finite numbers, or no step of ``adaptive`` can follow it.
 
     Attributes
     ----------
     sample_index : int
-        First sample that is not finite; in a restart, counted in the log.
+        First sample that is missing; in a restart, counted in the log.
     outputs : ndarray, shape (M, n_outputs)
         Outputs of the samples before, from the start of the piece.
     states : ndarray, shape (M, n_states)
@@ -30,6 +41,9 @@ def stop_when(asked: Callable[[], bool] | None) -> None:
 
     Ctrl-C reaches Python's main thread only; this is how it tells the threads that work for it. None ends it.
     """
+
+def check_integrator(name: str) -> None:
+    """Raise ``ValueError`` for a name that is no integrator's, or a tolerance in it that means nothing."""
 
 @final
 class Dynamics:

@@ -13,6 +13,9 @@ from vpm.model.settled import follow, rest
 
 Array = NDArray[np.float64]
 
+#: How the size of a piston is given: two diameters, or an area and the share of it on the side of the rod.
+_SIZES = ("bore", "rod", "area", "area_ratio")
+
 
 def measured_states(
     model: Model, experiment: Experiment, theta: Array, rows: NDArray[np.int64], cutoff: float | None
@@ -33,7 +36,7 @@ def measured_states(
             state[:coordinates] = model.core.equilibrium(theta, state[:joints])[0]
         internal = _internal(model, experiment, theta, state[:coordinates], int(row))
         follow(model, theta, internal, m.inputs[row], state[coordinates : coordinates + joints])
-        state[2 * coordinates :] = _seen(model, experiment, internal, int(row))
+        state[2 * coordinates :] = _seen(model, experiment, theta, state[:coordinates], internal, int(row))
     return states
 
 
@@ -41,7 +44,7 @@ def initial_state(model: Model, experiment: Experiment, theta: Array) -> Array:
     """State at the first sample, lags settled at the command, flexible links deflected as in equilibrium.
 
     The machine is at rest at zero where the log holds no position. Drives have stood without commands, but for what the
-    log holds of them: pressures of both chambers, current, place of the spool.
+    log holds of them: pressures of chambers, current, place of the spool. One pressure and the load tell the other.
     """
     joints, coordinates = len(model.joints), len(model.coordinates)
     state = np.zeros(model.core.n_states)
@@ -58,7 +61,7 @@ def initial_state(model: Model, experiment: Experiment, theta: Array) -> Array:
         command = f"{name.removesuffix('.lag')}.command"
         if name.endswith(".lag") and command in experiment:
             internal[place] = experiment[command][0]
-    state[2 * coordinates :] = _seen(model, experiment, internal, 0)
+    state[2 * coordinates :] = _seen(model, experiment, theta, state[:coordinates], internal, 0)
     return state
 
 
@@ -72,15 +75,53 @@ def _internal(model: Model, experiment: Experiment, theta: Array, coordinates: A
     return rest(model, theta, coordinates)
 
 
-def _seen(model: Model, experiment: Experiment, internal: Array, row: int) -> Array:
-    """Internal states with what the log holds of them; of a cylinder both pressures, for one alone is no balance."""
+def _seen(model: Model, experiment: Experiment, theta: Array, state: Array, internal: Array, row: int) -> Array:
+    """Internal states with what the log holds of them; see `_chambers` for pressures."""
     for place, name in enumerate(model.internal_names):
-        owner, _, state = name.partition(".")
-        if state in {"spool", "current"} and name in experiment:
+        owner, _, quantity = name.partition(".")
+        if quantity in {"spool", "current"} and name in experiment:
             internal[place] = experiment[name][row]
-        elif state.startswith("chamber_") and all(f"{owner}.pressure_{side}" in experiment for side in "ab"):
-            internal[place] = experiment[f"{owner}.{state.replace('chamber', 'pressure')}"][row]
+        elif quantity == "chamber_a":
+            internal[place : place + 2] = _chambers(model, experiment, theta, owner, state, internal[place:], row)
     return internal
+
+
+def _chambers(
+    model: Model, experiment: Experiment, theta: Array, name: str, coordinates: Array, rest: Array, row: int
+) -> Array:
+    """Pressures (2,) of both chambers of a cylinder: as logged, or as after a ``rest`` where the log holds none.
+
+    Where the log holds one of them, and the cylinder moves a joint by itself, the other is that which holds the machine
+    at rest, between the pressures of tank and supply.
+    """
+    logged = [experiment[c][row] if (c := f"{name}.pressure_{side}") in experiment else np.nan for side in "ab"]
+    if not np.any(np.isnan(logged)):
+        return np.array(logged)
+    alone = model.line_of_actuator(name) is None and [
+        other for other in model.actuators if model.joint_of_actuator(name) in model.joints_of_actuator(other)
+    ] == [name]
+    if np.all(np.isnan(logged)) or not alone:
+        return rest[:2]
+    joint = model.joints.index(model.joint_of_actuator(name))
+    load = float(model.core.equilibrium(theta, coordinates[: len(model.joints)])[1][joint])
+    full, ring = _areas(model, theta, name)
+    first, second = logged
+    balanced = [(ring * second + load) / full, (full * first - load) / ring]
+    supply = model.supply_of_actuator(name)
+    bounds = [theta[model.index(f"{supply}.{kind}")] for kind in ("tank_pressure", "pressure")]
+    return np.where(np.isnan(logged), np.clip(balanced, *bounds), logged)
+
+
+def _areas(model: Model, theta: Array, name: str) -> tuple[float, float]:
+    """Areas (m^2) of a cylinder on which the pressures of chambers a and b act."""
+    size = {
+        key: float(theta[model.index(f"{name}.cylinder.{key}")])
+        for key in _SIZES
+        if f"{name}.cylinder.{key}" in model.parameters
+    }
+    if "bore" in size:
+        return 0.25 * np.pi * size["bore"] ** 2, 0.25 * np.pi * (size["bore"] ** 2 - size["rod"] ** 2)
+    return size["area"], size["area"] * size["area_ratio"]
 
 
 @dataclass(frozen=True)

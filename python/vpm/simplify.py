@@ -15,7 +15,7 @@ from vpm.experiment import Experiment
 from vpm.identify import InverseDynamicsProblem, OutputErrorProblem, estimate, gaps
 from vpm.model import Effect, Model
 from vpm.results import Result, Storable
-from vpm.simulate import INTEGRATORS, Setup, judging_mode
+from vpm.simulate import FIXED_STEP, Setup, judging_mode
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -156,7 +156,7 @@ def simplify(
         reduced = _refitted(_without(model, removed), records)
         labels = tuple(f"{effect.name} at {effect.at}" for effect in removed)
         say(f"without {', '.join(labels) or 'nothing'}")
-        for integrator in INTEGRATORS:
+        for integrator in FIXED_STEP:
             error = _error(reduced, records, integrator)
             full = error if np.isnan(full) else full
             if error < np.inf:

@@ -36,7 +36,9 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 MODES = ("free_run", "inverse_dynamics", "restarts", "closed_loop", "prescribed_motion")
-INTEGRATORS = ("linearly_implicit", "rosenbrock", "rk4", "semi_implicit")
+#: Integrators of fixed steps, whose work is bounded.
+FIXED_STEP = ("linearly_implicit", "rosenbrock", "rk4", "semi_implicit")
+INTEGRATORS = (*FIXED_STEP, "adaptive")
 
 
 @dataclass(frozen=True)
@@ -45,11 +47,14 @@ class Setup:
 
     Attributes
     ----------
-    integrator : {"linearly_implicit", "rosenbrock", "rk4", "semi_implicit"}
+    integrator : {"linearly_implicit", "rosenbrock", "rk4", "semi_implicit", "adaptive"} or ``"adaptive(1e-8)"``
         The first two are stable whatever is stiff, of order 2 and 4; the first also stops on dry friction far
-        sharper than a step. The others are explicit, but for the constant stiffness of flexible links in the last.
+        sharper than a step. The next two are explicit, but for the constant stiffness of flexible links in the last.
+        ``adaptive`` takes as many steps of ``rosenbrock`` as keep the error of each within a tolerance, 1e-6 or the
+        one in brackets, relative to each state and its natural size: for impacts, oil and other things that change
+        between microseconds and seconds. Its time is not bounded.
     substeps : int
-        Integration steps per sample of the log.
+        Integration steps per sample of the log; with ``adaptive`` pieces of a sample that take one step at least.
     horizon : float
         Length of each restart, s.
     settling : float
@@ -64,14 +69,35 @@ class Setup:
 
     def __post_init__(self) -> None:
         """Check the choices."""
-        if self.integrator not in INTEGRATORS:
-            raise SimulationError(f"unknown integrator '{self.integrator}'; choose one of {', '.join(INTEGRATORS)}")
+        _check_integrator(self.integrator)
         if self.substeps < 1:
             raise SimulationError(f"substeps is {self.substeps}; give a whole number of at least 1")
         if not self.horizon > 0.0:
             raise SimulationError(f"horizon is {self.horizon} s; give a positive time")
         if not self.settling >= 0.0:
             raise SimulationError(f"settling is {self.settling} s; give a time that is not negative")
+
+
+def _check_integrator(name: str) -> None:
+    """Complain about a name that is none, or a tolerance that means nothing.
+
+    Raises
+    ------
+    SimulationError
+    """
+    from vpm._core import check_integrator
+
+    if name in INTEGRATORS:
+        return
+    if not name.startswith("adaptive("):
+        choice = ", ".join(INTEGRATORS)
+        raise SimulationError(
+            f"unknown integrator '{name}'; choose one of {choice} or, with a tolerance, adaptive(1e-8)"
+        )
+    try:
+        check_integrator(name)
+    except ValueError as error:
+        raise SimulationError(str(error)) from None
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -156,8 +182,10 @@ def judging_mode(model: Model, records: Sequence[Experiment]) -> str:
     Elsewhere restarts, which need no more than position and command.
     """
     held = model.controlled_actuators
-    known = all(f"{name}.reference" in record for name in held for record in records)
-    return "closed_loop" if held and not _uncontrolled(model) and known else "restarts"
+    needed = [f"{name}.reference" for name in held]
+    needed += [f"{name}.command" for name in _uncontrolled(model) if f"{name}.command" not in model.optional_inputs]
+    known = all(channel in record for channel in needed for record in records)
+    return "closed_loop" if held and known else "restarts"
 
 
 def simulate(
@@ -197,7 +225,7 @@ def simulate(
     SimulationError, ExperimentError
         A setting is wrong or a channel that the mode needs is missing.
     DivergedError
-        The state left the finite numbers; carries the run up to there.
+        The state left the finite numbers, or no step of ``adaptive`` can follow it; carries the run up to there.
 
     Warns
     -----
@@ -307,7 +335,7 @@ def copied_channels(model: Model, mode: str, passive: Sequence[str] = ()) -> fro
     """
     logged = {f"{name}.pressure" for name in model.logged_supplies}
     if mode == "closed_loop":
-        return frozenset(logged)
+        return frozenset(logged | {f"{name}.command" for name in _uncontrolled(model)})
     commands = {f"{name}.command" for name in model.actuators} | logged
     if mode == "prescribed_motion":
         followed = [name for name in model.joints if name not in passive]
@@ -439,24 +467,31 @@ def _inputs(model: Model, experiment: Experiment, mode: str) -> Array:
 
 
 def _references(model: Model, experiment: Experiment, mode: str) -> tuple[Array, Array]:
-    """References and disturbances, one column per input; pressures of logged supplies are disturbances."""
-    held, logged = list(model.controlled_actuators), [f"{name}.pressure" for name in model.logged_supplies]
-    _require(experiment, [f"{name}.reference" for name in held] + logged, mode)
+    """References and disturbances, one column per input; pressures of logged supplies are disturbances.
+
+    So are commands of actuators that no controller commands: there they are all that comes.
+    """
+    held, free = list(model.controlled_actuators), _uncontrolled(model)
+    logged = [f"{name}.pressure" for name in model.logged_supplies]
+    needed = [f"{name}.command" for name in free if f"{name}.command" not in model.optional_inputs]
+    _require(experiment, [f"{name}.reference" for name in held] + needed + logged, mode)
     references = _optional(experiment, [f"{name}.reference" for name in model.inputs])
-    return references, _optional(experiment, [*(f"{name}.disturbance" for name in model.actuators), *logged])
+    disturbances = _optional(experiment, [*(f"{name}.disturbance" for name in model.actuators), *logged])
+    commands = _optional(experiment, [f"{name}.command" for name in free])
+    disturbances[:, [model.actuators.index(name) for name in free]] += commands
+    return references, disturbances
 
 
 def _uncontrolled(model: Model) -> list[str]:
-    """Actuators that a closed loop leaves without a command; a spring along a line needs none."""
-    free = [name for name in model.actuators if f"{name}.command" not in model.optional_inputs]
-    return [name for name in free if name not in model.controlled_actuators]
+    """Actuators that no controller commands; in a closed loop the log does."""
+    return [name for name in model.actuators if name not in model.controlled_actuators]
 
 
 def _check_controllers(model: Model) -> None:
-    idle = _uncontrolled(model)
-    if idle:
+    if not model.controlled_actuators:
+        idle = f"for actuator '{model.actuators[0]}'" if model.actuators else "and an actuator"
         raise SimulationError(
-            f"mode 'closed_loop' needs a controller for actuator '{idle[0]}', but the model has none; "
+            f"mode 'closed_loop' needs a controller {idle}, but the model has none; "
             "add one under [controllers] or use free_run or restarts"
         )
 

@@ -3,11 +3,14 @@
 //! The same description is built over any number type: values, or values with exact derivatives with respect to the parameters.
 
 mod check;
+mod connections;
+mod controllers;
 mod drives;
 mod entry;
 
 use serde::Deserialize;
 
+pub use connections::LoadCell;
 pub(crate) use drives::piston_outside;
 pub use entry::{ControllerEntry, EffectEntry};
 
@@ -15,6 +18,8 @@ use crate::actuator::hydraulic::Supply;
 use crate::actuator::{Actuator, Drive, Target};
 use crate::beam::BeamEntry;
 use crate::body::{Body, PointMass, Weld};
+use crate::bushing::BushingEntry;
+use crate::contact::ContactEntry;
 use crate::data::Data;
 use crate::dynamics::check_regular;
 use crate::error::{Error, Result};
@@ -67,6 +72,15 @@ pub struct Description {
     /// Controllers.
     #[serde(default)]
     pub controllers: Vec<ControllerEntry>,
+    /// Contacts of points with planes.
+    #[serde(default)]
+    pub contacts: Vec<ContactEntry<usize>>,
+    /// Elastic connections of two frames.
+    #[serde(default)]
+    pub bushings: Vec<BushingEntry<usize>>,
+    /// Load cells.
+    #[serde(default)]
+    pub load_cells: Vec<LoadCell>,
     /// Number of elastic coordinates of each beam, known once the beams are built.
     #[serde(skip)]
     elastic: Vec<usize>,
@@ -81,6 +95,8 @@ impl Description {
         check::parameters(&description, &description.parameters)?;
         let model = description.model(&description.parameters)?;
         description.elastic = (0..model.n_beams()).filter_map(|k| model.beam(k)).map(|(beam, _)| beam.len()).collect();
+        description.connections(&description.parameters, &model)?;
+        controllers::check_rigid(&description)?;
         check_regular(&model, &mut Data::new(&model))?;
         Ok(description)
     }
@@ -144,6 +160,9 @@ impl Description {
             hydraulics: count(|drive| matches!(drive, Drive::Hydraulic(_))),
             dc_motors: count(|drive| matches!(drive, Drive::DcMotor(_))),
             supplies: self.supplies.len(),
+            contacts: self.contacts.len(),
+            bushings: self.bushings.len(),
+            load_cells: self.load_cells.len(),
         }
     }
 
@@ -157,6 +176,7 @@ impl Description {
     pub fn check_values(&self, theta: &[f64]) -> Result<()> {
         check::parameters(self, theta)?;
         let model = self.model(theta)?;
+        self.connections(theta, &model)?;
         check_regular(&model, &mut Data::new(&model))
     }
 
@@ -190,6 +210,7 @@ impl Description {
             lines: self.lines.iter().map(|line| line.map(number)).collect(),
             markers: self.markers.clone(),
             gauges: self.gauges.clone(),
+            attachments: self.attachments(),
         })
     }
 }
@@ -201,7 +222,9 @@ impl Build for &Description {
         let effects = self.effects.iter().filter_map(|entry| entry.on_joint(theta)).collect();
         let actuators = self.actuators.iter().map(|actuator| actuator.map(&mut |&index| theta[index])).collect();
         let supplies = self.supplies.iter().map(|supply| supply.map(&mut |&index| theta[index])).collect();
-        Ok(Dynamics::new(self.model(theta)?, effects, actuators, supplies))
+        let model = self.model(theta)?;
+        let connections = self.connections(theta, &model)?;
+        Ok(Dynamics::new(model, effects, actuators, supplies).connected(connections))
     }
 }
 

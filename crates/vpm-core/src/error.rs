@@ -1,8 +1,10 @@
 //! What can go wrong, as data: which part, the failing condition, the numbers and the repair, in one sentence each.
 
+pub use connection::ConnectionError;
 pub use drive::DriveError;
 pub use linkage::LinkageError;
 
+mod connection;
 mod drive;
 mod linkage;
 
@@ -190,21 +192,25 @@ pub enum Error {
         /// The value found.
         value: f64,
     },
-    /// A step control that does not arrive.
-    #[error(
-        "the step control came to {reached} s of {duration} s within {most} steps; allow more steps or a larger error, or look for a \
-         state that grows without limit"
-    )]
+    /// A step control that does not get on.
+    #[error("state number {state} {event} from {reached} s on, in steps of {step:.3e} s; {repair}")]
     Steps {
-        /// How many steps were allowed.
-        most: usize,
-        /// How far they led, s.
+        /// The state that stops it, from 0.
+        state: usize,
+        /// What the state does that no step can follow.
+        event: String,
+        /// How far the steps led, s.
         reached: f64,
-        /// How far they had to lead, s.
-        duration: f64,
+        /// Length of the last step, s.
+        step: f64,
+        /// What to do.
+        repair: &'static str,
     },
     /// No integrator has this name.
-    #[error("there is no integrator `{name}`; use semi_implicit, rk4, linearly_implicit or rosenbrock")]
+    #[error(
+        "there is no integrator `{name}`; use semi_implicit, rk4, linearly_implicit, rosenbrock, adaptive or, with a \
+         tolerance, adaptive(1e-8)"
+    )]
     Integrator {
         /// The name asked for.
         name: String,
@@ -257,6 +263,24 @@ pub enum Error {
     /// A drive or a supply that cannot be as described.
     #[error("{0}")]
     Drive(#[from] DriveError),
+    /// A contact, a bushing or a load cell that has no physical meaning.
+    #[error("{0}")]
+    Connection(#[from] ConnectionError),
+    /// A controller whose samples fall between those of the record.
+    #[error(
+        "controller `{controller}` samples every {sample_time} s, which is no whole multiple of the record's time step of {time_step} s; \
+         give it the sample_time {nearest} s, or resample the record"
+    )]
+    SampleTime {
+        /// Name of the controller.
+        controller: String,
+        /// Time between its samples, s.
+        sample_time: f64,
+        /// Time between the samples of the record, s.
+        time_step: f64,
+        /// The multiple next to it, s.
+        nearest: f64,
+    },
     /// A linkage that cannot be closed, or not be solved for its motion.
     #[error("{0}")]
     Linkage(#[from] LinkageError),
@@ -271,20 +295,20 @@ pub enum Error {
 /// Shorthand for results of this crate.
 pub type Result<T> = std::result::Result<T, Error>;
 
-/// A simulation that left the finite numbers, with what it had computed until then.
+/// A simulation that left the finite numbers or that no steps can follow, with what it had computed until then.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error(
-    "{what} is no longer finite at t = {time:.6} s (sample {sample_index}) with {method} in steps of {step:.3e} s; {repair}"
-)]
+#[error("{what} {event} at t = {time:.6} s (sample {sample_index}) with {method} in steps of {step:.3e} s; {repair}")]
 pub struct Diverged {
     /// Which quantity, for example ``the velocity of joint `axis` ``.
     pub what: String,
+    /// What it does that no simulation can follow: "is no longer finite" as a rule.
+    pub event: String,
     /// Time after the first sample, in s.
     pub time: f64,
-    /// First sample that is not finite; in a restart, counted in the log.
+    /// First sample that is missing; in a restart, counted in the log.
     pub sample_index: usize,
-    /// Name of the integrator.
-    pub method: &'static str,
+    /// Name of the integrator, with its tolerance if it has one.
+    pub method: String,
     /// Step of the integrator in s.
     pub step: f64,
     /// What to do.
@@ -293,4 +317,9 @@ pub struct Diverged {
     pub outputs: Vec<f64>,
     /// States of the samples before, row by row.
     pub states: Vec<f64>,
+}
+
+impl Diverged {
+    /// What becomes of a quantity whose number is infinite or none.
+    pub const NOT_FINITE: &'static str = "is no longer finite";
 }

@@ -7,7 +7,7 @@ use crate::error::{Diverged, Error, Result};
 use crate::integrator::Integrator;
 use crate::ode::Ode;
 use crate::sensor::Sensor;
-use crate::simulate::{Stepping, check_pistons, check_state, check_step, state_name};
+use crate::simulate::{Stepping, check_pistons, check_state, check_step, halted, state_name};
 use crate::system::System;
 use crate::table::Table;
 
@@ -93,6 +93,7 @@ impl Live {
         check_pistons(description, theta, system.dynamics(), state)?;
         self.state.copy_from_slice(state);
         self.sample = 0;
+        self.integrator.reset();
         self.commands.fill(0.0);
         self.feed();
         self.hold();
@@ -118,9 +119,10 @@ impl Live {
         let row = self.sample % self.depth;
         self.commands[row * width..(row + 1) * width].copy_from_slice(inputs);
         self.hold();
-        for _ in 0..self.stepping.substeps {
-            self.integrator.step(&mut self.system, &mut self.state, self.stepping.step());
-        }
+        let (pieces, sample) = ((self.stepping.time_step, self.stepping.substeps), self.sample);
+        self.integrator
+            .advance(&mut self.system, &mut self.state, pieces, &|| false)
+            .map_err(|halt| halted(&self.description, self.stepping, sample, halt, (Vec::new(), Vec::new())))?;
         self.sample += 1;
         self.observe()?;
         Ok(&self.outputs)
@@ -164,11 +166,12 @@ impl Live {
     fn diverged(&self, place: usize) -> Error {
         Error::Diverged(Box::new(Diverged {
             what: format!("the {}", state_name(&self.description, place)),
+            event: Diverged::NOT_FINITE.to_owned(),
             time: self.time(),
             sample_index: self.sample,
-            method: self.stepping.method.name(),
+            method: self.stepping.method.to_string(),
             step: self.stepping.step(),
-            repair: "reset the simulation and use more substeps, the integrator linearly_implicit, or smaller commands",
+            repair: "reset the simulation and use more substeps, the integrator linearly_implicit or adaptive, or smaller commands",
             outputs: Vec::new(),
             states: Vec::new(),
         }))

@@ -1,5 +1,6 @@
 //! Simulation of a whole record: free run on commands, closed loop on references, restarts from many samples.
 
+mod control;
 mod names;
 mod prescribed;
 mod stability;
@@ -8,13 +9,13 @@ mod stepper;
 
 pub(crate) use names::state_name;
 pub use prescribed::prescribed;
-pub(crate) use stability::{check_beams, check_step};
+pub(crate) use stability::{check_step, check_structure};
 pub(crate) use start::check_pistons;
 pub(crate) use stepper::{Drive, Plan, Stepper};
 
 use crate::description::Description;
 use crate::error::{Diverged, Error, Result};
-use crate::integrator::Method;
+use crate::integrator::{Halt, Method};
 use crate::scalar::Scalar;
 use crate::sensitivity::{Interrupt, Job, Pair, differentiate};
 use crate::system::Build;
@@ -25,7 +26,7 @@ use crate::table::Table;
 pub struct Stepping {
     /// Time between samples, s.
     pub time_step: f64,
-    /// Integration steps per sample.
+    /// Integration steps per sample; with controlled errors, pieces of a sample that take one step at least.
     pub substeps: usize,
     /// The integrator.
     pub method: Method,
@@ -35,6 +36,7 @@ impl Stepping {
     /// Checked settings.
     pub fn new(time_step: f64, substeps: usize, method: Method) -> Result<Self> {
         check_time_step(time_step)?;
+        method.check()?;
         if substeps == 0 {
             let condition = "be at least 1".to_owned();
             return Err(Error::Setting { setting: "substeps", condition, value: 0.0, repair: "use 1 to begin with" });
@@ -107,7 +109,7 @@ pub fn closed_loop(
     disturbances.expect("disturbances", rows, inputs)?;
     check_state("initial_state", description, initial_state)?;
     for (number, actuator) in description.actuators.iter().enumerate() {
-        if !description.controllers.iter().any(|controller| controller.actuator == number) {
+        if !description.controllers.iter().any(|controller| controller.actuators.contains(&number)) {
             return Err(Error::OpenLoop { actuator: actuator.name.clone() });
         }
     }
@@ -192,20 +194,49 @@ fn check_starts(setting: Setting<'_>, initial: &[f64]) -> Result<()> {
 /// What stopped being finite, in the words of the model.
 pub(crate) fn diverged<S: Scalar>(stepper: &Stepper<'_, S>, what: String, row: usize, start: usize) -> Error {
     let stepping = stepper.stepping();
-    let repair = match stepping.method {
-        Method::LinearlyImplicit | Method::Rosenbrock => {
-            "use more substeps, or check the signs and sizes of the parameters"
-        }
-        Method::Rk4 | Method::SemiImplicit => "use more substeps or the integrator linearly_implicit",
-    };
     let (outputs, states) = stepper.before(row);
     Error::Diverged(Box::new(Diverged {
         what,
+        event: Diverged::NOT_FINITE.to_owned(),
         time: (start + row) as f64 * stepping.time_step,
         sample_index: start + row,
-        method: stepping.method.name(),
+        method: stepping.method.to_string(),
         step: stepping.step(),
-        repair,
+        repair: repair(stepping.method),
+        outputs,
+        states,
+    }))
+}
+
+/// What helps against a state that is not finite.
+fn repair(method: Method) -> &'static str {
+    match method {
+        Method::LinearlyImplicit | Method::Rosenbrock => {
+            "use more substeps or the integrator adaptive, or check the signs and sizes of the parameters"
+        }
+        Method::Rk4 | Method::SemiImplicit => "use more substeps or the integrator linearly_implicit",
+        Method::Adaptive { .. } => "check the signs and sizes of the parameters",
+    }
+}
+
+/// What the step control could not follow on the way from a sample (number `sample`, counted with its time from the beginning), in the
+/// words of the model; `tables` are the outputs and states of the samples until then.
+pub(crate) fn halted(
+    description: &Description,
+    stepping: Stepping,
+    sample: usize,
+    halt: Halt,
+    (outputs, states): (Vec<f64>, Vec<f64>),
+) -> Error {
+    let Halt::Stuck(stuck) = halt else { return Error::Interrupted };
+    Error::Diverged(Box::new(Diverged {
+        what: format!("the {}", state_name(description, stuck.state)),
+        event: stuck.event(),
+        time: sample as f64 * stepping.time_step + stuck.reached,
+        sample_index: sample + 1,
+        method: stepping.method.to_string(),
+        step: stuck.step,
+        repair: stuck.repair(),
         outputs,
         states,
     }))

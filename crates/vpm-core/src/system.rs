@@ -1,13 +1,18 @@
 //! A whole machine as one ordinary differential equation: tree, effects and actuators.
 
 mod answers;
+mod connections;
 mod drives;
 mod observe;
+mod slopes;
 mod stiff;
 mod tangent;
 
+pub use connections::Connections;
+
 use crate::actuator::hydraulic::Supply;
 use crate::actuator::{Actuator, Drive, Target};
+use crate::contact::ContactFriction;
 use crate::data::Data;
 use crate::dynamics::{aba, flexible, frames, lines, poses};
 use crate::effect::JointEffect;
@@ -48,6 +53,8 @@ pub struct Dynamics<S> {
     /// Resistance of each actuator's seals in the place of their friction, where an iteration matrix asks for it.
     seals: Vec<Option<S>>,
     loads: Vec<S>,
+    /// Contacts, bushings and load cells.
+    pub(crate) connections: Connections<S>,
 }
 
 impl<S: Scalar> Dynamics<S> {
@@ -73,11 +80,18 @@ impl<S: Scalar> Dynamics<S> {
             tensions: zeros(model.lines().len()),
             pulls: actuators.iter().any(|actuator| matches!(actuator.on, Target::Line(_))),
             loads: zeros(model.n_coordinates()),
+            connections: Connections::default(),
             model,
             effects,
             actuators,
             supplies,
         }
+    }
+
+    /// With contacts, bushings and load cells.
+    #[must_use]
+    pub fn connected(self, connections: Connections<S>) -> Self {
+        Self { connections, ..self }
     }
 
     /// Number of joints.
@@ -115,7 +129,7 @@ impl<S: Scalar> Dynamics<S> {
         self.tensions.fill(S::zero());
         self.efforts.copy_from_slice(efforts);
         self.locate(q, v);
-        self.accelerate(q, v, add_effects, &[]);
+        self.accelerate(q, v, (add_effects, ContactFriction::resistance), &[]);
         &self.data.acceleration
     }
 
@@ -127,33 +141,36 @@ impl<S: Scalar> Dynamics<S> {
     /// dx/dt at x.
     #[inline]
     pub fn rhs(&mut self, x: &[S], dxdt: &mut [S]) {
-        self.rhs_with(x, dxdt, add_effects);
+        self.rhs_with(x, dxdt, (add_effects, ContactFriction::resistance));
     }
 
-    /// dx/dt at x, with the efforts of the effects at (q, v) added by `add`.
+    /// dx/dt at x, with the efforts of the effects at (q, v) and the resistances of contacts by `laws`.
     #[inline]
     fn rhs_with(
         &mut self,
         x: &[S],
         dxdt: &mut [S],
-        add: impl FnOnce(&[(usize, JointEffect<S>)], &[S], &[S], &mut [S]),
+        laws: (impl FnOnce(&[(usize, JointEffect<S>)], &[S], &[S], &mut [S]), impl Fn(&ContactFriction<S>, S, S) -> S),
     ) {
         let n = self.coordinates();
         let (q, v) = x[..2 * n].split_at(n);
         self.locate(q, v);
         self.actuate(x, dxdt);
         dxdt[..n].copy_from_slice(v);
-        self.accelerate(q, v, add, &[]);
+        self.accelerate(q, v, laws, &[]);
         dxdt[n..2 * n].copy_from_slice(&self.data.acceleration);
     }
 
-    /// Moves the lines to (q, v), as far as anything acts on them, and of a machine that is no rigid tree all that its dynamics need.
+    /// Moves lines and frames to (q, v), as far as anything acts on them, and of a machine that is no rigid tree all that its dynamics need.
     #[inline]
     fn locate(&mut self, q: &[S], v: &[S]) {
         let Self { model, data, .. } = self;
         if !model.is_recursive() {
             flexible::terms(model, data, q, v);
-        } else if self.pulls {
+            if !self.connections.is_free() {
+                poses(model, data);
+            }
+        } else if self.pulls || !self.connections.is_free() {
             frames(model, data, q, v);
             poses(model, data);
             lines(model, data);
@@ -167,10 +184,13 @@ impl<S: Scalar> Dynamics<S> {
         &mut self,
         q: &[S],
         v: &[S],
-        add: impl FnOnce(&[(usize, JointEffect<S>)], &[S], &[S], &mut [S]),
+        (add, resistance): (
+            impl FnOnce(&[(usize, JointEffect<S>)], &[S], &[S], &mut [S]),
+            impl Fn(&ContactFriction<S>, S, S) -> S,
+        ),
         on_beams: &[S],
     ) {
-        let Self { model, data, loads, tensions, .. } = self;
+        let Self { model, data, loads, tensions, connections, .. } = self;
         let (of_joints, elastic) = loads.split_at_mut(model.n_joints());
         of_joints.copy_from_slice(&self.efforts);
         elastic.fill(S::zero());
@@ -178,6 +198,9 @@ impl<S: Scalar> Dynamics<S> {
         add(&self.effects, q, v, of_joints);
         if self.pulls {
             flexible::add_line_forces(data, tensions, loads);
+        }
+        if !connections.is_free() {
+            connections.add_loads(model, data, resistance, loads);
         }
         if model.is_recursive() {
             aba(model, data, q, v, loads);
@@ -285,7 +308,7 @@ impl<S: Scalar> Ode<S> for System<S> {
         for (joint, effect) in &self.dynamics.effects {
             self.resistances[*joint] += effect.resistance(x[n + joint]);
         }
-        if self.dynamics.model.n_elastic() == 0 || !self.ideal {
+        if self.dynamics.model.n_elastic() == 0 || !self.ideal || !self.dynamics.connections.is_free() {
             let (q, v) = x[..2 * n].split_at(n);
             self.dynamics.seal_chords(q, v, &mut self.seals);
             self.tangent.chords(x, matrix, &self.resistances, &self.seals);

@@ -26,7 +26,7 @@ pub fn time_steps(setting: Setting<'_>, initial_state: &[f64], inputs: Table<'_>
         }
         let begin = Instant::now();
         stepper.sample(row, 0)?;
-        stepper.advance(setting.interrupt)?;
+        stepper.advance(row, 0, setting.interrupt)?;
         durations.push(begin.elapsed().as_secs_f64());
     }
     Ok(durations)

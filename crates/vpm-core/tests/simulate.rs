@@ -223,7 +223,13 @@ fn settings_and_shapes_out_of_range_are_refused() {
     assert!(refused(Stepping::new(0.0, 1, Method::Rk4).unwrap_err()).contains("time_step"));
     assert!(refused(Stepping::new(f64::NAN, 1, Method::Rk4).unwrap_err()).contains("time_step"));
     assert!(refused(Stepping::new(1e-3, 0, Method::Rk4).unwrap_err()).contains("substeps"));
-    assert!(refused(Method::from_name("euler").unwrap_err()).contains("linearly_implicit"));
+    for name in ["euler", "adaptive(x)", "adaptive(1e-6", "adaptive()", "rk4(1e-6)"] {
+        assert!(refused(Method::from_name(name).unwrap_err()).contains(&format!("no integrator `{name}`; use semi")));
+    }
+    for name in ["adaptive(0)", "adaptive(-1e-6)", "adaptive(nan)", "adaptive(1)", "adaptive(1e-13)"] {
+        assert!(refused(Method::from_name(name).unwrap_err()).contains("tolerance of adaptive must lie between 1e-12"));
+    }
+    assert!(Stepping::new(1e-3, 1, Method::Adaptive { tolerance: 0.0 }).is_err());
     let bench = Bench::new(&axis(), 1e-3, 1, Method::Rk4);
     assert!(
         refused(bench.try_free(&[0.0], &[0.0; 5]).unwrap_err()).contains("initial_state must have 2 entries, got 1")

@@ -27,7 +27,7 @@ mod _core {
     #[pymodule_export]
     use crate::planar::PlanarArm;
     #[pymodule_export]
-    use crate::stepping::Simulation;
+    use crate::stepping::{Simulation, check_integrator};
     #[pymodule_export]
     use crate::system::System;
 }

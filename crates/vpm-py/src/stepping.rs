@@ -28,6 +28,12 @@ pub(crate) fn stepping((time_step, substeps, integrator): (f64, i64, &str)) -> P
     Ok(Method::from_name(integrator).and_then(|method| Stepping::new(time_step, substeps, method)))
 }
 
+/// Complains with `ValueError` about a name that is no integrator's, or a tolerance in it that means nothing.
+#[pyfunction]
+pub(crate) fn check_integrator(name: &str) -> PyResult<()> {
+    Method::from_name(name).map(|_| ()).map_err(|error| PyValueError::new_err(error.to_string()))
+}
+
 /// A simulation that goes on one sample at a time.
 ///
 /// Parameters
@@ -39,6 +45,7 @@ pub(crate) fn stepping((time_step, substeps, integrator): (f64, i64, &str)) -> P
 ///     Time between samples, s.
 /// substeps : int
 /// integrator : str
+///     Its name, for example ``rosenbrock``, ``adaptive`` or ``adaptive(1e-8)``.
 ///
 /// Raises
 /// ------

@@ -9,11 +9,11 @@ from typing import Any
 from vpm.catalogue import EFFECTS
 from vpm.model.beam import End, Gauge, Line, Marker, Section, sections_of
 from vpm.model.check import Checked
+from vpm.model.controller import ComputedTorque, Controller
 from vpm.model.drive_compile import drive_json, supply_json
 from vpm.model.effects import Effect, effects_of
 from vpm.model.parameters import INERTIA_AXES
 from vpm.model.pose import Pose, pose
-from vpm.model.schema import Cascade, Controller
 from vpm.model.structure import HYDRAULIC_CHANNELS, SUPPLY_CHANNELS, Axis, Frame, Mount, Structure
 
 
@@ -201,17 +201,27 @@ def _sensor(name: str, structure: Structure, index: Mapping[str, int]) -> dict[s
 
 
 def _controller(name: str, controller: Controller, structure: Structure, index: Mapping[str, int]) -> dict[str, Any]:
-    keys = (
-        ("position_gain", "velocity_gain")
-        if isinstance(controller, Cascade)
-        else ("proportional", "integral", "derivative")
-    )
-    return {
+    actuators = [list(structure.document.actuators).index(actuator) for actuator, _ in controller.pairs]
+    channels = [_channel(channel, structure) for _, channel in controller.pairs]
+    common = {
         "type": controller.type,
         "name": name,
-        "actuator": list(structure.document.actuators).index(controller.actuator),
-        "measures": _channel(controller.measures, structure),
-        **{key: index[f"{name}.{key}"] for key in keys},
+        "sample_time": controller.sample_time,
+        "delay": controller.delay or None,
+    }
+    if isinstance(controller, ComputedTorque):
+
+        def of_joints(key: str) -> list[int]:
+            return [index[f"{name}.{key}.{joint}"] for joint in controller.joints]
+
+        numbers = {key: of_joints(key) for key in ("proportional", "derivative")}
+        limit = None if controller.limit is None else of_joints("limit")
+        return {**common, "actuators": actuators, "measures": channels, **numbers, "limit": limit}
+    return {
+        **common,
+        "actuator": actuators[0],
+        "measures": channels[0],
+        **{key: index[f"{name}.{key}"] for key in controller.GAINS},
         "limit": index.get(f"{name}.limit"),
     }
 

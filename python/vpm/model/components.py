@@ -112,11 +112,26 @@ class Components(DriveComponents):
         """Line that an actuator drives; None if it drives a joint."""
         return self._checked.document.actuators[self._known(actuator, self.actuators, "actuator")].line
 
+    def held_channel(self, actuator: str) -> str:
+        """Channel that the controller of an actuator holds at its reference.
+
+        Raises
+        ------
+        ModelError
+            There is no such actuator, or no controller commands it.
+        """
+        name = self._known(actuator, self.controlled_actuators, "actuator with a controller")
+        return self._controlled[name]
+
     @cached_property
     def controlled_actuators(self) -> tuple[str, ...]:
         """Actuators that a controller commands, in the order of `actuators`."""
-        controlled = {controller.actuator for controller in self._checked.document.controllers.values()}
-        return tuple(name for name in self.actuators if name in controlled)
+        return tuple(name for name in self.actuators if name in self._controlled)
+
+    @property
+    def _controlled(self) -> Mapping[str, str]:
+        """Channel that is held for each actuator with a controller."""
+        return dict(pair for controller in self._checked.document.controllers.values() for pair in controller.pairs)
 
     # ---- channels ----------------------------------------------------------------------------------------------------
 

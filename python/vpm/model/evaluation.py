@@ -270,6 +270,11 @@ class Evaluations(Components):
             if name not in named:
                 state[2 * len(self.coordinates) + place] = internal[place]
 
+    @property
+    def state_units(self) -> tuple[str, ...]:
+        """SI units of the states, in the order of ``state_names``."""
+        return tuple(self._state_units())
+
     def command(self, values: Mapping[str, float] | ArrayLike | None = None) -> Array:
         """Commands of actuators, ``{"drive": 1.0}``, and pressures of logged supplies, ``{"pump.pressure": 1.6e7}``.
 

@@ -29,6 +29,7 @@ _EXAMPLES: Mapping[str, str] = {
     "axis": "axis = [1.0, 0.0, 0.0]",
     "joint": 'joint = "axis"',
     "actuator": 'actuator = "drive"',
+    "controllers.actuators": 'actuators = ["drive"]',
     "measures": 'measures = "axis.position"',
     "at": 'at = "axis"',
     "value": "value = 1.0",
@@ -163,7 +164,7 @@ def _choice_sentence(
     if kind == "union_tag_not_found" and keys[0] == "beams":
         return 'has no shape; add for example shape = "rectangle"'
     if kind == "union_tag_not_found":
-        return 'has no type; add type = "cascade" or type = "pid"'
+        return 'has no type; add one, for example type = "pd"'
     if kind == "value_error":
         reason = str(context.get("error", fallback))
         return reason if reason.startswith(("has ", "is ")) else f"is wrong: {reason}"

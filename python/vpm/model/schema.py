@@ -11,6 +11,7 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 from vpm.model.beam import Beam, Gauge, Line, Marker
+from vpm.model.controller import TYPES, Controller
 from vpm.model.drives import ACTUATOR_TYPES, Actuator
 from vpm.model.entry import ORIGIN, ZERO, Entry, Number, ParameterValue, Quantity, Text, Vector
 from vpm.model.hydraulic import Supply
@@ -57,32 +58,6 @@ class Sensor(Entry):
     """Reading of one channel."""
 
     measures: Text
-
-
-class Cascade(Entry):
-    """Position and velocity loop: u = kv (kp (r - y) - dy)."""
-
-    type: Literal["cascade"]
-    actuator: Text
-    measures: Text
-    position_gain: ParameterValue
-    velocity_gain: ParameterValue
-    limit: ParameterValue | None = None
-
-
-class Pid(Entry):
-    """u = kp e + ki int e + kd de/dt."""
-
-    type: Literal["pid"]
-    actuator: Text
-    measures: Text
-    proportional: ParameterValue
-    integral: ParameterValue = ZERO
-    derivative: ParameterValue = ZERO
-    limit: ParameterValue | None = None
-
-
-Controller = Annotated[Cascade | Pid, Field(discriminator="type")]
 
 
 class EffectEntry(BaseModel):
@@ -170,7 +145,7 @@ SECTIONS: Mapping[str, tuple[type[BaseModel], ...]] = {
     "supplies": (Supply,),
     "actuators": tuple(ACTUATOR_TYPES.values()),
     "sensors": (Sensor,),
-    "controllers": (Cascade, Pid),
+    "controllers": TYPES,
     "channels": (ChannelEntry,),
 }
 

@@ -224,8 +224,9 @@ class Structure:
     def _actuator_unit(self, actuator: str, channel: str) -> str:
         if channel == "force":
             return self.effort_unit(actuator)
-        if channel == "reference":  # of what the controller holds, which is a position of some joint
-            held = [c.measures for c in self.document.controllers.values() if c.actuator == actuator]
+        if channel == "reference":  # of what the controller holds: a position of some joint, a length of some line
+            pairs = [pair for controller in self.document.controllers.values() for pair in controller.pairs]
+            held = [measured for commanded, measured in pairs if commanded == actuator]
             joint = self.document.actuators[actuator].joint
             own = "m" if joint is None else COORDINATE_UNIT[self.joint_kind(joint)]
             return self.unit(held[0]) if held else own

@@ -1,19 +1,43 @@
 //! Steps of controlled error.
 
 use super::rosenbrock::Rosenbrock;
+use super::{Ask, PATIENCE};
 use crate::error::{Error, Result};
 use crate::ode::Ode;
 use crate::scalar::Scalar;
 
-/// How exact each step has to be.
-#[derive(Clone, Debug, PartialEq)]
-pub struct StepControl {
-    /// Error of a step relative to each state.
-    pub relative: f64,
-    /// Error of a step that counts as none, for each state in its unit.
-    pub absolute: Vec<f64>,
-    /// Most steps, accepted and refused, of one [`Adaptive::advance`].
-    pub most_steps: usize,
+/// Steps, taken and refused, that one [`Adaptive::advance`] may need.
+pub const MOST_STEPS: usize = 10_000;
+/// Steps below this part of the time to go are no steps any more.
+const SHORTEST: f64 = 1e-12;
+/// Smallest and largest tolerance that mean something.
+const TOLERANCES: [f64; 2] = [1e-12, 0.1];
+/// How much longer the next step may be.
+const LONGER: f64 = 5.0;
+/// How much shorter the next step may be.
+const SHORTER: f64 = 0.2;
+/// Part of the length that the error allows which is used.
+const CAUTION: f64 = 0.9;
+
+/// The Rosenbrock method of order 4 with steps as long as their error allows.
+///
+/// Law: the error of a step is the difference e to the embedded solution of order 3; with the weights
+/// `w = tolerance (scale + max(|x|, |x+|))`, the scales those of [`Ode::scales`], a step is taken where `E = max |e/w| <= 1`, and the
+/// next is `min(max(0.9 E^(-1/4), 1/5), 5)` times as long, not longer after a refused one. Where two steps are left, they are equal.
+/// Source: Hairer & Wanner 1996, "Solving Ordinary Differential Equations II", sections IV.7 and IV.8, equations 8.19 to 8.21, with
+/// the largest error in the place of the mean, so that states at rest do not hide one that moves.
+/// What decides are values alone: derivatives that the number type carries are those of the steps taken.
+/// The step goes on where the last call left it; [`Adaptive::reset`] forgets it. The work is bounded by the number of steps, not by
+/// the time. Checked: the tolerance; that the end is reached within the steps; the error follows the tolerance.
+#[derive(Clone, Debug)]
+pub struct Adaptive<S> {
+    method: Rosenbrock<S>,
+    tolerance: f64,
+    scales: Vec<f64>,
+    next: Vec<S>,
+    proposed: Option<f64>,
+    /// Steps tried so far.
+    attempts: usize,
 }
 
 /// What one [`Adaptive::advance`] has taken.
@@ -25,79 +49,167 @@ pub struct Steps {
     pub refused: usize,
 }
 
-/// The Rosenbrock method of order 4 with steps as long as their error allows.
-///
-/// Law: the error of a step is the difference e to the embedded solution of order 3; with the weights
-/// `w = absolute + relative max(|x|, |x+|)` a step is taken where `E = sqrt(mean (e/w)^2) <= 1`, and the next is
-/// `min(max(0.9 E^(-1/4), 1/5), 5)` times as long, not longer after a refused one.
-/// Source: Hairer & Wanner 1996, "Solving Ordinary Differential Equations II", sections IV.7 and IV.8, equations 8.19 to 8.21.
-/// The work is not bounded by the time but by the number of steps: not for control loops. Checked: tolerances are positive, their
-/// number is that of the states; that the end is reached within the steps; the error follows the tolerance.
-#[derive(Clone, Debug)]
-pub struct Adaptive<S> {
-    method: Rosenbrock<S>,
-    next: Vec<S>,
-    control: StepControl,
-    proposed: Option<f64>,
+/// Why steps end before their time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Halt {
+    /// The caller asked for it.
+    Interrupted,
+    /// The step control does not get on.
+    Stuck(Stuck),
+}
+
+/// Where a step control does not get on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stuck {
+    /// The state whose error is the largest part of what it may be, or that is not finite.
+    pub state: usize,
+    /// How far the steps led, s.
+    pub reached: f64,
+    /// Length of the last step, s.
+    pub step: f64,
+    /// Whether there were too many steps; otherwise they became too short.
+    pub many: bool,
+}
+
+impl Stuck {
+    /// What the state does that no step can follow: the verb of a sentence about it.
+    pub fn event(&self) -> String {
+        if self.many {
+            return format!("takes more than {MOST_STEPS} steps to follow");
+        }
+        "changes faster than any step can follow".to_owned()
+    }
+
+    /// What to do.
+    pub fn repair(&self) -> &'static str {
+        if self.many {
+            "use a larger tolerance or more substeps, and look for a vibration or a growth that should not be there"
+        } else {
+            "look for a jump or an infinite slope in what moves it, and check the signs and sizes of the parameters"
+        }
+    }
+}
+
+impl Halt {
+    /// The same, counted from a time (s) before.
+    pub(super) fn later(self, time: f64) -> Self {
+        match self {
+            Self::Interrupted => Self::Interrupted,
+            Self::Stuck(stuck) => Self::Stuck(Stuck { reached: time + stuck.reached, ..stuck }),
+        }
+    }
+}
+
+impl From<Halt> for Error {
+    fn from(halt: Halt) -> Self {
+        match halt {
+            Halt::Interrupted => Self::Interrupted,
+            Halt::Stuck(stuck) => {
+                let Stuck { state, reached, step, .. } = stuck;
+                Self::Steps { state, event: stuck.event(), reached, step, repair: stuck.repair() }
+            }
+        }
+    }
+}
+
+/// How the error of a step compares with what it may be.
+struct Verdict {
+    /// Largest error in tolerances; infinite where the step has no number.
+    error: f64,
+    /// The state with that error.
+    state: usize,
 }
 
 impl<S: Scalar> Adaptive<S> {
-    /// Buffers for systems of as many states as `control` has absolute tolerances.
-    pub fn new(control: StepControl) -> Result<Self> {
-        for &value in control.absolute.iter().chain([&control.relative]) {
-            if value.is_nan() || value <= 0.0 {
-                let (setting, condition) = ("a tolerance of the step control", "be positive".to_owned());
-                let repair = "use 1e-6 and a millionth of the size of each state, for example";
-                return Err(Error::Setting { setting, condition, value, repair });
-            }
-        }
-        let dim = control.absolute.len();
-        Ok(Self { method: Rosenbrock::new(dim), next: vec![S::zero(); dim], control, proposed: None })
+    /// Buffers for systems of `dim` states; errors of `tolerance` relative to each state and its scale.
+    pub fn new(tolerance: f64, dim: usize) -> Result<Self> {
+        check(tolerance)?;
+        Ok(Self::unchecked(tolerance, dim))
+    }
+
+    pub(super) fn unchecked(tolerance: f64, dim: usize) -> Self {
+        let (method, next) = (Rosenbrock::new(dim), vec![S::zero(); dim]);
+        Self { method, tolerance, scales: vec![1.0; dim], next, proposed: None, attempts: 0 }
+    }
+
+    /// Forgets the length of the last step.
+    pub fn reset(&mut self) {
+        self.proposed = None;
     }
 
     /// Moves `x` on by `duration` (s), from a first step that the last call proposed or, at first, a thousandth of the duration.
-    pub fn advance(&mut self, ode: &mut impl Ode<S>, x: &mut [S], duration: f64) -> Result<Steps> {
-        if x.len() != self.next.len() {
-            let (what, each) = ("the state under step control".to_owned(), "absolute tolerance".to_owned());
-            return Err(Error::Dimension { what, expected: self.next.len(), found: x.len(), each });
-        }
-        let (mut gone, mut steps, mut longest) = (0.0, Steps::default(), 5.0);
+    ///
+    /// Now and then it asks whether to stop.
+    pub fn advance(
+        &mut self,
+        ode: &mut impl Ode<S>,
+        x: &mut [S],
+        duration: f64,
+        ask: Ask<'_>,
+    ) -> std::result::Result<Steps, Halt> {
+        ode.scales(&mut self.scales);
+        let (mut gone, mut steps, mut longest) = (0.0, Steps::default(), LONGER);
         let mut step = self.proposed.unwrap_or(1e-3 * duration);
         while gone < duration {
-            if steps.accepted + steps.refused >= self.control.most_steps {
-                return Err(Error::Steps { most: self.control.most_steps, reached: gone, duration });
-            }
             let left = duration - gone;
-            let taken = if step < left { step } else { left };
-            let error = self.attempt(ode, x, taken);
-            let factor = (0.9 * error.powf(-0.25)).clamp(0.2, longest);
-            if error <= 1.0 {
+            let taken = match left / step {
+                ..=1.0 => left,
+                ..2.0 => 0.5 * left,
+                _ => step,
+            };
+            let verdict = self.attempt(ode, x, taken);
+            let stuck = Stuck { state: verdict.state, reached: gone, step: taken, many: false };
+            let length = taken * (CAUTION * verdict.error.powf(-0.25)).clamp(SHORTER, longest);
+            if verdict.error <= 1.0 {
                 x.copy_from_slice(&self.next);
-                gone = if step < left { gone + taken } else { duration };
+                gone = if taken < left { gone + taken } else { duration };
                 // A step that the end cut short says nothing against the longer one.
-                step = if step < left { taken * factor } else { step.max(taken * factor) };
-                (steps.accepted, longest) = (steps.accepted + 1, 5.0);
+                step = if taken < step { step.max(length) } else { length };
+                (steps.accepted, longest) = (steps.accepted + 1, LONGER);
+            } else if taken < SHORTEST * duration {
+                return Err(Halt::Stuck(stuck));
             } else {
-                step = taken * if error.is_finite() { factor } else { 0.2 };
+                step = length;
                 (steps.refused, longest) = (steps.refused + 1, 1.0);
+            }
+            if steps.accepted + steps.refused >= MOST_STEPS && gone < duration {
+                return Err(Halt::Stuck(Stuck { many: true, ..stuck }));
+            }
+            self.attempts = self.attempts.wrapping_add(1);
+            if self.attempts.is_multiple_of(PATIENCE) && ask() {
+                return Err(Halt::Interrupted);
             }
         }
         self.proposed = Some(step);
         Ok(steps)
     }
 
-    /// Computes a step into `next`; its error in tolerances, infinite where the step has no number.
-    fn attempt(&mut self, ode: &mut impl Ode<S>, x: &[S], step: f64) -> f64 {
+    /// Computes a step into `next`, and judges it.
+    fn attempt(&mut self, ode: &mut impl Ode<S>, x: &[S], step: f64) -> Verdict {
         self.method.attempt(ode, x, step);
         self.next.copy_from_slice(x);
         self.method.accept(&mut self.next);
-        let mut sum = 0.0;
-        let pairs = x.iter().zip(&self.next).zip(self.method.last_increment()).zip(&self.control.absolute);
-        for (((before, after), error), absolute) in pairs {
-            let weight = absolute + self.control.relative * before.re().abs().max(after.re().abs());
-            sum += (error.re() / weight).powi(2);
+        let mut worst = Verdict { error: 1e-12, state: 0 };
+        let pairs = x.iter().zip(&self.next).zip(self.method.last_increment()).zip(&self.scales);
+        for (state, (((before, after), error), scale)) in pairs.enumerate() {
+            let weight = self.tolerance * (scale + before.re().abs().max(after.re().abs()));
+            let error = (error.re() / weight).abs();
+            // Not a number is as bad as it gets.
+            let error = if error.is_nan() { f64::INFINITY } else { error };
+            if error > worst.error {
+                worst = Verdict { error, state };
+            }
         }
-        let error = (sum / x.len().max(1) as f64).sqrt();
-        if error.is_nan() { f64::INFINITY } else { error.max(1e-12) }
+        worst
     }
+}
+
+/// Complains about a tolerance that means nothing.
+pub(super) fn check(tolerance: f64) -> Result<()> {
+    let [least, most] = TOLERANCES;
+    if (least..=most).contains(&tolerance) {
+        return Ok(());
+    }
+    let (setting, condition) = ("the tolerance of adaptive", format!("lie between {least:e} and {most}"));
+    Err(Error::Setting { setting, condition, value: tolerance, repair: "write adaptive(1e-6), for example" })
 }

@@ -10,20 +10,31 @@ mod rk4;
 mod rosenbrock;
 mod semi_implicit;
 pub mod stability;
+mod stage;
 
-pub use adaptive::{Adaptive, StepControl, Steps};
+pub use adaptive::{Adaptive, Halt, MOST_STEPS, Steps, Stuck};
 pub use linearly_implicit::LinearlyImplicit;
 pub use lu::Lu;
 pub use rk4::Rk4;
 pub use rosenbrock::{RODAS4P2, Rosenbrock, Tableau};
 pub use semi_implicit::SemiImplicit;
 
+use std::fmt;
+
 use crate::error::{Error, Result};
 use crate::ode::Ode;
 use crate::scalar::Scalar;
 
+/// Steps between two questions whether to stop.
+const PATIENCE: usize = 256;
+/// What `adaptive` alone stands for.
+const TOLERANCE: f64 = 1e-6;
+
+/// Asked now and then whether to stop.
+pub type Ask<'a> = &'a (dyn Fn() -> bool + Sync);
+
 /// Which integrator to use.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Method {
     /// Symplectic Euler, order 1.
     SemiImplicit,
@@ -33,62 +44,137 @@ pub enum Method {
     LinearlyImplicit,
     /// Rosenbrock, order 4, L-stable.
     Rosenbrock,
+    /// The same with steps of controlled error, as many as it takes.
+    Adaptive {
+        /// Error of a step relative to each state and its scale.
+        tolerance: f64,
+    },
 }
 
 impl Method {
+    /// Those of fixed steps.
+    pub const FIXED: [Self; 4] = [Self::SemiImplicit, Self::Rk4, Self::LinearlyImplicit, Self::Rosenbrock];
     /// All of them.
-    pub const ALL: [Self; 4] = [Self::SemiImplicit, Self::Rk4, Self::LinearlyImplicit, Self::Rosenbrock];
+    pub const ALL: [Self; 5] = [
+        Self::SemiImplicit,
+        Self::Rk4,
+        Self::LinearlyImplicit,
+        Self::Rosenbrock,
+        Self::Adaptive { tolerance: TOLERANCE },
+    ];
 
-    /// Its name in options and messages.
+    /// Its name in options, without a tolerance.
     pub fn name(self) -> &'static str {
         match self {
             Self::SemiImplicit => "semi_implicit",
             Self::Rk4 => "rk4",
             Self::LinearlyImplicit => "linearly_implicit",
             Self::Rosenbrock => "rosenbrock",
+            Self::Adaptive { .. } => "adaptive",
         }
     }
 
-    /// The method of that name.
+    /// The method of that name; `adaptive(1e-8)` is `adaptive` with another tolerance.
     pub fn from_name(name: &str) -> Result<Self> {
+        let tolerance = name.strip_prefix("adaptive(").and_then(|rest| rest.strip_suffix(')'));
+        if let Some(tolerance) = tolerance.and_then(|number| number.trim().parse().ok()) {
+            adaptive::check(tolerance)?;
+            return Ok(Self::Adaptive { tolerance });
+        }
         Self::ALL
             .into_iter()
             .find(|method| method.name() == name)
             .ok_or_else(|| Error::Integrator { name: name.to_owned() })
     }
+
+    /// Complains about a tolerance that means nothing.
+    pub fn check(self) -> Result<()> {
+        if let Self::Adaptive { tolerance } = self { adaptive::check(tolerance) } else { Ok(()) }
+    }
+}
+
+impl fmt::Display for Method {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Adaptive { tolerance } => write!(formatter, "adaptive({tolerance:e})"),
+            fixed => formatter.write_str(fixed.name()),
+        }
+    }
 }
 
 /// Any of the integrators, with its buffers.
 #[derive(Clone, Debug)]
-pub enum Integrator<S> {
-    /// Symplectic Euler.
+pub struct Integrator<S> {
+    scheme: Scheme<S>,
+    /// Fixed steps so far.
+    steps: usize,
+}
+
+#[derive(Clone, Debug)]
+enum Scheme<S> {
     SemiImplicit(SemiImplicit<S>),
-    /// Classical Runge-Kutta.
     Rk4(Rk4<S>),
-    /// Rosenbrock, order 2.
     LinearlyImplicit(LinearlyImplicit<S>),
-    /// Rosenbrock, order 4.
     Rosenbrock(Rosenbrock<S>),
+    Adaptive(Adaptive<S>),
 }
 
 impl<S: Scalar> Integrator<S> {
     /// The integrator `method` for systems of `dim` states.
     pub fn new(method: Method, dim: usize) -> Self {
-        match method {
-            Method::SemiImplicit => Self::SemiImplicit(SemiImplicit::new(dim)),
-            Method::Rk4 => Self::Rk4(Rk4::new(dim)),
-            Method::LinearlyImplicit => Self::LinearlyImplicit(LinearlyImplicit::new(dim)),
-            Method::Rosenbrock => Self::Rosenbrock(Rosenbrock::new(dim)),
+        let scheme = match method {
+            Method::SemiImplicit => Scheme::SemiImplicit(SemiImplicit::new(dim)),
+            Method::Rk4 => Scheme::Rk4(Rk4::new(dim)),
+            Method::LinearlyImplicit => Scheme::LinearlyImplicit(LinearlyImplicit::new(dim)),
+            Method::Rosenbrock => Scheme::Rosenbrock(Rosenbrock::new(dim)),
+            Method::Adaptive { tolerance } => Scheme::Adaptive(Adaptive::unchecked(tolerance, dim)),
+        };
+        Self { scheme, steps: 0 }
+    }
+
+    /// Moves `x` on by `step` (s): one step, or as many as it takes to control the error. Where those do not get there, the state that
+    /// stops them is not a number.
+    pub fn step(&mut self, ode: &mut impl Ode<S>, x: &mut [S], step: f64) {
+        match &mut self.scheme {
+            Scheme::SemiImplicit(method) => method.step(ode, x, step),
+            Scheme::Rk4(method) => method.step(ode, x, step),
+            Scheme::LinearlyImplicit(method) => method.step(ode, x, step),
+            Scheme::Rosenbrock(method) => method.step(ode, x, step),
+            Scheme::Adaptive(method) => {
+                if let Err(Halt::Stuck(stuck)) = method.advance(ode, x, step, &|| false) {
+                    x[stuck.state] = S::from_f64(f64::NAN);
+                }
+            }
         }
     }
 
-    /// Moves `x` on by `step` (s).
-    pub fn step(&mut self, ode: &mut impl Ode<S>, x: &mut [S], step: f64) {
-        match self {
-            Self::SemiImplicit(method) => method.step(ode, x, step),
-            Self::Rk4(method) => method.step(ode, x, step),
-            Self::LinearlyImplicit(method) => method.step(ode, x, step),
-            Self::Rosenbrock(method) => method.step(ode, x, step),
+    /// Moves `x` on by `duration` (s) in that many equal `pieces`, and asks now and then whether to stop.
+    pub fn advance(
+        &mut self,
+        ode: &mut impl Ode<S>,
+        x: &mut [S],
+        (duration, pieces): (f64, usize),
+        ask: Ask<'_>,
+    ) -> std::result::Result<(), Halt> {
+        let piece = duration / pieces as f64;
+        for number in 0..pieces {
+            if let Scheme::Adaptive(method) = &mut self.scheme {
+                method.advance(ode, x, piece, ask).map_err(|halt| halt.later(number as f64 * piece))?;
+                continue;
+            }
+            self.step(ode, x, piece);
+            self.steps = self.steps.wrapping_add(1);
+            if self.steps.is_multiple_of(PATIENCE) && ask() {
+                return Err(Halt::Interrupted);
+            }
+        }
+        Ok(())
+    }
+
+    /// Forgets what earlier steps have told about the length of the next.
+    pub fn reset(&mut self) {
+        if let Scheme::Adaptive(method) = &mut self.scheme {
+            method.reset();
         }
     }
 }

@@ -49,6 +49,7 @@ pub(super) fn output_name(description: &Description, column: usize) -> String {
     const JOINT: [&str; 4] = ["position", "velocity", "acceleration", "effort"];
     const MARKER: [&str; 6] = ["x", "y", "z", "rx", "ry", "rz"];
     const HYDRAULIC: [&str; 5] = ["spool", "pressure a", "pressure b", "flow a", "flow b"];
+    const WRENCH: [&str; 6] = ["mx", "my", "mz", "fx", "fy", "fz"];
     let layout: Layout = description.layout();
     let pick = |first: usize, quantities: &[&str], kind: &str, names: &[&str]| {
         let (place, quantity) = ((column - first) / quantities.len(), (column - first) % quantities.len());
@@ -86,6 +87,18 @@ pub(super) fn output_name(description: &Description, column: usize) -> String {
         let names = of_kind(|drive| matches!(drive, Drive::DcMotor(_)));
         return pick(layout.dc_motors(), &["current"], "actuator", &names);
     }
-    let names: Vec<_> = d.supplies.iter().map(|supply| supply.name.as_str()).collect();
-    pick(layout.supplies(), &["pressure", "flow"], "supply", &names)
+    if column < layout.contacts() {
+        let names: Vec<_> = d.supplies.iter().map(|supply| supply.name.as_str()).collect();
+        return pick(layout.supplies(), &["pressure", "flow"], "supply", &names);
+    }
+    if column < layout.bushings() {
+        let names: Vec<_> = d.contacts.iter().map(|contact| contact.name.as_str()).collect();
+        return pick(layout.contacts(), &["depth", "normal_force", "fx", "fy", "fz"], "contact", &names);
+    }
+    if column < layout.load_cells() {
+        let names: Vec<_> = d.bushings.iter().map(|bushing| bushing.name.as_str()).collect();
+        return pick(layout.bushings(), &WRENCH, "bushing", &names);
+    }
+    let names: Vec<_> = d.load_cells.iter().map(|cell| cell.name.as_str()).collect();
+    pick(layout.load_cells(), &WRENCH, "load cell", &names)
 }

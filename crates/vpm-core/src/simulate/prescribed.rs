@@ -1,11 +1,11 @@
 //! Joints that follow a given motion, and what answers to it: beams, and joints that nobody drives.
 
-use super::{Run, Setting, Stepping, check_beams, names};
+use super::{Run, Setting, Stepping, check_structure, halted, names};
 use crate::algebra::Cholesky;
 use crate::description::Description;
 use crate::dynamics::flexible;
 use crate::error::{Diverged, Error, Result};
-use crate::integrator::Integrator;
+use crate::integrator::{Halt, Integrator, Stuck};
 use crate::motion::{JointMotion, position_sensors};
 use crate::ode::Ode;
 use crate::scalar::{Dual, Scalar};
@@ -14,10 +14,10 @@ use crate::sensor::Sensor;
 use crate::statics::{free_coordinates, settled};
 use crate::system::{Build, Dynamics};
 
+/// Size of a coordinate, rad or m, that a step control counts as small; rates have 1.
+const COORDINATE_SCALE: f64 = 1e-2;
 /// Derivatives taken in one sweep.
 const LANES: usize = 8;
-/// Integration steps between two questions whether to stop.
-const PATIENCE: usize = 256;
 
 /// Joints follow `motion`, readings of the model's position sensors, but for `passive` ones, whose columns mean nothing; these and the
 /// beams move freely.
@@ -44,7 +44,7 @@ pub fn prescribed(setting: Setting<'_>, motion: JointMotion<'_>, passive: &[usiz
         let mut state = motion.position.row(0).to_vec();
         state.resize(setting.description.n_states(), 0.0);
         let driven: Vec<usize> = (0..joints).filter(|joint| !passive.contains(joint)).collect();
-        check_beams(setting.description, setting.theta, setting.stepping, &state, &driven)?;
+        check_structure(setting.description, setting.theta, setting.stepping, &state, &driven)?;
     }
     let job = Guided { setting, motion, passive: &passive };
     let output = |pass: &Pair<_>, place: usize| pass.first[place];
@@ -143,19 +143,14 @@ impl<'a, S: Scalar> Guide<'a, S> {
 
     fn run(mut self, interrupt: Interrupt<'_>) -> Result<Pair<S>> {
         let (rows, layout) = (self.motion.position.rows(), self.description.layout());
-        let mut steps = 0_usize;
         for row in 0..rows {
             let (now, next) = (self.at(row), self.at((row + 1).min(rows - 1)));
             for ((ends, now), next) in self.ode.ends.iter_mut().zip(now).zip(next) {
                 *ends = [now, next];
             }
             self.sample(row)?;
-            for _ in 0..if row + 1 < rows { self.stepping.substeps } else { 0 } {
-                self.integrator.step(&mut self.ode, &mut self.state, self.stepping.step());
-                steps += 1;
-                if steps.is_multiple_of(PATIENCE) && interrupt() {
-                    return Err(Error::Interrupted);
-                }
+            if row + 1 < rows {
+                self.advance(row, interrupt)?;
             }
         }
         let mut outputs = self.truth.clone();
@@ -167,6 +162,25 @@ impl<'a, S: Scalar> Guide<'a, S> {
             }
         }
         Ok(Pair { first: outputs, second: self.states })
+    }
+
+    /// Carries the free coordinates from one sample to the next.
+    fn advance(&mut self, row: usize, interrupt: Interrupt<'_>) -> Result<()> {
+        let (stepping, Self { integrator, ode, state, .. }) = (self.stepping, &mut *self);
+        let pieces = (stepping.time_step, stepping.substeps);
+        integrator.advance(ode, state, pieces, interrupt).map_err(|halt| {
+            let halt = match halt {
+                Halt::Stuck(stuck) => Halt::Stuck(Stuck { state: self.ode.place(stuck.state), ..stuck }),
+                Halt::Interrupted => halt,
+            };
+            halted(self.description, stepping, row, halt, self.before(row + 1))
+        })
+    }
+
+    /// Values of the samples before `row`: outputs and states.
+    fn before(&self, row: usize) -> (Vec<f64>, Vec<f64>) {
+        let values = |numbers: &[S], width: usize| numbers[..row * width].iter().map(Scalar::re).collect();
+        (values(&self.truth, self.description.n_outputs()), values(&self.states, self.description.n_states()))
     }
 
     /// Records what is seen and needed at a sample.
@@ -189,6 +203,7 @@ impl<'a, S: Scalar> Guide<'a, S> {
             channels[2] = a;
             channels[3] = effort;
         }
+        dynamics.observe_reactions([q, v, a], outputs);
         let wrong = |number: &S| !number.is_finite();
         let place = state.iter().position(wrong).map(|place| names::state_name(self.description, place));
         let place = place.or_else(|| outputs.iter().position(wrong).map(|c| names::output_name(self.description, c)));
@@ -196,16 +211,17 @@ impl<'a, S: Scalar> Guide<'a, S> {
     }
 
     fn diverged(&self, name: &str, row: usize) -> Error {
-        let values = |numbers: &[S], width: usize| numbers[..row * width].iter().map(Scalar::re).collect();
+        let (outputs, states) = self.before(row);
         Error::Diverged(Box::new(Diverged {
             what: format!("the {name}"),
+            event: Diverged::NOT_FINITE.to_owned(),
             time: row as f64 * self.stepping.time_step,
             sample_index: row,
-            method: self.stepping.method.name(),
+            method: self.stepping.method.to_string(),
             step: self.stepping.step(),
             repair: "use more substeps or the integrator linearly_implicit, and check the motion for jumps",
-            outputs: values(&self.truth, self.description.n_outputs()),
-            states: values(&self.states, self.description.n_states()),
+            outputs,
+            states,
         }))
     }
 }
@@ -218,6 +234,17 @@ struct Free<S> {
     ends: Vec<[State<S>; 2]>,
     /// Time between samples, s.
     interval: f64,
+}
+
+impl<S: Scalar> Free<S> {
+    /// Where a state of the free coordinates stands among those of the machine.
+    fn place(&self, state: usize) -> usize {
+        let (free, n) = (&self.values.free, self.values.q.len());
+        match free.get(state) {
+            Some(&place) => place,
+            None => n + free.get(state.wrapping_sub(free.len())).copied().unwrap_or_default(),
+        }
+    }
 }
 
 struct Buffers<S> {
@@ -268,6 +295,7 @@ impl<S: Scalar> Buffers<S> {
         for (joint, effect) in &dynamics.effects {
             load[*joint] -= effect.effort(q[*joint], v[*joint]);
         }
+        dynamics.subtract_connections(load);
         let matrix = dynamics.data.mass_matrix();
         for (own, &row) in mass.chunks_exact_mut(count.max(1)).zip(&*free) {
             for (entry, &place) in own.iter_mut().zip(&*free) {
@@ -388,8 +416,11 @@ impl<S: Scalar> Ode<S> for Free<S> {
         (self.duals.ends, self.duals.state) = (lifted, state);
     }
 
-    /// `[0, 1; -M^-1 K, -M^-1 D]`: all that is stiff, for the price of one mass matrix.
+    /// `[0, 1; -M^-1 K, -M^-1 D]`: all that is stiff, for the price of one mass matrix; with contacts and bushings the exact Jacobian.
     fn iteration_matrix(&mut self, x: &[S], matrix: &mut [S]) {
+        if !self.values.dynamics.connections.is_free() {
+            return self.jacobian(x, matrix);
+        }
         let (dim, n) = (x.len(), self.coordinates());
         matrix.fill(S::zero());
         for k in 0..n {
@@ -407,5 +438,12 @@ impl<S: Scalar> Ode<S> for Free<S> {
         self.values.evaluate(x, &self.ends, self.interval);
         self.values.elasticity(block, 2 * n);
         n > 0
+    }
+
+    fn scales(&self, scales: &mut [f64]) {
+        let n = self.coordinates();
+        scales.fill(1.0);
+        scales[..n].fill(COORDINATE_SCALE);
+        scales[2 * n..].fill(self.interval);
     }
 }

@@ -1,10 +1,10 @@
 //! The loop over samples: what happens at a sample, and between two.
 
+use super::control::{Control, reading};
 use super::names::{output_name, state_name};
-use super::{Setting, Stepping, diverged};
-use crate::controller::{ControlLaw, ControlMemory};
+use super::{Setting, Stepping, diverged, halted};
 use crate::description::Description;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::integrator::Integrator;
 use crate::ode::Ode;
 use crate::scalar::Scalar;
@@ -12,9 +12,6 @@ use crate::sensitivity::{Interrupt, Pair};
 use crate::sensor::Sensor;
 use crate::system::System;
 use crate::table::Table;
-
-/// Integration steps between two questions whether to stop.
-const PATIENCE: usize = 256;
 
 /// Where the commands come from.
 #[derive(Clone, Copy)]
@@ -45,14 +42,12 @@ pub(crate) struct Stepper<'a, S> {
     stepping: Stepping,
     system: System<S>,
     integrator: Integrator<S>,
-    sensors: Vec<Sensor<S>>,
-    /// Law, actuator, measured column of each controller.
-    controllers: Vec<(ControlLaw<S>, usize, usize)>,
-    memories: Vec<ControlMemory<S>>,
+    /// Sensors, each with the column that it reads.
+    sensors: Vec<(usize, Sensor<S>)>,
+    /// The controllers, if there is a loop to close.
+    control: Option<Control<S>>,
     state: Vec<S>,
     rate: Vec<S>,
-    /// Integration steps so far.
-    steps: usize,
     /// Inputs of the whole record, row by row; given ones from the beginning, a controller's as time goes by.
     commands: Vec<S>,
     /// True channels of the piece, row by row.
@@ -68,26 +63,26 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         let description = setting.description;
         let system = description.system(theta)?;
         let (dim, rows, zero) = (system.dim(), plan.horizon, S::zero());
-        let commands = match plan.drive {
-            Drive::Commands(inputs) => inputs.numbers().iter().map(|&command| S::from_f64(command)).collect(),
-            Drive::Loop { references, .. } => vec![zero; references.numbers().len()],
+        // A closed loop begins with its disturbances, to which the controllers add.
+        let (given, control) = match plan.drive {
+            Drive::Commands(inputs) => (inputs, None),
+            Drive::Loop { references, disturbances } => {
+                (disturbances, Some(Control::new(setting, theta, rows, references.columns())?))
+            }
         };
-        let entries = &description.controllers;
-        let law = |law: &ControlLaw<usize>| law.map(&mut |&index| theta[index]);
         let layout = description.layout();
+        let sensors = description.sensors(theta).into_iter().map(|sensor| (sensor.channel.column(layout), sensor));
         Ok(Self {
             description,
             plan: *plan,
             stepping: setting.stepping,
             integrator: Integrator::new(setting.stepping.method, dim),
-            sensors: description.sensors(theta),
-            controllers: entries.iter().map(|c| (law(&c.law), c.actuator, c.measures.column(layout))).collect(),
-            memories: vec![ControlMemory::default(); entries.len()],
+            sensors: sensors.collect(),
+            control,
             system,
             state: vec![zero; dim],
             rate: vec![zero; dim],
-            steps: 0,
-            commands,
+            commands: given.numbers().iter().map(|&command| S::from_f64(command)).collect(),
             truth: vec![zero; rows * description.n_outputs()],
             states: vec![zero; rows * dim],
             outputs: vec![zero; rows * description.n_outputs()],
@@ -122,7 +117,7 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         for row in 0..self.plan.horizon {
             self.sample(row, start)?;
             if row + 1 < self.plan.horizon {
-                self.advance(interrupt)?;
+                self.advance(row, start, interrupt)?;
             }
         }
         Ok(())
@@ -134,7 +129,10 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         for (state, &value) in self.state.iter_mut().zip(initial) {
             *state = S::from_f64(value);
         }
-        self.memories.fill(ControlMemory::default());
+        self.integrator.reset();
+        if let Some(control) = &mut self.control {
+            control.restart();
+        }
     }
 
     /// Everything that happens at a sample: measure, command, hold, evaluate, record. `start` is the piece's place in the record.
@@ -145,7 +143,7 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         }
         self.states[row * dim..(row + 1) * dim].copy_from_slice(&self.state);
         self.record_motion(row);
-        self.control(row);
+        self.control(row, start);
         self.hold(row + start);
         self.system.rhs(&self.state, &mut self.rate);
         self.record_efforts(row, start);
@@ -157,17 +155,13 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         Ok(())
     }
 
-    /// Carries the state to the next sample.
-    pub(crate) fn advance(&mut self, interrupt: Interrupt<'_>) -> Result<()> {
-        let step = self.stepping.step();
-        for _ in 0..self.stepping.substeps {
-            self.integrator.step(&mut self.system, &mut self.state, step);
-            self.steps = self.steps.wrapping_add(1);
-            if self.steps.is_multiple_of(PATIENCE) && interrupt() {
-                return Err(Error::Interrupted);
-            }
-        }
-        Ok(())
+    /// Carries the state from sample `row` of the piece that begins at `start` to the next.
+    pub(crate) fn advance(&mut self, row: usize, start: usize, interrupt: Interrupt<'_>) -> Result<()> {
+        let (stepping, Self { integrator, system, state, .. }) = (self.stepping, &mut *self);
+        let pieces = (stepping.time_step, stepping.substeps);
+        integrator
+            .advance(system, state, pieces, interrupt)
+            .map_err(|halt| halted(self.description, stepping, start + row, halt, self.before(row + 1)))
     }
 
     fn record_motion(&mut self, row: usize) {
@@ -176,18 +170,18 @@ impl<'a, S: Scalar> Stepper<'a, S> {
     }
 
     /// Lets the controllers command, if there is a loop to close.
-    fn control(&mut self, row: usize) {
-        let Drive::Loop { references, disturbances } = self.plan.drive else { return };
-        let (time_step, inputs) = (self.stepping.time_step, self.description.n_inputs());
-        for (number, (law, actuator, column)) in self.controllers.iter().enumerate() {
-            let reference = S::from_f64(references.at(row, *actuator));
-            let measured = self.reading(row, *column);
-            let command = law.command(&mut self.memories[number], reference, measured, time_step);
-            self.commands[row * inputs + actuator] = command + disturbances.at(row, *actuator);
+    fn control(&mut self, row: usize, start: usize) {
+        let Drive::Loop { references, .. } = self.plan.drive else { return };
+        if self.control.as_ref().is_some_and(|control| control.feels(row)) {
+            // Forces under the commands that are still held.
+            self.system.rhs(&self.state, &mut self.rate);
+            self.record_efforts(row, start);
         }
-        for supply in self.description.n_actuators()..inputs {
-            self.commands[row * inputs + supply] = S::from_f64(disturbances.at(row, supply));
-        }
+        let Self { control: Some(control), system, state, sensors, truth, commands, .. } = self else { return };
+        let (at, outputs) = ((row, self.stepping.time_step), (truth.as_slice(), self.description.n_outputs()));
+        control.sample(row, references, (system.dynamics(), state), |column| reading(sensors, outputs, at, column));
+        let first = row * references.columns();
+        control.arrive(row, |actuator, command| commands[first + actuator] += command);
     }
 
     /// Holds what every input amounts to over the interval that begins at sample `k` of the record.
@@ -204,7 +198,7 @@ impl<'a, S: Scalar> Stepper<'a, S> {
     fn record_efforts(&mut self, row: usize, start: usize) {
         let (layout, inputs) = (self.description.layout(), self.description.n_inputs());
         let truth = &mut self.truth[row * layout.count()..(row + 1) * layout.count()];
-        self.system.dynamics().observe_efforts(&self.rate, truth);
+        self.system.dynamics().observe_efforts(&self.state, &self.rate, truth);
         let commands = &self.commands[(row + start) * inputs..];
         for (channels, &command) in truth[layout.actuators()..].chunks_exact_mut(2).zip(commands).take(layout.actuators)
         {
@@ -217,21 +211,10 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         let layout = self.description.layout();
         let width = layout.count();
         self.outputs[row * width..(row + 1) * width].copy_from_slice(&self.truth[row * width..(row + 1) * width]);
-        for number in 0..self.sensors.len() {
-            let column = self.sensors[number].channel.column(layout);
-            self.outputs[row * width + column] = self.reading(row, column);
-        }
-    }
-
-    /// What is seen of a channel: its sensor's reading, or the truth where there is no sensor.
-    fn reading(&self, row: usize, column: usize) -> S {
-        let layout = self.description.layout();
-        let width = layout.count();
-        let truth = |sample: usize| self.truth[sample * width + column];
-        let mut sensors = self.sensors.iter();
-        match sensors.find(|sensor| sensor.channel.column(layout) == column) {
-            Some(sensor) => sensor.read(row, self.stepping.time_step, truth),
-            None => truth(row),
+        let Self { sensors, truth, outputs, stepping, .. } = self;
+        for (column, sensor) in &*sensors {
+            let truth = |sample: usize| truth[sample * width + column];
+            outputs[row * width + column] = sensor.read(row, stepping.time_step, truth);
         }
     }
 

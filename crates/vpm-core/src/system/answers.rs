@@ -2,6 +2,7 @@
 
 use super::{Dynamics, add_effects};
 use crate::actuator::{Actuator, Drive, Target};
+use crate::contact::ContactFriction;
 use crate::dynamics::{Energy, crba, energy, flexible, for_each_column, frames, lines, poses, rnea};
 use crate::scalar::Scalar;
 use crate::spatial::{Pose, Twist};
@@ -14,7 +15,7 @@ impl<S: Scalar> Dynamics<S> {
         self.efforts.copy_from_slice(&efforts[..joints]);
         let elastic = &efforts[joints..];
         self.locate(q, v);
-        self.accelerate(q, v, |effects, q, v, total| add_effects(effects, q, v, total), elastic);
+        self.accelerate(q, v, (add_effects, ContactFriction::resistance), elastic);
         &self.data.acceleration
     }
 
@@ -30,6 +31,11 @@ impl<S: Scalar> Dynamics<S> {
         }
         loads.fill(S::zero());
         add_effects(&self.effects, q, v, loads);
+        if !self.connections.is_free() {
+            frames(model, data, q, v);
+            poses(model, data);
+            self.connections.add_loads(model, data, ContactFriction::resistance, loads);
+        }
         for (effort, &effect) in efforts.iter_mut().zip(&*loads) {
             *effort -= effect;
         }
@@ -46,17 +52,34 @@ impl<S: Scalar> Dynamics<S> {
         &data.mass_matrix
     }
 
-    /// Kinetic and potential energy in J. The potential is that of gravity, of the beams, of the effects that have one, and of springs along
-    /// lines without command, visco-elastic ones settled.
+    /// Kinetic and potential energy in J. The potential is that of gravity, of the beams, of contacts and bushings, of the effects that have
+    /// one, and of springs along lines without command, visco-elastic ones settled.
     pub fn energy(&mut self, q: &[S], v: &[S]) -> Energy<S> {
-        let Self { model, data, effects, .. } = self;
+        let Self { model, data, effects, connections, .. } = self;
         let mut total = match model.is_recursive() {
             true => energy(model, data, q, v),
             false => flexible::energy(model, data, q, v),
         };
         total.potential += effects.iter().map(|(joint, effect)| effect.potential(q[*joint])).sum();
+        if !connections.is_free() {
+            frames(model, data, q, v);
+            poses(model, data);
+            total.potential += connections.potential(data);
+        }
         total.potential += self.springs(q, v);
         total
+    }
+
+    /// Takes off `loads` what contacts and bushings do, after [`Dynamics::terms`] at the same coordinates and rates.
+    pub(crate) fn subtract_connections(&mut self, loads: &mut [S]) {
+        let Self { model, data, loads: own, connections, .. } = self;
+        if connections.is_free() {
+            return;
+        }
+        poses(model, data);
+        own.fill(S::zero());
+        connections.add_loads(model, data, ContactFriction::resistance, own);
+        loads.iter_mut().zip(&*own).for_each(|(load, &own)| *load -= own);
     }
 
     /// Energy of the springs along lines, J.

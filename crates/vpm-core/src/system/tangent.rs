@@ -1,6 +1,8 @@
 //! The state Jacobian of a machine, by dual numbers.
 
 use super::{Build, Dynamics};
+use crate::contact::ContactFriction;
+use crate::effect::JointEffect;
 use crate::scalar::{Dual, Scalar};
 
 /// States up to which two directions are taken at once: the two states of a single axis, and a good fit to the vector registers.
@@ -57,7 +59,7 @@ impl<S: Scalar> Tangent<S> {
     }
 }
 
-/// The right-hand side with the friction laws replaced by `resistances`.
+/// The right-hand side with the friction laws of joints replaced by `resistances`, and those of contacts by their chords.
 #[inline]
 fn chords<S: Scalar, const N: usize>(
     dynamics: &mut Dynamics<Dual<S, N>>,
@@ -65,14 +67,18 @@ fn chords<S: Scalar, const N: usize>(
     rate: &mut [Dual<S, N>],
     resistances: &[S],
 ) {
-    dynamics.rhs_with(x, rate, |effects, q, v, total| {
+    let at_rest = |effects: &[(usize, JointEffect<_>)], q: &[_], v: &[_], total: &mut [_]| {
         for (joint, effect) in effects {
             total[*joint] += effect.effort_at_rest(q[*joint]);
         }
         for ((total, &v), &resistance) in total.iter_mut().zip(v).zip(resistances) {
             *total -= Dual::constant(resistance) * v;
         }
-    });
+    };
+    let chord = |law: &ContactFriction<Dual<S, N>>, square: Dual<S, N>, normal| {
+        Dual::constant(law.chord(Dual::constant(square.value)).value) * normal
+    };
+    dynamics.rhs_with(x, rate, (at_rest, chord));
 }
 
 impl<S: Scalar, const N: usize> Lanes<S, N> {

@@ -94,4 +94,8 @@ impl Ode<f64> for Chirped {
             row.copy_from_slice(&rate.gradient);
         }
     }
+    fn scales(&self, scales: &mut [f64]) {
+        let (spool, frequency) = (self.servo.valve.stroke, self.servo.valve.frequency);
+        scales.copy_from_slice(&[1e-2, spool, 1.0, spool * frequency, 1e5, 1e5, 1.0]);
+    }
 }

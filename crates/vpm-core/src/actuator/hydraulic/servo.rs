@@ -206,4 +206,10 @@ impl<S: Scalar> Ode<S> for ServoRig<S> {
             row.copy_from_slice(&rate.gradient);
         }
     }
+
+    /// Position 1 cm, velocity 1 m/s, the stroke of the spool and its rate at the natural frequency, pressures 1 bar.
+    fn scales(&self, scales: &mut [f64]) {
+        let (spool, frequency) = (self.servo.valve.stroke.re(), self.servo.valve.frequency.re());
+        scales.copy_from_slice(&[1e-2, spool, 1.0, spool * frequency, 1e5, 1e5]);
+    }
 }

@@ -38,12 +38,14 @@ impl<const LINKS: usize, const EACH: usize, const ALL: usize> Arm<LINKS, EACH, A
     fn diverged(&self, rows: &[State<ALL>], time: f64, sample: usize) -> Error {
         Error::Diverged(Box::new(Diverged {
             what: "the motion of the flexible arm".to_owned(),
+            event: Diverged::NOT_FINITE.to_owned(),
             time,
             sample_index: sample,
             method: match self.order() {
                 Order::Second => "linearly_implicit",
                 Order::Fourth => "additive",
-            },
+            }
+            .to_owned(),
             step: self.step_size(),
             repair: "use a smaller step, and check gains, masses and stiffnesses with their units",
             outputs: Vec::new(),
