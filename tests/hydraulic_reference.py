@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from vpm.experiment import Experiment
 from vpm.model import Model
@@ -49,8 +49,9 @@ STALL_OUT = AREA * (SUPPLY - RATIO * TANK)
 STALL_IN = AREA * (RATIO * SUPPLY - TANK)
 
 
-def chirp(time: Array, amplitude: float = 0.5e-3) -> Array:
+def chirp(instants: ArrayLike, amplitude: float = 0.5e-3) -> Array:
     """Current of the chirp, A."""
+    time = np.asarray(instants, dtype=np.float64)
     low, high = 2.0 * np.pi, 40.0 * np.pi
     return amplitude * np.sin((low + (high - low) * time / 2.0) * time)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 import vpm
 from drive_texts import RIG
@@ -26,7 +27,7 @@ def _closed_forms() -> list[Row]:
     state = dict(zip(model.state_names, model.state(), strict=True))
     out, back = _without_load(2e-3), _without_load(-2e-3)
     frequency = float(bare.linearize().frequencies()[0])
-    found = {
+    found: dict[str, ArrayLike] = {
         "hyd.Kv": model.parameters["servo.valve.flow_gain"].value,
         "hyd.initial_pressures": [state["servo.chamber_a"], state["servo.chamber_b"]],
         "hyd.noload.extend": out,
