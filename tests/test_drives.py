@@ -344,3 +344,22 @@ def test_the_core_takes_every_value_that_a_file_may_give(text: str) -> None:
                 continue  # outside of its range, or against another value
             internal = model.core.internal_state(changed_model.theta, [0.0] * len(model.coordinates))
             assert len(internal) == len(model.internal_names), name
+
+
+def test_logs_may_hold_what_is_inside_of_drives() -> None:
+    table = """
+[channels]
+"servo.command" = { column = "i", unit = "mA" }
+"servo.pressure_a" = { column = "pa", unit = "bar" }
+"servo.spool" = { column = "z", unit = "%", scale = 1.0 }
+"pump.pressure" = { column = "ps", unit = "MPa" }
+"""
+    with pytest.raises(ModelError) as caught:
+        Model.from_toml(RIG + table)
+    assert caught.value.where == 'channels."servo.spool".unit'
+    model = Model.from_toml(RIG + table.replace('"%"', '"mA"'))
+    assert model.channel_table["pump.pressure"].unit == "MPa"
+    with pytest.raises(ModelError, match="is no channel of the model"):
+        Model.from_toml(RIG + table.replace('"%"', '"mA"').replace("pressure_a", "presure_a"))
+    with pytest.raises(ModelError, match="is no output of the model"):
+        Model.from_toml(RIG + '\n[sensors.gauge]\nmeasures = "servo.current"\n')
