@@ -53,7 +53,7 @@ fn axis() -> Result<Description> {
             {"type": "coulomb_friction", "joint": 0, "coulomb": 3, "transition_velocity": 4},
             {"type": "stribeck_friction", "joint": 0, "stribeck": 5, "stribeck_velocity": 6, "transition_velocity": 4},
             {"type": "bias_force", "joint": 0, "force": 7}],
-        "actuators": [{"name": "drive", "on": {"joint": 0}, "gain": 8, "delay": 9}],
+        "actuators": [{"name": "drive", "on": {"joint": 0}, "drive": {"type": "ideal", "gain": 8}, "delay": 9}],
         "controllers": [{"type": "cascade", "name": "servo", "actuator": 0, "measures": {"kind": "position", "joint": 0},
             "position_gain": 10, "velocity_gain": 11, "limit": 12}],
     });

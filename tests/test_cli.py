@@ -14,6 +14,7 @@ import pytest
 
 from vpm.demo import MODEL, TRAIN, VALIDATION
 
+STEP = Path(__file__).resolve().parent.parent / "examples" / "emps" / "step.toml"
 COMMANDS = ("info", "simulate", "compare", "identify", "diagnose", "report", "simplify", "budget", "demo")
 
 
@@ -51,6 +52,40 @@ def test_simulate_saves_and_plots(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "r.npz").stat().st_size > 1000
     assert "<svg" in (tmp_path / "r.svg").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("words", [("FILE", "--plot"), ("--plot", "FILE"), ("FILE", "--plot", "--out", "runs.npz")])
+def test_a_scenario_runs_and_its_picture_is_named_after_it(tmp_path: Path, words: tuple[str, ...]) -> None:
+    done = vpm("simulate", *(STEP if word == "FILE" else word for word in words), cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "3 of 3 runs" in done.stdout
+    assert "axis.position" in done.stdout
+    assert (tmp_path / "step.png").read_bytes().startswith(b"\x89PNG")
+    assert (tmp_path / "runs.npz").exists() == ("--out" in words)
+
+
+def test_the_picture_of_a_scenario_goes_where_it_is_asked_for(tmp_path: Path) -> None:
+    for words in (("--plot", "a.svg"), ("--plot=b.pdf",), ()):
+        assert vpm("simulate", STEP, *words, cwd=tmp_path).returncode == 0
+    assert {path.name for path in tmp_path.iterdir()} == {"a.svg", "b.pdf"}
+
+
+def test_a_log_gives_its_name_to_a_picture_without_one(tmp_path: Path) -> None:
+    done = vpm("simulate", MODEL, VALIDATION, "--plot", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["validation.png"]
+
+
+def test_a_run_of_a_scenario_that_fails_is_named_and_the_others_are_shown(tmp_path: Path) -> None:
+    gain = 'set = { "servo.velocity_gain" = -1e12, "servo.limit" = 1e308 }'
+    text = STEP.read_text(encoding="utf-8").replace('model = "model.toml"', f"model = '{STEP.parent / 'model.toml'}'")
+    (tmp_path / "step.toml").write_text(text.replace("[[runs]]", f"[[runs]]\n{gain}", 1), encoding="utf-8")
+    done = vpm("simulate", "step.toml", "--plot", cwd=tmp_path)
+    assert done.returncode == 1
+    assert (tmp_path / "step.png").stat().st_size > 5000
+    assert "with dry friction, stiff:" in done.stdout
+    last = done.stderr.strip().splitlines()[-1]
+    assert last.startswith('error: step.toml: 1 of 3 runs failed: run "as modelled": ')
 
 
 def test_compare_says_where_the_residual_lives() -> None:
@@ -105,6 +140,10 @@ def test_demo_tells_the_story(tmp_path: Path) -> None:
         (("info", "nowhere.toml"), "nowhere.toml"),
         (("simulate", MODEL, "nowhere.csv"), "nowhere.csv"),
         (("simulate", MODEL, TRAIN, "--mode", "sideways"), "unknown mode 'sideways'"),
+        (("simulate", MODEL), "is a model file, and a simulation needs a log with it"),
+        (("simulate", STEP, TRAIN), "is a scenario, which needs no LOG"),
+        (("simulate", STEP, "--mode", "free_run"), "is a scenario, which needs no --mode"),
+        (("simulate", STEP, "--plot", "step.jpg"), "step.jpg is no name of a picture"),
         (("diagnose", MODEL, TRAIN, "--effect", "coulomb"), "coulomb_friction"),
         (("identify", MODEL, TRAIN, "--free", "shoulder.viscous"), "shoulder.friction.viscous"),
         (("budget", MODEL, "--rate", "-5"), "a rate of -5 Hz"),

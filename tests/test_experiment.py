@@ -478,7 +478,8 @@ class Axis:
 
     name = "slide"
     joints = ("axis",)
-    actuators = ("drive",)
+    input_channels = ("drive.command",)
+    optional_inputs = ()
 
 
 def moving(samples: int = 4000, sigma: float = 1e-6) -> Experiment:
@@ -539,7 +540,10 @@ def test_motion_is_a_result(tmp_path: Path) -> None:
             "501 samples at 500 Hz leave 0 after 1504 at each end",
         ),
         (lambda e: motion(e, type("Other", (Axis,), {"joints": ("elbow",)})()), 'needs the channel "elbow.position"'),
-        (lambda e: motion(e, type("Other", (Axis,), {"actuators": ("motor",)})()), 'needs the channel "motor.command"'),
+        (
+            lambda e: motion(e, type("Other", (Axis,), {"input_channels": ("motor.command",)})()),
+            'needs the channel "motor.command"',
+        ),
         (lambda _: common_cutoff([], Axis()), "needs at least one record"),
     ],
 )

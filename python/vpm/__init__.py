@@ -22,6 +22,7 @@ from vpm.linear import LinearModel
 from vpm.model import Dynamics, Model
 from vpm.planar import PlanarArm
 from vpm.report import Report, report, write_report
+from vpm.scenario import Scenario, ScenarioRun
 from vpm.simplify import Ladder, simplify
 from vpm.simulate import Run, Setup, simulate
 from vpm.stepping import Simulation
@@ -42,6 +43,8 @@ __all__ = [
     "PlanarArm",
     "Report",
     "Run",
+    "Scenario",
+    "ScenarioRun",
     "Setup",
     "Simulation",
     "Trial",

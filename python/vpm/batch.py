@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import partial
 from threading import Event
 
 from numpy.typing import ArrayLike
@@ -80,32 +81,55 @@ def simulate_batch(
     """
     if mode not in MODES:
         raise SimulationError(f"unknown mode '{mode}'; choose one of {', '.join(MODES)}")
-    workers = (os.cpu_count() or 1) if workers is None else workers
-    if workers < 1:
-        raise SimulationError(f"{workers} workers can do nothing; give at least 1")
     listed = [trial if isinstance(trial, Trial) else Trial(trial) for trial in trials]
     chosen = setup or Setup()
     _ = model.core  # built once, here; a model that cannot be built is no failure of a trial
+    return side_by_side([partial(_one, model, trial, mode, chosen, cutoff) for trial in listed], workers, progress)
+
+
+def side_by_side(
+    jobs: Sequence[Callable[[], Run]],
+    workers: int | None = None,
+    progress: Callable[[int, int], object] | bool = False,
+) -> list[Run | VpmError]:
+    """Simulations on threads, as `simulate_batch` does them, of machines that may differ.
+
+    Parameters
+    ----------
+    jobs : sequence of callable
+        Each gives a run.
+    workers, progress
+        As in `simulate_batch`.
+
+    Returns
+    -------
+    list of Run or VpmError
+        In the order of the jobs; one that fails is an error in the list.
+
+    Raises
+    ------
+    SimulationError
+        The number of workers is impossible.
+    KeyboardInterrupt
+        Ctrl-C; all jobs stop.
+    """
+    workers = (os.cpu_count() or 1) if workers is None else workers
+    if workers < 1:
+        raise SimulationError(f"{workers} workers can do nothing; give at least 1")
     if progress is True:
-        with _bar(len(listed)) as shown:
-            return _run_all(model, listed, mode, workers, shown, chosen, cutoff)
-    return _run_all(model, listed, mode, workers, progress or None, chosen, cutoff)
+        with _bar(len(jobs)) as shown:
+            return _run_all(jobs, workers, shown)
+    return _run_all(jobs, workers, progress or None)
 
 
 def _run_all(
-    model: Model,
-    trials: Sequence[Trial],
-    mode: str,
-    workers: int,
-    progress: Callable[[int, int], object] | None,
-    setup: Setup,
-    cutoff: float | None,
+    jobs: Sequence[Callable[[], Run]], workers: int, progress: Callable[[int, int], object] | None
 ) -> list[Run | VpmError]:
     from vpm._core import stop_when
 
     stop = Event()
     with ThreadPoolExecutor(workers, "vpm", initializer=lambda: stop_when(stop.is_set)) as pool:
-        futures = [pool.submit(_one, model, trial, mode, setup, cutoff) for trial in trials]
+        futures = [pool.submit(_kept, job) for job in jobs]
         try:
             _watch(futures, progress)
         except BaseException:
@@ -124,24 +148,29 @@ def _watch(futures: Sequence[Future[Run | VpmError]], progress: Callable[[int, i
             progress(len(futures) - len(waiting), len(futures))
 
 
-def _one(model: Model, trial: Trial, mode: str, setup: Setup, cutoff: float | None) -> Run | VpmError:
+def _kept(job: Callable[[], Run]) -> Run | VpmError:
+    """What a job gives, an error as a value."""
     try:
-        machine = model.with_parameters(trial.parameters) if trial.parameters else model
-        state = None if trial.initial_state is None else machine.state(trial.initial_state)
-        return simulate(
-            machine,
-            trial.experiment,
-            mode,
-            integrator=setup.integrator,
-            substeps=setup.substeps,
-            horizon=setup.horizon,
-            cutoff=cutoff,
-            initial_state=state,
-        )
+        return job()
     except VpmError as error:
         return error
     except ValueError as error:  # of the core: sizes and numbers that no simulation can take
         return SimulationError(str(error))
+
+
+def _one(model: Model, trial: Trial, mode: str, setup: Setup, cutoff: float | None) -> Run:
+    machine = model.with_parameters(trial.parameters) if trial.parameters else model
+    state = None if trial.initial_state is None else machine.state(trial.initial_state)
+    return simulate(
+        machine,
+        trial.experiment,
+        mode,
+        integrator=setup.integrator,
+        substeps=setup.substeps,
+        horizon=setup.horizon,
+        cutoff=cutoff,
+        initial_state=state,
+    )
 
 
 @contextmanager

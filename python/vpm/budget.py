@@ -128,7 +128,7 @@ def budget(
         raise SimulationError(f"{steps} steps are too few for a 99.9 % quantile; time at least 1000")
     setup = Setup(integrator, substeps)
     inputs = _commands(model, rate, experiment)
-    state = np.zeros(model.core.n_states)
+    state = model.state()
     seconds = model.core.time_steps(model.theta, state, inputs, 1.0 / rate, setup.substeps, setup.integrator, steps)
     quantiles = {name: float(np.quantile(seconds, q)) for name, q in QUANTILES.items()}
     overruns = int(np.count_nonzero(seconds > 1.0 / rate))
@@ -137,11 +137,12 @@ def budget(
 
 def _commands(model: Model, rate: float, experiment: Experiment | None) -> Array:
     if experiment is not None:
-        columns = [experiment[f"{name}.command"] for name in model.actuators]
+        columns = [experiment[name] for name in model.input_channels]
     else:
         time = np.arange(SWEEP_SAMPLES) / rate
         wave = np.mean([np.sin(2.0 * np.pi * f * time) for f in SWEEP_FREQUENCIES], axis=0)
         columns = [wave for _ in model.actuators]
+        columns += [np.full(time.size, model.parameters[name].value) for name in model.inputs[len(columns) :]]
     return np.ascontiguousarray(np.column_stack(columns)) if columns else np.zeros((1, 0))
 
 

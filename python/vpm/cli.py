@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
@@ -12,9 +12,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
+from typer.core import TyperGroup
 
 from vpm import __version__
 from vpm.errors import ValidityWarning, VpmError
+from vpm.simulate import INTEGRATORS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -22,7 +24,44 @@ if TYPE_CHECKING:
     from vpm.experiment import Experiment
     from vpm.model import Model
 
+#: What ``--plot`` without a file name stands for, and the endings by which such a name is told from a model or a log.
+BESIDE = "*.png"
+PICTURES = (".png", ".svg", ".pdf")
+
+
+class _Commands(TyperGroup):
+    """The commands; ``--plot`` of ``simulate`` may stand alone, also before the files that the command works on."""
+
+    def main(
+        self,
+        args: Sequence[str] | None = None,
+        prog_name: str | None = None,
+        complete_var: str | None = None,
+        standalone_mode: bool = True,
+        windows_expand_args: bool = True,
+        **extra: object,
+    ) -> object:
+        """Run the command of a command line."""
+        words = _with_picture(sys.argv[1:] if args is None else list(args))
+        return super().main(words, prog_name, complete_var, standalone_mode, windows_expand_args, **extra)
+
+
+def _with_picture(words: list[str]) -> list[str]:
+    """Give ``--plot`` the value `BESIDE` where an option, a file or nothing follows it."""
+    if words[:1] != ["simulate"]:
+        return words
+    full: list[str] = []
+    for word, following in zip(words, [*words[1:], ""], strict=True):
+        full.append(word)
+        picture = Path(following).suffix.lower() in PICTURES
+        other = not following or following.startswith("-") or Path(following).is_file()
+        if word == "--plot" and other and not picture:
+            full.append(BESIDE)
+    return full
+
+
 app = typer.Typer(
+    cls=_Commands,
     name="vpm",
     help="Virtual prototype models: simulate a robot, compare it with logs, identify it, and name what is missing.",
     no_args_is_help=True,
@@ -85,17 +124,72 @@ def info(model: Annotated[Path | None, typer.Argument(metavar="[MODEL]", help="M
         )
 
 
-@app.command(epilog="Example:  vpm simulate examples/emps/model.toml log.csv --mode closed_loop --plot run.png")
+@app.command(
+    epilog="Example:  vpm simulate examples/emps/step.toml --plot    (writes step.png)\n\n"
+    "Example:  vpm simulate examples/emps/model.toml log.csv --mode closed_loop --plot run.png",
+)
 def simulate(
-    model: ModelPath,
-    log: OneLog,
-    mode: Mode = "free_run",
-    integrator: Integrator = "linearly_implicit",
+    model: Annotated[Path, typer.Argument(metavar="FILE", help="Scenario, or model file that a LOG goes with (TOML).")],
+    log: Annotated[Path | None, typer.Argument(metavar="LOG", help="Measured record (CSV), for a model file.")] = None,
+    mode: Annotated[
+        str | None,
+        typer.Option(
+            help="free_run, inverse_dynamics, restarts, closed_loop or prescribed_motion; free_run by default.",
+            metavar="MODE",
+        ),
+    ] = None,
+    integrator: Annotated[
+        str | None,
+        typer.Option(help=f"{', '.join(INTEGRATORS)}; by default linearly_implicit, or what the scenario says."),
+    ] = None,
     channels: Channels = None,
-    out: Annotated[Path | None, typer.Option(help="Save the run (NPZ) here.")] = None,
-    plot: Plot = None,
+    out: Annotated[Path | None, typer.Option(help="Save the run or the runs (NPZ) here.")] = None,
+    plot: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="[PICTURE]",
+            help="Write the plot to this file (PNG, SVG or PDF); alone: to a PNG here, named after scenario or log.",
+        ),
+    ] = None,
 ) -> None:
-    """Simulate a model on the inputs of a log and compare with what was measured."""
+    """Run a scenario: a test without a log. Or simulate a model on the inputs of a log and compare with it."""
+    from vpm.model.messages import read_toml
+
+    if "scenario" in read_toml(model):
+        for value, name in ((log, "LOG"), (mode, "--mode"), (integrator, "--integrator"), (channels, "--channels")):
+            if value is not None:
+                raise VpmError(f"{model} is a scenario, which needs no {name}; leave it out, or name a model file")
+        _simulate_scenario(model, out, plot)
+    elif log is None:
+        raise VpmError(
+            f"{model} is a model file, and a simulation needs a log with it; name one, or a scenario file, which has "
+            "the key scenario"
+        )
+    else:
+        _simulate_log(model, log, mode or "free_run", integrator or "linearly_implicit", channels, out, plot)
+
+
+def _simulate_scenario(path: Path, out: Path | None, plot: Path | None) -> None:
+    from vpm.scenario import Scenario
+
+    scenario = Scenario.load(path)
+    with _progress() as tell, warnings.catch_warnings():
+        warnings.simplefilter("ignore", ValidityWarning)  # they stand in the notes of the runs
+        tell(f"{scenario.name}: {len(scenario.models)} runs")
+        result = scenario.run(progress=lambda done, total: tell(f"{done} of {total} runs"))
+    console.print(str(result), markup=False)
+    if out is not None:
+        result.save(out)
+    _save_plot(result.plot, plot, path)
+    if result.failures:
+        raise VpmError(
+            f"{path}: {len(result.failures)} of {len(scenario.models)} runs failed: {'; '.join(result.told)}"
+        )
+
+
+def _simulate_log(
+    model: Path, log: Path, mode: str, integrator: str, channels: Path | None, out: Path | None, plot: Path | None
+) -> None:
     from vpm.compare import compare as compare_run
     from vpm.simulate import simulate as simulate_log
 
@@ -109,7 +203,7 @@ def simulate(
         console.print(f"not compared: {error}", markup=False)
     if out is not None:
         run.save(out)
-    _save_plot(run.plot, plot)
+    _save_plot(run.plot, plot, log)
 
 
 @app.command(epilog="Example:  vpm compare examples/emps/model.toml log.csv --mode inverse_dynamics")
@@ -322,7 +416,11 @@ def _warnings_told() -> Iterator[None]:
                 errors.print(f"warning: {warning.message}", markup=False)
 
 
-def _save_plot(draw: Callable[[], Figure], path: Path | None) -> None:
+def _save_plot(draw: Callable[[], Figure], path: Path | None, named: Path | None = None) -> None:
+    """Draw to a file; one that is to be named after another file is a PNG in the working directory."""
     if path is not None:
+        path = Path(f"{named.stem}.png") if named is not None and str(path) == BESIDE else path
+        if path.suffix.lower() not in PICTURES:
+            raise VpmError(f"{path} is no name of a picture; give it one of the endings {', '.join(PICTURES)}")
         draw().savefig(path)
         console.print(f"wrote {path}", markup=False)

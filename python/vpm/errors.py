@@ -89,6 +89,26 @@ class ExperimentError(VpmError):
         self.time = time
 
 
+class ScenarioError(VpmError):
+    """A scenario file is wrong, or does not fit its models.
+
+    Attributes
+    ----------
+    where : str or None
+        Place in the file, for example ``"runs[0].model"``.
+    path : str or None
+        File that the scenario was read from.
+    more : int
+        How many further problems it has.
+    """
+
+    def __init__(self, message: str, *, where: str | None = None, path: str | None = None, more: int = 0) -> None:
+        super().__init__(message)
+        self.where = where
+        self.path = path
+        self.more = more
+
+
 class SimulationError(VpmError):
     """A simulation was asked for in a way that cannot be done: unknown mode, integrator, channel or horizon."""
 

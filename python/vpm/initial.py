@@ -9,8 +9,12 @@ from numpy.typing import NDArray
 
 from vpm.experiment import Experiment, Motion, motion
 from vpm.model import Model
+from vpm.model.settled import follow, rest
 
 Array = NDArray[np.float64]
+
+#: How the size of a piston is given: two diameters, or an area and the share of it on the side of the rod.
+_SIZES = ("bore", "rod", "area", "area_ratio")
 
 
 def measured_states(
@@ -18,7 +22,8 @@ def measured_states(
 ) -> Array:
     """States (len(rows), nx) at some samples of the measured motion.
 
-    Sensor errors are undone, lags have settled at the held command, flexible links are deflected as in equilibrium.
+    Sensor errors are undone; flexible links are deflected as in equilibrium; lags, spools and currents have settled on
+    the held command, and chambers are without net force, unless the log holds what is inside of a drive.
     """
     m = motion(experiment, model, cutoff=cutoff)
     gain, offset = sensor_errors(model, theta)
@@ -26,27 +31,24 @@ def measured_states(
     joints, coordinates = len(model.joints), len(model.coordinates)
     states[:, :joints] = (m.position[rows] - offset) / gain
     states[:, coordinates : coordinates + joints] = m.velocity[rows] / gain
-    states[:, 2 * coordinates :] = m.inputs[rows][
-        :, [i for i, name in enumerate(model.actuators) if model.has_lag(name)]
-    ]
-    if coordinates > joints:
-        for state in states:
+    for state, row in zip(states, rows, strict=True):
+        if coordinates > joints:
             state[:coordinates] = model.core.equilibrium(theta, state[:joints])[0]
+        internal = _internal(model, experiment, theta, state[:coordinates], int(row))
+        follow(model, theta, internal, m.inputs[row], state[coordinates : coordinates + joints])
+        state[2 * coordinates :] = _seen(model, experiment, theta, state[:coordinates], internal, int(row))
     return states
 
 
 def initial_state(model: Model, experiment: Experiment, theta: Array) -> Array:
     """State at the first sample, lags settled at the command, flexible links deflected as in equilibrium.
 
-    The machine is at rest at zero where the log holds no position.
+    The machine is at rest at zero where the log holds no position. Drives have stood without commands, but for what the
+    log holds of them: pressures of chambers, current, place of the spool. One pressure and the load tell the other.
     """
     joints, coordinates = len(model.joints), len(model.coordinates)
     state = np.zeros(model.core.n_states)
     gain, offset = sensor_errors(model, theta)
-    lags = [name for name in model.actuators if model.has_lag(name)]
-    for place, name in enumerate(lags):
-        if f"{name}.command" in experiment:
-            state[2 * coordinates + place] = experiment[f"{name}.command"][0]
     for joint, name in enumerate(model.joints):
         if f"{name}.position" in experiment:
             position, velocity = _fit_start(experiment, f"{name}.position")
@@ -54,7 +56,72 @@ def initial_state(model: Model, experiment: Experiment, theta: Array) -> Array:
             state[coordinates + joint] = velocity / gain[joint]
     if coordinates > joints:
         state[:coordinates] = model.core.equilibrium(theta, state[:joints])[0]
+    internal = _internal(model, experiment, theta, state[:coordinates], 0)
+    for place, name in enumerate(model.internal_names):
+        command = f"{name.removesuffix('.lag')}.command"
+        if name.endswith(".lag") and command in experiment:
+            internal[place] = experiment[command][0]
+    state[2 * coordinates :] = _seen(model, experiment, theta, state[:coordinates], internal, 0)
     return state
+
+
+def _internal(model: Model, experiment: Experiment, theta: Array, coordinates: Array, row: int) -> Array:
+    """What drives and supplies hold after a rest at the pressures that the log holds of supplies."""
+    known = [name for name in model.supplies if f"{name}.pressure" in experiment]
+    if known:
+        theta = theta.copy()
+        for name in known:
+            theta[model.index(f"{name}.pressure")] = experiment[f"{name}.pressure"][row]
+    return rest(model, theta, coordinates)
+
+
+def _seen(model: Model, experiment: Experiment, theta: Array, state: Array, internal: Array, row: int) -> Array:
+    """Internal states with what the log holds of them; see `_chambers` for pressures."""
+    for place, name in enumerate(model.internal_names):
+        owner, _, quantity = name.partition(".")
+        if quantity in {"spool", "current"} and name in experiment:
+            internal[place] = experiment[name][row]
+        elif quantity == "chamber_a":
+            internal[place : place + 2] = _chambers(model, experiment, theta, owner, state, internal[place:], row)
+    return internal
+
+
+def _chambers(
+    model: Model, experiment: Experiment, theta: Array, name: str, coordinates: Array, rest: Array, row: int
+) -> Array:
+    """Pressures (2,) of both chambers of a cylinder: as logged, or as after a ``rest`` where the log holds none.
+
+    Where the log holds one of them, and the cylinder moves a joint by itself, the other is that which holds the machine
+    at rest, between the pressures of tank and supply.
+    """
+    logged = [experiment[c][row] if (c := f"{name}.pressure_{side}") in experiment else np.nan for side in "ab"]
+    if not np.any(np.isnan(logged)):
+        return np.array(logged)
+    alone = model.line_of_actuator(name) is None and [
+        other for other in model.actuators if model.joint_of_actuator(name) in model.joints_of_actuator(other)
+    ] == [name]
+    if np.all(np.isnan(logged)) or not alone:
+        return rest[:2]
+    joint = model.joints.index(model.joint_of_actuator(name))
+    load = float(model.core.equilibrium(theta, coordinates[: len(model.joints)])[1][joint])
+    full, ring = _areas(model, theta, name)
+    first, second = logged
+    balanced = [(ring * second + load) / full, (full * first - load) / ring]
+    supply = model.supply_of_actuator(name)
+    bounds = [theta[model.index(f"{supply}.{kind}")] for kind in ("tank_pressure", "pressure")]
+    return np.where(np.isnan(logged), np.clip(balanced, *bounds), logged)
+
+
+def _areas(model: Model, theta: Array, name: str) -> tuple[float, float]:
+    """Areas (m^2) of a cylinder on which the pressures of chambers a and b act."""
+    size = {
+        key: float(theta[model.index(f"{name}.cylinder.{key}")])
+        for key in _SIZES
+        if f"{name}.cylinder.{key}" in model.parameters
+    }
+    if "bore" in size:
+        return 0.25 * np.pi * size["bore"] ** 2, 0.25 * np.pi * (size["bore"] ** 2 - size["rod"] ** 2)
+    return size["area"], size["area"] * size["area_ratio"]
 
 
 @dataclass(frozen=True)
@@ -63,7 +130,8 @@ class _Joints:
 
     name: str
     joints: tuple[str, ...]
-    actuators: tuple[str, ...] = ()
+    input_channels: tuple[str, ...] = ()
+    optional_inputs: tuple[str, ...] = ()
 
 
 def passive_joints(experiment: Experiment, model: Model) -> tuple[str, ...]:

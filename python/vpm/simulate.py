@@ -183,9 +183,11 @@ def judging_mode(model: Model, records: Sequence[Experiment]) -> str:
 
     Elsewhere restarts, which need no more than position and command.
     """
-    controlled = all(name in model.controlled_actuators for name in model.actuators)
-    known = all(f"{name}.reference" in record for name in model.actuators for record in records)
-    return "closed_loop" if model.actuators and controlled and known else "restarts"
+    held = model.controlled_actuators
+    needed = [f"{name}.reference" for name in held]
+    needed += [f"{name}.command" for name in _uncontrolled(model) if f"{name}.command" not in model.optional_inputs]
+    known = all(channel in record for channel in needed for record in records)
+    return "closed_loop" if held and known else "restarts"
 
 
 def simulate(
@@ -292,19 +294,18 @@ def _dispatch(
     begin = np.zeros(1, dtype=np.int64)
     stepping = (experiment.dt, setup.substeps, setup.integrator, columns)
     if mode == "free_run":
-        inputs = _columns(experiment, [f"{name}.command" for name in model.actuators], mode)
+        inputs = _inputs(model, experiment, mode)
         state = start(model, experiment, theta) if initial_state is None else initial_state
         outputs, states, jacobian = model.core.simulate(theta, state, inputs, *stepping)
         return SimulatedArrays(outputs, jacobian, rows, begin, states)
     if mode == "closed_loop":
         _check_controllers(model)
-        references = _columns(experiment, [f"{name}.reference" for name in model.actuators], mode)
-        disturbances = _optional(experiment, [f"{name}.disturbance" for name in model.actuators])
+        references, disturbances = _references(model, experiment, mode)
         state = start(model, experiment, theta) if initial_state is None else initial_state
         outputs, states, jacobian = model.core.simulate_closed_loop(theta, state, references, disturbances, *stepping)
         return SimulatedArrays(outputs, jacobian, rows, begin, states)
     if mode == "restarts":
-        inputs = _columns(experiment, [f"{name}.command" for name in model.actuators], mode)
+        inputs = _inputs(model, experiment, mode)
         starts, length = _restart_grid(experiment, setup.horizon)
         states = measured_states(model, experiment, theta, starts, cutoff)
         outputs, jacobian = model.core.restart(theta, states, starts, length, inputs, *stepping)
@@ -334,13 +335,15 @@ def copied_channels(model: Model, mode: str, passive: Sequence[str] = ()) -> fro
 
     The motion of ``passive`` joints is worked out.
     """
-    commands = {f"{name}.command" for name in model.actuators}
+    logged = {f"{name}.pressure" for name in model.logged_supplies}
     if mode == "closed_loop":
-        return frozenset()
+        return frozenset(logged | {f"{name}.command" for name in _uncontrolled(model)})
+    commands = {f"{name}.command" for name in model.actuators} | logged
     if mode == "prescribed_motion":
         followed = [name for name in model.joints if name not in passive]
         motions = {f"{name}.{kind}" for name in followed for kind in ("position", "velocity", "acceleration")}
-        return frozenset(commands | motions | {f"{name}.force" for name in model.actuators})
+        resting = {*model.actuators, *model.supplies}
+        return frozenset(motions | {name for name in model.output_channels if name.partition(".")[0] in resting})
     return frozenset(commands)
 
 
@@ -392,14 +395,25 @@ def _run(model: Model, experiment: Experiment, mode: str, arrays: SimulatedArray
     )
 
 
-def check_rigid(model: Model) -> None:
-    """Complain, with the way on, if a balance of effort cannot be drawn up: nobody measures elastic coordinates.
+def check_balance(model: Model) -> None:
+    """Complain, with the way on, if a balance of effort cannot be drawn up.
+
+    Nobody measures elastic coordinates, and the effort of a drive with a life of its own does not follow from its
+    command.
 
     Raises
     ------
     SimulationError
-        A flexible link has elastic coordinates.
+        A flexible link has elastic coordinates, or an actuator is not ideal.
     """
+    for name in model.actuators:
+        kind = model.actuator_type(name)
+        if kind != "ideal":
+            raise SimulationError(
+                f"mode 'inverse_dynamics' and a diagnosis balance efforts sample by sample, but that of {name} (type "
+                f"{kind}) does not follow from its command alone; use the mode 'free_run' or 'restarts', and identify "
+                "instead of diagnose, or describe it as an ideal actuator"
+            )
     if model.core.n_elastic:
         elastic = [name for name in model.beams if model.levels[name] != "rigid"]
         raise SimulationError(
@@ -409,7 +423,7 @@ def check_rigid(model: Model) -> None:
 
 
 def _inverse_dynamics_run(model: Model, experiment: Experiment, cutoff: float | None) -> Run:
-    check_rigid(model)
+    check_balance(model)
     m = motion(experiment, model, cutoff=cutoff)
     required, applied, _ = model.core.inverse_dynamics(
         model.theta, m.position, m.velocity, m.acceleration, m.inputs, m.dt, []
@@ -429,27 +443,57 @@ def _inverse_dynamics_run(model: Model, experiment: Experiment, cutoff: float | 
     )
 
 
-def _columns(experiment: Experiment, channels: Sequence[str], mode: str) -> Array:
+def _require(experiment: Experiment, channels: Sequence[str], mode: str) -> None:
+    """Complain about the first channel that a mode needs and the log does not hold."""
     missing = [channel for channel in channels if channel not in experiment]
     if missing:
         raise ExperimentError(
             f"{experiment.name}: mode '{mode}' needs channel '{missing[0]}', but the log holds "
             f"{', '.join(experiment.channels)}; map a column to it in the channel table"
         )
-    return np.ascontiguousarray(np.column_stack([experiment[channel] for channel in channels]))
 
 
 def _optional(experiment: Experiment, channels: Sequence[str]) -> Array:
-    zero = np.zeros(len(experiment))
-    known = {channel: experiment[channel] for channel in channels if channel in experiment}
-    return np.ascontiguousarray(np.column_stack([known.get(channel, zero) for channel in channels]))
+    """Columns of a log, zero where it does not hold one."""
+    table = np.zeros((len(experiment), len(channels)))
+    for column, channel in enumerate(channels):
+        if channel in experiment:
+            table[:, column] = experiment[channel]
+    return table
+
+
+def _inputs(model: Model, experiment: Experiment, mode: str) -> Array:
+    """Commands and pressures of logged supplies, one column each; springs without a command keep their length."""
+    _require(experiment, [name for name in model.input_channels if name not in model.optional_inputs], mode)
+    return _optional(experiment, model.input_channels)
+
+
+def _references(model: Model, experiment: Experiment, mode: str) -> tuple[Array, Array]:
+    """References and disturbances, one column per input; pressures of logged supplies are disturbances.
+
+    So are commands of actuators that no controller commands: there they are all that comes.
+    """
+    held, free = list(model.controlled_actuators), _uncontrolled(model)
+    logged = [f"{name}.pressure" for name in model.logged_supplies]
+    needed = [f"{name}.command" for name in free if f"{name}.command" not in model.optional_inputs]
+    _require(experiment, [f"{name}.reference" for name in held] + needed + logged, mode)
+    references = _optional(experiment, [f"{name}.reference" for name in model.inputs])
+    disturbances = _optional(experiment, [*(f"{name}.disturbance" for name in model.actuators), *logged])
+    commands = _optional(experiment, [f"{name}.command" for name in free])
+    disturbances[:, [model.actuators.index(name) for name in free]] += commands
+    return references, disturbances
+
+
+def _uncontrolled(model: Model) -> list[str]:
+    """Actuators that no controller commands; in a closed loop the log does."""
+    return [name for name in model.actuators if name not in model.controlled_actuators]
 
 
 def _check_controllers(model: Model) -> None:
-    idle = [name for name in model.actuators if name not in model.controlled_actuators]
-    if idle:
+    if not model.controlled_actuators:
+        idle = f"for actuator '{model.actuators[0]}'" if model.actuators else "and an actuator"
         raise SimulationError(
-            f"mode 'closed_loop' needs a controller for actuator '{idle[0]}', but the model has none; "
+            f"mode 'closed_loop' needs a controller {idle}, but the model has none; "
             "add one under [controllers] or use free_run or restarts"
         )
 

@@ -85,8 +85,8 @@ class Simulation:
 
     @property
     def inputs(self) -> tuple[str, ...]:
-        """Names of the commands, in the order of `step`."""
-        return self._model.actuators
+        """Names of the inputs, in the order of `step`: commands of actuators, then pressures of logged supplies."""
+        return self._model.inputs
 
     @cached_property
     def channels(self) -> tuple[str, ...]:
@@ -135,8 +135,8 @@ class Simulation:
         Parameters
         ----------
         inputs : array_like, shape (nu,), or mapping of str to float
-            One command per actuator, in command units; a number where there is one actuator. In a mapping, what is not
-            named is zero.
+            One command per actuator, in command units, then the pressure of each logged supply; a number where there
+            is one input. In a mapping, a command that is not named is zero, a pressure that of the model.
 
         Returns
         -------
@@ -234,7 +234,7 @@ class Simulation:
         columns = len(self.inputs)
         if table.ndim != 2 or table.shape[1] != columns:
             raise SimulationError(
-                f"the commands have shape {table.shape}, but {columns} actuators need (N, {columns}); "
+                f"the commands have shape {table.shape}, but {columns} inputs need (N, {columns}); "
                 "give one row per step"
             )
         if self._limited:

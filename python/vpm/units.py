@@ -2,7 +2,8 @@
 
 A unit is written as products, quotients, powers and parentheses of symbols: ``N s/m``, ``kg m^2``, ``V/(m/s)``,
 ``N m s/rad``, ``1/s``, ``l/min``. A space, ``*`` or ``·`` multiplies. A product after a slash (``J/kg K``) is refused,
-because readers disagree about it: write ``J/(kg K)``.
+because readers disagree about it: write ``J/(kg K)``. A power may be a decimal number: the gain of an orifice is in
+``m^3/(s A Pa^0.5)``, a contact stiffness in ``N/m^1.1``; such powers are kept as exact fractions.
 
 Angles have no dimension, and ``rad`` is 1 (SI brochure, 9th edition, section 2.3.3), so ``N m`` and ``N m/rad`` are of
 one kind; so are ``Hz`` and ``rad/s``, and no factor of 2 pi stands between these two. Write ``rev/s`` for turns.
@@ -14,6 +15,8 @@ import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from decimal import Decimal
+from fractions import Fraction
 from functools import lru_cache
 from typing import overload
 
@@ -21,6 +24,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.errors import UnitError, near_match
+
+#: Powers beyond this, or with more characters, mean nothing.
+LARGEST_POWER, LONGEST_POWER = 99, 8
 
 #: The base units that the dimension vectors count.
 BASE_UNITS = ("m", "kg", "s", "A", "K")
@@ -39,7 +45,13 @@ _PREFIXES = {
     "G": 1e9,
 }
 
-_TOKEN = re.compile(r"\s*(?:(?P<name>[^\W\d_]+|[°%])|(?P<power>\^|\*\*)|(?P<integer>[+-]?\d+)|(?P<mark>[*·/()]))")
+_TOKEN = re.compile(
+    r"\s*(?:(?P<name>[^\W\d_]+|[°%])|(?P<power>\^|\*\*)|(?P<number>[+-]?\d+(?:\.\d+)?)|(?P<mark>[*·/()]))"
+)
+
+
+#: Power of a unit; a whole one is an int.
+Power = int | Fraction
 
 
 @dataclass(frozen=True)
@@ -52,16 +64,16 @@ class Unit:
         As it was written.
     factor : float
         SI value of one such unit.
-    dimension : tuple of int
+    dimension : tuple of int or Fraction
         Powers of `BASE_UNITS`.
-    si_terms : tuple of (str, int)
+    si_terms : tuple of (str, int or Fraction)
         The same unit with every symbol replaced by its SI symbol; symbols and powers.
     """
 
     text: str
     factor: float
-    dimension: tuple[int, ...]
-    si_terms: tuple[tuple[str, int], ...]
+    dimension: tuple[Power, ...]
+    si_terms: tuple[tuple[str, Power], ...]
 
     @property
     def si(self) -> str:
@@ -133,7 +145,7 @@ _SYMBOLS: Mapping[str, _Symbol] = {
     "K": _symbol(1.0, (0, 0, 0, 0, 1), "K", "m"),
 }
 
-_DIMENSIONLESS = (0,) * len(BASE_UNITS)
+_DIMENSIONLESS: tuple[Power, ...] = (0,) * len(BASE_UNITS)
 
 
 @lru_cache(maxsize=1024)
@@ -253,11 +265,11 @@ def convert(value: float | NDArray[np.float64], from_unit: str, to_unit: str) ->
     return value if given == wanted else value * (given / wanted)
 
 
-_Parsed = tuple[float, tuple[int, ...], dict[str, int]]
+_Parsed = tuple[float, tuple[Power, ...], dict[str, Power]]
 
 
 class _Reader:
-    """Recursive descent over ``expression = power {("*" | "/" | " ") power}``, ``power = atom ["^" integer]``."""
+    """Recursive descent over ``expression = power {("*" | "/" | " ") power}``, ``power = atom ["^" number]``."""
 
     def __init__(self, text: str) -> None:
         self.text = text
@@ -281,9 +293,9 @@ class _Reader:
             divided = divided or sign == -1
             other = self.power()
             factor *= other[0] ** sign
-            dimension = tuple(a + sign * b for a, b in zip(dimension, other[1], strict=True))
+            dimension = tuple(_whole(a + sign * b) for a, b in zip(dimension, other[1], strict=True))
             for name, power in other[2].items():
-                terms[name] = terms.get(name, 0) + sign * power
+                terms[name] = _whole(terms.get(name, 0) + sign * power)
         return factor, dimension, terms
 
     def power(self) -> _Parsed:
@@ -292,14 +304,16 @@ class _Reader:
             return factor, dimension, terms
         self.at += 1
         digits = self.next or ""
-        if not digits.lstrip("+-").isdigit():
-            raise _unreadable(self.text, 'an integer has to follow the "^"')
-        exponent = int(digits)
-        if abs(exponent) > 99:
-            raise _unreadable(self.text, f"the power {exponent} is beyond 99")
+        if not digits.lstrip("+-").replace(".", "", 1).isdigit():
+            raise _unreadable(self.text, 'a number has to follow the "^"')
+        if len(digits) > LONGEST_POWER or abs(Fraction(digits)) > LARGEST_POWER:
+            raise _unreadable(self.text, f"the power {digits} is beyond {LARGEST_POWER}, or has too many digits")
+        exponent = _whole(Fraction(digits))
         self.at += 1
-        scaled = {name: power * exponent for name, power in terms.items()}
-        return factor**exponent, tuple(power * exponent for power in dimension), scaled
+        scaled = {name: _whole(power * exponent) for name, power in terms.items()}
+        # Whole powers stay products, which round less.
+        size = factor**exponent if isinstance(exponent, int) else factor ** float(exponent)
+        return size, tuple(_whole(power * exponent) for power in dimension), scaled
 
     def atom(self) -> _Parsed:
         symbol = self.next
@@ -317,6 +331,11 @@ class _Reader:
         if not (symbol.isalpha() or symbol in {"°", "%"}):
             raise _unreadable(self.text, f'"{symbol}" stands where a symbol is needed')
         return _look_up(symbol, self.text)
+
+
+def _whole(power: Power) -> Power:
+    """The power, as an int if it is one."""
+    return int(power) if power.denominator == 1 else power
 
 
 def _tokens(text: str) -> list[str]:
@@ -357,14 +376,20 @@ def _unreadable(text: str, reason: str) -> UnitError:
     return UnitError(f'unit "{text}" cannot be read: {reason}; units are written like "N s/m" or "kg m^2"', unit=text)
 
 
-def _write(terms: tuple[tuple[str, int], ...]) -> str:
+def _write(terms: tuple[tuple[str, Power], ...]) -> str:
     """Symbols and powers as text that `parse_unit` reads back."""
 
     def product(sign: int) -> list[str]:
-        return [name if abs(power) == 1 else f"{name}^{abs(power)}" for name, power in terms if power * sign > 0]
+        found = [(name, sign * Fraction(power)) for name, power in terms if power * sign > 0]
+        return [name if power == 1 else f"{name}^{_digits(power)}" for name, power in found]
 
     above, below = product(1), product(-1)
     if not below:
         return " ".join(above) or "1"
     divisor = below[0] if len(below) == 1 else f"({' '.join(below)})"
     return f"{' '.join(above) or '1'}/{divisor}"
+
+
+def _digits(power: Fraction) -> str:
+    """A positive power as decimal digits; powers are sums and products of decimal numbers, so they have an end."""
+    return format(Decimal(power.numerator) / Decimal(power.denominator), "f")

@@ -1,5 +1,9 @@
 //! An elastic connection of two frames in all six directions.
 
+mod entry;
+
+pub use entry::{BushingEnd, BushingEntry};
+
 use serde::Deserialize;
 
 use crate::effect::Domain;

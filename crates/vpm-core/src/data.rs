@@ -179,6 +179,14 @@ impl<S: Scalar> Data<S> {
     }
 }
 
+impl<S: Scalar> LineSlot<S> {
+    /// How fast it grows, m/s.
+    #[inline]
+    pub(crate) fn rate(&self) -> S {
+        self.direction.dot(self.to.velocity - self.from.velocity)
+    }
+}
+
 impl<S: Scalar> Composite<S> {
     fn new(model: &Model<S>) -> Self {
         let n = model.n_coordinates();

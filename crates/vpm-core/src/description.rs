@@ -3,15 +3,23 @@
 //! The same description is built over any number type: values, or values with exact derivatives with respect to the parameters.
 
 mod check;
+mod connections;
+mod controllers;
+mod drives;
 mod entry;
 
 use serde::Deserialize;
 
+pub use connections::LoadCell;
+pub(crate) use drives::piston_outside;
 pub use entry::{ControllerEntry, EffectEntry};
 
-use crate::actuator::Actuator;
+use crate::actuator::hydraulic::Supply;
+use crate::actuator::{Actuator, Drive, Target};
 use crate::beam::BeamEntry;
 use crate::body::{Body, PointMass, Weld};
+use crate::bushing::BushingEntry;
+use crate::contact::ContactEntry;
 use crate::data::Data;
 use crate::dynamics::check_regular;
 use crate::error::{Error, Result};
@@ -52,6 +60,9 @@ pub struct Description {
     /// Physical effects.
     #[serde(default)]
     pub effects: Vec<EffectEntry>,
+    /// Hydraulic supplies.
+    #[serde(default)]
+    pub supplies: Vec<Supply<usize>>,
     /// Actuators.
     #[serde(default)]
     pub actuators: Vec<Actuator<usize>>,
@@ -61,6 +72,15 @@ pub struct Description {
     /// Controllers.
     #[serde(default)]
     pub controllers: Vec<ControllerEntry>,
+    /// Contacts of points with planes.
+    #[serde(default)]
+    pub contacts: Vec<ContactEntry<usize>>,
+    /// Elastic connections of two frames.
+    #[serde(default)]
+    pub bushings: Vec<BushingEntry<usize>>,
+    /// Load cells.
+    #[serde(default)]
+    pub load_cells: Vec<LoadCell>,
     /// Number of elastic coordinates of each beam, known once the beams are built.
     #[serde(skip)]
     elastic: Vec<usize>,
@@ -75,6 +95,8 @@ impl Description {
         check::parameters(&description, &description.parameters)?;
         let model = description.model(&description.parameters)?;
         description.elastic = (0..model.n_beams()).filter_map(|k| model.beam(k)).map(|(beam, _)| beam.len()).collect();
+        description.connections(&description.parameters, &model)?;
+        controllers::check_rigid(&description)?;
         check_regular(&model, &mut Data::new(&model))?;
         Ok(description)
     }
@@ -104,14 +126,20 @@ impl Description {
         self.beams.len()
     }
 
-    /// Number of actuators, which is the number of inputs.
+    /// Number of actuators.
     pub fn n_actuators(&self) -> usize {
         self.actuators.len()
     }
 
-    /// Length of the state: coordinates, rates, one state per lag in the order of the actuators.
+    /// Number of inputs: a command for each actuator, then a pressure for each logged supply.
+    pub fn n_inputs(&self) -> usize {
+        self.actuators.len() + self.supplies.iter().filter(|supply| supply.is_logged()).count()
+    }
+
+    /// Length of the state: coordinates, rates, the states of each actuator (lag, then drive), pressures of supplies that sag.
     pub fn n_states(&self) -> usize {
-        2 * self.n_coordinates() + self.actuators.iter().filter(|actuator| actuator.lag.is_some()).count()
+        let sagging = self.supplies.iter().filter(|supply| supply.is_sagging()).count();
+        2 * self.n_coordinates() + self.actuators.iter().map(Actuator::n_states).sum::<usize>() + sagging
     }
 
     /// Number of output channels.
@@ -121,12 +149,20 @@ impl Description {
 
     /// Where the outputs are.
     pub fn layout(&self) -> Layout {
+        let count =
+            |kind: fn(&Drive<usize>) -> bool| self.actuators.iter().filter(|actuator| kind(&actuator.drive)).count();
         Layout {
             joints: self.bodies.len(),
             actuators: self.actuators.len(),
             lines: self.lines.len(),
             gauges: self.gauges.len(),
             markers: self.markers.len(),
+            hydraulics: count(|drive| matches!(drive, Drive::Hydraulic(_))),
+            dc_motors: count(|drive| matches!(drive, Drive::DcMotor(_))),
+            supplies: self.supplies.len(),
+            contacts: self.contacts.len(),
+            bushings: self.bushings.len(),
+            load_cells: self.load_cells.len(),
         }
     }
 
@@ -140,6 +176,7 @@ impl Description {
     pub fn check_values(&self, theta: &[f64]) -> Result<()> {
         check::parameters(self, theta)?;
         let model = self.model(theta)?;
+        self.connections(theta, &model)?;
         check_regular(&model, &mut Data::new(&model))
     }
 
@@ -157,15 +194,23 @@ impl Description {
 
     fn model<S: Scalar>(&self, theta: &[S]) -> Result<Model<S>> {
         let number = &mut |&index: &usize| theta[index];
+        let mut bodies: Vec<_> = self.bodies.iter().map(|body| body.map(number)).collect();
+        for actuator in &self.actuators {
+            if let (Target::Joint(joint), Drive::DcMotor(motor)) = (actuator.on, &actuator.drive) {
+                let (rotor, own) = (&mut bodies[joint].rotor_inertia, motor.map(number).reflected_inertia());
+                *rotor = Some(rotor.map_or(own, |rotor| rotor + own));
+            }
+        }
         Model::assemble(Parts {
             gravity: self.gravity,
-            bodies: self.bodies.iter().map(|body| body.map(number)).collect(),
+            bodies,
             welds: self.welds.iter().map(|weld| weld.map(number)).collect(),
             beams: self.beams.iter().map(|beam| beam.map(number)).collect(),
             point_masses: self.effects.iter().filter_map(|entry| entry.payload(theta)).collect(),
             lines: self.lines.iter().map(|line| line.map(number)).collect(),
             markers: self.markers.clone(),
             gauges: self.gauges.clone(),
+            attachments: self.attachments(),
         })
     }
 }
@@ -176,7 +221,10 @@ impl Build for &Description {
     fn dynamics<S: Scalar>(&self, theta: &[S]) -> Result<Dynamics<S>> {
         let effects = self.effects.iter().filter_map(|entry| entry.on_joint(theta)).collect();
         let actuators = self.actuators.iter().map(|actuator| actuator.map(&mut |&index| theta[index])).collect();
-        Ok(Dynamics::new(self.model(theta)?, effects, actuators))
+        let supplies = self.supplies.iter().map(|supply| supply.map(&mut |&index| theta[index])).collect();
+        let model = self.model(theta)?;
+        let connections = self.connections(theta, &model)?;
+        Ok(Dynamics::new(model, effects, actuators, supplies).connected(connections))
     }
 }
 

@@ -1,7 +1,11 @@
 //! What can go wrong, as data: which part, the failing condition, the numbers and the repair, in one sentence each.
 
+pub use connection::ConnectionError;
+pub use drive::DriveError;
 pub use linkage::LinkageError;
 
+mod connection;
+mod drive;
 mod linkage;
 
 /// An input or a computation that has no physical meaning.
@@ -248,13 +252,29 @@ pub enum Error {
         /// What to do.
         repair: &'static str,
     },
-    /// An actuator without controller in a closed loop.
+    /// A closed loop without controllers.
+    #[error("the machine has no controller, so no loop is closed; give it one or simulate with measured commands")]
+    OpenLoop,
+    /// A drive or a supply that cannot be as described.
+    #[error("{0}")]
+    Drive(#[from] DriveError),
+    /// A contact, a bushing or a load cell that has no physical meaning.
+    #[error("{0}")]
+    Connection(#[from] ConnectionError),
+    /// A controller whose samples fall between those of the record.
     #[error(
-        "actuator `{actuator}` has no controller, so the loop is not closed; give it one or simulate with measured commands"
+        "controller `{controller}` samples every {sample_time} s, which is no whole multiple of the record's time step of {time_step} s; \
+         give it the sample_time {nearest} s, or resample the record"
     )]
-    OpenLoop {
-        /// Name of the actuator.
-        actuator: String,
+    SampleTime {
+        /// Name of the controller.
+        controller: String,
+        /// Time between its samples, s.
+        sample_time: f64,
+        /// Time between the samples of the record, s.
+        time_step: f64,
+        /// The multiple next to it, s.
+        nearest: f64,
     },
     /// A linkage that cannot be closed, or not be solved for its motion.
     #[error("{0}")]

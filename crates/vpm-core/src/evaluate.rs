@@ -41,6 +41,18 @@ pub fn equilibrium(description: &Description, theta: &[f64], position: &[f64]) -
     Ok((rest.coordinates, efforts))
 }
 
+/// States of drives and supplies of a machine that has stood at `position` (all coordinates) without commands: what follows coordinates
+/// and rates in a state.
+///
+/// Law: lags, currents and spools 0; visco-elastic elements settled at their length; chambers without net force, `A pa = alpha A pb` and
+/// `pa + pb = ps + pt`; sagging supplies at their pressure.
+pub fn internal_state(description: &Description, theta: &[f64], position: &[f64]) -> Result<Vec<f64>> {
+    let mut dynamics = prepare(description, theta, [("position", position)])?;
+    let mut states = vec![0.0; description.n_states() - 2 * description.n_coordinates()];
+    dynamics.settle_drives(position, &mut states);
+    Ok(states)
+}
+
 /// Natural frequencies in Hz with the joints locked at `position` (one per joint), about rest under gravity, slowest first; negative
 /// for growth instead of vibration.
 ///

@@ -1,8 +1,8 @@
 //! Inverse dynamics of a whole record: the effort that the motion needs against the effort that the actuators deliver.
 
-use crate::actuator::Target;
+use crate::actuator::{Drive, Target};
 use crate::description::Description;
-use crate::error::{Error, Result};
+use crate::error::{DriveError, Error, Result};
 use crate::motion::{JointMotion, position_sensors};
 use crate::scalar::Scalar;
 use crate::sensitivity::{Interrupt, Job, Pair, differentiate};
@@ -23,7 +23,7 @@ pub struct Motion<'a> {
     pub velocity: Table<'a>,
     /// Accelerations, N x joints.
     pub acceleration: Table<'a>,
-    /// Commands, N x actuators, held from each sample to the next.
+    /// Inputs, N x inputs, held from each sample to the next.
     pub inputs: Table<'a>,
     /// Time between samples, s.
     pub time_step: f64,
@@ -58,11 +58,15 @@ pub fn inverse_dynamics(
     if let Some((beam, _)) = description.beams.iter().zip(description.elastic()).find(|(_, len)| **len > 0) {
         return Err(Error::Flexible { beam: beam.name.clone() });
     }
+    if let Some(own) = description.actuators.iter().find(|actuator| !matches!(actuator.drive, Drive::Ideal(_))) {
+        let (actuator, drive) = (own.name.clone(), own.drive.name());
+        return Err(DriveError::Effort { actuator, drive }.into());
+    }
     let (rows, joints) = (motion.position.rows(), description.n_joints());
     motion.position.expect("position", rows, joints)?;
     motion.velocity.expect("velocity", rows, joints)?;
     motion.acceleration.expect("acceleration", rows, joints)?;
-    motion.inputs.expect("inputs", rows, description.n_actuators())?;
+    motion.inputs.expect("inputs", rows, description.n_inputs())?;
     check_time_step(motion.time_step)?;
     let job = Inverse { description, motion, interrupt };
     let residual = |pass: &Pair<_>, place: usize| pass.first[place] - pass.second[place];
@@ -124,6 +128,7 @@ impl Inverse<'_> {
         let (joints, lines) = (dynamics.joints(), dynamics.layout().lines);
         let mut applied = vec![S::zero(); inputs.rows() * joints];
         for (number, actuator) in dynamics.actuators.iter().enumerate() {
+            let Drive::Ideal(drive) = &actuator.drive else { continue };
             let command = |sample: usize| S::from_f64(inputs.at(sample, number));
             let (mut state, mut before) = (None, None);
             for (k, row) in applied.chunks_exact_mut(joints).enumerate() {
@@ -136,7 +141,7 @@ impl Inverse<'_> {
                     }
                     None => input,
                 };
-                let effort = actuator.motor.effort(mean);
+                let effort = drive.effort(mean);
                 let delivered = (before.unwrap_or(effort) + effort) * 0.5;
                 match actuator.on {
                     Target::Joint(joint) => row[joint] += delivered,

@@ -41,7 +41,7 @@ pub struct Linearization {
 /// and against the response of the simulation to small steps.
 pub fn linearize(description: &Description, theta: &[f64], state: &[f64], inputs: &[f64]) -> Result<Linearization> {
     check_state("state", description, state)?;
-    Table::vector("inputs", inputs, description.n_actuators(), "actuator")?;
+    Table::vector("inputs", inputs, description.n_inputs(), "actuator and logged supply")?;
     let mut tangent = Tangent::new(description, theta)?;
     let (nx, nu, ny) = (state.len(), inputs.len(), description.n_outputs());
     let zeros = |rows: usize, columns: usize| vec![0.0; rows * columns];
@@ -78,7 +78,7 @@ impl Tangent {
             system: description.system(&theta)?,
             sensors: description.sensors(&theta),
             state: zeros(description.n_states()),
-            commands: zeros(description.n_actuators()),
+            commands: zeros(description.n_inputs()),
             rate: zeros(description.n_states()),
             reading: zeros(description.n_outputs()),
         })
@@ -94,9 +94,9 @@ impl Tangent {
         for (number, (place, &value)) in self.commands.iter_mut().zip(inputs.iter().enumerate()) {
             *number = lift((state.len() + place, &value));
         }
-        for (actuator, &command) in self.commands.iter().enumerate() {
-            let input = self.system.dynamics().actuators[actuator].input(0, 1.0, |_| command);
-            self.system.hold(actuator, input);
+        for (number, &command) in self.commands.iter().enumerate() {
+            let input = self.system.dynamics().input(number, 0, 1.0, |_| command);
+            self.system.hold(number, input);
         }
         self.system.rhs(&self.state, &mut self.rate);
         self.observe();
@@ -107,7 +107,8 @@ impl Tangent {
         let dynamics = self.system.dynamics();
         let layout = dynamics.layout();
         dynamics.observe(&self.state, &self.rate, &mut self.reading);
-        for (channels, &command) in self.reading[layout.actuators()..].chunks_exact_mut(2).zip(&self.commands) {
+        let channels = self.reading[layout.actuators()..layout.lines()].chunks_exact_mut(2);
+        for (channels, &command) in channels.zip(&self.commands) {
             channels[0] = command;
         }
         for sensor in &self.sensors {

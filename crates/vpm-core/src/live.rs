@@ -7,10 +7,12 @@ use crate::error::{Diverged, Error, Result};
 use crate::integrator::Integrator;
 use crate::ode::Ode;
 use crate::sensor::Sensor;
-use crate::simulate::{Stepping, check_state, check_step, halted, state_name};
+use crate::simulate::{Stepping, check_pistons, check_state, check_step, halted, state_name};
 use crate::system::System;
 use crate::table::Table;
 
+/// What an input stands for.
+const INPUT: &str = "actuator and logged supply";
 /// Samples that a delay may reach back.
 const LONGEST_DELAY: f64 = 1e6;
 
@@ -22,13 +24,14 @@ const LONGEST_DELAY: f64 = 1e6;
 pub struct Live {
     description: Arc<Description>,
     stepping: Stepping,
+    theta: Vec<f64>,
     system: System<f64>,
     integrator: Integrator<f64>,
     sensors: Vec<Sensor<f64>>,
     state: Vec<f64>,
     rate: Vec<f64>,
     outputs: Vec<f64>,
-    /// Commands and true channels of the last samples, sample k in row `k % depth`.
+    /// Inputs and true channels of the last samples, sample k in row `k % depth`.
     commands: Vec<f64>,
     truth: Vec<f64>,
     depth: usize,
@@ -39,20 +42,21 @@ impl Live {
     /// The machine in `state`, no command given yet.
     pub fn new(description: Arc<Description>, theta: &[f64], state: &[f64], stepping: Stepping) -> Result<Self> {
         check_state("state", &description, state)?;
-        check_step(&description, theta, stepping, state, &[])?;
+        check_step(&description, theta, stepping, state)?;
         let system: System<f64> = description.system(theta)?;
         let (dim, sensors) = (system.dim(), description.sensors(theta));
         let depth = depth(&description, theta, stepping.time_step)?;
-        let (outputs, actuators) = (description.n_outputs(), description.n_actuators());
+        let (outputs, inputs) = (description.n_outputs(), description.n_inputs());
         let mut live = Self {
             stepping,
+            theta: theta.to_vec(),
             system,
             integrator: Integrator::new(stepping.method, dim),
             sensors,
             state: vec![0.0; dim],
             rate: vec![0.0; dim],
             outputs: vec![0.0; outputs],
-            commands: vec![0.0; depth * actuators],
+            commands: vec![0.0; depth * inputs],
             truth: vec![0.0; depth * outputs],
             depth,
             sample: 0,
@@ -84,21 +88,36 @@ impl Live {
 
     /// Begins again in `state` at time zero, with no command and nothing remembered.
     pub fn reset(&mut self, state: &[f64]) -> Result<()> {
-        check_state("state", &self.description, state)?;
+        let Self { description, theta, system, .. } = self;
+        check_state("state", description, state)?;
+        check_pistons(description, theta, system.dynamics(), state)?;
         self.state.copy_from_slice(state);
         self.sample = 0;
         self.integrator.reset();
         self.commands.fill(0.0);
+        self.feed();
         self.hold();
         self.observe()
     }
 
-    /// Holds one command per actuator for the time of one sample, and shows the outputs at its end.
+    /// Puts logged supplies at their own pressure, until one is given.
+    fn feed(&mut self) {
+        let (actuators, inputs) = (self.description.n_actuators(), self.description.n_inputs());
+        for row in self.commands.chunks_exact_mut(inputs.max(1)) {
+            let logged = self.description.supplies.iter().filter(|supply| supply.is_logged());
+            for (input, supply) in row[actuators..].iter_mut().zip(logged) {
+                *input = self.theta[supply.pressure];
+            }
+        }
+    }
+
+    /// Holds the inputs (a command for each actuator, a pressure for each logged supply) for the time of one sample, and shows the outputs
+    /// at its end.
     pub fn step(&mut self, inputs: &[f64]) -> Result<&[f64]> {
-        Table::vector("inputs", inputs, self.description.n_actuators(), "actuator")?;
-        let actuators = inputs.len();
+        Table::vector("inputs", inputs, self.description.n_inputs(), INPUT)?;
+        let width = inputs.len();
         let row = self.sample % self.depth;
-        self.commands[row * actuators..(row + 1) * actuators].copy_from_slice(inputs);
+        self.commands[row * width..(row + 1) * width].copy_from_slice(inputs);
         self.hold();
         let (pieces, sample) = ((self.stepping.time_step, self.stepping.substeps), self.sample);
         self.integrator
@@ -109,13 +128,13 @@ impl Live {
         Ok(&self.outputs)
     }
 
-    /// Puts on the actuators what the commands until now amount to over the coming interval.
+    /// Puts on actuators and supplies what the inputs until now amount to over the coming interval.
     fn hold(&mut self) {
         let Self { system, commands, depth, sample, .. } = self;
-        let actuators = self.description.n_actuators();
-        for number in 0..actuators {
-            let command = |sample: usize| commands[(sample % *depth) * actuators + number];
-            let input = system.dynamics().actuators[number].input(*sample, self.stepping.time_step, command);
+        let inputs = self.description.n_inputs();
+        for number in 0..inputs {
+            let command = |sample: usize| commands[(sample % *depth) * inputs + number];
+            let input = system.dynamics().input(number, *sample, self.stepping.time_step, command);
             system.hold(number, input);
         }
     }
@@ -129,7 +148,7 @@ impl Live {
         let row = self.sample % self.depth * width;
         self.system.dynamics().observe(&self.state, &self.rate, &mut self.truth[row..row + width]);
         // The command that is still held at the end of its interval; none before the first.
-        let held = self.sample.saturating_sub(1) % self.depth * layout.actuators;
+        let held = self.sample.saturating_sub(1) % self.depth * self.description.n_inputs();
         let channels = self.truth[row + layout.actuators()..row + layout.lines()].chunks_exact_mut(2);
         for (channels, &command) in channels.zip(&self.commands[held..]) {
             channels[0] = command;

@@ -32,6 +32,7 @@ pub struct Model<S> {
     order: Vec<Node>,
     lines: Vec<Wire<S>>,
     markers: Vec<Place>,
+    attachments: Vec<Place>,
     gauges: Vec<Strip>,
     n_coordinates: usize,
     n_frames: usize,
@@ -203,6 +204,12 @@ impl<S: Scalar> Model<S> {
     #[inline]
     pub(crate) fn markers(&self) -> &[Place] {
         &self.markers
+    }
+
+    /// The frames that contacts and bushings act on.
+    #[inline]
+    pub(crate) fn attachments(&self) -> &[Place] {
+        &self.attachments
     }
 
     /// The strain gauges.

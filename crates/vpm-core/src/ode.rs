@@ -27,7 +27,8 @@ pub trait Ode<S> {
         false
     }
 
-    /// Writes the size of each state, in its unit, below which its error counts as that of a state of this size.
+    /// Writes a natural size of every state, in its unit: what a change of the state is small beside. Step control takes it for absolute
+    /// tolerances.
     fn scales(&self, scales: &mut [f64]) {
         scales.fill(1.0);
     }

@@ -90,12 +90,114 @@ pub enum Channel {
         /// Number of the marker.
         marker: usize,
     },
+    /// A quantity of a hydraulic drive.
+    Hydraulic {
+        /// Number of the drive among the hydraulic ones.
+        hydraulic: usize,
+        /// Which.
+        quantity: HydraulicQuantity,
+    },
+    /// Current of a motor, A.
+    Current {
+        /// Number of the drive among the motors.
+        dc_motor: usize,
+    },
+    /// A quantity of a hydraulic supply.
+    Supply {
+        /// Number of the supply.
+        supply: usize,
+        /// Which.
+        quantity: SupplyQuantity,
+    },
+    /// Depth of a contact, or a force in it.
+    Contact {
+        /// Number of the contact.
+        contact: usize,
+        /// Which one.
+        quantity: ContactQuantity,
+    },
+    /// Wrench of a bushing on the body of A, in the axes of A.
+    Bushing {
+        /// Number of the bushing.
+        bushing: usize,
+        /// Which component.
+        component: Component,
+    },
+    /// Reaction wrench at a joint, on the child, in its axes.
+    LoadCell {
+        /// Number of the load cell.
+        load_cell: usize,
+        /// Which component.
+        component: Component,
+    },
+}
+
+/// What a hydraulic drive shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum HydraulicQuantity {
+    /// Place of the spool, spool unit.
+    Spool,
+    /// Pressure in chamber a, Pa.
+    PressureA,
+    /// Pressure in chamber b, Pa.
+    PressureB,
+    /// Flow of the valve into chamber a, m^3/s.
+    FlowA,
+    /// Flow of the valve out of chamber b, m^3/s.
+    FlowB,
+}
+
+/// What a supply shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SupplyQuantity {
+    /// Its pressure, Pa.
+    Pressure,
+    /// The flow drawn from it, m^3/s.
+    Flow,
+}
+
+/// What can be recorded of a contact; forces act on the machine, in world axes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ContactQuantity {
+    /// How deep the point is in the plane, m.
+    Depth,
+    /// Force along the normal, N.
+    NormalForce,
+    /// First component of the force, N.
+    Fx,
+    /// Second component of the force, N.
+    Fy,
+    /// Third component of the force, N.
+    Fz,
+}
+
+/// A component of a wrench.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Component {
+    /// First component of the moment, N m.
+    Mx,
+    /// Second component of the moment, N m.
+    My,
+    /// Third component of the moment, N m.
+    Mz,
+    /// First component of the force, N.
+    Fx,
+    /// Second component of the force, N.
+    Fy,
+    /// Third component of the force, N.
+    Fz,
 }
 
 /// How many parts of each kind a model has, which decides where its outputs are.
 ///
 /// In this order: position, velocity, acceleration, effort of each joint; command, force of each actuator; length, rate, force of each
-/// line; strain of each gauge; x, y, z, rx, ry, rz of each marker.
+/// line; strain of each gauge; x, y, z, rx, ry, rz of each marker; spool, pressure a, pressure b, flow a, flow b of each hydraulic drive;
+/// current of each motor; pressure, flow of each supply; depth, normal force, fx, fy, fz of each contact; mx, my, mz, fx, fy, fz of each
+/// bushing and of each load cell.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Layout {
     /// Joints.
@@ -108,6 +210,18 @@ pub struct Layout {
     pub gauges: usize,
     /// Markers.
     pub markers: usize,
+    /// Hydraulic drives.
+    pub hydraulics: usize,
+    /// Direct-current motors.
+    pub dc_motors: usize,
+    /// Hydraulic supplies.
+    pub supplies: usize,
+    /// Contacts.
+    pub contacts: usize,
+    /// Bushings.
+    pub bushings: usize,
+    /// Load cells.
+    pub load_cells: usize,
 }
 
 impl Layout {
@@ -131,9 +245,39 @@ impl Layout {
         self.gauges() + self.gauges
     }
 
+    /// Where the outputs of the hydraulic drives begin.
+    pub fn hydraulics(self) -> usize {
+        self.markers() + 6 * self.markers
+    }
+
+    /// Where the outputs of the motors begin.
+    pub fn dc_motors(self) -> usize {
+        self.hydraulics() + 5 * self.hydraulics
+    }
+
+    /// Where the outputs of the supplies begin.
+    pub fn supplies(self) -> usize {
+        self.dc_motors() + self.dc_motors
+    }
+
+    /// Where the outputs of the contacts begin.
+    pub fn contacts(self) -> usize {
+        self.supplies() + 2 * self.supplies
+    }
+
+    /// Where the outputs of the bushings begin.
+    pub fn bushings(self) -> usize {
+        self.contacts() + 5 * self.contacts
+    }
+
+    /// Where the outputs of the load cells begin.
+    pub fn load_cells(self) -> usize {
+        self.bushings() + 6 * self.bushings
+    }
+
     /// Number of all outputs.
     pub fn count(self) -> usize {
-        self.markers() + 6 * self.markers
+        self.load_cells() + 6 * self.load_cells
     }
 }
 
@@ -157,6 +301,12 @@ impl Channel {
             Self::Rx { marker } => layout.markers() + 6 * marker + 3,
             Self::Ry { marker } => layout.markers() + 6 * marker + 4,
             Self::Rz { marker } => layout.markers() + 6 * marker + 5,
+            Self::Hydraulic { hydraulic, quantity } => layout.hydraulics() + 5 * hydraulic + quantity as usize,
+            Self::Current { dc_motor } => layout.dc_motors() + dc_motor,
+            Self::Supply { supply, quantity } => layout.supplies() + 2 * supply + quantity as usize,
+            Self::Contact { contact, quantity } => layout.contacts() + 5 * contact + quantity as usize,
+            Self::Bushing { bushing, component } => layout.bushings() + 6 * bushing + component as usize,
+            Self::LoadCell { load_cell, component } => layout.load_cells() + 6 * load_cell + component as usize,
         }
     }
 }

@@ -1,13 +1,16 @@
 //! Simulation of a whole record: free run on commands, closed loop on references, restarts from many samples.
 
+mod control;
 mod names;
 mod prescribed;
 mod stability;
+mod start;
 mod stepper;
 
 pub(crate) use names::state_name;
 pub use prescribed::prescribed;
-pub(crate) use stability::check_step;
+pub(crate) use stability::{check_step, check_structure};
+pub(crate) use start::check_pistons;
 pub(crate) use stepper::{Drive, Plan, Stepper};
 
 use crate::description::Description;
@@ -15,6 +18,7 @@ use crate::error::{Diverged, Error, Result};
 use crate::integrator::{Halt, Method};
 use crate::scalar::Scalar;
 use crate::sensitivity::{Interrupt, Job, Pair, differentiate};
+use crate::system::Build;
 use crate::table::Table;
 
 /// How time advances.
@@ -81,16 +85,18 @@ pub struct Setting<'a> {
     pub interrupt: Interrupt<'a>,
 }
 
-/// Free run: row k of `inputs` (N x actuators, command units) is held from sample k to sample k + 1, from `initial_state`.
+/// Free run: row k of `inputs` (N x inputs: commands, then pressures of logged supplies) is held from sample k to sample k + 1, from
+/// `initial_state`.
 pub fn free_run(setting: Setting<'_>, initial_state: &[f64], inputs: Table<'_>) -> Result<Run> {
-    inputs.expect("inputs", inputs.rows(), setting.description.n_actuators())?;
+    inputs.expect("inputs", inputs.rows(), setting.description.n_inputs())?;
     check_state("initial_state", setting.description, initial_state)?;
     let starts = [0];
     let plan = Plan { drive: Drive::Commands(inputs), initial: initial_state, starts: &starts, horizon: inputs.rows() };
     execute(setting, plan)
 }
 
-/// Closed loop: the controllers follow `references`; `disturbances` are added to their commands (both N x actuators).
+/// Closed loop: the controllers follow `references`; `disturbances` are added to their commands (both N x inputs). What no controller
+/// commands, other actuators and the pressures of logged supplies, is given by the disturbances alone.
 pub fn closed_loop(
     setting: Setting<'_>,
     initial_state: &[f64],
@@ -98,14 +104,12 @@ pub fn closed_loop(
     disturbances: Table<'_>,
 ) -> Result<Run> {
     let description = setting.description;
-    let (rows, inputs) = (references.rows(), description.n_actuators());
+    let (rows, inputs) = (references.rows(), description.n_inputs());
     references.expect("references", rows, inputs)?;
     disturbances.expect("disturbances", rows, inputs)?;
     check_state("initial_state", description, initial_state)?;
-    for (number, actuator) in description.actuators.iter().enumerate() {
-        if !description.controllers.iter().any(|controller| controller.actuator == number) {
-            return Err(Error::OpenLoop { actuator: actuator.name.clone() });
-        }
+    if description.controllers.is_empty() {
+        return Err(Error::OpenLoop);
     }
     let drive = Drive::Loop { references, disturbances };
     execute(setting, Plan { drive, initial: initial_state, starts: &[0], horizon: rows })
@@ -121,7 +125,7 @@ pub fn restarts(
     inputs: Table<'_>,
 ) -> Result<Run> {
     let description = setting.description;
-    inputs.expect("inputs", inputs.rows(), description.n_actuators())?;
+    inputs.expect("inputs", inputs.rows(), description.n_inputs())?;
     initial_states.expect("initial_states", starts.len(), description.n_states())?;
     if horizon == 0 || horizon > inputs.rows() {
         let condition = format!("lie between 1 and the {} samples of the inputs", inputs.rows());
@@ -140,7 +144,12 @@ pub fn restarts(
 }
 
 pub(crate) fn check_state(name: &str, description: &Description, state: &[f64]) -> Result<()> {
-    Table::vector(name, state, description.n_states(), "state of the model: positions, velocities, lags of actuators")?;
+    Table::vector(
+        name,
+        state,
+        description.n_states(),
+        "state of the model: positions, velocities, states of drives and supplies",
+    )?;
     Ok(())
 }
 
@@ -158,12 +167,26 @@ impl Job for Simulation<'_> {
 fn execute(setting: Setting<'_>, plan: Plan<'_>) -> Result<Run> {
     let dim = setting.description.n_states();
     if let Some(first) = plan.initial.get(..dim) {
-        check_step(setting.description, setting.theta, setting.stepping, first, &[])?;
+        check_step(setting.description, setting.theta, setting.stepping, first)?;
+        check_starts(setting, plan.initial)?;
     }
     let job = Simulation { setting, plan };
     let output = |pass: &Pair<_>, place: usize| pass.first[place];
     let (pair, jacobian) = differentiate(&job, setting.theta, setting.sensitivities, output)?;
     Ok(Run { outputs: pair.first, states: pair.second, jacobian })
+}
+
+/// Complains about a piston that starts outside of its stroke in one of the `initial` states.
+pub(crate) fn check_starts(setting: Setting<'_>, initial: &[f64]) -> Result<()> {
+    let Setting { description, theta, .. } = setting;
+    if description.layout().hydraulics == 0 {
+        return Ok(());
+    }
+    description.check_values(theta)?;
+    let mut dynamics = Build::dynamics(&description, theta)?;
+    initial
+        .chunks_exact(description.n_states().max(1))
+        .try_for_each(|state| check_pistons(description, theta, &mut dynamics, state))
 }
 
 /// What stopped being finite, in the words of the model.

@@ -227,6 +227,7 @@ fn unbalance<S: Scalar>(dynamics: &mut Dynamics<S>, q: &[S], weight: f64) -> Vec
     for (joint, effect) in &dynamics.effects {
         load[*joint] -= effect.effort_at_rest(q[*joint]);
     }
+    dynamics.subtract_connections(&mut load);
     load
 }
 

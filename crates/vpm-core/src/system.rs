@@ -1,22 +1,31 @@
 //! A whole machine as one ordinary differential equation: tree, effects and actuators.
 
 mod answers;
+mod connections;
+mod drives;
 mod observe;
+mod slopes;
 mod stiff;
 mod tangent;
 
-use crate::actuator::{Actuator, Target};
+pub use connections::Connections;
+
+use crate::actuator::hydraulic::Supply;
+use crate::actuator::{Actuator, Drive, Target};
+use crate::contact::ContactFriction;
 use crate::data::Data;
 use crate::dynamics::{aba, flexible, frames, lines, poses};
 use crate::effect::JointEffect;
 use crate::model::Model;
 use crate::ode::Ode;
 use crate::scalar::Scalar;
+use drives::Shown;
 use tangent::Tangent;
 
 /// The right-hand side: everything that acts, in one number type, with its buffers.
 ///
-/// Law: with x = [q, v, s], `dq/dt = v`, `M(q) dv/dt + h(q, v) + K q + D v = sum of actuator and effect efforts`, `T ds/dt = w - s`.
+/// Law: with x = [q, v, s], `dq/dt = v`, `M(q) dv/dt + h(q, v) + K q + D v = sum of actuator and effect efforts`; s are the states of
+/// each actuator in order (lag, then drive), then the pressures of supplies that sag.
 #[derive(Clone, Debug)]
 pub struct Dynamics<S> {
     /// The tree with its payloads.
@@ -27,7 +36,9 @@ pub struct Dynamics<S> {
     pub effects: Vec<(usize, JointEffect<S>)>,
     /// Actuators.
     pub actuators: Vec<Actuator<S>>,
-    /// What enters each actuator's lag, held constant over a sample interval.
+    /// Supplies of the hydraulic ones.
+    pub supplies: Vec<Supply<S>>,
+    /// What enters each actuator's lag, then the pressure of each logged supply; held constant over a sample interval.
     inputs: Vec<S>,
     forces: Vec<S>,
     /// Efforts of the actuators on the joints.
@@ -36,25 +47,54 @@ pub struct Dynamics<S> {
     tensions: Vec<S>,
     /// Whether any actuator acts on a line.
     pulls: bool,
+    /// Number of states of drives and supplies.
+    internal: usize,
+    /// Whether all actuators give efforts by their commands alone, and nothing feeds them.
+    ideal: bool,
+    shown: Shown<S>,
+    /// Resistance of each actuator's seals in the place of their friction, where an iteration matrix asks for it.
+    seals: Vec<Option<S>>,
     loads: Vec<S>,
+    /// Contacts, bushings and load cells.
+    pub(crate) connections: Connections<S>,
 }
 
 impl<S: Scalar> Dynamics<S> {
-    /// Puts the parts together. The joints and lines that effects and actuators name must exist in the model.
-    pub fn new(model: Model<S>, effects: Vec<(usize, JointEffect<S>)>, actuators: Vec<Actuator<S>>) -> Self {
+    /// Puts the parts together. The joints, lines and supplies that effects and actuators name must exist.
+    pub fn new(
+        model: Model<S>,
+        effects: Vec<(usize, JointEffect<S>)>,
+        actuators: Vec<Actuator<S>>,
+        supplies: Vec<Supply<S>>,
+    ) -> Self {
         let zeros = |count: usize| vec![S::zero(); count];
+        let mut inputs = zeros(actuators.len());
+        inputs.extend(supplies.iter().filter(|supply| supply.is_logged()).map(|supply| supply.pressure));
+        let sagging = supplies.iter().filter(|supply| supply.is_sagging()).count();
         Self {
             data: Data::new(&model),
-            inputs: zeros(actuators.len()),
+            inputs,
+            internal: actuators.iter().map(Actuator::n_states).sum::<usize>() + sagging,
+            ideal: supplies.is_empty() && actuators.iter().all(|actuator| matches!(actuator.drive, Drive::Ideal(_))),
+            shown: Shown::new(&actuators, &supplies),
+            seals: vec![None; actuators.len()],
             forces: zeros(actuators.len()),
             efforts: zeros(model.n_joints()),
             tensions: zeros(model.lines().len()),
             pulls: actuators.iter().any(|actuator| matches!(actuator.on, Target::Line(_))),
             loads: zeros(model.n_coordinates()),
+            connections: Connections::default(),
             model,
             effects,
             actuators,
+            supplies,
         }
+    }
+
+    /// With contacts, bushings and load cells.
+    #[must_use]
+    pub fn connected(self, connections: Connections<S>) -> Self {
+        Self { connections, ..self }
     }
 
     /// Number of joints.
@@ -69,9 +109,10 @@ impl<S: Scalar> Dynamics<S> {
         self.model.n_coordinates()
     }
 
-    /// Length of the state: coordinates, rates, one state per lag.
+    /// Length of the state: coordinates, rates, states of drives and supplies.
+    #[inline]
     pub fn dim(&self) -> usize {
-        2 * self.coordinates() + self.actuators.iter().filter(|actuator| actuator.lag.is_some()).count()
+        2 * self.coordinates() + self.internal
     }
 
     /// Effort that each actuator delivers in the last state evaluated, N or N m.
@@ -90,7 +131,8 @@ impl<S: Scalar> Dynamics<S> {
     pub fn accelerations(&mut self, q: &[S], v: &[S], efforts: &[S]) -> &[S] {
         self.tensions.fill(S::zero());
         self.efforts.copy_from_slice(efforts);
-        self.accelerate(q, v, add_effects, &[]);
+        self.locate(q, v);
+        self.accelerate(q, v, (add_effects, ContactFriction::resistance), &[]);
         &self.data.acceleration
     }
 
@@ -102,73 +144,71 @@ impl<S: Scalar> Dynamics<S> {
     /// dx/dt at x.
     #[inline]
     pub fn rhs(&mut self, x: &[S], dxdt: &mut [S]) {
-        self.rhs_with(x, dxdt, add_effects);
+        self.rhs_with(x, dxdt, (add_effects, ContactFriction::resistance));
     }
 
-    /// dx/dt at x, with the efforts of the effects at (q, v) added by `add`.
+    /// dx/dt at x, with the efforts of the effects at (q, v) and the resistances of contacts by `laws`.
     #[inline]
     fn rhs_with(
         &mut self,
         x: &[S],
         dxdt: &mut [S],
-        add: impl FnOnce(&[(usize, JointEffect<S>)], &[S], &[S], &mut [S]),
+        laws: (impl FnOnce(&[(usize, JointEffect<S>)], &[S], &[S], &mut [S]), impl Fn(&ContactFriction<S>, S, S) -> S),
     ) {
         let n = self.coordinates();
-        let ((q, v), lags) = (x[..2 * n].split_at(n), &x[2 * n..]);
-        self.actuate(lags, &mut dxdt[2 * n..]);
+        let (q, v) = x[..2 * n].split_at(n);
+        self.locate(q, v);
+        self.actuate(x, dxdt);
         dxdt[..n].copy_from_slice(v);
-        self.accelerate(q, v, add, &[]);
+        self.accelerate(q, v, laws, &[]);
         dxdt[n..2 * n].copy_from_slice(&self.data.acceleration);
     }
 
+    /// Moves lines and frames to (q, v), as far as anything acts on them, and of a machine that is no rigid tree all that its dynamics need.
+    #[inline]
+    fn locate(&mut self, q: &[S], v: &[S]) {
+        let Self { model, data, .. } = self;
+        if !model.is_recursive() {
+            flexible::terms(model, data, q, v);
+            if !self.connections.is_free() {
+                poses(model, data);
+            }
+        } else if self.pulls || !self.connections.is_free() {
+            frames(model, data, q, v);
+            poses(model, data);
+            lines(model, data);
+        }
+    }
+
     /// Accelerations under the efforts and tensions that stand, and efforts on the elastic coordinates if any are given, left in the
-    /// data.
+    /// data; after [`Dynamics::locate`] at the same place.
     #[inline]
     fn accelerate(
         &mut self,
         q: &[S],
         v: &[S],
-        add: impl FnOnce(&[(usize, JointEffect<S>)], &[S], &[S], &mut [S]),
+        (add, resistance): (
+            impl FnOnce(&[(usize, JointEffect<S>)], &[S], &[S], &mut [S]),
+            impl Fn(&ContactFriction<S>, S, S) -> S,
+        ),
         on_beams: &[S],
     ) {
-        let Self { model, data, loads, tensions, .. } = self;
+        let Self { model, data, loads, tensions, connections, .. } = self;
         let (of_joints, elastic) = loads.split_at_mut(model.n_joints());
         of_joints.copy_from_slice(&self.efforts);
         elastic.fill(S::zero());
         elastic[..on_beams.len()].copy_from_slice(on_beams);
         add(&self.effects, q, v, of_joints);
+        if self.pulls {
+            flexible::add_line_forces(data, tensions, loads);
+        }
+        if !connections.is_free() {
+            connections.add_loads(model, data, resistance, loads);
+        }
         if model.is_recursive() {
-            if self.pulls {
-                frames(model, data, q, v);
-                poses(model, data);
-                lines(model, data);
-                flexible::add_line_forces(data, tensions, loads);
-            }
             aba(model, data, q, v, loads);
         } else {
-            flexible::terms(model, data, q, v);
-            flexible::add_line_forces(data, tensions, loads);
             flexible::solve(model, data, q, v, loads);
-        }
-    }
-
-    /// Forces, joint efforts and tensions of the actuators, and the rates of their lags.
-    fn actuate(&mut self, lags: &[S], rates: &mut [S]) {
-        self.efforts.fill(S::zero());
-        self.tensions.fill(S::zero());
-        let mut states = lags.iter().zip(rates);
-        for ((actuator, &input), force) in self.actuators.iter().zip(&self.inputs).zip(&mut self.forces) {
-            *force = match (&actuator.lag, if actuator.lag.is_some() { states.next() } else { None }) {
-                (Some(lag), Some((&state, rate))) => {
-                    *rate = lag.rate(state, input);
-                    actuator.motor.effort(state)
-                }
-                _ => actuator.motor.effort(input),
-            };
-            match actuator.on {
-                Target::Joint(joint) => self.efforts[joint] += *force,
-                Target::Line(line) => self.tensions[line] += *force,
-            }
         }
     }
 }
@@ -187,6 +227,7 @@ pub struct System<S> {
     dynamics: Dynamics<S>,
     tangent: Tangent<S>,
     resistances: Vec<S>,
+    seals: Vec<Option<S>>,
     /// A column of an iteration matrix on its way.
     column: Vec<S>,
 }
@@ -198,7 +239,8 @@ impl<S: Scalar> System<S> {
         let tangent = Tangent::new(theta, build, dynamics.dim())?;
         let resistances = vec![S::zero(); dynamics.joints()];
         let column = vec![S::zero(); dynamics.coordinates()];
-        Ok(Self { dynamics, tangent, resistances, column })
+        let seals = vec![None; dynamics.actuators.len()];
+        Ok(Self { dynamics, tangent, resistances, seals, column })
     }
 
     /// The right-hand side.
@@ -207,11 +249,22 @@ impl<S: Scalar> System<S> {
         &mut self.dynamics
     }
 
-    /// Holds `input` (after delay, dead zone and saturation) on an actuator from now on.
+    /// Holds what input `number` amounts to, see [`Dynamics::input`], from now on: one for each actuator, then the pressures of logged
+    /// supplies.
     #[inline]
-    pub fn hold(&mut self, actuator: usize, input: S) {
-        self.dynamics.inputs[actuator] = input;
-        self.tangent.hold(actuator, input);
+    pub fn hold(&mut self, number: usize, input: S) {
+        self.dynamics.inputs[number] = input;
+        self.tangent.hold(number, input);
+    }
+}
+
+impl<S: Scalar> System<S> {
+    /// As df/dx, without the friction of joints and seals, row by row.
+    pub(crate) fn without_friction(&mut self, x: &[S], matrix: &mut [S]) {
+        self.resistances.fill(S::zero());
+        self.seals.fill(Some(S::zero()));
+        self.tangent.chords(x, matrix, &self.resistances, &self.seals);
+        self.seals.fill(None);
     }
 }
 
@@ -244,8 +297,8 @@ impl<S: Scalar> Ode<S> for System<S> {
         self.tangent.jacobian(x, jacobian);
     }
 
-    /// As df/dx, but with chords from rest in the place of the tangents of friction laws; of a machine with elastic beams, all that is
-    /// stiff in it, for the price of one mass matrix.
+    /// As df/dx, but with chords from rest in the place of the tangents of friction laws; of a machine with elastic beams and ideal drives,
+    /// all that is stiff in it, for the price of one mass matrix.
     ///
     /// The tangent of dry friction is flat beyond the transition velocity, so that a step which crosses it would not see the friction
     /// turn around, and could keep a joint creeping for ever; the chord sees it. At rest, and for viscous friction, they are the same.
@@ -255,11 +308,22 @@ impl<S: Scalar> Ode<S> for System<S> {
         for (joint, effect) in &self.dynamics.effects {
             self.resistances[*joint] += effect.resistance(x[n + joint]);
         }
-        if self.dynamics.model.n_elastic() == 0 {
-            self.tangent.chords(x, matrix, &self.resistances);
+        if self.dynamics.model.n_elastic() == 0 || !self.dynamics.ideal || !self.dynamics.connections.is_free() {
+            let (q, v) = x[..2 * n].split_at(n);
+            self.dynamics.seal_chords(q, v, &mut self.seals);
+            self.tangent.chords(x, matrix, &self.resistances, &self.seals);
         } else {
             stiff::iteration_matrix(&mut self.dynamics, x, matrix, &self.resistances, &mut self.column);
         }
+    }
+
+    /// A hundredth for coordinates, 1 for rates, of the drives what is natural for each.
+    fn scales(&self, scales: &mut [f64]) {
+        let n = self.coordinates();
+        let (motion, internal) = scales.split_at_mut(2 * n);
+        motion[..n].fill(1e-2);
+        motion[n..].fill(1.0);
+        self.dynamics.drive_scales(internal);
     }
 
     /// Stiffness and damping of the beams.

@@ -85,7 +85,8 @@ fn iteration_matrix_of_a_beam_at_rest_is_the_jacobian() -> Result<()> {
             .map(|(name, value)| parameter(content, name, value));
         push(content, "effects", json!({"type": "spring", "joint": 1, "stiffness": stiffness, "rest": rest}));
         push(content, "effects", json!({"type": "viscous_friction", "joint": 0, "viscous": viscous}));
-        let actuator = json!({"name": "motor", "on": {"joint": 1}, "gain": gain, "lag": time});
+        let actuator =
+            json!({"name": "motor", "on": {"joint": 1}, "drive": {"type": "ideal", "gain": gain}, "lag": time});
         push(content, "actuators", actuator);
     });
     let mut system = d.system::<f64>(&d.parameters)?;

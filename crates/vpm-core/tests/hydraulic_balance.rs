@@ -4,7 +4,7 @@ use allocation_counter::measure;
 use proptest::prelude::*;
 use vpm_core::actuator::DeadZone;
 use vpm_core::actuator::hydraulic::{
-    Chambers, EntrainedAir, Fluid, Load, Orifice, SealFriction, ServoCylinder, ServoRig, ServoState,
+    Chambers, EntrainedAir, Fluid, Load, Orifice, PistonSize, SealFriction, ServoCylinder, ServoRig, ServoState,
 };
 use vpm_core::effect::{CoulombFriction, StribeckFriction, ViscousFriction};
 use vpm_core::error::Error;
@@ -237,7 +237,10 @@ fn meaningless_parameters_are_named() {
     assert_eq!(path(with(|servo| servo.valve.overlap.width = -1.0)), "valve.overlap");
     assert_eq!(path(with(|servo| servo.cylinder.line_b = f64::NAN)), "cylinder.line_b");
     assert_eq!(path(with(|servo| servo.load.mass = 0.0)), "load.mass");
-    assert!(matches!(with(|servo| servo.cylinder.rod = 0.016), Err(Error::Setting { .. })));
+    assert!(matches!(
+        with(|servo| servo.cylinder.size = PistonSize::Diameters { bore: 0.016, rod: 0.016 }),
+        Err(Error::Setting { .. })
+    ));
     assert_eq!(with(|_| ()), Ok(()));
 }
 
@@ -248,8 +251,7 @@ prop_compose! {
         mass in 0.2..50.0_f64, dry in 0.0..200.0_f64, supply in 5e6..25e6_f64, leak in 0.0..1e-11_f64,
     ) -> ServoCylinder<f64> {
         let mut servo = complete();
-        servo.cylinder.bore *= size;
-        servo.cylinder.rod = slim * servo.cylinder.bore;
+        servo.cylinder.size = PistonSize::Diameters { bore: 0.016 * size, rod: slim * 0.016 * size };
         servo.fluid = Fluid { bulk_modulus: beta, air: Some(EntrainedAir { fraction: air, ..AIR }), ..servo.fluid };
         servo.valve.overlap.width = lap;
         servo.load = Load { mass, ..servo.load };
@@ -343,7 +345,7 @@ proptest! {
             let (mut x, mut rig) = (servo.rest().to_array(), ServoRig::new(servo).unwrap());
             let mut integrator = Integrator::new(method, 6);
             for &current in &currents {
-                rig.current = current * (servo.cylinder.bore / 0.016).powi(2);
+                rig.current = current * (servo.cylinder.areas().a / nominal().cylinder.areas().a);
                 (0..10).for_each(|_| integrator.step(&mut rig, &mut x, 1e-4));
                 prop_assert!(x.iter().all(|number| Scalar::is_finite(*number)), "{}: {x:?}", method.name());
                 prop_assert!(x[0].abs() < 0.5 * servo.cylinder.stroke, "{}: {x:?}", method.name());

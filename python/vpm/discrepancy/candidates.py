@@ -162,7 +162,7 @@ def _joint_of(kind: str, site: str, model: Model) -> int:
     if kind == "joint":
         return model.joints.index(site)
     if kind == "actuator":
-        return model.joints.index(model.joint_of_actuator(site))
+        return model.joints.index(model.joints_of_actuator(site)[0])
     return 0
 
 

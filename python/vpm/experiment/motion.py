@@ -25,7 +25,7 @@ NO_INSTRUMENT = 1e-9
 
 
 class Machine(Protocol):
-    """What is asked of a model: its name, its joints and its actuators, in the order of its coordinates."""
+    """What is asked of a model: its name, its joints in the order of its coordinates, and its inputs."""
 
     @property
     def name(self) -> str:
@@ -36,8 +36,12 @@ class Machine(Protocol):
         """Names of the joints."""
 
     @property
-    def actuators(self) -> Iterable[str]:
-        """Names of the actuators."""
+    def input_channels(self) -> Iterable[str]:
+        """Channels of the log that drive it."""
+
+    @property
+    def optional_inputs(self) -> Collection[str]:
+        """Those of them that are zero where the log does not hold them."""
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -46,12 +50,12 @@ class Motion(Result):
 
     Attributes
     ----------
-    joints, actuators : tuple of str
-        Columns of the motion and of `inputs`.
+    joints, drivers : tuple of str
+        Columns of the motion, and channels of `inputs`.
     position, velocity, acceleration : ndarray, shape (N, n)
         m or rad, per second, per second squared.
     inputs : ndarray, shape (N, nu)
-        Command of each actuator as logged, held from its sample to the next.
+        Commands and pressures of supplies as logged, each held from its sample to the next.
     time : ndarray, shape (N,)
         s.
     dt : float
@@ -67,7 +71,7 @@ class Motion(Result):
     """
 
     joints: tuple[str, ...]
-    actuators: tuple[str, ...]
+    drivers: tuple[str, ...]
     position: Array
     velocity: Array
     acceleration: Array
@@ -102,8 +106,8 @@ class Motion(Result):
             columns[f"{joint}.position"] = self.position[:, column]
             columns[f"{joint}.velocity"] = self.velocity[:, column]
             columns[f"{joint}.acceleration"] = self.acceleration[:, column]
-        for column, actuator in enumerate(self.actuators):
-            columns[f"{actuator}.command"] = self.inputs[:, column]
+        for column, channel in enumerate(self.drivers):
+            columns[channel] = self.inputs[:, column]
         return columns
 
 
@@ -134,12 +138,12 @@ def motion(
     ExperimentError
         A channel is missing, the cut-off frequency is not possible, or the log is too short for it.
     """
-    joints, actuators = tuple(model.joints), tuple(model.actuators)
+    joints, drivers = tuple(model.joints), tuple(model.input_channels)
     unknown = sorted(set(measured) - {"velocity", "acceleration"})
     if unknown:
         raise ExperimentError(f'"{unknown[0]}" cannot be taken as measured; choose from velocity, acceleration')
-    raw = _channels(experiment, model, joints, "position")
-    inputs = _channels(experiment, model, actuators, "command")
+    raw = _channels(experiment, model, _of(joints, "position"))
+    inputs = _channels(experiment, model, drivers, model.optional_inputs)
     rate = experiment.rate
     choice = choose_cutoff(raw, rate) if cutoff is None else None
     cutoff = choice.cutoff if choice is not None else float(cutoff or 0.0)
@@ -150,7 +154,7 @@ def motion(
     notes = [_choice_note(choice, joints, np.ptp(raw, axis=0), rate, cutoff)]
     for order, quantity in enumerate(("velocity", "acceleration")):
         if quantity in measured:
-            derivatives[order:] = [lowpass(_channels(experiment, model, joints, quantity), rate, cutoff)]
+            derivatives[order:] = [lowpass(_channels(experiment, model, _of(joints, quantity)), rate, cutoff)]
             notes.append(f"The {quantity} is the measured one, through the same filter.")
         if order == 0:
             derivatives.append(differentiate(derivatives[0], experiment.dt))
@@ -158,7 +162,7 @@ def motion(
     notes.append(f"{edge} samples at each end are left to the settling of the filter.")
     return Motion(
         joints,
-        actuators,
+        drivers,
         position,
         derivatives[0],
         derivatives[1],
@@ -195,23 +199,31 @@ def common_cutoff(experiments: Iterable[Experiment], model: Machine) -> float:
         There is no record, a channel is missing, or a record is too short.
     """
     joints = tuple(model.joints)
-    cutoffs = [choose_cutoff(_channels(each, model, joints, "position"), each.rate).cutoff for each in experiments]
+    channels = _of(joints, "position")
+    cutoffs = [choose_cutoff(_channels(each, model, channels), each.rate).cutoff for each in experiments]
     if not cutoffs:
         raise ExperimentError("a common cut-off frequency needs at least one record, and none was given")
     return min(cutoffs)
 
 
-def _channels(experiment: Experiment, model: Machine, owners: tuple[str, ...], quantity: str) -> Array:
-    for owner in owners:
-        channel = f"{owner}.{quantity}"
-        if channel not in experiment:
+def _of(owners: tuple[str, ...], quantity: str) -> tuple[str, ...]:
+    return tuple(f"{owner}.{quantity}" for owner in owners)
+
+
+def _channels(
+    experiment: Experiment, model: Machine, channels: tuple[str, ...], optional: Collection[str] = ()
+) -> Array:
+    """Columns of a log; zeros for optional ones that it does not hold."""
+    for channel in channels:
+        if channel not in experiment and channel not in optional:
             near = near_match(channel, experiment.channels, what="the log holds")
             raise ExperimentError(
                 f'{experiment.name}: the motion of "{model.name}" needs the channel "{channel}", which the log does '
                 f"not hold; map a column to it in the channel table ({near})",
                 channel=channel,
             )
-    columns = [experiment[f"{owner}.{quantity}"] for owner in owners]
+    known = {channel: experiment[channel] for channel in channels if channel in experiment}
+    columns = [known.get(channel, np.zeros(len(experiment))) for channel in channels]
     return np.ascontiguousarray(np.column_stack(columns)) if columns else np.zeros((len(experiment), 0))
 
 

@@ -18,7 +18,7 @@ from vpm.errors import IdentificationError
 from vpm.experiment import Experiment, Motion, motion, parallel_filter
 from vpm.initial import joint_motion
 from vpm.model import Model
-from vpm.simulate import MODES, Setup, check_rigid, copied_channels, simulate_arrays
+from vpm.simulate import MODES, Setup, check_balance, copied_channels, simulate_arrays
 
 Array = NDArray[np.float64]
 
@@ -109,10 +109,11 @@ class InverseDynamicsProblem:
     mode = "inverse_dynamics"
 
     def __init__(self, model: Model, experiments: Sequence[Experiment], *, cutoff: float | None = None) -> None:
-        check_rigid(model)
+        check_balance(model)
         self.experiments = tuple(experiments)
         self.motions: tuple[Motion, ...] = tuple(motion(e, model, cutoff=cutoff) for e in experiments)
-        driven = sorted({model.joints.index(model.joint_of_actuator(name)) for name in model.actuators})
+        moved = {joint for name in model.actuators for joint in model.joints_of_actuator(name)}
+        driven = sorted(model.joints.index(joint) for joint in moved)
         self._joints = driven or list(range(len(model.joints)))
         self.blocks = self._lay_out(model)
 

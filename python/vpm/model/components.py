@@ -7,12 +7,13 @@ from functools import cached_property
 from types import MappingProxyType
 
 from vpm.catalogue import JointKind
-from vpm.errors import ModelError, near_match
+from vpm.errors import ModelError
 from vpm.model.check import Checked
+from vpm.model.drive_components import DriveComponents
 from vpm.model.schema import ChannelEntry
 
 
-class Components:
+class Components(DriveComponents):
     """The part of a model that answers by name; it relies on the checked document and changes nothing."""
 
     _checked: Checked
@@ -65,20 +66,19 @@ class Components:
 
     @cached_property
     def state_names(self) -> tuple[str, ...]:
-        """State of a simulation: position and velocity of every coordinate, then what actuators with a lag hold."""
+        """State of a simulation: position and velocity of every coordinate, then what drives and supplies hold.
+
+        Per actuator its lag, then of a motor ``current``, of a Maxwell element ``stretch``, of a cylinder ``spool``,
+        ``spool_rate``, ``chamber_a`` and ``chamber_b``; then the pressure of supplies that sag.
+        """
         positions = [f"{name}.position" for name in self.coordinates]
         velocities = [f"{name}.velocity" for name in self.coordinates]
-        return (*positions, *velocities, *(f"{name}.lag" for name in self.actuators if self.has_lag(name)))
+        return (*positions, *velocities, *self.internal_names)
 
     @cached_property
     def levels(self) -> Mapping[str, str]:
         """Level of detail of each beam, as `at` takes it."""
         return MappingProxyType({name: str(self._checked.document.beams[name].detail) for name in self.beams})
-
-    @property
-    def actuators(self) -> tuple[str, ...]:
-        """Actuators; actuator k is input k."""
-        return tuple(self._checked.document.actuators)
 
     @property
     def sensors(self) -> tuple[str, ...]:
@@ -89,6 +89,21 @@ class Components:
     def controllers(self) -> tuple[str, ...]:
         """Controllers."""
         return tuple(self._checked.document.controllers)
+
+    @property
+    def contacts(self) -> tuple[str, ...]:
+        """Contacts of points with planes."""
+        return tuple(self._checked.document.contacts)
+
+    @property
+    def bushings(self) -> tuple[str, ...]:
+        """Elastic connections of two frames."""
+        return tuple(self._checked.document.bushings)
+
+    @property
+    def load_cells(self) -> tuple[str, ...]:
+        """Readings of reaction wrenches at joints."""
+        return tuple(self._checked.document.load_cells)
 
     def joint_kind(self, joint: str) -> JointKind:
         """Kind of a joint: "prismatic", "revolute" or "helical"."""
@@ -104,7 +119,7 @@ class Components:
         """
         entry = self._checked.document.actuators[self._known(actuator, self.actuators, "actuator")]
         if entry.joint is None:
-            rest = f'drives the line "{entry.line}", which moves several joints; ask line_of_actuator'
+            rest = f'drives the line "{entry.line}", which moves several joints; ask joints_of_actuator'
             raise ModelError(f"actuator {actuator} {rest}", where=actuator)
         return entry.joint
 
@@ -112,23 +127,26 @@ class Components:
         """Line that an actuator drives; None if it drives a joint."""
         return self._checked.document.actuators[self._known(actuator, self.actuators, "actuator")].line
 
+    def held_channel(self, actuator: str) -> str:
+        """Channel that the controller of an actuator holds at its reference.
+
+        Raises
+        ------
+        ModelError
+            There is no such actuator, or no controller commands it.
+        """
+        name = self._known(actuator, self.controlled_actuators, "actuator with a controller")
+        return self._controlled[name]
+
     @cached_property
     def controlled_actuators(self) -> tuple[str, ...]:
         """Actuators that a controller commands, in the order of `actuators`."""
-        controlled = {controller.actuator for controller in self._checked.document.controllers.values()}
-        return tuple(name for name in self.actuators if name in controlled)
+        return tuple(name for name in self.actuators if name in self._controlled)
 
-    def has_lag(self, actuator: str) -> bool:
-        """Whether an actuator follows its command with a lag, which adds a state."""
-        self._known(actuator, self.actuators, "actuator")
-        return any(e.type == "actuator_lag" and e.at == actuator for e in self._checked.document.effects)
-
-    def _known(self, name: str, names: tuple[str, ...], what: str) -> str:
-        if name not in names:
-            raise ModelError(
-                f'{self.name} has no {what} "{name}"; {near_match(name, names, what="it has")}', where=name
-            )
-        return name
+    @property
+    def _controlled(self) -> Mapping[str, str]:
+        """Channel that is held for each actuator with a controller."""
+        return dict(pair for controller in self._checked.document.controllers.values() for pair in controller.pairs)
 
     # ---- channels ----------------------------------------------------------------------------------------------------
 
@@ -143,16 +161,14 @@ class Components:
         return self._checked.structure.channels
 
     @cached_property
-    def input_channels(self) -> tuple[str, ...]:
-        """Commands, one per actuator."""
-        return tuple(f"{name}.command" for name in self.actuators)
-
-    @cached_property
     def output_channels(self) -> tuple[str, ...]:
         """What a simulation gives, in the order of the core.
 
         Per joint position, velocity, acceleration, effort; per actuator command, force; per line length, rate, tension;
-        per gauge strain; per marker its origin x, y, z and its rotation vector rx, ry, rz in the world.
+        per gauge strain; per marker its origin x, y, z and its rotation vector rx, ry, rz in the world; per hydraulic
+        actuator spool, pressure_a, pressure_b, flow_a, flow_b; per motor current; per supply pressure, flow; per
+        contact depth, normal_force and the force fx, fy, fz in world axes; per bushing the wrench mx, my, mz, fx, fy,
+        fz on A in its axes; per load cell the reaction mx, my, mz, fx, fy, fz on the child in its axes.
         """
         return self._checked.structure.outputs
 

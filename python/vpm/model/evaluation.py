@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from vpm.errors import ModelError, near_match
 from vpm.linear import LinearModel
 from vpm.model.components import Components
+from vpm.model.settled import follow, rest
 
 if TYPE_CHECKING:
     from vpm._core import Dynamics, System
@@ -37,6 +38,10 @@ class Evaluations(Components):
     @abstractmethod
     def theta(self) -> Array:
         """Values of all parameters."""
+
+    @abstractmethod
+    def index(self, name: str) -> int:
+        """Index of a parameter."""
 
     @property
     @abstractmethod
@@ -242,7 +247,8 @@ class Evaluations(Components):
         Parameters
         ----------
         values : mapping of str to float, or array_like of shape (nx,), optional
-            By name as in ``model.state_names``, ``{"axis.position": 0.1}``; what is not named is zero.
+            By name as in ``model.state_names``, ``{"axis.position": 0.1}``; what is not named is zero, and drives
+            and supplies of which nothing is named are as after a long rest without commands at these positions.
 
         Returns
         -------
@@ -253,10 +259,26 @@ class Evaluations(Components):
         ModelError
             A name is unknown, or the array has another length.
         """
-        return self._filled(values, self.state_names, "state")
+        filled = self._filled(values, self.state_names, "state")
+        if values is None or isinstance(values, Mapping):
+            self._keep_named(filled, rest(self, self.theta, filled[: len(self.coordinates)]), values or {})
+        return filled
+
+    def _keep_named(self, state: Array, internal: Array, named: Mapping[str, float]) -> None:
+        """Put in what drives and supplies hold, but for what is named."""
+        for place, name in enumerate(self.internal_names):
+            if name not in named:
+                state[2 * len(self.coordinates) + place] = internal[place]
+
+    @property
+    def state_units(self) -> tuple[str, ...]:
+        """SI units of the states, in the order of ``state_names``."""
+        return tuple(self._state_units())
 
     def command(self, values: Mapping[str, float] | ArrayLike | None = None) -> Array:
-        """Commands of all actuators from names, ``{"drive": 1.0}``; what is not named is zero.
+        """Commands of actuators, ``{"drive": 1.0}``, and pressures of logged supplies, ``{"pump.pressure": 1.6e7}``.
+
+        A command that is not named is zero, a pressure the nominal one of its supply.
 
         Parameters
         ----------
@@ -273,7 +295,11 @@ class Evaluations(Components):
         """
         if isinstance(values, Mapping):
             values = {name.removesuffix(".command"): value for name, value in values.items()}
-        return self._filled(values, self.actuators, "actuator")
+        filled = self._filled(values, self.inputs, "actuator")
+        for place, name in enumerate(self.inputs):
+            if name in self.parameters and (values is None or (isinstance(values, Mapping) and name not in values)):
+                filled[place] = self.parameters[name].value
+        return filled
 
     def linearize(
         self,
@@ -286,7 +312,8 @@ class Evaluations(Components):
         ----------
         state : mapping of str to float, or array_like of shape (nx,), optional
             As in `state`; by default all joints are at zero and at rest. Flexible links of which no coordinate is named
-            rest under gravity, lags that are not named have settled on their commands.
+            rest under gravity; lags, spools and currents that are not named have settled on their commands, chambers
+            have no net force.
         inputs : mapping of str to float, or array_like of shape (nu,), optional
             As in `command`; the commands that stand.
 
@@ -311,10 +338,10 @@ class Evaluations(Components):
             C,
             D,
             self.state_names,
-            tuple(f"{name}.command" for name in self.actuators),
+            self.input_channels,
             self.output_channels,
             tuple(self._state_units()),
-            tuple(self.channel_unit(f"{name}.command") for name in self.actuators),
+            tuple(self.channel_unit(name) for name in self.input_channels),
             tuple(self.channel_unit(name) for name in self.output_channels),
             place,
             command,
@@ -322,16 +349,16 @@ class Evaluations(Components):
         )
 
     def _settled(self, values: Mapping[str, float] | ArrayLike | None, command: Array) -> Array:
-        """State in which flexible links that are not named rest and lags that are not named hold their command."""
+        """State in which flexible links that are not named rest and drives that are not named follow their command."""
         place = self.state(values)
         if values is None or isinstance(values, Mapping):
             named = values or {}
             joints, coordinates = len(self.joints), len(self.coordinates)
             if coordinates > joints and not any(name in named for name in self.state_names[joints:coordinates]):
                 place[:coordinates] = self.equilibrium(place[:joints])[0]
-            for column, name in enumerate(self.actuators):
-                if f"{name}.lag" in self.state_names and f"{name}.lag" not in named:
-                    place[self.state_names.index(f"{name}.lag")] = command[column]
+            internal = rest(self, self.theta, place[:coordinates])
+            follow(self, self.theta, internal, command, place[coordinates : coordinates + joints])
+            self._keep_named(place, internal, named)
         return place
 
     def _state_units(self) -> Iterator[str]:
@@ -339,7 +366,7 @@ class Evaluations(Components):
             for name in self.coordinates:
                 unit = self.channel_unit(f"{name}.position") if name in self.joints else "1"
                 yield unit + rate if unit != "1" else "1" + rate
-        yield from (self.channel_unit(f"{n}.command") for n in self.actuators if f"{n}.lag" in self.state_names)
+        yield from map(self.internal_unit, self.internal_names)
 
     def _filled(self, values: Mapping[str, float] | ArrayLike | None, names: tuple[str, ...], what: str) -> Array:
         filled = np.zeros(len(names))

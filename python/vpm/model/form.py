@@ -10,6 +10,10 @@ from pydantic import BaseModel, ValidationError
 
 from vpm.errors import near_match
 from vpm.model.beam import Circle, Damping, End, Given, IBeam, Material, Part, Rectangle, Tube
+from vpm.model.contact import EXAMPLES as CONNECTION_EXAMPLES
+from vpm.model.contact import NESTED as CONNECTION_TABLES
+from vpm.model.contact import TAGS
+from vpm.model.drives import ACTUATOR_TYPES, EXAMPLES, tables_inside
 from vpm.model.entry import Quantity
 from vpm.model.messages import Problem, place
 from vpm.model.schema import SECTIONS, DenavitHartenberg, Document, keys_of
@@ -27,8 +31,8 @@ _EXAMPLES: Mapping[str, str] = {
     "child": 'child = "link"',
     "axis": "axis = [1.0, 0.0, 0.0]",
     "joint": 'joint = "axis"',
-    "gain": 'gain = { value = 1.0, unit = "N/V" }',
     "actuator": 'actuator = "drive"',
+    "controllers.actuators": 'actuators = ["drive"]',
     "measures": 'measures = "axis.position"',
     "at": 'at = "axis"',
     "value": "value = 1.0",
@@ -43,6 +47,8 @@ _EXAMPLES: Mapping[str, str] = {
     "gauges.at": "at = 0.05",
     "from": 'from = { parent = "world", point = [0.0, 0.0, 0.0] }',
     "to": 'to = { parent = "link", point = [0.1, 0.0, 0.0] }',
+    **EXAMPLES,
+    **CONNECTION_EXAMPLES,
 }
 
 #: Tables inside of components, by their key.
@@ -85,12 +91,14 @@ def schema_problems(error: ValidationError, *, within: tuple[str, ...] = ()) -> 
     problems = []
     # Unknown keys come first: the key that is missing is often the one that is misspelt.
     for detail in sorted(error.errors(include_url=False), key=lambda found: found["type"] != "extra_forbidden"):
-        keys = _without_tags((*within, *detail["loc"]))
+        written = (*within, *detail["loc"])
+        keys, tag = _without_tags(written), _actuator_type(written)
         if keys[-1] == "value" and detail["type"] not in {"missing", "extra_forbidden"}:
             keys = keys[:-1]  # bare numbers have no such key
         problems.append(
             Problem(
-                place(*keys), _sentence(detail["type"], keys, detail["input"], detail.get("ctx", {}), detail["msg"])
+                place(*keys),
+                _sentence(detail["type"], keys, detail["input"], detail.get("ctx", {}), detail["msg"], tag),
             )
         )
     return problems
@@ -98,15 +106,40 @@ def schema_problems(error: ValidationError, *, within: tuple[str, ...] = ()) -> 
 
 def _without_tags(keys: tuple[str | int, ...]) -> tuple[str | int, ...]:
     """Place without the type of a controller or the shape of a section, which the schema puts into it."""
+    if _actuator_type(keys) is not None:
+        return (*keys[:2], *keys[3:])
+    if keys[0] == "bushings":
+        return tuple(key for key in keys if key not in TAGS)
     tags = {("controllers", None): 2, ("beams", "section"): 3, ("beams", "sections"): 4}
     tag = tags.get((str(keys[0]), str(keys[2]) if keys[0] == "beams" and len(keys) > 2 else None))
     return keys if tag is None or len(keys) <= tag + 1 else (*keys[:tag], *keys[tag + 1 :])
 
 
-def _sentence(kind: str, keys: tuple[str | int, ...], found: object, context: Mapping[str, Any], fallback: str) -> str:
-    """Rest of the sentence for one error of the schema."""
+def _actuator_type(keys: tuple[str | int, ...]) -> str | None:
+    """Type of the actuator that a place is in, as the schema puts it there; None elsewhere."""
+    inside = len(keys) > 2 and keys[0] == "actuators" and keys[2] in ACTUATOR_TYPES
+    return str(keys[2]) if inside else None
+
+
+def _other_types(key: str, tag: str | None) -> tuple[str, ...]:
+    """Types of actuators that have a key which the type at hand has not."""
+    return () if tag is None else tuple(name for name, entry in ACTUATOR_TYPES.items() if key in keys_of(entry))
+
+
+def _sentence(
+    kind: str,
+    keys: tuple[str | int, ...],
+    found: object,
+    context: Mapping[str, Any],
+    fallback: str,
+    tag: str | None = None,
+) -> str:
+    """Rest of the sentence for one error of the schema; ``tag`` is the type of the actuator that it is in."""
     if kind == "extra_forbidden":
-        return f"is not a known key; {near_match(str(keys[-1]), _known_keys(keys))}"
+        other = _other_types(str(keys[-1]), tag) if len(keys) == 3 else ()
+        if other:
+            return f'belongs to type = "{" or ".join(other)}", but this is {tag}; change the type or remove the key'
+        return f"is not a known key; {near_match(str(keys[-1]), _known_keys(keys, tag))}"
     if kind == "missing":
         example = _EXAMPLES.get(f"{keys[0]}.{keys[-1]}", _EXAMPLES.get(str(keys[-1])))
         return "is missing; add it" + (f", for example {example}" if example else "")
@@ -132,22 +165,29 @@ def _choice_sentence(
         tag = context.get("tag", found)
         if keys[0] == "beams" and "deforms" in keys:
             return f"is {_shown(tag)}, which is no deformation; {near_match(str(tag), choices)}"
-        what = "shape" if keys[0] == "beams" else "convention" if keys[-1] == "convention" else "type"
+        what = "shape" if keys[0] == "beams" else str(keys[-1]) if keys[-1] in {"convention", "source"} else "type"
         return f"has the {what} {_shown(tag)}; {near_match(str(tag), choices)}"
     if kind == "union_tag_not_found" and keys[0] == "beams":
         return 'has no shape; add for example shape = "rectangle"'
     if kind == "union_tag_not_found":
-        return 'has no type; add type = "cascade" or type = "pid"'
+        return 'has no type; add one, for example type = "pd"'
     if kind == "value_error":
         reason = str(context.get("error", fallback))
         return reason if reason.startswith(("has ", "is ")) else f"is wrong: {reason}"
     return f"is {_shown(found)}: {fallback[:1].lower()}{fallback[1:]}"
 
 
-def _known_keys(keys: tuple[str | int, ...]) -> tuple[str, ...]:
+def _known_keys(keys: tuple[str | int, ...], tag: str | None = None) -> tuple[str, ...]:
     """Keys that would have been right where an unknown one stands."""
     if len(keys) == 1:
         return keys_of(Document)
+    if len(keys) == 3 and tag is not None:
+        return keys_of(ACTUATOR_TYPES[tag])
+    if keys[0] in {"actuators", "supplies"} and len(keys) > 3:
+        inside_of = tables_inside(str(keys[0]), tag)
+        return keys_of(inside_of.get(str(keys[-2]), Quantity))
+    if keys[0] in {"contacts", "bushings"} and len(keys) > 3:
+        return keys_of(CONNECTION_TABLES.get(str(keys[-2]), Quantity))
     if len(keys) == 3 and keys[0] in SECTIONS:
         return keys_of(*SECTIONS[str(keys[0])])
     inside = [key for key in keys[2:-1] if not isinstance(key, int)]

@@ -1,7 +1,7 @@
 """The parameters of a model: one flat, ordered table with SI values, read from the document and checked.
 
-Order: bodies (mass, centre of mass, inertia), rotors, beams, lines, actuators (gain), controllers, then
-effects as they stand in the file.
+Order: bodies (mass, centre of mass, inertia), rotors, beams, lines, supplies, actuators, controllers, contacts,
+bushings, then effects as they stand in the file.
 """
 
 from __future__ import annotations
@@ -14,10 +14,14 @@ from typing import Literal
 from vpm.catalogue import EFFECTS, POSITIVE
 from vpm.errors import UnitError
 from vpm.model.beam import Beam, Line, Part, sections_of
+from vpm.model.connection_parameters import bushing_rows, contact_rows
+from vpm.model.controller import Controller
+from vpm.model.drive_parameters import Row, actuator_rows, supply_rows
 from vpm.model.effects import effect_unit
 from vpm.model.entry import Quantity
+from vpm.model.gains import gains
 from vpm.model.messages import Problem, place
-from vpm.model.schema import Cascade, Controller, Document, EffectEntry
+from vpm.model.schema import Document, EffectEntry
 from vpm.model.structure import Structure
 from vpm.units import convert, require_dimension, si_unit
 
@@ -166,8 +170,9 @@ def _range_text(low: float, high: float, unit: str, value: float) -> str:
     """Physical range in words; the catalogue and this module know ranges with a lower end only."""
     shown = "" if unit == "1" else f" {unit}"
     if low in {POSITIVE, _LEAST}:
-        # A value above zero is below the least that is taken for a number with a meaning.
-        return f"{low:g}{shown} or more" if value > 0.0 else f"more than 0{shown}"
+        # A value above zero is below the least that is taken for a number with a meaning, or above the most.
+        least = f"{low:g}{shown} or more" if 0.0 < value < low else f"more than 0{shown}"
+        return least if math.isinf(high) else f"{least} and up to {high:g}{shown}"
     return f"{low:g}{shown} or more" if math.isinf(high) else f"{low:g} to {high:g}{shown}"
 
 
@@ -182,11 +187,15 @@ def slots(document: Document, structure: Structure) -> Iterator[Slot]:
         yield from _beam_slots(name, document.beams[name])
     for name, line in document.lines.items():
         yield from _line_slots(name, line)
+    for name, supply in document.supplies.items():
+        yield from (_slot(("supplies", name), row) for row in supply_rows(supply))
     for name, actuator in document.actuators.items():
-        unit = si_unit(f"{structure.effort_unit(name)}/({actuator.command_unit})")
-        yield Slot(f"{name}.gain", ("actuators", name, "gain"), actuator.gain, unit, _ANY, "linear")
+        kind = None if actuator.joint is None else structure.joint_kind(actuator.joint)
+        rows = actuator_rows(actuator, structure.effort_unit(name), kind)
+        yield from (_slot(("actuators", name), row) for row in rows)
     for name, controller in document.controllers.items():
-        yield from _controller_slots(name, controller, document, structure)
+        yield from _controller_slots(name, controller, structure)
+    yield from _connection_slots(document)
     for position, entry in enumerate(document.effects):
         yield from _effect_slots(position, entry, structure)
 
@@ -248,22 +257,24 @@ def _line_slots(name: str, line: Line) -> Iterator[Slot]:
         yield Slot(f"{name}.{key}.inertia", (*keys, "inertia"), part.inertia, "kg m^2", _NOT_NEGATIVE, "linear")
 
 
-def _controller_slots(name: str, controller: Controller, document: Document, structure: Structure) -> Iterator[Slot]:
-    command = document.actuators[controller.actuator].command_unit
-    held = structure.unit(controller.measures)
-    if isinstance(controller, Cascade):
-        units = {"position_gain": "1/s", "velocity_gain": f"({command}) s/({held})"}
-    else:
-        units = {
-            "proportional": f"({command})/({held})",
-            "integral": f"({command})/({held} s)",
-            "derivative": f"({command}) s/({held})",
-        }
-    for key, unit in units.items():
-        yield Slot(f"{name}.{key}", ("controllers", name, key), getattr(controller, key), si_unit(unit), _ANY, "shape")
-    if controller.limit is not None:
-        keys = ("controllers", name, "limit")
-        yield Slot(f"{name}.limit", keys, controller.limit, si_unit(command), _ABOVE_ZERO, "shape")
+def _slot(component: tuple[str, str], row: Row) -> Slot:
+    """Place of a parameter whose dotted name is the name of its component and the keys below that."""
+    dotted = ".".join((component[1], *row.keys))
+    return Slot(dotted, (*component, *row.keys), row.quantity, row.unit, row.bounds, row.kind, row.impossible)
+
+
+def _controller_slots(name: str, controller: Controller, structure: Structure) -> Iterator[Slot]:
+    for gain in gains(controller, structure):
+        keys, bounds = ("controllers", name, *gain.way), _ABOVE_ZERO if gain.is_limit else _ANY
+        yield Slot(f"{name}.{gain.suffix}", keys, gain.quantity, si_unit(gain.unit), bounds, "shape")
+
+
+def _connection_slots(document: Document) -> Iterator[Slot]:
+    rows = [("contacts", name, row) for name, contact in document.contacts.items() for row in contact_rows(contact)]
+    rows += [("bushings", name, row) for name, bushing in document.bushings.items() for row in bushing_rows(bushing)]
+    for section, name, row in rows:
+        keys = (section, name, *row.keys)
+        yield Slot(f"{name}.{row.suffix}", keys, row.quantity, row.unit, row.bounds, row.kind, row.impossible)
 
 
 def _effect_slots(position: int, entry: EffectEntry, structure: Structure) -> Iterator[Slot]:

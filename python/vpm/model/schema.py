@@ -11,7 +11,11 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 from vpm.model.beam import Beam, Gauge, Line, Marker
+from vpm.model.contact import Bushing, Contact, LoadCell
+from vpm.model.controller import TYPES, Controller
+from vpm.model.drives import ACTUATOR_TYPES, Actuator
 from vpm.model.entry import ORIGIN, ZERO, Entry, Number, ParameterValue, Quantity, Text, Vector
+from vpm.model.hydraulic import Supply
 from vpm.units import parse_unit
 
 
@@ -33,7 +37,7 @@ class DenavitHartenberg(Entry):
     convention: Literal["standard", "modified"] = "standard"
 
 
-JointType = Literal["prismatic", "revolute", "helical", "cylindrical", "planar", "spherical", "fixed"]
+JointType = Literal["prismatic", "revolute", "helical", "cylindrical", "planar", "spherical", "free", "fixed"]
 
 
 class Joint(Entry):
@@ -51,45 +55,10 @@ class Joint(Entry):
     dh: DenavitHartenberg | None = None
 
 
-class Actuator(Entry):
-    """Drive of a joint or of a line: effort = gain times command."""
-
-    joint: Text | None = None
-    line: Text | None = None
-    gain: ParameterValue
-    command_unit: Text = "1"
-
-
 class Sensor(Entry):
     """Reading of one channel."""
 
     measures: Text
-
-
-class Cascade(Entry):
-    """Position and velocity loop: u = kv (kp (r - y) - dy)."""
-
-    type: Literal["cascade"]
-    actuator: Text
-    measures: Text
-    position_gain: ParameterValue
-    velocity_gain: ParameterValue
-    limit: ParameterValue | None = None
-
-
-class Pid(Entry):
-    """u = kp e + ki int e + kd de/dt."""
-
-    type: Literal["pid"]
-    actuator: Text
-    measures: Text
-    proportional: ParameterValue
-    integral: ParameterValue = ZERO
-    derivative: ParameterValue = ZERO
-    limit: ParameterValue | None = None
-
-
-Controller = Annotated[Cascade | Pid, Field(discriminator="type")]
 
 
 class EffectEntry(BaseModel):
@@ -158,9 +127,13 @@ class Document(Entry):
     lines: dict[str, Line] = Field(default_factory=dict)
     gauges: dict[str, Gauge] = Field(default_factory=dict)
     markers: dict[str, Marker] = Field(default_factory=dict)
+    supplies: dict[str, Supply] = Field(default_factory=dict)
     actuators: dict[str, Actuator] = Field(default_factory=dict)
     sensors: dict[str, Sensor] = Field(default_factory=dict)
     controllers: dict[str, Controller] = Field(default_factory=dict)
+    contacts: dict[str, Contact] = Field(default_factory=dict)
+    bushings: dict[str, Bushing] = Field(default_factory=dict)
+    load_cells: dict[str, LoadCell] = Field(default_factory=dict)
     effects: tuple[EffectEntry, ...] = ()
     channels: dict[str, ChannelEntry] | None = None
 
@@ -173,9 +146,13 @@ SECTIONS: Mapping[str, tuple[type[BaseModel], ...]] = {
     "lines": (Line,),
     "gauges": (Gauge,),
     "markers": (Marker,),
-    "actuators": (Actuator,),
+    "supplies": (Supply,),
+    "actuators": tuple(ACTUATOR_TYPES.values()),
     "sensors": (Sensor,),
-    "controllers": (Cascade, Pid),
+    "controllers": TYPES,
+    "contacts": (Contact,),
+    "bushings": (Bushing,),
+    "load_cells": (LoadCell,),
     "channels": (ChannelEntry,),
 }
 

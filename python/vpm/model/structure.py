@@ -17,8 +17,22 @@ from vpm.units import si_unit
 JOINT_CHANNELS = ("position", "velocity", "acceleration", "effort")
 ACTUATOR_OUTPUTS = ("command", "force")
 ACTUATOR_CHANNELS = (*ACTUATOR_OUTPUTS, "reference", "disturbance")
+HYDRAULIC_CHANNELS: tuple[str, ...] = ("spool", "pressure_a", "pressure_b", "flow_a", "flow_b")
+MOTOR_CHANNELS = ("current",)
+SUPPLY_CHANNELS: tuple[str, ...] = ("pressure", "flow")
+DRIVE_UNITS: Mapping[str, str] = {
+    "pressure_a": "Pa",
+    "pressure_b": "Pa",
+    "flow_a": "m^3/s",
+    "flow_b": "m^3/s",
+    "current": "A",
+    "pressure": "Pa",
+    "flow": "m^3/s",
+}
 LINE_UNITS: Mapping[str, str] = {"length": "m", "rate": "m/s", "tension": "N"}
 GAUGE_UNITS: Mapping[str, str] = {"strain": "1"}
+CONTACT_UNITS: Mapping[str, str] = {"depth": "m", "normal_force": "N", "fx": "N", "fy": "N", "fz": "N"}
+WRENCH_UNITS: Mapping[str, str] = {"mx": "N m", "my": "N m", "mz": "N m", "fx": "N", "fy": "N", "fz": "N"}
 MARKER_UNITS: Mapping[str, str] = {"x": "m", "y": "m", "z": "m", "rx": "rad", "ry": "rad", "rz": "rad"}
 
 COORDINATE_UNIT: Mapping[JointKind, str] = {"prismatic": "m", "revolute": "rad", "helical": "rad"}
@@ -177,8 +191,18 @@ class Structure:
             (tuple(document.lines), tuple(LINE_UNITS)),
             (tuple(document.gauges), tuple(GAUGE_UNITS)),
             (tuple(document.markers), tuple(MARKER_UNITS)),
+            (self.driven_by("hydraulic"), HYDRAULIC_CHANNELS),
+            (self.driven_by("dc_motor"), MOTOR_CHANNELS),
+            (tuple(document.supplies), SUPPLY_CHANNELS),
+            (tuple(document.contacts), tuple(CONTACT_UNITS)),
+            (tuple(document.bushings), tuple(WRENCH_UNITS)),
+            (tuple(document.load_cells), tuple(WRENCH_UNITS)),
         ]
         return tuple(f"{owner}.{channel}" for owners, channels in groups for owner in owners for channel in channels)
+
+    def driven_by(self, kind: str) -> tuple[str, ...]:
+        """Actuators of a type, in the order of the file."""
+        return tuple(name for name, actuator in self.document.actuators.items() if actuator.type == kind)
 
     def unit(self, channel: str) -> str:
         """SI unit of a channel.
@@ -196,15 +220,18 @@ class Structure:
             coordinate = COORDINATE_UNIT[self.joint_kind(owner)]
             units = {"position": coordinate, "velocity": f"{coordinate}/s", "acceleration": f"{coordinate}/s^2"}
             return units.get(name, EFFORT_UNIT[self.joint_kind(owner)])
+        if name in DRIVE_UNITS:
+            return DRIVE_UNITS[name]
         if owner in self.document.actuators:
             return self._actuator_unit(owner, name)
-        return {**LINE_UNITS, **GAUGE_UNITS, **MARKER_UNITS}[name]
+        return {**LINE_UNITS, **GAUGE_UNITS, **MARKER_UNITS, **CONTACT_UNITS, **WRENCH_UNITS}[name]
 
     def _actuator_unit(self, actuator: str, channel: str) -> str:
         if channel == "force":
             return self.effort_unit(actuator)
-        if channel == "reference":  # of what the controller holds, which is a position of some joint
-            held = [c.measures for c in self.document.controllers.values() if c.actuator == actuator]
+        if channel == "reference":  # of what the controller holds: a position of some joint, a length of some line
+            pairs = [pair for controller in self.document.controllers.values() for pair in controller.pairs]
+            held = [measured for commanded, measured in pairs if commanded == actuator]
             joint = self.document.actuators[actuator].joint
             own = "m" if joint is None else COORDINATE_UNIT[self.joint_kind(joint)]
             return self.unit(held[0]) if held else own

@@ -2,6 +2,7 @@
 
 from vpm.plot.bars import plot_candidates, plot_gap, plot_ladder, plot_parameters, plot_step_cost
 from vpm.plot.linear import plot_bode, plot_poles
+from vpm.plot.scenarios import plot_scenario
 from vpm.plot.signals import (
     plot_channels,
     plot_correlation,
@@ -28,6 +29,7 @@ __all__ = [
     "plot_residual_against",
     "plot_residual_time",
     "plot_run",
+    "plot_scenario",
     "plot_spectrum",
     "plot_step_cost",
 ]

@@ -1,21 +1,25 @@
 //! Actuators: the chain from a command to the effort on a joint, each link a file and a rig of its own.
 
+mod dc_motor;
 mod dead_zone;
+mod drive;
 pub mod hydraulic;
+mod ideal;
 mod input_delay;
 mod lag;
 mod maxwell;
-mod motor;
 mod saturation;
 mod spring_damper;
 
 use serde::Deserialize;
 
+pub use dc_motor::DcMotor;
 pub use dead_zone::DeadZone;
+pub use drive::Drive;
+pub use ideal::Ideal;
 pub use input_delay::InputDelay;
 pub use lag::Lag;
 pub use maxwell::Maxwell;
-pub use motor::Motor;
 pub use saturation::Saturation;
 pub use spring_damper::SpringDamper;
 
@@ -32,7 +36,7 @@ pub enum Target {
     Line(usize),
 }
 
-/// An actuator: delay, dead zone, saturation, lag, motor, in this order; links that are not there pass their input on.
+/// An actuator: delay, dead zone, saturation, lag, drive, in this order; links that are not there pass their input on.
 ///
 /// Checked: see each link.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -43,8 +47,7 @@ pub struct Actuator<P> {
     /// What it acts on.
     pub on: Target,
     /// From command to effort.
-    #[serde(rename = "gain")]
-    pub motor: Motor<P>,
+    pub drive: Drive<P>,
     /// Time between command and effect.
     #[serde(default = "none")]
     pub delay: Option<InputDelay<P>>,
@@ -70,7 +73,7 @@ impl<P> Actuator<P> {
         Actuator {
             name: self.name.clone(),
             on: self.on,
-            motor: self.motor.map(f),
+            drive: self.drive.map(f),
             delay: self.delay.as_ref().map(|link| link.map(f)),
             dead_zone: self.dead_zone.as_ref().map(|link| link.map(f)),
             saturation: self.saturation.as_ref().map(|link| link.map(f)),
@@ -80,12 +83,22 @@ impl<P> Actuator<P> {
 
     /// The parameters and where each is defined.
     pub fn domains(&self) -> Vec<(&P, Domain)> {
-        let mut domains = vec![(&self.motor.gain, Domain::Any)];
+        let mut domains = self.drive.domains();
         domains.extend(self.delay.as_ref().map(|link| (&link.time, Domain::NonNegative)));
         domains.extend(self.dead_zone.as_ref().map(|link| (&link.width, Domain::NonNegative)));
         domains.extend(self.saturation.as_ref().map(|link| (&link.limit, Domain::Positive)));
         domains.extend(self.lag.as_ref().map(|link| (&link.time_constant, Domain::Positive)));
         domains
+    }
+
+    /// Names of its states, in their order: that of the lag, then those of the drive.
+    pub fn states(&self) -> impl Iterator<Item = &'static str> {
+        self.lag.as_ref().map(|_| "lag").into_iter().chain(self.drive.states().iter().copied())
+    }
+
+    /// Number of its states.
+    pub fn n_states(&self) -> usize {
+        usize::from(self.lag.is_some()) + self.drive.states().len()
     }
 }
 

@@ -76,6 +76,25 @@ impl<S: Scalar> ContactFriction<S> {
         self.coefficient(speed) * normal / speed
     }
 
+    /// The resistance per normal force that an implicit step needs at a sliding speed whose square is `square` (m^2/s^2), in s/m: the
+    /// chord from rest or the tangent, whichever is larger.
+    ///
+    /// The tangent alone is negative where the friction falls, and flat beyond: a step that crosses rest would not see the friction turn
+    /// around.
+    #[inline]
+    pub fn chord(&self, square: S) -> S {
+        if square.re() <= 0.0 {
+            return S::zero();
+        }
+        let speed = square.sqrt();
+        let chord = self.coefficient(speed) / speed;
+        if speed.re() >= self.static_velocity.re() {
+            return chord;
+        }
+        let t = speed / self.static_velocity;
+        chord.max(self.static_coefficient * t * (-t + 1.0) * 6.0 / self.static_velocity)
+    }
+
     /// Friction in N, in the plane, at the sliding velocity `v` (m/s) under the normal force (N).
     #[inline]
     pub fn force(&self, v: Vector2<S>, normal: S) -> Vector2<S> {

@@ -18,10 +18,12 @@
 //! # Ok::<(), vpm_core::Error>(())
 //! ```
 
+mod entry;
 mod friction;
 mod normal;
 mod plane;
 
+pub use entry::{ContactEntry, PlaneEntry};
 pub use friction::ContactFriction;
 pub use normal::NormalContact;
 pub use plane::{Contact, Plane};

@@ -69,6 +69,14 @@ impl<S: Scalar> NormalContact<S> {
         if apart(d) { S::zero() } else { self.stiffness * (self.exponent * d.ln()).exp() }
     }
 
+    /// Slope of the spring in N/m, and resistance of the damper in N s/m, at depth `d` (m).
+    pub fn slopes(&self, d: S) -> [S; 2] {
+        if apart(d) {
+            return [S::zero(); 2];
+        }
+        [self.exponent * self.spring(d) / d, self.damping * step(d / self.damping_depth)]
+    }
+
     /// Energy in the spring in J: `k d^(n+1) / (n + 1)`.
     #[inline]
     pub fn potential(&self, d: S) -> S {

@@ -83,6 +83,19 @@ impl<S: Scalar> Contact<S> {
     /// the plane.
     #[inline]
     pub fn force(&self, plane: &Plane<S>, place: Vector3<S>, velocity: Vector3<S>) -> Vector3<S> {
+        self.force_with(plane, place, velocity, ContactFriction::resistance)
+    }
+
+    /// As [`Contact::force`], with the resistance in N s/m of the friction law, the square of the sliding speed (m^2/s^2) and the normal
+    /// force (N) by `resistance`.
+    #[inline]
+    pub(crate) fn force_with(
+        &self,
+        plane: &Plane<S>,
+        place: Vector3<S>,
+        velocity: Vector3<S>,
+        resistance: impl Fn(&ContactFriction<S>, S, S) -> S,
+    ) -> Vector3<S> {
         let leaving = plane.normal.dot(velocity);
         let normal = self.normal.force(plane.depth(place), -leaving);
         let pushed = plane.normal * normal;
@@ -90,6 +103,6 @@ impl<S: Scalar> Contact<S> {
             return pushed;
         };
         let sliding = velocity - plane.normal * leaving;
-        pushed - sliding * friction.resistance(sliding.dot(sliding), normal)
+        pushed - sliding * resistance(friction, sliding.dot(sliding), normal)
     }
 }

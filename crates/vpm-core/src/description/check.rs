@@ -1,6 +1,6 @@
 //! What a description must satisfy before anything is built from it.
 
-use super::{Description, EffectEntry};
+use super::{Description, EffectEntry, connections, controllers, drives};
 use crate::actuator::Target;
 use crate::body::Site;
 use crate::effect::Domain;
@@ -25,6 +25,10 @@ pub(super) fn references(description: &Description) -> Result<()> {
         within(&what, "parameter", index, description.parameters.len())?;
     }
     sites(description)?;
+    drives::references(description)?;
+    for cell in &description.load_cells {
+        within(&format!("load cell `{}`", cell.name), "joint", cell.joint, description.n_joints())?;
+    }
     channels(description)?;
     unique_claims(description)
 }
@@ -50,15 +54,18 @@ pub(super) fn parameters(description: &Description, theta: &[f64]) -> Result<()>
             return Err(Error::Domain { path: path.clone(), condition: domain.condition(), value });
         }
     }
-    Ok(())
+    drives::orders(description, theta)
 }
 
 fn domains(description: &Description) -> impl Iterator<Item = (usize, Domain)> {
     let effects = description.effects.iter().flat_map(EffectEntry::domains);
     let actuators = description.actuators.iter().flat_map(|actuator| actuator.domains());
+    let supplies = description.supplies.iter().flat_map(|supply| supply.domains());
     let sensors = description.sensors.iter().flat_map(|sensor| sensor.domains());
     let controllers = description.controllers.iter().flat_map(|controller| controller.law.domains());
-    effects.chain(actuators).chain(sensors).chain(controllers).map(|(&index, domain)| (index, domain))
+    let connections = connections::domains(description);
+    let domains = effects.chain(actuators).chain(supplies).chain(sensors).chain(controllers).chain(connections);
+    domains.map(|(&index, domain)| (index, domain))
 }
 
 /// Every place in the parameter vector that is used, and by what.
@@ -82,12 +89,16 @@ fn used_parameters(description: &Description) -> Vec<(String, usize)> {
     for actuator in &description.actuators {
         actuator.map(&mut |&index| used.push((format!("actuator `{}`", actuator.name), index)));
     }
+    for supply in &description.supplies {
+        supply.map(&mut |&index| used.push((format!("supply `{}`", supply.name), index)));
+    }
     for sensor in &description.sensors {
         sensor.map(&mut |&index| used.push((format!("sensor `{}`", sensor.name), index)));
     }
     for controller in &description.controllers {
         controller.law.map(&mut |&index| used.push((format!("controller `{}`", controller.name), index)));
     }
+    used.extend(connections::used(description));
     used
 }
 
@@ -109,10 +120,6 @@ fn sites(description: &Description) -> Result<()> {
             Target::Line(line) => within(&what, "line", line, description.lines.len())?,
         }
     }
-    for controller in &description.controllers {
-        let what = format!("controller `{}`", controller.name);
-        within(&what, "actuator", controller.actuator, description.n_actuators())?;
-    }
     Ok(())
 }
 
@@ -120,18 +127,11 @@ fn channels(description: &Description) -> Result<()> {
     for sensor in &description.sensors {
         channel(&format!("sensor `{}`", sensor.name), sensor.channel, description)?;
     }
-    for controller in &description.controllers {
-        let what = format!("controller `{}`", controller.name);
-        channel(&what, controller.measures, description)?;
-        if !matches!(controller.measures, Channel::Position { .. }) {
-            let message = format!("{what} measures {:?}, but a controller measures a position", controller.measures);
-            return Err(Error::Description { message });
-        }
-    }
-    Ok(())
+    controllers::check(description)
 }
 
-fn channel(what: &str, channel: Channel, description: &Description) -> Result<()> {
+pub(super) fn channel(what: &str, channel: Channel, description: &Description) -> Result<()> {
+    let layout = description.layout();
     match channel {
         Channel::Position { joint }
         | Channel::Velocity { joint }
@@ -150,6 +150,12 @@ fn channel(what: &str, channel: Channel, description: &Description) -> Result<()
         | Channel::Rx { marker }
         | Channel::Ry { marker }
         | Channel::Rz { marker } => within(what, "marker", marker, description.markers.len()),
+        Channel::Hydraulic { hydraulic, .. } => within(what, "hydraulic drive", hydraulic, layout.hydraulics),
+        Channel::Current { dc_motor } => within(what, "direct-current motor", dc_motor, layout.dc_motors),
+        Channel::Supply { supply, .. } => within(what, "supply", supply, layout.supplies),
+        Channel::Contact { contact, .. } => within(what, "contact", contact, description.contacts.len()),
+        Channel::Bushing { bushing, .. } => within(what, "bushing", bushing, description.bushings.len()),
+        Channel::LoadCell { load_cell, .. } => within(what, "load cell", load_cell, description.load_cells.len()),
     }
 }
 
@@ -160,9 +166,12 @@ fn unique_claims(description: &Description) -> Result<()> {
             return Err(twice(&first.name, &second.name, "measure the same channel"));
         }
     }
-    for (k, second) in description.controllers.iter().enumerate() {
-        if let Some(first) = description.controllers[..k].iter().find(|first| first.actuator == second.actuator) {
-            return Err(twice(&first.name, &second.name, "command the same actuator"));
+    let mut commanded = vec![None; description.n_actuators()];
+    for controller in &description.controllers {
+        for &actuator in &controller.actuators {
+            if let Some(first) = commanded[actuator].replace(&controller.name) {
+                return Err(twice(first, &controller.name, "command the same actuator"));
+            }
         }
     }
     Ok(())
@@ -172,7 +181,7 @@ fn twice(first: &str, second: &str, claim: &str) -> Error {
     Error::Twice { first: first.to_owned(), second: second.to_owned(), claim: claim.to_owned() }
 }
 
-fn within(what: &str, target: &'static str, index: usize, count: usize) -> Result<()> {
+pub(super) fn within(what: &str, target: &'static str, index: usize, count: usize) -> Result<()> {
     if index < count {
         return Ok(());
     }

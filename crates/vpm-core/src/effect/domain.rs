@@ -13,6 +13,8 @@ pub enum Domain {
     NonNegative,
     /// Anything but zero.
     NonZero,
+    /// Greater than zero and at most 1.
+    Ratio,
 }
 
 impl Domain {
@@ -24,6 +26,7 @@ impl Domain {
                 Self::Positive => value > 0.0,
                 Self::NonNegative => value >= 0.0,
                 Self::NonZero => value != 0.0,
+                Self::Ratio => value > 0.0 && value <= 1.0,
             }
     }
 
@@ -34,6 +37,7 @@ impl Domain {
             Self::Positive => "be greater than zero",
             Self::NonNegative => "not be negative",
             Self::NonZero => "not be zero",
+            Self::Ratio => "be greater than zero and at most 1",
         }
     }
 }

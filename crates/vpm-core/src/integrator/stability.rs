@@ -8,7 +8,7 @@ use super::Method;
 use crate::error::{Error, Result};
 
 /// By how much a step may let a mode grow before it counts as unstable: eigenvalues that coincide are known to half of the digits only.
-const SLACK: f64 = 1e-6;
+pub(super) const SLACK: f64 = 1e-6;
 /// QR sweeps before an eigenproblem counts as lost.
 const SWEEPS: usize = 10_000;
 
@@ -183,7 +183,7 @@ impl Reduced {
 }
 
 /// Largest step for which `rk4` lets `e^(value t)` grow no more than it does by itself.
-fn rk4_limit(value: Complex<f64>) -> f64 {
+pub(super) fn rk4_limit(value: Complex<f64>) -> f64 {
     let stable = |reach: f64| {
         let z = value * (reach / value.norm());
         let growth = (((z / 4.0 + 1.0) * z / 3.0 + 1.0) * z / 2.0 + 1.0) * z + 1.0;
@@ -201,7 +201,7 @@ fn rk4_limit(value: Complex<f64>) -> f64 {
     low / value.norm()
 }
 
-fn eigenvalues(matrix: DMatrix<f64>) -> Result<Vec<Complex<f64>>> {
+pub(super) fn eigenvalues(matrix: DMatrix<f64>) -> Result<Vec<Complex<f64>>> {
     let size = matrix.nrows() as f64;
     match Schur::try_new(matrix, f64::EPSILON, SWEEPS) {
         Some(schur) => Ok(schur.complex_eigenvalues().iter().copied().collect()),

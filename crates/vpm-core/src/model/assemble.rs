@@ -30,6 +30,8 @@ pub struct Parts<S> {
     pub markers: Vec<Marker>,
     /// Strain gauges.
     pub gauges: Vec<Gauge>,
+    /// Frames that contacts and bushings act on.
+    pub attachments: Vec<Marker>,
 }
 
 /// A tree on its way.
@@ -78,7 +80,14 @@ impl<S: Scalar> Parts<S> {
         let ends = self.lines.iter().flat_map(|line| {
             [("from", line.from.on), ("to", line.to.on)].map(|(end, on)| (format!("`{}.{end}`", line.name), on))
         });
-        bodies.chain(welds).chain(beams).chain(markers).chain(self.gauges.iter().map(gauge)).chain(ends)
+        let attachments = self.attachments.iter().map(|frame| (format!("`{}`", frame.name), frame.on));
+        bodies
+            .chain(welds)
+            .chain(beams)
+            .chain(markers)
+            .chain(self.gauges.iter().map(gauge))
+            .chain(ends)
+            .chain(attachments)
     }
 
     fn check_references(&self) -> Result<()> {

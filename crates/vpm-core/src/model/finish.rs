@@ -27,6 +27,7 @@ impl<S: Scalar> Assembly<'_, S> {
             Ok(self.aligned(self.resolved(marker.on).beyond(pose)))
         };
         let markers = self.parts.markers.iter().map(marker).collect::<Result<_>>()?;
+        let attachments = self.parts.attachments.iter().map(marker).collect::<Result<_>>()?;
         for number in 0..self.beams.len() {
             self.beams[number].root = self.aligned(self.beams[number].root);
             if let Some(first) = self.beams[number].frame {
@@ -45,6 +46,7 @@ impl<S: Scalar> Assembly<'_, S> {
             frames,
             lines,
             markers,
+            attachments,
             gauges: self.parts.gauges.iter().map(|gauge| self.strip(gauge)).collect(),
             beams: self.beams,
             n_coordinates,

@@ -1,5 +1,6 @@
 //! States and outputs of a machine in words.
 
+use crate::actuator::Drive;
 use crate::description::Description;
 use crate::sensor::Layout;
 
@@ -12,8 +13,13 @@ pub(crate) fn state_name(description: &Description, place: usize) -> String {
     if place < 2 * n {
         return coordinate_name(description, "velocity", place - n);
     }
-    let mut lagging = description.actuators.iter().filter(|actuator| actuator.lag.is_some());
-    format!("lag of actuator `{}`", lagging.nth(place - 2 * n).map_or("", |actuator| &actuator.name))
+    let of_drives =
+        description.actuators.iter().flat_map(|actuator| actuator.states().map(move |state| (state, actuator)));
+    let of_drives =
+        of_drives.map(|(state, actuator)| format!("{} of actuator `{}`", state.replace('_', " "), actuator.name));
+    let sagging = description.supplies.iter().filter(|supply| supply.is_sagging());
+    let of_supplies = sagging.map(|supply| format!("pressure of supply `{}`", supply.name));
+    of_drives.chain(of_supplies).nth(place - 2 * n).unwrap_or_default()
 }
 
 fn coordinate_name(description: &Description, quantity: &str, place: usize) -> String {
@@ -42,6 +48,8 @@ pub(super) fn coordinate(description: &Description, place: usize) -> String {
 pub(super) fn output_name(description: &Description, column: usize) -> String {
     const JOINT: [&str; 4] = ["position", "velocity", "acceleration", "effort"];
     const MARKER: [&str; 6] = ["x", "y", "z", "rx", "ry", "rz"];
+    const HYDRAULIC: [&str; 5] = ["spool", "pressure a", "pressure b", "flow a", "flow b"];
+    const WRENCH: [&str; 6] = ["mx", "my", "mz", "fx", "fy", "fz"];
     let layout: Layout = description.layout();
     let pick = |first: usize, quantities: &[&str], kind: &str, names: &[&str]| {
         let (place, quantity) = ((column - first) / quantities.len(), (column - first) % quantities.len());
@@ -64,6 +72,33 @@ pub(super) fn output_name(description: &Description, column: usize) -> String {
         let names: Vec<_> = d.gauges.iter().map(|gauge| gauge.name.as_str()).collect();
         return pick(layout.gauges(), &["strain"], "gauge", &names);
     }
-    let names: Vec<_> = d.markers.iter().map(|marker| marker.name.as_str()).collect();
-    pick(layout.markers(), &MARKER, "marker", &names)
+    if column < layout.hydraulics() {
+        let names: Vec<_> = d.markers.iter().map(|marker| marker.name.as_str()).collect();
+        return pick(layout.markers(), &MARKER, "marker", &names);
+    }
+    let of_kind = |kind: fn(&Drive<usize>) -> bool| -> Vec<&str> {
+        d.actuators.iter().filter(|actuator| kind(&actuator.drive)).map(|actuator| actuator.name.as_str()).collect()
+    };
+    if column < layout.dc_motors() {
+        let names = of_kind(|drive| matches!(drive, Drive::Hydraulic(_)));
+        return pick(layout.hydraulics(), &HYDRAULIC, "actuator", &names);
+    }
+    if column < layout.supplies() {
+        let names = of_kind(|drive| matches!(drive, Drive::DcMotor(_)));
+        return pick(layout.dc_motors(), &["current"], "actuator", &names);
+    }
+    if column < layout.contacts() {
+        let names: Vec<_> = d.supplies.iter().map(|supply| supply.name.as_str()).collect();
+        return pick(layout.supplies(), &["pressure", "flow"], "supply", &names);
+    }
+    if column < layout.bushings() {
+        let names: Vec<_> = d.contacts.iter().map(|contact| contact.name.as_str()).collect();
+        return pick(layout.contacts(), &["depth", "normal_force", "fx", "fy", "fz"], "contact", &names);
+    }
+    if column < layout.load_cells() {
+        let names: Vec<_> = d.bushings.iter().map(|bushing| bushing.name.as_str()).collect();
+        return pick(layout.bushings(), &WRENCH, "bushing", &names);
+    }
+    let names: Vec<_> = d.load_cells.iter().map(|cell| cell.name.as_str()).collect();
+    pick(layout.load_cells(), &WRENCH, "load cell", &names)
 }

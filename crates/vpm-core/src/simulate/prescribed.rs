@@ -1,6 +1,6 @@
 //! Joints that follow a given motion, and what answers to it: beams, and joints that nobody drives.
 
-use super::{Run, Setting, Stepping, check_step, halted, names};
+use super::{Run, Setting, Stepping, check_structure, halted, names};
 use crate::algebra::Cholesky;
 use crate::description::Description;
 use crate::dynamics::flexible;
@@ -44,7 +44,7 @@ pub fn prescribed(setting: Setting<'_>, motion: JointMotion<'_>, passive: &[usiz
         let mut state = motion.position.row(0).to_vec();
         state.resize(setting.description.n_states(), 0.0);
         let driven: Vec<usize> = (0..joints).filter(|joint| !passive.contains(joint)).collect();
-        check_step(setting.description, setting.theta, setting.stepping, &state, &driven)?;
+        check_structure(setting.description, setting.theta, setting.stepping, &state, &driven)?;
     }
     let job = Guided { setting, motion, passive: &passive };
     let output = |pass: &Pair<_>, place: usize| pass.first[place];
@@ -203,6 +203,7 @@ impl<'a, S: Scalar> Guide<'a, S> {
             channels[2] = a;
             channels[3] = effort;
         }
+        dynamics.observe_reactions([q, v, a], outputs);
         let wrong = |number: &S| !number.is_finite();
         let place = state.iter().position(wrong).map(|place| names::state_name(self.description, place));
         let place = place.or_else(|| outputs.iter().position(wrong).map(|c| names::output_name(self.description, c)));
@@ -294,6 +295,7 @@ impl<S: Scalar> Buffers<S> {
         for (joint, effect) in &dynamics.effects {
             load[*joint] -= effect.effort(q[*joint], v[*joint]);
         }
+        dynamics.subtract_connections(load);
         let matrix = dynamics.data.mass_matrix();
         for (own, &row) in mass.chunks_exact_mut(count.max(1)).zip(&*free) {
             for (entry, &place) in own.iter_mut().zip(&*free) {
@@ -414,8 +416,11 @@ impl<S: Scalar> Ode<S> for Free<S> {
         (self.duals.ends, self.duals.state) = (lifted, state);
     }
 
-    /// `[0, 1; -M^-1 K, -M^-1 D]`: all that is stiff, for the price of one mass matrix.
+    /// `[0, 1; -M^-1 K, -M^-1 D]`: all that is stiff, for the price of one mass matrix; with contacts and bushings the exact Jacobian.
     fn iteration_matrix(&mut self, x: &[S], matrix: &mut [S]) {
+        if !self.values.dynamics.connections.is_free() {
+            return self.jacobian(x, matrix);
+        }
         let (dim, n) = (x.len(), self.coordinates());
         matrix.fill(S::zero());
         for k in 0..n {

@@ -1,20 +1,46 @@
-//! Whether the steps of an explicit method are short enough for the flexible links of a machine.
+//! Whether the steps of an explicit method are short enough for the flexible links, drives, contacts and bushings of a machine.
 
 use super::Stepping;
-use super::names::coordinate;
+use super::names::{coordinate, state_name};
+use crate::actuator::Drive;
 use crate::description::Description;
 use crate::error::Result;
 use crate::integrator::Method;
+use crate::integrator::growth::{Rates, check_rates};
 use crate::integrator::stability::{LinearSystem, check};
 use crate::ode::Ode;
 use crate::system::System;
 
-/// Complains, with the mode and the largest stable step, if the flexible links cannot be stepped so from `state`; the
-/// joints `driven` follow a motion of their own.
+/// Complains, with the mode and the largest stable step, if flexible links, drives, contacts and bushings cannot be stepped so from `state`.
 ///
-/// Judged at the mass matrix of that state and the constant stiffness and damping of the beams; friction and springs of joints, whose
-/// slopes change with the state, are left to the run itself.
-pub(crate) fn check_step(
+/// Judged with the drives where they stand in that state; what friction, end stops, opening valves and contacts that
+/// are open add later is left to the run.
+pub(crate) fn check_step(description: &Description, theta: &[f64], stepping: Stepping, state: &[f64]) -> Result<()> {
+    if description.actuators.iter().all(|actuator| matches!(actuator.drive, Drive::Ideal(_))) {
+        return check_structure(description, theta, stepping, state, &[]);
+    }
+    let explicit = matches!(stepping.method, Method::Rk4 | Method::SemiImplicit);
+    if !explicit || state.iter().any(|number| !number.is_finite()) {
+        return Ok(());
+    }
+    let mut system: System<f64> = description.system(theta)?;
+    let (n, dim) = (description.n_coordinates(), description.n_states());
+    let (mut jacobian, mut elastic, mut sizes) = (vec![0.0; dim * dim], vec![0.0; 2 * n * n], vec![0.0; dim]);
+    system.without_friction(state, &mut jacobian);
+    system.scales(&mut sizes);
+    let elasticity = system.elasticity(state, &mut elastic).then_some(&*elastic);
+    let names: Vec<String> = (0..dim).map(|place| state_name(description, place)).collect();
+    let rates = Rates { jacobian: &jacobian, coordinates: n, elasticity, sizes: &sizes, names: &names };
+    check_rates(stepping.method, stepping.step(), &rates)
+}
+
+/// Complains, with the mode and the largest stable step, if the flexible links, contacts and bushings cannot be stepped so from `state`;
+/// the joints `driven` follow a motion of their own.
+///
+/// Judged at the mass matrix of that state, the constant stiffness and damping of the beams, and those of contacts and bushings where
+/// they are; friction and springs of joints, whose slopes change with the state, are left to the run itself, and so is a contact that is
+/// open at the start.
+pub(crate) fn check_structure(
     description: &Description,
     theta: &[f64],
     stepping: Stepping,
@@ -22,23 +48,26 @@ pub(crate) fn check_step(
     driven: &[usize],
 ) -> Result<()> {
     let explicit = matches!(stepping.method, Method::Rk4 | Method::SemiImplicit);
-    if !explicit || description.n_elastic() == 0 || state.iter().any(|number| !number.is_finite()) {
+    let connected = !description.contacts.is_empty() || !description.bushings.is_empty();
+    if !explicit || description.n_elastic() == 0 && !connected || state.iter().any(|number| !number.is_finite()) {
         return Ok(());
     }
     let mut system: System<f64> = description.system(theta)?;
     let n = description.n_coordinates();
-    if stepping.method == Method::SemiImplicit && system.elasticity(state, &mut vec![0.0; 2 * n * n]) {
+    let implicit = stepping.method == Method::SemiImplicit && system.elasticity(state, &mut vec![0.0; 2 * n * n]);
+    if implicit && !connected {
         return Ok(()); // beams are taken implicitly
     }
     let dynamics = system.dynamics();
-    dynamics.terms(&state[..n], &vec![0.0; n]);
+    dynamics.terms(&state[..n], &state[n..2 * n]);
     let (mut stiffness, mut damping) = (vec![0.0; n * n], vec![0.0; n * n]);
-    for elastic in dynamics.model.beams() {
+    dynamics.add_slopes(&mut stiffness, &mut damping);
+    for elastic in dynamics.model.beams().iter().filter(|_| !implicit) {
         let (first, len) = (elastic.coordinate, elastic.beam.len());
         for (whole, own) in [(&mut stiffness, elastic.beam.stiffness()), (&mut damping, elastic.beam.damping())] {
             for (row, entries) in own.chunks_exact(len.max(1)).enumerate() {
                 let place = (first + row) * n + first;
-                whole[place..place + len].copy_from_slice(entries);
+                whole[place..place + len].iter_mut().zip(entries).for_each(|(sum, entry)| *sum += entry);
             }
         }
     }

@@ -1,6 +1,8 @@
 //! A machine in a single state, in buffers that stand ready: inverse and forward dynamics, mass matrix, energy, Jacobians.
 
 use super::{Dynamics, add_effects};
+use crate::actuator::{Actuator, Drive, Target};
+use crate::contact::ContactFriction;
 use crate::dynamics::{Energy, crba, energy, flexible, for_each_column, frames, lines, poses, rnea};
 use crate::scalar::Scalar;
 use crate::spatial::{Pose, Twist};
@@ -12,13 +14,30 @@ impl<S: Scalar> Dynamics<S> {
         self.tensions.fill(S::zero());
         self.efforts.copy_from_slice(&efforts[..joints]);
         let elastic = &efforts[joints..];
-        self.accelerate(q, v, |effects, q, v, total| add_effects(effects, q, v, total), elastic);
+        self.locate(q, v);
+        self.accelerate(q, v, (add_effects, ContactFriction::resistance), elastic);
         &self.data.acceleration
     }
 
     /// Efforts on all coordinates that give accelerations `a` at (q, v), with the efforts of the effects taken off. On the elastic
     /// coordinates they vanish in free motion.
     pub fn inverse_dynamics(&mut self, q: &[S], v: &[S], a: &[S], efforts: &mut [S]) {
+        self.inverse_dynamics_of_tree(q, v, a, efforts);
+        if self.connections.is_free() {
+            return;
+        }
+        let Self { model, data, loads, .. } = self;
+        loads.fill(S::zero());
+        frames(model, data, q, v);
+        poses(model, data);
+        self.connections.add_loads(model, data, ContactFriction::resistance, loads);
+        for (effort, &load) in efforts.iter_mut().zip(&*loads) {
+            *effort -= load;
+        }
+    }
+
+    /// As [`Dynamics::inverse_dynamics`], but without what contacts and bushings do.
+    pub(crate) fn inverse_dynamics_of_tree(&mut self, q: &[S], v: &[S], a: &[S], efforts: &mut [S]) {
         let Self { model, data, loads, .. } = self;
         if model.is_recursive() {
             efforts.copy_from_slice(rnea(model, data, q, v, a));
@@ -44,15 +63,52 @@ impl<S: Scalar> Dynamics<S> {
         &data.mass_matrix
     }
 
-    /// Kinetic and potential energy in J. The potential is that of gravity, of the beams, and of the effects that have one.
+    /// Kinetic and potential energy in J. The potential is that of gravity, of the beams, of contacts and bushings, of the effects that have
+    /// one, and of springs along lines without command, visco-elastic ones settled.
     pub fn energy(&mut self, q: &[S], v: &[S]) -> Energy<S> {
-        let Self { model, data, effects, .. } = self;
+        let Self { model, data, effects, connections, .. } = self;
         let mut total = match model.is_recursive() {
             true => energy(model, data, q, v),
             false => flexible::energy(model, data, q, v),
         };
         total.potential += effects.iter().map(|(joint, effect)| effect.potential(q[*joint])).sum();
+        if !connections.is_free() {
+            frames(model, data, q, v);
+            poses(model, data);
+            total.potential += connections.potential(data);
+        }
+        total.potential += self.springs(q, v);
         total
+    }
+
+    /// Takes off `loads` what contacts and bushings do, after [`Dynamics::terms`] at the same coordinates and rates.
+    pub(crate) fn subtract_connections(&mut self, loads: &mut [S]) {
+        let Self { model, data, loads: own, connections, .. } = self;
+        if connections.is_free() {
+            return;
+        }
+        poses(model, data);
+        own.fill(S::zero());
+        connections.add_loads(model, data, ContactFriction::resistance, own);
+        loads.iter_mut().zip(&*own).for_each(|(load, &own)| *load -= own);
+    }
+
+    /// Energy of the springs along lines, J.
+    fn springs(&mut self, q: &[S], v: &[S]) -> S {
+        let spring = |drive: &Drive<S>| matches!(drive, Drive::SpringDamper(_) | Drive::Maxwell(_));
+        if !self.actuators.iter().any(|actuator| spring(&actuator.drive)) {
+            return S::zero();
+        }
+        self.locate(q, v);
+        let lines = &self.data.composite.lines;
+        let potential = |actuator: &Actuator<S>| match (&actuator.drive, actuator.on) {
+            (Drive::SpringDamper(law), Target::Line(line)) => law.potential(lines[line].length),
+            (Drive::Maxwell(law), Target::Line(line)) => {
+                law.potential(lines[line].length, law.settled(lines[line].length))
+            }
+            _ => S::zero(),
+        };
+        self.actuators.iter().map(potential).sum()
     }
 
     /// Whether actuators act on lines.

@@ -1,7 +1,8 @@
 //! What can be seen of a machine in a state: all its outputs, in one place.
 
 use super::Dynamics;
-use crate::dynamics::{frames, lines, poses};
+use super::connections::into_body;
+use crate::dynamics::{Motion, frames, lines, poses, reactions};
 use crate::scalar::Scalar;
 use crate::sensor::Layout;
 use crate::spatial::Pose;
@@ -15,6 +16,12 @@ impl<S: Scalar> Dynamics<S> {
             lines: self.model.lines().len(),
             gauges: self.model.gauges().len(),
             markers: self.model.markers().len(),
+            hydraulics: self.shown.hydraulics.len(),
+            dc_motors: self.shown.currents.len(),
+            supplies: self.supplies.len(),
+            contacts: self.connections.contacts.len(),
+            bushings: self.connections.bushings.len(),
+            load_cells: self.connections.cells.len(),
         }
     }
 
@@ -22,8 +29,9 @@ impl<S: Scalar> Dynamics<S> {
     /// actuator is what enters its lag.
     pub fn observe(&mut self, x: &[S], dxdt: &[S], outputs: &mut [S]) {
         self.observe_motion(x, outputs);
-        self.observe_efforts(dxdt, outputs);
-        let commands = outputs[self.layout().actuators()..].chunks_exact_mut(2);
+        self.observe_efforts(x, dxdt, outputs);
+        let layout = self.layout();
+        let commands = outputs[layout.actuators()..layout.lines()].chunks_exact_mut(2);
         for (channels, &input) in commands.zip(&self.inputs) {
             channels[0] = input;
         }
@@ -37,16 +45,16 @@ impl<S: Scalar> Dynamics<S> {
             channels[0] = q;
             channels[1] = v;
         }
-        if layout.lines + layout.gauges + layout.markers == 0 {
+        if layout.lines + layout.gauges + layout.markers == 0 && self.connections.is_free() {
             return;
         }
-        let Self { model, data, .. } = self;
+        let Self { model, data, connections, .. } = self;
         frames(model, data, q, v);
         poses(model, data);
         lines(model, data);
         for (channels, line) in outputs[layout.lines()..].chunks_exact_mut(3).zip(&data.composite.lines) {
             channels[0] = line.length;
-            channels[1] = line.direction.dot(line.to.velocity - line.from.velocity);
+            channels[1] = line.rate();
         }
         for (output, gauge) in outputs[layout.gauges()..].iter_mut().zip(model.gauges()) {
             let [kappa_x, kappa_y, .., extension] = gauge.section.strain(&q[gauge.first..gauge.first + gauge.len]);
@@ -58,10 +66,29 @@ impl<S: Scalar> Dynamics<S> {
             channels[..3].copy_from_slice(&pose.translation.to_array());
             channels[3..].copy_from_slice(&pose.rotation.rotation_vector().to_array());
         }
+        connections.observe_contacts(data, &mut outputs[layout.contacts()..layout.bushings()]);
+        connections.observe_bushings(data, &mut outputs[layout.bushings()..layout.load_cells()]);
     }
 
-    /// The outputs that follow from the efforts: accelerations, efforts, forces, after [`Dynamics::rhs`].
-    pub(crate) fn observe_efforts(&mut self, dxdt: &[S], outputs: &mut [S]) {
+    /// The reactions at the load cells' joints in the motion `[q, v, a]`, with the forces that stand on the lines.
+    pub(crate) fn observe_reactions(&mut self, motion: Motion<'_, S>, outputs: &mut [S]) {
+        if self.connections.cells.is_empty() {
+            return;
+        }
+        let first = self.layout().load_cells();
+        let Self { model, data, connections, tensions, .. } = self;
+        let mut extra = std::mem::take(&mut connections.extra);
+        reactions(model, data, motion, &mut extra, tensions, |data| connections.take_off(data));
+        connections.extra = extra;
+        for (channels, &joint) in outputs[first..].chunks_exact_mut(6).zip(&connections.cells) {
+            let wrench = into_body(model, joint, data.composite.frames[joint + 1].wrench);
+            channels[..3].copy_from_slice(&wrench.angular.to_array());
+            channels[3..].copy_from_slice(&wrench.linear.to_array());
+        }
+    }
+
+    /// The outputs that follow from the efforts: accelerations, efforts, forces, what drives and supplies show, reactions, in state `x` after [`Dynamics::rhs`].
+    pub(crate) fn observe_efforts(&mut self, x: &[S], dxdt: &[S], outputs: &mut [S]) {
         let (n, layout) = (self.coordinates(), self.layout());
         let accelerations = &dxdt[n..2 * n];
         let of_joints = outputs[..layout.actuators()].chunks_exact_mut(4);
@@ -75,5 +102,17 @@ impl<S: Scalar> Dynamics<S> {
         for (channels, &tension) in outputs[layout.lines()..].chunks_exact_mut(3).zip(&self.tensions) {
             channels[2] = tension;
         }
+        let shown = &self.shown;
+        for (channels, values) in
+            outputs[layout.hydraulics()..layout.dc_motors()].chunks_exact_mut(5).zip(&shown.hydraulics)
+        {
+            channels.copy_from_slice(values);
+        }
+        outputs[layout.dc_motors()..layout.supplies()].copy_from_slice(&shown.currents);
+        for (channels, values) in outputs[layout.supplies()..layout.contacts()].chunks_exact_mut(2).zip(&shown.supplies)
+        {
+            channels.copy_from_slice(values);
+        }
+        self.observe_reactions([&x[..n], &x[n..2 * n], accelerations], outputs);
     }
 }

@@ -1,11 +1,11 @@
 //! What is stiff in a machine with elastic beams, for implicit steps.
 
 use super::Dynamics;
-use crate::actuator::Target;
+use crate::actuator::{Drive, Target};
 use crate::scalar::Scalar;
 
 /// `[0, 1; -M^-1 K, -M^-1 D]` with the slopes of the effects in K and their chords, `resistances`, in D, and the columns and rows of
-/// the lags, for the price of one mass matrix.
+/// the lags of ideal drives, for the price of one mass matrix.
 ///
 /// What it leaves out, the change of gravity, of velocity terms and of levers with the state, is slow beside the vibrations. Checked:
 /// against the exact Jacobian of a beam at rest without gravity, where nothing is left out.
@@ -42,7 +42,8 @@ pub(super) fn iteration_matrix<S: Scalar>(
     let lagging = actuators.iter().filter_map(|actuator| actuator.lag.as_ref().map(|lag| (actuator, lag)));
     for (place, (actuator, lag)) in (2 * n..).zip(lagging) {
         column.fill(S::zero());
-        let force = actuator.motor.effort(S::one());
+        let Drive::Ideal(drive) = &actuator.drive else { continue };
+        let force = drive.slope(x[place]);
         match actuator.on {
             Target::Joint(joint) => column[joint] = force,
             Target::Line(line) => data.line_load(line, force, column),

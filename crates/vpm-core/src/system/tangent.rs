@@ -1,6 +1,8 @@
 //! The state Jacobian of a machine, by dual numbers.
 
 use super::{Build, Dynamics};
+use crate::contact::ContactFriction;
+use crate::effect::JointEffect;
 use crate::scalar::{Dual, Scalar};
 
 /// States up to which two directions are taken at once: the two states of a single axis, and a good fit to the vector registers.
@@ -33,10 +35,10 @@ impl<S: Scalar> Tangent<S> {
     }
 
     #[inline]
-    pub(super) fn hold(&mut self, actuator: usize, input: S) {
+    pub(super) fn hold(&mut self, number: usize, input: S) {
         match self {
-            Self::Narrow(lanes) => lanes.dynamics.inputs[actuator] = Dual::constant(input),
-            Self::Wide(lanes) => lanes.dynamics.inputs[actuator] = Dual::constant(input),
+            Self::Narrow(lanes) => lanes.dynamics.inputs[number] = Dual::constant(input),
+            Self::Wide(lanes) => lanes.dynamics.inputs[number] = Dual::constant(input),
         }
     }
 
@@ -48,16 +50,16 @@ impl<S: Scalar> Tangent<S> {
         }
     }
 
-    /// df/dx with the friction laws replaced by `resistances` on the joints.
-    pub(super) fn chords(&mut self, x: &[S], matrix: &mut [S], resistances: &[S]) {
+    /// df/dx with the friction laws replaced by `resistances` on the joints and by those of the `seals`.
+    pub(super) fn chords(&mut self, x: &[S], matrix: &mut [S], resistances: &[S], seals: &[Option<S>]) {
         match self {
-            Self::Narrow(lanes) => lanes.columns(x, matrix, |d, x, rate| chords(d, x, rate, resistances)),
-            Self::Wide(lanes) => lanes.columns(x, matrix, |d, x, rate| chords(d, x, rate, resistances)),
+            Self::Narrow(lanes) => lanes.chords(x, matrix, resistances, seals),
+            Self::Wide(lanes) => lanes.chords(x, matrix, resistances, seals),
         }
     }
 }
 
-/// The right-hand side with the friction laws replaced by `resistances`.
+/// The right-hand side with the friction laws of joints replaced by `resistances`, and those of contacts by their chords.
 #[inline]
 fn chords<S: Scalar, const N: usize>(
     dynamics: &mut Dynamics<Dual<S, N>>,
@@ -65,14 +67,18 @@ fn chords<S: Scalar, const N: usize>(
     rate: &mut [Dual<S, N>],
     resistances: &[S],
 ) {
-    dynamics.rhs_with(x, rate, |effects, q, v, total| {
+    let at_rest = |effects: &[(usize, JointEffect<_>)], q: &[_], v: &[_], total: &mut [_]| {
         for (joint, effect) in effects {
             total[*joint] += effect.effort_at_rest(q[*joint]);
         }
         for ((total, &v), &resistance) in total.iter_mut().zip(v).zip(resistances) {
             *total -= Dual::constant(resistance) * v;
         }
-    });
+    };
+    let chord = |law: &ContactFriction<Dual<S, N>>, square: Dual<S, N>, normal| {
+        Dual::constant(law.chord(Dual::constant(square.value)).value) * normal
+    };
+    dynamics.rhs_with(x, rate, (at_rest, chord));
 }
 
 impl<S: Scalar, const N: usize> Lanes<S, N> {
@@ -80,6 +86,14 @@ impl<S: Scalar, const N: usize> Lanes<S, N> {
         let lifted: Vec<_> = theta.iter().map(|&value| Dual::constant(value)).collect();
         let zero = vec![Dual::default(); dim];
         Ok(Self { dynamics: build.dynamics(&lifted)?, state: zero.clone(), rate: zero })
+    }
+
+    fn chords(&mut self, x: &[S], matrix: &mut [S], resistances: &[S], seals: &[Option<S>]) {
+        for (seal, chord) in self.dynamics.seals.iter_mut().zip(seals) {
+            *seal = chord.map(Dual::constant);
+        }
+        self.columns(x, matrix, |d, x, rate| chords(d, x, rate, resistances));
+        self.dynamics.seals.fill(None);
     }
 
     /// The derivative of `rhs` along each state, `N` at a time, as columns of a matrix stored row by row.

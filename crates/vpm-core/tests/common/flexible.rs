@@ -33,6 +33,7 @@ pub fn lift<S: Scalar>(parts: &Parts<f64>) -> Parts<S> {
         lines: parts.lines.iter().map(|line| line.map(number)).collect(),
         markers: parts.markers.clone(),
         gauges: parts.gauges.clone(),
+        attachments: parts.attachments.clone(),
     }
 }
 

@@ -1,8 +1,9 @@
 //! The published servo-cylinder, and its motion under a current that is a function of time.
+#![allow(dead_code, reason = "each user takes some of it")]
 
 use vpm_core::actuator::DeadZone;
 use vpm_core::actuator::hydraulic::{
-    Cylinder, EndStop, Fluid, Load, Orifice, SealFriction, ServoCylinder, ServoState, Valve,
+    Cylinder, EndStop, Fluid, Load, Orifice, PistonSize, SealFriction, ServoCylinder, ServoState, Valve,
 };
 use vpm_core::ode::Ode;
 use vpm_core::{Dual, Scalar};
@@ -11,8 +12,7 @@ use vpm_core::{Dual, Scalar};
 pub fn nominal() -> ServoCylinder<f64> {
     let gain = Orifice::rated_gain(7.5 / 60e3, 35e5, 0.01);
     let cylinder = Cylinder {
-        bore: 0.016,
-        rod: 0.010,
+        size: PistonSize::Diameters { bore: 0.016, rod: 0.010 },
         stroke: 0.080,
         line_a: 2.9e-6,
         line_b: 2.9e-6,

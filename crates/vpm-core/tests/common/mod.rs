@@ -1,6 +1,8 @@
 //! Machines for the tests: built part by part, with every number a named parameter.
 #![allow(dead_code, reason = "each test file uses its own part of this")]
 
+pub mod parts;
+
 use serde_json::{Value, json, to_value};
 use vpm_core::description::Description;
 use vpm_core::integrator::Method;
@@ -35,10 +37,37 @@ impl Machine {
     }
 
     fn push(&mut self, list: &str, part: Value) {
+        if self.parts[list].is_null() {
+            self.parts[list] = json!([]);
+        }
         self.parts[list].as_array_mut().unwrap().push(part);
     }
 
-    fn parameter(&mut self, name: &str, value: f64) -> usize {
+    /// A part of any kind: what is in `fixed` as it is, and of `numbers` every float as a parameter named by its way.
+    pub fn add(&mut self, list: &str, mut fixed: Value, numbers: Value) -> &mut Self {
+        let name = fixed["name"].as_str().unwrap().to_owned();
+        for (key, value) in numbers.as_object().unwrap() {
+            fixed[key] = self.numbered(&format!("{name}.{key}"), value);
+        }
+        self.push(list, fixed);
+        self
+    }
+
+    fn numbered(&mut self, way: &str, value: &Value) -> Value {
+        match value {
+            Value::Number(number) if number.is_f64() => json!(self.parameter(way, number.as_f64().unwrap())),
+            Value::Object(parts) => {
+                parts.iter().map(|(key, part)| (key.clone(), self.numbered(&format!("{way}.{key}"), part))).collect()
+            }
+            Value::Array(parts) => {
+                let parts = parts.iter().enumerate();
+                parts.map(|(place, part)| self.numbered(&format!("{way}.{place}"), part)).collect()
+            }
+            other => other.clone(),
+        }
+    }
+
+    pub fn parameter(&mut self, name: &str, value: f64) -> usize {
         self.names.push(name.to_owned());
         self.values.push(value);
         self.values.len() - 1
@@ -68,10 +97,16 @@ impl Machine {
         self.part("effects", "payload", part, &[("mass", mass)])
     }
 
-    /// An actuator `drive`, `drive1`, ... on a joint.
+    /// An actuator `drive0`, `drive1`, ... on a joint, with an ideal drive.
     pub fn actuator(&mut self, joint: usize, numbers: &[(&str, f64)]) -> &mut Self {
         let name = format!("drive{joint}");
-        self.part("actuators", &name, json!({"name": name, "on": {"joint": joint}}), numbers)
+        let of_drive = |known: &&(&str, f64)| ["gain", "limit"].contains(&known.0);
+        let mut drive = json!({"type": "ideal"});
+        for (number, value) in numbers.iter().filter(of_drive) {
+            drive[number] = json!(self.parameter(&format!("{name}.{number}"), *value));
+        }
+        let others: Vec<_> = numbers.iter().filter(|number| !of_drive(number)).copied().collect();
+        self.part("actuators", &name, json!({"name": name, "on": {"joint": joint}, "drive": drive}), &others)
     }
 
     /// A sensor on a channel, `{"kind": ..., "joint": ...}`.
@@ -142,7 +177,7 @@ impl Bench {
     }
 
     fn table<'a>(&self, name: &str, numbers: &'a [f64]) -> Table<'a> {
-        let columns = self.description.n_actuators();
+        let columns = self.description.n_inputs();
         Table::new(name, numbers, numbers.len() / columns.max(1), columns).unwrap()
     }
 

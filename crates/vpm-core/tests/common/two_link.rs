@@ -59,7 +59,8 @@ pub fn arm(level: &Value) -> Result<Description> {
             {"name": "second", "beam": 1, "at": 0.02, "x": 0.0, "y": 0.002}],
         "markers": [{"name": "tip", "on": tip(1, 0.41), "translation": [0.0, 0.0, 0.0], "rotation": UPRIGHT}],
         "effects": effects,
-        "actuators": [{"name": "motor0", "on": {"joint": 0}, "gain": gain}, {"name": "motor1", "on": {"joint": 1}, "gain": gain}],
+        "actuators": [{"name": "motor0", "on": {"joint": 0}, "drive": {"type": "ideal", "gain": gain}},
+            {"name": "motor1", "on": {"joint": 1}, "drive": {"type": "ideal", "gain": gain}}],
         "parameters": values, "parameter_names": names,
     });
     Description::from_json(&description.to_string())

@@ -111,6 +111,13 @@ impl System {
         ))
     }
 
+    /// States of drives and supplies (n_states - 2 n,) of a machine that has stood at a position (n,) without commands.
+    fn internal_state<'py>(&self, py: Python<'py>, theta: &Any<'py>, position: &Any<'py>) -> PyResult<Row<'py>> {
+        let (theta, q) = (Numbers::vector("theta", theta)?, Numbers::vector("position", position)?);
+        let result = unbroken(|| evaluate::internal_state(self.description(), theta.values(), q.values()))?;
+        Ok(PyArray1::from_vec(py, self.checked(py, result)?))
+    }
+
     /// All coordinates (n,) at rest under gravity with the joints held, and the efforts (n_joints,) that hold them.
     fn equilibrium<'py>(
         &self,

@@ -88,7 +88,7 @@ impl System {
         self.description.n_beams()
     }
 
-    /// Length of the state: positions, velocities, one state per actuator with lag.
+    /// Length of the state: positions, velocities, states of the drives, pressures of sagging supplies.
     #[getter]
     fn n_states(&self) -> usize {
         self.description.n_states()
@@ -100,13 +100,13 @@ impl System {
         self.description.n_actuators()
     }
 
-    /// Number of inputs: one command per actuator.
+    /// Number of inputs: one command per actuator, then one pressure per logged supply.
     #[getter]
     fn n_inputs(&self) -> usize {
-        self.description.n_actuators()
+        self.description.n_inputs()
     }
 
-    /// Number of output channels: four per joint, two per actuator.
+    /// Number of output channels.
     #[getter]
     fn n_outputs(&self) -> usize {
         self.description.n_outputs()

@@ -1,10 +1,8 @@
 //! The cylinder: two chambers of oil with a piston between them.
 
-use std::f64::consts::FRAC_PI_4;
-
 use serde::Deserialize;
 
-use super::{EndStop, Fluid, NamedDomain, SealFriction};
+use super::{EndStop, Fluid, NamedDomain, PistonSize, SealFriction};
 use crate::effect::Domain;
 use crate::scalar::Scalar;
 
@@ -19,20 +17,18 @@ pub struct Chambers<S> {
 
 /// Cylinder with a rod on one side; x is the piston's place from mid-stroke, positive where chamber a is large.
 ///
-/// Law: areas `A = pi/4 bore^2` and `alpha A = pi/4 (bore^2 - rod^2)`; volumes `va = line_a + A (L/2 + x)` and
+/// Law: areas A and `alpha A`, see [`PistonSize`]; volumes `va = line_a + A (L/2 + x)` and
 /// `vb = line_b + alpha A (L/2 - x)`, never below those of the lines; `pa' = beta_e/va (qa - A v - leak - leak_a)` and
 /// `pb' = beta_e/vb (-qb + alpha A v + leak - leak_b)` (4.11, 4.12 with the sign of A v corrected), `leak = C_i (pa - pb)`,
 /// `leak_k = C_e (pk - pt)`. Force on the piston `A pa - alpha A pb` (N), friction of the seals and stops apart.
 /// Beyond an end the closed chamber's volume stays that of its line, and does not change with v.
-/// Source: D'Imperio 2016, section 4.1 and appendix A. Checked: bore, rod, stroke, lines and stiffness of the stop are positive,
-/// leakages and damping not negative; the rod is thinner than the bore.
+/// Source: D'Imperio 2016, section 4.1 and appendix A. Checked: stroke, lines and stiffness of the stop are positive,
+/// leakages and damping not negative; see the size.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Cylinder<P> {
-    /// Diameter of the piston, m.
-    pub bore: P,
-    /// Diameter of the rod, m.
-    pub rod: P,
+    /// How thick piston and rod are.
+    pub size: PistonSize<P>,
     /// Way of the piston, m.
     pub stroke: P,
     /// Volume of the line to chamber a and of what the piston leaves there at its end, m^3.
@@ -53,8 +49,7 @@ impl<P> Cylinder<P> {
     /// The same cylinder over another number type.
     pub fn map<T>(&self, f: &mut impl FnMut(&P) -> T) -> Cylinder<T> {
         Cylinder {
-            bore: f(&self.bore),
-            rod: f(&self.rod),
+            size: self.size.map(f),
             stroke: f(&self.stroke),
             line_a: f(&self.line_a),
             line_b: f(&self.line_b),
@@ -67,9 +62,8 @@ impl<P> Cylinder<P> {
 
     /// The parameters and where each is defined.
     pub fn domains(&self) -> Vec<NamedDomain<'_, P>> {
-        let mut domains = vec![
-            ("cylinder.bore", &self.bore, Domain::Positive),
-            ("cylinder.rod", &self.rod, Domain::Positive),
+        let mut domains = self.size.domains();
+        domains.extend([
             ("cylinder.stroke", &self.stroke, Domain::Positive),
             ("cylinder.line_a", &self.line_a, Domain::Positive),
             ("cylinder.line_b", &self.line_b, Domain::Positive),
@@ -77,7 +71,7 @@ impl<P> Cylinder<P> {
             ("cylinder.external_leakage", &self.external_leakage, Domain::NonNegative),
             ("cylinder.stop.stiffness", &self.stop.stiffness, Domain::Positive),
             ("cylinder.stop.damping", &self.stop.damping, Domain::NonNegative),
-        ];
+        ]);
         domains.extend(self.seal.domains());
         domains
     }
@@ -87,8 +81,14 @@ impl<S: Scalar> Cylinder<S> {
     /// Areas in m^2 on which the pressures act.
     #[inline]
     pub fn areas(&self) -> Chambers<S> {
-        let full = self.bore * self.bore * FRAC_PI_4;
-        Chambers { a: full, b: full - self.rod * self.rod * FRAC_PI_4 }
+        self.size.areas()
+    }
+
+    /// Pressures in Pa at rest without net force between a supply and a tank (Pa): `A pa = alpha A pb`, `pa + pb = ps + pt`.
+    pub fn rest(&self, supply: S, tank: S) -> Chambers<S> {
+        let areas = self.areas();
+        let b = (supply + tank) / (areas.b / areas.a + 1.0);
+        Chambers { a: areas.b / areas.a * b, b }
     }
 
     /// Volumes in m^3 with the piston at `x`.

@@ -1,20 +1,27 @@
-//! Hydraulic drives: oil, edges of a valve, servovalve, cylinder, and a servo-cylinder as a rig of its own.
+//! Hydraulic drives: oil, edges of a valve, servovalve, cylinder, supply; as drives of a machine, and a servo-cylinder as a rig of its
+//! own.
 //!
 //! Equation numbers are those of D'Imperio 2016, "Modelling and simulation techniques for advanced robotic systems", chapter 4;
 //! where a printed equation is wrong the corrected one is given. All pressures are absolute, in Pa.
 
 mod cylinder;
+mod drive;
 mod fluid;
 mod orifice;
 mod piston;
 mod servo;
+mod size;
+mod supply;
 mod valve;
 
 pub use cylinder::{Chambers, Cylinder};
+pub use drive::{DriveAction, DriveState, HydraulicDrive};
 pub use fluid::{EntrainedAir, Fluid};
 pub use orifice::Orifice;
 pub use piston::{EndStop, SealFriction};
 pub use servo::{Load, ServoCylinder, ServoRig, ServoState};
+pub use size::PistonSize;
+pub use supply::{Sagging, Source, Supply};
 pub use valve::{Flows, Valve};
 
 use crate::effect::Domain;

@@ -90,4 +90,17 @@ impl<S: Scalar> SealFriction<S> {
         let coulomb = self.coulomb.map_or(S::zero(), |law| law.effort(v));
         viscous + coulomb + self.stribeck.map_or(S::zero(), |law| law.effort(v))
     }
+    /// Resistance in N s/m at velocity `v` (m/s): the force is `-r v`, the slope of the chord from rest.
+    #[inline]
+    pub fn resistance(&self, v: S) -> S {
+        let viscous = self.viscous.map_or(S::zero(), |law| law.resistance());
+        let coulomb = self.coulomb.map_or(S::zero(), |law| law.resistance(v));
+        viscous + coulomb + self.stribeck.map_or(S::zero(), |law| law.resistance(v))
+    }
+
+    /// Whether there is any.
+    #[inline]
+    pub fn is_there(&self) -> bool {
+        self.viscous.is_some() || self.coulomb.is_some() || self.stribeck.is_some()
+    }
 }

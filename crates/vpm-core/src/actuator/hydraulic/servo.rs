@@ -2,7 +2,7 @@
 
 use serde::Deserialize;
 
-use super::{Chambers, Cylinder, Flows, Fluid, NamedDomain, Valve};
+use super::{Chambers, Cylinder, Flows, Fluid, NamedDomain, PistonSize, Valve};
 use crate::effect::Domain;
 use crate::error::{Error, Result};
 use crate::ode::Ode;
@@ -104,9 +104,8 @@ impl<P> ServoCylinder<P> {
 impl<S: Scalar> ServoCylinder<S> {
     /// At rest at mid-stroke with the spool in the middle and no force on the load: `A pa = alpha A pb`, `pa + pb = ps + pt`.
     pub fn rest(&self) -> ServoState<S> {
-        let (areas, zero) = (self.cylinder.areas(), S::zero());
-        let b = (self.supply_pressure + self.tank_pressure) / (areas.b / areas.a + 1.0);
-        let chambers = Chambers { a: areas.b / areas.a * b, b };
+        let zero = S::zero();
+        let chambers = self.cylinder.rest(self.supply_pressure, self.tank_pressure);
         ServoState { position: zero, spool: zero, velocity: zero, spool_rate: zero, chambers }
     }
 
@@ -162,10 +161,11 @@ impl<S: Scalar> ServoRig<S> {
                 return Err(Error::Domain { path: name.to_owned(), condition: domain.condition(), value });
             }
         }
-        let (bore, value) = (servo.cylinder.bore.re(), servo.cylinder.rod.re());
-        if value >= bore {
-            let condition = format!("be below the bore, {bore} m");
-            let repair = "give both as diameters in m";
+        if let PistonSize::Diameters { bore, rod } = servo.cylinder.size
+            && rod.re() >= bore.re()
+        {
+            let condition = format!("be below the bore, {} m", bore.re());
+            let (value, repair) = (rod.re(), "give both as diameters in m");
             return Err(Error::Setting { setting: "the diameter of a cylinder's rod", condition, value, repair });
         }
         let lifted = servo.map(&mut |&parameter| Dual::constant(parameter));

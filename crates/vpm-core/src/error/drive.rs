@@ -1,0 +1,65 @@
+//! What can go wrong with drives and their supplies.
+
+/// A drive or a supply that cannot be as described, or that is asked for what it cannot tell.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum DriveError {
+    /// A drive on something that it cannot act on.
+    #[error(
+        "actuator `{actuator}` of type {drive} acts on {found}, but it needs {needed}; put it there or give it another type"
+    )]
+    Target {
+        /// Name of the actuator.
+        actuator: String,
+        /// Type of its drive.
+        drive: &'static str,
+        /// What it acts on, with the name.
+        found: String,
+        /// What it can act on.
+        needed: &'static str,
+    },
+    /// Two parameters whose order has no meaning.
+    #[error("`{path}` must be below `{other}` ({limit}), got {value}; {repair}")]
+    Order {
+        /// Dotted name of the one.
+        path: String,
+        /// Its value.
+        value: f64,
+        /// Dotted name of the other.
+        other: String,
+        /// Its value.
+        limit: f64,
+        /// What to do.
+        repair: &'static str,
+    },
+    /// A piston that starts outside of its cylinder.
+    #[error(
+        "the piston of actuator `{actuator}` starts {place} m from mid-stroke, but its stroke ends at -{reach} m and {reach} m; start \
+         where {measure} lies between {least} m and {most} m, or correct `retracted_length`"
+    )]
+    Piston {
+        /// Name of the actuator.
+        actuator: String,
+        /// Place of the piston from mid-stroke, m.
+        place: f64,
+        /// Half of the stroke, m.
+        reach: f64,
+        /// What decides the place, for example ``the length of line `strut` ``.
+        measure: String,
+        /// Its value at the end of chamber a, m.
+        least: f64,
+        /// Its value at the end of chamber b, m.
+        most: f64,
+    },
+    /// Inverse dynamics with a drive that has a life of its own.
+    #[error(
+        "the effort of actuator `{actuator}` of type {drive} does not follow from its command alone, so that it cannot be balanced sample \
+         by sample; simulate it, in a free run or in restarts from measured states"
+    )]
+    Effort {
+        /// Name of the actuator.
+        actuator: String,
+        /// Type of its drive.
+        drive: &'static str,
+    },
+}

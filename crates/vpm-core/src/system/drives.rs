@@ -1,0 +1,266 @@
+//! Drives and supplies of a machine: what they push, and how their states change.
+
+use super::Dynamics;
+use crate::actuator::hydraulic::{Chambers, DriveState, Source, Supply};
+use crate::actuator::{Actuator, Drive, Maxwell, SpringDamper, Target};
+use crate::data::LineSlot;
+use crate::scalar::Scalar;
+
+/// What drives and supplies show beside their forces, in the state last evaluated.
+#[derive(Clone, Debug)]
+pub(super) struct Shown<S> {
+    /// Spool, pressures a and b (Pa), flows into a and out of b (m^3/s) of each hydraulic drive.
+    pub(super) hydraulics: Vec<[S; 5]>,
+    /// Current of each motor, A.
+    pub(super) currents: Vec<S>,
+    /// Pressure (Pa) of each supply, and the flow (m^3/s) drawn from it.
+    pub(super) supplies: Vec<[S; 2]>,
+}
+
+impl<S: Scalar> Shown<S> {
+    pub(super) fn new(actuators: &[Actuator<S>], supplies: &[Supply<S>]) -> Self {
+        let count = |kind: fn(&Drive<S>) -> bool| actuators.iter().filter(|actuator| kind(&actuator.drive)).count();
+        Self {
+            hydraulics: vec![[S::zero(); 5]; count(|drive| matches!(drive, Drive::Hydraulic(_)))],
+            currents: vec![S::zero(); count(|drive| matches!(drive, Drive::DcMotor(_)))],
+            supplies: supplies.iter().map(|supply| [supply.pressure, S::zero()]).collect(),
+        }
+    }
+}
+
+/// Length or coordinate of what an actuator acts on, and its rate.
+#[inline]
+fn motion<S: Scalar>(on: Target, q: &[S], v: &[S], lines: &[LineSlot<S>]) -> [S; 2] {
+    match on {
+        Target::Joint(joint) => [q[joint], v[joint]],
+        Target::Line(line) => [lines[line].length, lines[line].rate()],
+    }
+}
+
+impl<S: Scalar> Dynamics<S> {
+    /// Forces, joint efforts and tensions of the actuators, and the rates of the states of drives and supplies, at state `x` with the
+    /// lines where they are.
+    #[inline]
+    pub(super) fn actuate(&mut self, x: &[S], dxdt: &mut [S]) {
+        let first = 2 * self.coordinates();
+        if self.ideal {
+            self.actuate_ideal(&x[first..], &mut dxdt[first..]);
+        } else {
+            self.actuate_any(x, dxdt);
+        }
+    }
+
+    /// As [`Dynamics::actuate`] where all efforts follow from commands alone.
+    #[inline]
+    fn actuate_ideal(&mut self, lags: &[S], rates: &mut [S]) {
+        self.efforts.fill(S::zero());
+        self.tensions.fill(S::zero());
+        let mut states = lags.iter().zip(rates);
+        for ((actuator, &input), force) in self.actuators.iter().zip(&self.inputs).zip(&mut self.forces) {
+            let Drive::Ideal(drive) = &actuator.drive else { continue };
+            *force = match (&actuator.lag, if actuator.lag.is_some() { states.next() } else { None }) {
+                (Some(lag), Some((&state, rate))) => {
+                    *rate = lag.rate(state, input);
+                    drive.effort(state)
+                }
+                _ => drive.effort(input),
+            };
+            match actuator.on {
+                Target::Joint(joint) => self.efforts[joint] += *force,
+                Target::Line(line) => self.tensions[line] += *force,
+            }
+        }
+    }
+
+    /// As [`Dynamics::actuate`] for drives of every kind.
+    fn actuate_any(&mut self, x: &[S], dxdt: &mut [S]) {
+        let n = self.coordinates();
+        let (q, v, states, rates) = (&x[..n], &x[n..2 * n], &x[2 * n..], &mut dxdt[2 * n..]);
+        self.efforts.fill(S::zero());
+        self.tensions.fill(S::zero());
+        if !self.supplies.is_empty() {
+            self.feed(states);
+        }
+        let Self { actuators, supplies, inputs, data, shown, seals, .. } = self;
+        let (mut at, mut motors, mut cylinders) = (0, 0, 0);
+        for (number, actuator) in actuators.iter().enumerate() {
+            let mut input = inputs[number];
+            if let Some(lag) = &actuator.lag {
+                rates[at] = lag.rate(states[at], input);
+                input = states[at];
+                at += 1;
+            }
+            let moving = || motion(actuator.on, q, v, &data.composite.lines);
+            let force = match &actuator.drive {
+                Drive::Ideal(law) => law.effort(input),
+                Drive::DcMotor(law) => {
+                    let (current, [_, rate]) = (states[at], moving());
+                    rates[at] = law.current_rate(current, input, rate);
+                    shown.currents[motors] = current;
+                    (at, motors) = (at + 1, motors + 1);
+                    law.effort(current, rate)
+                }
+                Drive::SpringDamper(law) => {
+                    let [length, rate] = moving();
+                    SpringDamper { free_length: law.free_length + input, ..*law }.force(length, rate)
+                }
+                Drive::Maxwell(law) => {
+                    let (stretch, [length, _]) = (states[at], moving());
+                    let law = Maxwell { free_length: law.free_length + input, ..*law };
+                    rates[at] = law.rate(length, stretch);
+                    at += 1;
+                    -law.force(length, stretch)
+                }
+                Drive::Hydraulic(law) => {
+                    let [length, rate] = moving();
+                    let (piston, [pressure, drawn]) = (law.piston(length), &mut shown.supplies[law.supply]);
+                    let [spool, spool_rate, a, b] = [0, 1, 2, 3].map(|k| states[at + k]);
+                    let state = DriveState { spool, spool_rate, chambers: Chambers { a, b } };
+                    let action = law.action(state, input, [piston, rate], (&supplies[law.supply], *pressure));
+                    rates[at..at + 4].copy_from_slice(&action.rates);
+                    *drawn += action.flows.supply;
+                    let (pressures, flows) = (action.pressures, action.flows);
+                    shown.hydraulics[cylinders] = [spool, pressures.a, pressures.b, flows.into_a, flows.out_of_b];
+                    (at, cylinders) = (at + 4, cylinders + 1);
+                    let seal = match seals[number] {
+                        Some(resistance) => -(resistance * rate),
+                        None => law.cylinder.seal.force(rate),
+                    };
+                    action.force + seal
+                }
+            };
+            self.forces[number] = force;
+            match actuator.on {
+                Target::Joint(joint) => self.efforts[joint] += force,
+                Target::Line(line) => self.tensions[line] += force,
+            }
+        }
+        if !self.supplies.is_empty() {
+            self.sag(&mut rates[at..]);
+        }
+    }
+
+    /// The pressures of the supplies, nothing drawn yet.
+    fn feed(&mut self, states: &[S]) {
+        let Self { supplies, inputs, shown, actuators, internal, .. } = self;
+        let mut logged = inputs[actuators.len()..].iter();
+        let sagging = supplies.iter().filter(|supply| supply.is_sagging()).count();
+        let mut own = states[*internal - sagging..].iter();
+        for (supply, shown) in supplies.iter().zip(&mut shown.supplies) {
+            let pressure = match supply.source {
+                Source::Constant => None,
+                Source::Logged => logged.next(),
+                Source::Sagging(_) => own.next(),
+            };
+            *shown = [pressure.copied().unwrap_or(supply.pressure), S::zero()];
+        }
+    }
+
+    /// The rates of the pressures that are states.
+    fn sag(&self, rates: &mut [S]) {
+        let mut rates = rates.iter_mut();
+        for (supply, &[pressure, flow]) in self.supplies.iter().zip(&self.shown.supplies) {
+            if let Source::Sagging(law) = &supply.source
+                && let Some(rate) = rates.next()
+            {
+                *rate = law.rate(pressure, supply.pressure, flow);
+            }
+        }
+    }
+
+    /// What input `number` amounts to over the interval that begins at sample `k`: of an actuator after delay, dead zone and saturation, of
+    /// a supply as it is.
+    #[inline]
+    pub fn input(&self, number: usize, k: usize, time_step: f64, command: impl Fn(usize) -> S) -> S {
+        match self.actuators.get(number) {
+            Some(actuator) => actuator.input(k, time_step, command),
+            None => command(k),
+        }
+    }
+
+    /// Writes the states of drives and supplies of a machine that has stood at `q` without commands: lags, currents and spools 0,
+    /// visco-elastic elements settled, chambers without net force, supplies at their pressure.
+    pub fn settle_drives(&mut self, q: &[S], states: &mut [S]) {
+        let zero = vec![S::zero(); q.len()];
+        self.locate(q, &zero);
+        let mut at = states.iter_mut();
+        let mut next = |value: S| at.next().into_iter().for_each(|state| *state = value);
+        for actuator in &self.actuators {
+            if actuator.lag.is_some() {
+                next(S::zero());
+            }
+            let [length, _] = motion(actuator.on, q, &zero, &self.data.composite.lines);
+            match &actuator.drive {
+                Drive::Ideal(_) | Drive::SpringDamper(_) => {}
+                Drive::DcMotor(_) => next(S::zero()),
+                Drive::Maxwell(law) => next(law.settled(length)),
+                Drive::Hydraulic(law) => {
+                    let Chambers { a, b } = law.rest(&self.supplies[law.supply]);
+                    [S::zero(), S::zero(), a, b].into_iter().for_each(&mut next);
+                }
+            }
+        }
+        self.supplies.iter().filter(|supply| supply.is_sagging()).for_each(|supply| next(supply.pressure));
+    }
+
+    /// Number of an actuator whose piston stands beyond its stroke at `q` by more than the stops give way (1 mm or 2 % of the stroke),
+    /// with the piston's place from mid-stroke and half of the stroke, m.
+    pub(crate) fn piston_outside(&mut self, q: &[S]) -> Option<(usize, f64, f64)> {
+        if self.shown.hydraulics.is_empty() {
+            return None;
+        }
+        self.loads.fill(S::zero());
+        let rest = std::mem::take(&mut self.loads);
+        self.locate(q, &rest);
+        let lines = &self.data.composite.lines;
+        let found = self.actuators.iter().enumerate().find_map(|(number, actuator)| {
+            let Drive::Hydraulic(law) = &actuator.drive else { return None };
+            let [length, _] = motion(actuator.on, q, &rest, lines);
+            let (place, reach) = (law.piston(length).re(), 0.5 * law.cylinder.stroke.re());
+            (place.abs() > reach + (0.04 * reach).max(1e-3)).then_some((number, place, reach))
+        });
+        self.loads = rest;
+        found
+    }
+
+    /// Writes the resistances of the seals, N s/m, that stand for their friction in an iteration matrix at (q, v); the lines are moved there.
+    pub(super) fn seal_chords(&mut self, q: &[S], v: &[S], chords: &mut [Option<S>]) {
+        let sealed = |actuator: &Actuator<S>| match &actuator.drive {
+            Drive::Hydraulic(law) => law.cylinder.seal.is_there(),
+            _ => false,
+        };
+        if self.ideal || !self.actuators.iter().any(sealed) {
+            return;
+        }
+        self.locate(q, v);
+        for (actuator, chord) in self.actuators.iter().zip(chords) {
+            if let Drive::Hydraulic(law) = &actuator.drive {
+                let [_, rate] = motion(actuator.on, q, v, &self.data.composite.lines);
+                *chord = Some(law.cylinder.seal.resistance(rate));
+            }
+        }
+    }
+
+    /// Natural sizes of the states of drives and supplies, in SI units.
+    pub(super) fn drive_scales(&self, scales: &mut [f64]) {
+        const STRETCH: f64 = 1e-3;
+        const PRESSURE: f64 = 1e5;
+        let mut scales = scales.iter_mut();
+        let mut next = |value: f64| scales.next().into_iter().for_each(|scale| *scale = value);
+        for actuator in &self.actuators {
+            if actuator.lag.is_some() {
+                next(actuator.saturation.map_or(1.0, |saturation| saturation.limit.re()));
+            }
+            match &actuator.drive {
+                Drive::Ideal(_) | Drive::SpringDamper(_) => {}
+                Drive::DcMotor(_) => next(1.0),
+                Drive::Maxwell(_) => next(STRETCH),
+                Drive::Hydraulic(law) => {
+                    let (stroke, frequency) = (law.valve.stroke.re(), law.valve.frequency.re());
+                    [stroke, stroke * frequency, PRESSURE, PRESSURE].into_iter().for_each(&mut next);
+                }
+            }
+        }
+        self.supplies.iter().filter(|supply| supply.is_sagging()).for_each(|_| next(PRESSURE));
+    }
+}

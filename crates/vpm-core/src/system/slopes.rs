@@ -1,0 +1,75 @@
+//! Stiffness and damping that contacts and bushings give the coordinates, for the check of explicit steps.
+
+use super::Dynamics;
+use super::connections::{PlacedBushing, PlacedContact};
+use crate::bushing::Bushing;
+use crate::contact::ContactFriction;
+use crate::dynamics::{for_each_column, poses};
+use crate::spatial::{Pose, Twist};
+
+impl Dynamics<f64> {
+    /// Adds to `stiffness` and `damping` (n x n) those of contacts and bushings, after [`Dynamics::terms`] at the same state.
+    ///
+    /// Law: `J^T K J` and `J^T C J` with K and C of each law where it is now, the friction by its chord: what is left out, the change of
+    /// J with the state, is small beside it. Checked: against the change of the loads with the state.
+    pub(crate) fn add_slopes(&mut self, stiffness: &mut [f64], damping: &mut [f64]) {
+        poses(&self.model, &mut self.data);
+        for contact in &self.connections.contacts {
+            self.add_contact(contact, stiffness, damping);
+        }
+        for bushing in &self.connections.bushings {
+            self.add_bushing(bushing, stiffness, damping);
+        }
+    }
+
+    fn add_contact(&self, contact: &PlacedContact<f64>, stiffness: &mut [f64], damping: &mut [f64]) {
+        let slot = &self.data.composite.frames[contact.frame];
+        let Some(touch) = contact.touch(slot, ContactFriction::resistance) else { return };
+        let (normal, n) = (contact.plane.normal(), self.coordinates());
+        let [slope, resistance] = contact.law.normal.slopes(contact.plane.depth(touch.place));
+        let leaving = normal.dot(touch.velocity);
+        let sliding = touch.velocity - normal * leaving;
+        let chord = contact.law.friction.map_or(0.0, |law| law.chord(sliding.dot(sliding)));
+        let chord = chord * normal.dot(touch.force);
+        let mut columns = vec![None; n];
+        self.columns(contact.frame, |place, column| {
+            columns[place] = Some(column.linear + column.angular.cross(touch.place));
+        });
+        for (i, left) in columns.iter().enumerate() {
+            for (j, right) in columns.iter().enumerate() {
+                let (Some(left), Some(right)) = (left, right) else { continue };
+                let along = normal.dot(*left) * normal.dot(*right);
+                stiffness[i * n + j] += slope * along;
+                damping[i * n + j] += resistance * along + chord * (left.dot(*right) - along);
+            }
+        }
+    }
+
+    fn add_bushing(&self, bushing: &PlacedBushing<f64>, stiffness: &mut [f64], damping: &mut [f64]) {
+        let (frames, n) = (&self.data.composite.frames, self.coordinates());
+        let [pose_a, pose_b]: [Pose<f64>; 2] = [bushing.a, bushing.b].map(|end| frames[end.frame].pose * end.pose);
+        let pose = pose_b.inverse() * pose_a;
+        let mut motions = vec![Twist::zero(); n];
+        for (end, sign) in [(bushing.a, 1.0), (bushing.b, -1.0)] {
+            self.columns(end.frame, |place, column| motions[place] += pose_a.inverse_twist(column) * sign);
+        }
+        let rates: Vec<[f64; 6]> = motions.iter().map(|motion| Bushing::displacement_rate(&pose, *motion)).collect();
+        for (matrix, whole) in [(&bushing.law.stiffness, stiffness), (&bushing.law.damping, damping)] {
+            for (i, left) in rates.iter().enumerate() {
+                for (j, right) in rates.iter().enumerate() {
+                    whole[i * n + j] += quadratic(left, matrix, right);
+                }
+            }
+        }
+    }
+
+    fn columns(&self, frame: usize, visit: impl FnMut(usize, Twist<f64>)) {
+        let composite = &self.data.composite;
+        for_each_column(&self.model, &composite.frames, &composite.sections, frame, visit);
+    }
+}
+
+fn quadratic(left: &[f64; 6], matrix: &[[f64; 6]; 6], right: &[f64; 6]) -> f64 {
+    let row = |entries: &[f64; 6]| entries.iter().zip(right).map(|(entry, right)| entry * right).sum::<f64>();
+    left.iter().zip(matrix).map(|(left, entries)| left * row(entries)).sum()
+}

@@ -1,0 +1,137 @@
+"""What a model answers about its drives and supplies, by name: types, what they move, inputs, states."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from functools import cached_property
+
+from vpm.errors import ModelError, near_match
+from vpm.model.check import Checked
+from vpm.model.drives import COMPLIANT
+from vpm.model.pose import Pose
+from vpm.model.structure import Mount, Structure
+
+#: States of a drive beside its lag, in the order of the core.
+DRIVE_STATES: Mapping[str, tuple[str, ...]] = {
+    "dc_motor": ("current",),
+    "maxwell": ("stretch",),
+    "hydraulic": ("spool", "spool_rate", "chamber_a", "chamber_b"),
+}
+
+
+class DriveComponents:
+    """The part of a model that knows its drives; it relies on the checked document and changes nothing."""
+
+    _checked: Checked
+
+    @property
+    def supplies(self) -> tuple[str, ...]:
+        """Hydraulic supplies."""
+        return tuple(self._checked.document.supplies)
+
+    @cached_property
+    def logged_supplies(self) -> tuple[str, ...]:
+        """Supplies whose pressure is an input, taken from the log."""
+        supplies = self._checked.document.supplies
+        return tuple(name for name, supply in supplies.items() if supply.source == "logged")
+
+    @property
+    def actuators(self) -> tuple[str, ...]:
+        """Actuators; actuator k is input k."""
+        return tuple(self._checked.document.actuators)
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Inputs by name: each actuator for its command, then ``pump.pressure`` of each logged supply."""
+        return (*self.actuators, *(f"{name}.pressure" for name in self.logged_supplies))
+
+    @cached_property
+    def input_channels(self) -> tuple[str, ...]:
+        """Commands, one per actuator, then the pressures of logged supplies."""
+        return (*(f"{name}.command" for name in self.actuators), *self.inputs[len(self.actuators) :])
+
+    @cached_property
+    def optional_inputs(self) -> frozenset[str]:
+        """Commands that a log need not hold: lengths that are added to those of springs, none by default."""
+        actuators = self._checked.document.actuators
+        return frozenset(f"{name}.command" for name, entry in actuators.items() if isinstance(entry, COMPLIANT))
+
+    def actuator_type(self, actuator: str) -> str:
+        """Type of an actuator: "ideal", "dc_motor", "spring_damper", "maxwell" or "hydraulic".
+
+        Raises
+        ------
+        ModelError
+            There is no such actuator.
+        """
+        return self._checked.document.actuators[self._known(actuator, self.actuators, "actuator")].type
+
+    def supply_of_actuator(self, actuator: str) -> str | None:
+        """Supply of a hydraulic actuator; None for the others.
+
+        Raises
+        ------
+        ModelError
+            There is no such actuator.
+        """
+        entry = self._checked.document.actuators[self._known(actuator, self.actuators, "actuator")]
+        return entry.supply if entry.type == "hydraulic" else None
+
+    def joints_of_actuator(self, actuator: str) -> tuple[str, ...]:
+        """Joints on which an actuator has an effect: its own, or those that change the length of its line.
+
+        Raises
+        ------
+        ModelError
+            There is no such actuator.
+        """
+        entry = self._checked.document.actuators[self._known(actuator, self.actuators, "actuator")]
+        if entry.joint is not None:
+            return (entry.joint,)
+        structure, line = self._checked.structure, self._checked.document.lines[str(entry.line)]
+        ends = [structure.mounted(end.parent, end.at, Pose()).mount for end in (line.start, line.end)]
+        ways = [set(_way(structure, end)) for end in ends]
+        return tuple(name for k, name in enumerate(structure.joints) if k in ways[0] ^ ways[1])
+
+    def has_lag(self, actuator: str) -> bool:
+        """Whether an actuator follows its command with a lag, which adds a state."""
+        self._known(actuator, self.actuators, "actuator")
+        return any(e.type == "actuator_lag" and e.at == actuator for e in self._checked.document.effects)
+
+    @cached_property
+    def internal_names(self) -> tuple[str, ...]:
+        """States beside coordinates and their rates: per actuator lag and drive, then supplies that sag."""
+        supplies = self._checked.document.supplies
+        sagging = (f"{name}.pressure" for name, supply in supplies.items() if supply.source == "sagging")
+        return (*(state for name in self.actuators for state in self._states_of(name)), *sagging)
+
+    def _states_of(self, actuator: str) -> Iterator[str]:
+        if self.has_lag(actuator):
+            yield f"{actuator}.lag"
+        for state in DRIVE_STATES.get(self.actuator_type(actuator), ()):
+            yield f"{actuator}.{state}"
+
+    def internal_unit(self, state: str) -> str:
+        """SI unit of a state of `internal_names`."""
+        owner, _, name = state.partition(".")
+        units = {"current": "A", "stretch": "m", "chamber_a": "Pa", "chamber_b": "Pa", "pressure": "Pa"}
+        if name in units:
+            return units[name]
+        command = self._checked.structure.unit(f"{owner}.command")
+        return f"{command}/s" if name == "spool_rate" else command
+
+    def _known(self, name: str, names: tuple[str, ...], what: str) -> str:
+        if name not in names:
+            model = self._checked.document.name
+            raise ModelError(f'{model} has no {what} "{name}"; {near_match(name, names, what="it has")}', where=name)
+        return name
+
+
+def _way(structure: Structure, mount: Mount) -> Iterator[int]:
+    """Joints on the way from a mount to the world."""
+    while mount.kind != "world":
+        if mount.kind == "section":
+            mount = structure.frames[structure.beams[mount.index]].mount
+        else:
+            yield mount.index
+            mount = structure.axes[mount.index].frame.mount

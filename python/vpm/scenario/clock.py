@@ -1,0 +1,66 @@
+"""The time base of a scenario: one for all runs."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vpm.scenario.messages import refuse
+from vpm.scenario.schema import Document
+from vpm.scenario.values import si_value
+
+#: Samples that a scenario may have: more do not fit into a memory.
+MOST_SAMPLES = 10_000_000
+
+#: Share of a step by which the duration may miss a whole number of steps: decimal fractions are rounded.
+DIVISION_TOLERANCE = 1e-6
+
+
+@dataclass(frozen=True)
+class Clock:
+    """Samples at ``0, time_step, 2 time_step, ... duration``.
+
+    Attributes
+    ----------
+    duration, time_step : float
+        s.
+    steps : int
+        Steps between the first and the last sample.
+    """
+
+    duration: float
+    time_step: float
+    steps: int
+
+    @cached_property
+    def time(self) -> NDArray[np.float64]:
+        """Shape (steps + 1,), s."""
+        return np.arange(self.steps + 1, dtype=np.float64) * np.float64(self.time_step)
+
+
+def clock_of(document: Document) -> Clock:
+    """Time base of a scenario.
+
+    Raises
+    ------
+    ScenarioError
+        A time is not positive, or the duration is no whole number of steps.
+    """
+    duration = si_value(document.duration, "s", ("duration",))
+    time_step = si_value(document.time_step, "s", ("time_step",))
+    for name, value in (("duration", duration), ("time_step", time_step)):
+        if not value > 0.0:
+            refuse((name,), f"is {value:g} s, but has to be above 0 s; correct it")
+    steps = duration / time_step
+    if steps > MOST_SAMPLES:
+        refuse(("time_step",), f"is {time_step:g} s, which makes {steps:.3g} samples in {duration:g} s; make it longer")
+    whole = round(steps)
+    if whole < 1 or abs(steps - whole) > DIVISION_TOLERANCE:
+        near = duration / max(1, math.ceil(steps - DIVISION_TOLERANCE))
+        rest = f"is {time_step:g} s, which does not divide the duration of {duration:g} s ({steps:.6g} steps)"
+        refuse(("time_step",), f"{rest}; write for example {near:.6g}")
+    return Clock(duration, time_step, whole)

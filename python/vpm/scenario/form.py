@@ -1,0 +1,122 @@
+"""What the schema finds in a scenario file, rewritten as sentences with the repair."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from pydantic import ValidationError
+
+from vpm.errors import near_match
+from vpm.model.messages import Problem, place
+from vpm.model.schema import keys_of
+from vpm.scenario.schema import INPUTS, SIGNALS, Document, Given, Listed, PlotEntry, RunEntry
+
+Keys = tuple[str | int, ...]
+
+#: How a key is written, for messages about missing ones.
+_EXAMPLES: Mapping[str, str] = {
+    "scenario": 'scenario = "drop from 50 mm"',
+    "duration": "duration = 0.5",
+    "time_step": "time_step = 1e-3",
+    "runs": "a table [[runs]] with name and model",
+    "name": 'name = "stiff"',
+    "model": 'model = "arm.toml"',
+    "panels": 'panels = [["axis.position"], ["drive.force"]]',
+    "value": "value = 1.0",
+    "amplitude": 'amplitude = { value = 5.0, unit = "deg" }',
+    "frequency": "frequency = 2.0",
+    "from": "from = 0.5",
+    "to": "to = 10.0",
+    "time": "time = [0.0, 0.1]",
+    "type": 'type = "payload"',
+    "at": 'at = "axis"',
+}
+
+#: What has to stand at a place, by the kind of error that says it does not.
+_KINDS: Mapping[str, str] = {
+    "float_type": "a number",
+    "int_type": "a whole number",
+    "finite_number": "a finite number",
+    "string_type": "text in quotes",
+    "dict_type": "a table",
+    "model_type": "a table",
+    "model_attributes_type": "a table",
+    "list_type": "a list",
+    "tuple_type": "a list",
+}
+
+
+def schema_problems(error: ValidationError) -> list[Problem]:
+    """Rewrite what the schema found; unknown keys come first, for what is missing is often what is misspelt."""
+    problems = []
+    for detail in sorted(error.errors(include_url=False), key=lambda found: found["type"] != "extra_forbidden"):
+        keys, signal = _without_type(detail["loc"])
+        if keys[-1] == "value" and detail["type"] not in {"missing", "extra_forbidden"} and _nested(keys):
+            keys = keys[:-1]  # bare numbers have no such key
+        rest = _sentence(detail["type"], keys, signal, detail["input"], detail.get("ctx", {}))
+        problems.append(Problem(place(*keys), rest))
+    return problems
+
+
+def _without_type(keys: Keys) -> tuple[Keys, str | None]:
+    """Place without what the schema puts into it: the type of a signal, the branch of a level."""
+    if keys[0] in INPUTS and len(keys) > 2:
+        place_of_number = keys[5:] if len(keys) == 6 and keys[4] == "value" else keys[4:]  # bare lists have no such key
+        return (*keys[:2], *keys[3:4], *place_of_number), str(keys[2])
+    if keys[0] == "runs" and len(keys) > 3 and keys[2] == "level":
+        return keys[:3], None
+    return keys, None
+
+
+def _nested(keys: Keys) -> bool:
+    """Whether ``value`` at the end is that of a quantity, not a signal's own."""
+    return not (keys[0] in INPUTS and len(keys) == 3)
+
+
+def _sentence(kind: str, keys: Keys, signal: str | None, found: object, context: Mapping[str, Any]) -> str:
+    """Rest of the sentence for one error of the schema."""
+    if kind == "extra_forbidden":
+        return f"is not a known key; {near_match(str(keys[-1]), _known_keys(keys, signal))}"
+    if kind == "missing":
+        example = _EXAMPLES.get(str(keys[-1]))
+        return "is missing; add it" + (f", for example {example}" if example else "")
+    if kind in _KINDS:
+        return f"is {_shown(found)}, but has to be {_KINDS[kind]}; correct it"
+    if kind == "greater_than_equal":
+        return f"is {found}, but has to be {context['ge']} or more; correct it"
+    if kind == "too_short":
+        return f"is empty; add {_EXAMPLES.get(str(keys[-1]), 'an entry')}"
+    if kind == "string_too_short":
+        return "is empty text; give it a content"
+    if kind == "union_tag_not_found":
+        return f'has no type; add for example type = "points"; {near_match("", SIGNALS, what="the types are")}'
+    if kind == "union_tag_invalid":
+        return f"has the type {_shown(context.get('tag'))}; {near_match(str(context.get('tag')), SIGNALS)}"
+    reason = str(context.get("error", f"is {_shown(found)}, which cannot be; correct it"))
+    return reason if reason.startswith(("has ", "is ")) else f"is wrong: {reason}"
+
+
+def _known_keys(keys: Keys, signal: str | None) -> tuple[str, ...]:
+    """Keys that would have been right where an unknown one stands."""
+    if len(keys) == 1:
+        return keys_of(Document)
+    if signal is not None and len(keys) == 3:
+        return keys_of(SIGNALS[signal])
+    if keys[0] == "runs" and len(keys) == 3:
+        return keys_of(RunEntry)
+    if keys[0] == "plot":
+        return keys_of(PlotEntry)
+    return keys_of(Listed if keys[-2] == "time" else Given)
+
+
+def _shown(value: object) -> str:
+    if isinstance(value, str):
+        return f'"{value}"'
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, Mapping):
+        return "a table"
+    if isinstance(value, list | tuple):
+        return f"a list of {len(value)}"
+    return str(value)
