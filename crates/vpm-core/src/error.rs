@@ -252,14 +252,9 @@ pub enum Error {
         /// What to do.
         repair: &'static str,
     },
-    /// An actuator without controller in a closed loop.
-    #[error(
-        "actuator `{actuator}` has no controller, so the loop is not closed; give it one or simulate with measured commands"
-    )]
-    OpenLoop {
-        /// Name of the actuator.
-        actuator: String,
-    },
+    /// A closed loop without controllers.
+    #[error("the machine has no controller, so no loop is closed; give it one or simulate with measured commands")]
+    OpenLoop,
     /// A drive or a supply that cannot be as described.
     #[error("{0}")]
     Drive(#[from] DriveError),

@@ -95,8 +95,8 @@ pub fn free_run(setting: Setting<'_>, initial_state: &[f64], inputs: Table<'_>) 
     execute(setting, plan)
 }
 
-/// Closed loop: the controllers follow `references`; `disturbances` are added to their commands (both N x inputs). The pressures of logged
-/// supplies stand among the disturbances, and so do the commands of actuators that have no controller.
+/// Closed loop: the controllers follow `references`; `disturbances` are added to their commands (both N x inputs). What no controller
+/// commands, other actuators and the pressures of logged supplies, is given by the disturbances alone.
 pub fn closed_loop(
     setting: Setting<'_>,
     initial_state: &[f64],
@@ -108,8 +108,8 @@ pub fn closed_loop(
     references.expect("references", rows, inputs)?;
     disturbances.expect("disturbances", rows, inputs)?;
     check_state("initial_state", description, initial_state)?;
-    if let (Some(actuator), true) = (description.actuators.first(), description.controllers.is_empty()) {
-        return Err(Error::OpenLoop { actuator: actuator.name.clone() });
+    if description.controllers.is_empty() {
+        return Err(Error::OpenLoop);
     }
     let drive = Drive::Loop { references, disturbances };
     execute(setting, Plan { drive, initial: initial_state, starts: &[0], horizon: rows })
