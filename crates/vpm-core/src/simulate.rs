@@ -108,7 +108,8 @@ pub fn closed_loop(
     disturbances.expect("disturbances", rows, inputs)?;
     check_state("initial_state", description, initial_state)?;
     for (number, actuator) in description.actuators.iter().enumerate() {
-        if !description.controllers.iter().any(|controller| controller.actuator == number) {
+        let held = description.controllers.iter().any(|controller| controller.actuator == number);
+        if actuator.drive.needs_command() && !held {
             return Err(Error::OpenLoop { actuator: actuator.name.clone() });
         }
     }
