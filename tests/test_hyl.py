@@ -157,7 +157,7 @@ def test_controllers_of_a_robot_change_the_drop_a_little() -> None:
     assert np.abs(heights - REFERENCE["hyl.drop.hip_height"]["value"][:4]).max() == pytest.approx(5.6e-4, abs=5e-5)
 
 
-@pytest.mark.parametrize("name", ["static", "quasi_static", "drop", "hydraulic_drop"])
+@pytest.mark.parametrize("name", ["static", "drop", "hydraulic_drop"])
 def test_every_scenario_runs(name: str) -> None:
     result = vpm.Scenario.load(hyl.HYL / f"{name}.toml").run()
     assert result.failures == {}
@@ -169,7 +169,8 @@ def test_every_scenario_runs(name: str) -> None:
 def test_a_hand_reaches_the_published_range() -> None:
     """A knee cylinder of 295 to 317 mm, and a knee force up to about 3 kN."""
     result = vpm.Scenario.load(hyl.HYL / "quasi_static.toml").run()
+    assert result.failures == {}
     lengths = np.concatenate([run["knee_cylinder.length"] for run in result.runs.values()])
     forces = np.concatenate([run["knee_drive.force"] for run in result.runs.values()])
-    assert 0.293 < lengths.min() < 0.300
+    assert 0.295 < lengths.min() < 0.300
     assert 2500.0 < forces.max() < 3300.0
