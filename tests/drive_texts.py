@@ -74,7 +74,7 @@ damping = { value = 3.3, unit = "kN s/m" }
 type = "maxwell"
 line = "knee_strut"
 stiffness = { value = 44.0, unit = "kN/m" }
-free_length = { value = 400.0, unit = "mm" }
+free_length = { value = 420.0, unit = "mm" }
 fast_stiffness = { value = 20.0, unit = "kN/m" }
 relaxation_time = { value = 4.0, unit = "ms" }
 """

@@ -48,6 +48,13 @@ proportional = 200.0
 derivative = 20.0
 """
 
+HAND = """
+[actuators.hand]
+joint = "axis"
+gain = 1.0
+command_unit = "N"
+"""
+
 LAG = """
 [[effects]]
 type = "actuator_lag"
@@ -175,6 +182,22 @@ def test_a_controller_without_a_reference_holds_where_it_is(folder: Path) -> Non
     assert np.all(made.experiment("servo")["drive.reference"] == 0.25)
     run = made.run()["servo"]
     assert run.notes == ("drive has no reference, so it holds axis.position at its initial 0.25 m.",)
+
+
+def test_a_hand_without_a_controller_pushes_a_controlled_machine(folder: Path) -> None:
+    (folder / "pushed.toml").write_text(SLED + HAND + SERVO, encoding="utf-8")
+    push = {"type": "sine", "amplitude": 2.0, "frequency": 4.0, "mean": 1.0}
+    made = scenario(folder, commands={"hand": push}, runs=[{"name": "pushed", "model": "pushed.toml"}])
+    run = made.run()["pushed"]
+    # The same force through the drive itself, added to what its controller commands.
+    inputs = made.experiment("pushed")
+    model = vpm.Model.load(folder / "servo.toml")
+    values = {"drive.reference": inputs["drive.reference"], "drive.disturbance": inputs["hand.command"] / 3.0}
+    log = vpm.Experiment.from_arrays(inputs.time, values, model=model)
+    alone = vpm.simulate(model, log, "closed_loop")
+    assert np.abs(run["axis.position"]).max() > 0.01
+    assert run["axis.position"] == pytest.approx(alone["axis.position"], abs=1e-12)
+    assert np.array_equal(run["hand.command"], inputs["hand.command"])
 
 
 def test_runs_differ_in_effects_parameters_and_level(folder: Path) -> None:

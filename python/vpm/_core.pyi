@@ -277,10 +277,10 @@ class System:
             As in `simulate`; ``effort`` of a joint is the effort that the motion needs.
         """
     def internal_state(self, theta: ArrayLike, position: ArrayLike) -> NDArray[np.float64]:
-        """What follows coordinates and rates in a state of a machine that has stood at ``position`` (n_coordinates,) without commands.
+        """What follows coordinates and rates in a state of a machine that has stood without commands.
 
-        Shape (n_states - 2 n_coordinates,): lags, currents and spools zero, visco-elastic elements settled, chambers without net force,
-        sagging supplies at their pressure.
+        It stood at ``position`` (n_coordinates,). Shape (n_states - 2 n_coordinates,): lags, currents and spools zero,
+        visco-elastic elements settled, chambers without net force, sagging supplies at their pressure.
         """
     def equilibrium(self, theta: ArrayLike, position: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Coordinates (n_coordinates,) at rest with the joints held at ``position``, and the holding efforts (n,)."""

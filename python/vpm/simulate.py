@@ -38,7 +38,7 @@ Array = NDArray[np.float64]
 MODES = ("free_run", "inverse_dynamics", "restarts", "closed_loop", "prescribed_motion")
 #: Integrators of fixed steps, whose work is bounded.
 FIXED_STEP = ("linearly_implicit", "rosenbrock", "rk4", "semi_implicit")
-INTEGRATORS = (*FIXED_STEP, "adaptive")
+INTEGRATORS = (*FIXED_STEP, "guarded", "adaptive")
 
 
 @dataclass(frozen=True)
@@ -47,14 +47,16 @@ class Setup:
 
     Attributes
     ----------
-    integrator : {"linearly_implicit", "rosenbrock", "rk4", "semi_implicit", "adaptive"} or ``"adaptive(1e-8)"``
+    integrator : {"linearly_implicit", "rosenbrock", "rk4", "semi_implicit", "guarded", "adaptive", "adaptive(1e-8)"}
         The first two are stable whatever is stiff, of order 2 and 4; the first also stops on dry friction far
         sharper than a step. The next two are explicit, but for the constant stiffness of flexible links in the last.
         ``adaptive`` takes as many steps of ``rosenbrock`` as keep the error of each within a tolerance, 1e-6 or the
         one in brackets, relative to each state and its natural size: for impacts, oil and other things that change
-        between microseconds and seconds. Its time is not bounded.
+        between microseconds and seconds. Its time is not bounded. ``guarded`` is its counterpart for real time: one
+        step of ``rosenbrock``, or up to 16 where an impact or a jump makes its error larger than 1 %.
     substeps : int
-        Integration steps per sample of the log; with ``adaptive`` pieces of a sample that take one step at least.
+        Integration steps per sample of the log; with ``adaptive`` and ``guarded`` pieces of a sample that take one
+        step at least.
     horizon : float
         Length of each restart, s.
     settling : float
@@ -182,8 +184,10 @@ def judging_mode(model: Model, records: Sequence[Experiment]) -> str:
     Elsewhere restarts, which need no more than position and command.
     """
     held = model.controlled_actuators
-    known = all(f"{name}.reference" in record for name in held for record in records)
-    return "closed_loop" if held and not _uncontrolled(model) and known else "restarts"
+    needed = [f"{name}.reference" for name in held]
+    needed += [f"{name}.command" for name in _uncontrolled(model) if f"{name}.command" not in model.optional_inputs]
+    known = all(channel in record for channel in needed for record in records)
+    return "closed_loop" if held and known else "restarts"
 
 
 def simulate(
@@ -333,12 +337,13 @@ def copied_channels(model: Model, mode: str, passive: Sequence[str] = ()) -> fro
     """
     logged = {f"{name}.pressure" for name in model.logged_supplies}
     if mode == "closed_loop":
-        return frozenset(logged)
+        return frozenset(logged | {f"{name}.command" for name in _uncontrolled(model)})
     commands = {f"{name}.command" for name in model.actuators} | logged
     if mode == "prescribed_motion":
         followed = [name for name in model.joints if name not in passive]
         motions = {f"{name}.{kind}" for name in followed for kind in ("position", "velocity", "acceleration")}
-        return frozenset(commands | motions | {f"{name}.force" for name in model.actuators})
+        resting = {*model.actuators, *model.supplies}
+        return frozenset(motions | {name for name in model.output_channels if name.partition(".")[0] in resting})
     return frozenset(commands)
 
 
@@ -405,9 +410,9 @@ def check_balance(model: Model) -> None:
         kind = model.actuator_type(name)
         if kind != "ideal":
             raise SimulationError(
-                f"mode 'inverse_dynamics' and a diagnosis balance efforts sample by sample, but that of {name}, a "
-                f"{kind}, does not follow from its command alone; use the mode 'free_run' or 'restarts', and identify "
-                f"instead of diagnose, or describe it as an ideal actuator"
+                f"mode 'inverse_dynamics' and a diagnosis balance efforts sample by sample, but that of {name} (type "
+                f"{kind}) does not follow from its command alone; use the mode 'free_run' or 'restarts', and identify "
+                "instead of diagnose, or describe it as an ideal actuator"
             )
     if model.core.n_elastic:
         elastic = [name for name in model.beams if model.levels[name] != "rigid"]
@@ -438,52 +443,57 @@ def _inverse_dynamics_run(model: Model, experiment: Experiment, cutoff: float | 
     )
 
 
-def _columns(experiment: Experiment, channels: Sequence[str], mode: str) -> Array:
+def _require(experiment: Experiment, channels: Sequence[str], mode: str) -> None:
+    """Complain about the first channel that a mode needs and the log does not hold."""
     missing = [channel for channel in channels if channel not in experiment]
     if missing:
         raise ExperimentError(
             f"{experiment.name}: mode '{mode}' needs channel '{missing[0]}', but the log holds "
             f"{', '.join(experiment.channels)}; map a column to it in the channel table"
         )
-    return _stacked(experiment, [experiment[channel] for channel in channels])
 
 
 def _optional(experiment: Experiment, channels: Sequence[str]) -> Array:
-    zero = np.zeros(len(experiment))
-    known = {channel: experiment[channel] for channel in channels if channel in experiment}
-    return _stacked(experiment, [known.get(channel, zero) for channel in channels])
-
-
-def _stacked(experiment: Experiment, columns: Sequence[Array]) -> Array:
-    """Columns side by side, shape (N, len(columns)); none for a machine that nobody drives."""
-    return np.ascontiguousarray(np.column_stack([np.empty((len(experiment), 0)), *columns]))
+    """Columns of a log, zero where it does not hold one."""
+    table = np.zeros((len(experiment), len(channels)))
+    for column, channel in enumerate(channels):
+        if channel in experiment:
+            table[:, column] = experiment[channel]
+    return table
 
 
 def _inputs(model: Model, experiment: Experiment, mode: str) -> Array:
     """Commands and pressures of logged supplies, one column each; springs without a command keep their length."""
-    _columns(experiment, [name for name in model.input_channels if name not in model.optional_inputs], mode)
+    _require(experiment, [name for name in model.input_channels if name not in model.optional_inputs], mode)
     return _optional(experiment, model.input_channels)
 
 
 def _references(model: Model, experiment: Experiment, mode: str) -> tuple[Array, Array]:
-    """References and disturbances, one column per input; pressures of logged supplies are disturbances."""
-    held, logged = list(model.controlled_actuators), [f"{name}.pressure" for name in model.logged_supplies]
-    _columns(experiment, [f"{name}.reference" for name in held] + logged, mode)
+    """References and disturbances, one column per input; pressures of logged supplies are disturbances.
+
+    So are commands of actuators that no controller commands: there they are all that comes.
+    """
+    held, free = list(model.controlled_actuators), _uncontrolled(model)
+    logged = [f"{name}.pressure" for name in model.logged_supplies]
+    needed = [f"{name}.command" for name in free if f"{name}.command" not in model.optional_inputs]
+    _require(experiment, [f"{name}.reference" for name in held] + needed + logged, mode)
     references = _optional(experiment, [f"{name}.reference" for name in model.inputs])
-    return references, _optional(experiment, [*(f"{name}.disturbance" for name in model.actuators), *logged])
+    disturbances = _optional(experiment, [*(f"{name}.disturbance" for name in model.actuators), *logged])
+    commands = _optional(experiment, [f"{name}.command" for name in free])
+    disturbances[:, [model.actuators.index(name) for name in free]] += commands
+    return references, disturbances
 
 
 def _uncontrolled(model: Model) -> list[str]:
-    """Actuators that a closed loop leaves without a command; a spring along a line needs none."""
-    free = [name for name in model.actuators if f"{name}.command" not in model.optional_inputs]
-    return [name for name in free if name not in model.controlled_actuators]
+    """Actuators that no controller commands; in a closed loop the log does."""
+    return [name for name in model.actuators if name not in model.controlled_actuators]
 
 
 def _check_controllers(model: Model) -> None:
-    idle = _uncontrolled(model)
-    if idle:
+    if not model.controlled_actuators:
+        idle = f"for actuator '{model.actuators[0]}'" if model.actuators else "and an actuator"
         raise SimulationError(
-            f"mode 'closed_loop' needs a controller for actuator '{idle[0]}', but the model has none; "
+            f"mode 'closed_loop' needs a controller {idle}, but the model has none; "
             "add one under [controllers] or use free_run or restarts"
         )
 

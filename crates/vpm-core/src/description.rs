@@ -4,6 +4,7 @@
 
 mod check;
 mod connections;
+mod controllers;
 mod drives;
 mod entry;
 
@@ -95,6 +96,7 @@ impl Description {
         let model = description.model(&description.parameters)?;
         description.elastic = (0..model.n_beams()).filter_map(|k| model.beam(k)).map(|(beam, _)| beam.len()).collect();
         description.connections(&description.parameters, &model)?;
+        controllers::check_rigid(&description)?;
         check_regular(&model, &mut Data::new(&model))?;
         Ok(description)
     }

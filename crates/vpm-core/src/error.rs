@@ -208,7 +208,7 @@ pub enum Error {
     },
     /// No integrator has this name.
     #[error(
-        "there is no integrator `{name}`; use semi_implicit, rk4, linearly_implicit, rosenbrock, adaptive or, with a \
+        "there is no integrator `{name}`; use semi_implicit, rk4, linearly_implicit, rosenbrock, guarded, adaptive or, with a \
          tolerance, adaptive(1e-8)"
     )]
     Integrator {
@@ -252,20 +252,30 @@ pub enum Error {
         /// What to do.
         repair: &'static str,
     },
-    /// An actuator without controller in a closed loop.
-    #[error(
-        "actuator `{actuator}` has no controller, so the loop is not closed; give it one or simulate with measured commands"
-    )]
-    OpenLoop {
-        /// Name of the actuator.
-        actuator: String,
-    },
+    /// A closed loop without controllers.
+    #[error("the machine has no controller, so no loop is closed; give it one or simulate with measured commands")]
+    OpenLoop,
     /// A drive or a supply that cannot be as described.
     #[error("{0}")]
     Drive(#[from] DriveError),
     /// A contact, a bushing or a load cell that has no physical meaning.
     #[error("{0}")]
     Connection(#[from] ConnectionError),
+    /// A controller whose samples fall between those of the record.
+    #[error(
+        "controller `{controller}` samples every {sample_time} s, which is no whole multiple of the record's time step of {time_step} s; \
+         give it the sample_time {nearest} s, or resample the record"
+    )]
+    SampleTime {
+        /// Name of the controller.
+        controller: String,
+        /// Time between its samples, s.
+        sample_time: f64,
+        /// Time between the samples of the record, s.
+        time_step: f64,
+        /// The multiple next to it, s.
+        nearest: f64,
+    },
     /// A linkage that cannot be closed, or not be solved for its motion.
     #[error("{0}")]
     Linkage(#[from] LinkageError),

@@ -49,6 +49,8 @@ pub struct Dynamics<S> {
     pulls: bool,
     /// Number of states of drives and supplies.
     internal: usize,
+    /// Whether all actuators give efforts by their commands alone, and nothing feeds them.
+    ideal: bool,
     shown: Shown<S>,
     /// Resistance of each actuator's seals in the place of their friction, where an iteration matrix asks for it.
     seals: Vec<Option<S>>,
@@ -73,6 +75,7 @@ impl<S: Scalar> Dynamics<S> {
             data: Data::new(&model),
             inputs,
             internal: actuators.iter().map(Actuator::n_states).sum::<usize>() + sagging,
+            ideal: supplies.is_empty() && actuators.iter().all(|actuator| matches!(actuator.drive, Drive::Ideal(_))),
             shown: Shown::new(&actuators, &supplies),
             seals: vec![None; actuators.len()],
             forces: zeros(actuators.len()),
@@ -161,13 +164,16 @@ impl<S: Scalar> Dynamics<S> {
         dxdt[n..2 * n].copy_from_slice(&self.data.acceleration);
     }
 
-    /// Moves the lines and frames to (q, v), as far as anything acts on them, and of a machine that is no rigid tree all that its dynamics need.
+    /// Moves lines and frames to (q, v), as far as anything acts on them, and of a machine that is no rigid tree all that its dynamics need.
     #[inline]
     fn locate(&mut self, q: &[S], v: &[S]) {
-        let Self { model, data, connections, .. } = self;
+        let Self { model, data, .. } = self;
         if !model.is_recursive() {
             flexible::terms(model, data, q, v);
-        } else if self.pulls || !connections.is_free() {
+            if !self.connections.is_free() {
+                poses(model, data);
+            }
+        } else if self.pulls || !self.connections.is_free() {
             frames(model, data, q, v);
             poses(model, data);
             lines(model, data);
@@ -196,14 +202,12 @@ impl<S: Scalar> Dynamics<S> {
         if self.pulls {
             flexible::add_line_forces(data, tensions, loads);
         }
-        if model.is_recursive() {
+        if !connections.is_free() {
             connections.add_loads(model, data, resistance, loads);
+        }
+        if model.is_recursive() {
             aba(model, data, q, v, loads);
         } else {
-            if !connections.is_free() {
-                poses(model, data);
-                connections.add_loads(model, data, resistance, loads);
-            }
             flexible::solve(model, data, q, v, loads);
         }
     }
@@ -224,8 +228,6 @@ pub struct System<S> {
     tangent: Tangent<S>,
     resistances: Vec<S>,
     seals: Vec<Option<S>>,
-    /// Whether all actuators give efforts by their commands alone.
-    ideal: bool,
     /// A column of an iteration matrix on its way.
     column: Vec<S>,
 }
@@ -238,8 +240,7 @@ impl<S: Scalar> System<S> {
         let resistances = vec![S::zero(); dynamics.joints()];
         let column = vec![S::zero(); dynamics.coordinates()];
         let seals = vec![None; dynamics.actuators.len()];
-        let ideal = dynamics.actuators.iter().all(|actuator| matches!(actuator.drive, Drive::Ideal(_)));
-        Ok(Self { dynamics, tangent, resistances, seals, ideal, column })
+        Ok(Self { dynamics, tangent, resistances, seals, column })
     }
 
     /// The right-hand side.
@@ -307,8 +308,7 @@ impl<S: Scalar> Ode<S> for System<S> {
         for (joint, effect) in &self.dynamics.effects {
             self.resistances[*joint] += effect.resistance(x[n + joint]);
         }
-        let free = self.dynamics.connections.is_free();
-        if self.dynamics.model.n_elastic() == 0 || !self.ideal || !free {
+        if self.dynamics.model.n_elastic() == 0 || !self.dynamics.ideal || !self.dynamics.connections.is_free() {
             let (q, v) = x[..2 * n].split_at(n);
             self.dynamics.seal_chords(q, v, &mut self.seals);
             self.tangent.chords(x, matrix, &self.resistances, &self.seals);

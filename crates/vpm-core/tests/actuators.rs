@@ -7,7 +7,7 @@ use common::{Bench, Machine, close};
 use proptest::prelude::*;
 use serde_json::json;
 use vpm_core::actuator::{DeadZone, InputDelay, Lag, Saturation};
-use vpm_core::controller::{Cascade, ControlLaw, ControlMemory, Pid};
+use vpm_core::controller::{Cascade, ControlMemory, Pid};
 use vpm_core::delay::SampleDelay;
 use vpm_core::integrator::Method;
 use vpm_core::samples::slider;
@@ -135,11 +135,7 @@ fn sensor_shows_gain_offset_and_delay() {
 
 #[test]
 fn cascade_is_its_formula() {
-    let law = ControlLaw::Cascade(Cascade {
-        position_gain: 10.0,
-        velocity_gain: 4.0,
-        limit: Some(Saturation { limit: 5.0 }),
-    });
+    let law = Cascade { position_gain: 10.0, velocity_gain: 4.0, limit: Some(Saturation { limit: 5.0 }) };
     let (mut memory, dt) = (ControlMemory::default(), 0.01);
     let y = [0.0, 0.01, 0.03, 0.02, 0.0];
     let r = [0.0, 0.05, 0.02, 0.03, 9.0];
@@ -153,7 +149,7 @@ fn cascade_is_its_formula() {
 
 #[test]
 fn pid_integral_does_not_wind_up() {
-    let pid = |limit| ControlLaw::Pid(Pid { proportional: 1.0, integral: 2.0, derivative: 0.0, limit });
+    let pid = |limit| Pid { proportional: 1.0, integral: 2.0, derivative: 0.0, limit };
     let dt = 0.1;
     // Without a limit: kp e + ki (sum of e) dt.
     let mut memory = ControlMemory::default();
@@ -173,7 +169,7 @@ fn pid_integral_does_not_wind_up() {
 
 #[test]
 fn pid_derivative_is_the_backward_difference() {
-    let law = ControlLaw::Pid(Pid { proportional: 0.0, integral: 0.0, derivative: 0.5, limit: None });
+    let law = Pid { proportional: 0.0, integral: 0.0, derivative: 0.5, limit: None };
     let mut memory = ControlMemory::default();
     assert_eq!(law.command(&mut memory, 1.0, 0.0, 0.1), 0.0);
     close(law.command(&mut memory, 1.0, 0.2, 0.1), 0.5 * -0.2 / 0.1, 1e-14);

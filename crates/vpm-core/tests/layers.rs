@@ -45,8 +45,8 @@ const ALONE: [(&str, &[&str]); 12] = [
             "effect::ViscousFriction",
         ],
     ),
-    ("contact", &["error", "scalar", "spatial", "effect::Domain"]),
-    ("bushing", &["error", "scalar", "spatial", "effect::Domain"]),
+    ("contact", &["error", "scalar", "spatial", "mount", "effect::Domain"]),
+    ("bushing", &["error", "scalar", "spatial", "mount", "effect::Domain"]),
     ("sensor", &["error", "scalar", "delay", "effect::Domain"]),
     ("controller", &["error", "scalar", "effect::Domain", "actuator::Saturation"]),
 ];

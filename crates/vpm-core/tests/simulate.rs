@@ -242,7 +242,7 @@ fn settings_and_shapes_out_of_range_are_refused() {
     let open = Bench::new(Machine::new(&pendulum(1.0, 1.0)).actuator(0, &[("gain", 1.0)]), 1e-3, 1, Method::Rk4);
     let none = Table::new("references", &[0.0; 5], 5, 1).unwrap();
     let loose = vpm_core::simulate::closed_loop(open.setting(), &[0.0, 0.0], none, none);
-    assert!(refused(loose.unwrap_err()).contains("`drive0` has no controller"));
+    assert!(refused(loose.unwrap_err()).contains("has no controller, so no loop is closed"));
 }
 
 #[test]

@@ -90,6 +90,21 @@ class Components(DriveComponents):
         """Controllers."""
         return tuple(self._checked.document.controllers)
 
+    @property
+    def contacts(self) -> tuple[str, ...]:
+        """Contacts of points with planes."""
+        return tuple(self._checked.document.contacts)
+
+    @property
+    def bushings(self) -> tuple[str, ...]:
+        """Elastic connections of two frames."""
+        return tuple(self._checked.document.bushings)
+
+    @property
+    def load_cells(self) -> tuple[str, ...]:
+        """Readings of reaction wrenches at joints."""
+        return tuple(self._checked.document.load_cells)
+
     def joint_kind(self, joint: str) -> JointKind:
         """Kind of a joint: "prismatic", "revolute" or "helical"."""
         return self._checked.structure.joint_kind(self._known(joint, self.joints, "joint"))
@@ -121,14 +136,17 @@ class Components(DriveComponents):
             There is no such actuator, or no controller commands it.
         """
         name = self._known(actuator, self.controlled_actuators, "actuator with a controller")
-        controllers = self._checked.document.controllers.values()
-        return next(controller.measures for controller in controllers if controller.actuator == name)
+        return self._controlled[name]
 
     @cached_property
     def controlled_actuators(self) -> tuple[str, ...]:
         """Actuators that a controller commands, in the order of `actuators`."""
-        controlled = {controller.actuator for controller in self._checked.document.controllers.values()}
-        return tuple(name for name in self.actuators if name in controlled)
+        return tuple(name for name in self.actuators if name in self._controlled)
+
+    @property
+    def _controlled(self) -> Mapping[str, str]:
+        """Channel that is held for each actuator with a controller."""
+        return dict(pair for controller in self._checked.document.controllers.values() for pair in controller.pairs)
 
     # ---- channels ----------------------------------------------------------------------------------------------------
 
@@ -148,7 +166,9 @@ class Components(DriveComponents):
 
         Per joint position, velocity, acceleration, effort; per actuator command, force; per line length, rate, tension;
         per gauge strain; per marker its origin x, y, z and its rotation vector rx, ry, rz in the world; per hydraulic
-        actuator spool, pressure_a, pressure_b, flow_a, flow_b; per motor current; per supply pressure, flow.
+        actuator spool, pressure_a, pressure_b, flow_a, flow_b; per motor current; per supply pressure, flow; per
+        contact depth, normal_force and the force fx, fy, fz in world axes; per bushing the wrench mx, my, mz, fx, fy,
+        fz on A in its axes; per load cell the reaction mx, my, mz, fx, fy, fz on the child in its axes.
         """
         return self._checked.structure.outputs
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from vpm.errors import near_match
+from vpm.model.controller_check import controller_problems
 from vpm.model.drives import Actuator
 from vpm.model.messages import Problem, place
 from vpm.model.schema import Document
@@ -27,7 +28,7 @@ def reference_problems(document: Document, structure: Structure) -> Iterator[Pro
                 where, f'is "{sensor.measures}", which sensor "{seen[sensor.measures]}" already reads; remove one'
             )
         seen.setdefault(sensor.measures, name)
-    yield from _controller_problems(document, structure)
+    yield from controller_problems(document, structure)
     yield from _line_problems(document)
 
 
@@ -59,25 +60,6 @@ def _driven_problems(name: str, joint: str, document: Document, structure: Struc
         return
     repair = near_match(joint, structure.joints, what="it has")
     yield Problem(where, f'is "{joint}", which is no joint of the model; {repair}')
-
-
-def _controller_problems(document: Document, structure: Structure) -> Iterator[Problem]:
-    seen: dict[str, str] = {}
-    positions = [f"{joint}.position" for joint in structure.joints]
-    for name, controller in document.controllers.items():
-        where = place("controllers", name, "actuator")
-        if controller.actuator not in document.actuators:
-            repair = near_match(controller.actuator, document.actuators, what="it has")
-            yield Problem(where, f'is "{controller.actuator}", which is no actuator of the model; {repair}')
-        elif controller.actuator in seen:
-            other = seen[controller.actuator]
-            rest = f'is "{controller.actuator}", which controller "{other}" already commands; remove one'
-            yield Problem(where, rest)
-        seen.setdefault(controller.actuator, name)
-        if controller.measures not in positions:
-            repair = near_match(controller.measures, positions, what="it can measure")
-            where = place("controllers", name, "measures")
-            yield Problem(where, f'is "{controller.measures}", which is no joint position of the model; {repair}')
 
 
 def _line_problems(document: Document) -> Iterator[Problem]:

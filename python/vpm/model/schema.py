@@ -11,6 +11,8 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 from vpm.model.beam import Beam, Gauge, Line, Marker
+from vpm.model.contact import Bushing, Contact, LoadCell
+from vpm.model.controller import TYPES, Controller
 from vpm.model.drives import ACTUATOR_TYPES, Actuator
 from vpm.model.entry import ORIGIN, ZERO, Entry, Number, ParameterValue, Quantity, Text, Vector
 from vpm.model.hydraulic import Supply
@@ -35,7 +37,7 @@ class DenavitHartenberg(Entry):
     convention: Literal["standard", "modified"] = "standard"
 
 
-JointType = Literal["prismatic", "revolute", "helical", "cylindrical", "planar", "spherical", "fixed"]
+JointType = Literal["prismatic", "revolute", "helical", "cylindrical", "planar", "spherical", "free", "fixed"]
 
 
 class Joint(Entry):
@@ -57,32 +59,6 @@ class Sensor(Entry):
     """Reading of one channel."""
 
     measures: Text
-
-
-class Cascade(Entry):
-    """Position and velocity loop: u = kv (kp (r - y) - dy)."""
-
-    type: Literal["cascade"]
-    actuator: Text
-    measures: Text
-    position_gain: ParameterValue
-    velocity_gain: ParameterValue
-    limit: ParameterValue | None = None
-
-
-class Pid(Entry):
-    """u = kp e + ki int e + kd de/dt."""
-
-    type: Literal["pid"]
-    actuator: Text
-    measures: Text
-    proportional: ParameterValue
-    integral: ParameterValue = ZERO
-    derivative: ParameterValue = ZERO
-    limit: ParameterValue | None = None
-
-
-Controller = Annotated[Cascade | Pid, Field(discriminator="type")]
 
 
 class EffectEntry(BaseModel):
@@ -155,6 +131,9 @@ class Document(Entry):
     actuators: dict[str, Actuator] = Field(default_factory=dict)
     sensors: dict[str, Sensor] = Field(default_factory=dict)
     controllers: dict[str, Controller] = Field(default_factory=dict)
+    contacts: dict[str, Contact] = Field(default_factory=dict)
+    bushings: dict[str, Bushing] = Field(default_factory=dict)
+    load_cells: dict[str, LoadCell] = Field(default_factory=dict)
     effects: tuple[EffectEntry, ...] = ()
     channels: dict[str, ChannelEntry] | None = None
 
@@ -170,7 +149,10 @@ SECTIONS: Mapping[str, tuple[type[BaseModel], ...]] = {
     "supplies": (Supply,),
     "actuators": tuple(ACTUATOR_TYPES.values()),
     "sensors": (Sensor,),
-    "controllers": (Cascade, Pid),
+    "controllers": TYPES,
+    "contacts": (Contact,),
+    "bushings": (Bushing,),
+    "load_cells": (LoadCell,),
     "channels": (ChannelEntry,),
 }
 

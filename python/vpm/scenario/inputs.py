@@ -48,13 +48,8 @@ def _driven(document: Document, owner: str, model: Model) -> Iterator[tuple[str,
             refuse(keys, f"is for an actuator that a controller commands in {owner}; write [references.{name}]")
         yield f"{name}.command", keys, signal
     for name, signal in document.supplies.items():
-        _check_known(name, logged_supplies(model), 'supply with source = "logged"', owner, ("supplies", name))
+        _check_known(name, model.logged_supplies, 'supply with source = "logged"', owner, ("supplies", name))
         yield f"{name}.pressure", ("supplies", name), signal
-
-
-def logged_supplies(model: Model) -> tuple[str, ...]:
-    """Supplies of a machine whose pressure is an input."""
-    return getattr(model, "logged_supplies", ())
 
 
 def _check_known(name: str, known: tuple[str, ...], what: str, owner: str, keys: Keys) -> None:

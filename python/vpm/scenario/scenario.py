@@ -62,9 +62,7 @@ class Scenario:
             self._setup = _setup(self._document)
             self._models = machines(self._document.runs, Path(folder))
             # All that can be wrong is found here, before the first run takes its time.
-            for name, model in self._models.items():
-                given_inputs(self._document, f'run "{name}"', model, self._clock)
-            self._starts = {n: start_state(self._document, f'run "{n}"', m) for n, m in self._models.items()}
+            self._starts = {name: self._start(f'run "{name}"', model) for name, model in self._models.items()}
             self._panels = checked_panels(self._document, self._models)
             self._columns = checked_columns(self._document, self._models)
 
@@ -174,13 +172,9 @@ class Scenario:
         held = held_inputs(machine, self.initial_state(model), given)
         rest = np.zeros(self._clock.steps + 1)
         values = given | {channel: np.full(len(rest), level) for channel, (level, _) in held.items()}
-        looped = bool(machine.controlled_actuators)
         for actuator in machine.actuators:
-            if actuator in machine.controlled_actuators:
-                continue
-            command = values.setdefault(f"{actuator}.command", rest)
-            if looped:  # beside a loop that is closed, a command is what is added to that of no controller
-                values |= {f"{actuator}.reference": rest, f"{actuator}.disturbance": command}
+            if actuator not in machine.controlled_actuators:
+                values.setdefault(f"{actuator}.command", rest)
         units = tuple(machine.channel_unit(channel) for channel in values)
         data = np.column_stack([np.empty((len(rest), 0)), *values.values()])
         return Experiment(
@@ -204,7 +198,7 @@ class Scenario:
             return self._starts[model].copy()
         owner, machine = self._named(model)
         with in_file(self._path):
-            return start_state(self._document, owner, machine)
+            return self._start(owner, machine)
 
     def mode(self, model: Model | str) -> str:
         """Mode of `vpm.simulate`: ``closed_loop`` for a machine with controllers, ``free_run`` for others."""
@@ -246,6 +240,9 @@ class Scenario:
             substeps=self._setup.substeps,
             initial_state=self._starts[name],
         )
+
+    def _start(self, owner: str, model: Model) -> Array:
+        return start_state(self._document, owner, model, given_inputs(self._document, owner, model, self._clock))
 
     def _named(self, model: Model | str) -> tuple[str, Model]:
         """What to call a machine in messages, and the machine."""

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from vpm.errors import near_match
 from vpm.model import Model
-from vpm.scenario.inputs import logged_supplies
+from vpm.model.settled import rest
 from vpm.scenario.messages import refuse
 from vpm.scenario.schema import Document
 from vpm.scenario.values import si_value
@@ -18,11 +18,21 @@ from vpm.stepping import Simulation
 Array = NDArray[np.float64]
 
 
-def start_state(document: Document, owner: str, model: Model) -> Array:
+def start_state(document: Document, owner: str, model: Model, inputs: Mapping[str, Array]) -> Array:
     """State at time zero, shape (nx,).
 
     What the scenario names is as it says. Else joints are at zero and at rest, flexible links are deflected as in
-    their equilibrium there, and drives are as in a machine that has stood there without commands.
+    their equilibrium there, and drives are as in a machine that has stood there without commands, its logged supplies
+    at their first pressure.
+
+    Parameters
+    ----------
+    document : Document
+    owner : str
+        What to call the machine in messages.
+    model : Model
+    inputs : mapping of str to ndarray
+        What the scenario gives, by channel.
 
     Raises
     ------
@@ -40,9 +50,11 @@ def start_state(document: Document, owner: str, model: Model) -> Array:
     joints, coordinates = len(model.joints), len(model.coordinates)
     if not any(name in document.initial for name in names[joints:coordinates]):
         _deflect(state, joints, coordinates, owner, model)
-    if not hasattr(model.core, "internal_state"):
-        return state
-    settled = model.core.internal_state(model.theta, state[:coordinates])
+    theta = model.theta.copy()
+    for supply in model.logged_supplies:
+        if f"{supply}.pressure" in inputs:
+            theta[model.index(f"{supply}.pressure")] = inputs[f"{supply}.pressure"][0]
+    settled = rest(model, theta, state[:coordinates])
     for column, name in enumerate(names[2 * coordinates :]):
         if name not in document.initial:
             state[2 * coordinates + column] = settled[column]
@@ -100,7 +112,7 @@ def _held_references(model: Model, state: Array, given: Collection[str]) -> dict
 
 def _kept_pressures(model: Model, given: Collection[str]) -> dict[str, tuple[float, str]]:
     kept = {}
-    for supply in logged_supplies(model):
+    for supply in model.logged_supplies:
         channel = f"{supply}.pressure"
         if channel not in given:
             value = model.parameters[channel].value

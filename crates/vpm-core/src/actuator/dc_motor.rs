@@ -13,8 +13,9 @@ use crate::scalar::Scalar;
 /// arrives, and a joint that is driven back has to overcome `2 - eta` of the motor's torque. The rotor's inertia J adds `N^2 J` to that of
 /// the joint; it stands in the mass matrix, not in this law. At a rate that is held, the current after a time h is
 /// `i_s + (i - i_s) e^(-h / tau_e)` with `i_s = (u - k_e N dq) / R`.
-/// Source: the electric drive, Siciliano, Sciavicco, Villani & Oriolo 2009, "Robotics", section 5.2.1; transmission, section 5.2.3;
-/// friction that is proportional to the load, Khalil & Dombre 2002, "Modeling, Identification and Control of Robots", section 9.3.4.
+/// Source: the electric drive, Siciliano, Sciavicco, Villani & Oriolo 2009, "Robotics", section 5.2.1; its gear, section 5.2.3; friction
+/// that grows with the load, Hamon, Gautier & Garrec 2010, "Dynamic identification of robots with a dry friction model depending on load
+/// and velocity", IEEE/RSJ IROS.
 /// Checked: resistance, time constant, gear's transition velocity positive, efficiency and inertia not negative.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]

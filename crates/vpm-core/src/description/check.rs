@@ -1,6 +1,6 @@
 //! What a description must satisfy before anything is built from it.
 
-use super::{Description, EffectEntry, connections, drives};
+use super::{Description, EffectEntry, connections, controllers, drives};
 use crate::actuator::Target;
 use crate::body::Site;
 use crate::effect::Domain;
@@ -120,10 +120,6 @@ fn sites(description: &Description) -> Result<()> {
             Target::Line(line) => within(&what, "line", line, description.lines.len())?,
         }
     }
-    for controller in &description.controllers {
-        let what = format!("controller `{}`", controller.name);
-        within(&what, "actuator", controller.actuator, description.n_actuators())?;
-    }
     Ok(())
 }
 
@@ -131,18 +127,10 @@ fn channels(description: &Description) -> Result<()> {
     for sensor in &description.sensors {
         channel(&format!("sensor `{}`", sensor.name), sensor.channel, description)?;
     }
-    for controller in &description.controllers {
-        let what = format!("controller `{}`", controller.name);
-        channel(&what, controller.measures, description)?;
-        if !matches!(controller.measures, Channel::Position { .. }) {
-            let message = format!("{what} measures {:?}, but a controller measures a position", controller.measures);
-            return Err(Error::Description { message });
-        }
-    }
-    Ok(())
+    controllers::check(description)
 }
 
-fn channel(what: &str, channel: Channel, description: &Description) -> Result<()> {
+pub(super) fn channel(what: &str, channel: Channel, description: &Description) -> Result<()> {
     let layout = description.layout();
     match channel {
         Channel::Position { joint }
@@ -178,9 +166,12 @@ fn unique_claims(description: &Description) -> Result<()> {
             return Err(twice(&first.name, &second.name, "measure the same channel"));
         }
     }
-    for (k, second) in description.controllers.iter().enumerate() {
-        if let Some(first) = description.controllers[..k].iter().find(|first| first.actuator == second.actuator) {
-            return Err(twice(&first.name, &second.name, "command the same actuator"));
+    let mut commanded = vec![None; description.n_actuators()];
+    for controller in &description.controllers {
+        for &actuator in &controller.actuators {
+            if let Some(first) = commanded[actuator].replace(&controller.name) {
+                return Err(twice(first, &controller.name, "command the same actuator"));
+            }
         }
     }
     Ok(())

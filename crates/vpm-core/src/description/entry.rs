@@ -29,18 +29,24 @@ pub enum EffectEntry {
     },
 }
 
-/// A controller: its law, what it measures and what it commands, written as one flat table with a `type`.
+/// A controller: its law, what it measures and what it commands, and when, written as one flat table with a `type`.
+///
+/// A law of one joint has `actuator` and `measures`; one of several has lists, `actuators` and `measures`.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(try_from = "Map<String, Value>")]
 pub struct ControllerEntry {
     /// Name, unique in the model.
     pub name: String,
-    /// Number of the actuator that it commands.
-    pub actuator: usize,
-    /// The position that it controls.
-    pub measures: Channel,
+    /// Numbers of the actuators that it commands.
+    pub actuators: Vec<usize>,
+    /// The position that it controls with each of them.
+    pub measures: Vec<Channel>,
     /// Its law.
     pub law: ControlLaw<usize>,
+    /// Time between its samples, s; that of the record if none.
+    pub sample_time: Option<f64>,
+    /// Time from measuring to commanding, s; none at all if none.
+    pub delay: Option<f64>,
 }
 
 impl EffectEntry {
@@ -56,6 +62,11 @@ impl EffectEntry {
 /// Takes one field out of a table, so that the rest can be read strictly by the law it belongs to.
 fn take<T: for<'de> Deserialize<'de>>(table: &mut Map<String, Value>, field: &'static str) -> serde_json::Result<T> {
     serde_json::from_value(table.remove(field).ok_or_else(|| serde_json::Error::missing_field(field))?)
+}
+
+/// As [`take`], for a field that may be missing or null.
+fn optional(table: &mut Map<String, Value>, field: &'static str) -> serde_json::Result<Option<f64>> {
+    table.remove(field).map_or(Ok(None), serde_json::from_value)
 }
 
 /// Reads what is left of a table, and says in which entry a mistake is.
@@ -92,9 +103,14 @@ impl TryFrom<Map<String, Value>> for ControllerEntry {
     fn try_from(mut table: Map<String, Value>) -> Result<Self, String> {
         let name = named("controller", || take::<String>(&mut table, "name"))?;
         named(&format!("controller `{name}`"), || {
-            let actuator = take(&mut table, "actuator")?;
-            let measures = take(&mut table, "measures")?;
-            Ok(Self { name: name.clone(), actuator, measures, law: serde_json::from_value(Value::Object(table))? })
+            let (sample_time, delay) = (optional(&mut table, "sample_time")?, optional(&mut table, "delay")?);
+            let (actuators, measures) = if table.contains_key("actuators") {
+                (take(&mut table, "actuators")?, take(&mut table, "measures")?)
+            } else {
+                (vec![take(&mut table, "actuator")?], vec![take(&mut table, "measures")?])
+            };
+            let law = serde_json::from_value(Value::Object(table))?;
+            Ok(Self { name: name.clone(), actuators, measures, law, sample_time, delay })
         })
     }
 }

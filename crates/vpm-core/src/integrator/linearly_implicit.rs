@@ -1,7 +1,6 @@
 //! A Rosenbrock method: implicit stability for two linear solves a step.
 
-use super::lu::Lu;
-use super::rosenbrock::shift;
+use super::stage::Stage;
 use crate::ode::Ode;
 use crate::scalar::Scalar;
 
@@ -18,7 +17,7 @@ const GAMMA: f64 = 1.0 - std::f64::consts::FRAC_1_SQRT_2;
 /// section IV.7. Checked: order 2; a stiff decay is damped at steps far beyond its time constant.
 #[derive(Clone, Debug)]
 pub struct LinearlyImplicit<S> {
-    lu: Lu<S>,
+    left: Stage<S>,
     first: Vec<S>,
     second: Vec<S>,
     stage: Vec<S>,
@@ -28,14 +27,14 @@ impl<S: Scalar> LinearlyImplicit<S> {
     /// Buffers for systems of `dim` states.
     pub fn new(dim: usize) -> Self {
         let zero = vec![S::zero(); dim];
-        Self { lu: Lu::new(dim), first: zero.clone(), second: zero.clone(), stage: zero }
+        Self { left: Stage::new(dim), first: zero.clone(), second: zero.clone(), stage: zero }
     }
 
     /// Moves `x` on by `step` (s).
     pub fn step(&mut self, ode: &mut impl Ode<S>, x: &mut [S], step: f64) {
-        self.factorise(ode, x, step);
+        self.left.factorise(ode, GAMMA * step, |ode, matrix| ode.iteration_matrix(x, matrix));
         ode.rhs(x, &mut self.first);
-        self.lu.solve(&mut self.first);
+        self.left.solve(&mut self.first);
         for ((stage, &start), &rate) in self.stage.iter_mut().zip(&*x).zip(&self.first) {
             *stage = start + rate * step;
         }
@@ -43,17 +42,9 @@ impl<S: Scalar> LinearlyImplicit<S> {
         for (second, &first) in self.second.iter_mut().zip(&self.first) {
             *second -= first * 2.0;
         }
-        self.lu.solve(&mut self.second);
+        self.left.solve(&mut self.second);
         for ((state, &first), &second) in x.iter_mut().zip(&self.first).zip(&self.second) {
             *state += first * (1.5 * step) + second * (0.5 * step);
         }
-    }
-
-    /// Factorises 1 - g h A.
-    fn factorise(&mut self, ode: &mut impl Ode<S>, x: &[S], step: f64) {
-        let matrix = self.lu.matrix();
-        ode.iteration_matrix(x, matrix);
-        shift(matrix, x.len(), GAMMA * step);
-        self.lu.factorise();
     }
 }

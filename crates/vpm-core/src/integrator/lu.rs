@@ -4,12 +4,17 @@ use crate::scalar::Scalar;
 
 /// LU factors of a small square matrix, in buffers that are allocated once.
 ///
-/// Law: `P A = L U` with row exchanges for the largest pivot (Golub & Van Loan 2013, "Matrix Computations", algorithm 3.4.1).
+/// Law: `P A = L U` with row exchanges for the largest pivot (Golub & Van Loan 2013, "Matrix Computations", algorithm 3.4.1). What
+/// solves is kept column by column, with the inverse of each pivot: columns are added as they stand, without sums that wait for
+/// each other (algorithms 3.1.3 and 3.1.4 there).
 /// A singular matrix gives infinite or undefined numbers, which the caller finds in its result.
 #[derive(Clone, Debug)]
 pub struct Lu<S> {
     dim: usize,
+    /// The matrix, then L below and U above the diagonal, row by row.
     factors: Vec<S>,
+    /// The same column by column, with the inverse of each pivot on the diagonal.
+    columns: Vec<S>,
     order: Vec<usize>,
     scratch: Vec<S>,
 }
@@ -17,13 +22,20 @@ pub struct Lu<S> {
 impl<S: Scalar> Lu<S> {
     /// Buffers for matrices of `dim` rows.
     pub fn new(dim: usize) -> Self {
-        Self { dim, factors: vec![S::zero(); dim * dim], order: (0..dim).collect(), scratch: vec![S::zero(); dim] }
+        let (square, line) = (vec![S::zero(); dim * dim], vec![S::zero(); dim]);
+        Self { dim, factors: square.clone(), columns: square, order: (0..dim).collect(), scratch: line }
+    }
+
+    /// Rows of the matrix.
+    pub(super) fn dim(&self) -> usize {
+        self.dim
     }
 
     /// Makes the buffers fit matrices of `dim` rows; allocates only where they were never that large.
     pub fn resize(&mut self, dim: usize) {
         self.dim = dim;
         self.factors.resize(dim * dim, S::zero());
+        self.columns.resize(dim * dim, S::zero());
         self.order.resize(dim, 0);
         self.scratch.resize(dim, S::zero());
     }
@@ -51,6 +63,20 @@ impl<S: Scalar> Lu<S> {
                     *entry -= factor * pivot;
                 }
             }
+            self.columns[column * n + column] = inverse;
+        }
+        self.turn();
+    }
+
+    /// Copies the factors beside the diagonal from rows to columns.
+    fn turn(&mut self) {
+        let n = self.dim;
+        for (row, entries) in self.factors.chunks_exact(n.max(1)).enumerate() {
+            let pivot = self.columns[row * n + row];
+            for (target, &entry) in self.columns[row..].iter_mut().step_by(n).zip(entries) {
+                *target = entry;
+            }
+            self.columns[row * n + row] = pivot;
         }
     }
 
@@ -58,7 +84,13 @@ impl<S: Scalar> Lu<S> {
     fn exchange(&mut self, column: usize) {
         let n = self.dim;
         let size = |row: usize| self.factors[row * n + column].re().abs();
-        let best = (column + 1..n).fold(column, |best, row| if size(row) > size(best) { row } else { best });
+        let (mut best, mut largest) = (column, size(column));
+        for row in column + 1..n {
+            let found = size(row);
+            if found > largest {
+                (best, largest) = (row, found);
+            }
+        }
         if best != column {
             self.order.swap(column, best);
             let (upper, lower) = self.factors.split_at_mut(best * n);
@@ -69,22 +101,27 @@ impl<S: Scalar> Lu<S> {
     /// Replaces `b` by the solution x of `A x = b`.
     pub fn solve(&mut self, b: &mut [S]) {
         let n = self.dim;
-        for (entry, &row) in self.scratch.iter_mut().zip(&self.order) {
+        let Self { columns, order, scratch, .. } = self;
+        for (entry, &row) in scratch.iter_mut().zip(&*order) {
             *entry = b[row];
         }
-        b.copy_from_slice(&self.scratch);
-        for row in 0..n {
-            let (known, rest) = b.split_at_mut(row);
-            rest[0] -= dot(&self.factors[row * n..row * n + row], known);
+        for (k, column) in columns.chunks_exact(n.max(1)).enumerate() {
+            let (known, below) = scratch.split_at_mut(k + 1);
+            take(below, &column[k + 1..], known[k]);
         }
-        for row in (0..n).rev() {
-            let (rest, known) = b.split_at_mut(row + 1);
-            let sum = dot(&self.factors[row * n + row + 1..(row + 1) * n], known);
-            rest[row] = (rest[row] - sum) / self.factors[row * n + row];
+        for (k, column) in columns.chunks_exact(n.max(1)).enumerate().rev() {
+            let (above, known) = scratch.split_at_mut(k);
+            let value = known[0] * column[k];
+            b[k] = value;
+            take(above, &column[..k], value);
         }
     }
 }
 
-fn dot<S: Scalar>(left: &[S], right: &[S]) -> S {
-    left.iter().zip(right).map(|(&l, &r)| l * r).sum()
+/// Takes `factor` times a column off.
+#[inline]
+fn take<S: Scalar>(entries: &mut [S], column: &[S], factor: S) {
+    for (entry, &part) in entries.iter_mut().zip(column) {
+        *entry -= part * factor;
+    }
 }

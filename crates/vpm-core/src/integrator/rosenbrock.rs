@@ -1,6 +1,6 @@
 //! A Rosenbrock method of fourth order.
 
-use super::lu::Lu;
+use super::stage::Stage;
 use crate::ode::Ode;
 use crate::scalar::Scalar;
 
@@ -61,7 +61,7 @@ pub const RODAS4P2: Tableau = Tableau {
 /// Dry friction far sharper than the step is better left to [`super::LinearlyImplicit`], which sees chords in the place of tangents.
 #[derive(Clone, Debug)]
 pub struct Rosenbrock<S> {
-    lu: Lu<S>,
+    left: Stage<S>,
     stage: Vec<S>,
     /// The increments `u_i`, one stage after the other.
     increments: Vec<S>,
@@ -70,7 +70,7 @@ pub struct Rosenbrock<S> {
 impl<S: Scalar> Rosenbrock<S> {
     /// Buffers for systems of `dim` states.
     pub fn new(dim: usize) -> Self {
-        Self { lu: Lu::new(dim), stage: vec![S::zero(); dim], increments: vec![S::zero(); STAGES * dim] }
+        Self { left: Stage::new(dim), stage: vec![S::zero(); dim], increments: vec![S::zero(); STAGES * dim] }
     }
 
     /// Moves `x` on by `step` (s).
@@ -81,11 +81,8 @@ impl<S: Scalar> Rosenbrock<S> {
 
     /// Computes the stages of a step from `x`, and leaves x where it is.
     pub(super) fn attempt(&mut self, ode: &mut impl Ode<S>, x: &[S], step: f64) {
-        let (dim, reach) = (x.len(), RODAS4P2.gamma * step);
-        let matrix = self.lu.matrix();
-        ode.jacobian(x, matrix);
-        shift(matrix, dim, reach);
-        self.lu.factorise();
+        let dim = x.len();
+        self.left.factorise(ode, RODAS4P2.gamma * step, |ode, matrix| ode.jacobian(x, matrix));
         for (i, (distance, coupling)) in RODAS4P2.distance.iter().zip(&RODAS4P2.coupling).enumerate() {
             let (known, rest) = self.increments.split_at_mut(i * dim);
             let increment = &mut rest[..dim];
@@ -99,7 +96,7 @@ impl<S: Scalar> Rosenbrock<S> {
             for entry in increment.iter_mut() {
                 *entry = *entry * RODAS4P2.gamma;
             }
-            self.lu.solve(increment);
+            self.left.solve(increment);
         }
     }
 
@@ -114,16 +111,6 @@ impl<S: Scalar> Rosenbrock<S> {
     /// What the last stage adds: the difference between the step and its companion of third order, `x + sum a_6j u_j`.
     pub(super) fn last_increment(&self) -> &[S] {
         &self.increments[(STAGES - 1) * self.stage.len()..]
-    }
-}
-
-/// Turns a matrix A, row by row, into `1 - reach A`.
-pub(super) fn shift<S: Scalar>(matrix: &mut [S], dim: usize, reach: f64) {
-    for entry in matrix.iter_mut() {
-        *entry = *entry * -reach;
-    }
-    for diagonal in matrix.iter_mut().step_by(dim + 1) {
-        *diagonal = *diagonal + 1.0;
     }
 }
 

@@ -11,9 +11,10 @@ use crate::integrator::stability::{LinearSystem, check};
 use crate::ode::Ode;
 use crate::system::System;
 
-/// Complains, with the mode and the largest stable step, if flexible links and drives cannot be stepped so from `state`.
+/// Complains, with the mode and the largest stable step, if flexible links, drives, contacts and bushings cannot be stepped so from `state`.
 ///
-/// Judged with the drives where they stand in that state; what friction, end stops and opening valves add later is left to the run.
+/// Judged with the drives where they stand in that state; what friction, end stops, opening valves and contacts that
+/// are open add later is left to the run.
 pub(crate) fn check_step(description: &Description, theta: &[f64], stepping: Stepping, state: &[f64]) -> Result<()> {
     if description.actuators.iter().all(|actuator| matches!(actuator.drive, Drive::Ideal(_))) {
         return check_structure(description, theta, stepping, state, &[]);

@@ -1,8 +1,8 @@
 //! The loop over samples: what happens at a sample, and between two.
 
+use super::control::{Control, reading};
 use super::names::{output_name, state_name};
 use super::{Setting, Stepping, diverged, halted};
-use crate::controller::{ControlLaw, ControlMemory};
 use crate::description::Description;
 use crate::error::Result;
 use crate::integrator::Integrator;
@@ -42,10 +42,10 @@ pub(crate) struct Stepper<'a, S> {
     stepping: Stepping,
     system: System<S>,
     integrator: Integrator<S>,
-    sensors: Vec<Sensor<S>>,
-    /// Law, actuator, measured column of each controller.
-    controllers: Vec<(ControlLaw<S>, usize, usize)>,
-    memories: Vec<ControlMemory<S>>,
+    /// Sensors, each with the column that it reads.
+    sensors: Vec<(usize, Sensor<S>)>,
+    /// The controllers, if there is a loop to close.
+    control: Option<Control<S>>,
     state: Vec<S>,
     rate: Vec<S>,
     /// Inputs of the whole record, row by row; given ones from the beginning, a controller's as time goes by.
@@ -63,25 +63,26 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         let description = setting.description;
         let system = description.system(theta)?;
         let (dim, rows, zero) = (system.dim(), plan.horizon, S::zero());
-        let commands = match plan.drive {
-            Drive::Commands(inputs) => inputs.numbers().iter().map(|&command| S::from_f64(command)).collect(),
-            Drive::Loop { references, .. } => vec![zero; references.numbers().len()],
+        // A closed loop begins with its disturbances, to which the controllers add.
+        let (given, control) = match plan.drive {
+            Drive::Commands(inputs) => (inputs, None),
+            Drive::Loop { references, disturbances } => {
+                (disturbances, Some(Control::new(setting, theta, rows, references.columns())?))
+            }
         };
-        let entries = &description.controllers;
-        let law = |law: &ControlLaw<usize>| law.map(&mut |&index| theta[index]);
         let layout = description.layout();
+        let sensors = description.sensors(theta).into_iter().map(|sensor| (sensor.channel.column(layout), sensor));
         Ok(Self {
             description,
             plan: *plan,
             stepping: setting.stepping,
             integrator: Integrator::new(setting.stepping.method, dim),
-            sensors: description.sensors(theta),
-            controllers: entries.iter().map(|c| (law(&c.law), c.actuator, c.measures.column(layout))).collect(),
-            memories: vec![ControlMemory::default(); entries.len()],
+            sensors: sensors.collect(),
+            control,
             system,
             state: vec![zero; dim],
             rate: vec![zero; dim],
-            commands,
+            commands: given.numbers().iter().map(|&command| S::from_f64(command)).collect(),
             truth: vec![zero; rows * description.n_outputs()],
             states: vec![zero; rows * dim],
             outputs: vec![zero; rows * description.n_outputs()],
@@ -128,8 +129,10 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         for (state, &value) in self.state.iter_mut().zip(initial) {
             *state = S::from_f64(value);
         }
-        self.memories.fill(ControlMemory::default());
         self.integrator.reset();
+        if let Some(control) = &mut self.control {
+            control.restart();
+        }
     }
 
     /// Everything that happens at a sample: measure, command, hold, evaluate, record. `start` is the piece's place in the record.
@@ -140,7 +143,7 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         }
         self.states[row * dim..(row + 1) * dim].copy_from_slice(&self.state);
         self.record_motion(row);
-        self.control(row);
+        self.control(row, start);
         self.hold(row + start);
         self.system.rhs(&self.state, &mut self.rate);
         self.record_efforts(row, start);
@@ -167,18 +170,18 @@ impl<'a, S: Scalar> Stepper<'a, S> {
     }
 
     /// Lets the controllers command, if there is a loop to close.
-    fn control(&mut self, row: usize) {
-        let Drive::Loop { references, disturbances } = self.plan.drive else { return };
-        let (time_step, inputs) = (self.stepping.time_step, self.description.n_inputs());
-        for (number, (law, actuator, column)) in self.controllers.iter().enumerate() {
-            let reference = S::from_f64(references.at(row, *actuator));
-            let measured = self.reading(row, *column);
-            let command = law.command(&mut self.memories[number], reference, measured, time_step);
-            self.commands[row * inputs + actuator] = command + disturbances.at(row, *actuator);
+    fn control(&mut self, row: usize, start: usize) {
+        let Drive::Loop { references, .. } = self.plan.drive else { return };
+        if self.control.as_ref().is_some_and(|control| control.feels(row)) {
+            // Forces under the commands that are still held.
+            self.system.rhs(&self.state, &mut self.rate);
+            self.record_efforts(row, start);
         }
-        for supply in self.description.n_actuators()..inputs {
-            self.commands[row * inputs + supply] = S::from_f64(disturbances.at(row, supply));
-        }
+        let Self { control: Some(control), system, state, sensors, truth, commands, .. } = self else { return };
+        let (at, outputs) = ((row, self.stepping.time_step), (truth.as_slice(), self.description.n_outputs()));
+        control.sample(row, references, (system.dynamics(), state), |column| reading(sensors, outputs, at, column));
+        let first = row * references.columns();
+        control.arrive(row, |actuator, command| commands[first + actuator] += command);
     }
 
     /// Holds what every input amounts to over the interval that begins at sample `k` of the record.
@@ -208,21 +211,10 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         let layout = self.description.layout();
         let width = layout.count();
         self.outputs[row * width..(row + 1) * width].copy_from_slice(&self.truth[row * width..(row + 1) * width]);
-        for number in 0..self.sensors.len() {
-            let column = self.sensors[number].channel.column(layout);
-            self.outputs[row * width + column] = self.reading(row, column);
-        }
-    }
-
-    /// What is seen of a channel: its sensor's reading, or the truth where there is no sensor.
-    fn reading(&self, row: usize, column: usize) -> S {
-        let layout = self.description.layout();
-        let width = layout.count();
-        let truth = |sample: usize| self.truth[sample * width + column];
-        let mut sensors = self.sensors.iter();
-        match sensors.find(|sensor| sensor.channel.column(layout) == column) {
-            Some(sensor) => sensor.read(row, self.stepping.time_step, truth),
-            None => truth(row),
+        let Self { sensors, truth, outputs, stepping, .. } = self;
+        for (column, sensor) in &*sensors {
+            let truth = |sample: usize| truth[sample * width + column];
+            outputs[row * width + column] = sensor.read(row, stepping.time_step, truth);
         }
     }
 

@@ -22,6 +22,22 @@ impl<S: Scalar> Dynamics<S> {
     /// Efforts on all coordinates that give accelerations `a` at (q, v), with the efforts of the effects taken off. On the elastic
     /// coordinates they vanish in free motion.
     pub fn inverse_dynamics(&mut self, q: &[S], v: &[S], a: &[S], efforts: &mut [S]) {
+        self.inverse_dynamics_of_tree(q, v, a, efforts);
+        if self.connections.is_free() {
+            return;
+        }
+        let Self { model, data, loads, .. } = self;
+        loads.fill(S::zero());
+        frames(model, data, q, v);
+        poses(model, data);
+        self.connections.add_loads(model, data, ContactFriction::resistance, loads);
+        for (effort, &load) in efforts.iter_mut().zip(&*loads) {
+            *effort -= load;
+        }
+    }
+
+    /// As [`Dynamics::inverse_dynamics`], but without what contacts and bushings do.
+    pub(crate) fn inverse_dynamics_of_tree(&mut self, q: &[S], v: &[S], a: &[S], efforts: &mut [S]) {
         let Self { model, data, loads, .. } = self;
         if model.is_recursive() {
             efforts.copy_from_slice(rnea(model, data, q, v, a));
@@ -31,11 +47,6 @@ impl<S: Scalar> Dynamics<S> {
         }
         loads.fill(S::zero());
         add_effects(&self.effects, q, v, loads);
-        if !self.connections.is_free() {
-            frames(model, data, q, v);
-            poses(model, data);
-            self.connections.add_loads(model, data, ContactFriction::resistance, loads);
-        }
         for (effort, &effect) in efforts.iter_mut().zip(&*loads) {
             *effort -= effect;
         }
@@ -70,6 +81,18 @@ impl<S: Scalar> Dynamics<S> {
         total
     }
 
+    /// Takes off `loads` what contacts and bushings do, after [`Dynamics::terms`] at the same coordinates and rates.
+    pub(crate) fn subtract_connections(&mut self, loads: &mut [S]) {
+        let Self { model, data, loads: own, connections, .. } = self;
+        if connections.is_free() {
+            return;
+        }
+        poses(model, data);
+        own.fill(S::zero());
+        connections.add_loads(model, data, ContactFriction::resistance, own);
+        loads.iter_mut().zip(&*own).for_each(|(load, &own)| *load -= own);
+    }
+
     /// Energy of the springs along lines, J.
     fn springs(&mut self, q: &[S], v: &[S]) -> S {
         let spring = |drive: &Drive<S>| matches!(drive, Drive::SpringDamper(_) | Drive::Maxwell(_));
@@ -86,18 +109,6 @@ impl<S: Scalar> Dynamics<S> {
             _ => S::zero(),
         };
         self.actuators.iter().map(potential).sum()
-    }
-
-    /// Takes off `loads` what contacts and bushings do, after [`Dynamics::terms`] at the same coordinates and rates.
-    pub(crate) fn subtract_connections(&mut self, loads: &mut [S]) {
-        let Self { model, data, loads: own, connections, .. } = self;
-        if connections.is_free() {
-            return;
-        }
-        poses(model, data);
-        own.fill(S::zero());
-        connections.add_loads(model, data, ContactFriction::resistance, own);
-        loads.iter_mut().zip(&*own).for_each(|(load, &own)| *load -= own);
     }
 
     /// Whether actuators act on lines.

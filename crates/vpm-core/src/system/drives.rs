@@ -42,6 +42,38 @@ impl<S: Scalar> Dynamics<S> {
     /// lines where they are.
     #[inline]
     pub(super) fn actuate(&mut self, x: &[S], dxdt: &mut [S]) {
+        let first = 2 * self.coordinates();
+        if self.ideal {
+            self.actuate_ideal(&x[first..], &mut dxdt[first..]);
+        } else {
+            self.actuate_any(x, dxdt);
+        }
+    }
+
+    /// As [`Dynamics::actuate`] where all efforts follow from commands alone.
+    #[inline]
+    fn actuate_ideal(&mut self, lags: &[S], rates: &mut [S]) {
+        self.efforts.fill(S::zero());
+        self.tensions.fill(S::zero());
+        let mut states = lags.iter().zip(rates);
+        for ((actuator, &input), force) in self.actuators.iter().zip(&self.inputs).zip(&mut self.forces) {
+            let Drive::Ideal(drive) = &actuator.drive else { continue };
+            *force = match (&actuator.lag, if actuator.lag.is_some() { states.next() } else { None }) {
+                (Some(lag), Some((&state, rate))) => {
+                    *rate = lag.rate(state, input);
+                    drive.effort(state)
+                }
+                _ => drive.effort(input),
+            };
+            match actuator.on {
+                Target::Joint(joint) => self.efforts[joint] += *force,
+                Target::Line(line) => self.tensions[line] += *force,
+            }
+        }
+    }
+
+    /// As [`Dynamics::actuate`] for drives of every kind.
+    fn actuate_any(&mut self, x: &[S], dxdt: &mut [S]) {
         let n = self.coordinates();
         let (q, v, states, rates) = (&x[..n], &x[n..2 * n], &x[2 * n..], &mut dxdt[2 * n..]);
         self.efforts.fill(S::zero());
@@ -197,7 +229,7 @@ impl<S: Scalar> Dynamics<S> {
             Drive::Hydraulic(law) => law.cylinder.seal.is_there(),
             _ => false,
         };
-        if !self.actuators.iter().any(sealed) {
+        if self.ideal || !self.actuators.iter().any(sealed) {
             return;
         }
         self.locate(q, v);

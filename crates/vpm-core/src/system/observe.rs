@@ -87,8 +87,7 @@ impl<S: Scalar> Dynamics<S> {
         }
     }
 
-    /// The outputs that follow from the efforts: accelerations, efforts, forces, reactions, what drives and supplies show; in state `x` after
-    /// [`Dynamics::rhs`].
+    /// The outputs that follow from the efforts: accelerations, efforts, forces, what drives and supplies show, reactions, in state `x` after [`Dynamics::rhs`].
     pub(crate) fn observe_efforts(&mut self, x: &[S], dxdt: &[S], outputs: &mut [S]) {
         let (n, layout) = (self.coordinates(), self.layout());
         let accelerations = &dxdt[n..2 * n];

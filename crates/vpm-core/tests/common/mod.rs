@@ -1,6 +1,8 @@
 //! Machines for the tests: built part by part, with every number a named parameter.
 #![allow(dead_code, reason = "each test file uses its own part of this")]
 
+pub mod parts;
+
 use serde_json::{Value, json, to_value};
 use vpm_core::description::Description;
 use vpm_core::integrator::Method;

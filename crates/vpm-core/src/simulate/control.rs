@@ -1,0 +1,260 @@
+//! Controllers at work: what they see at a sample, what they hold until their next one, and when it arrives.
+
+use super::Setting;
+use crate::actuator::{Drive, Target};
+use crate::controller::{ControlLaw, ControlMemory, Differences, Stroke, samples_between};
+use crate::delay::SampleDelay;
+use crate::description::{ControllerEntry, Description};
+use crate::error::Result;
+use crate::scalar::Scalar;
+use crate::sensor::{Channel, Sensor};
+use crate::system::Dynamics;
+use crate::table::Table;
+
+/// The controllers of a machine, with all that they remember.
+pub(super) struct Control<S> {
+    loops: Vec<Loop<S>>,
+    /// What the controllers put out, before their delays: one number per input, row by row.
+    drafts: Vec<S>,
+    inputs: usize,
+    machine: Machine<S>,
+}
+
+/// A controller with its memory.
+struct Loop<S> {
+    law: ControlLaw<S>,
+    ports: Vec<Port>,
+    /// Samples of the record from one of the controller to its next, and the time in s that they take.
+    every: usize,
+    period: f64,
+    delay: Option<SampleDelay<S>>,
+    memory: ControlMemory<S>,
+    /// Rates of the reference of each port.
+    differences: Vec<Differences<S>>,
+}
+
+/// Where a controller meets one of its actuators: columns among the outputs, and the way from the actuator to the joint.
+#[derive(Clone, Copy)]
+struct Port {
+    actuator: usize,
+    position: usize,
+    rate: usize,
+    force: usize,
+    stroke_rate: usize,
+    joint: usize,
+    /// The line of the actuator, if it is on one.
+    line: Option<usize>,
+}
+
+/// The machine as the controllers see it.
+struct Machine<S> {
+    position: Vec<S>,
+    rate: Vec<S>,
+    acceleration: Vec<S>,
+    efforts: Vec<S>,
+    /// Lever arms of the lines, line by line.
+    levers: Vec<S>,
+}
+
+impl<S: Scalar> Control<S> {
+    /// The controllers of a loop over `rows` samples with `inputs` references each.
+    pub(super) fn new(setting: &Setting<'_>, theta: &[S], rows: usize, inputs: usize) -> Result<Self> {
+        let description = setting.description;
+        let entries = &description.controllers;
+        let loops = entries.iter().map(|entry| Loop::new(entry, description, theta, setting.stepping.time_step));
+        let (n, zeros) = (description.n_coordinates(), |count: usize| vec![S::zero(); count]);
+        let machine = Machine {
+            position: zeros(n),
+            rate: zeros(n),
+            acceleration: zeros(n),
+            efforts: zeros(n),
+            levers: zeros(description.lines.len() * n),
+        };
+        Ok(Self { loops: loops.collect::<Result<_>>()?, drafts: zeros(rows * inputs), inputs, machine })
+    }
+
+    /// Forgets everything.
+    pub(super) fn restart(&mut self) {
+        for control in &mut self.loops {
+            control.memory = ControlMemory::default();
+            control.differences.fill(Differences::default());
+        }
+    }
+
+    /// Whether a controller that is due at sample `row` measures a force, which has to be there before its command is.
+    pub(super) fn feels(&self, row: usize) -> bool {
+        self.loops.iter().any(|control| control.due(row) && matches!(control.law, ControlLaw::ForceLoop(_)))
+    }
+
+    /// Lets the controllers that are due at sample `row` command, and the others hold; `state` gives what no sensor is made for.
+    pub(super) fn sample(
+        &mut self,
+        row: usize,
+        references: Table<'_>,
+        (dynamics, state): (&mut Dynamics<S>, &[S]),
+        see: impl Fn(usize) -> S,
+    ) {
+        let Self { loops, drafts, inputs, machine } = self;
+        let (past, now) = drafts.split_at_mut(row * *inputs);
+        let held = &past[past.len().saturating_sub(*inputs)..];
+        if loops.iter().any(|control| control.due(row) && control.needs_machine()) {
+            machine.look(state, dynamics, &see);
+        }
+        for control in loops {
+            if control.due(row) {
+                control.command(references.row(row), dynamics, machine, &see, now);
+            } else {
+                for port in &control.ports {
+                    now[port.actuator] = held[port.actuator];
+                }
+            }
+        }
+    }
+
+    /// Calls `put` with each actuator and the command that arrives there at sample `row`.
+    pub(super) fn arrive(&self, row: usize, mut put: impl FnMut(usize, S)) {
+        for control in &self.loops {
+            for &Port { actuator, .. } in &control.ports {
+                let draft = |sample: usize| self.drafts[sample * self.inputs + actuator];
+                put(actuator, control.delay.map_or_else(|| draft(row), |delay| delay.delayed(row, draft)));
+            }
+        }
+    }
+}
+
+impl<S: Scalar> Loop<S> {
+    fn new(entry: &ControllerEntry, description: &Description, theta: &[S], time_step: f64) -> Result<Self> {
+        let every = samples_between(&entry.name, entry.sample_time, time_step)?;
+        let pairs = entry.actuators.iter().zip(&entry.measures);
+        Ok(Self {
+            law: entry.law.map(&mut |&index| theta[index]),
+            ports: pairs.map(|(&actuator, &measured)| Port::new(actuator, measured, description)).collect(),
+            every,
+            period: every as f64 * time_step,
+            delay: entry.delay.map(|delay| SampleDelay::new(S::from_f64(delay), time_step)),
+            memory: ControlMemory::default(),
+            differences: vec![Differences::default(); entry.measures.len()],
+        })
+    }
+
+    #[inline]
+    fn due(&self, row: usize) -> bool {
+        row.is_multiple_of(self.every)
+    }
+
+    fn needs_machine(&self) -> bool {
+        match self.law {
+            ControlLaw::ComputedTorque(_) => true,
+            ControlLaw::ForceLoop(_) => self.ports.iter().any(|port| port.line.is_some()),
+            _ => false,
+        }
+    }
+
+    /// Writes the commands of its actuators into `commands`.
+    fn command(
+        &mut self,
+        references: &[f64],
+        dynamics: &mut Dynamics<S>,
+        machine: &mut Machine<S>,
+        see: &impl Fn(usize) -> S,
+        commands: &mut [S],
+    ) {
+        let Self { law, ports, period, memory, differences, .. } = self;
+        if let ControlLaw::ComputedTorque(law) = law {
+            for (place, (port, differences)) in ports.iter().zip(differences).enumerate() {
+                let reference = differences.next(S::from_f64(references[port.actuator]), *period);
+                let Machine { position, rate, acceleration, .. } = &mut *machine;
+                acceleration[port.joint] = law.acceleration(place, reference, position[port.joint], rate[port.joint]);
+            }
+            machine.invert(dynamics);
+            for (place, port) in ports.iter().enumerate() {
+                // The checks let drives of no other kind come here.
+                let Drive::Ideal(drive) = &dynamics.actuators[port.actuator].drive else { continue };
+                commands[port.actuator] = law.limited(place, machine.efforts[port.joint] / drive.gain);
+            }
+            return;
+        }
+        for port in ports {
+            let (reference, y) = (S::from_f64(references[port.actuator]), see(port.position));
+            commands[port.actuator] = match law {
+                ControlLaw::Cascade(law) => law.command(memory, reference, y, *period),
+                ControlLaw::Pid(law) => law.command(memory, reference, y, *period),
+                ControlLaw::Pd(law) => law.command(reference, y, see(port.rate)),
+                ControlLaw::ForceLoop(law) => {
+                    let arm = machine.arm(port);
+                    let stroke = Stroke { arm, rate: see(port.stroke_rate), force: see(port.force) };
+                    law.command(reference, y, see(port.rate), stroke)
+                }
+                ControlLaw::ComputedTorque(_) => S::zero(),
+            };
+        }
+    }
+}
+
+impl Port {
+    fn new(actuator: usize, measured: Channel, description: &Description) -> Self {
+        let layout = description.layout();
+        let (joint, rate) = match measured {
+            Channel::Length { line } => (0, Channel::Rate { line }),
+            Channel::Position { joint } => (joint, Channel::Velocity { joint }),
+            // The checks let no other channel come here.
+            other => (0, other),
+        };
+        let (line, stroke_rate) = match description.actuators[actuator].on {
+            Target::Line(line) => (Some(line), Channel::Rate { line }),
+            Target::Joint(joint) => (None, Channel::Velocity { joint }),
+        };
+        Self {
+            actuator,
+            position: measured.column(layout),
+            rate: rate.column(layout),
+            force: Channel::Force { actuator }.column(layout),
+            stroke_rate: stroke_rate.column(layout),
+            joint,
+            line,
+        }
+    }
+}
+
+impl<S: Scalar> Machine<S> {
+    /// Reads the joints; elastic coordinates have no sensor and count as they are.
+    fn look(&mut self, state: &[S], dynamics: &mut Dynamics<S>, see: &impl Fn(usize) -> S) {
+        let (n, layout) = (self.position.len(), dynamics.layout());
+        self.position.copy_from_slice(&state[..n]);
+        self.rate.copy_from_slice(&state[n..2 * n]);
+        for (joint, (position, rate)) in self.position.iter_mut().zip(&mut self.rate).take(layout.joints).enumerate() {
+            *position = see(Channel::Position { joint }.column(layout));
+            *rate = see(Channel::Velocity { joint }.column(layout));
+        }
+        if dynamics.pulls() {
+            dynamics.levers(&self.position, &mut self.levers);
+        }
+    }
+
+    /// Efforts for the accelerations that were asked for; those that nobody asked for are zero, for the next controller too.
+    fn invert(&mut self, dynamics: &mut Dynamics<S>) {
+        dynamics.inverse_dynamics_of_tree(&self.position, &self.rate, &self.acceleration, &mut self.efforts);
+        self.acceleration.fill(S::zero());
+    }
+
+    /// Growth of an actuator's length per motion of the joint that is measured with it.
+    fn arm(&self, port: &Port) -> S {
+        let coordinates = self.position.len();
+        port.line.map_or(S::one(), |line| self.levers[line * coordinates + port.joint])
+    }
+}
+
+/// What is seen of an output at sample `row`: its sensor's reading, or the truth where there is no sensor. `truth` holds the outputs of
+/// all samples until then, `width` each.
+pub(super) fn reading<S: Scalar>(
+    sensors: &[(usize, Sensor<S>)],
+    (truth, width): (&[S], usize),
+    (row, time_step): (usize, f64),
+    column: usize,
+) -> S {
+    let truth = |sample: usize| truth[sample * width + column];
+    match sensors.iter().find(|(own, _)| *own == column) {
+        Some((_, sensor)) => sensor.read(row, time_step, truth),
+        None => truth(row),
+    }
+}
