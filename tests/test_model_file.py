@@ -418,7 +418,7 @@ REFUSALS = [
     # unknown and missing keys
     ("mass = {", "mas = {", "bodies.carriage.mas", 'did you mean "mass"?'),
     ("gravity", "gravty", "gravty", 'did you mean "gravity"?'),
-    (END, "[foo]\n[channels]", "foo", "actuators, beams, bodies, channels"),
+    (END, "[foo]\n[channels]", "foo", "actuators, beams, bodies, bushings, channels"),
     ("position_gain", "positiongain", "controllers.servo.positiongain", 'did you mean "position_gain"?'),
     ("viscous =", "viscus =", "effects[0].viscus", 'did you mean "viscous"?'),
     ('"q_m", unit', '"q_m", scal = 1, unit', 'channels."axis.position".scal', 'did you mean "scale"?'),

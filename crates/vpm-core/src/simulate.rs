@@ -213,6 +213,9 @@ fn repair(method: Method) -> &'static str {
             "use more substeps or the integrator adaptive, or check the signs and sizes of the parameters"
         }
         Method::Rk4 | Method::SemiImplicit => "use more substeps or the integrator linearly_implicit",
+        Method::Guarded => {
+            "use more substeps or the integrator adaptive, or check the signs and sizes of the parameters"
+        }
         Method::Adaptive { .. } => "check the signs and sizes of the parameters",
     }
 }

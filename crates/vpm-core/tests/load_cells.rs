@@ -12,10 +12,11 @@ use vpm_core::joint::{Joint, JointKind};
 use vpm_core::linearize::linearize;
 use vpm_core::live::Live;
 use vpm_core::model::Parts;
+use vpm_core::motion::JointMotion;
 use vpm_core::mount::Mount;
 use vpm_core::prepared::Prepared;
 use vpm_core::samples::Random;
-use vpm_core::simulate::{Setting, Stepping, free_run};
+use vpm_core::simulate::{Setting, Stepping, free_run, prescribed};
 use vpm_core::spatial::{Matrix3, Vector3};
 use vpm_core::table::Table;
 
@@ -51,7 +52,11 @@ fn act(content: &mut Value, parts: &Parts<f64>) {
     bushing(content, "strap", ends, [3.0; 6], [0.5; 6], [0.5; 6]);
     for line in 0..2 {
         let gain = parameter(content, "drive.gain", 7.0);
-        push(content, "actuators", json!({"name": format!("drive{line}"), "on": {"line": line}, "gain": gain}));
+        push(
+            content,
+            "actuators",
+            json!({"name": format!("drive{line}"), "on": {"line": line}, "drive": {"type": "ideal", "gain": gain}}),
+        );
     }
 }
 
@@ -222,6 +227,34 @@ fn a_stiff_bushing_in_place_of_the_joint_carries_the_same() -> Result<()> {
         assert!(cell[5].abs() > 10.0);
     }
     assert!(gaps[1] < 0.02 && gaps[1] < 0.3 * gaps[0], "{gaps:?}");
+    Ok(())
+}
+
+#[test]
+fn a_given_motion_loads_its_joints() -> Result<()> {
+    // A bob at l that turns about y with w: m l w^2 towards the joint, its weight, and m l^2 a about the axis.
+    let (mass, length, speed, turn) = (2.0, 0.5, 3.0, 1.5);
+    let inertia = Some(Inertia { mass, center_of_mass: [length, 0.0, 0.0], moments: [0.0; 6] });
+    let pin = [(JointKind::Revolute, [0.0, 1.0, 0.0])];
+    let parts =
+        Parts { gravity: [0.0, 0.0, -G], bodies: chain("rod", 0, Mount::World, &pin, inertia), ..Parts::default() };
+    let d = description(&parts, |content| load_cell(content, "cell", 0));
+    let (angle, rates, acceleration) = ([0.4, 0.4 + speed * 1e-3], [speed; 2], [turn; 2]);
+    let motion = JointMotion {
+        position: Table::new("position", &angle, 2, 1)?,
+        velocity: Table::new("velocity", &rates, 2, 1)?,
+        acceleration: Table::new("acceleration", &acceleration, 2, 1)?,
+    };
+    let stepping = Stepping::new(1e-3, 1, Method::LinearlyImplicit)?;
+    let setting = Setting { description: &d, theta: &d.parameters, stepping, sensitivities: &[], interrupt: &|| false };
+    let run = prescribed(setting, motion, &[])?;
+    // About y, the bob is down by l sin q; in the rod's axes gravity is g [sin q, 0, -cos q].
+    let (sine, cosine) = (0.4_f64.sin(), 0.4_f64.cos());
+    let along = -mass * (length * speed * speed + G * sine);
+    let across = mass * (-length * turn + G * cosine);
+    let expected = [0.0, -length * across, 0.0, along, 0.0, across];
+    run.outputs[4..10].iter().zip(expected).for_each(|(found, expected)| close(*found, expected, 1e-9));
+    close(run.outputs[3], expected[1], 1e-9);
     Ok(())
 }
 

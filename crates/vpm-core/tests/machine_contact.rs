@@ -15,8 +15,9 @@ use vpm_core::integrator::Method;
 use vpm_core::joint::JointKind;
 use vpm_core::live::Live;
 use vpm_core::model::Parts;
+use vpm_core::motion::JointMotion;
 use vpm_core::mount::Mount;
-use vpm_core::simulate::{Run, Setting, Stepping, free_run};
+use vpm_core::simulate::{Run, Setting, Stepping, free_run, prescribed};
 use vpm_core::table::Table;
 
 #[path = "common/connections.rs"]
@@ -368,5 +369,36 @@ fn a_foot_under_a_turning_leg_feels_the_ground() -> Result<()> {
     let last = run.outputs.chunks_exact(other.n_outputs()).last().unwrap_or(&[]);
     close(last[5], MASS * G, 1e-6 * MASS * G);
     close(last[4], MASS * G / k, 1e-6 * MASS * G / k);
+    Ok(())
+}
+
+#[test]
+fn a_passive_joint_finds_its_rest_on_the_ground() -> Result<()> {
+    // The block is dragged along x by a given motion; z is nobody's.
+    let (k, n, rows, step) = (1e5, 1.3, 200, 1e-3);
+    let d = block([k, n, 500.0, 1e-4], Some(FRICTION), GROUND);
+    let speed = 2.0 * FRICTION[3];
+    let table = |numbers: &[f64]| numbers.iter().flat_map(|&number| [number, 9.9]).collect::<Vec<f64>>();
+    let places: Vec<f64> = (0..rows).map(|k| speed * step * k as f64).collect();
+    let [position, velocity, acceleration] = [table(&places), table(&vec![speed; rows]), table(&vec![0.0; rows])];
+    let motion = JointMotion {
+        position: Table::new("position", &position, rows, 2)?,
+        velocity: Table::new("velocity", &velocity, rows, 2)?,
+        acceleration: Table::new("acceleration", &acceleration, rows, 2)?,
+    };
+    for method in [Method::LinearlyImplicit, Method::Rosenbrock] {
+        let stepping = Stepping::new(step, 1, method)?;
+        let setting =
+            Setting { description: &d, theta: &d.parameters, stepping, sensitivities: &[], interrupt: &|| false };
+        let run = prescribed(setting, motion, &[1])?;
+        for row in [0, rows - 1] {
+            let outputs = &run.outputs[d.n_outputs() * row..];
+            close(outputs[8], (MASS * G / k).powf(1.0 / n), 1e-9);
+            close(outputs[9], MASS * G, 1e-6 * MASS * G);
+            // The motion needs what friction takes, the joint without a drive nothing.
+            close(outputs[3], FRICTION[2] * MASS * G, 1e-6 * MASS * G);
+            close(outputs[7], 0.0, 1e-6 * MASS * G);
+        }
+    }
     Ok(())
 }

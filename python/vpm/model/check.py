@@ -10,6 +10,7 @@ from pydantic import ValidationError
 
 from vpm.errors import UnitError, near_match
 from vpm.model.beam_check import beam_problems, size_problems
+from vpm.model.connection_check import complete_contacts, connection_problems, connection_value_problems
 from vpm.model.drive_check import complete_drives, drive_problems, unit_problems, value_problems
 from vpm.model.effects import complete_effects, effect_problems
 from vpm.model.form import schema_problems
@@ -60,17 +61,18 @@ def check_document(content: Mapping[str, object], path: str | None = None) -> Ch
     _stop_at([*tree_problems(document), *joint_problems(document), *gauge_problems(document)], path)
     structure = build_structure(document)
     references = [*reference_problems(document, structure), *drive_problems(document, structure)]
+    references += connection_problems(document, structure)
     _stop_at([*references, *_command_problems(document)], path)
     _stop_at(
         [*unit_problems(document), *effect_problems(document, structure), *_channel_problems(document, structure)], path
     )
-    document = complete_drives(complete_effects(document, structure))
+    document = complete_contacts(complete_drives(complete_effects(document, structure)))
     structure = build_structure(document)
     found = tuple(slots(document, structure))
     _stop_at([problem for slot in found for problem in slot.problems()], path)
     parameters = table(list(found))
     inertias = [problem for body in structure.bodies for problem in _inertia_problems(body, parameters)]
-    pairs = value_problems(document, parameters)
+    pairs = [*value_problems(document, parameters), *connection_value_problems(document, parameters)]
     _stop_at([*inertias, *size_problems(document, parameters), *pairs], path)
     return Checked(document, structure, found, parameters)
 

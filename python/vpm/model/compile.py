@@ -9,12 +9,20 @@ from typing import Any
 from vpm.catalogue import EFFECTS
 from vpm.model.beam import End, Gauge, Line, Marker, Section, sections_of
 from vpm.model.check import Checked
+from vpm.model.connection_compile import (
+    bushing_json,
+    cell_json,
+    connection_channel,
+    contact_json,
+    frame_json,
+    mount_json,
+)
 from vpm.model.controller import ComputedTorque, Controller
 from vpm.model.drive_compile import drive_json, supply_json
 from vpm.model.effects import Effect, effects_of
 from vpm.model.parameters import INERTIA_AXES
 from vpm.model.pose import Pose, pose
-from vpm.model.structure import HYDRAULIC_CHANNELS, SUPPLY_CHANNELS, Axis, Frame, Mount, Structure
+from vpm.model.structure import HYDRAULIC_CHANNELS, SUPPLY_CHANNELS, Axis, Frame, Structure
 
 
 def description(checked: Checked) -> str:
@@ -47,6 +55,9 @@ def description(checked: Checked) -> str:
         "actuators": [_actuator(name, structure, index) for name in document.actuators],
         "sensors": [_sensor(name, structure, index) for name in document.sensors],
         "controllers": [_controller(name, c, structure, index) for name, c in document.controllers.items()],
+        "contacts": [contact_json(name, entry, structure, index) for name, entry in document.contacts.items()],
+        "bushings": [bushing_json(name, entry, structure, index) for name, entry in document.bushings.items()],
+        "load_cells": [cell_json(name, entry, structure) for name, entry in document.load_cells.items()],
     }
     return json.dumps(_unsigned(content), allow_nan=False)
 
@@ -63,20 +74,6 @@ def _unsigned(value: object) -> object:
     return value
 
 
-def _mount(mount: Mount) -> str | dict[str, Any]:
-    match mount.kind:
-        case "world":
-            return "world"
-        case "body":
-            return {"body": mount.index}
-        case "section":
-            return {"section": {"beam": mount.index, "at": mount.at}}
-
-
-def _frame(frame: Frame) -> dict[str, Any]:
-    return {"on": _mount(frame.mount), **_pose(frame.pose)}
-
-
 def _pose(placed: Pose) -> dict[str, Any]:
     return {"translation": list(placed.translation), "rotation": list(placed.rotation)}
 
@@ -86,7 +83,7 @@ def _body(axis: Axis, index: Mapping[str, int]) -> dict[str, Any]:
     kind = {"helical": {"pitch": coordinate.pitch}} if coordinate.kind == "helical" else coordinate.kind
     return {
         "name": axis.carrier,
-        "on": _mount(axis.frame.mount),
+        "on": mount_json(axis.frame.mount),
         "joint": {"name": axis.name, "kind": kind, "axis": list(coordinate.direction), **_pose(axis.frame.pose)},
         "inertia": None if axis.body is None else _inertia(axis.body, index),
         "rotor_inertia": index.get(f"{axis.name}.rotor_inertia"),
@@ -94,7 +91,7 @@ def _body(axis: Axis, index: Mapping[str, int]) -> dict[str, Any]:
 
 
 def _weld(name: str, frame: Frame, index: Mapping[str, int]) -> dict[str, Any]:
-    return {"name": name, **_frame(frame), "inertia": _inertia(name, index)}
+    return {"name": name, **frame_json(frame), "inertia": _inertia(name, index)}
 
 
 def _inertia(body: str, index: Mapping[str, int]) -> dict[str, Any]:
@@ -111,7 +108,7 @@ def _beam(name: str, structure: Structure, index: Mapping[str, int]) -> dict[str
     modes = sum(level.count(component) for component in beam.deforms)
     return {
         "name": name,
-        **_frame(structure.frames[name]),
+        **frame_json(structure.frames[name]),
         "length": beam.length,
         "level": level.name if level.name == "rigid" else {level.name: level.number},
         "deforms": list(beam.deforms),
@@ -140,7 +137,7 @@ def _gauge(name: str, gauge: Gauge, structure: Structure) -> dict[str, Any]:
 
 def _marker(name: str, marker: Marker, structure: Structure) -> dict[str, Any]:
     placed = pose(marker.translation, marker.rotation)
-    return {"name": name, **_frame(structure.mounted(marker.parent, marker.at, placed))}
+    return {"name": name, **frame_json(structure.mounted(marker.parent, marker.at, placed))}
 
 
 def _line(name: str, line: Line, structure: Structure, index: Mapping[str, int]) -> dict[str, Any]:
@@ -155,7 +152,7 @@ def _line(name: str, line: Line, structure: Structure, index: Mapping[str, int])
 
 def _end(end: End, structure: Structure) -> dict[str, Any]:
     frame = structure.mounted(end.parent, end.at, Pose(end.point))
-    return {"on": _mount(frame.mount), "point": list(frame.pose.translation)}
+    return {"on": mount_json(frame.mount), "point": list(frame.pose.translation)}
 
 
 def _effect(effect: Effect, structure: Structure, index: Mapping[str, int]) -> dict[str, Any]:
@@ -228,6 +225,9 @@ def _controller(name: str, controller: Controller, structure: Structure, index: 
 
 def _channel(channel: str, structure: Structure) -> dict[str, Any]:
     owner, _, kind = channel.partition(".")
+    connection = connection_channel(owner, kind, structure)
+    if connection is not None:
+        return connection
     owners: dict[str, tuple[str, ...]] = {
         "joint": structure.joints,
         "actuator": tuple(structure.document.actuators),

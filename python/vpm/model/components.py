@@ -90,6 +90,21 @@ class Components(DriveComponents):
         """Controllers."""
         return tuple(self._checked.document.controllers)
 
+    @property
+    def contacts(self) -> tuple[str, ...]:
+        """Contacts of points with planes."""
+        return tuple(self._checked.document.contacts)
+
+    @property
+    def bushings(self) -> tuple[str, ...]:
+        """Elastic connections of two frames."""
+        return tuple(self._checked.document.bushings)
+
+    @property
+    def load_cells(self) -> tuple[str, ...]:
+        """Readings of reaction wrenches at joints."""
+        return tuple(self._checked.document.load_cells)
+
     def joint_kind(self, joint: str) -> JointKind:
         """Kind of a joint: "prismatic", "revolute" or "helical"."""
         return self._checked.structure.joint_kind(self._known(joint, self.joints, "joint"))
@@ -151,7 +166,9 @@ class Components(DriveComponents):
 
         Per joint position, velocity, acceleration, effort; per actuator command, force; per line length, rate, tension;
         per gauge strain; per marker its origin x, y, z and its rotation vector rx, ry, rz in the world; per hydraulic
-        actuator spool, pressure_a, pressure_b, flow_a, flow_b; per motor current; per supply pressure, flow.
+        actuator spool, pressure_a, pressure_b, flow_a, flow_b; per motor current; per supply pressure, flow; per
+        contact depth, normal_force and the force fx, fy, fz in world axes; per bushing the wrench mx, my, mz, fx, fy,
+        fz on A in its axes; per load cell the reaction mx, my, mz, fx, fy, fz on the child in its axes.
         """
         return self._checked.structure.outputs
 

@@ -6,10 +6,12 @@
 | cylindrical | ``_rotation``, ``_translation`` | its axis |
 | planar | ``_x``, ``_y``, ``_rotation`` | two in the plane, then its axis, the normal of the plane |
 | spherical | ``_x``, ``_y``, ``_z`` | x, then the y that x has turned, then the z that both have turned |
+| free | ``_x``, ``_y``, ``_z``, ``_rx``, ``_ry``, ``_rz`` | ways along x, y, z, then angles as spherical |
 | fixed | none | |
 
 The lower pairs: F. Reuleaux, "Theoretische Kinematik", 1875; angles of the spherical joint as Cardan angles in J.
-Wittenburg, "Dynamics of Multibody Systems", 2008, section 2.1.2. These have a singularity at ``_y`` = 90 degrees.
+Wittenburg, "Dynamics of Multibody Systems", 2008, section 2.1.2. These have a singularity at ``_y`` (``_ry``) = 90
+degrees.
 """
 
 from __future__ import annotations
@@ -30,6 +32,7 @@ _SUFFIXES: Mapping[JointType, tuple[str, ...]] = {
     "cylindrical": ("_rotation", "_translation"),
     "planar": ("_x", "_y", "_rotation"),
     "spherical": ("_x", "_y", "_z"),
+    "free": ("_x", "_y", "_z", "_rx", "_ry", "_rz"),
     "fixed": (),
 }
 
@@ -80,6 +83,9 @@ def coordinates(name: str, joint: Joint) -> tuple[Coordinate, ...]:
             )
         case "spherical":
             return tuple(Coordinate(n, "revolute", d) for n, d in zip(names, (X, Y, Z), strict=True))
+        case "free":
+            ways = tuple(Coordinate(n, "prismatic", d) for n, d in zip(names[:3], (X, Y, Z), strict=True))
+            return (*ways, *(Coordinate(n, "revolute", d) for n, d in zip(names[3:], (X, Y, Z), strict=True)))
         case "fixed":
             return ()
 

@@ -10,6 +10,9 @@ from pydantic import BaseModel, ValidationError
 
 from vpm.errors import near_match
 from vpm.model.beam import Circle, Damping, End, Given, IBeam, Material, Part, Rectangle, Tube
+from vpm.model.contact import EXAMPLES as CONNECTION_EXAMPLES
+from vpm.model.contact import NESTED as CONNECTION_TABLES
+from vpm.model.contact import TAGS
 from vpm.model.drives import ACTUATOR_TYPES, EXAMPLES, tables_inside
 from vpm.model.entry import Quantity
 from vpm.model.messages import Problem, place
@@ -45,6 +48,7 @@ _EXAMPLES: Mapping[str, str] = {
     "from": 'from = { parent = "world", point = [0.0, 0.0, 0.0] }',
     "to": 'to = { parent = "link", point = [0.1, 0.0, 0.0] }',
     **EXAMPLES,
+    **CONNECTION_EXAMPLES,
 }
 
 #: Tables inside of components, by their key.
@@ -104,6 +108,8 @@ def _without_tags(keys: tuple[str | int, ...]) -> tuple[str | int, ...]:
     """Place without the type of a controller or the shape of a section, which the schema puts into it."""
     if _actuator_type(keys) is not None:
         return (*keys[:2], *keys[3:])
+    if keys[0] == "bushings":
+        return tuple(key for key in keys if key not in TAGS)
     tags = {("controllers", None): 2, ("beams", "section"): 3, ("beams", "sections"): 4}
     tag = tags.get((str(keys[0]), str(keys[2]) if keys[0] == "beams" and len(keys) > 2 else None))
     return keys if tag is None or len(keys) <= tag + 1 else (*keys[:tag], *keys[tag + 1 :])
@@ -180,6 +186,8 @@ def _known_keys(keys: tuple[str | int, ...], tag: str | None = None) -> tuple[st
     if keys[0] in {"actuators", "supplies"} and len(keys) > 3:
         inside_of = tables_inside(str(keys[0]), tag)
         return keys_of(inside_of.get(str(keys[-2]), Quantity))
+    if keys[0] in {"contacts", "bushings"} and len(keys) > 3:
+        return keys_of(CONNECTION_TABLES.get(str(keys[-2]), Quantity))
     if len(keys) == 3 and keys[0] in SECTIONS:
         return keys_of(*SECTIONS[str(keys[0])])
     inside = [key for key in keys[2:-1] if not isinstance(key, int)]

@@ -1,7 +1,7 @@
 """The parameters of a model: one flat, ordered table with SI values, read from the document and checked.
 
-Order: bodies (mass, centre of mass, inertia), rotors, beams, lines, supplies, actuators, controllers, then
-effects as they stand in the file.
+Order: bodies (mass, centre of mass, inertia), rotors, beams, lines, supplies, actuators, controllers, contacts,
+bushings, then effects as they stand in the file.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from typing import Literal
 from vpm.catalogue import EFFECTS, POSITIVE
 from vpm.errors import UnitError
 from vpm.model.beam import Beam, Line, Part, sections_of
+from vpm.model.connection_parameters import bushing_rows, contact_rows
 from vpm.model.controller import Controller
 from vpm.model.drive_parameters import Row, actuator_rows, supply_rows
 from vpm.model.effects import effect_unit
@@ -194,6 +195,7 @@ def slots(document: Document, structure: Structure) -> Iterator[Slot]:
         yield from (_slot(("actuators", name), row) for row in rows)
     for name, controller in document.controllers.items():
         yield from _controller_slots(name, controller, structure)
+    yield from _connection_slots(document)
     for position, entry in enumerate(document.effects):
         yield from _effect_slots(position, entry, structure)
 
@@ -265,6 +267,14 @@ def _controller_slots(name: str, controller: Controller, structure: Structure) -
     for gain in gains(controller, structure):
         keys, bounds = ("controllers", name, *gain.way), _ABOVE_ZERO if gain.is_limit else _ANY
         yield Slot(f"{name}.{gain.suffix}", keys, gain.quantity, si_unit(gain.unit), bounds, "shape")
+
+
+def _connection_slots(document: Document) -> Iterator[Slot]:
+    rows = [("contacts", name, row) for name, contact in document.contacts.items() for row in contact_rows(contact)]
+    rows += [("bushings", name, row) for name, bushing in document.bushings.items() for row in bushing_rows(bushing)]
+    for section, name, row in rows:
+        keys = (section, name, *row.keys)
+        yield Slot(f"{name}.{row.suffix}", keys, row.quantity, row.unit, row.bounds, row.kind, row.impossible)
 
 
 def _effect_slots(position: int, entry: EffectEntry, structure: Structure) -> Iterator[Slot]:

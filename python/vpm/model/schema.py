@@ -11,6 +11,7 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 from vpm.model.beam import Beam, Gauge, Line, Marker
+from vpm.model.contact import Bushing, Contact, LoadCell
 from vpm.model.controller import TYPES, Controller
 from vpm.model.drives import ACTUATOR_TYPES, Actuator
 from vpm.model.entry import ORIGIN, ZERO, Entry, Number, ParameterValue, Quantity, Text, Vector
@@ -36,7 +37,7 @@ class DenavitHartenberg(Entry):
     convention: Literal["standard", "modified"] = "standard"
 
 
-JointType = Literal["prismatic", "revolute", "helical", "cylindrical", "planar", "spherical", "fixed"]
+JointType = Literal["prismatic", "revolute", "helical", "cylindrical", "planar", "spherical", "free", "fixed"]
 
 
 class Joint(Entry):
@@ -130,6 +131,9 @@ class Document(Entry):
     actuators: dict[str, Actuator] = Field(default_factory=dict)
     sensors: dict[str, Sensor] = Field(default_factory=dict)
     controllers: dict[str, Controller] = Field(default_factory=dict)
+    contacts: dict[str, Contact] = Field(default_factory=dict)
+    bushings: dict[str, Bushing] = Field(default_factory=dict)
+    load_cells: dict[str, LoadCell] = Field(default_factory=dict)
     effects: tuple[EffectEntry, ...] = ()
     channels: dict[str, ChannelEntry] | None = None
 
@@ -146,6 +150,9 @@ SECTIONS: Mapping[str, tuple[type[BaseModel], ...]] = {
     "actuators": tuple(ACTUATOR_TYPES.values()),
     "sensors": (Sensor,),
     "controllers": TYPES,
+    "contacts": (Contact,),
+    "bushings": (Bushing,),
+    "load_cells": (LoadCell,),
     "channels": (ChannelEntry,),
 }
 

@@ -31,6 +31,8 @@ DRIVE_UNITS: Mapping[str, str] = {
 }
 LINE_UNITS: Mapping[str, str] = {"length": "m", "rate": "m/s", "tension": "N"}
 GAUGE_UNITS: Mapping[str, str] = {"strain": "1"}
+CONTACT_UNITS: Mapping[str, str] = {"depth": "m", "normal_force": "N", "fx": "N", "fy": "N", "fz": "N"}
+WRENCH_UNITS: Mapping[str, str] = {"mx": "N m", "my": "N m", "mz": "N m", "fx": "N", "fy": "N", "fz": "N"}
 MARKER_UNITS: Mapping[str, str] = {"x": "m", "y": "m", "z": "m", "rx": "rad", "ry": "rad", "rz": "rad"}
 
 COORDINATE_UNIT: Mapping[JointKind, str] = {"prismatic": "m", "revolute": "rad", "helical": "rad"}
@@ -192,6 +194,9 @@ class Structure:
             (self.driven_by("hydraulic"), HYDRAULIC_CHANNELS),
             (self.driven_by("dc_motor"), MOTOR_CHANNELS),
             (tuple(document.supplies), SUPPLY_CHANNELS),
+            (tuple(document.contacts), tuple(CONTACT_UNITS)),
+            (tuple(document.bushings), tuple(WRENCH_UNITS)),
+            (tuple(document.load_cells), tuple(WRENCH_UNITS)),
         ]
         return tuple(f"{owner}.{channel}" for owners, channels in groups for owner in owners for channel in channels)
 
@@ -219,7 +224,7 @@ class Structure:
             return DRIVE_UNITS[name]
         if owner in self.document.actuators:
             return self._actuator_unit(owner, name)
-        return {**LINE_UNITS, **GAUGE_UNITS, **MARKER_UNITS}[name]
+        return {**LINE_UNITS, **GAUGE_UNITS, **MARKER_UNITS, **CONTACT_UNITS, **WRENCH_UNITS}[name]
 
     def _actuator_unit(self, actuator: str, channel: str) -> str:
         if channel == "force":

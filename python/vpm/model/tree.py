@@ -65,6 +65,11 @@ def _attachments(document: Document) -> Iterator[tuple[tuple[str, ...], str, flo
     for name, line in document.lines.items():
         yield ("lines", name, "from"), line.start.parent, line.start.at
         yield ("lines", name, "to"), line.end.parent, line.end.at
+    for name, contact in document.contacts.items():
+        yield ("contacts", name), contact.parent, contact.at
+    for name, bushing in document.bushings.items():
+        yield ("bushings", name, "a"), bushing.a.parent, bushing.a.at
+        yield ("bushings", name, "b"), bushing.b.parent, bushing.b.at
 
 
 def _attachment_problems(keys: tuple[str, ...], parent: str, at: float | None, document: Document) -> Iterator[Problem]:
@@ -142,7 +147,7 @@ def _place_problems(name: str, joint: Joint) -> Iterator[Problem]:
 
 def _axis_problems(name: str, joint: Joint) -> Iterator[Problem]:
     where = place("joints", name, "axis")
-    if joint.type in {"fixed", "spherical"}:
+    if joint.type in {"fixed", "spherical", "free"}:
         if joint.axis is not None:
             yield Problem(where, f"is given, but a {joint.type} joint has no axis; remove it")
         return
