@@ -105,7 +105,9 @@ def standing() -> dict[str, ArrayLike]:
 
 def falling(model: vpm.Model) -> dict[str, ArrayLike]:
     """Touch-down, peak, heights and impulse of the drop."""
-    runs = [drop("rcm.toml", gain(p), duration=0.4, time_step=1e-5) for p in (150.0, 300.0)]
+    runs = [
+        drop("rcm.toml", gain(p), duration=0.4, time_step=1e-5, integrator="adaptive(1e-8)") for p in (150.0, 300.0)
+    ]
     heights = [np.interp([0.15, 0.2, 0.3, 0.4], run.time, run["slider.position"]) for run in runs]
     return {
         "hyl.touchdown": touchdown(runs[0]),
