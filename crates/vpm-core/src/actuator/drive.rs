@@ -56,11 +56,6 @@ impl<P> Drive<P> {
         }
     }
 
-    /// Whether it does nothing without a command. Springs along a line act by themselves; a command only changes their free length.
-    pub fn needs_command(&self) -> bool {
-        !matches!(self, Self::SpringDamper(_) | Self::Maxwell(_))
-    }
-
     /// Names of its states, in their order.
     pub fn states(&self) -> &'static [&'static str] {
         match self {
