@@ -73,6 +73,7 @@ chirp: $(VENV)/.installed ## time the servo-cylinder beside the solvers that are
 
 figures: $(VENV)/.installed ## draw the pictures of docs/ anew, from the package
 	$(BIN)/python docs/figures/validity.py
+	$(BIN)/python docs/figures/hyl.py
 
 docs: $(VENV)/.installed ## run every snippet of the documents; build the Rust documentation
 	$(BIN)/python -m pytest tests/test_docs.py $(PYTEST_ARGS)

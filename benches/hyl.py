@@ -25,6 +25,8 @@ CHOICES = (
     ("adaptive(1e-5)", 1),
     ("adaptive", 1),
     ("adaptive(1e-8)", 1),
+    ("guarded", 1),
+    ("guarded", 2),
     ("rosenbrock", 2),
     ("rosenbrock", 4),
     ("rosenbrock", 8),
