@@ -8,7 +8,7 @@
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .SUFFIXES:
-.PHONY: help demo test test-rust test-python reference validation lint lint-rust lint-python bench peers bench-counts docs figures package clean
+.PHONY: help demo test test-rust test-python reference validation lint lint-rust lint-python bench peers chirp bench-counts docs figures package clean
 
 PYTHON ?= python3
 DEMO_OUT ?= demo-report
@@ -65,11 +65,15 @@ bench-counts: $(VENV)/.installed ## count the instructions of one call of the re
 	$(BIN)/python benches/instruction_counts.py
 
 peers: $(VENV)/.installed ## time vpm beside other engines, which this installs; writes docs/performance.md
-	$(BIN)/python -m pip install --quiet 'exudyn>=1.10' 'mujoco>=3.3' 'pin>=3.0'
+	$(BIN)/python -m pip install --quiet 'exudyn>=1.10' 'mujoco>=3.3' 'pin>=3.0' 'casadi>=3.6' 'numba>=0.60'
 	$(BIN)/python benches/peers.py
+
+chirp: $(VENV)/.installed ## time the servo-cylinder beside the solvers that are installed (C, CasADi, SciPy with Numba)
+	$(BIN)/python benches/servo_chirp.py
 
 figures: $(VENV)/.installed ## draw the pictures of docs/ anew, from the package
 	$(BIN)/python docs/figures/validity.py
+	$(BIN)/python docs/figures/hyl.py
 
 docs: $(VENV)/.installed ## run every snippet of the documents; build the Rust documentation
 	$(BIN)/python -m pytest tests/test_docs.py $(PYTEST_ARGS)

@@ -21,8 +21,8 @@ import markdown  # noqa: E402
 CALLS = 1000
 
 
-def program() -> Path:
-    """The compiled example, built where cargo puts it."""
+def program(example: str) -> Path:
+    """An example of the core, compiled where cargo puts it."""
     command = [
         "cargo",
         "build",
@@ -30,7 +30,7 @@ def program() -> Path:
         "--package",
         "vpm-core",
         "--example",
-        "recursions",
+        example,
         "--message-format=json",
     ]
     done = subprocess.run(command, cwd=ROOT, check=True, stdout=subprocess.PIPE, text=True)  # noqa: S603
@@ -53,7 +53,7 @@ def main() -> None:
     options = parser.parse_args()
     if shutil.which("valgrind") is None:
         raise SystemExit("the counts need valgrind, which is not here; install your system's package valgrind")
-    binary, lines = program(), []
+    binary, lines = program("recursions"), []
     for algorithm in ("rnea", "crba", "aba"):
         count = (instructions(binary, algorithm, CALLS) - instructions(binary, algorithm, 0)) / CALLS
         lines.append((algorithm, f"{count:.0f}"))

@@ -16,7 +16,7 @@ import json
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -232,6 +232,7 @@ class Leg:
             held = None if self.period is None else self.commands(now[:, None])[:, 0]
             wanted = times[(times > begin + 1e-12) & (times <= end + 1e-12)]
             ends = np.union1d(wanted, end) if wanted.size == 0 or abs(wanted[-1] - end) > 1e-12 else wanted
+            options: dict[str, Any] = {"jac": self._slopes_of(held)} if self.method == "Radau" else {}
             solved = solve_ivp(
                 self._rate_of(held),
                 (begin, ends[-1]),
@@ -240,7 +241,7 @@ class Leg:
                 t_eval=ends,
                 rtol=tolerance,
                 atol=tolerance * self.scales(),
-                **({"jac": self._slopes_of(held)} if self.method == "Radau" else {}),
+                **options,
             )
             if not solved.success:
                 raise RuntimeError(solved.message)
@@ -265,6 +266,11 @@ class Leg:
             return np.asarray((ahead - behind) / (2.0 * steps))
 
         return slopes
+
+    def poles(self) -> NDArray[np.complex128]:
+        """Eigenvalues of the leg that hangs in the air, its controllers without samples (1/s)."""
+        n = 2 * self.size
+        return np.asarray(np.linalg.eigvals(self._slopes_of(None)(0.0, self.start())[:n, :n]))
 
     def observe(self, states: Array, times: Array) -> dict[str, Array]:
         """Channels of a simulation: height, angles, cylinders, ground, torques."""
@@ -322,6 +328,7 @@ CASES: dict[str, Leg] = {
     "rigid, high gain": Leg(drive="pistons", period=1e-3, proportional=300.0),
     "bushings, low gain": Leg(drive="pistons", period=1e-3, bushings=STIFF),
     "springs": Leg(drive="springs"),
+    "springs, bushings": Leg(drive="springs", bushings=STIFF),
     "hydraulic, low gain": Leg(drive="hydraulic", period=1e-3),
     "hydraulic, high gain": Leg(drive="hydraulic", period=1e-3, proportional=300.0),
     "hydraulic, bushings": Leg(drive="hydraulic", period=1e-3, bushings=STIFF),

@@ -9,6 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 import two_link_arm
+from drive_texts import RIG
 from model_texts import changed, described
 from vpm.errors import ModelError, SimulationError
 from vpm.experiment import Experiment
@@ -116,6 +117,11 @@ derivative = [16.0, 20.0]
 ARM = two_link_arm.MODEL + COMPUTED
 
 
+def grid(rows: int, step: float) -> Array:
+    """Times of so many samples, s."""
+    return np.asarray(step * np.arange(rows), dtype=np.float64)
+
+
 def record(time: Array, model: Model, references: dict[str, Array]) -> Experiment:
     """Record of nothing but references."""
     channels = {f"{name}.reference": values for name, values in references.items()}
@@ -136,12 +142,13 @@ def held_step(damping: float, inertia: float, h: float) -> tuple[Array, Array]:
 def test_an_axis_under_pd_is_the_exact_discrete_solution(every: int, delay: float, whole: int, fraction: float) -> None:
     friction = '[[effects]]\ntype = "viscous_friction"\nat = "axis"\nviscous = 3.0\n'
     model = Model.from_toml(f"{AXIS}sample_time = {0.01 * every}\ndelay = {delay}\n{friction}")
-    time = 0.01 * np.arange(120)
+    time = grid(120, 0.01)
     reference = 0.3 + 0.1 * np.sin(15.0 * time)
     log = record(time, model, {"drive": reference})
     run = simulate(model, log, "closed_loop", integrator="rk4", substeps=16, initial_state=np.array([0.1, -0.2]))
     matrix, push = held_step(3.0, 2.0, 0.01)
-    state, drafts, expected = np.array([0.1, -0.2]), [], []
+    state, expected = np.array([0.1, -0.2]), []
+    drafts: list[float] = []
     for k, r in enumerate(reference):
         expected.append(state)
         drafts.append(5.0 * (r - state[0]) - 0.6 * state[1] if k % every == 0 else drafts[k - 1])
@@ -154,7 +161,7 @@ def test_an_axis_under_pd_is_the_exact_discrete_solution(every: int, delay: floa
 def gap_to_linear(step: float) -> float:
     """Largest gap between the error of the arm and e'' + D e' + P e = 0, both poles of a joint in one place."""
     model = Model.from_toml(ARM)
-    time = np.arange(0.0, 1.0, step)
+    time = grid(round(1.0 / step), step)
     shoulder, elbow = 0.5 * np.sin(2.0 * time), 0.8 * np.sin(3.0 * time + 0.4)
     log = record(time, model, {"first": shoulder, "second": elbow})
     initial = np.array([-0.1, 0.8 * np.sin(0.4) - 0.1, 1.0, 2.4 * np.cos(0.4)])
@@ -172,7 +179,7 @@ def test_under_computed_torque_the_error_of_an_arm_dies_away_as_asked_for() -> N
 
 def test_a_force_loop_asks_for_a_torque_by_way_of_the_force() -> None:
     model = Model.from_toml(LEG)
-    time = 0.001 * np.arange(12)
+    time = grid(12, 0.001)
     log = record(time, model, {"motor": np.full(12, 0.3), "valve": np.full(12, 0.9)})
     run = simulate(model, log, "closed_loop", initial_state=np.array([0.1, 0.6, 0.5, -0.4]))
 
@@ -191,6 +198,46 @@ def test_a_force_loop_asks_for_a_torque_by_way_of_the_force() -> None:
     assert run["motor.command"][0] == pytest.approx(3.0 * 0.2 - 0.2 * 0.5)
 
 
+def test_with_a_feed_forward_an_ideal_actuator_gives_the_torque_itself() -> None:
+    changes = (
+        (
+            'force_gain = { value = 0.2, unit = "mV/N" }',
+            'feed_forward = { value = 0.5, unit = "mV/N" }\nforce_gain = 0.0',
+        ),
+        ('velocity_gain = { value = 0.5, unit = "V s/m" }\n', ""),
+        ("sample_time = 0.002\ndelay = 0.0015\n", ""),
+    )
+    model = changed(LEG, *changes)
+    time = grid(400, 1e-3)
+    log = record(time, model, {"motor": np.full(400, 0.3), "valve": 0.1 * np.sin(5.0 * time) - 0.5})
+    run = simulate(model, log, "closed_loop", initial_state=np.array([0.1, -0.5, 0.5, -0.4]))
+    # The power of the force along the line is that of the torque at the joint: tau dq = F ds/dt.
+    torque = 150.0 * (log["valve.reference"] - run["knee.position"]) - 6.0 * run["knee.velocity"]
+    power = run["valve.force"] * run["cylinder.rate"]
+    np.testing.assert_allclose(torque * run["knee.velocity"], power, atol=1e-9 * np.max(np.abs(power)))
+
+
+def test_a_cylinder_in_a_force_loop_comes_to_rest_at_the_force_that_is_asked_for() -> None:
+    """The valve integrates: without leakage no current is left at rest, and the spring k takes F = p (r - q) = k q."""
+    loop = """
+[controllers.stroke]
+type = "force_loop"
+actuator = "servo"
+measures = "axis.position"
+proportional = { value = 100.0, unit = "kN/m" }
+force_gain = { value = 0.1, unit = "mA/kN" }
+velocity_gain = { value = 8.0, unit = "mA s/m" }
+delay = 0.0005
+"""
+    changes = (("internal_leakage = 1.7e-13", "internal_leakage = 0.0"), ("value = 589.927", "value = 50000.0"))
+    model = changed(RIG + loop, *changes)
+    run = simulate(model, record(grid(1500, 1e-3), model, {"servo": np.full(1500, 0.010)}), "closed_loop", substeps=4)
+    place = 1e5 * 0.010 / (1e5 + 5e4)
+    assert run["axis.position"][-1] == pytest.approx(place, rel=1e-6)
+    assert run["servo.force"][-1] == pytest.approx(5e4 * place, rel=1e-6)
+    assert np.max(np.abs(run["servo.command"])) > 1e-6
+
+
 def test_a_pd_holds_the_length_of_a_line() -> None:
     changes = (
         ('type = "force_loop"', 'type = "pd"'),
@@ -203,7 +250,7 @@ def test_a_pd_holds_the_length_of_a_line() -> None:
     )
     model = changed(LEG, *changes)
     assert model.channel_unit("valve.reference") == "m"
-    log = record(0.001 * np.arange(12), model, {"motor": np.zeros(12), "valve": np.full(12, 0.35)})
+    log = record(grid(12, 0.001), model, {"motor": np.zeros(12), "valve": np.full(12, 0.35)})
     run = simulate(model, log, "closed_loop", initial_state=np.array([0.1, 0.6, 0.5, -0.4]))
     expected = 20.0 * (0.35 - run["cylinder.length"]) - run["cylinder.rate"]
     np.testing.assert_allclose(run["valve.command"], expected, atol=1e-12)
@@ -218,6 +265,7 @@ def test_parameters_have_names_units_and_bounds() -> None:
         "hip_pd.limit": "A",
         "knee_force.proportional": "N m/rad",
         "knee_force.derivative": "N m s/rad",
+        "knee_force.feed_forward": "V/N",
         "knee_force.force_gain": "V/N",
         "knee_force.velocity_gain": "V s/m",
         "knee_force.limit": "V",
@@ -262,7 +310,7 @@ def test_controllers_reach_the_core_and_read_back_as_they_are_written() -> None:
 
 def test_derivatives_through_the_loop_are_those_of_differences() -> None:
     model = Model.from_toml(LEG)
-    time = 0.001 * np.arange(200)
+    time = grid(200, 0.001)
     log = record(time, model, {"motor": 0.3 * np.sin(9.0 * time), "valve": 0.6 + 0.2 * np.sin(7.0 * time)})
     initial = np.array([0.1, 0.6, 0.5, -0.4])
     names = ("knee_force.force_gain", "knee_force.proportional", "hip_pd.derivative", "shank.mass")
@@ -281,7 +329,7 @@ def test_derivatives_through_the_loop_are_those_of_differences() -> None:
 
 def test_a_sample_time_has_to_fit_the_record() -> None:
     model = Model.from_toml(f"{AXIS}sample_time = 0.0025\n")
-    log = record(0.001 * np.arange(12), model, {"drive": np.zeros(12)})
+    log = record(grid(12, 0.001), model, {"drive": np.zeros(12)})
     with pytest.raises(SimulationError) as caught:
         simulate(model, log, "closed_loop")
     message = str(caught.value)
@@ -335,6 +383,13 @@ REFUSALS = [
     (ARM, '["second", "first"]', '["second", "frist"]', "controllers.arm.actuators[1]", 'did you mean "first"?'),
     (ARM, "derivative = [16.0, 20.0]", "derivative = [16.0]", "controllers.arm.derivative", "has 1 entries for 2"),
     (ARM, "derivative = [16.0, 20.0]", "derivative = 16.0", "controllers.arm.derivative", "has to be a list"),
+    (
+        ARM,
+        'joint = "elbow"\ngain = { value = 3.0, unit = "N m/A" }\ncommand_unit = "A"',
+        'joint = "elbow"\ntype = "dc_motor"\nresistance = 1.0\ntime_constant = 1e-3\ntorque_constant = 0.05',
+        "actuators.second.type",
+        'has the type "dc_motor", but computed_torque commands efforts',
+    ),
     (ARM, 'unit = "1/s^2"', 'unit = "1/s"', "controllers.arm.proportional[1]", "has a wrong unit"),
     (ARM, "[controllers.arm]", f"{BEAM}\n[controllers.arm]", "controllers.arm", 'elastic coordinates of beam "whip"'),
 ]

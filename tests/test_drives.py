@@ -327,3 +327,39 @@ def test_a_change_that_crosses_another_value_is_refused() -> None:
     assert limits["pump.oil.bulk_modulus"].minimum == 1e5  # no fit tries an oil that is softer than air
     assert 0.0 < limits["servo.valve.flow_gain"].minimum < 1e-12
     assert limits["servo.cylinder.internal_leakage"].minimum == 0.0
+
+
+@pytest.mark.parametrize("text", [RIG, MOTOR, SPRUNG + LEG_CYLINDER])
+def test_the_core_takes_every_value_that_a_file_may_give(text: str) -> None:
+    """Also at the ends of the physical ranges: both sides have to agree on what a parameter may be."""
+    model = Model.from_toml(text)
+    components = (*model.actuators, *model.supplies)
+    for name in [name for name in model.parameter_names if name.partition(".")[0] in components]:
+        parameter = model.parameters[name]
+        ends = [end for end in (parameter.minimum, parameter.maximum) if math.isfinite(end)]
+        for value in (0.5 * parameter.value, 2.0 * parameter.value, *ends):
+            try:
+                changed_model = model.with_parameters({name: value})
+            except ModelError:
+                continue  # outside of its range, or against another value
+            internal = model.core.internal_state(changed_model.theta, [0.0] * len(model.coordinates))
+            assert len(internal) == len(model.internal_names), name
+
+
+def test_logs_may_hold_what_is_inside_of_drives() -> None:
+    table = """
+[channels]
+"servo.command" = { column = "i", unit = "mA" }
+"servo.pressure_a" = { column = "pa", unit = "bar" }
+"servo.spool" = { column = "z", unit = "%", scale = 1.0 }
+"pump.pressure" = { column = "ps", unit = "MPa" }
+"""
+    with pytest.raises(ModelError) as caught:
+        Model.from_toml(RIG + table)
+    assert caught.value.where == 'channels."servo.spool".unit'
+    model = Model.from_toml(RIG + table.replace('"%"', '"mA"'))
+    assert model.channel_table["pump.pressure"].unit == "MPa"
+    with pytest.raises(ModelError, match="is no channel of the model"):
+        Model.from_toml(RIG + table.replace('"%"', '"mA"').replace("pressure_a", "presure_a"))
+    with pytest.raises(ModelError, match="is no output of the model"):
+        Model.from_toml(RIG + '\n[sensors.gauge]\nmeasures = "servo.current"\n')

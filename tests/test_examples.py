@@ -19,6 +19,12 @@ ROOT = Path(__file__).resolve().parent.parent
         ("spinning_beam", {"spin_up.png"}, ("strain(6)                 0.5738", "beyond the arm's own length")),
         # 0.9963 m and -0.0447 m at 0.1 s: the same, falling_flexible_pendulum, printed to 1e-4 m.
         ("flexible_pendulum", {"strobe.png", "energies.png"}, ("0.1      0.9963", "largest kinetic energy")),
+        # 36.834 and 46.522 bar, 11.513 mm after 50 ms: hydraulic_reference.STEP, printed to 1e-3.
+        (
+            "servo_cylinder",
+            {"step.png"},
+            ("constant         50    11.513      36.834      46.522", "sagging         200"),
+        ),
         # The first gauge shows 633 µm/m at rest in the horizontal (values/tudor.json); the swing begins there.
         (
             "tudor",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from dataclasses import replace
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 
 import vpm
 from hyl_laws import Ground
-from hyl_witness import CASES, DESIRED, GRAVITY, LOWER, MASS, TIMES, UPPER, Leg
+from hyl_witness import CASES, DESIRED, GRAVITY, LOWER, MASS, STIFF, TIMES, UPPER, Drive, Leg
 from validation import hyl
 from validation.row import accepted, values
 from vpm import linkages
@@ -49,7 +50,7 @@ def test_the_witness_falls_as_the_reference() -> None:
     peaks, heights = [], []
     for gain in (150.0, 300.0):
         leg = Leg(proportional=gain)
-        seen = leg.observe(leg.simulate(times, 1e-8), times)
+        seen = leg.observe(leg.simulate(times, 1e-6), times)
         peaks.append(seen["normal_force"].max())
         heights.append(seen["height"][-4:])
         lost = seen["impulse"][-1] - MASS * GRAVITY * times[-1] - seen["momentum"][-1]
@@ -69,6 +70,22 @@ def test_the_stored_values_are_those_of_an_implicit_method_too(case: str) -> Non
         np.testing.assert_allclose(column, expected, rtol=0.0, atol=1e-6 * max(np.abs(expected).max(), 1e-9))
 
 
+def test_forces_beside_soft_joints_take_energy_from_nowhere_and_torques_and_springs_do_not() -> None:
+    """Why the controllers of the leg on bushings are sampled."""
+    worst: dict[Drive, float] = {}
+    drives: tuple[Drive, ...] = ("pistons", "torques", "springs")
+    for drive in drives:
+        poles = Leg(drive=drive, bushings=STIFF).poles()
+        poles = poles[poles.imag > 1.0]  # those that oscillate
+        damping = -poles.real / np.abs(poles)
+        worst[drive] = damping.min()
+        if drive == "pistons":
+            frequency = abs(poles[damping.argmin()].imag) / (2.0 * np.pi)
+            assert frequency == pytest.approx(4970.0, abs=10.0)
+    assert worst["pistons"] == pytest.approx(-0.073, abs=0.001)
+    assert min(worst["torques"], worst["springs"]) > 0.015
+
+
 # ---- the package -----------------------------------------------------------------------------------------------------
 
 
@@ -77,7 +94,7 @@ def test_a_drop_is_that_of_the_witness(case: str) -> None:
     """Heights, forces and pressures; the rows of docs/validation.md allow no more."""
     for name, (found, expected) in hyl.agreement(case).items():
         scale = float(np.abs(expected).max())
-        np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-5 * scale, err_msg=name)
+        np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-6 * scale, err_msg=name)
 
 
 def test_cylinders_carry_the_published_weights() -> None:
@@ -127,16 +144,20 @@ def test_impulse_and_weight_balance_with_hydraulics() -> None:
     assert abs(hyl.lost_impulse(model, run)) < 1e-3
 
 
-def test_controllers_of_a_robot_change_the_drop_little() -> None:
-    """At 1 kHz the hip is within 1.5 mm of where controllers without samples have it, and the peak is as it was."""
-    heights = {}
-    for step in (1e-5, 1e-3):
-        run = hyl.drop("rcm.toml", {}, duration=0.4, time_step=step)
-        heights[step] = np.interp([0.15, 0.2, 0.3, 0.4], run.time, run["slider.position"])
-    assert np.abs(heights[1e-3] - heights[1e-5]).max() < 1.5e-3
+def test_controllers_of_a_robot_change_the_drop_a_little() -> None:
+    """At 1 kHz the peak is 3 % lower, since the damping hears of the impact late, and the hip within 0.6 mm."""
+    text = (hyl.HYL / "rcm.toml").read_text(encoding="utf-8")
+    sampled = vpm.Model.from_toml(text.replace("derivative = 6.0\n", "derivative = 6.0\nsample_time = 1e-3\n"))
+    content = tomllib.loads((hyl.HYL / "drop.toml").read_text(encoding="utf-8")) | {"duration": 0.4, "time_step": 1e-5}
+    scenario = vpm.Scenario.from_dict(content, folder=hyl.HYL)
+    log, start = scenario.experiment(sampled), scenario.initial_state(sampled)
+    run = vpm.simulate(sampled, log, scenario.mode(sampled), initial_state=start, integrator="adaptive")
+    assert run["foot.normal_force"].max() == pytest.approx(1126.0, abs=1.0)
+    heights = np.interp([0.15, 0.2, 0.3, 0.4], run.time, run["slider.position"])
+    assert np.abs(heights - REFERENCE["hyl.drop.hip_height"]["value"][:4]).max() == pytest.approx(5.6e-4, abs=5e-5)
 
 
-@pytest.mark.parametrize("name", ["static", "quasi_static", "drop", "hydraulic_drop"])
+@pytest.mark.parametrize("name", ["static", "drop", "hydraulic_drop"])
 def test_every_scenario_runs(name: str) -> None:
     result = vpm.Scenario.load(hyl.HYL / f"{name}.toml").run()
     assert result.failures == {}
@@ -148,7 +169,8 @@ def test_every_scenario_runs(name: str) -> None:
 def test_a_hand_reaches_the_published_range() -> None:
     """A knee cylinder of 295 to 317 mm, and a knee force up to about 3 kN."""
     result = vpm.Scenario.load(hyl.HYL / "quasi_static.toml").run()
+    assert result.failures == {}
     lengths = np.concatenate([run["knee_cylinder.length"] for run in result.runs.values()])
     forces = np.concatenate([run["knee_drive.force"] for run in result.runs.values()])
-    assert 0.293 < lengths.min() < 0.300
+    assert 0.295 < lengths.min() < 0.300
     assert 2500.0 < forces.max() < 3300.0

@@ -231,6 +231,24 @@ def test_lags_and_named_states_begin_as_told(folder: Path) -> None:
     assert rest.run()["bare"]["drive.force"][0] == 0.0
 
 
+def test_logged_supplies_have_the_pressure_that_is_given_or_that_of_the_model(folder: Path) -> None:
+    text = (ROOT / "examples" / "servo_cylinder" / "rig.toml").read_text(encoding="utf-8")
+    text = text.replace("[supplies.pump]", '[supplies.pump]\nsource = "logged"', 1)
+    (folder / "rig.toml").write_text(text, encoding="utf-8")
+    runs = [{"name": "rig", "model": "rig.toml"}]
+    falling = {"type": "points", "time": [0.0, 0.02], "value": {"value": [140.0, 100.0], "unit": "bar"}}
+    made = scenario(folder, runs=runs, supplies={"pump": falling}, duration=0.02, integrator="rosenbrock", substeps=4)
+    run = made.run()["rig"]
+    assert run.notes == ()
+    assert run["pump.pressure"] == pytest.approx(np.linspace(140e5, 100e5, 21))
+    # At rest without net force the chambers share the pressures of the pump, here the first one, and of the tank.
+    begin = dict(zip(made.models["rig"].state_names, made.initial_state("rig"), strict=True))
+    assert begin["servo.chamber_a"] + begin["servo.chamber_b"] == pytest.approx(141e5)
+    kept = scenario(folder, runs=runs, duration=0.02, integrator="rosenbrock", substeps=4).run()["rig"]
+    assert kept.notes == ("pump has no pressure over time, so it keeps the 1.6e+07 Pa of its model.",)
+    assert np.all(kept["pump.pressure"] == 160e5)
+
+
 def test_flexible_links_begin_in_their_equilibrium() -> None:
     made = Scenario.load(ROOT / "examples" / "flexible_pendulum" / "release.toml")
     model = made.models["strain(6)"]

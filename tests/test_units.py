@@ -107,8 +107,8 @@ def test_products_and_quotients(left: str, right: str) -> None:
     product, quotient = parse_unit(f"({left})({right})"), parse_unit(f"({left})/({right})")
     assert product.factor == pytest.approx(a.factor * b.factor, rel=1e-14)
     assert quotient.factor == pytest.approx(a.factor / b.factor, rel=1e-14)
-    assert product.dimension == tuple(np.add(a.dimension, b.dimension))
-    assert quotient.dimension == tuple(np.subtract(a.dimension, b.dimension))
+    assert product.dimension == tuple(x + y for x, y in zip(a.dimension, b.dimension, strict=True))
+    assert quotient.dimension == tuple(x - y for x, y in zip(a.dimension, b.dimension, strict=True))
 
 
 @given(expressions(), st.lists(st.floats(-1e6, 1e6), min_size=1, max_size=5))

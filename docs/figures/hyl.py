@@ -68,10 +68,10 @@ def dominant(run: vpm.Run, channel: str = "foot.normal_force") -> tuple[float, f
 
 
 def study() -> Iterator[tuple[str, vpm.Run]]:
-    """Drops with low gain: rigid joints, then bearings from soft to stiff."""
-    runs: list[dict[str, object]] = [{"name": "rigid", "model": "rcm.toml"}]
-    runs += [{"name": f"{k:g} N/m", "model": "fcm.toml", "set": bushed(k)} for k in STIFFNESSES]
-    result = dropped(runs, duration=0.2, time_step=2e-5)
+    """Drops with the cylinders as springs (low gain): rigid joints, then bearings from soft to stiff."""
+    runs: list[dict[str, object]] = [{"name": "rigid", "model": "rcm_springs.toml"}]
+    runs += [{"name": f"{k:g} N/m", "model": "fcm_springs.toml", "set": bushed(k)} for k in STIFFNESSES]
+    result = dropped(runs, duration=0.2, time_step=2e-5, references={})
     for entry in runs:
         yield str(entry["name"]), result[str(entry["name"])]
 

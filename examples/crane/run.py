@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.signal import cont2discrete, lfilter
+from threadpoolctl import threadpool_limits
 
 from vpm.experiment import Experiment
 from vpm.experiment.table import read_table
@@ -164,8 +165,9 @@ def linear(record: Experiment, half: int, *, two_gains: bool) -> Array:
         return regressors(x)[:half] @ gains(x) - measured[:half]
 
     starts = [np.log([omega, damping]) for omega in (3.0, 6.0, 12.0) for damping in (0.1, 0.5)]
-    best = min((least_squares(misfit, start) for start in starts), key=lambda fit: fit.cost).x
-    predicted: Array = regressors(best) @ gains(best)
+    with threadpool_limits(1, user_api="blas"):  # many small systems: threads would wait for each other
+        best = min((least_squares(misfit, start) for start in starts), key=lambda fit: fit.cost).x
+        predicted: Array = regressors(best) @ gains(best)
     return predicted
 
 

@@ -90,7 +90,7 @@ Mode = Annotated[
     ),
 ]
 Integrator = Annotated[
-    str, typer.Option(help="linearly_implicit, rosenbrock, rk4, semi_implicit, adaptive or adaptive(1e-8).")
+    str, typer.Option(help="linearly_implicit, rosenbrock, rk4, semi_implicit, guarded, adaptive or adaptive(1e-8).")
 ]
 Plot = Annotated[Path | None, typer.Option(help="Write the plot to this file (PNG, SVG or PDF).")]
 Out = Annotated[Path, typer.Option(help="Folder for report.json, report.html and the repaired model.")]

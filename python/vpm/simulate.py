@@ -38,7 +38,7 @@ Array = NDArray[np.float64]
 MODES = ("free_run", "inverse_dynamics", "restarts", "closed_loop", "prescribed_motion")
 #: Integrators of fixed steps, whose work is bounded.
 FIXED_STEP = ("linearly_implicit", "rosenbrock", "rk4", "semi_implicit")
-INTEGRATORS = (*FIXED_STEP, "adaptive")
+INTEGRATORS = (*FIXED_STEP, "guarded", "adaptive")
 
 
 @dataclass(frozen=True)
@@ -47,14 +47,16 @@ class Setup:
 
     Attributes
     ----------
-    integrator : {"linearly_implicit", "rosenbrock", "rk4", "semi_implicit", "adaptive"} or ``"adaptive(1e-8)"``
+    integrator : {"linearly_implicit", "rosenbrock", "rk4", "semi_implicit", "guarded", "adaptive", "adaptive(1e-8)"}
         The first two are stable whatever is stiff, of order 2 and 4; the first also stops on dry friction far
         sharper than a step. The next two are explicit, but for the constant stiffness of flexible links in the last.
         ``adaptive`` takes as many steps of ``rosenbrock`` as keep the error of each within a tolerance, 1e-6 or the
         one in brackets, relative to each state and its natural size: for impacts, oil and other things that change
-        between microseconds and seconds. Its time is not bounded.
+        between microseconds and seconds. Its time is not bounded. ``guarded`` is its counterpart for real time: one
+        step of ``rosenbrock``, or up to 16 where an impact or a jump makes its error larger than 1 %.
     substeps : int
-        Integration steps per sample of the log; with ``adaptive`` pieces of a sample that take one step at least.
+        Integration steps per sample of the log; with ``adaptive`` and ``guarded`` pieces of a sample that take one
+        step at least.
     horizon : float
         Length of each restart, s.
     settling : float

@@ -177,7 +177,7 @@ fn execute(setting: Setting<'_>, plan: Plan<'_>) -> Result<Run> {
 }
 
 /// Complains about a piston that starts outside of its stroke in one of the `initial` states.
-fn check_starts(setting: Setting<'_>, initial: &[f64]) -> Result<()> {
+pub(crate) fn check_starts(setting: Setting<'_>, initial: &[f64]) -> Result<()> {
     let Setting { description, theta, .. } = setting;
     if description.layout().hydraulics == 0 {
         return Ok(());
@@ -213,6 +213,9 @@ fn repair(method: Method) -> &'static str {
             "use more substeps or the integrator adaptive, or check the signs and sizes of the parameters"
         }
         Method::Rk4 | Method::SemiImplicit => "use more substeps or the integrator linearly_implicit",
+        Method::Guarded => {
+            "use more substeps or the integrator adaptive, or check the signs and sizes of the parameters"
+        }
         Method::Adaptive { .. } => "check the signs and sizes of the parameters",
     }
 }

@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use crate::error::{Error, Result};
-use crate::simulate::{Drive, Plan, Setting, Stepper, check_state};
+use crate::simulate::{Drive, Plan, Setting, Stepper, check_starts, check_state};
 use crate::table::Table;
 
 /// Duration in s of each of `count` steps on the way through `inputs`, which begins again from `initial_state` at its end.
@@ -16,6 +16,7 @@ pub fn time_steps(setting: Setting<'_>, initial_state: &[f64], inputs: Table<'_>
         let (what, each) = ("inputs".to_owned(), "sample, at least one".to_owned());
         return Err(Error::Dimension { what, expected: 1, found: 0, each });
     }
+    check_starts(setting, initial_state)?;
     let plan = Plan { drive: Drive::Commands(inputs), initial: initial_state, starts: &[0], horizon: inputs.rows() };
     let mut stepper = Stepper::new(&setting, &plan, setting.theta)?;
     let mut durations = Vec::with_capacity(count);

@@ -262,3 +262,46 @@ fn it_can_be_interrupted_within_a_sample() -> Result<(), Error> {
     assert_eq!(asked.into_inner(), 2);
     Ok(())
 }
+
+#[test]
+fn a_guarded_step_is_a_plain_one_where_nothing_happens() {
+    let mut smooth = Machine::new(&double_pendulum([1.0, 0.7], [0.5, 0.4]));
+    smooth.effect("viscous_friction", 0, &[("viscous", 0.2)]).actuator(0, &[("gain", 1.5)]);
+    let inputs: Vec<f64> = (0..100).map(|k| (0.1 * f64::from(k)).sin()).collect();
+    let run = |method| Bench::new(&smooth, 0.005, 1, method).free(&START[..4], &inputs).states;
+    assert_eq!(run(Method::Guarded), run(Method::Rosenbrock));
+}
+
+/// Hides from a step that some of the states are coordinates.
+struct Plain<O>(O);
+impl<O: Ode<f64>> Ode<f64> for Plain<O> {
+    fn dim(&self) -> usize {
+        self.0.dim()
+    }
+    fn coordinates(&self) -> usize {
+        0
+    }
+    fn rhs(&mut self, x: &[f64], dxdt: &mut [f64]) {
+        self.0.rhs(x, dxdt);
+    }
+    fn jacobian(&mut self, x: &[f64], jacobian: &mut [f64]) {
+        self.0.jacobian(x, jacobian);
+    }
+    fn iteration_matrix(&mut self, x: &[f64], matrix: &mut [f64]) {
+        self.0.iteration_matrix(x, matrix);
+    }
+}
+
+#[test]
+fn steps_without_their_coordinates_are_the_same() {
+    for method in [Method::LinearlyImplicit, Method::Rosenbrock] {
+        let (mut left, mut right) = (machine().system(), Plain(machine().system()));
+        let (mut x, mut y) = (START, START);
+        let [mut short, mut whole] = [0; 2].map(|_| Integrator::new(method, 5));
+        for _ in 0..50 {
+            short.step(&mut left, &mut x, 0.002);
+            whole.step(&mut right, &mut y, 0.002);
+        }
+        assert!(x != y && largest_difference(&x, &y) < 1e-11, "{}: {x:?} {y:?}", method.name());
+    }
+}

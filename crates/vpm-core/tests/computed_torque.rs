@@ -86,6 +86,28 @@ fn joints_without_command_count_as_not_accelerating() {
 }
 
 #[test]
+fn forces_of_contacts_are_unknown_to_computed_torque() {
+    let command = |touching: bool| {
+        let mut parts = tree(5);
+        if touching {
+            let numbers = [("stiffness", 1e5), ("exponent", 1.1), ("damping", 100.0), ("damping_depth", 1e-3)];
+            let normal: serde_json::Map<_, _> =
+                numbers.into_iter().map(|(key, value)| (key.to_owned(), json!(parts.number(key, value)))).collect();
+            let contact = json!({"name": "foot", "on": {"body": 2}, "point": [0.1, 0.2, 0.3],
+                "plane": {"point": [0.0, 0.0, 5.0], "normal": [0.0, 0.0, 1.0]}, "normal": normal, "friction": null});
+            parts.add("contacts", contact, &[]);
+        }
+        let bench = parts.bench(1e-3, 1);
+        let run = bench.closed(&[0.2, -0.4, 0.6, 0.5, 1.0, -0.7], &[0.3, 0.1, 0.9], &[0.0; 3]);
+        // Commands of the three actuators, and an acceleration, which the contact does change.
+        [12, 14, 16, 2].map(|column| run.outputs[column])
+    };
+    let (free, touching) = (command(false), command(true));
+    assert_eq!(free[..3], touching[..3]);
+    assert!((free[3] - touching[3]).abs() > 1.0);
+}
+
+#[test]
 fn the_rates_of_a_reference_need_samples_behind_it() {
     let mut differences = vpm_core::controller::Differences::default();
     let parabola = |k: usize| 2.0 + 3.0 * k as f64 + 0.5 * (k * k) as f64;

@@ -34,8 +34,13 @@ fn everything() -> Parts {
     parts.add("controllers", pd, &[("proportional", &[2.0]), ("derivative", &[0.4]), ("limit", &[4.0])]);
     let mut force = controller("force_loop", 3, position(2));
     force["sample_time"] = json!(0.05);
-    let gains: [(&str, &[f64]); 4] =
-        [("proportional", &[3.0]), ("derivative", &[0.4]), ("force_gain", &[0.2]), ("velocity_gain", &[0.1])];
+    let gains: [(&str, &[f64]); 5] = [
+        ("proportional", &[3.0]),
+        ("derivative", &[0.4]),
+        ("feed_forward", &[0.1]),
+        ("force_gain", &[0.2]),
+        ("velocity_gain", &[0.1]),
+    ];
     parts.add("controllers", force, &gains);
     parts
 }

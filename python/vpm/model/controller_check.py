@@ -56,7 +56,10 @@ def _pair_problems(
             f"but a force_loop needs an actuator on a line or on the joint it measures; measure {entry.joint}.position"
         )
         yield Problem(where, f'is "{channel}", while "{actuator}" drives {drives}, {rest}')
-    if isinstance(controller, ComputedTorque) and entry.joint != joint:
+    if isinstance(controller, ComputedTorque) and entry.type != "ideal":
+        rest = f'has the type "{entry.type}", but computed_torque commands efforts; make it "ideal" or control it by pd'
+        yield Problem(place("actuators", actuator, "type"), rest)
+    elif isinstance(controller, ComputedTorque) and entry.joint != joint:
         rest = "but computed_torque needs each actuator on the joint it measures in the same place; reorder the lists"
         rest += "" if entry.joint is not None else ", or use force_loop"
         yield Problem(where, f'is "{channel}", while "{actuator}" drives {drives}, {rest}')

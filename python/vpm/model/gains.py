@@ -54,11 +54,12 @@ def _units(controller: Cascade | Pid | Pd | ForceLoop, command: str, structure: 
     if isinstance(controller, ForceLoop):
         effort = EFFORT_UNIT[structure.joint_kind(controller.measures.partition(".")[0])]
         stroke = "m" if structure.document.actuators[controller.actuator].line is not None else held
+        per_force = f"({command})/({structure.effort_unit(controller.actuator)})"
         return {
             "proportional": f"({effort})/({held})",
             "derivative": f"({effort}) s/({held})",
-            "feed_forward": f"({command})/({structure.effort_unit(controller.actuator)})",
-            "force_gain": f"({command})/({structure.effort_unit(controller.actuator)})",
+            "feed_forward": per_force,
+            "force_gain": per_force,
             "velocity_gain": f"({command}) s/({stroke})",
         }
     return {

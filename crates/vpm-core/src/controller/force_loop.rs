@@ -8,14 +8,14 @@ use crate::effect::Domain;
 use crate::scalar::Scalar;
 
 /// Impedance of a joint around an inner force loop, as in hydraulic legs: a joint torque is asked for, turned into a force along the
-/// actuator's line, and the difference to the force that is there drives the actuator.
+/// actuator's line, and that force itself and its difference to the force that is there drive the actuator.
 ///
 /// Law: `tau = proportional (r - q) - derivative dq`, `F_d = tau / (ds/dq)`,
 /// `u = feed_forward F_d + force_gain (F_d - F) + velocity_gain ds/dt`, limited to ±limit, with s the length of the line. Units: N m/rad
-/// (N/m), N m s/rad (N s/m), command per N, command per m/s. The feed-forward commands an actuator that has its force at once, without a
-/// loop; the velocity term gives a valve the flow that the moving piston takes anyway. An actuator that integrates its command, such as a cylinder behind a valve, comes
-/// to rest at `F = F_d`; one whose force is g times its command comes to `F = F_d g force_gain / (1 + g force_gain)`. At a dead centre,
-/// `ds/dq = 0`, no force gives a torque and the command has no finite value without a limit.
+/// (N/m), N m s/rad (N s/m), command per N twice, command per m/s. The velocity term gives a valve the flow that the moving piston takes
+/// anyway. An actuator that integrates its command, such as a cylinder behind a valve, comes to rest at `F = F_d` without feed forward; one
+/// whose force is g times its command comes to `F = F_d g (feed_forward + force_gain) / (1 + g force_gain)`, which is F_d for
+/// `feed_forward = 1 / g`. At a dead centre, `ds/dq = 0`, no force gives a torque and the command has no finite value without a limit.
 /// Source: torque control with velocity compensation, Boaventura, Semini, Buchli, Frigerio, Focchi & Caldwell 2012, "Dynamic torque control
 /// of a hydraulic quadruped robot", IEEE ICRA. Checked: the limit must be positive; the fixed point above, the lever arm by differences.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
@@ -25,7 +25,7 @@ pub struct ForceLoop<P> {
     pub proportional: P,
     /// Torque per rate of the joint.
     pub derivative: P,
-    /// Command per force that is asked for.
+    /// Command per force that is asked for; nothing if none.
     #[serde(default = "none")]
     pub feed_forward: Option<P>,
     /// Command per force that is missing.
@@ -64,7 +64,7 @@ impl<P> ForceLoop<P> {
     /// The parameters and where each is defined.
     pub fn domains(&self) -> Vec<(&P, Domain)> {
         let mut free = vec![&self.proportional, &self.derivative, &self.force_gain, &self.velocity_gain];
-        free.extend(&self.feed_forward);
+        free.extend(self.feed_forward.as_ref());
         domains(free, self.limit.as_ref())
     }
 }
@@ -73,10 +73,9 @@ impl<S: Scalar> ForceLoop<S> {
     /// The command for `reference` at the measured joint position `q` and rate `dq`, with what is seen of the actuator.
     #[inline]
     pub fn command(&self, reference: S, q: S, dq: S, stroke: Stroke<S>) -> S {
-        let torque = self.proportional * (reference - q) - self.derivative * dq;
-        let wanted = torque / stroke.arm;
-        let ahead = self.feed_forward.map_or(S::zero(), |gain| gain * wanted);
-        let command = ahead + self.force_gain * (wanted - stroke.force) + self.velocity_gain * stroke.rate;
+        let wanted = (self.proportional * (reference - q) - self.derivative * dq) / stroke.arm;
+        let command = self.force_gain * (wanted - stroke.force) + self.velocity_gain * stroke.rate;
+        let command = self.feed_forward.map_or(command, |gain| command + gain * wanted);
         self.limit.map_or(command, |limit| limit.apply(command))
     }
 }

@@ -14,5 +14,7 @@ pub fn samples_between(controller: &str, sample_time: Option<f64>, time_step: f6
         // The cast saturates: a controller slower than any record commands once.
         return Ok(count as usize);
     }
-    Err(Error::SampleTime { controller: controller.to_owned(), sample_time, time_step, nearest: count * time_step })
+    // Without the last bits of the product, which nobody wants to read or write.
+    let nearest = (count * time_step * 1e12).round() / 1e12;
+    Err(Error::SampleTime { controller: controller.to_owned(), sample_time, time_step, nearest })
 }

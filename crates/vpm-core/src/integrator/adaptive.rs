@@ -12,12 +12,36 @@ pub const MOST_STEPS: usize = 10_000;
 const SHORTEST: f64 = 1e-12;
 /// Smallest and largest tolerance that mean something.
 const TOLERANCES: [f64; 2] = [1e-12, 0.1];
-/// How much longer the next step may be.
-const LONGER: f64 = 5.0;
 /// How much shorter the next step may be.
 const SHORTER: f64 = 0.2;
 /// Part of the length that the error allows which is used.
 const CAUTION: f64 = 0.9;
+
+/// What is asked of steps.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Rule {
+    /// Error of a step relative to each state and its scale.
+    tolerance: f64,
+    /// First step as a part of the time to go.
+    first: f64,
+    /// Steps no longer than this part of the time to go are taken whatever their error; 0 if there are none.
+    floor: f64,
+    /// How much longer the next step may be.
+    longer: f64,
+    /// How long the next step may be after a refused one, in its length.
+    refused: f64,
+}
+
+impl Rule {
+    /// As many steps as the tolerance needs.
+    const fn exact(tolerance: f64) -> Self {
+        Self { tolerance, first: 1e-3, floor: 0.0, longer: 5.0, refused: 1.0 }
+    }
+
+    /// One step where that will do, sixteen at most, refused ones apart. With these factors there is no more than one refused step to
+    /// every step taken, and four on the way from the longest to the shortest.
+    const GUARDED: Self = Self { tolerance: 1e-2, first: 1.0, floor: 1.0 / 16.0, longer: 2.0, refused: 0.5 };
+}
 
 /// The Rosenbrock method of order 4 with steps as long as their error allows.
 ///
@@ -32,7 +56,7 @@ const CAUTION: f64 = 0.9;
 #[derive(Clone, Debug)]
 pub struct Adaptive<S> {
     method: Rosenbrock<S>,
-    tolerance: f64,
+    rule: Rule,
     scales: Vec<f64>,
     next: Vec<S>,
     proposed: Option<f64>,
@@ -128,8 +152,18 @@ impl<S: Scalar> Adaptive<S> {
     }
 
     pub(super) fn unchecked(tolerance: f64, dim: usize) -> Self {
+        Self::with(Rule::exact(tolerance), dim)
+    }
+
+    /// Buffers for systems of `dim` states, for bounded work: a call takes one step where its error stays below 1e-2, and no more than
+    /// 16 (and 20 refused ones) where not. Steps of a sixteenth are taken whatever their error.
+    pub fn guarded(dim: usize) -> Self {
+        Self::with(Rule::GUARDED, dim)
+    }
+
+    fn with(rule: Rule, dim: usize) -> Self {
         let (method, next) = (Rosenbrock::new(dim), vec![S::zero(); dim]);
-        Self { method, tolerance, scales: vec![1.0; dim], next, proposed: None, attempts: 0 }
+        Self { method, rule, scales: vec![1.0; dim], next, proposed: None, attempts: 0 }
     }
 
     /// Forgets the length of the last step.
@@ -148,8 +182,10 @@ impl<S: Scalar> Adaptive<S> {
         ask: Ask<'_>,
     ) -> std::result::Result<Steps, Halt> {
         ode.scales(&mut self.scales);
-        let (mut gone, mut steps, mut longest) = (0.0, Steps::default(), LONGER);
-        let mut step = self.proposed.unwrap_or(1e-3 * duration);
+        let rule = self.rule;
+        let (mut gone, mut steps, mut longest) = (0.0, Steps::default(), rule.longer);
+        let mut fresh = true;
+        let (mut step, floor) = (self.proposed.unwrap_or(rule.first * duration), rule.floor * duration);
         while gone < duration {
             let left = duration - gone;
             let taken = match left / step {
@@ -157,20 +193,24 @@ impl<S: Scalar> Adaptive<S> {
                 ..2.0 => 0.5 * left,
                 _ => step,
             };
+            if fresh {
+                self.method.linearise(ode, x);
+            }
             let verdict = self.attempt(ode, x, taken);
             let stuck = Stuck { state: verdict.state, reached: gone, step: taken, many: false };
             let length = taken * (CAUTION * verdict.error.powf(-0.25)).clamp(SHORTER, longest);
-            if verdict.error <= 1.0 {
+            if verdict.error <= 1.0 || (taken <= floor && verdict.error.is_finite()) {
                 x.copy_from_slice(&self.next);
                 gone = if taken < left { gone + taken } else { duration };
                 // A step that the end cut short says nothing against the longer one.
-                step = if taken < step { step.max(length) } else { length };
-                (steps.accepted, longest) = (steps.accepted + 1, LONGER);
-            } else if taken < SHORTEST * duration {
+                step = floor.max(if taken < step { step.max(length) } else { length });
+                (steps.accepted, longest, fresh) = (steps.accepted + 1, rule.longer, true);
+            } else if taken <= floor.max(SHORTEST * duration) {
                 return Err(Halt::Stuck(stuck));
             } else {
-                step = length;
-                (steps.refused, longest) = (steps.refused + 1, 1.0);
+                step = floor.max(length.min(rule.refused * taken));
+                // Rates and Jacobian are still those where the step begins.
+                (steps.refused, longest, fresh) = (steps.refused + 1, 1.0, false);
             }
             if steps.accepted + steps.refused >= MOST_STEPS && gone < duration {
                 return Err(Halt::Stuck(Stuck { many: true, ..stuck }));
@@ -192,7 +232,7 @@ impl<S: Scalar> Adaptive<S> {
         let mut worst = Verdict { error: 1e-12, state: 0 };
         let pairs = x.iter().zip(&self.next).zip(self.method.last_increment()).zip(&self.scales);
         for (state, (((before, after), error), scale)) in pairs.enumerate() {
-            let weight = self.tolerance * (scale + before.re().abs().max(after.re().abs()));
+            let weight = self.rule.tolerance * (scale + before.re().abs().max(after.re().abs()));
             let error = (error.re() / weight).abs();
             // Not a number is as bad as it gets.
             let error = if error.is_nan() { f64::INFINITY } else { error };

@@ -49,18 +49,21 @@ pub enum Method {
         /// Error of a step relative to each state and its scale.
         tolerance: f64,
     },
+    /// The same in bounded work: one step, or up to 16 where its error tells of an impact or a jump.
+    Guarded,
 }
 
 impl Method {
     /// Those of fixed steps.
     pub const FIXED: [Self; 4] = [Self::SemiImplicit, Self::Rk4, Self::LinearlyImplicit, Self::Rosenbrock];
     /// All of them.
-    pub const ALL: [Self; 5] = [
+    pub const ALL: [Self; 6] = [
         Self::SemiImplicit,
         Self::Rk4,
         Self::LinearlyImplicit,
         Self::Rosenbrock,
         Self::Adaptive { tolerance: TOLERANCE },
+        Self::Guarded,
     ];
 
     /// Its name in options, without a tolerance.
@@ -71,6 +74,7 @@ impl Method {
             Self::LinearlyImplicit => "linearly_implicit",
             Self::Rosenbrock => "rosenbrock",
             Self::Adaptive { .. } => "adaptive",
+            Self::Guarded => "guarded",
         }
     }
 
@@ -128,6 +132,7 @@ impl<S: Scalar> Integrator<S> {
             Method::LinearlyImplicit => Scheme::LinearlyImplicit(LinearlyImplicit::new(dim)),
             Method::Rosenbrock => Scheme::Rosenbrock(Rosenbrock::new(dim)),
             Method::Adaptive { tolerance } => Scheme::Adaptive(Adaptive::unchecked(tolerance, dim)),
+            Method::Guarded => Scheme::Adaptive(Adaptive::guarded(dim)),
         };
         Self { scheme, steps: 0 }
     }

@@ -233,7 +233,7 @@ impl<S: Scalar> Machine<S> {
 
     /// Efforts for the accelerations that were asked for; those that nobody asked for are zero, for the next controller too.
     fn invert(&mut self, dynamics: &mut Dynamics<S>) {
-        dynamics.inverse_dynamics(&self.position, &self.rate, &self.acceleration, &mut self.efforts);
+        dynamics.inverse_dynamics_of_tree(&self.position, &self.rate, &self.acceleration, &mut self.efforts);
         self.acceleration.fill(S::zero());
     }
 

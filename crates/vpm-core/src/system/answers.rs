@@ -22,6 +22,22 @@ impl<S: Scalar> Dynamics<S> {
     /// Efforts on all coordinates that give accelerations `a` at (q, v), with the efforts of the effects taken off. On the elastic
     /// coordinates they vanish in free motion.
     pub fn inverse_dynamics(&mut self, q: &[S], v: &[S], a: &[S], efforts: &mut [S]) {
+        self.inverse_dynamics_of_tree(q, v, a, efforts);
+        if self.connections.is_free() {
+            return;
+        }
+        let Self { model, data, loads, .. } = self;
+        loads.fill(S::zero());
+        frames(model, data, q, v);
+        poses(model, data);
+        self.connections.add_loads(model, data, ContactFriction::resistance, loads);
+        for (effort, &load) in efforts.iter_mut().zip(&*loads) {
+            *effort -= load;
+        }
+    }
+
+    /// As [`Dynamics::inverse_dynamics`], but without what contacts and bushings do.
+    pub(crate) fn inverse_dynamics_of_tree(&mut self, q: &[S], v: &[S], a: &[S], efforts: &mut [S]) {
         let Self { model, data, loads, .. } = self;
         if model.is_recursive() {
             efforts.copy_from_slice(rnea(model, data, q, v, a));
@@ -31,11 +47,6 @@ impl<S: Scalar> Dynamics<S> {
         }
         loads.fill(S::zero());
         add_effects(&self.effects, q, v, loads);
-        if !self.connections.is_free() {
-            frames(model, data, q, v);
-            poses(model, data);
-            self.connections.add_loads(model, data, ContactFriction::resistance, loads);
-        }
         for (effort, &effect) in efforts.iter_mut().zip(&*loads) {
             *effort -= effect;
         }

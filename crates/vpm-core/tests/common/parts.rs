@@ -46,7 +46,7 @@ impl Parts {
         }
         self.add("lines", line, &[]);
         let mut actuator = json!({"name": "piston", "on": {"line": 0}});
-        actuator["gain"] = json!(self.number("piston.gain", gain));
+        actuator["drive"] = json!({"type": "ideal", "gain": self.number("piston.gain", gain)});
         if let Some(lag) = lag {
             actuator["lag"] = json!(self.number("piston.lag", lag));
         }

@@ -54,16 +54,19 @@ impl Value {
 }
 
 /// Compares what was found with every value whose name begins with `prefix`: none may be missing, none may be off.
-pub fn check_all(prefix: &str, found: &[(&str, Vec<f64>)]) -> serde_json::Result<()> {
+/// The largest part of a tolerance that is used.
+pub fn check_all(prefix: &str, found: &[(&str, Vec<f64>)]) -> serde_json::Result<f64> {
     let mut values: Vec<Value> = serde_json::from_str(include_str!("linkages.json"))?;
     values.extend(serde_json::from_str::<Vec<Value>>(include_str!("hydraulic.json"))?);
     let wanted: BTreeMap<&str, &Value> =
         values.iter().filter(|value| value.id.starts_with(prefix)).map(|value| (value.id.as_str(), value)).collect();
     let names: BTreeSet<&str> = found.iter().map(|(name, _)| *name).collect();
     assert_eq!(names, wanted.keys().copied().collect(), "every value has to be computed, and no other");
+    let mut most = 0.0_f64;
     for (name, numbers) in found {
         let value = wanted[name];
         let used = value.used(numbers);
+        most = most.max(used);
         println!("{name}: {used:.1e} of the tolerance");
         let (expected, unit, source) = (value.numbers(), &value.unit, &value.source);
         assert!(
@@ -71,5 +74,5 @@ pub fn check_all(prefix: &str, found: &[(&str, Vec<f64>)]) -> serde_json::Result
             "`{name}` is {numbers:?} {unit} instead of {expected:?} ({source}): {used} of the tolerance"
         );
     }
-    Ok(())
+    Ok(most)
 }

@@ -1,0 +1,95 @@
+//! Where drives and supplies begin, whether their pistons are where they can be, and how large their states are.
+
+use super::Dynamics;
+use super::drives::motion;
+use crate::actuator::hydraulic::Chambers;
+use crate::actuator::{Actuator, Drive};
+use crate::scalar::Scalar;
+
+impl<S: Scalar> Dynamics<S> {
+    /// Writes the states of drives and supplies of a machine that has stood at `q` without commands: lags, currents and spools 0,
+    /// visco-elastic elements settled, chambers without net force, supplies at their pressure.
+    pub fn settle_drives(&mut self, q: &[S], states: &mut [S]) {
+        let zero = vec![S::zero(); q.len()];
+        self.locate(q, &zero);
+        let mut at = states.iter_mut();
+        let mut next = |value: S| at.next().into_iter().for_each(|state| *state = value);
+        for actuator in &self.actuators {
+            if actuator.lag.is_some() {
+                next(S::zero());
+            }
+            let [length, _] = motion(actuator.on, q, &zero, &self.data.composite.lines);
+            match &actuator.drive {
+                Drive::Ideal(_) | Drive::SpringDamper(_) => {}
+                Drive::DcMotor(_) => next(S::zero()),
+                Drive::Maxwell(law) => next(law.settled(length)),
+                Drive::Hydraulic(law) => {
+                    let Chambers { a, b } = law.rest(&self.supplies[law.supply]);
+                    [S::zero(), S::zero(), a, b].into_iter().for_each(&mut next);
+                }
+            }
+        }
+        self.supplies.iter().filter(|supply| supply.is_sagging()).for_each(|supply| next(supply.pressure));
+    }
+
+    /// Number of an actuator whose piston stands beyond its stroke at `q` by more than the stops give way (1 mm or 2 % of the stroke),
+    /// with the piston's place from mid-stroke and half of the stroke, m.
+    pub(crate) fn piston_outside(&mut self, q: &[S]) -> Option<(usize, f64, f64)> {
+        if self.shown.hydraulics.is_empty() {
+            return None;
+        }
+        self.loads.fill(S::zero());
+        let rest = std::mem::take(&mut self.loads);
+        self.locate(q, &rest);
+        let lines = &self.data.composite.lines;
+        let found = self.actuators.iter().enumerate().find_map(|(number, actuator)| {
+            let Drive::Hydraulic(law) = &actuator.drive else { return None };
+            let [length, _] = motion(actuator.on, q, &rest, lines);
+            let (place, reach) = (law.piston(length).re(), 0.5 * law.cylinder.stroke.re());
+            (place.abs() > reach + (0.04 * reach).max(1e-3)).then_some((number, place, reach))
+        });
+        self.loads = rest;
+        found
+    }
+
+    /// Writes the resistances of the seals, N s/m, that stand for their friction in an iteration matrix at (q, v); the lines are moved there.
+    pub(super) fn seal_chords(&mut self, q: &[S], v: &[S], chords: &mut [Option<S>]) {
+        let sealed = |actuator: &Actuator<S>| match &actuator.drive {
+            Drive::Hydraulic(law) => law.cylinder.seal.is_there(),
+            _ => false,
+        };
+        if self.ideal || !self.actuators.iter().any(sealed) {
+            return;
+        }
+        self.locate(q, v);
+        for (actuator, chord) in self.actuators.iter().zip(chords) {
+            if let Drive::Hydraulic(law) = &actuator.drive {
+                let [_, rate] = motion(actuator.on, q, v, &self.data.composite.lines);
+                *chord = Some(law.cylinder.seal.resistance(rate));
+            }
+        }
+    }
+
+    /// Natural sizes of the states of drives and supplies, in SI units.
+    pub(super) fn drive_scales(&self, scales: &mut [f64]) {
+        const STRETCH: f64 = 1e-3;
+        const PRESSURE: f64 = 1e5;
+        let mut scales = scales.iter_mut();
+        let mut next = |value: f64| scales.next().into_iter().for_each(|scale| *scale = value);
+        for actuator in &self.actuators {
+            if actuator.lag.is_some() {
+                next(actuator.saturation.map_or(1.0, |saturation| saturation.limit.re()));
+            }
+            match &actuator.drive {
+                Drive::Ideal(_) | Drive::SpringDamper(_) => {}
+                Drive::DcMotor(_) => next(1.0),
+                Drive::Maxwell(_) => next(STRETCH),
+                Drive::Hydraulic(law) => {
+                    let (stroke, frequency) = (law.valve.stroke.re(), law.valve.frequency.re());
+                    [stroke, stroke * frequency, PRESSURE, PRESSURE].into_iter().for_each(&mut next);
+                }
+            }
+        }
+        self.supplies.iter().filter(|supply| supply.is_sagging()).for_each(|_| next(PRESSURE));
+    }
+}
