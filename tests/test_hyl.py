@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import runpy
 import tomllib
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -174,3 +176,17 @@ def test_a_hand_reaches_the_published_range() -> None:
     forces = np.concatenate([run["knee_drive.force"] for run in result.runs.values()])
     assert 0.295 < lengths.min() < 0.300
     assert 2500.0 < forces.max() < 3300.0
+
+
+def test_soft_bearings_ring_and_stiff_ones_do_not() -> None:
+    """The table of docs/hyl.md, from what draws its picture."""
+    drawn = SimpleNamespace(**runpy.run_path(str(hyl.HYL.parent.parent / "docs" / "figures" / "hyl.py")))
+    found = {name: (run["foot.normal_force"].max(), *drawn.dominant(run)) for name, run in drawn.study()}
+    rigid, stiff = found["rigid"], found["1e+08 N/m"]
+    assert stiff[0] == pytest.approx(rigid[0], rel=2e-3)
+    assert max(rigid[2], stiff[2]) < 0.3
+    for name, frequency in (("1e+06 N/m", 109.0), ("3e+06 N/m", 194.0), ("1e+07 N/m", 338.0)):
+        peak, dominant, amplitude = found[name]
+        assert dominant == pytest.approx(frequency, abs=2.0)
+        assert amplitude > 4.0
+        assert 0.84 < peak / rigid[0] < 0.88
