@@ -2,6 +2,7 @@
 
 mod answers;
 mod connections;
+mod driven;
 mod drives;
 mod observe;
 mod ode;

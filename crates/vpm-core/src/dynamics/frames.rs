@@ -82,16 +82,26 @@ pub(crate) fn poses<S: Scalar>(model: &Model<S>, data: &mut Data<S>) {
 
 /// Geometry and motion of every line after [`poses`].
 pub(crate) fn lines<S: Scalar>(model: &Model<S>, data: &mut Data<S>) {
+    bare_lines(model, data);
     let Composite { frames, sections, lines, .. } = &mut data.composite;
     for (Wire { from, to, .. }, slot) in model.lines().iter().zip(lines) {
-        let LineSlot { length, direction, from: begin, to: end } = slot;
-        for (place, point) in [(from, &mut *begin), (to, &mut *end)] {
-            move_point(&frames[place.frame], place, point);
+        for (place, point) in [(from, &mut slot.from), (to, &mut slot.to)] {
             let PointSlot { place: at, columns, .. } = point;
             columns.fill(Vector3::zero());
             for_each_column(model, frames, sections, place.frame, |coordinate, column| {
                 columns[coordinate] = column.linear + column.angular.cross(*at);
             });
+        }
+    }
+}
+
+/// As [`lines`], but without the velocities per unit rate of the coordinates.
+pub(super) fn bare_lines<S: Scalar>(model: &Model<S>, data: &mut Data<S>) {
+    let Composite { frames, lines, .. } = &mut data.composite;
+    for (Wire { from, to, .. }, slot) in model.lines().iter().zip(lines) {
+        let LineSlot { length, direction, from: begin, to: end } = slot;
+        for (place, point) in [(from, &mut *begin), (to, &mut *end)] {
+            move_point(&frames[place.frame], place, point);
         }
         let across = end.place - begin.place;
         *length = across.dot(across).sqrt();

@@ -134,11 +134,12 @@ impl<S: Scalar> Connections<S> {
         }
     }
 
-    /// Takes what contacts and bushings do off what the frames have to be given otherwise, for reactions.
-    pub(super) fn take_off(&self, data: &mut Data<S>) {
+    /// Takes what contacts and bushings do off what the frames have to be given otherwise, for reactions; the resistance of friction laws
+    /// is that of `resistance`.
+    pub(super) fn take_off(&self, data: &mut Data<S>, resistance: impl Fn(&ContactFriction<S>, S, S) -> S) {
         for contact in &self.contacts {
             let slot = data.composite.frames[contact.frame];
-            if let Some(touch) = contact.touch(&slot, ContactFriction::resistance) {
+            if let Some(touch) = contact.touch(&slot, &resistance) {
                 take_off(data, contact.frame, contact.wrench(&slot, &touch));
             }
         }

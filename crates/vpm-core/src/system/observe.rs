@@ -2,6 +2,7 @@
 
 use super::Dynamics;
 use super::connections::into_body;
+use crate::contact::ContactFriction;
 use crate::dynamics::{Motion, frames, lines, poses, reactions};
 use crate::scalar::Scalar;
 use crate::sensor::Layout;
@@ -78,7 +79,9 @@ impl<S: Scalar> Dynamics<S> {
         let first = self.layout().load_cells();
         let Self { model, data, connections, tensions, .. } = self;
         let mut extra = std::mem::take(&mut connections.extra);
-        reactions(model, data, motion, &mut extra, tensions, |data| connections.take_off(data));
+        reactions(model, data, motion, &mut extra, tensions, |data| {
+            connections.take_off(data, ContactFriction::resistance);
+        });
         connections.extra = extra;
         for (channels, &joint) in outputs[first..].chunks_exact_mut(6).zip(&connections.cells) {
             let wrench = into_body(model, joint, data.composite.frames[joint + 1].wrench);
