@@ -19,13 +19,14 @@ pub fn frames<S: Scalar>(model: &Model<S>, data: &mut Data<S>, q: &[S], v: &[S])
         match node {
             Node::Body(number, _) => {
                 let link = &model.links()[*number];
-                let parent = frames[link.parent];
+                // Only these two: a frame is large, and larger in dual numbers.
+                let FrameSlot { velocity, acceleration, .. } = frames[link.parent];
                 let slot = &mut frames[number + 1];
                 slot.across = link.pose(q[*number]);
-                slot.velocity = slot.across.inverse_twist(parent.velocity);
+                slot.velocity = slot.across.inverse_twist(velocity);
                 link.kind.add_rate(&mut slot.velocity, v[*number]);
                 let across = link.kind.rate_cross(&slot.velocity, v[*number]);
-                slot.acceleration = slot.across.inverse_twist(parent.acceleration) + across;
+                slot.acceleration = slot.across.inverse_twist(acceleration) + across;
                 slot.inertia = link.inertia;
             }
             Node::Beam(number, _) => {
@@ -99,7 +100,7 @@ pub(crate) fn lines<S: Scalar>(model: &Model<S>, data: &mut Data<S>) {
 pub(super) fn bare_lines<S: Scalar>(model: &Model<S>, data: &mut Data<S>) {
     let Composite { frames, lines, .. } = &mut data.composite;
     for (Wire { from, to, .. }, slot) in model.lines().iter().zip(lines) {
-        let LineSlot { length, direction, from: begin, to: end } = slot;
+        let LineSlot { length, direction, from: begin, to: end, .. } = slot;
         for (place, point) in [(from, &mut *begin), (to, &mut *end)] {
             move_point(&frames[place.frame], place, point);
         }

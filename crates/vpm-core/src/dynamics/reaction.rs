@@ -112,11 +112,12 @@ fn accelerate<S: Scalar>(model: &Model<S>, data: &mut Data<S>, a: &[S], extra: &
 ///
 /// As in the equations of motion: a part moves with `J = J_end + c J_u`, so that its own end carries it along the line and both do across.
 fn line<S: Scalar>(wire: &Wire<S>, number: usize, data: &mut Data<S>, tension: S) {
-    let LineSlot { length, direction: u, from, to } = &data.composite.lines[number];
-    let turn = |v: Vector3<S>| (v - *u * u.dot(v)) * length.recip();
+    let LineSlot { length, direction: u, from, to, .. } = &data.composite.lines[number];
+    let shrink = length.recip();
+    let turn = |v: Vector3<S>| (v - *u * u.dot(v)) * shrink;
     let (rate, change) = (to.velocity - from.velocity, to.acceleration - from.acceleration);
     let (stretch, spin) = (u.dot(rate), turn(rate));
-    let swing = turn(change) - (spin * (stretch * length.recip())) * S::from_f64(2.0) - *u * spin.dot(spin);
+    let swing = turn(change) - spin * (stretch * shrink * 2.0) - *u * spin.dot(spin);
     // What the beginning and the end have to give, in world axes.
     let mut needed = [*u * tension, -(*u * tension)];
     for (part, point, sign, own) in [(&wire.barrel, from, 1.0, 0), (&wire.rod, to, -1.0, 1)] {

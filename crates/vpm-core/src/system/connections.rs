@@ -138,9 +138,10 @@ impl<S: Scalar> Connections<S> {
     /// is that of `resistance`.
     pub(super) fn take_off(&self, data: &mut Data<S>, resistance: impl Fn(&ContactFriction<S>, S, S) -> S) {
         for contact in &self.contacts {
-            let slot = data.composite.frames[contact.frame];
-            if let Some(touch) = contact.touch(&slot, &resistance) {
-                take_off(data, contact.frame, contact.wrench(&slot, &touch));
+            let slot = &data.composite.frames[contact.frame];
+            let wrench = contact.touch(slot, &resistance).map(|touch| contact.wrench(slot, &touch));
+            if let Some(wrench) = wrench {
+                take_off(data, contact.frame, wrench);
             }
         }
         for PlacedBushing { a, b, law } in &self.bushings {

@@ -1,5 +1,6 @@
 //! The state Jacobian of a machine whose drives have states of their own, by the chain rule through the forces of its drives.
 
+use super::places::{Place, places, pressures};
 use super::tangent::Laws;
 use super::{Build, Dynamics};
 use crate::actuator::hydraulic::Source;
@@ -35,15 +36,6 @@ pub(super) struct Driven<S> {
     extra: Vec<Twist<Number<S>>>,
     /// A column of the Jacobian on its way.
     column: Vec<S>,
-}
-
-/// Where the states of an actuator stand among those of drives and supplies.
-#[derive(Clone, Copy)]
-struct Place {
-    first: usize,
-    count: usize,
-    /// State of the supply that it draws from.
-    supply: Option<usize>,
 }
 
 impl<S: Scalar> Driven<S> {
@@ -237,39 +229,4 @@ impl<S: Scalar> Dynamics<Number<S>> {
             Source::Constant | Source::Logged => S::zero(),
         }
     }
-}
-
-impl Place {
-    /// Whether the actuator has a flow.
-    fn draws<S>(self, actuator: &Actuator<S>) -> bool {
-        matches!(actuator.drive, Drive::Hydraulic(_))
-    }
-}
-
-/// Where the states of every actuator stand.
-fn places<S: Scalar>(machine: &Dynamics<S>) -> impl Iterator<Item = Place> {
-    let mut next = 0;
-    machine.actuators.iter().map(move |actuator| {
-        let (first, count) = (next, actuator.n_states());
-        next += count;
-        let supply = match &actuator.drive {
-            Drive::Hydraulic(law) => pressure(machine, law.supply),
-            _ => None,
-        };
-        Place { first, count, supply }
-    })
-}
-
-/// Places of the states of the supplies.
-fn pressures<S: Scalar>(machine: &Dynamics<S>) -> impl Iterator<Item = usize> {
-    (0..machine.supplies.len()).filter_map(|number| pressure(machine, number))
-}
-
-/// Place of the state of supply `number`, if it has one.
-fn pressure<S: Scalar>(machine: &Dynamics<S>, number: usize) -> Option<usize> {
-    let sagging = |supplies: &[crate::actuator::hydraulic::Supply<S>]| {
-        supplies.iter().filter(|supply| supply.is_sagging()).count()
-    };
-    let after = sagging(&machine.supplies[number..]);
-    machine.supplies[number].is_sagging().then(|| machine.internal - after)
 }

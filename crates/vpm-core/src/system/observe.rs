@@ -41,6 +41,19 @@ impl<S: Scalar> Dynamics<S> {
     /// The outputs that the state alone decides: positions and velocities, lines, strains, markers.
     pub(crate) fn observe_motion(&mut self, x: &[S], outputs: &mut [S]) {
         let (n, layout) = (self.coordinates(), self.layout());
+        if layout.lines + layout.gauges + layout.markers > 0 || !self.connections.is_free() {
+            let (q, v) = x[..2 * n].split_at(n);
+            let Self { model, data, .. } = self;
+            frames(model, data, q, v);
+            poses(model, data);
+            lines(model, data);
+        }
+        self.observe_here(x, outputs);
+    }
+
+    /// As [`Dynamics::observe_motion`], with all frames and lines where they are in the state.
+    pub(crate) fn observe_here(&mut self, x: &[S], outputs: &mut [S]) {
+        let (n, layout) = (self.coordinates(), self.layout());
         let (q, v) = x[..2 * n].split_at(n);
         for ((channels, &q), &v) in outputs[..layout.actuators()].chunks_exact_mut(4).zip(q).zip(v) {
             channels[0] = q;
@@ -49,10 +62,7 @@ impl<S: Scalar> Dynamics<S> {
         if layout.lines + layout.gauges + layout.markers == 0 && self.connections.is_free() {
             return;
         }
-        let Self { model, data, connections, .. } = self;
-        frames(model, data, q, v);
-        poses(model, data);
-        lines(model, data);
+        let Self { model, data, connections, .. } = &*self;
         for (channels, line) in outputs[layout.lines()..].chunks_exact_mut(3).zip(&data.composite.lines) {
             channels[0] = line.length;
             channels[1] = line.rate();

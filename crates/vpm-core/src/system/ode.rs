@@ -18,6 +18,8 @@ pub struct System<S> {
     column: Vec<S>,
     /// Rates at a state whose matrix is asked for alone.
     rates: Vec<S>,
+    /// Whether these are the rates where the next step begins.
+    ready: bool,
 }
 
 impl<S: Scalar> System<S> {
@@ -29,12 +31,13 @@ impl<S: Scalar> System<S> {
         let column = vec![S::zero(); dynamics.coordinates()];
         let seals = vec![None; dynamics.actuators.len()];
         let rates = vec![S::zero(); dynamics.dim()];
-        Ok(Self { dynamics, tangent, resistances, seals, column, rates })
+        Ok(Self { dynamics, tangent, resistances, seals, column, rates, ready: false })
     }
 
     /// The right-hand side.
     #[inline]
     pub fn dynamics(&mut self) -> &mut Dynamics<S> {
+        self.ready = false;
         &mut self.dynamics
     }
 
@@ -42,14 +45,32 @@ impl<S: Scalar> System<S> {
     /// supplies.
     #[inline]
     pub fn hold(&mut self, number: usize, input: S) {
+        self.ready = false;
         self.dynamics.inputs[number] = input;
         self.tangent.hold(number, input);
     }
 }
 
 impl<S: Scalar> System<S> {
+    /// Takes note that the machine, last evaluated with these `rates`, makes its next step from that very state. What is asked of the
+    /// system before makes it forget.
+    pub(crate) fn depart(&mut self, rates: &[S]) {
+        self.rates.copy_from_slice(rates);
+        self.ready = true;
+    }
+
+    /// Rates at `x`: those at hand if a step begins there.
+    fn begin(&mut self, x: &[S], rates: &mut [S]) {
+        if std::mem::take(&mut self.ready) {
+            rates.copy_from_slice(&self.rates);
+        } else {
+            self.dynamics.rhs(x, rates);
+        }
+    }
+
     /// As df/dx, without the friction of joints and seals, row by row.
     pub(crate) fn without_friction(&mut self, x: &[S], matrix: &mut [S]) {
+        self.ready = false;
         self.resistances.fill(S::zero());
         self.seals.fill(Some(S::zero()));
         if self.tangent.leans() {
@@ -101,11 +122,13 @@ impl<S: Scalar> Ode<S> for System<S> {
 
     #[inline]
     fn rhs(&mut self, x: &[S], dxdt: &mut [S]) {
+        self.ready = false;
         self.dynamics.rhs(x, dxdt);
     }
 
     /// Columns by forward accumulation; exact also where S itself carries derivatives.
     fn jacobian(&mut self, x: &[S], jacobian: &mut [S]) {
+        self.ready = false;
         if self.tangent.leans() {
             self.dynamics.rhs(x, &mut self.rates);
         }
@@ -113,12 +136,12 @@ impl<S: Scalar> Ode<S> for System<S> {
     }
 
     fn linearise(&mut self, x: &[S], jacobian: &mut [S], rates: &mut [S]) {
-        self.dynamics.rhs(x, rates);
+        self.begin(x, rates);
         self.tangent.jacobian(&mut self.dynamics, x, jacobian);
     }
 
     fn prepare(&mut self, x: &[S], matrix: &mut [S], rates: &mut [S]) {
-        self.dynamics.rhs(x, rates);
+        self.begin(x, rates);
         self.matrix(x, matrix);
     }
 
@@ -128,6 +151,7 @@ impl<S: Scalar> Ode<S> for System<S> {
     /// The tangent of dry friction is flat beyond the transition velocity, so that a step which crosses it would not see the friction
     /// turn around, and could keep a joint creeping for ever; the chord sees it. At rest, and for viscous friction, they are the same.
     fn iteration_matrix(&mut self, x: &[S], matrix: &mut [S]) {
+        self.ready = false;
         if self.tangent.leans() {
             self.dynamics.rhs(x, &mut self.rates);
         }
@@ -145,6 +169,7 @@ impl<S: Scalar> Ode<S> for System<S> {
 
     /// Stiffness and damping of the beams.
     fn elasticity(&mut self, x: &[S], block: &mut [S]) -> bool {
+        self.ready = false;
         let n = self.coordinates();
         if self.dynamics.model.n_elastic() == 0 {
             return false;
