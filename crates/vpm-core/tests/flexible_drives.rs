@@ -13,6 +13,7 @@ use vpm_core::Result;
 use vpm_core::description::Description;
 use vpm_core::evaluate::{energy, internal_state};
 use vpm_core::integrator::{Integrator, Method};
+use vpm_core::linearize::linearize;
 use vpm_core::ode::Ode;
 use vpm_core::samples::Random;
 use vpm_core::system::System;
@@ -74,6 +75,34 @@ fn moving(d: &Description) -> Result<(System<f64>, Vec<f64>)> {
     system.hold(0, 0.01);
     system.hold(1, 2e-3);
     Ok((system, [q, random.numbers(n, 0.1), internal].concat()))
+}
+
+#[test]
+fn jacobian_through_the_forces_is_that_of_the_whole_right_hand_side() -> Result<()> {
+    // Two cylinders that let one supply sag; a cylinder beside an element without a flow; two springs that stretch.
+    for drives in [[&cylinder(), &cylinder()], [&cylinder(), &maxwell(0.4)], [&maxwell(0.4), &maxwell(0.5)]] {
+        let d = machine(drives);
+        let (mut system, mut x) = moving(&d)?;
+        let (n, dim) = (d.n_coordinates(), x.len());
+        // Both valves open, to different sides.
+        if dim > 2 * n + 3 {
+            x[2 * n] += 2e-3;
+            x[dim - 5] -= 1e-3;
+        }
+        let whole = linearize(&d, &d.parameters, &x, &[0.01, 2e-3])?.state;
+        let (mut found, mut sizes) = (vec![0.0; dim * dim], vec![0.0; dim]);
+        system.jacobian(&x, &mut found);
+        system.scales(&mut sizes);
+        for row in 0..dim {
+            let scaled = |matrix: &[f64], column: usize| matrix[row * dim + column] * sizes[column];
+            let largest = (0..dim).map(|column| scaled(&whole, column).abs()).fold(0.0, f64::max);
+            for column in 0..dim {
+                let (found, expected) = (scaled(&found, column), scaled(&whole, column));
+                assert!((found - expected).abs() <= 1e-10 * largest, "{row}, {column}: {found} {expected}");
+            }
+        }
+    }
+    Ok(())
 }
 
 #[test]
