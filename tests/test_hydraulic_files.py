@@ -192,9 +192,7 @@ def test_impacts_and_voids_need_no_choice_of_an_integrator(rig: Model) -> None:
     assert run["axis.position"][-1] == pytest.approx(-0.04 - STALL_IN / 5e8, abs=1e-7)
     assert vpm.Simulation(rig, 1e-3).run(np.zeros((2, 1))).settings["integrator"] == "adaptive"
     assert vpm.budget(rig, steps=1000).integrator == "guarded"
-    with pytest.raises(
-        DivergedError, match="of actuator `servo` is .* m beyond the end of its stroke.*use the integrator"
-    ):
+    with pytest.raises(DivergedError, match=r"is .* m beyond the end of its stroke, .* use the"):
         simulate(rig, record, integrator="rosenbrock")
 
 
