@@ -215,7 +215,7 @@ def test_a_piston_outside_of_its_stroke_is_refused(rig: Model) -> None:
     ):
         with pytest.raises(SimulationError) as caught:
             start()
-        for part in ("servo", "axis", "starts 0.0", "-0.04 m and 0.04 m", "retracted_length"):
+        for part in ("servo", "axis", "starts 0.05", "-0.040000 m and 0.040000 m", "retracted_length"):
             assert part in str(caught.value)
 
 
