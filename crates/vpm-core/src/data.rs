@@ -60,6 +60,8 @@ pub(crate) struct LineSlot<S> {
     pub(crate) direction: Vector3<S>,
     pub(crate) from: PointSlot<S>,
     pub(crate) to: PointSlot<S>,
+    /// Rate of the direction per unit rate of each coordinate, of lines that weigh something.
+    pub(crate) turns: Vec<Vector3<S>>,
 }
 
 /// A point that moves with the machine, in the axes of the world.
@@ -197,7 +199,13 @@ impl<S: Scalar> Composite<S> {
             acceleration: Vector3::zero(),
             columns: vec![Vector3::zero(); n],
         };
-        let line = || LineSlot { length: S::zero(), direction: Vector3::zero(), from: point(), to: point() };
+        let line = || LineSlot {
+            length: S::zero(),
+            direction: Vector3::zero(),
+            from: point(),
+            to: point(),
+            turns: vec![Vector3::zero(); n],
+        };
         Self {
             frames: vec![world; model.n_frames()],
             sections: model.beams().iter().map(|elastic| elastic.beam.sections()).collect(),

@@ -19,6 +19,18 @@ pub trait Ode<S> {
         self.jacobian(x, matrix);
     }
 
+    /// Writes df/dx and f(x); for systems to which the one is of use for the other.
+    fn linearise(&mut self, x: &[S], jacobian: &mut [S], rates: &mut [S]) {
+        self.jacobian(x, jacobian);
+        self.rhs(x, rates);
+    }
+
+    /// Writes [`Ode::iteration_matrix`] and f(x), likewise.
+    fn prepare(&mut self, x: &[S], matrix: &mut [S], rates: &mut [S]) {
+        self.iteration_matrix(x, matrix);
+        self.rhs(x, rates);
+    }
+
     /// Writes what constant linear stiffness K and damping D add to the accelerations by coordinates and rates, `[-M^-1 K, -M^-1 D]`:
     /// with n coordinates, n rows of 2 n entries each; tells whether there is any. Without it nothing is written.
     ///

@@ -2,9 +2,11 @@
 
 mod answers;
 mod connections;
+mod driven;
 mod drives;
 mod observe;
 mod ode;
+mod places;
 mod settle;
 mod slopes;
 mod stiff;
@@ -159,6 +161,31 @@ impl<S: Scalar> Dynamics<S> {
         let n = self.coordinates();
         let (q, v) = x[..2 * n].split_at(n);
         self.locate(q, v);
+        self.push(x, dxdt, laws);
+    }
+
+    /// dx/dt at the `x` of the last [`Dynamics::rhs`] under other inputs, where the machine [`Dynamics::stands`].
+    #[inline]
+    pub(crate) fn rhs_here(&mut self, x: &[S], dxdt: &mut [S]) {
+        self.push(x, dxdt, (add_effects, ContactFriction::resistance));
+    }
+
+    /// Whether all frames and lines, and the mass matrix, are those of the state after [`Dynamics::rhs`].
+    #[inline]
+    pub(crate) fn stands(&self) -> bool {
+        !self.model.is_recursive() && !self.model.lines().is_empty()
+    }
+
+    /// dx/dt at x, after [`Dynamics::locate`].
+    #[inline]
+    fn push(
+        &mut self,
+        x: &[S],
+        dxdt: &mut [S],
+        laws: (impl FnOnce(&[(usize, JointEffect<S>)], &[S], &[S], &mut [S]), impl Fn(&ContactFriction<S>, S, S) -> S),
+    ) {
+        let n = self.coordinates();
+        let (q, v) = x[..2 * n].split_at(n);
         self.actuate(x, dxdt);
         dxdt[..n].copy_from_slice(v);
         self.accelerate(q, v, laws, &[]);

@@ -258,7 +258,10 @@ fn a_piston_starts_within_its_stroke() {
         assert!(matches!(error, Error::Drive(DriveError::Piston { .. })));
         let told = error.to_string();
         let part = if on == On::Joint { "position of joint `axis`" } else { "length of line `strut`" };
-        assert!(told.contains("actuator `hip`") && told.contains(part) && told.contains("0.460000 m and 0.540000 m"), "{told}");
+        assert!(
+            told.contains("actuator `hip`") && told.contains(part) && told.contains("0.460000 m and 0.540000 m"),
+            "{told}"
+        );
         let stepping = Stepping::new(1e-3, 1, Method::LinearlyImplicit).unwrap();
         let live = Live::new(Arc::new(machine.build()), &machine.values, &start, stepping);
         assert!(matches!(live, Err(Error::Drive(DriveError::Piston { .. }))));

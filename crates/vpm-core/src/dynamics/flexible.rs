@@ -120,24 +120,30 @@ fn massive_lines<S: Scalar>(model: &Model<S>, data: &mut Data<S>) {
     let Data { composite: Composite { lines, bias, .. }, mass_matrix: mass, .. } = data;
     let n = bias.len();
     for (Wire { barrel, rod, .. }, slot) in model.lines().iter().zip(lines) {
-        let LineSlot { length, direction: u, from, to } = slot;
-        let turn = |v: Vector3<S>| (v - *u * u.dot(v)) * length.recip();
+        if barrel.is_none() && rod.is_none() {
+            continue;
+        }
+        let LineSlot { length, direction: u, from, to, turns } = slot;
+        let shrink = length.recip();
+        let turn = |v: Vector3<S>| (v - *u * u.dot(v)) * shrink;
         let (rate, change) = (to.velocity - from.velocity, to.acceleration - from.acceleration);
         let (stretch, spin) = (u.dot(rate), turn(rate));
         // u'' from d^2/dt^2 (s u), s the length.
-        let swing = turn(change) - (spin * (stretch * length.recip())) * S::from_f64(2.0) - *u * spin.dot(spin);
+        let swing = turn(change) - spin * (stretch * shrink * 2.0) - *u * spin.dot(spin);
+        for (turned, (&to, &from)) in turns.iter_mut().zip(to.columns.iter().zip(&from.columns)) {
+            *turned = turn(to - from);
+        }
         for (part, point, sign) in [(barrel, &*from, 1.0), (rod, &*to, -1.0)] {
             let Some(part) = part else { continue };
             let center = part.center * sign;
             let acceleration = (point.acceleration + swing * center) * part.mass;
-            for i in 0..n {
-                let turning = turn(to.columns[i] - from.columns[i]);
-                let moving = point.columns[i] + turning * center;
+            for (i, (&turning, &column)) in turns.iter().zip(&point.columns).enumerate() {
+                let moving = column + turning * center;
                 bias[i] += moving.dot(acceleration) + turning.dot(swing) * part.inertia;
-                for j in 0..=i {
-                    let other = turn(to.columns[j] - from.columns[j]);
-                    let along = moving.dot(point.columns[j] + other * center) * part.mass;
-                    mass[i * n + j] += along + turning.dot(other) * part.inertia;
+                let others = turns.iter().zip(&point.columns);
+                for (entry, (&other, &column)) in mass[i * n..=i * n + i].iter_mut().zip(others) {
+                    let along = moving.dot(column + other * center) * part.mass;
+                    *entry += along + turning.dot(other) * part.inertia;
                 }
             }
         }
@@ -189,7 +195,7 @@ pub fn energy<S: Scalar>(model: &Model<S>, data: &mut Data<S>, q: &[S], v: &[S])
         total.kinetic += inertia.kinetic_energy(*velocity);
         total.potential -= gravity.dot(pose.rotation * inertia.first_moment + pose.translation * inertia.mass);
     }
-    for (Wire { barrel, rod, .. }, LineSlot { length, direction: u, from, to }) in
+    for (Wire { barrel, rod, .. }, LineSlot { length, direction: u, from, to, .. }) in
         model.lines().iter().zip(&data.composite.lines)
     {
         let rate = to.velocity - from.velocity;

@@ -19,13 +19,14 @@ pub fn frames<S: Scalar>(model: &Model<S>, data: &mut Data<S>, q: &[S], v: &[S])
         match node {
             Node::Body(number, _) => {
                 let link = &model.links()[*number];
-                let parent = frames[link.parent];
+                // Only these two: a frame is large, and larger in dual numbers.
+                let FrameSlot { velocity, acceleration, .. } = frames[link.parent];
                 let slot = &mut frames[number + 1];
                 slot.across = link.pose(q[*number]);
-                slot.velocity = slot.across.inverse_twist(parent.velocity);
+                slot.velocity = slot.across.inverse_twist(velocity);
                 link.kind.add_rate(&mut slot.velocity, v[*number]);
                 let across = link.kind.rate_cross(&slot.velocity, v[*number]);
-                slot.acceleration = slot.across.inverse_twist(parent.acceleration) + across;
+                slot.acceleration = slot.across.inverse_twist(acceleration) + across;
                 slot.inertia = link.inertia;
             }
             Node::Beam(number, _) => {
@@ -82,16 +83,26 @@ pub(crate) fn poses<S: Scalar>(model: &Model<S>, data: &mut Data<S>) {
 
 /// Geometry and motion of every line after [`poses`].
 pub(crate) fn lines<S: Scalar>(model: &Model<S>, data: &mut Data<S>) {
+    bare_lines(model, data);
     let Composite { frames, sections, lines, .. } = &mut data.composite;
     for (Wire { from, to, .. }, slot) in model.lines().iter().zip(lines) {
-        let LineSlot { length, direction, from: begin, to: end } = slot;
-        for (place, point) in [(from, &mut *begin), (to, &mut *end)] {
-            move_point(&frames[place.frame], place, point);
+        for (place, point) in [(from, &mut slot.from), (to, &mut slot.to)] {
             let PointSlot { place: at, columns, .. } = point;
             columns.fill(Vector3::zero());
             for_each_column(model, frames, sections, place.frame, |coordinate, column| {
                 columns[coordinate] = column.linear + column.angular.cross(*at);
             });
+        }
+    }
+}
+
+/// As [`lines`], but without the velocities per unit rate of the coordinates.
+pub(super) fn bare_lines<S: Scalar>(model: &Model<S>, data: &mut Data<S>) {
+    let Composite { frames, lines, .. } = &mut data.composite;
+    for (Wire { from, to, .. }, slot) in model.lines().iter().zip(lines) {
+        let LineSlot { length, direction, from: begin, to: end, .. } = slot;
+        for (place, point) in [(from, &mut *begin), (to, &mut *end)] {
+            move_point(&frames[place.frame], place, point);
         }
         let across = end.place - begin.place;
         *length = across.dot(across).sqrt();

@@ -1,7 +1,7 @@
 //! Reaction wrenches: what the joints of a machine carry.
 
-use super::frames::{frames, lines, poses};
-use crate::data::{Data, LineSlot, PointSlot};
+use super::frames::{bare_lines, frames, poses};
+use crate::data::{Composite, Data, LineSlot, PointSlot};
 use crate::model::{Elastic, Model, Node, Wire};
 use crate::scalar::Scalar;
 use crate::spatial::{Pose, Twist, Vector3, Wrench};
@@ -17,15 +17,30 @@ pub(crate) type Motion<'a, S> = [&'a [S]; 3];
 pub(crate) fn reactions<S: Scalar>(
     model: &Model<S>,
     data: &mut Data<S>,
-    [q, v, a]: Motion<'_, S>,
+    motion: Motion<'_, S>,
     extra: &mut [Twist<S>],
     tensions: &[S],
     applied: impl FnOnce(&mut Data<S>),
 ) {
+    reach(model, data, motion, extra);
+    weigh(model, data, tensions, applied);
+}
+
+/// The first half of [`reactions`]: all frames and lines in the motion, but for the columns of the lines.
+pub(crate) fn reach<S: Scalar>(model: &Model<S>, data: &mut Data<S>, [q, v, a]: Motion<'_, S>, extra: &mut [Twist<S>]) {
     frames(model, data, q, v);
     accelerate(model, data, a, extra);
     poses(model, data);
-    lines(model, data);
+    bare_lines(model, data);
+}
+
+/// The second half of [`reactions`]: what the frames carry, after [`reach`].
+pub(crate) fn weigh<S: Scalar>(
+    model: &Model<S>,
+    data: &mut Data<S>,
+    tensions: &[S],
+    applied: impl FnOnce(&mut Data<S>),
+) {
     for slot in data.composite.frames.iter_mut().skip(1) {
         let momentum = slot.inertia.apply(slot.velocity);
         slot.wrench = slot.inertia.apply(slot.acceleration) + slot.velocity.cross_wrench(momentum);
@@ -35,6 +50,24 @@ pub(crate) fn reactions<S: Scalar>(
     }
     applied(data);
     inward(model, data);
+}
+
+/// Efforts on all coordinates that give the wrenches of the last [`weigh`]: all but what rotors, stiffness and damping of beams need.
+pub(crate) fn project<S: Scalar>(model: &Model<S>, data: &Data<S>, efforts: &mut [S]) {
+    let Composite { frames, sections, .. } = &data.composite;
+    for ((effort, link), slot) in efforts.iter_mut().zip(model.links()).zip(&frames[1..]) {
+        *effort = link.kind.effort(&slot.wrench);
+    }
+    for (Elastic { beam, coordinate, frame, .. }, sections) in model.beams().iter().zip(sections) {
+        let (len, first) = (beam.len(), frame.unwrap_or(0));
+        let efforts = &mut efforts[*coordinate..coordinate + len];
+        efforts.fill(S::zero());
+        for (slot, columns) in frames[first..].iter().zip(sections.columns.chunks_exact(len.max(1))) {
+            for (effort, column) in efforts.iter_mut().zip(columns) {
+                *effort += column.power(slot.wrench);
+            }
+        }
+    }
 }
 
 /// Takes a wrench that acts on a frame, about its origin and in its axes, off what that has to be given otherwise.
@@ -79,11 +112,12 @@ fn accelerate<S: Scalar>(model: &Model<S>, data: &mut Data<S>, a: &[S], extra: &
 ///
 /// As in the equations of motion: a part moves with `J = J_end + c J_u`, so that its own end carries it along the line and both do across.
 fn line<S: Scalar>(wire: &Wire<S>, number: usize, data: &mut Data<S>, tension: S) {
-    let LineSlot { length, direction: u, from, to } = &data.composite.lines[number];
-    let turn = |v: Vector3<S>| (v - *u * u.dot(v)) * length.recip();
+    let LineSlot { length, direction: u, from, to, .. } = &data.composite.lines[number];
+    let shrink = length.recip();
+    let turn = |v: Vector3<S>| (v - *u * u.dot(v)) * shrink;
     let (rate, change) = (to.velocity - from.velocity, to.acceleration - from.acceleration);
     let (stretch, spin) = (u.dot(rate), turn(rate));
-    let swing = turn(change) - (spin * (stretch * length.recip())) * S::from_f64(2.0) - *u * spin.dot(spin);
+    let swing = turn(change) - spin * (stretch * shrink * 2.0) - *u * spin.dot(spin);
     // What the beginning and the end have to give, in world axes.
     let mut needed = [*u * tension, -(*u * tension)];
     for (part, point, sign, own) in [(&wire.barrel, from, 1.0, 0), (&wire.rod, to, -1.0, 1)] {

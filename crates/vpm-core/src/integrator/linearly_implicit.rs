@@ -32,9 +32,8 @@ impl<S: Scalar> LinearlyImplicit<S> {
 
     /// Moves `x` on by `step` (s).
     pub fn step(&mut self, ode: &mut impl Ode<S>, x: &mut [S], step: f64) {
-        ode.iteration_matrix(x, self.left.matrix());
+        ode.prepare(x, self.left.matrix(), &mut self.first);
         self.left.factorise(ode.coordinates(), GAMMA * step);
-        ode.rhs(x, &mut self.first);
         self.left.solve(&mut self.first);
         for ((stage, &start), &rate) in self.stage.iter_mut().zip(&*x).zip(&self.first) {
             *stage = start + rate * step;

@@ -89,8 +89,7 @@ impl<S: Scalar> Rosenbrock<S> {
 
     /// Rates and Jacobian at `x`, where a step begins.
     pub(super) fn linearise(&mut self, ode: &mut impl Ode<S>, x: &[S]) {
-        ode.jacobian(x, self.left.matrix());
-        ode.rhs(x, &mut self.rates);
+        ode.linearise(x, self.left.matrix(), &mut self.rates);
     }
 
     /// Computes the stages of a step from the `x` of the last [`Self::linearise`], and leaves x where it is.

@@ -86,19 +86,21 @@ impl<S: Scalar> Control<S> {
         self.loops.iter().any(|control| control.due(row) && matches!(control.law, ControlLaw::ForceLoop(_)))
     }
 
-    /// Lets the controllers that are due at sample `row` command, and the others hold; `state` gives what no sensor is made for.
+    /// Lets the controllers that are due at sample `row` command, and the others hold; `state` gives what no sensor is made for. Goes by
+    /// the machine as it stands if it does at what the sensors show, and tells whether it still does.
     pub(super) fn sample(
         &mut self,
         row: usize,
         references: Table<'_>,
-        (dynamics, state): (&mut Dynamics<S>, &[S]),
+        (dynamics, state, stands): (&mut Dynamics<S>, &[S], bool),
         see: impl Fn(usize) -> S,
-    ) {
+    ) -> bool {
         let Self { loops, drafts, inputs, machine } = self;
         let (past, now) = drafts.split_at_mut(row * *inputs);
         let held = &past[past.len().saturating_sub(*inputs)..];
+        let stands = stands && !loops.iter().any(|control| matches!(control.law, ControlLaw::ComputedTorque(_)));
         if loops.iter().any(|control| control.due(row) && control.needs_machine()) {
-            machine.look(state, dynamics, &see);
+            machine.look((state, stands), dynamics, &see);
         }
         for control in loops {
             if control.due(row) {
@@ -109,6 +111,7 @@ impl<S: Scalar> Control<S> {
                 }
             }
         }
+        stands
     }
 
     /// Calls `put` with each actuator and the command that arrives there at sample `row`.
@@ -218,7 +221,7 @@ impl Port {
 
 impl<S: Scalar> Machine<S> {
     /// Reads the joints; elastic coordinates have no sensor and count as they are.
-    fn look(&mut self, state: &[S], dynamics: &mut Dynamics<S>, see: &impl Fn(usize) -> S) {
+    fn look(&mut self, (state, stands): (&[S], bool), dynamics: &mut Dynamics<S>, see: &impl Fn(usize) -> S) {
         let (n, layout) = (self.position.len(), dynamics.layout());
         self.position.copy_from_slice(&state[..n]);
         self.rate.copy_from_slice(&state[n..2 * n]);
@@ -226,7 +229,9 @@ impl<S: Scalar> Machine<S> {
             *position = see(Channel::Position { joint }.column(layout));
             *rate = see(Channel::Velocity { joint }.column(layout));
         }
-        if dynamics.pulls() {
+        if stands {
+            dynamics.levers_here(&mut self.levers);
+        } else if dynamics.pulls() {
             dynamics.levers(&self.position, &mut self.levers);
         }
     }

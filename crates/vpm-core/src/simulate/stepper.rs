@@ -143,11 +143,15 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         }
         self.check_stops(row, start)?;
         self.states[row * dim..(row + 1) * dim].copy_from_slice(&self.state);
-        self.record_motion(row);
-        self.control(row, start);
+        let stands = self.control(row, start);
         self.hold(row + start);
-        self.system.rhs(&self.state, &mut self.rate);
+        if stands {
+            self.system.dynamics().rhs_here(&self.state, &mut self.rate);
+        } else {
+            self.system.rhs(&self.state, &mut self.rate);
+        }
         self.record_efforts(row, start);
+        self.system.depart(&self.rate);
         self.read(row);
         let width = self.description.n_outputs();
         if let Some(column) = self.outputs[row * width..(row + 1) * width].iter().position(|out| !out.is_finite()) {
@@ -178,24 +182,42 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         Err(leapt(self, what, place.abs() - reach, (row, start)))
     }
 
-    fn record_motion(&mut self, row: usize) {
+    fn record_motion(&mut self, row: usize, stands: bool) {
         let width = self.description.n_outputs();
-        self.system.dynamics().observe_motion(&self.state, &mut self.truth[row * width..(row + 1) * width]);
+        let (dynamics, truth) = (self.system.dynamics(), &mut self.truth[row * width..(row + 1) * width]);
+        if stands {
+            dynamics.observe_here(&self.state, truth);
+        } else {
+            dynamics.observe_motion(&self.state, truth);
+        }
     }
 
-    /// Lets the controllers command, if there is a loop to close.
-    fn control(&mut self, row: usize, start: usize) {
-        let Drive::Loop { references, .. } = self.plan.drive else { return };
-        if self.control.as_ref().is_some_and(|control| control.feels(row)) {
+    /// Records the motion and lets the controllers command, if there is a loop to close; tells whether the machine stands evaluated at
+    /// the state then.
+    fn control(&mut self, row: usize, start: usize) -> bool {
+        let feels = self.control.as_ref().is_some_and(|control| control.feels(row));
+        let stands = feels && self.system.dynamics().stands();
+        if !stands {
+            self.record_motion(row, false);
+        }
+        if feels {
             // Forces under the commands that are still held.
             self.system.rhs(&self.state, &mut self.rate);
+            if stands {
+                self.record_motion(row, true);
+            }
             self.record_efforts(row, start);
         }
-        let Self { control: Some(control), system, state, sensors, truth, commands, .. } = self else { return };
+        let Drive::Loop { references, .. } = self.plan.drive else { return false };
+        // What sensors show need not be where the machine is.
+        let stands = stands && self.sensors.is_empty();
+        let Self { control: Some(control), system, state, sensors, truth, commands, .. } = self else { return false };
         let (at, outputs) = ((row, self.stepping.time_step), (truth.as_slice(), self.description.n_outputs()));
-        control.sample(row, references, (system.dynamics(), state), |column| reading(sensors, outputs, at, column));
+        let see = |column| reading(sensors, outputs, at, column);
+        let stands = control.sample(row, references, (system.dynamics(), state, stands), see);
         let first = row * references.columns();
         control.arrive(row, |actuator, command| commands[first + actuator] += command);
+        stands
     }
 
     /// Holds what every input amounts to over the interval that begins at sample `k` of the record.

@@ -123,8 +123,14 @@ impl<S: Scalar> Dynamics<S> {
         frames(model, data, q, loads);
         poses(model, data);
         lines(model, data);
+        self.levers_here(levers);
+    }
+
+    /// As [`Dynamics::levers`], where the lines are.
+    pub(crate) fn levers_here(&self, levers: &mut [S]) {
+        let (n, data) = (self.coordinates(), &self.data);
         levers.fill(S::zero());
-        for (line, row) in levers.chunks_exact_mut(q.len()).enumerate() {
+        for (line, row) in levers.chunks_exact_mut(n.max(1)).enumerate() {
             data.line_load(line, S::one(), row);
         }
     }

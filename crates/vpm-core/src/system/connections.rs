@@ -134,12 +134,14 @@ impl<S: Scalar> Connections<S> {
         }
     }
 
-    /// Takes what contacts and bushings do off what the frames have to be given otherwise, for reactions.
-    pub(super) fn take_off(&self, data: &mut Data<S>) {
+    /// Takes what contacts and bushings do off what the frames have to be given otherwise, for reactions; the resistance of friction laws
+    /// is that of `resistance`.
+    pub(super) fn take_off(&self, data: &mut Data<S>, resistance: impl Fn(&ContactFriction<S>, S, S) -> S) {
         for contact in &self.contacts {
-            let slot = data.composite.frames[contact.frame];
-            if let Some(touch) = contact.touch(&slot, ContactFriction::resistance) {
-                take_off(data, contact.frame, contact.wrench(&slot, &touch));
+            let slot = &data.composite.frames[contact.frame];
+            let wrench = contact.touch(slot, &resistance).map(|touch| contact.wrench(slot, &touch));
+            if let Some(wrench) = wrench {
+                take_off(data, contact.frame, wrench);
             }
         }
         for PlacedBushing { a, b, law } in &self.bushings {

@@ -15,13 +15,17 @@ pub(super) struct Shown<S> {
     pub(super) currents: Vec<S>,
     /// Pressure (Pa) of each supply, and the flow (m^3/s) drawn from it.
     pub(super) supplies: Vec<[S; 2]>,
+    /// Flow (m^3/s) that each hydraulic drive draws.
+    pub(super) drawn: Vec<S>,
 }
 
 impl<S: Scalar> Shown<S> {
     pub(super) fn new(actuators: &[Actuator<S>], supplies: &[Supply<S>]) -> Self {
         let count = |kind: fn(&Drive<S>) -> bool| actuators.iter().filter(|actuator| kind(&actuator.drive)).count();
+        let cylinders = count(|drive| matches!(drive, Drive::Hydraulic(_)));
         Self {
-            hydraulics: vec![[S::zero(); 5]; count(|drive| matches!(drive, Drive::Hydraulic(_)))],
+            hydraulics: vec![[S::zero(); 5]; cylinders],
+            drawn: vec![S::zero(); cylinders],
             currents: vec![S::zero(); count(|drive| matches!(drive, Drive::DcMotor(_)))],
             supplies: supplies.iter().map(|supply| [supply.pressure, S::zero()]).collect(),
         }
@@ -46,7 +50,8 @@ impl<S: Scalar> Dynamics<S> {
         if self.ideal {
             self.actuate_ideal(&x[first..], &mut dxdt[first..]);
         } else {
-            self.actuate_any(x, dxdt);
+            let (q, v) = x[..first].split_at(self.coordinates());
+            self.actuate_moving(&x[first..], &mut dxdt[first..], |on, lines| motion(on, q, v, lines));
         }
     }
 
@@ -72,10 +77,13 @@ impl<S: Scalar> Dynamics<S> {
         }
     }
 
-    /// As [`Dynamics::actuate`] for drives of every kind.
-    fn actuate_any(&mut self, x: &[S], dxdt: &mut [S]) {
-        let n = self.coordinates();
-        let (q, v, states, rates) = (&x[..n], &x[n..2 * n], &x[2 * n..], &mut dxdt[2 * n..]);
+    /// As [`Dynamics::actuate`] for drives of every kind in their `states`, each at the length and rate that `motion` tells.
+    pub(super) fn actuate_moving(
+        &mut self,
+        states: &[S],
+        rates: &mut [S],
+        motion: impl Fn(Target, &[LineSlot<S>]) -> [S; 2],
+    ) {
         self.efforts.fill(S::zero());
         self.tensions.fill(S::zero());
         if !self.supplies.is_empty() {
@@ -90,7 +98,7 @@ impl<S: Scalar> Dynamics<S> {
                 input = states[at];
                 at += 1;
             }
-            let moving = || motion(actuator.on, q, v, &data.composite.lines);
+            let moving = || motion(actuator.on, &data.composite.lines);
             let force = match &actuator.drive {
                 Drive::Ideal(law) => law.effort(input),
                 Drive::DcMotor(law) => {
@@ -119,6 +127,7 @@ impl<S: Scalar> Dynamics<S> {
                     let action = law.action(state, input, [piston, rate], (&supplies[law.supply], *pressure));
                     rates[at..at + 4].copy_from_slice(&action.rates);
                     *drawn += action.flows.supply;
+                    shown.drawn[cylinders] = action.flows.supply;
                     let (pressures, flows) = (action.pressures, action.flows);
                     shown.hydraulics[cylinders] = [spool, pressures.a, pressures.b, flows.into_a, flows.out_of_b];
                     (at, cylinders) = (at + 4, cylinders + 1);

@@ -2,6 +2,7 @@
 
 use super::Dynamics;
 use super::connections::into_body;
+use crate::contact::ContactFriction;
 use crate::dynamics::{Motion, frames, lines, poses, reactions};
 use crate::scalar::Scalar;
 use crate::sensor::Layout;
@@ -40,6 +41,19 @@ impl<S: Scalar> Dynamics<S> {
     /// The outputs that the state alone decides: positions and velocities, lines, strains, markers.
     pub(crate) fn observe_motion(&mut self, x: &[S], outputs: &mut [S]) {
         let (n, layout) = (self.coordinates(), self.layout());
+        if layout.lines + layout.gauges + layout.markers > 0 || !self.connections.is_free() {
+            let (q, v) = x[..2 * n].split_at(n);
+            let Self { model, data, .. } = self;
+            frames(model, data, q, v);
+            poses(model, data);
+            lines(model, data);
+        }
+        self.observe_here(x, outputs);
+    }
+
+    /// As [`Dynamics::observe_motion`], with all frames and lines where they are in the state.
+    pub(crate) fn observe_here(&mut self, x: &[S], outputs: &mut [S]) {
+        let (n, layout) = (self.coordinates(), self.layout());
         let (q, v) = x[..2 * n].split_at(n);
         for ((channels, &q), &v) in outputs[..layout.actuators()].chunks_exact_mut(4).zip(q).zip(v) {
             channels[0] = q;
@@ -48,10 +62,7 @@ impl<S: Scalar> Dynamics<S> {
         if layout.lines + layout.gauges + layout.markers == 0 && self.connections.is_free() {
             return;
         }
-        let Self { model, data, connections, .. } = self;
-        frames(model, data, q, v);
-        poses(model, data);
-        lines(model, data);
+        let Self { model, data, connections, .. } = &*self;
         for (channels, line) in outputs[layout.lines()..].chunks_exact_mut(3).zip(&data.composite.lines) {
             channels[0] = line.length;
             channels[1] = line.rate();
@@ -78,7 +89,9 @@ impl<S: Scalar> Dynamics<S> {
         let first = self.layout().load_cells();
         let Self { model, data, connections, tensions, .. } = self;
         let mut extra = std::mem::take(&mut connections.extra);
-        reactions(model, data, motion, &mut extra, tensions, |data| connections.take_off(data));
+        reactions(model, data, motion, &mut extra, tensions, |data| {
+            connections.take_off(data, ContactFriction::resistance);
+        });
         connections.extra = extra;
         for (channels, &joint) in outputs[first..].chunks_exact_mut(6).zip(&connections.cells) {
             let wrench = into_body(model, joint, data.composite.frames[joint + 1].wrench);

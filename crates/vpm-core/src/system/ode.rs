@@ -2,6 +2,8 @@
 
 use super::tangent::Tangent;
 use super::{Build, Dynamics, stiff};
+use crate::contact::ContactFriction;
+use crate::effect::JointEffect;
 use crate::ode::Ode;
 use crate::scalar::Scalar;
 
@@ -14,22 +16,28 @@ pub struct System<S> {
     seals: Vec<Option<S>>,
     /// A column of an iteration matrix on its way.
     column: Vec<S>,
+    /// Rates at a state whose matrix is asked for alone.
+    rates: Vec<S>,
+    /// Whether these are the rates where the next step begins.
+    ready: bool,
 }
 
 impl<S: Scalar> System<S> {
     /// From the same machine in several number types; `build` makes it from numbers.
     pub fn new<E>(theta: &[S], build: impl Build<Error = E>) -> Result<Self, E> {
         let dynamics = build.dynamics(theta)?;
-        let tangent = Tangent::new(theta, build, dynamics.dim())?;
+        let tangent = Tangent::new(theta, build, &dynamics)?;
         let resistances = vec![S::zero(); dynamics.joints()];
         let column = vec![S::zero(); dynamics.coordinates()];
         let seals = vec![None; dynamics.actuators.len()];
-        Ok(Self { dynamics, tangent, resistances, seals, column })
+        let rates = vec![S::zero(); dynamics.dim()];
+        Ok(Self { dynamics, tangent, resistances, seals, column, rates, ready: false })
     }
 
     /// The right-hand side.
     #[inline]
     pub fn dynamics(&mut self) -> &mut Dynamics<S> {
+        self.ready = false;
         &mut self.dynamics
     }
 
@@ -37,18 +45,67 @@ impl<S: Scalar> System<S> {
     /// supplies.
     #[inline]
     pub fn hold(&mut self, number: usize, input: S) {
+        self.ready = false;
         self.dynamics.inputs[number] = input;
         self.tangent.hold(number, input);
     }
 }
 
 impl<S: Scalar> System<S> {
+    /// Takes note that the machine, last evaluated with these `rates`, makes its next step from that very state. What is asked of the
+    /// system before makes it forget.
+    pub(crate) fn depart(&mut self, rates: &[S]) {
+        self.rates.copy_from_slice(rates);
+        self.ready = true;
+    }
+
+    /// Rates at `x`: those at hand if a step begins there.
+    fn begin(&mut self, x: &[S], rates: &mut [S]) {
+        if std::mem::take(&mut self.ready) {
+            rates.copy_from_slice(&self.rates);
+        } else {
+            self.dynamics.rhs(x, rates);
+        }
+    }
+
     /// As df/dx, without the friction of joints and seals, row by row.
     pub(crate) fn without_friction(&mut self, x: &[S], matrix: &mut [S]) {
+        self.ready = false;
         self.resistances.fill(S::zero());
         self.seals.fill(Some(S::zero()));
-        self.tangent.chords(x, matrix, &self.resistances, &self.seals);
+        if self.tangent.leans() {
+            self.dynamics.seals.copy_from_slice(&self.seals);
+            let at_rest = |effects: &[(usize, JointEffect<S>)], q: &[S], _: &[S], total: &mut [S]| {
+                effects.iter().for_each(|(joint, effect)| total[*joint] += effect.effort_at_rest(q[*joint]));
+            };
+            let chord = |law: &ContactFriction<S>, square, normal| law.chord(square) * normal;
+            self.dynamics.rhs_with(x, &mut self.rates, (at_rest, chord));
+            self.dynamics.seals.fill(None);
+        }
+        self.tangent.chords(&mut self.dynamics, x, matrix, (&self.resistances, &self.seals));
         self.seals.fill(None);
+    }
+
+    /// Writes [`Ode::iteration_matrix`], after the rates at `x` if the tangent leans on them.
+    fn matrix(&mut self, x: &[S], matrix: &mut [S]) {
+        let n = self.coordinates();
+        self.resistances.fill(S::zero());
+        for (joint, effect) in &self.dynamics.effects {
+            self.resistances[*joint] += effect.resistance(x[n + joint]);
+        }
+        if self.is_stiff_alone() {
+            stiff::iteration_matrix(&mut self.dynamics, x, matrix, &self.resistances, &mut self.column);
+            return;
+        }
+        let (q, v) = x[..2 * n].split_at(n);
+        self.dynamics.seal_chords(q, v, &mut self.seals);
+        self.tangent.chords(&mut self.dynamics, x, matrix, (&self.resistances, &self.seals));
+    }
+
+    /// Whether beams are all that is stiff in it.
+    fn is_stiff_alone(&self) -> bool {
+        let Dynamics { model, ideal, connections, .. } = &self.dynamics;
+        model.n_elastic() > 0 && *ideal && connections.is_free()
     }
 }
 
@@ -65,12 +122,27 @@ impl<S: Scalar> Ode<S> for System<S> {
 
     #[inline]
     fn rhs(&mut self, x: &[S], dxdt: &mut [S]) {
+        self.ready = false;
         self.dynamics.rhs(x, dxdt);
     }
 
     /// Columns by forward accumulation; exact also where S itself carries derivatives.
     fn jacobian(&mut self, x: &[S], jacobian: &mut [S]) {
-        self.tangent.jacobian(x, jacobian);
+        self.ready = false;
+        if self.tangent.leans() {
+            self.dynamics.rhs(x, &mut self.rates);
+        }
+        self.tangent.jacobian(&mut self.dynamics, x, jacobian);
+    }
+
+    fn linearise(&mut self, x: &[S], jacobian: &mut [S], rates: &mut [S]) {
+        self.begin(x, rates);
+        self.tangent.jacobian(&mut self.dynamics, x, jacobian);
+    }
+
+    fn prepare(&mut self, x: &[S], matrix: &mut [S], rates: &mut [S]) {
+        self.begin(x, rates);
+        self.matrix(x, matrix);
     }
 
     /// As df/dx, but with chords from rest in the place of the tangents of friction laws; of a machine with elastic beams and ideal drives,
@@ -79,18 +151,11 @@ impl<S: Scalar> Ode<S> for System<S> {
     /// The tangent of dry friction is flat beyond the transition velocity, so that a step which crosses it would not see the friction
     /// turn around, and could keep a joint creeping for ever; the chord sees it. At rest, and for viscous friction, they are the same.
     fn iteration_matrix(&mut self, x: &[S], matrix: &mut [S]) {
-        let n = self.coordinates();
-        self.resistances.fill(S::zero());
-        for (joint, effect) in &self.dynamics.effects {
-            self.resistances[*joint] += effect.resistance(x[n + joint]);
+        self.ready = false;
+        if self.tangent.leans() {
+            self.dynamics.rhs(x, &mut self.rates);
         }
-        if self.dynamics.model.n_elastic() == 0 || !self.dynamics.ideal || !self.dynamics.connections.is_free() {
-            let (q, v) = x[..2 * n].split_at(n);
-            self.dynamics.seal_chords(q, v, &mut self.seals);
-            self.tangent.chords(x, matrix, &self.resistances, &self.seals);
-        } else {
-            stiff::iteration_matrix(&mut self.dynamics, x, matrix, &self.resistances, &mut self.column);
-        }
+        self.matrix(x, matrix);
     }
 
     /// A hundredth for coordinates, 1 for rates, of the drives what is natural for each.
@@ -104,6 +169,7 @@ impl<S: Scalar> Ode<S> for System<S> {
 
     /// Stiffness and damping of the beams.
     fn elasticity(&mut self, x: &[S], block: &mut [S]) -> bool {
+        self.ready = false;
         let n = self.coordinates();
         if self.dynamics.model.n_elastic() == 0 {
             return false;

@@ -54,8 +54,8 @@ impl<S: Scalar> Dynamics<S> {
         found
     }
 
-    /// Writes the resistances of the seals, N s/m, that stand for their friction in an iteration matrix at (q, v); the lines are moved there.
-    pub(super) fn seal_chords(&mut self, q: &[S], v: &[S], chords: &mut [Option<S>]) {
+    /// Writes the resistances of the seals, N s/m, that stand for their friction in an iteration matrix at (q, v), after [`Dynamics::rhs`] there.
+    pub(super) fn seal_chords(&self, q: &[S], v: &[S], chords: &mut [Option<S>]) {
         let sealed = |actuator: &Actuator<S>| match &actuator.drive {
             Drive::Hydraulic(law) => law.cylinder.seal.is_there(),
             _ => false,
@@ -63,7 +63,6 @@ impl<S: Scalar> Dynamics<S> {
         if self.ideal || !self.actuators.iter().any(sealed) {
             return;
         }
-        self.locate(q, v);
         for (actuator, chord) in self.actuators.iter().zip(chords) {
             if let Drive::Hydraulic(law) = &actuator.drive {
                 let [_, rate] = motion(actuator.on, q, v, &self.data.composite.lines);

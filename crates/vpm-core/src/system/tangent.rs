@@ -1,6 +1,7 @@
 //! The state Jacobian of a machine, by dual numbers.
 
-use super::{Build, Dynamics};
+use super::driven::Driven;
+use super::{Build, Dynamics, add_effects};
 use crate::contact::ContactFriction;
 use crate::effect::JointEffect;
 use crate::scalar::{Dual, Scalar};
@@ -15,6 +16,8 @@ pub(super) enum Tangent<S> {
     Narrow(Lanes<S, 2>),
     /// A machine of many.
     Wide(Lanes<S, 8>),
+    /// One with drives or supplies that have states.
+    Driven(Driven<S>),
 }
 
 /// The machine in dual numbers of `N` directions.
@@ -25,12 +28,61 @@ pub(super) struct Lanes<S, const N: usize> {
     rate: Vec<Dual<S, N>>,
 }
 
+/// What effects and contacts do in a right-hand side.
+pub(super) trait Laws<S: Scalar> {
+    /// Adds the efforts of the effects on the joints at (q, v).
+    fn add(&self, effects: &[(usize, JointEffect<S>)], q: &[S], v: &[S], total: &mut [S]);
+    /// Resistance of a contact's friction at the square of its velocity, under its normal force.
+    fn resistance(&self, law: &ContactFriction<S>, square: S, normal: S) -> S;
+}
+
+/// The laws as they are.
+#[derive(Clone, Copy, Debug)]
+struct Exact;
+
+impl<S: Scalar> Laws<S> for Exact {
+    fn add(&self, effects: &[(usize, JointEffect<S>)], q: &[S], v: &[S], total: &mut [S]) {
+        add_effects(effects, q, v, total);
+    }
+    fn resistance(&self, law: &ContactFriction<S>, square: S, normal: S) -> S {
+        law.resistance(square, normal)
+    }
+}
+
+/// The friction laws of joints replaced by these resistances, and those of contacts by their chords.
+#[derive(Clone, Copy, Debug)]
+struct Chords<'a, S>(&'a [S]);
+
+impl<S: Scalar, const N: usize> Laws<Dual<S, N>> for Chords<'_, S> {
+    fn add(
+        &self,
+        effects: &[(usize, JointEffect<Dual<S, N>>)],
+        q: &[Dual<S, N>],
+        v: &[Dual<S, N>],
+        total: &mut [Dual<S, N>],
+    ) {
+        for (joint, effect) in effects {
+            total[*joint] += effect.effort_at_rest(q[*joint]);
+        }
+        for ((total, &v), &resistance) in total.iter_mut().zip(v).zip(self.0) {
+            *total -= Dual::constant(resistance) * v;
+        }
+    }
+    fn resistance(&self, law: &ContactFriction<Dual<S, N>>, square: Dual<S, N>, normal: Dual<S, N>) -> Dual<S, N> {
+        Dual::constant(law.chord(Dual::constant(square.value)).value) * normal
+    }
+}
+
 impl<S: Scalar> Tangent<S> {
-    pub(super) fn new<E>(theta: &[S], build: impl Build<Error = E>, dim: usize) -> Result<Self, E> {
+    /// For a machine as `dynamics`.
+    pub(super) fn new<E>(theta: &[S], build: impl Build<Error = E>, dynamics: &Dynamics<S>) -> Result<Self, E> {
+        let dim = dynamics.dim();
         Ok(if dim <= NARROW {
             Self::Narrow(Lanes::new(theta, build, dim)?)
-        } else {
+        } else if dynamics.ideal {
             Self::Wide(Lanes::new(theta, build, dim)?)
+        } else {
+            Self::Driven(Driven::new(theta, build, dim)?)
         })
     }
 
@@ -39,46 +91,51 @@ impl<S: Scalar> Tangent<S> {
         match self {
             Self::Narrow(lanes) => lanes.dynamics.inputs[number] = Dual::constant(input),
             Self::Wide(lanes) => lanes.dynamics.inputs[number] = Dual::constant(input),
+            Self::Driven(driven) => driven.dynamics.inputs[number] = Dual::constant(input),
         }
     }
 
-    /// df/dx, row by row.
-    pub(super) fn jacobian(&mut self, x: &[S], matrix: &mut [S]) {
+    /// df/dx, row by row, at the state `x` where `machine` was evaluated last if [`Tangent::leans`].
+    pub(super) fn jacobian(&mut self, machine: &mut Dynamics<S>, x: &[S], matrix: &mut [S]) {
         match self {
-            Self::Narrow(lanes) => lanes.columns(x, matrix, Dynamics::rhs),
-            Self::Wide(lanes) => lanes.columns(x, matrix, Dynamics::rhs),
+            Self::Narrow(lanes) => lanes.columns(x, matrix, &Exact),
+            Self::Wide(lanes) => lanes.columns(x, matrix, &Exact),
+            Self::Driven(driven) => driven.jacobian(machine, x, matrix, &Exact),
         }
     }
 
-    /// df/dx with the friction laws replaced by `resistances` on the joints and by those of the `seals`.
-    pub(super) fn chords(&mut self, x: &[S], matrix: &mut [S], resistances: &[S], seals: &[Option<S>]) {
+    /// df/dx with the friction laws replaced by `resistances` on the joints and by those of the `seals`, likewise.
+    pub(super) fn chords(
+        &mut self,
+        machine: &mut Dynamics<S>,
+        x: &[S],
+        matrix: &mut [S],
+        (resistances, seals): (&[S], &[Option<S>]),
+    ) {
+        let laws = Chords(resistances);
         match self {
-            Self::Narrow(lanes) => lanes.chords(x, matrix, resistances, seals),
-            Self::Wide(lanes) => lanes.chords(x, matrix, resistances, seals),
+            Self::Narrow(lanes) => lanes.chords(x, matrix, laws, seals),
+            Self::Wide(lanes) => lanes.chords(x, matrix, laws, seals),
+            Self::Driven(driven) => {
+                put_seals(&mut driven.dynamics, seals);
+                driven.jacobian(machine, x, matrix, &laws);
+                driven.dynamics.seals.fill(None);
+            }
         }
+    }
+
+    /// Whether the Jacobian needs the machine to be evaluated at the state before.
+    #[inline]
+    pub(super) fn leans(&self) -> bool {
+        matches!(self, Self::Driven(_))
     }
 }
 
-/// The right-hand side with the friction laws of joints replaced by `resistances`, and those of contacts by their chords.
-#[inline]
-fn chords<S: Scalar, const N: usize>(
-    dynamics: &mut Dynamics<Dual<S, N>>,
-    x: &[Dual<S, N>],
-    rate: &mut [Dual<S, N>],
-    resistances: &[S],
-) {
-    let at_rest = |effects: &[(usize, JointEffect<_>)], q: &[_], v: &[_], total: &mut [_]| {
-        for (joint, effect) in effects {
-            total[*joint] += effect.effort_at_rest(q[*joint]);
-        }
-        for ((total, &v), &resistance) in total.iter_mut().zip(v).zip(resistances) {
-            *total -= Dual::constant(resistance) * v;
-        }
-    };
-    let chord = |law: &ContactFriction<Dual<S, N>>, square: Dual<S, N>, normal| {
-        Dual::constant(law.chord(Dual::constant(square.value)).value) * normal
-    };
-    dynamics.rhs_with(x, rate, (at_rest, chord));
+/// Replaces the friction of the seals.
+fn put_seals<S: Scalar, const N: usize>(dynamics: &mut Dynamics<Dual<S, N>>, seals: &[Option<S>]) {
+    for (seal, chord) in dynamics.seals.iter_mut().zip(seals) {
+        *seal = chord.map(Dual::constant);
+    }
 }
 
 impl<S: Scalar, const N: usize> Lanes<S, N> {
@@ -88,29 +145,24 @@ impl<S: Scalar, const N: usize> Lanes<S, N> {
         Ok(Self { dynamics: build.dynamics(&lifted)?, state: zero.clone(), rate: zero })
     }
 
-    fn chords(&mut self, x: &[S], matrix: &mut [S], resistances: &[S], seals: &[Option<S>]) {
-        for (seal, chord) in self.dynamics.seals.iter_mut().zip(seals) {
-            *seal = chord.map(Dual::constant);
-        }
-        self.columns(x, matrix, |d, x, rate| chords(d, x, rate, resistances));
+    fn chords(&mut self, x: &[S], matrix: &mut [S], laws: Chords<'_, S>, seals: &[Option<S>]) {
+        put_seals(&mut self.dynamics, seals);
+        self.columns(x, matrix, &laws);
         self.dynamics.seals.fill(None);
     }
 
-    /// The derivative of `rhs` along each state, `N` at a time, as columns of a matrix stored row by row.
+    /// The derivative of the rates along each state, `N` at a time, as columns of a matrix stored row by row.
     #[inline]
-    fn columns(
-        &mut self,
-        x: &[S],
-        matrix: &mut [S],
-        rhs: impl Fn(&mut Dynamics<Dual<S, N>>, &[Dual<S, N>], &mut [Dual<S, N>]),
-    ) {
+    fn columns(&mut self, x: &[S], matrix: &mut [S], laws: &impl Laws<Dual<S, N>>) {
         let dim = x.len();
         for first in (0..dim).step_by(N) {
             for (column, (state, &value)) in self.state.iter_mut().zip(x).enumerate() {
                 // A column before `first` wraps around to a lane that does not exist, which gives a constant.
                 *state = Dual::variable(value, column.wrapping_sub(first));
             }
-            rhs(&mut self.dynamics, &self.state, &mut self.rate);
+            let add = |effects: &[_], q: &[_], v: &[_], total: &mut [_]| laws.add(effects, q, v, total);
+            let resistance = |law: &_, square, normal| laws.resistance(law, square, normal);
+            self.dynamics.rhs_with(&self.state, &mut self.rate, (add, resistance));
             for (row, rate) in matrix.chunks_exact_mut(dim).zip(&self.rate) {
                 for (entry, &slope) in row[first..].iter_mut().zip(&rate.gradient) {
                     *entry = slope;
