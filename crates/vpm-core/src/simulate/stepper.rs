@@ -197,17 +197,12 @@ impl<'a, S: Scalar> Stepper<'a, S> {
     fn control(&mut self, row: usize, start: usize) -> bool {
         let feels = self.control.as_ref().is_some_and(|control| control.feels(row));
         let stands = feels && self.system.dynamics().stands();
-        if !stands {
-            self.record_motion(row, false);
-        }
         if feels {
             // Forces under the commands that are still held.
             self.system.rhs(&self.state, &mut self.rate);
-            if stands {
-                self.record_motion(row, true);
-            }
             self.record_efforts(row, start);
         }
+        self.record_motion(row, stands);
         let Drive::Loop { references, .. } = self.plan.drive else { return false };
         // What sensors show need not be where the machine is.
         let stands = stands && self.sensors.is_empty();
