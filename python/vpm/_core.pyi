@@ -457,9 +457,7 @@ class Narx:
     def texts(self) -> list[str]:
         """Terms as they are written."""
 
-    def simulate_free_run(
-        self, name: str, output: ArrayLike, inputs: ArrayLike, limit: float
-    ) -> NDArray[np.float64]:
+    def simulate_free_run(self, name: str, output: ArrayLike, inputs: ArrayLike, limit: float) -> NDArray[np.float64]:
         """Output (N,) from the simulated past; raises ``Diverged`` with the samples before."""
 
     def predict_one_step(self, name: str, output: ArrayLike, inputs: ArrayLike) -> NDArray[np.float64]:
@@ -520,9 +518,7 @@ class MaxwellNarx:
         ``trapezoidal``, ``printed`` or ``central_mean``.
     """
 
-    def __new__(
-        cls, k0: ArrayLike, s0: ArrayLike, k1: float, c1: float, step: float, scheme: str
-    ) -> MaxwellNarx: ...
+    def __new__(cls, k0: ArrayLike, s0: ArrayLike, k1: float, c1: float, step: float, scheme: str) -> MaxwellNarx: ...
     def simulate_free_run(
         self, start: Sequence[float], drive: ArrayLike, length: ArrayLike, limit: float
     ) -> NDArray[np.float64]:

@@ -142,5 +142,7 @@ def _count(factors: int, degree: int) -> int:
 def _delays(lags: Lags, name: str, *, least: int) -> list[int]:
     delays = list(range(1, lags + 1)) if isinstance(lags, int) else sorted({int(lag) for lag in lags})
     if delays and delays[0] < least:
-        raise IdentificationError(f"lags of {name} must be {least} or more, got {delays[0]}; the output looks back only")
+        raise IdentificationError(
+            f"lags of {name} must be {least} or more, got {delays[0]}; the output looks back only"
+        )
     return delays

@@ -78,7 +78,9 @@ def series(record: RecordLike, output: str, inputs: Sequence[str], name: str = "
                 f'"{channel}" of record {title} has shape {column.shape}, but "{output}" has {columns[0].size} samples; '
                 "give one number for each sample"
             )
-    table = np.column_stack(columns[1:]) if inputs else np.empty((columns[0].size, 0))
+    table = columns[1][:, None] if len(inputs) == 1 else np.empty((columns[0].size, len(inputs)))
+    for at, column in enumerate(columns[1:] if len(inputs) > 1 else ()):
+        table[:, at] = column
     if isinstance(record, Experiment):
         return Series(title, record.time, record.dt, columns[0], table)
     return Series(title, np.arange(columns[0].size, dtype=np.float64), 1.0, columns[0], table)

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from statistics import NormalDist
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vpm.compare import Correlation, autocorrelation, cross_correlation
+from vpm.compare.correlation import NORMAL_95
 from vpm.results import Result
 
 if TYPE_CHECKING:
@@ -18,13 +20,30 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
+def inside(correlation: Correlation) -> bool:
+    """Whether a correlation is what chance gives.
+
+    At most one lag in ten lies outside the band, where one in twenty is expected; and no single lag is larger than the
+    largest of all lags would be in 19 of 20 independent signals (Bonferroni's inequality).
+
+    Parameters
+    ----------
+    correlation : Correlation
+    """
+    values = np.abs(correlation.values[correlation.lags != 0.0]) if correlation.lags[0] >= 0.0 else correlation.values
+    if values.size == 0:
+        return True
+    largest = correlation.band / NORMAL_95 * NormalDist().inv_cdf(1.0 - 0.025 / values.size)
+    return correlation.outside <= 0.1 and float(np.abs(values).max()) <= largest
+
+
 @dataclass(frozen=True, repr=False, eq=False)
 class ResidualTests(Result):
     """Correlations of a residual with its own past and with the inputs.
 
-    A residual is white where its autocorrelation at all lags but zero lies **inside** the band ``1.96 / sqrt(N)``, up to
-    one lag in twenty; it owes nothing to an input where the cross-correlation lies inside its band. The band of a
-    cross-correlation is wider where both signals vary slowly.
+    A residual is white where its autocorrelation at lags other than zero lies **inside** the band ``1.96 / sqrt(N)``; it
+    owes nothing to an input where the cross-correlation lies inside its band, which is wider where both signals vary
+    slowly. One lag in twenty lies outside by chance.
 
     Attributes
     ----------
@@ -38,13 +57,13 @@ class ResidualTests(Result):
 
     @property
     def white(self) -> bool:
-        """Whether at most one lag in ten of the residual's own lies outside the band (5 % are expected by chance)."""
-        return self.own.outside <= 0.1
+        """Whether the residual does not remember its own past: see `inside`."""
+        return inside(self.own)
 
     @property
     def independent_of_inputs(self) -> bool:
-        """Whether at most one lag in ten lies outside the band for every input."""
-        return all(correlation.outside <= 0.1 for correlation in self.inputs)
+        """Whether the residual owes nothing to any input: see `inside`."""
+        return all(inside(correlation) for correlation in self.inputs)
 
     def _headline(self) -> Mapping[str, object]:
         outside = {name.of: round(name.outside, 4) for name in (self.own, *self.inputs)}
