@@ -1,7 +1,8 @@
-"""Time one step of a NARX model of 20 terms beside others: a plain loop in Python, sysidentpy, Numba and C, those that are there.
+"""Time one step of a NARX model of 20 terms beside others: plain Python, sysidentpy, Numba and C, those that are there.
 
-Every candidate simulates the same free run of the same model from the same start; runs that differ are not timed. The candidates take
-turns, and each line gives the median and the quartiles of all rounds, so that what else the machine does meets all of them.
+Every candidate simulates the same free run of the same model from the same start; runs that differ are not timed. The
+candidates take turns, and each line gives the median and the quartiles of all rounds, so that what else the machine
+does meets all of them.
 """
 
 from __future__ import annotations
@@ -24,10 +25,12 @@ from vpm.narx import Narx
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
 
 Array = NDArray[np.float64]
+Ints = NDArray[np.int32]
 SAMPLES, ROUNDS, LAG = 20_000, 15, 3
 
 GENERIC_C = """
-void run(int n, int terms, const int *degree, const int *signal, const int *delay, const double *theta, const double *u, double *y) {
+void run(int n, int terms, const int *degree, const int *signal, const int *delay, const double *theta,
+         const double *u, double *y) {
     for (int k = %d; k < n; k++) {
         double sum = 0.0;
         for (int i = 0; i < terms; i++) {
@@ -51,7 +54,7 @@ def twenty() -> Narx:
     return Narx.from_terms("y", ["u"], terms, [0.05 / (1 + at) for at in range(len(terms))])
 
 
-def arrays(model: Narx) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int32]]:
+def arrays(model: Narx) -> tuple[Ints, Ints, Ints]:
     """Degree of each term, and signals and lags of its factors."""
     degree = np.array([len(term) for term in model.terms], np.int32)
     signal, delay = np.zeros((20, 3), np.int32), np.zeros((20, 3), np.int32)
@@ -61,7 +64,8 @@ def arrays(model: Narx) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[n
     return degree, signal, delay
 
 
-def loop(n: int, degree: Any, signal: Any, delay: Any, theta: Any, u: Any, y: Any) -> Any:
+def loop(n: int, degree: Ints, signal: Ints, delay: Ints, theta: Array, u: Array, y: Array) -> Array:
+    """The difference equation over a table of terms."""
     for k in range(3, n):
         total = 0.0
         for i in range(theta.size):
@@ -74,7 +78,7 @@ def loop(n: int, degree: Any, signal: Any, delay: Any, theta: Any, u: Any, y: An
     return y
 
 
-def compiled(source: str, folder: Path, name: str) -> Any:
+def compiled(source: str, folder: Path, name: str) -> Callable[..., object] | None:
     """A C function, or None without a compiler."""
     compiler = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
     if compiler is None:
@@ -82,7 +86,8 @@ def compiled(source: str, folder: Path, name: str) -> Any:
     path = folder / f"{name}.c"
     path.write_text(source, encoding="utf-8")
     library = folder / f"{name}.so"
-    subprocess.run([compiler, "-O3", "-march=native", "-shared", "-fPIC", str(path), "-o", str(library)], check=True)
+    command = [compiler, "-O3", "-march=native", "-shared", "-fPIC", str(path), "-o", str(library)]
+    subprocess.run(command, check=True)  # noqa: S603
     return ctypes.CDLL(str(library)).run
 
 
@@ -103,7 +108,7 @@ def pointer(array: NDArray[Any]) -> ctypes.c_void_p:
 def c_candidates(model: Narx, u: Array, folder: Path) -> dict[str, Callable[[], Array]]:
     generic = compiled(GENERIC_C % LAG, folder, "generic")
     written = compiled(unrolled(model), folder, "unrolled")
-    if generic is None:
+    if generic is None or written is None:
         print("no C compiler here")
         return {}
     parts = arrays(model)

@@ -33,7 +33,7 @@ def fitted(y: Array, u: Array, *, lags: int, degree: int, n_terms: int) -> Any:
 
 
 def sysidentpy_terms(y: Array, u: Array, *, lags: int, degree: int, n_terms: int) -> dict[Term, float]:
-    """Its terms as factors (signal, lag), with their coefficients. It writes y[k-d] as 1000 + d and u[k-d] as 2000 + d."""
+    """Its terms as factors (signal, lag), with coefficients: it writes 1000 + d for y[k-d], 2000 + d for u[k-d]."""
     model = fitted(y, u, lags=lags, degree=degree, n_terms=n_terms)
     found = {}
     for code, value in zip(model.final_model, np.asarray(model.theta).ravel(), strict=True):

@@ -1,7 +1,8 @@
-"""NARX models of two public records, where they are at hand: structure from the first half alone, judged on the second."""
+"""NARX models of public records, where they are at hand: structure from one part alone, judged on another."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +17,7 @@ CRANE = DATA / "hydraulic_crane_actuator" / "actuator.csv"
 DAMPER = DATA / "mr_damper_hysteresis"
 ARM = DATA / "daisy_robot_arm" / "robot_arm.csv"
 
-Record = dict[str, ArrayLike]
+Record = Mapping[str, ArrayLike]
 
 
 def read(path: Path) -> Record:

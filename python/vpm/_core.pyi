@@ -502,7 +502,7 @@ def narx_select(
     NDArray[np.float64],
     list[tuple[str, str]],
 ]:
-    """Terms chosen by their error-reduction ratio: terms, coefficients, ratios, values of the criterion, dependent ones."""
+    """Terms chosen by error-reduction ratio: terms, coefficients, ratios, values of the criterion, dependent ones."""
 
 @final
 class MaxwellNarx:

@@ -7,7 +7,7 @@ from typing import Literal
 
 import numpy as np
 
-from vpm import _core
+from vpm._core import narx_candidates, narx_fit, narx_select
 from vpm.errors import IdentificationError
 from vpm.narx.model import Narx
 from vpm.narx.records import RecordLike, as_list, series
@@ -45,8 +45,8 @@ def identify(
 
     Candidates are all products of at most `degree` lagged signals. They are chosen one by one: always the one that
     explains most of the output's energy beyond those before it (orthogonal least squares: S. Chen, S. Billings, W. Luo,
-    Int. J. Control 50, 1989; S. Billings, *Nonlinear System Identification*, 2013, section 3.2). Samples count that have a
-    full past inside their own record.
+    Int. J. Control 50, 1989; S. Billings, *Nonlinear System Identification*, 2013, section 3.2). Samples count that have
+    a full past inside their own record.
 
     Parameters
     ----------
@@ -65,8 +65,8 @@ def identify(
     n_terms : int or "all", optional
         So many terms; ``"all"`` fits every candidate without selection. By default the criterion decides.
     criterion : {"bic", "aic", "unexplained", "free_run_tail"}
-        Least information criterion; or the first model that leaves no more than `value` of the energy unexplained; or the
-        best free run over the last share `value` of each record, which terms and coefficients have not seen then.
+        Least information criterion; or the first model that leaves no more than `value` of the energy unexplained; or
+        the best free run over the last share `value` of each record, which terms and coefficients have not seen then.
     value : float, optional
         1e-6 for ``"unexplained"``, 0.3 for ``"free_run_tail"``.
     max_terms : int
@@ -95,9 +95,9 @@ def identify(
     most = n_terms if isinstance(n_terms, int) else max_terms
     try:
         if n_terms == "all":
-            theta = _core.narx_fit(signals, pool, triples)
+            theta = narx_fit(signals, pool, triples)
             return Narx(output, tuple(inputs), _frozen(pool), theta, np.full(theta.size, np.nan), limit)
-        terms, theta, ratios, values, dependent = _core.narx_select(signals, pool, triples, most, stop, number)
+        terms, theta, ratios, values, dependent = narx_select(signals, pool, triples, most, stop, number)
     except (ValueError, OverflowError) as error:
         raise IdentificationError(str(error)) from error
     notes = [f"{name} cannot be told from the chosen terms once {by} is among them." for name, by in dependent]
@@ -127,10 +127,10 @@ def _pool(
     count = _count(sum(len(delays) for _, delays in lags), degree)
     if count > MOST_CANDIDATES:
         raise IdentificationError(
-            f"these lags and degree {degree} give {count} candidates, and at most {MOST_CANDIDATES} are formed; take fewer "
-            "lags or a lower degree"
+            f"these lags and degree {degree} give {count} candidates, and at most {MOST_CANDIDATES} are formed; take "
+            "fewer lags or a lower degree"
         )
-    return _core.narx_candidates(lags, degree, constant)
+    return narx_candidates(lags, degree, constant)
 
 
 def _count(factors: int, degree: int) -> int:

@@ -10,7 +10,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vpm import _core
+from vpm._core import Diverged
+from vpm._core import MaxwellNarx as Compiled
 from vpm.errors import DivergedError, IdentificationError, SimulationError
 from vpm.results import Result
 
@@ -37,8 +38,8 @@ class MaxwellNarx(Result):
     step : float
         Time between samples, s.
     scheme : {"trapezoidal", "printed", "central_mean"}
-        Of second order; the printed equations 5.49 to 5.52, of first order with two interleaved sequences; their repair,
-        of second order.
+        Of second order; the printed equations 5.49 to 5.52, of first order with two interleaved sequences; their
+        repair, of second order.
     """
 
     k0: Array
@@ -60,9 +61,9 @@ class MaxwellNarx(Result):
         _ = self._compiled
 
     @cached_property
-    def _compiled(self) -> _core.MaxwellNarx:
+    def _compiled(self) -> Compiled:
         try:
-            return _core.MaxwellNarx(self.k0, self.s0, self.k1, self.c1, self.step, self.scheme)
+            return Compiled(self.k0, self.s0, self.k1, self.c1, self.step, self.scheme)
         except ValueError as error:
             raise IdentificationError(str(error)) from error
 
@@ -103,7 +104,7 @@ class MaxwellNarx(Result):
         u = np.zeros(s.shape) if drive is None else np.asarray(drive, dtype=np.float64)
         try:
             return self._compiled.simulate_free_run(list(start), u, s, limit)
-        except _core.Diverged as error:
+        except Diverged as error:
             raise DivergedError(str(error), run=error.outputs, time=error.sample_index * self.step) from error
         except (ValueError, TypeError) as error:
             raise SimulationError(str(error)) from error

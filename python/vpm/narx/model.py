@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from vpm import _core
+from vpm._core import Diverged, NarxStepper
+from vpm._core import Narx as Compiled
 from vpm.errors import DivergedError, IdentificationError, SimulationError
 from vpm.experiment import Experiment
 from vpm.narx.records import RecordLike, Series, series
@@ -35,8 +36,8 @@ class Narx(Result):
         Factors of each term: signal (0 is the output, then the inputs) and lag; a term without factors is the constant.
     coefficients : ndarray, shape (P,)
     error_reduction : ndarray, shape (P,)
-        Share of the output's energy in training that each term explains beyond those before it; NaN where terms were not
-        selected.
+        Share of the output's energy in training that each term explains beyond those before it; NaN where terms were
+        not selected.
     limit : float
         A free run beyond this magnitude counts as diverged.
     notes : tuple of str
@@ -90,10 +91,10 @@ class Narx(Result):
         return cls(output, tuple(inputs), listed, theta, np.full(theta.size, np.nan))
 
     @cached_property
-    def _compiled(self) -> _core.Narx:
+    def _compiled(self) -> Compiled:
         listed = [list(term) for term in self.terms]
         try:
-            return _core.Narx([self.output, *self.inputs], listed, self.coefficients)
+            return Compiled([self.output, *self.inputs], listed, self.coefficients)
         except (ValueError, OverflowError) as error:
             raise IdentificationError(str(error)) from error
 
@@ -160,7 +161,7 @@ class Narx(Result):
         bound = self.limit if limit is None else limit
         try:
             values = self._compiled.simulate_free_run(given.name, given.output, given.inputs, bound)
-        except _core.Diverged as error:
+        except Diverged as error:
             at = error.sample_index
             cut = Series(given.name, given.time[:at], given.dt, given.output[:at], given.inputs[:at])
             partial = self._run("free run", cut, error.outputs, record)
@@ -169,7 +170,7 @@ class Narx(Result):
             raise SimulationError(str(error)) from error
         return self._run("free run", given, values, record)
 
-    def stepper(self) -> _core.NarxStepper:
+    def stepper(self) -> NarxStepper:
         """Simulation that is fed sample by sample: ``start(output, inputs)``, then ``step(inputs)``.
 
         Returns

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TypeAlias, TypeVar
+from typing import TypeAlias, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,8 +16,6 @@ Array = NDArray[np.float64]
 
 #: A log, or arrays by name, which have no clock: their time counts samples.
 RecordLike: TypeAlias = "Experiment | Mapping[str, ArrayLike]"
-
-AnyRecord = TypeVar("AnyRecord", Experiment, Mapping[str, ArrayLike])
 
 
 @dataclass(frozen=True)
@@ -75,8 +73,8 @@ def series(record: RecordLike, output: str, inputs: Sequence[str], name: str = "
     for channel, column in zip(names, columns, strict=True):
         if column.shape != (columns[0].size,):
             raise IdentificationError(
-                f'"{channel}" of record {title} has shape {column.shape}, but "{output}" has {columns[0].size} samples; '
-                "give one number for each sample"
+                f'"{channel}" of record {title} has shape {column.shape}, but "{output}" has {columns[0].size} '
+                "samples; give one number for each sample"
             )
     table = columns[1][:, None] if len(inputs) == 1 else np.empty((columns[0].size, len(inputs)))
     for at, column in enumerate(columns[1:] if len(inputs) > 1 else ()):
@@ -91,7 +89,17 @@ def as_list(records: RecordLike | Sequence[RecordLike]) -> list[RecordLike]:
     return [records] if isinstance(records, Experiment | Mapping) else list(records)
 
 
-def split_in_time(record: AnyRecord, share: float, overlap: int = 0) -> tuple[AnyRecord, AnyRecord]:
+@overload
+def split_in_time(record: Experiment, share: float, overlap: int = 0) -> tuple[Experiment, Experiment]: ...
+
+
+@overload
+def split_in_time(
+    record: Mapping[str, ArrayLike], share: float, overlap: int = 0
+) -> tuple[Mapping[str, ArrayLike], Mapping[str, ArrayLike]]: ...
+
+
+def split_in_time(record: RecordLike, share: float, overlap: int = 0) -> tuple[RecordLike, RecordLike]:
     """Split a record into a first and a last part.
 
     Neighbouring samples of a motion are almost the same sample, so that parts are contiguous in time and never drawn at
@@ -118,8 +126,8 @@ def split_in_time(record: AnyRecord, share: float, overlap: int = 0) -> tuple[An
     at = round(share * length)
     if not 0 < at < length or not 0 <= overlap <= at:
         raise IdentificationError(
-            f"a share of {share:g} of {length} samples with {overlap} repeated leaves no two parts; give a share between "
-            "0 and 1 and repeat no more than the first part has"
+            f"a share of {share:g} of {length} samples with {overlap} repeated leaves no two parts; give a share "
+            "between 0 and 1 and repeat no more than the first part has"
         )
     if isinstance(record, Experiment):
         first, last = slice(0, at), slice(at - overlap, length)

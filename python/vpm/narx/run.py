@@ -41,9 +41,9 @@ def inside(correlation: Correlation) -> bool:
 class ResidualTests(Result):
     """Correlations of a residual with its own past and with the inputs.
 
-    A residual is white where its autocorrelation at lags other than zero lies **inside** the band ``1.96 / sqrt(N)``; it
-    owes nothing to an input where the cross-correlation lies inside its band, which is wider where both signals vary
-    slowly. One lag in twenty lies outside by chance.
+    A residual is white where its autocorrelation at lags other than zero lies **inside** the band ``1.96 / sqrt(N)``;
+    it owes nothing to an input where the cross-correlation lies inside its band, which is wider where both signals
+    vary slowly. One lag in twenty lies outside by chance.
 
     Attributes
     ----------

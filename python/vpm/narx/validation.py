@@ -77,17 +77,25 @@ def validate(model: Narx, records: RecordLike | Sequence[RecordLike]) -> NarxVal
     SimulationError
         A record does not fit the model.
     """
-    rows, notes = [], []
+    names: list[str] = []
+    samples: list[int] = []
+    predictions: list[tuple[float, float]] = []
+    runs: list[tuple[float, float, float]] = []
+    notes: list[str] = []
     for record in as_list(records):
         predicted = model.predict_one_step(record)
         try:
             free = model.simulate_free_run(record)
-            run = (free.rmse, free.fit, free.max_error)
+            runs.append((free.rmse, free.fit, free.max_error))
         except DivergedError as error:
             notes.append(error.message)
-            run = (float("inf"), float("-inf"), float("inf"))
-        rows.append((predicted.record, predicted.residual.size, predicted.rmse, run[0], predicted.fit, *run[1:]))
-    if not rows:
+            runs.append((float("inf"), float("-inf"), float("inf")))
+        names.append(predicted.record)
+        samples.append(predicted.residual.size)
+        predictions.append((predicted.rmse, predicted.fit))
+    if not names:
         raise IdentificationError("there is no record; give one at least")
-    columns = list(zip(*rows, strict=True))
-    return NarxValidation(*columns, tuple(notes))  # type: ignore[arg-type]
+    prediction_rmse, prediction_fit = zip(*predictions, strict=True)
+    rmse, fit, largest = zip(*runs, strict=True)
+    errors = prediction_rmse, rmse, prediction_fit, fit, largest
+    return NarxValidation(tuple(names), tuple(samples), *errors, tuple(notes))
