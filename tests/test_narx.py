@@ -163,6 +163,11 @@ def with_sample(value: float) -> dict[str, ArrayLike]:
         (noisy(1), {"input_lags": {"v": 2}}, 'names "v"'),
         (noisy(1), {"degree": 0}, "degree must be 1 or more"),
         (noisy(1), {"degree": 9, "output_lags": 20}, "candidates, and at most"),
+        (
+            {"y": np.ones(20_000), "u": np.ones(20_000)},
+            {"degree": 6, "output_lags": 8},
+            "8008 candidates over 20000 samples take 1.6e\\+08 numbers",
+        ),
         (noisy(1), {"n_terms": 0}, "none is allowed"),
         (noisy(1), {"n_terms": -1}, "negative"),
         (noisy(1), {"criterion": "magic"}, "choices are terms, unexplained, bic"),

@@ -21,8 +21,11 @@ DEFAULTS = {"bic": 0.0, "aic": 0.0, "unexplained": 1e-6, "free_run_tail": 0.3}
 #: A free run beyond so many times the largest measured output counts as diverged.
 FAR = 1e3
 
-#: Most candidates that are formed: each is a column as long as the records.
+#: Most candidates that are formed.
 MOST_CANDIDATES = 20_000
+
+#: Most numbers in the columns of all candidates, of which two copies are held: 2 GB.
+MOST_NUMBERS = 125_000_000
 
 Lags = int | Sequence[int]
 
@@ -44,9 +47,9 @@ def identify(
     """Choose the terms of a NARX model by their error-reduction ratio and fit their coefficients.
 
     Candidates are all products of at most `degree` lagged signals. They are chosen one by one: always the one that
-    explains most of the output's energy beyond those before it (orthogonal least squares: S. Chen, S. Billings, W. Luo,
-    Int. J. Control 50, 1989; S. Billings, *Nonlinear System Identification*, 2013, section 3.2). Samples count that have
-    a full past inside their own record.
+    explains most of the output's energy beyond those before it (orthogonal least squares: S. Chen, S. Billings and
+    W. Luo, Int. J. Control 50, 1989; S. Billings, *Nonlinear System Identification*, 2013, section 3.2). Samples count
+    that have a full past inside their own record.
 
     Parameters
     ----------
@@ -87,6 +90,12 @@ def identify(
     if not given:
         raise IdentificationError("there is no record; give one at least")
     pool = _pool(signals, output_lags, input_lags, degree, constant=constant)
+    samples = sum(one.time.size for one in given)
+    if len(pool) * samples > MOST_NUMBERS:
+        raise IdentificationError(
+            f"{len(pool)} candidates over {samples} samples take {len(pool) * samples:.2g} numbers, and at most "
+            f"{MOST_NUMBERS:.2g} are held; take fewer lags, a lower degree or fewer samples"
+        )
     triples = [(one.name, one.output, one.inputs) for one in given]
     largest = max(float(np.abs(one.output).max(initial=0.0)) for one in given)
     limit = FAR * largest if largest > 0.0 else float("inf")
