@@ -168,6 +168,8 @@ def with_sample(value: float) -> dict[str, ArrayLike]:
             {"degree": 6, "output_lags": 8},
             "8008 candidates over 20000 samples take 1.6e\\+08 numbers",
         ),
+        (noisy(1), {"criterion": "free_run_tail", "value": 1.5}, "free-run tail must lie between 0 and 1, got 1.5"),
+        (noisy(1), {"criterion": "free_run_tail", "value": 0.999}, "has 600 samples, but a model that looks back 2"),
         (noisy(1), {"n_terms": 0}, "none is allowed"),
         (noisy(1), {"n_terms": -1}, "negative"),
         (noisy(1), {"criterion": "magic"}, "choices are terms, unexplained, bic"),
@@ -198,6 +200,14 @@ def test_runs_refuse_records_that_do_not_fit() -> None:
         Narx.from_terms("y", ["u"], [((0, 0),)], [1.0])
     with pytest.raises(IdentificationError, match="are 2, but the model has 1 terms"):
         Narx.from_terms("y", ["u"], [((0, 1),)], [1.0, 2.0])
+
+
+def test_steppers_refuse_other_counts_of_inputs() -> None:
+    stepper = quadratic().stepper()
+    with pytest.raises(ValueError, match="has 2 numbers, but the model has 1 inputs"):
+        stepper.step(np.zeros(2))
+    with pytest.raises(ValueError, match="looks back 2 samples with 1 inputs"):
+        stepper.start(np.zeros(3), np.zeros((3, 1)))
 
 
 def test_splits_are_contiguous() -> None:

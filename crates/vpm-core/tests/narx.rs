@@ -89,6 +89,8 @@ fn steps_are_the_free_run_and_allocate_nothing() -> Result<()> {
         });
         assert!(same);
         assert_eq!(counted.count_total, 0);
+        // Beyond one lap of the buffer, a missing input is zero and not what stood there before.
+        assert_eq!(stepper.clone().step(&[]), stepper.clone().step(&[0.0]));
         stepper.start(&vec![0.0; lag], &inputs[..lag])?;
         let record = Record { name: "r", output: &run, inputs: &inputs };
         let predicted = model.predict_one_step(&record)?;

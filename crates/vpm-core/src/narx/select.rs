@@ -4,7 +4,7 @@ use super::design::{DEPENDENT, Design, dot, norm, solve};
 use super::model::Narx;
 use super::record::Record;
 use super::structure::Structure;
-use crate::error::{NarxError, Result};
+use crate::error::{Error, NarxError, Result};
 
 /// What ends the selection. All of them look at training data only.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -74,11 +74,15 @@ fn best(criterion: &[f64], stop: Stop) -> usize {
 /// Splits every record in time, selects on the first parts, counts terms by free runs over the last parts.
 fn by_free_run(pool: &Structure, records: &[Record<'_>], most: usize, share: f64) -> Result<Selection> {
     let (inputs, lag) = (pool.inputs(), pool.longest_lag());
+    if !(share > 0.0 && share < 1.0) {
+        let (condition, repair) = ("lie between 0 and 1".to_owned(), "give the part of each record that is held out");
+        return Err(Error::Setting { setting: "the share of the free-run tail", condition, value: share, repair });
+    }
     let cut = |record: &Record<'_>| ((1.0 - share) * record.samples() as f64) as usize;
     for record in records {
         record.check(pool, record.samples())?;
         let (least, samples) = (2 * lag + 2, record.samples());
-        if !(share > 0.0 && share < 1.0) || cut(record) <= lag || cut(record) >= samples {
+        if cut(record) <= lag || cut(record) >= samples {
             return Err(NarxError::Short { record: record.name.to_owned(), samples, lag, least }.into());
         }
     }

@@ -51,14 +51,15 @@ impl Stepper {
         Ok(())
     }
 
+    /// How many inputs a step takes.
+    pub fn inputs(&self) -> usize {
+        self.program.stride - 1
+    }
+
     /// The output of this sample from its inputs and the **simulated** past; numbers missing in `inputs` count as zero.
     #[inline]
     pub fn step(&mut self, inputs: &[f64]) -> f64 {
-        let row = self.from + self.longest * self.program.stride;
-        for (place, value) in self.buffer[row + 1..row + self.program.stride].iter_mut().zip(inputs) {
-            *place = *value;
-        }
-        let value = self.program.evaluate(&self.buffer, self.from);
+        let (row, value) = self.present(inputs);
         self.buffer[row] = value;
         self.advance();
         value
@@ -67,14 +68,20 @@ impl Stepper {
     /// As [`step`](Self::step), but the past of the next samples is what was **measured** here.
     #[inline]
     pub fn step_measured(&mut self, inputs: &[f64], measured: f64) -> f64 {
-        let row = self.from + self.longest * self.program.stride;
-        for (place, value) in self.buffer[row + 1..row + self.program.stride].iter_mut().zip(inputs) {
-            *place = *value;
-        }
-        let value = self.program.evaluate(&self.buffer, self.from);
+        let (row, value) = self.present(inputs);
         self.buffer[row] = measured;
         self.advance();
         value
+    }
+
+    /// Takes the inputs of this sample: where its row begins, and the output that the model gives for it.
+    #[inline]
+    fn present(&mut self, inputs: &[f64]) -> (usize, f64) {
+        let row = self.from + self.longest * self.program.stride;
+        for (at, place) in self.buffer[row + 1..row + self.program.stride].iter_mut().enumerate() {
+            *place = inputs.get(at).copied().unwrap_or(0.0);
+        }
+        (row, self.program.evaluate(&self.buffer, self.from))
     }
 
     #[inline]

@@ -180,7 +180,14 @@ impl NarxStepper {
     /// Output of this sample from its inputs (m,).
     fn step(&self, inputs: &Any<'_>) -> PyResult<f64> {
         let inputs = Vector::new("inputs", inputs)?;
-        Ok(self.stepper()?.step(inputs.values()?))
+        let (mut stepper, inputs) = (self.stepper()?, inputs.values()?);
+        if inputs.len() != stepper.inputs() {
+            let (found, needed) = (inputs.len(), stepper.inputs());
+            let text =
+                format!("`inputs` has {found} numbers, but the model has {needed} inputs; give one number for each");
+            return Err(PyValueError::new_err(text));
+        }
+        Ok(stepper.step(inputs))
     }
 }
 
