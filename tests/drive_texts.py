@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+from model_texts import TWO_LINKS
+
 ROOT = Path(__file__).resolve().parent.parent
 RIG = (ROOT / "examples" / "servo_cylinder" / "rig.toml").read_text(encoding="utf-8")
 
@@ -28,53 +30,31 @@ torque_constant = { value = 50.0, unit = "N mm/A", uncertainty = 5.0 }
 gear_ratio = 20.0
 """
 
-SPRUNG = """
+SPRUNG = f"""
 name = "sprung leg"
 gravity = [0.0, 0.0, -9.81]
 
-[bodies.thigh]
-mass = 8.0
-center_of_mass = [0.0, 0.0, -0.2]
-inertia = [0.1, 0.1, 0.01, 0.0, 0.0, 0.0]
-
-[bodies.shank]
-mass = 4.0
-center_of_mass = [0.0, 0.0, -0.2]
-inertia = [0.05, 0.05, 0.01, 0.0, 0.0, 0.0]
-
-[joints.hip]
-type = "revolute"
-parent = "world"
-child = "thigh"
-axis = [0.0, 1.0, 0.0]
-
-[joints.knee]
-type = "revolute"
-parent = "thigh"
-child = "shank"
-axis = [0.0, 1.0, 0.0]
-translation = [0.0, 0.0, -0.4]
-
+{TWO_LINKS}
 [lines.hip_strut]
-from = { parent = "world", point = [0.1, 0.0, 0.0] }
-to = { parent = "thigh", point = [0.05, 0.0, -0.3] }
+from = {{ parent = "world", point = [0.1, 0.0, 0.0] }}
+to = {{ parent = "thigh", point = [0.05, 0.0, -0.3] }}
 
 [lines.knee_strut]
-from = { parent = "thigh", point = [0.05, 0.0, -0.1] }
-to = { parent = "shank", point = [0.05, 0.0, -0.1] }
+from = {{ parent = "thigh", point = [0.05, 0.0, -0.1] }}
+to = {{ parent = "shank", point = [0.05, 0.0, -0.1] }}
 
 [actuators.hip_drive]
 type = "spring_damper"
 line = "hip_strut"
-stiffness = { value = 83.0, unit = "kN/m" }
-free_length = { value = 300.0, unit = "mm" }
-damping = { value = 3.3, unit = "kN s/m" }
+stiffness = {{ value = 83.0, unit = "kN/m" }}
+free_length = {{ value = 300.0, unit = "mm" }}
+damping = {{ value = 3.3, unit = "kN s/m" }}
 
 [actuators.knee_drive]
 type = "maxwell"
 line = "knee_strut"
-stiffness = { value = 44.0, unit = "kN/m" }
-free_length = { value = 420.0, unit = "mm" }
-fast_stiffness = { value = 20.0, unit = "kN/m" }
-relaxation_time = { value = 4.0, unit = "ms" }
+stiffness = {{ value = 44.0, unit = "kN/m" }}
+free_length = {{ value = 420.0, unit = "mm" }}
+fast_stiffness = {{ value = 20.0, unit = "kN/m" }}
+relaxation_time = {{ value = 4.0, unit = "ms" }}
 """

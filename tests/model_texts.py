@@ -5,6 +5,32 @@ from typing import Any
 
 from vpm.model import Model
 
+#: Thigh and shank of a leg that hangs from the world: bodies and joints of a model text.
+TWO_LINKS = """\
+[bodies.thigh]
+mass = 8.0
+center_of_mass = [0.0, 0.0, -0.2]
+inertia = [0.1, 0.1, 0.01, 0.0, 0.0, 0.0]
+
+[bodies.shank]
+mass = 4.0
+center_of_mass = [0.0, 0.0, -0.2]
+inertia = [0.05, 0.05, 0.01, 0.0, 0.0, 0.0]
+
+[joints.hip]
+type = "revolute"
+parent = "world"
+child = "thigh"
+axis = [0.0, 1.0, 0.0]
+
+[joints.knee]
+type = "revolute"
+parent = "thigh"
+child = "shank"
+axis = [0.0, 1.0, 0.0]
+translation = [0.0, 0.0, -0.4]
+"""
+
 
 def changed(text: str, *changes: tuple[str, str]) -> Model:
     """Model of a file in which each old text, which has to be there, stands once replaced by a new one."""

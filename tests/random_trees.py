@@ -44,10 +44,10 @@ def trees(draw: st.DrawFn) -> dict[str, Any]:
 @st.composite
 def joint_tables(draw: st.DrawFn, *, fixed: bool) -> dict[str, Any]:
     """A joint of any type; of one that moves, unless `fixed` ones are allowed."""
-    moving = ["prismatic", "revolute", "helical", "cylindrical", "planar", "spherical"]
+    moving = ["prismatic", "revolute", "helical", "cylindrical", "planar", "spherical", "free"]
     kind = draw(st.sampled_from([*moving, "fixed"] if fixed else moving))
     table: dict[str, Any] = {"type": kind}
-    if kind not in {"spherical", "fixed"}:
+    if kind not in {"spherical", "free", "fixed"}:
         axis = np.array(draw(st.tuples(*[st.floats(-1.0, 1.0)] * 3).filter(lambda a: math.hypot(*a) > 0.1)))
         table["axis"] = (axis / np.linalg.norm(axis)).tolist()
     if kind == "helical":

@@ -115,6 +115,19 @@ def test_a_block_comes_to_rest_on_its_foot(block: Model) -> None:
     assert abs(sim["x.velocity"]) < 0.02
 
 
+def test_steps_of_controlled_error_meet_the_ground() -> None:
+    """Without losses the block comes back to where it fell from, though a sample is longer than the impact."""
+    smooth = changed(BLOCK, ("damping = { value = 1,", "damping = { value = 0,"), ("friction = {", "# friction = {"))
+    height, energy = 0.05, 2.0 * G * 0.05
+    sim = vpm.Simulation(smooth, 5e-3, integrator="adaptive(1e-8)", state={"z.position": height})
+    run = sim.run(np.zeros((200, 0)))
+    assert np.sum(run["foot.normal_force"] > 0.0) < 5  # hardly a sample sees the ground
+    potential = 2.0 * G * run["z.position"] + 0.5 * 2.0 * run["z.velocity"] ** 2
+    free = run["foot.depth"] < 0.0
+    assert np.sum(np.diff(np.sign(run["z.velocity"])) > 0) >= 4  # bounces
+    assert potential[free] == pytest.approx(np.full(np.sum(free), energy), rel=1e-5)
+
+
 def test_an_open_contact_is_not_seen_and_a_closed_one_is(block: Model) -> None:
     vpm.Simulation(block, 1e-2, integrator="rk4", state={"z.position": 0.1})
     with pytest.raises(SimulationError, match=r"a step of .* is too large for rk4: the mode that moves `z` most"):

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 import two_link_arm
 from drive_texts import RIG
-from model_texts import changed, described
+from model_texts import TWO_LINKS, changed, described
 from vpm.errors import ModelError, SimulationError
 from vpm.experiment import Experiment
 from vpm.model import Model
@@ -44,45 +44,23 @@ proportional = { value = 5.0, unit = "V/m" }
 derivative = { value = 0.6, unit = "V s/m" }
 """
 
-LEG = """
+LEG = f"""
 name = "leg"
 gravity = [0.0, 0.0, -9.81]
 
-[bodies.thigh]
-mass = 8.0
-center_of_mass = [0.0, 0.0, -0.2]
-inertia = [0.1, 0.1, 0.01, 0.0, 0.0, 0.0]
-
-[bodies.shank]
-mass = 4.0
-center_of_mass = [0.0, 0.0, -0.2]
-inertia = [0.05, 0.05, 0.01, 0.0, 0.0, 0.0]
-
-[joints.hip]
-type = "revolute"
-parent = "world"
-child = "thigh"
-axis = [0.0, 1.0, 0.0]
-
-[joints.knee]
-type = "revolute"
-parent = "thigh"
-child = "shank"
-axis = [0.0, 1.0, 0.0]
-translation = [0.0, 0.0, -0.4]
-
+{TWO_LINKS}
 [lines.cylinder]
-from = { parent = "thigh", point = [0.05, 0.0, -0.1] }
-to = { parent = "shank", point = [0.05, 0.0, -0.1] }
+from = {{ parent = "thigh", point = [0.05, 0.0, -0.1] }}
+to = {{ parent = "shank", point = [0.05, 0.0, -0.1] }}
 
 [actuators.motor]
 joint = "hip"
-gain = { value = 50.0, unit = "N m/A" }
+gain = {{ value = 50.0, unit = "N m/A" }}
 command_unit = "A"
 
 [actuators.valve]
 line = "cylinder"
-gain = { value = 2.0, unit = "kN/V" }
+gain = {{ value = 2.0, unit = "kN/V" }}
 command_unit = "V"
 
 [controllers.hip_pd]
@@ -90,18 +68,18 @@ type = "pd"
 actuator = "motor"
 measures = "hip.position"
 proportional = 3.0
-derivative = { value = 0.2, unit = "A s/rad" }
+derivative = {{ value = 0.2, unit = "A s/rad" }}
 limit = 5.0
 
 [controllers.knee_force]
 type = "force_loop"
 actuator = "valve"
 measures = "knee.position"
-proportional = { value = 150.0, unit = "N m/rad" }
-derivative = { value = 6.0, unit = "N m s/rad" }
-force_gain = { value = 0.2, unit = "mV/N" }
-velocity_gain = { value = 0.5, unit = "V s/m" }
-limit = { value = 8.0, unit = "V" }
+proportional = {{ value = 150.0, unit = "N m/rad" }}
+derivative = {{ value = 6.0, unit = "N m s/rad" }}
+force_gain = {{ value = 0.2, unit = "mV/N" }}
+velocity_gain = {{ value = 0.5, unit = "V s/m" }}
+limit = {{ value = 8.0, unit = "V" }}
 sample_time = 0.002
 delay = 0.0015
 """

@@ -48,6 +48,22 @@ to = { parent = "mast", at = 0.3 }
 """
 
 
+KNEE_LOOP = """
+[actuators.knee_motor]
+joint = "knee"
+gain = { value = 1.0, unit = "N m/V" }
+command_unit = "V"
+
+[controllers.knee_loop]
+type = "pid"
+actuator = "knee_motor"
+measures = "knee.position"
+proportional = 400.0
+integral = 2000.0
+derivative = 10.0
+"""
+
+
 def motor(*changes: tuple[str, str], effects: str = "") -> Model:
     return changed(MOTOR + effects, *changes)
 
@@ -235,3 +251,15 @@ def test_a_cylinder_lifts_a_flexible_boom() -> None:
         assert run["servo.force"][-1] * (lengths[0] - lengths[1]) / 2e-4 == pytest.approx(
             holding, rel=1e-3 if model is rigid else 1e-2
         )
+
+
+def test_a_closed_loop_needs_no_controller_for_a_spring() -> None:
+    """The hip hangs on its spring, a motor holds the knee; the loop is closed."""
+    text = SPRUNG[: SPRUNG.index("[actuators.knee_drive]")] + KNEE_LOOP
+    model = Model.from_toml(text)
+    time = 1e-3 * np.arange(3000)
+    record = Experiment.from_arrays(time, {"knee_motor.reference": np.full(3000, 0.3)}, model=model)
+    run = simulate(model, record, "closed_loop")
+    assert run["knee.position"][-1] == pytest.approx(0.3, abs=0.02)
+    spring = 83e3 * (0.3 - run["hip_strut.length"]) - 3.3e3 * run["hip_strut.rate"]
+    assert run["hip_drive.force"] == pytest.approx(spring, rel=1e-9)

@@ -25,7 +25,7 @@ from hydraulic_reference import (
 )
 from model_texts import changed
 from vpm.batch import Trial, simulate_batch
-from vpm.errors import DiagnosisError, ExperimentError, SimulationError
+from vpm.errors import DiagnosisError, DivergedError, ExperimentError, SimulationError
 from vpm.experiment import Experiment
 from vpm.identify import identify
 from vpm.model import Model
@@ -181,6 +181,21 @@ def test_a_fit_finds_bulk_modulus_and_gain_of_the_valve(rig: Model, mode: str) -
     assert not fit.at_bounds
 
 
+def test_impacts_and_voids_need_no_choice_of_an_integrator(rig: Model) -> None:
+    """Full current against both ends and back: by default a run steps so that it goes on correctly."""
+    time = 1e-3 * np.arange(400)
+    record = held(rig, 1e-3, np.where((time < 0.15) | ((time >= 0.16) & (time < 0.17)), 10e-3, -10e-3))
+    run, exact = simulate(rig, record), simulate(rig, record, integrator="adaptive(1e-9)")
+    assert run.settings["integrator"] == "adaptive"
+    assert np.max(np.abs(run["axis.position"] - exact["axis.position"])) < 1e-8
+    assert min(run["servo.pressure_a"].min(), run["servo.pressure_b"].min()) == 2000.0
+    assert run["axis.position"][-1] == pytest.approx(-0.04 - STALL_IN / 5e8, abs=1e-7)
+    assert vpm.Simulation(rig, 1e-3).run(np.zeros((2, 1))).settings["integrator"] == "adaptive"
+    assert vpm.budget(rig, steps=1000).integrator == "guarded"
+    with pytest.raises(DivergedError, match=r"is .* m beyond the end of its stroke, .* use the"):
+        simulate(rig, record, integrator="rosenbrock")
+
+
 def test_measured_pressures_are_the_start(rig: Model) -> None:
     zeros = np.zeros(50)
     pressures = {"servo__pressure_a": zeros + 5e6, "servo__pressure_b": zeros + 7e6}
@@ -200,7 +215,7 @@ def test_a_piston_outside_of_its_stroke_is_refused(rig: Model) -> None:
     ):
         with pytest.raises(SimulationError) as caught:
             start()
-        for part in ("servo", "axis", "starts 0.0", "-0.04 m and 0.04 m", "retracted_length"):
+        for part in ("servo", "axis", "starts 0.05", "-0.040000 m and 0.040000 m", "retracted_length"):
             assert part in str(caught.value)
 
 

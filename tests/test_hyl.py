@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import runpy
 import tomllib
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -50,7 +52,7 @@ def test_the_witness_falls_as_the_reference() -> None:
     peaks, heights = [], []
     for gain in (150.0, 300.0):
         leg = Leg(proportional=gain)
-        seen = leg.observe(leg.simulate(times, 1e-8), times)
+        seen = leg.observe(leg.simulate(times, 1e-6), times)
         peaks.append(seen["normal_force"].max())
         heights.append(seen["height"][-4:])
         lost = seen["impulse"][-1] - MASS * GRAVITY * times[-1] - seen["momentum"][-1]
@@ -76,6 +78,7 @@ def test_forces_beside_soft_joints_take_energy_from_nowhere_and_torques_and_spri
     drives: tuple[Drive, ...] = ("pistons", "torques", "springs")
     for drive in drives:
         poles = Leg(drive=drive, bushings=STIFF).poles()
+        poles = poles[poles.imag > 1.0]  # those that oscillate
         damping = -poles.real / np.abs(poles)
         worst[drive] = damping.min()
         if drive == "pistons":
@@ -156,7 +159,7 @@ def test_controllers_of_a_robot_change_the_drop_a_little() -> None:
     assert np.abs(heights - REFERENCE["hyl.drop.hip_height"]["value"][:4]).max() == pytest.approx(5.6e-4, abs=5e-5)
 
 
-@pytest.mark.parametrize("name", ["static", "quasi_static", "drop", "hydraulic_drop"])
+@pytest.mark.parametrize("name", ["static", "drop", "hydraulic_drop"])
 def test_every_scenario_runs(name: str) -> None:
     result = vpm.Scenario.load(hyl.HYL / f"{name}.toml").run()
     assert result.failures == {}
@@ -168,7 +171,22 @@ def test_every_scenario_runs(name: str) -> None:
 def test_a_hand_reaches_the_published_range() -> None:
     """A knee cylinder of 295 to 317 mm, and a knee force up to about 3 kN."""
     result = vpm.Scenario.load(hyl.HYL / "quasi_static.toml").run()
+    assert result.failures == {}
     lengths = np.concatenate([run["knee_cylinder.length"] for run in result.runs.values()])
     forces = np.concatenate([run["knee_drive.force"] for run in result.runs.values()])
-    assert 0.293 < lengths.min() < 0.300
+    assert 0.295 < lengths.min() < 0.300
     assert 2500.0 < forces.max() < 3300.0
+
+
+def test_soft_bearings_ring_and_stiff_ones_do_not() -> None:
+    """The table of docs/hyl.md, from what draws its picture."""
+    drawn = SimpleNamespace(**runpy.run_path(str(hyl.HYL.parent.parent / "docs" / "figures" / "hyl.py")))
+    found = {name: (run["foot.normal_force"].max(), *drawn.dominant(run)) for name, run in drawn.study()}
+    rigid, stiff = found["rigid"], found["1e+08 N/m"]
+    assert stiff[0] == pytest.approx(rigid[0], rel=2e-3)
+    assert max(rigid[2], stiff[2]) < 0.3
+    for name, frequency in (("1e+06 N/m", 109.0), ("3e+06 N/m", 194.0), ("1e+07 N/m", 338.0)):
+        peak, dominant, amplitude = found[name]
+        assert dominant == pytest.approx(frequency, abs=2.0)
+        assert amplitude > 4.0
+        assert 0.84 < peak / rigid[0] < 0.88

@@ -56,13 +56,19 @@ def placed(entry: dict[str, Any]) -> Matrix:
             [[1, 0, 0], [0, 1, 0], [0, 0, 1]],
         ),
         ("spherical", ["x", "y", "z"], ["revolute"] * 3, [[1, 0, 0], [0, 1, 0], [0, 0, 1]]),
+        (
+            "free",
+            ["x", "y", "z", "rx", "ry", "rz"],
+            [*["prismatic"] * 3, *["revolute"] * 3],
+            [[1, 0, 0], [0, 1, 0], [0, 0, 1]] * 2,
+        ),
     ],
 )
 def test_coordinates_follow_each_other_on_massless_carriers(
     kind: str, names: list[str], kinds: list[str], axes: list[list[float]]
 ) -> None:
     joint = {"type": kind, "translation": [1.0, 2.0, 3.0], "rotation": [0.1, 0.2, 0.3]}
-    model = machine(joint if kind == "spherical" else {**joint, "axis": [0.0, 0.0, 1.0]})
+    model = machine(joint if kind in {"spherical", "free"} else {**joint, "axis": [0.0, 0.0, 1.0]})
     assert model.joints == model.coordinates == tuple(f"{kind}_{name}" for name in names)
     assert model.bodies == ("body",)
     bodies = described(model)["bodies"]

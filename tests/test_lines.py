@@ -2,53 +2,31 @@
 
 import pytest
 
-from model_texts import changed, described
+from model_texts import TWO_LINKS, changed, described
 from vpm.errors import ModelError
 from vpm.model import Model
 
-LEG = """
+LEG = f"""
 name = "leg"
 gravity = [0.0, 0.0, -9.81]
 
-[bodies.thigh]
-mass = 8.0
-center_of_mass = [0.0, 0.0, -0.2]
-inertia = [0.1, 0.1, 0.01, 0.0, 0.0, 0.0]
-
-[bodies.shank]
-mass = 4.0
-center_of_mass = [0.0, 0.0, -0.2]
-inertia = [0.05, 0.05, 0.01, 0.0, 0.0, 0.0]
-
-[joints.hip]
-type = "revolute"
-parent = "world"
-child = "thigh"
-axis = [0.0, 1.0, 0.0]
-
-[joints.knee]
-type = "revolute"
-parent = "thigh"
-child = "shank"
-axis = [0.0, 1.0, 0.0]
-translation = [0.0, 0.0, -0.4]
-
+{TWO_LINKS}
 [lines.cylinder]
-from = { parent = "thigh", point = [0.05, 0.0, -0.1] }
-to = { parent = "shank", point = [0.05, 0.0, -0.1] }
-barrel = { mass = { value = 900.0, unit = "g" }, center = 0.08, inertia = 2e-3 }
-rod = { mass = 0.3, center = 0.1 }
+from = {{ parent = "thigh", point = [0.05, 0.0, -0.1] }}
+to = {{ parent = "shank", point = [0.05, 0.0, -0.1] }}
+barrel = {{ mass = {{ value = 900.0, unit = "g" }}, center = 0.08, inertia = 2e-3 }}
+rod = {{ mass = 0.3, center = 0.1 }}
 
 [actuators.valve]
 line = "cylinder"
-gain = { value = 2.0, unit = "kN/V" }
+gain = {{ value = 2.0, unit = "kN/V" }}
 command_unit = "V"
 
 [sensors.stroke]
 measures = "cylinder.length"
 
 [channels]
-"cylinder.tension" = { column = "F_kN", unit = "kN" }
+"cylinder.tension" = {{ column = "F_kN", unit = "kN" }}
 """
 
 

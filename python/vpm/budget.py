@@ -15,7 +15,7 @@ from vpm.errors import SimulationError
 from vpm.experiment import Experiment
 from vpm.model import Model
 from vpm.results import Result
-from vpm.simulate import Setup
+from vpm.simulate import AUTOMATIC, Setup
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -98,7 +98,7 @@ def budget(
     rate: float = 1000.0,
     share: float = 0.2,
     steps: int = 1_000_000,
-    integrator: str = "linearly_implicit",
+    integrator: str = AUTOMATIC,
     substeps: int = 1,
     experiment: Experiment | None = None,
 ) -> BudgetReport:
@@ -114,7 +114,7 @@ def budget(
     steps : int
         How many steps to time.
     integrator, substeps
-        See :class:`vpm.simulate.Setup`.
+        See :class:`vpm.simulate.Setup`; ``auto`` takes steps whose time has a bound.
     experiment : Experiment, optional
         Its commands drive the model, over and over; without it a sum of sines at one unit of command does.
 
@@ -127,12 +127,13 @@ def budget(
     if steps < 1000:
         raise SimulationError(f"{steps} steps are too few for a 99.9 % quantile; time at least 1000")
     setup = Setup(integrator, substeps)
+    method = setup.method(model, bounded=True)
     inputs = _commands(model, rate, experiment)
     state = model.state()
-    seconds = model.core.time_steps(model.theta, state, inputs, 1.0 / rate, setup.substeps, setup.integrator, steps)
+    seconds = model.core.time_steps(model.theta, state, inputs, 1.0 / rate, setup.substeps, method, steps)
     quantiles = {name: float(np.quantile(seconds, q)) for name, q in QUANTILES.items()}
     overruns = int(np.count_nonzero(seconds > 1.0 / rate))
-    return BudgetReport(model.name, integrator, rate, steps, quantiles, share, overruns, _machine())
+    return BudgetReport(model.name, method, rate, steps, quantiles, share, overruns, _machine())
 
 
 def _commands(model: Model, rate: float, experiment: Experiment | None) -> Array:

@@ -90,7 +90,8 @@ Mode = Annotated[
     ),
 ]
 Integrator = Annotated[
-    str, typer.Option(help="linearly_implicit, rosenbrock, rk4, semi_implicit, guarded, adaptive or adaptive(1e-8).")
+    str,
+    typer.Option(help="auto, linearly_implicit, rosenbrock, rk4, semi_implicit, guarded, adaptive, adaptive(1e-8)."),
 ]
 Plot = Annotated[Path | None, typer.Option(help="Write the plot to this file (PNG, SVG or PDF).")]
 Out = Annotated[Path, typer.Option(help="Folder for report.json, report.html and the repaired model.")]
@@ -140,7 +141,7 @@ def simulate(
     ] = None,
     integrator: Annotated[
         str | None,
-        typer.Option(help=f"{', '.join(INTEGRATORS)}; by default linearly_implicit, or what the scenario says."),
+        typer.Option(help=f"{', '.join(INTEGRATORS)}; auto by default, or what the scenario says."),
     ] = None,
     channels: Channels = None,
     out: Annotated[Path | None, typer.Option(help="Save the run or the runs (NPZ) here.")] = None,
@@ -166,7 +167,7 @@ def simulate(
             "the key scenario"
         )
     else:
-        _simulate_log(model, log, mode or "free_run", integrator or "linearly_implicit", channels, out, plot)
+        _simulate_log(model, log, mode or "free_run", integrator or "auto", channels, out, plot)
 
 
 def _simulate_scenario(path: Path, out: Path | None, plot: Path | None) -> None:
@@ -337,7 +338,7 @@ def budget(
         float, typer.Option(help="Share of the period that a step may take at its 99.9 % quantile.")
     ] = 0.2,
     steps: Annotated[int, typer.Option(help="Number of steps to time.")] = 1_000_000,
-    integrator: Integrator = "linearly_implicit",
+    integrator: Integrator = "auto",
 ) -> None:
     """Time one step of the model against a controller's period; exit code 1 if it does not fit."""
     from vpm.budget import budget as time_steps

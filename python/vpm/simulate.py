@@ -38,7 +38,9 @@ Array = NDArray[np.float64]
 MODES = ("free_run", "inverse_dynamics", "restarts", "closed_loop", "prescribed_motion")
 #: Integrators of fixed steps, whose work is bounded.
 FIXED_STEP = ("linearly_implicit", "rosenbrock", "rk4", "semi_implicit")
-INTEGRATORS = (*FIXED_STEP, "guarded", "adaptive")
+#: Chooses by what a machine contains.
+AUTOMATIC = "auto"
+INTEGRATORS = (AUTOMATIC, *FIXED_STEP, "guarded", "adaptive")
 
 
 @dataclass(frozen=True)
@@ -47,9 +49,12 @@ class Setup:
 
     Attributes
     ----------
-    integrator : {"linearly_implicit", "rosenbrock", "rk4", "semi_implicit", "guarded", "adaptive", "adaptive(1e-8)"}
-        The first two are stable whatever is stiff, of order 2 and 4; the first also stops on dry friction far
-        sharper than a step. The next two are explicit, but for the constant stiffness of flexible links in the last.
+    integrator : {"auto", "linearly_implicit", "rosenbrock", "rk4", "semi_implicit", "guarded", "adaptive"}
+        Or, with a tolerance, ``"adaptive(1e-8)"``.
+        ``auto`` is ``adaptive`` for machines with contacts or hydraulic drives, which impacts and oil make abrupt, and
+        ``linearly_implicit`` for all others. The next two are stable whatever is stiff, of order 2 and 4; the first of
+        them also stops on dry friction far sharper than a step. Then come two that are explicit, but for the constant
+        stiffness of flexible links in the second.
         ``adaptive`` takes as many steps of ``rosenbrock`` as keep the error of each within a tolerance, 1e-6 or the
         one in brackets, relative to each state and its natural size: for impacts, oil and other things that change
         between microseconds and seconds. Its time is not bounded. ``guarded`` is its counterpart for real time: one
@@ -64,7 +69,7 @@ class Setup:
         the first state, such as vibrations, has died away. Restarts have none.
     """
 
-    integrator: str = "linearly_implicit"
+    integrator: str = AUTOMATIC
     substeps: int = 1
     horizon: float = 0.25
     settling: float = 0.0
@@ -78,6 +83,21 @@ class Setup:
             raise SimulationError(f"horizon is {self.horizon} s; give a positive time")
         if not self.settling >= 0.0:
             raise SimulationError(f"settling is {self.settling} s; give a time that is not negative")
+
+    def method(self, model: Model, *, bounded: bool = False) -> str:
+        """Integrator for a model, as the core names it.
+
+        Parameters
+        ----------
+        model : Model
+        bounded : bool
+            Where ``auto`` would step adaptively, take ``guarded``, whose time has a bound.
+        """
+        if self.integrator != AUTOMATIC:
+            return self.integrator
+        if not model.is_abrupt:
+            return "linearly_implicit"
+        return "guarded" if bounded else "adaptive"
 
 
 def _check_integrator(name: str) -> None:
@@ -195,7 +215,7 @@ def simulate(
     experiment: Experiment,
     mode: str = "free_run",
     *,
-    integrator: str = "linearly_implicit",
+    integrator: str = AUTOMATIC,
     substeps: int = 1,
     horizon: float = 0.25,
     cutoff: float | None = None,
@@ -292,7 +312,7 @@ def _dispatch(
 ) -> SimulatedArrays:
     rows = np.arange(len(experiment))
     begin = np.zeros(1, dtype=np.int64)
-    stepping = (experiment.dt, setup.substeps, setup.integrator, columns)
+    stepping = (experiment.dt, setup.substeps, setup.method(model), columns)
     if mode == "free_run":
         inputs = _inputs(model, experiment, mode)
         state = start(model, experiment, theta) if initial_state is None else initial_state
@@ -324,7 +344,7 @@ def _prescribed(model: Model, m: Motion, theta: Array, columns: list[int], setup
         motion[order][:, followed] = values[m.kept]
     q, v, a = motion
     outputs, states, jacobian = model.core.simulate_prescribed(
-        theta, q, v, a, m.dt, setup.substeps, setup.integrator, columns, passive
+        theta, q, v, a, m.dt, setup.substeps, setup.method(model), columns, passive
     )
     rows = np.arange(len(m.time))[m.kept]
     return SimulatedArrays(outputs, jacobian, rows, np.zeros(1, dtype=np.int64), states)
@@ -378,7 +398,7 @@ def _run(model: Model, experiment: Experiment, mode: str, arrays: SimulatedArray
         if channel in experiment:
             measured[:, column] = experiment[channel][arrays.rows]
     length = len(arrays.rows) // len(arrays.starts) if arrays.starts.size else 0
-    settings: dict[str, float | int | str] = {"integrator": setup.integrator, "substeps": setup.substeps}
+    settings: dict[str, float | int | str] = {"integrator": setup.method(model), "substeps": setup.substeps}
     if mode == "restarts":
         settings["horizon"] = setup.horizon
     return Run(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -10,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from vpm.errors import DivergedError, SimulationError, near_match
 from vpm.model import Model
-from vpm.simulate import Run, Setup, judged
+from vpm.simulate import AUTOMATIC, Run, Setup, judged
 
 Array = NDArray[np.float64]
 
@@ -53,17 +54,18 @@ class Simulation:
         model: Model,
         time_step: float,
         *,
-        integrator: str = "linearly_implicit",
+        integrator: str = AUTOMATIC,
         substeps: int = 1,
         state: Mapping[str, float] | ArrayLike | None = None,
     ) -> None:
         from vpm._core import Simulation as Core
 
         setup = Setup(integrator, substeps)
+        setup = replace(setup, integrator=setup.method(model))
         self._model, self._time_step, self._setup = model, float(time_step), setup
         self._start = model.state(state)
         try:
-            self._core = Core(model.core, model.theta, self._start, float(time_step), substeps, integrator)
+            self._core = Core(model.core, model.theta, self._start, float(time_step), substeps, setup.integrator)
         except ValueError as error:
             raise SimulationError(str(error)) from error
         self._outputs = self._core.outputs

@@ -191,16 +191,32 @@ pub(crate) fn check_starts(setting: Setting<'_>, initial: &[f64]) -> Result<()> 
 
 /// What stopped being finite, in the words of the model.
 pub(crate) fn diverged<S: Scalar>(stepper: &Stepper<'_, S>, what: String, row: usize, start: usize) -> Error {
+    let (event, repair) = (Diverged::NOT_FINITE.to_owned(), repair(stepper.stepping().method));
+    lost(stepper, what, (event, repair), (row, start))
+}
+
+/// A piston that steps of a fixed length carried `beyond` (m) the end of its stroke, as no stop lets it: the steps leapt over the impact.
+pub(crate) fn leapt<S: Scalar>(stepper: &Stepper<'_, S>, what: String, beyond: f64, at: (usize, usize)) -> Error {
+    let event = format!("is {beyond:.6} m beyond the end of its stroke, where these steps leapt over its stop,");
+    lost(stepper, what, (event, "use the integrator adaptive, or guarded where the time of a step has a bound"), at)
+}
+
+fn lost<S: Scalar>(
+    stepper: &Stepper<'_, S>,
+    what: String,
+    (event, repair): (String, &'static str),
+    (row, start): (usize, usize),
+) -> Error {
     let stepping = stepper.stepping();
     let (outputs, states) = stepper.before(row);
     Error::Diverged(Box::new(Diverged {
         what,
-        event: Diverged::NOT_FINITE.to_owned(),
+        event,
         time: (start + row) as f64 * stepping.time_step,
         sample_index: start + row,
         method: stepping.method.to_string(),
         step: stepping.step(),
-        repair: repair(stepping.method),
+        repair,
         outputs,
         states,
     }))

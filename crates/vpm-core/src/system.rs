@@ -17,7 +17,7 @@ use crate::actuator::hydraulic::Supply;
 use crate::actuator::{Actuator, Drive, Target};
 use crate::contact::ContactFriction;
 use crate::data::Data;
-use crate::dynamics::{aba, flexible, frames, lines, poses};
+use crate::dynamics::{aba, flexible, lines, motion, poses};
 use crate::effect::JointEffect;
 use crate::model::Model;
 use crate::scalar::Scalar;
@@ -175,8 +175,7 @@ impl<S: Scalar> Dynamics<S> {
                 poses(model, data);
             }
         } else if self.pulls || !self.connections.is_free() {
-            frames(model, data, q, v);
-            poses(model, data);
+            motion(model, data, q, v);
             lines(model, data);
         }
     }

@@ -258,9 +258,24 @@ fn a_piston_starts_within_its_stroke() {
         assert!(matches!(error, Error::Drive(DriveError::Piston { .. })));
         let told = error.to_string();
         let part = if on == On::Joint { "position of joint `axis`" } else { "length of line `strut`" };
-        assert!(told.contains("actuator `hip`") && told.contains(part) && told.contains("0.46 m and 0.54 m"), "{told}");
+        assert!(told.contains("actuator `hip`") && told.contains(part) && told.contains("0.460000 m and 0.540000 m"), "{told}");
         let stepping = Stepping::new(1e-3, 1, Method::LinearlyImplicit).unwrap();
         let live = Live::new(Arc::new(machine.build()), &machine.values, &start, stepping);
         assert!(matches!(live, Err(Error::Drive(DriveError::Piston { .. }))));
+    }
+}
+
+#[test]
+fn steps_of_a_fixed_length_that_leap_over_a_stop_are_refused() {
+    let machine = machine(&nominal(), On::Joint);
+    let full: Vec<f64> = (0..200).map(|k| if k < 150 { 10e-3 } else { -10e-3 }).collect();
+    let run = |method| Bench::new(&machine, 1e-3, 1, method).try_free(&rest(&machine), &full);
+    let told = run(Method::Rosenbrock).unwrap_err().to_string();
+    let sentence = "the piston of actuator `hip` is ";
+    assert!(told.contains(sentence) && told.contains("leapt over its stop") && told.contains("adaptive"), "{told}");
+    for method in [Method::Guarded, Method::Adaptive { tolerance: 1e-6 }] {
+        let states = run(method).unwrap().states;
+        let largest = states.chunks_exact(6).fold(0.0, |most: f64, state| most.max((state[0] - MIDDLE).abs()));
+        assert!((0.0400..0.0401).contains(&largest), "{largest}");
     }
 }

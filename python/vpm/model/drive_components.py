@@ -56,6 +56,12 @@ class DriveComponents:
         actuators = self._checked.document.actuators
         return frozenset(f"{name}.command" for name, entry in actuators.items() if isinstance(entry, COMPLIANT))
 
+    @property
+    def is_abrupt(self) -> bool:
+        """Whether contacts or oil can change a motion within a sample, so that its steps need control."""
+        document = self._checked.document
+        return bool(document.contacts) or any(entry.type == "hydraulic" for entry in document.actuators.values())
+
     def actuator_type(self, actuator: str) -> str:
         """Type of an actuator: "ideal", "dc_motor", "spring_damper", "maxwell" or "hydraulic".
 

@@ -122,7 +122,8 @@ class Evaluations(Components):
     def energy(self, q: ArrayLike, v: ArrayLike) -> tuple[float, float]:
         """Kinetic and potential energy, J.
 
-        The potential is that of the bodies in gravity and of the effects and flexible links that store energy.
+        The potential is that of the bodies in gravity and of the effects, flexible links, contacts and bushings that
+        store energy.
 
         Parameters
         ----------

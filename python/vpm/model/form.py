@@ -15,7 +15,7 @@ from vpm.model.contact import NESTED as CONNECTION_TABLES
 from vpm.model.contact import TAGS
 from vpm.model.drives import ACTUATOR_TYPES, EXAMPLES, tables_inside
 from vpm.model.entry import Quantity
-from vpm.model.messages import Problem, place
+from vpm.model.messages import Problem, place, shown
 from vpm.model.schema import SECTIONS, DenavitHartenberg, Document, keys_of
 
 #: How a key is written, for messages about missing ones.
@@ -144,7 +144,7 @@ def _sentence(
         example = _EXAMPLES.get(f"{keys[0]}.{keys[-1]}", _EXAMPLES.get(str(keys[-1])))
         return "is missing; add it" + (f", for example {example}" if example else "")
     if kind in _KINDS:
-        return f"is {_shown(found)}, but has to be {_KINDS[kind]}; correct it"
+        return f"is {shown(found)}, but has to be {_KINDS[kind]}; correct it"
     if kind in {"too_short", "too_long"}:
         needed = context.get("min_length") or context.get("max_length")
         if isinstance(found, Mapping):
@@ -164,9 +164,9 @@ def _choice_sentence(
         choices = re.findall(r"'([^']*)'", str(context.get("expected") or context.get("expected_tags")))
         tag = context.get("tag", found)
         if keys[0] == "beams" and "deforms" in keys:
-            return f"is {_shown(tag)}, which is no deformation; {near_match(str(tag), choices)}"
+            return f"is {shown(tag)}, which is no deformation; {near_match(str(tag), choices)}"
         what = "shape" if keys[0] == "beams" else str(keys[-1]) if keys[-1] in {"convention", "source"} else "type"
-        return f"has the {what} {_shown(tag)}; {near_match(str(tag), choices)}"
+        return f"has the {what} {shown(tag)}; {near_match(str(tag), choices)}"
     if kind == "union_tag_not_found" and keys[0] == "beams":
         return 'has no shape; add for example shape = "rectangle"'
     if kind == "union_tag_not_found":
@@ -174,7 +174,7 @@ def _choice_sentence(
     if kind == "value_error":
         reason = str(context.get("error", fallback))
         return reason if reason.startswith(("has ", "is ")) else f"is wrong: {reason}"
-    return f"is {_shown(found)}: {fallback[:1].lower()}{fallback[1:]}"
+    return f"is {shown(found)}: {fallback[:1].lower()}{fallback[1:]}"
 
 
 def _known_keys(keys: tuple[str | int, ...], tag: str | None = None) -> tuple[str, ...]:
@@ -192,15 +192,3 @@ def _known_keys(keys: tuple[str | int, ...], tag: str | None = None) -> tuple[st
         return keys_of(*SECTIONS[str(keys[0])])
     inside = [key for key in keys[2:-1] if not isinstance(key, int)]
     return keys_of(*_NESTED[inside[0]]) if len(inside) == 1 and inside[0] in _NESTED else keys_of(Quantity)
-
-
-def _shown(value: object) -> str:
-    if isinstance(value, str):
-        return f'"{value}"'
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, Mapping):
-        return "a table"
-    if isinstance(value, list | tuple):
-        return f"a list of {len(value)}"
-    return str(value)

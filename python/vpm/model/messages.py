@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -98,3 +98,16 @@ def parse_toml(text: str, path: str | None = None) -> dict[str, Any]:
         head = f"{path}: " if path else ""
         message = f"{head}line {line}, column {column} is not TOML: {what[:1].lower()}{what[1:]}; correct the line"
         raise ModelError(message, path=path, line=line, column=column) from None
+
+
+def shown(value: object) -> str:
+    """What stands in a file, in a sentence: ``"text"``, ``true``, ``a table``, ``a list of 3``."""
+    if isinstance(value, str):
+        return f'"{value}"'
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, Mapping):
+        return "a table"
+    if isinstance(value, list | tuple):
+        return f"a list of {len(value)}"
+    return str(value)

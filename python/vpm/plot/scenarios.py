@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain, cycle
@@ -105,18 +106,21 @@ def plot_scenario(result: ScenarioLike) -> Figure:
         axis.set_xlabel("time [s]")
     for axis in chain.from_iterable(axes):
         axis.margins(x=0.01)
-    _finish(figure, result, colors, len(columns))
+    _finish(figure, result, colors, list(columns.values()))
     return figure
 
 
-def _finish(figure: Figure, result: ScenarioLike, colors: Mapping[str, str], columns: int) -> None:
+def _finish(figure: Figure, result: ScenarioLike, colors: Mapping[str, str], columns: Sequence[Sequence[str]]) -> None:
     """Title, names of the runs, and what failed."""
     from matplotlib.lines import Line2D
 
     figure.suptitle(result.name, fontsize=11, x=0.02, ha="left")
-    if len(colors) > 1:
-        handles = [Line2D([], [], color=color, linewidth=2.0, label=name) for name, color in colors.items()]
-        figure.legend(handles=handles, loc="outside upper right", ncols=min(len(handles), 2 * columns + 1))
+    shown = [name for name in dict.fromkeys(chain.from_iterable(columns)) if name in colors]
+    if len(shown) > 1:
+        handles = [Line2D([], [], color=colors[name], linewidth=2.0, label=name) for name in shown]
+        # Columns of equal length stand in the legend as in the picture.
+        alike = len(columns) > 1 and len({len(names) for names in columns}) == 1
+        figure.legend(handles=handles, loc="outside upper right", ncols=len(columns) if alike else min(len(shown), 3))
     told = "\n".join(fill(f"{name} failed: {reason}", 110) for name, reason in result.failures.items())
     if told:
         figure.supxlabel(told, fontsize=8, color=ORANGE)
@@ -145,9 +149,11 @@ def _draw_row(axes: Sequence[Axes], row: _Row, columns: Sequence[Sequence[str]],
         for style, traces in zip(cycle(CHANNELS), row.traces.values(), strict=False):
             here = [(name, *traces[name]) for name in names if name in traces]
             shared = len(traces) > 1 and _alike([values for _, values in traces.values()])
-            for name, time, values in here[: 1 if shared else None]:
+            for place, (name, time, values) in enumerate(here[: 1 if shared else None]):
                 color = INK if shared else colors[name]
-                axis.plot(*thinned(time, row.factor * values), style, color=color, linewidth=1.1)
+                # Later lines are thinner, so that one that they cover can be seen behind them.
+                width = 1.1 + 0.45 * (len(here) - 1 - place) if len(here) <= 4 and not shared else 1.1
+                axis.plot(*thinned(time, row.factor * values), style, color=color, linewidth=width)
     if row.limits is not None:
         axes[0].set_ylim(row.limits)
     _name_channels(axes[0], row)
@@ -156,7 +162,8 @@ def _draw_row(axes: Sequence[Axes], row: _Row, columns: Sequence[Sequence[str]],
 def _name_channels(axis: Axes, row: _Row) -> None:
     from matplotlib.lines import Line2D
 
-    quantities = {channel.rpartition(".")[2] for channel in row.channels}
+    # pressure_a and pressure_b are pressures.
+    quantities = {re.sub(r"_[ab]$", "", channel.rpartition(".")[2]) for channel in row.channels}
     axis.set_ylabel(label(quantities.pop().replace("_", " ") if len(quantities) == 1 else "", row.unit).strip())
     if len(row.channels) == 1:
         axis.set_title(row.channels[0])

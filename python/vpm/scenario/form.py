@@ -8,7 +8,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from vpm.errors import near_match
-from vpm.model.messages import Problem, place
+from vpm.model.messages import Problem, place, shown
 from vpm.model.schema import keys_of
 from vpm.scenario.schema import INPUTS, SIGNALS, Document, Given, Listed, PlotEntry, RunEntry
 
@@ -82,7 +82,7 @@ def _sentence(kind: str, keys: Keys, signal: str | None, found: object, context:
         example = _EXAMPLES.get(str(keys[-1]))
         return "is missing; add it" + (f", for example {example}" if example else "")
     if kind in _KINDS:
-        return f"is {_shown(found)}, but has to be {_KINDS[kind]}; correct it"
+        return f"is {shown(found)}, but has to be {_KINDS[kind]}; correct it"
     if kind == "greater_than_equal":
         return f"is {found}, but has to be {context['ge']} or more; correct it"
     if kind == "too_short":
@@ -92,8 +92,8 @@ def _sentence(kind: str, keys: Keys, signal: str | None, found: object, context:
     if kind == "union_tag_not_found":
         return f'has no type; add for example type = "points"; {near_match("", SIGNALS, what="the types are")}'
     if kind == "union_tag_invalid":
-        return f"has the type {_shown(context.get('tag'))}; {near_match(str(context.get('tag')), SIGNALS)}"
-    reason = str(context.get("error", f"is {_shown(found)}, which cannot be; correct it"))
+        return f"has the type {shown(context.get('tag'))}; {near_match(str(context.get('tag')), SIGNALS)}"
+    reason = str(context.get("error", f"is {shown(found)}, which cannot be; correct it"))
     return reason if reason.startswith(("has ", "is ")) else f"is wrong: {reason}"
 
 
@@ -108,15 +108,3 @@ def _known_keys(keys: Keys, signal: str | None) -> tuple[str, ...]:
     if keys[0] == "plot":
         return keys_of(PlotEntry)
     return keys_of(Listed if keys[-2] == "time" else Given)
-
-
-def _shown(value: object) -> str:
-    if isinstance(value, str):
-        return f'"{value}"'
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, Mapping):
-        return "a table"
-    if isinstance(value, list | tuple):
-        return f"a list of {len(value)}"
-    return str(value)

@@ -12,6 +12,7 @@ from pydantic import BaseModel, BeforeValidator, Field
 
 from vpm.model.entry import Entry, Number, Text
 from vpm.model.schema import EffectEntry
+from vpm.simulate import AUTOMATIC
 
 
 class Given(Entry):
@@ -112,7 +113,7 @@ class Document(Entry):
     scenario: Text
     duration: Value
     time_step: Value
-    integrator: Text = "linearly_implicit"
+    integrator: Text = AUTOMATIC
     substeps: Annotated[int, Field(strict=True, ge=1)] = 1
     initial: dict[str, Value] = Field(default_factory=dict)
     references: dict[str, Signal] = Field(default_factory=dict)

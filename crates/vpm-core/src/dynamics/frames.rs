@@ -47,6 +47,20 @@ pub fn frames<S: Scalar>(model: &Model<S>, data: &mut Data<S>, q: &[S], v: &[S])
     }
 }
 
+/// Poses `X_WF` and velocities of the bodies of a rigid tree, and nothing else: what forces on them need.
+pub(crate) fn motion<S: Scalar>(model: &Model<S>, data: &mut Data<S>, q: &[S], v: &[S]) {
+    debug_assert!(model.is_recursive());
+    let frames = &mut data.composite.frames;
+    for (k, ((link, &q), &v)) in model.links().iter().zip(q).zip(v).enumerate() {
+        let (before, rest) = frames.split_at_mut(k + 1);
+        let (parent, slot) = (&before[link.parent], &mut rest[0]);
+        slot.across = link.pose(q);
+        slot.pose = parent.pose * slot.across;
+        slot.velocity = slot.across.inverse_twist(parent.velocity);
+        link.kind.add_rate(&mut slot.velocity, v);
+    }
+}
+
 /// Poses `X_WF` of every frame after [`frames`].
 pub(crate) fn poses<S: Scalar>(model: &Model<S>, data: &mut Data<S>) {
     let frames = &mut data.composite.frames;

@@ -34,8 +34,8 @@ pub enum DriveError {
     },
     /// A piston that starts outside of its cylinder.
     #[error(
-        "the piston of actuator `{actuator}` starts {place} m from mid-stroke, but its stroke ends at -{reach} m and {reach} m; start \
-         where {measure} lies between {least} m and {most} m, or correct `retracted_length`"
+        "the piston of actuator `{actuator}` starts {place:.6} m from mid-stroke, but its stroke ends at -{reach:.6} m and {reach:.6} m; start \
+         where {measure} lies between {least:.6} m and {most:.6} m, or correct `retracted_length`"
     )]
     Piston {
         /// Name of the actuator.

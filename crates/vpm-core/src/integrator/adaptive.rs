@@ -184,6 +184,7 @@ impl<S: Scalar> Adaptive<S> {
         ode.scales(&mut self.scales);
         let rule = self.rule;
         let (mut gone, mut steps, mut longest) = (0.0, Steps::default(), rule.longer);
+        let mut fresh = true;
         let (mut step, floor) = (self.proposed.unwrap_or(rule.first * duration), rule.floor * duration);
         while gone < duration {
             let left = duration - gone;
@@ -192,6 +193,9 @@ impl<S: Scalar> Adaptive<S> {
                 ..2.0 => 0.5 * left,
                 _ => step,
             };
+            if fresh {
+                self.method.linearise(ode, x);
+            }
             let verdict = self.attempt(ode, x, taken);
             let stuck = Stuck { state: verdict.state, reached: gone, step: taken, many: false };
             let length = taken * (CAUTION * verdict.error.powf(-0.25)).clamp(SHORTER, longest);
@@ -200,12 +204,13 @@ impl<S: Scalar> Adaptive<S> {
                 gone = if taken < left { gone + taken } else { duration };
                 // A step that the end cut short says nothing against the longer one.
                 step = floor.max(if taken < step { step.max(length) } else { length });
-                (steps.accepted, longest) = (steps.accepted + 1, rule.longer);
+                (steps.accepted, longest, fresh) = (steps.accepted + 1, rule.longer, true);
             } else if taken <= floor.max(SHORTEST * duration) {
                 return Err(Halt::Stuck(stuck));
             } else {
                 step = floor.max(length.min(rule.refused * taken));
-                (steps.refused, longest) = (steps.refused + 1, 1.0);
+                // Rates and Jacobian are still those where the step begins.
+                (steps.refused, longest, fresh) = (steps.refused + 1, 1.0, false);
             }
             if steps.accepted + steps.refused >= MOST_STEPS && gone < duration {
                 return Err(Halt::Stuck(Stuck { many: true, ..stuck }));

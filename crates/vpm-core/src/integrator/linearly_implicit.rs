@@ -32,7 +32,8 @@ impl<S: Scalar> LinearlyImplicit<S> {
 
     /// Moves `x` on by `step` (s).
     pub fn step(&mut self, ode: &mut impl Ode<S>, x: &mut [S], step: f64) {
-        self.left.factorise(ode, GAMMA * step, |ode, matrix| ode.iteration_matrix(x, matrix));
+        ode.iteration_matrix(x, self.left.matrix());
+        self.left.factorise(ode.coordinates(), GAMMA * step);
         ode.rhs(x, &mut self.first);
         self.left.solve(&mut self.first);
         for ((stage, &start), &rate) in self.stage.iter_mut().zip(&*x).zip(&self.first) {

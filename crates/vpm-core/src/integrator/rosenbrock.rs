@@ -62,6 +62,8 @@ pub const RODAS4P2: Tableau = Tableau {
 #[derive(Clone, Debug)]
 pub struct Rosenbrock<S> {
     left: Stage<S>,
+    /// Rates where the step begins.
+    rates: Vec<S>,
     stage: Vec<S>,
     /// The increments `u_i`, one stage after the other.
     increments: Vec<S>,
@@ -70,25 +72,41 @@ pub struct Rosenbrock<S> {
 impl<S: Scalar> Rosenbrock<S> {
     /// Buffers for systems of `dim` states.
     pub fn new(dim: usize) -> Self {
-        Self { left: Stage::new(dim), stage: vec![S::zero(); dim], increments: vec![S::zero(); STAGES * dim] }
+        Self {
+            left: Stage::new(dim),
+            rates: vec![S::zero(); dim],
+            stage: vec![S::zero(); dim],
+            increments: vec![S::zero(); STAGES * dim],
+        }
     }
 
     /// Moves `x` on by `step` (s).
     pub fn step(&mut self, ode: &mut impl Ode<S>, x: &mut [S], step: f64) {
+        self.linearise(ode, x);
         self.attempt(ode, x, step);
         self.accept(x);
     }
 
-    /// Computes the stages of a step from `x`, and leaves x where it is.
+    /// Rates and Jacobian at `x`, where a step begins.
+    pub(super) fn linearise(&mut self, ode: &mut impl Ode<S>, x: &[S]) {
+        ode.jacobian(x, self.left.matrix());
+        ode.rhs(x, &mut self.rates);
+    }
+
+    /// Computes the stages of a step from the `x` of the last [`Self::linearise`], and leaves x where it is.
     pub(super) fn attempt(&mut self, ode: &mut impl Ode<S>, x: &[S], step: f64) {
         let dim = x.len();
-        self.left.factorise(ode, RODAS4P2.gamma * step, |ode, matrix| ode.jacobian(x, matrix));
+        self.left.factorise(ode.coordinates(), RODAS4P2.gamma * step);
         for (i, (distance, coupling)) in RODAS4P2.distance.iter().zip(&RODAS4P2.coupling).enumerate() {
             let (known, rest) = self.increments.split_at_mut(i * dim);
             let increment = &mut rest[..dim];
-            self.stage.copy_from_slice(x);
-            add(&mut self.stage, known, distance);
-            ode.rhs(&self.stage, increment);
+            if i == 0 {
+                increment.copy_from_slice(&self.rates);
+            } else {
+                self.stage.copy_from_slice(x);
+                add(&mut self.stage, known, distance);
+                ode.rhs(&self.stage, increment);
+            }
             for entry in increment.iter_mut() {
                 *entry = *entry * step;
             }

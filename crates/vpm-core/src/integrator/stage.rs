@@ -1,7 +1,6 @@
 //! The linear system of an implicit stage.
 
 use super::lu::Lu;
-use crate::ode::Ode;
 use crate::scalar::Scalar;
 
 /// `1 - r A` of an implicit step, with the coordinates eliminated: they follow their rates.
@@ -12,8 +11,10 @@ use crate::scalar::Scalar;
 /// Source: elimination by blocks, Golub & Van Loan 2013, "Matrix Computations", section 3.2.9. Checked: against the whole system.
 #[derive(Clone, Debug)]
 pub(super) struct Stage<S> {
-    /// A, row by row; then r B in the columns of the coordinates.
+    /// A, row by row.
     matrix: Vec<S>,
+    /// r B, row by row.
+    coupling: Vec<S>,
     lu: Lu<S>,
     coordinates: usize,
     dim: usize,
@@ -23,27 +24,31 @@ pub(super) struct Stage<S> {
 impl<S: Scalar> Stage<S> {
     /// Buffers for systems of `dim` states.
     pub(super) fn new(dim: usize) -> Self {
-        Self { matrix: vec![S::zero(); dim * dim], lu: Lu::new(dim), coordinates: 0, dim, reach: 0.0 }
+        let (matrix, coupling) = (vec![S::zero(); dim * dim], vec![S::zero(); dim * dim]);
+        Self { matrix, coupling, lu: Lu::new(dim), coordinates: 0, dim, reach: 0.0 }
     }
 
-    /// Prepares `1 - reach A` with the `matrix` A that is written in its place.
-    pub(super) fn factorise<O: Ode<S>>(&mut self, ode: &mut O, reach: f64, write: impl FnOnce(&mut O, &mut [S])) {
-        write(ode, &mut self.matrix);
-        (self.coordinates, self.reach) = (ode.coordinates(), reach);
-        let (n, dim) = (self.coordinates, self.dim);
-        let left = dim - n;
+    /// Where A has to be written, row by row, before it is factorised; it stays there.
+    pub(super) fn matrix(&mut self) -> &mut [S] {
+        &mut self.matrix
+    }
+
+    /// Prepares `1 - reach A`, where that many coordinates lead the state.
+    pub(super) fn factorise(&mut self, coordinates: usize, reach: f64) {
+        (self.coordinates, self.reach) = (coordinates, reach);
+        let (n, dim, left) = (coordinates, self.dim, self.dim - coordinates);
         if self.lu.dim() != left {
             self.lu.resize(left);
         }
-        let rows = self.matrix.chunks_exact_mut(dim.max(1)).skip(n);
-        for (k, (row, target)) in rows.zip(self.lu.matrix().chunks_exact_mut(left.max(1))).enumerate() {
-            let (of_coordinates, others) = row.split_at_mut(n);
-            for (target, &entry) in target.iter_mut().zip(&*others) {
+        let rows = self.matrix.chunks_exact(dim.max(1)).skip(n).zip(self.coupling.chunks_exact_mut(n.max(1)));
+        for (k, ((row, coupling), target)) in rows.zip(self.lu.matrix().chunks_exact_mut(left.max(1))).enumerate() {
+            let (of_coordinates, others) = row.split_at(n);
+            for (target, &entry) in target.iter_mut().zip(others) {
                 *target = entry * -reach;
             }
-            for (target, entry) in target.iter_mut().zip(of_coordinates) {
-                *entry = *entry * reach;
-                *target -= *entry * reach;
+            for ((target, coupling), &entry) in target.iter_mut().zip(coupling).zip(of_coordinates) {
+                *coupling = entry * reach;
+                *target -= *coupling * reach;
             }
             target[k] = target[k] + 1.0;
         }
@@ -53,7 +58,7 @@ impl<S: Scalar> Stage<S> {
     /// Replaces `b` by the solution x of `(1 - reach A) x = b`.
     pub(super) fn solve(&mut self, b: &mut [S]) {
         let (coordinates, others) = b.split_at_mut(self.coordinates);
-        for (entry, row) in others.iter_mut().zip(self.matrix.chunks_exact(self.dim.max(1)).skip(self.coordinates)) {
+        for (entry, row) in others.iter_mut().zip(self.coupling.chunks_exact(self.coordinates.max(1))) {
             for (&part, &coordinate) in row.iter().zip(&*coordinates) {
                 *entry += part * coordinate;
             }

@@ -2,10 +2,10 @@
 
 use super::control::{Control, reading};
 use super::names::{output_name, state_name};
-use super::{Setting, Stepping, diverged, halted};
+use super::{Setting, Stepping, diverged, halted, leapt};
 use crate::description::Description;
 use crate::error::Result;
-use crate::integrator::Integrator;
+use crate::integrator::{Integrator, Method};
 use crate::ode::Ode;
 use crate::scalar::Scalar;
 use crate::sensitivity::{Interrupt, Pair};
@@ -141,6 +141,7 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         if let Some(place) = self.state.iter().position(|state| !state.is_finite()) {
             return Err(diverged(self, self.state_name(place), row, start));
         }
+        self.check_stops(row, start)?;
         self.states[row * dim..(row + 1) * dim].copy_from_slice(&self.state);
         self.record_motion(row);
         self.control(row, start);
@@ -162,6 +163,19 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         integrator
             .advance(system, state, pieces, interrupt)
             .map_err(|halt| halted(self.description, stepping, start + row, halt, self.before(row + 1)))
+    }
+
+    /// Complains about a piston that went through its stop; steps of controlled error do not let it.
+    fn check_stops(&mut self, row: usize, start: usize) -> Result<()> {
+        if matches!(self.stepping.method, Method::Adaptive { .. } | Method::Guarded) {
+            return Ok(());
+        }
+        let n = self.description.n_coordinates();
+        let Some((number, place, reach)) = self.system.dynamics().piston_outside(&self.state[..n]) else {
+            return Ok(());
+        };
+        let what = format!("the piston of actuator `{}`", self.description.actuators[number].name);
+        Err(leapt(self, what, place.abs() - reach, (row, start)))
     }
 
     fn record_motion(&mut self, row: usize) {

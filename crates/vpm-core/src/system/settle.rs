@@ -32,8 +32,8 @@ impl<S: Scalar> Dynamics<S> {
         self.supplies.iter().filter(|supply| supply.is_sagging()).for_each(|supply| next(supply.pressure));
     }
 
-    /// Number of an actuator whose piston stands beyond its stroke at `q` by more than the stops give way (1 mm or 2 % of the stroke),
-    /// with the piston's place from mid-stroke and half of the stroke, m.
+    /// Number of an actuator whose piston stands beyond its stroke at `q` by more than the stops give way (1 mm or 2 % of the stroke, and
+    /// what they yield under twice the force of the supply), with the piston's place from mid-stroke and half of the stroke, m.
     pub(crate) fn piston_outside(&mut self, q: &[S]) -> Option<(usize, f64, f64)> {
         if self.shown.hydraulics.is_empty() {
             return None;
@@ -46,7 +46,9 @@ impl<S: Scalar> Dynamics<S> {
             let Drive::Hydraulic(law) = &actuator.drive else { return None };
             let [length, _] = motion(actuator.on, q, &rest, lines);
             let (place, reach) = (law.piston(length).re(), 0.5 * law.cylinder.stroke.re());
-            (place.abs() > reach + (0.04 * reach).max(1e-3)).then_some((number, place, reach))
+            let push = self.supplies[law.supply].pressure.re() * law.cylinder.areas().a.re();
+            let give = (0.04 * reach).max(1e-3) + 2.0 * push / law.cylinder.stop.stiffness.re();
+            (place.abs() > reach + give).then_some((number, place, reach))
         });
         self.loads = rest;
         found
