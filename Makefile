@@ -8,7 +8,7 @@
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .SUFFIXES:
-.PHONY: help demo test test-rust test-python reference validation lint lint-rust lint-python bench peers chirp bench-counts docs figures package clean
+.PHONY: help demo test test-rust test-python reference validation lint lint-rust lint-python bench peers chirp narx-peers bench-counts docs figures package clean
 
 PYTHON ?= python3
 DEMO_OUT ?= demo-report
@@ -70,6 +70,9 @@ peers: $(VENV)/.installed ## time vpm beside other engines, which this installs;
 
 chirp: $(VENV)/.installed ## time the servo-cylinder beside the solvers that are installed (C, CasADi, SciPy with Numba)
 	$(BIN)/python benches/servo_chirp.py
+
+narx-peers: $(VENV)/.installed ## time a NARX model beside what is installed (C, Numba, sysidentpy)
+	$(BIN)/python benches/narx_peers.py
 
 figures: $(VENV)/.installed ## draw the pictures of docs/ anew, from the package
 	$(BIN)/python docs/figures/validity.py

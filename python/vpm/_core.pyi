@@ -11,11 +11,17 @@ __all__ = [
     "Dynamics",
     "Karl",
     "Leg",
+    "MaxwellNarx",
+    "Narx",
+    "NarxStepper",
     "PlanarArm",
     "Simulation",
     "System",
     "check_integrator",
     "hyq_parameters",
+    "narx_candidates",
+    "narx_fit",
+    "narx_select",
     "stop_when",
 ]
 
@@ -427,3 +433,93 @@ class PlanarArm:
         Diverged
             The state is no longer finite.
         """
+
+@final
+class Narx:
+    """A polynomial of lagged outputs and inputs with its coefficients.
+
+    Parameters
+    ----------
+    signals : list of str
+        The output's name, then the inputs'.
+    terms : list of list of (int, int)
+        Factors of each term: signal (0 is the output) and lag.
+    coefficients : array_like, shape (P,)
+    """
+
+    def __new__(
+        cls, signals: Sequence[str], terms: Sequence[Sequence[tuple[int, int]]], coefficients: ArrayLike
+    ) -> Narx: ...
+    @property
+    def longest_lag(self) -> int:
+        """Longest lag in samples."""
+
+    def texts(self) -> list[str]:
+        """Terms as they are written."""
+
+    def simulate_free_run(self, name: str, output: ArrayLike, inputs: ArrayLike, limit: float) -> NDArray[np.float64]:
+        """Output (N,) from the simulated past; raises ``Diverged`` with the samples before."""
+
+    def predict_one_step(self, name: str, output: ArrayLike, inputs: ArrayLike) -> NDArray[np.float64]:
+        """Output (N,) from the measured past."""
+
+    def stepper(self) -> NarxStepper:
+        """Return a simulation that is fed sample by sample."""
+
+@final
+class NarxStepper:
+    """A simulation of a NARX model that is fed sample by sample."""
+
+    def start(self, output: ArrayLike, inputs: ArrayLike) -> None:
+        """Set the past: outputs (L,) and inputs (L, m), oldest first, L the longest lag."""
+
+    def step(self, inputs: ArrayLike) -> float:
+        """Output of this sample from its inputs (m,)."""
+
+def narx_candidates(
+    lags: Sequence[tuple[int, Sequence[int]]], degree: int, constant: bool
+) -> list[list[tuple[int, int]]]:
+    """All products of at most `degree` lagged signals: factors (signal, lag) of each."""
+
+def narx_fit(
+    signals: Sequence[str],
+    terms: Sequence[Sequence[tuple[int, int]]],
+    records: Sequence[tuple[str, ArrayLike, ArrayLike]],
+) -> NDArray[np.float64]:
+    """Coefficients of given terms by least squares over records (name, output (N,), inputs (N, m))."""
+
+def narx_select(
+    signals: Sequence[str],
+    terms: Sequence[Sequence[tuple[int, int]]],
+    records: Sequence[tuple[str, ArrayLike, ArrayLike]],
+    most: int,
+    stop: str,
+    value: float,
+) -> tuple[
+    list[list[tuple[int, int]]],
+    NDArray[np.float64],
+    NDArray[np.float64],
+    NDArray[np.float64],
+    list[tuple[str, str]],
+]:
+    """Terms chosen by error-reduction ratio: terms, coefficients, ratios, values of the criterion, dependent ones."""
+
+@final
+class MaxwellNarx:
+    """A Maxwell element beside a spring as a difference equation.
+
+    Parameters
+    ----------
+    k0, s0 : array_like, shape (10,)
+        Coefficients over ``1, u, s, u^2, u s, s^2, u^3, u^2 s, u s^2, s^3``; N/m and m.
+    k1, c1, step : float
+        N/m, N s/m, s.
+    scheme : str
+        ``trapezoidal``, ``printed`` or ``central_mean``.
+    """
+
+    def __new__(cls, k0: ArrayLike, s0: ArrayLike, k1: float, c1: float, step: float, scheme: str) -> MaxwellNarx: ...
+    def simulate_free_run(
+        self, start: Sequence[float], drive: ArrayLike, length: ArrayLike, limit: float
+    ) -> NDArray[np.float64]:
+        """Forces (N,) in N; the first two are `start`."""

@@ -3,10 +3,12 @@
 pub use connection::ConnectionError;
 pub use drive::DriveError;
 pub use linkage::LinkageError;
+pub use narx::NarxError;
 
 mod connection;
 mod drive;
 mod linkage;
+mod narx;
 
 /// An input or a computation that has no physical meaning.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -279,12 +281,21 @@ pub enum Error {
     /// A linkage that cannot be closed, or not be solved for its motion.
     #[error("{0}")]
     Linkage(#[from] LinkageError),
+    /// A NARX model that cannot be as described, or records that cannot tell it.
+    #[error("{0}")]
+    Narx(Box<NarxError>),
     /// A computation left the finite numbers.
     #[error("{0}")]
     Diverged(Box<Diverged>),
     /// The caller asked to stop.
     #[error("the computation was interrupted; start it again to get its result")]
     Interrupted,
+}
+
+impl From<NarxError> for Error {
+    fn from(error: NarxError) -> Self {
+        Self::Narx(Box::new(error))
+    }
 }
 
 /// Shorthand for results of this crate.

@@ -28,6 +28,7 @@ pub mod live;
 pub mod model;
 pub mod motion;
 pub mod mount;
+pub mod narx;
 pub mod ode;
 pub mod prepared;
 pub mod samples;

@@ -24,10 +24,11 @@ const TREE: [&str; 16] = [
     "linkage",
 ];
 /// Parts that stand alone, each a rig of its own, and all that they may import besides themselves.
-const ALONE: [(&str, &[&str]); 12] = [
+const ALONE: [(&str, &[&str]); 13] = [
     ("error", &[]),
     ("scalar", &[]),
     ("table", &["error"]),
+    ("narx", &["error"]),
     ("delay", &["error", "scalar"]),
     ("ode", &["error", "scalar"]),
     ("integrator", &["error", "scalar", "ode"]),

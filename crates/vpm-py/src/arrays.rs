@@ -96,7 +96,9 @@ fn read(name: &str, array: &Bound<'_, PyAny>) -> PyResult<(Vec<f64>, Vec<usize>)
         ))
     })?;
     let view = array.as_array();
-    Ok((view.iter().copied().collect(), view.shape().to_vec()))
+    // Without gaps it is one copy of memory, which matters for records.
+    let values = view.as_slice().map_or_else(|| view.iter().copied().collect(), <[f64]>::to_vec);
+    Ok((values, view.shape().to_vec()))
 }
 
 fn wrong_shape(name: &str, wanted: &str, shape: &[usize]) -> PyErr {

@@ -9,6 +9,7 @@ mod dynamics;
 mod errors;
 mod interrupt;
 mod linkage;
+mod narx;
 mod planar;
 mod stepping;
 mod system;
@@ -24,6 +25,8 @@ mod _core {
     use crate::interrupt::stop_when;
     #[pymodule_export]
     use crate::linkage::{Karl, Leg, hyq_parameters};
+    #[pymodule_export]
+    use crate::narx::{MaxwellNarx, Narx, NarxStepper, narx_candidates, narx_fit, narx_select};
     #[pymodule_export]
     use crate::planar::PlanarArm;
     #[pymodule_export]

@@ -2,6 +2,7 @@
 
 from vpm.plot.bars import plot_candidates, plot_gap, plot_ladder, plot_parameters, plot_step_cost
 from vpm.plot.linear import plot_bode, plot_poles
+from vpm.plot.narx import plot_narx_run, plot_narx_terms
 from vpm.plot.scenarios import plot_scenario
 from vpm.plot.signals import (
     plot_channels,
@@ -23,6 +24,8 @@ __all__ = [
     "plot_correlation",
     "plot_gap",
     "plot_ladder",
+    "plot_narx_run",
+    "plot_narx_terms",
     "plot_parameters",
     "plot_pictures",
     "plot_poles",

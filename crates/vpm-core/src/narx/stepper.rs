@@ -1,0 +1,95 @@
+//! A simulation that is fed sample by sample, for use inside a control loop.
+
+use super::model::Narx;
+use super::program::Program;
+use crate::error::{NarxError, Result};
+
+/// Rows that a window moves along before it is moved back: the copy is spread over so many steps.
+const ROWS: usize = 256;
+
+/// The memory of a running model: a window that slides along a buffer. A step allocates nothing.
+#[derive(Clone, Debug)]
+pub struct Stepper {
+    program: Program,
+    buffer: Vec<f64>,
+    /// Where the window begins.
+    from: usize,
+    /// Where it begins at last.
+    end: usize,
+    longest: usize,
+}
+
+impl Stepper {
+    pub(super) fn new(model: &Narx) -> Self {
+        let program = model.program.clone();
+        let end = program.stride * ROWS;
+        let buffer = vec![0.0; end + program.reach()];
+        Self { longest: model.structure().longest_lag(), program, buffer, from: 0, end }
+    }
+
+    /// Sets the past: the last samples of the output and the rows of inputs, oldest first, both as long as the longest lag.
+    ///
+    /// # Errors
+    ///
+    /// Other lengths.
+    pub fn start(&mut self, output: &[f64], inputs: &[f64]) -> Result<()> {
+        let (stride, lag) = (self.program.stride, self.longest);
+        if output.len() != lag || inputs.len() != lag * (stride - 1) {
+            let needed = format!("looks back {lag} samples with {} inputs", stride - 1);
+            let found = format!("has {} outputs and {} numbers of inputs", output.len(), inputs.len());
+            let what = "the start".to_owned();
+            return Err(
+                NarxError::Count { what, found, needed, repair: "give exactly those rows, oldest first" }.into()
+            );
+        }
+        self.from = 0;
+        for (sample, &value) in output.iter().enumerate() {
+            let row = &mut self.buffer[sample * stride..][..stride];
+            row[0] = value;
+            row[1..].copy_from_slice(&inputs[sample * (stride - 1)..][..stride - 1]);
+        }
+        Ok(())
+    }
+
+    /// How many inputs a step takes.
+    pub fn inputs(&self) -> usize {
+        self.program.stride - 1
+    }
+
+    /// The output of this sample from its inputs and the **simulated** past; numbers missing in `inputs` count as zero.
+    #[inline]
+    pub fn step(&mut self, inputs: &[f64]) -> f64 {
+        let (row, value) = self.present(inputs);
+        self.buffer[row] = value;
+        self.advance();
+        value
+    }
+
+    /// As [`step`](Self::step), but the past of the next samples is what was **measured** here.
+    #[inline]
+    pub fn step_measured(&mut self, inputs: &[f64], measured: f64) -> f64 {
+        let (row, value) = self.present(inputs);
+        self.buffer[row] = measured;
+        self.advance();
+        value
+    }
+
+    /// Takes the inputs of this sample: where its row begins, and the output that the model gives for it.
+    #[inline]
+    fn present(&mut self, inputs: &[f64]) -> (usize, f64) {
+        let row = self.from + self.longest * self.program.stride;
+        for (at, place) in self.buffer[row + 1..row + self.program.stride].iter_mut().enumerate() {
+            *place = inputs.get(at).copied().unwrap_or(0.0);
+        }
+        (row, self.program.evaluate(&self.buffer, self.from))
+    }
+
+    #[inline]
+    fn advance(&mut self) {
+        self.from += self.program.stride;
+        if self.from >= self.end {
+            self.buffer.copy_within(self.from..self.from + self.program.window, 0);
+            self.from = 0;
+        }
+    }
+}

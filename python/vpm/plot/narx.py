@@ -1,0 +1,79 @@
+"""Pictures of NARX models: runs beside the record, and what each term explains."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vpm.plot.signals import draw_overlay, legend_above
+from vpm.plot.style import BLUE, INK, label, panels, styled, thinned
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Array = NDArray[np.float64]
+
+
+class NarxRunLike(Protocol):
+    """What `plot_narx_run` draws."""
+
+    @property
+    def kind(self) -> str:
+        """Free run or one-step prediction."""
+
+    @property
+    def record(self) -> str:
+        """Name of the record."""
+
+    @property
+    def output(self) -> str:
+        """Name of the output."""
+
+    @property
+    def unit(self) -> str:
+        """Its unit."""
+
+    @property
+    def time(self) -> Array:
+        """Shape (N,)."""
+
+    @property
+    def measured(self) -> Array:
+        """Shape (N,)."""
+
+    @property
+    def values(self) -> Array:
+        """Shape (N,)."""
+
+
+@styled
+def plot_narx_run(run: NarxRunLike) -> Figure:
+    """Draw the computed over the measured output, and their difference below."""
+    figure, axes = panels(2, height=1.9, share_x=True)
+    draw_overlay(axes[0][0], run.time, run.measured, run.values, [0])
+    axes[0][0].set_ylabel(label(run.output, run.unit))
+    legend_above(axes[0][0], 2, right=True)
+    axes[1][0].plot(*thinned(run.time, run.measured - run.values), color=BLUE)
+    axes[1][0].set_ylabel(label("difference", run.unit))
+    axes[1][0].set_xlabel("time")
+    figure.suptitle(f"{run.kind} on {run.record}")
+    return figure
+
+
+@styled
+def plot_narx_terms(names: Sequence[str], error_reduction: Array) -> Figure:
+    """Draw the share of the output's energy that is still unexplained after each term, in the order of choice."""
+    figure, axes = panels(1, height=0.8 + 0.22 * len(names))
+    axis = axes[0][0]
+    rest = np.maximum(1.0 - np.cumsum(np.nan_to_num(error_reduction)), np.finfo(np.float64).eps)
+    places = np.arange(len(names))
+    axis.plot(rest, places, "o-", color=BLUE)
+    axis.set_xscale("log")
+    axis.set_yticks(places, names)
+    axis.invert_yaxis()
+    axis.axvline(1.0, color=INK, linewidth=0.8)
+    axis.set_xlabel("unexplained share of the output's energy, after this term")
+    return figure
