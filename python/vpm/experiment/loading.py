@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from os import PathLike
@@ -13,8 +14,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from vpm.errors import ExperimentError, UnitError, near_match
 from vpm.experiment.grid import Source, check_finite, check_increasing, check_uniform, make_uniform
+from vpm.experiment.merge import merge_clocks
+from vpm.experiment.readers import open_log
+from vpm.experiment.readers.base import Log
 from vpm.experiment.record import Experiment
-from vpm.experiment.table import Table, missing_column, read_header, read_table
+from vpm.experiment.table import Table
 from vpm.units import parse_unit
 
 if TYPE_CHECKING:
@@ -47,6 +51,8 @@ class _Draft:
     columns: dict[str, Array] = field(default_factory=dict)
     units: dict[str, str] = field(default_factory=dict)
     delays: dict[str, float] = field(default_factory=dict)
+    clocks: dict[str, Array] = field(default_factory=dict)
+    shift: float = 0.0
     history: list[str] = field(default_factory=list)
     unused: tuple[str, ...] = ()
 
@@ -118,25 +124,31 @@ def _channel_table(
 
 
 def _mapped_draft(path: str | PathLike[str], table: Mapping[str, ChannelEntry], model: Model | None) -> _Draft:
-    header, _ = read_header(path)
-    present = _present_columns(path, table, header)
-    content = read_table(path, list(present.values()))
+    log = open_log(path)
+    present = _present_columns(path, table, log)
+    content = log.read(list(present.values()), present["time"])
     source = Source(str(path), content.lines, str(path))
     entry = table["time"]
     clock_factor, _ = _to_si(entry.unit, "time", None, str(path), expected="s")
-    draft = _Draft(source, (content.columns[entry.column] * entry.scale + entry.offset) * clock_factor)
-    draft.history.append(f"Read {draft.time.size} rows of {Path(path).name}.")
-    draft.unused = tuple(column for column in header if column not in present.values())
+    if present["time"] in content.stamps and clock_factor * entry.scale != 1.0:
+        raise ExperimentError(
+            f'{path}: the clock "{entry.column}" holds stamps, which are read in seconds, but its entry makes '
+            f'{clock_factor * entry.scale:g} s of each; write unit = "s" and no scale',
+            path=str(path),
+            channel="time",
+        )
+    draft = _Draft(source, (content.columns[present["time"]] * entry.scale + entry.offset) * clock_factor)
+    draft.shift = entry.offset * clock_factor
+    draft.history += [f"Read {draft.time.size} rows of {Path(path).name}.", *content.notes]
+    draft.unused = tuple(column for column in log.header if column not in present.values())
     for channel, entry in table.items():
         if channel != "time":
-            _map_channel(draft, content, channel, entry, present=channel in present, model=model)
+            _map_channel(draft, content, channel, entry, present.get(channel), model)
     return draft
 
 
-def _present_columns(
-    path: str | PathLike[str], table: Mapping[str, ChannelEntry], header: tuple[str, ...]
-) -> dict[str, str]:
-    """Column of each channel that the file has; the others have to be optional."""
+def _present_columns(path: str | PathLike[str], table: Mapping[str, ChannelEntry], log: Log) -> dict[str, str]:
+    """Column of each channel that the file has, by its name there; the others have to be optional."""
     if "time" not in table:
         raise ExperimentError(
             f'{path}: the channel table maps no column to "time"; add time = {{ column = "...", unit = "s" }}',
@@ -145,33 +157,40 @@ def _present_columns(
     owners: dict[str, str] = {}
     present = {}
     for channel, entry in table.items():
-        if entry.column in owners:
+        found = log.find(entry.column)
+        column = found or entry.column
+        if column in owners:
             raise ExperimentError(
-                f'{path}: the column "{entry.column}" is mapped to both "{owners[entry.column]}" and "{channel}"; '
+                f'{path}: the column "{entry.column}" is mapped to both "{owners[column]}" and "{channel}"; '
                 "map it once",
                 path=str(path),
                 channel=channel,
             )
-        owners[entry.column] = channel
-        if entry.column in header:
-            present[channel] = entry.column
-        elif not entry.optional or channel == "time":
-            raise missing_column(path, entry.column, header, channel)
+        owners[column] = channel
+        if found is not None:
+            present[channel] = found
+        elif not entry.optional or channel == "time" or entry.column in log.refused:
+            raise log.missing(entry.column, channel)
     return present
 
 
 def _map_channel(
-    draft: _Draft, content: Table, channel: str, entry: ChannelEntry, *, present: bool, model: Model | None
+    draft: _Draft, content: Table, channel: str, entry: ChannelEntry, column: str | None, model: Model | None
 ) -> None:
     """Scale, shift and convert one column: value = (column * scale + offset) in the unit of the entry."""
     factor, unit = _to_si(entry.unit, channel, model, draft.source.name)
     draft.units[channel] = unit
-    if not present:
+    if column is None:
         draft.columns[channel] = np.zeros(draft.time.size)
         draft.history.append(f'{channel} is zero, because the file has no column "{entry.column}" and it is optional.')
         return
-    raw = content.columns[entry.column]
-    check_finite(raw, draft.time, f'column "{entry.column}" ({channel})', draft.source, channel=channel)
+    raw = content.columns[column]
+    own = content.clocks.get(column)
+    if own is not None:
+        draft.clocks[channel] = own + draft.shift
+    check_finite(
+        raw, draft.time if own is None else own, f'column "{entry.column}" ({channel})', draft.source, channel=channel
+    )
     draft.columns[channel] = (raw * entry.scale + entry.offset) * factor
     words = [f'{channel} is column "{entry.column}"']
     if entry.scale != 1.0:
@@ -186,29 +205,47 @@ def _map_channel(
 
 def _plain_draft(path: str | PathLike[str]) -> _Draft:
     """Every column a channel of its own name; a unit may stand in brackets behind it."""
-    content = read_table(path)
-    names = {column: _bracketed(column) for column in content.header}
-    clocks = [column for column, (name, _) in names.items() if name in TIME_COLUMNS]
-    if not clocks:
-        raise ExperimentError(
-            f"{path} has no column named {', '.join(TIME_COLUMNS)}, its columns are {', '.join(content.header)}; "
-            "give a channel table that says which one is the clock",
-            path=str(path),
-        )
+    log = open_log(path)
+    names = {column: _stated(column, log) for column in log.header}
+    clock = _clock_column(path, names)
+    content = log.read(log.header, clock)
     source = Source(str(path), content.lines, str(path))
-    clock_unit = names[clocks[0]][1]
-    factor, _ = _to_si(clock_unit or "s", "time", None, str(path), expected="s")
-    draft = _Draft(source, content.columns[clocks[0]] * factor)
-    draft.history.append(f'Read {draft.time.size} rows of {Path(path).name}; the clock is column "{clocks[0]}".')
+    factor, _ = _to_si(names[clock][1] or "s", "time", None, str(path), expected="s")
+    draft = _Draft(source, content.columns[clock] * factor, clocks=dict(content.clocks))
+    draft.history.append(f'Read {draft.time.size} rows of {Path(path).name}; the clock is column "{clock}".')
+    draft.history += content.notes
     for column, (name, stated) in names.items():
-        if column == clocks[0]:
+        if column == clock:
             continue
-        check_finite(content.columns[column], draft.time, f'column "{column}"', source, channel=name)
+        own = content.clocks.get(column, draft.time)
+        check_finite(content.columns[column], own, f'column "{column}"', source, channel=name)
         factor, draft.units[name] = _to_si(stated or "1", name, None, str(path))
         draft.columns[name] = content.columns[column] * factor
         how = f"converted from {stated} to {draft.units[name]}" if stated else "as it is, its unit is not stated"
         draft.history.append(f'{name} is column "{column}", {how}.')
     return draft
+
+
+def _clock_column(path: str | PathLike[str], names: Mapping[str, tuple[str, str]]) -> str:
+    """The column that is named like a clock; in files with groups, the only one whose last word is."""
+    clocks = [column for column, (name, _) in names.items() if name in TIME_COLUMNS]
+    inner = [column for column, (name, _) in names.items() if re.split(r"[./]", name)[-1] in TIME_COLUMNS]
+    if not clocks and len(inner) == 1:
+        clocks = inner
+    if not clocks:
+        raise ExperimentError(
+            f"{path} has no column named {', '.join(TIME_COLUMNS)}, its columns are {', '.join(names)}; "
+            "give a channel table that says which one is the clock",
+            path=str(path),
+        )
+    return clocks[0]
+
+
+def _stated(column: str, log: Log) -> tuple[str, str]:
+    """Name and unit of a column: the unit that the file states, or in brackets behind the name."""
+    if column in log.units:
+        return column, log.units[column]
+    return _bracketed(column) if log.bracketed_units else (column, "")
 
 
 def _bracketed(column: str) -> tuple[str, str]:
@@ -242,6 +279,11 @@ def _finish(draft: _Draft, name: str, irregular: str, resample: float | None) ->
         raise ExperimentError(f'irregular="{irregular}" is not known; choose "error" or "interpolate"')
     check_finite(draft.time, draft.time, "the time", draft.source, channel="time")
     check_increasing(draft.time, draft.source)
+    if draft.clocks:
+        draft.time, draft.columns, merged = merge_clocks(
+            draft.time, draft.columns, draft.clocks, draft.source, irregular=irregular
+        )
+        draft.history += merged
     for channel, column in draft.columns.items():
         check_finite(column, draft.time, f'the channel "{channel}"', draft.source, channel=channel)
     channels = tuple(draft.columns)
