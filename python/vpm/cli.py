@@ -16,6 +16,7 @@ from typer.core import TyperGroup
 
 from vpm import __version__
 from vpm.errors import ValidityWarning, VpmError
+from vpm.excite_command import app as excite_app
 from vpm.simulate import INTEGRATORS
 
 if TYPE_CHECKING:
@@ -69,6 +70,7 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
+app.add_typer(excite_app, name="excite")
 console = Console(highlight=False, soft_wrap=True)
 errors = Console(stderr=True, highlight=False, soft_wrap=True)
 
