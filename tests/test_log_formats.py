@@ -315,6 +315,11 @@ def test_what_is_wrong_in_a_bag(tmp_path: Path) -> None:
             for k in range(COUNT)
         ]
         bag.send("/joint_states", "sensor_msgs/msg/JointState", states)
+        bag.send("/empty", "sensor_msgs/msg/JointState", [])
+    with pytest.raises(ExperimentError, match=r'"/empty" for the channel "axis\.position" has no messages; record it'):
+        Experiment.load(tmp_path / "bag", table("time", "/empty.position[0]"))
+    with pytest.raises(ExperimentError, match=r'"/joint_states\.header\.stamp" is a clock and no channel'):
+        Experiment.load(tmp_path / "bag", table("/joint_states.time", "/joint_states.header.stamp"))
     with pytest.raises(
         ExperimentError, match=r"message 20 of /joint_states does not lie after.*map time to /joint_states\.time"
     ):
@@ -393,3 +398,18 @@ def test_a_bag_is_identified_from_the_command_line(tmp_path: Path) -> None:
     assert isinstance(refused.exception, ExperimentError)
     done = RUNNER.invoke(app, [*command, "--interpolate"])
     assert done.exit_code == 0, done.output
+
+
+@needs("rosbags")
+def test_joints_of_two_senders_on_one_topic(tmp_path: Path) -> None:
+    """An arm and a gripper publish in turn; each joint is read from the messages that hold it."""
+    bag = Bag(tmp_path / "bag")
+    with bag.writer:
+        messages = []
+        for k, t in enumerate(TIME):
+            stamp = START + 10_000_000 * k
+            messages.append((stamp, bag.state(stamp, ["shoulder"], np.array([np.sin(3.0 * t)]))))
+            late = stamp + 5_000_000
+            messages.append((late, bag.state(late, ["finger"], np.array([t + 0.005]))))
+        bag.send("/joint_states", "sensor_msgs/msg/JointState", messages)
+    check(Experiment.load(tmp_path / "bag", table("time", "/joint_states.position[shoulder]")))

@@ -78,10 +78,7 @@ ModelPath = Annotated[Path, typer.Argument(metavar="MODEL", help="Model file (TO
 FORMATS = "CSV, Parquet, MAT, HDF5, ROS bag, MCAP"
 Logs = Annotated[list[Path], typer.Argument(metavar="LOG...", help=f"Measured records ({FORMATS}).")]
 OneLog = Annotated[Path, typer.Argument(metavar="LOG", help=f"Measured record ({FORMATS}).")]
-Interpolate = Annotated[
-    bool,
-    typer.Option("--interpolate", help="Bring uneven steps and channels with clocks of their own to one grid."),
-]
+Interpolate = Annotated[bool, typer.Option("--interpolate", help="Bring uneven steps and clocks to one grid.")]
 Channels = Annotated[
     Path | None, typer.Option(help="Channel table (TOML); by default the [channels] table of the model file.")
 ]

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
-from glob import glob, has_magic
 from os import PathLike
-from pathlib import Path
 from typing import TYPE_CHECKING, Literal, Self, overload
 
 from vpm.errors import ExperimentError, near_match
+from vpm.experiment.membership import check_channels, files_of, record_names, shared
 from vpm.experiment.record import Experiment
 from vpm.results import Result
 
@@ -50,7 +48,7 @@ class Campaign(Result, Sequence[Experiment]):
                     f'records {self.names.index(record.name) + 1} and {at + 1} of the campaign are both named "'
                     f'{record.name}"; give one of them another name'
                 )
-            _check_channels(first, record)
+            check_channels(first, record)
 
     @classmethod
     def load(
@@ -85,16 +83,16 @@ class Campaign(Result, Sequence[Experiment]):
             No file fits a pattern, a file cannot be right, or the files do not belong together.
         """
         given = [paths] if isinstance(paths, str | PathLike) else list(paths)
-        files = [file for path in given for file in _files(path)]
+        files = [file for path in given for file in files_of(path)]
         if len(files) == 1 and files[0].suffix == ".npz":
             stored = Result.load(files[0])
             if isinstance(stored, cls):
                 return stored
         records = [
             Experiment.load(file, channels, model, irregular=irregular, resample=resample, name=name)
-            for file, name in zip(files, _record_names(files), strict=True)
+            for file, name in zip(files, record_names(files), strict=True)
         ]
-        return cls(tuple(_shared(records) if common else records))
+        return cls(tuple(shared(records) if common else records))
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -244,42 +242,3 @@ class Campaign(Result, Sequence[Experiment]):
             "duration_s": [record.duration for record in self.experiments],
             "rate_Hz": [record.rate for record in self.experiments],
         }
-
-
-def _check_channels(first: Experiment, record: Experiment) -> None:
-    for one, other in ((first, record), (record, first)):
-        lost = [channel for channel in one.channels if channel not in other]
-        if lost:
-            raise ExperimentError(
-                f'{other.name} has no channel "{lost[0]}", which {one.name} has; map the same channels in every file, '
-                "mark it optional in the channel table if zeros are meant, or load with common=True",
-                channel=lost[0],
-            )
-    for channel in first.channels:
-        if first.unit(channel) != record.unit(channel):
-            raise ExperimentError(
-                f'"{channel}" is in {first.unit(channel)} in {first.name} and in {record.unit(channel)} in '
-                f"{record.name}; state its unit in one channel table for all files",
-                channel=channel,
-            )
-
-
-def _shared(records: Sequence[Experiment]) -> list[Experiment]:
-    """Records with the channels that all of them have, in the order of the first."""
-    common = [channel for channel in records[0].channels if all(channel in record for record in records)]
-    return [record.select(common) for record in records]
-
-
-def _files(path: str | PathLike[str]) -> list[Path]:
-    if not has_magic(str(path)) or Path(path).exists():
-        return [Path(path)]
-    found = sorted(glob(str(path), recursive=True))  # noqa: PTH207  Path.glob refuses absolute patterns
-    if not found:
-        raise ExperimentError(f'no file fits the pattern "{path}"; check the folder', path=str(path))
-    return [Path(file) for file in found]
-
-
-def _record_names(files: Sequence[Path]) -> list[str]:
-    """Names of the files without their ending, with the folder before them where that alone tells them apart."""
-    counts = Counter(file.stem for file in files)
-    return [file.stem if counts[file.stem] == 1 else f"{file.parent.name}/{file.stem}" for file in files]

@@ -86,9 +86,17 @@ class BagLog(Log):
         parsed = parse_field(rest, topic.first)
         return None if parsed is None else f"{topic.name}.{parsed.text}"
 
+    def missing(self, column: str, channel: str = "") -> ExperimentError:
+        """Error for a column that is not there, or whose topic is empty; see `Log.missing`."""
+        topic = f"/{column.partition('.')[0].lstrip('/')}"
+        return super().missing(topic if topic in self.refused else column, channel)
+
     def read(self, columns: Sequence[str], clock: str) -> Table:
         """Columns by name, each with its own times; see `Log.read`."""
         wanted = [column for column in columns if column != clock]
+        for column in wanted:
+            if column == "time" or column.partition(".")[2] in {STAMP, RECEIVED}:
+                raise self.error(f'{self.path}: "{column}" is a clock and no channel; map it to time only')
         base, kind = self._clock(wanted, clock)
         stamped = {name: kind == STAMP and has_stamp(topic.first) for name, topic in self._topics.items()}
         series = self._collect([*wanted, f"{base}.{RECEIVED}"], stamped)
