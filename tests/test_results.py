@@ -114,7 +114,7 @@ def test_tables(monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(VpmError, match="no table form"):
         Other(1.0).to_frame()
     monkeypatch.setitem(__import__("sys").modules, "pandas", None)
-    with pytest.raises(MissingExtraError, match=r'pip install "vpm-dynamics\[logs\]"'):
+    with pytest.raises(MissingExtraError, match=r'pip install "vpm-dynamics\[frames\]"'):
         sample.to_frame()
 
 

@@ -16,7 +16,7 @@ from vpm.catalogue import EFFECTS
 from vpm.compare import Comparison, compare
 from vpm.discrepancy import Diagnosis, diagnose
 from vpm.errors import VpmError
-from vpm.experiment import Experiment
+from vpm.experiment import Campaign, Experiment
 from vpm.identify import Fit, identify
 from vpm.linear import LinearModel
 from vpm.model import Dynamics, Model
@@ -32,6 +32,7 @@ __version__ = version("vpm-dynamics")
 __all__ = [
     "EFFECTS",
     "BudgetReport",
+    "Campaign",
     "Comparison",
     "Diagnosis",
     "Dynamics",

@@ -16,6 +16,7 @@ from typer.core import TyperGroup
 
 from vpm import __version__
 from vpm.errors import ValidityWarning, VpmError
+from vpm.excite_command import app as excite_app
 from vpm.simulate import INTEGRATORS
 
 if TYPE_CHECKING:
@@ -69,12 +70,15 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
+app.add_typer(excite_app, name="excite")
 console = Console(highlight=False, soft_wrap=True)
 errors = Console(stderr=True, highlight=False, soft_wrap=True)
 
 ModelPath = Annotated[Path, typer.Argument(metavar="MODEL", help="Model file (TOML).")]
-Logs = Annotated[list[Path], typer.Argument(metavar="LOG...", help="Measured records (CSV).")]
-OneLog = Annotated[Path, typer.Argument(metavar="LOG", help="Measured record (CSV).")]
+FORMATS = "CSV, Parquet, MAT, HDF5, ROS bag, MCAP"
+Logs = Annotated[list[Path], typer.Argument(metavar="LOG...", help=f"Measured records ({FORMATS}).")]
+OneLog = Annotated[Path, typer.Argument(metavar="LOG", help=f"Measured record ({FORMATS}).")]
+Interpolate = Annotated[bool, typer.Option("--interpolate", help="Bring uneven steps and clocks to one grid.")]
 Channels = Annotated[
     Path | None, typer.Option(help="Channel table (TOML); by default the [channels] table of the model file.")
 ]
@@ -131,7 +135,9 @@ def info(model: Annotated[Path | None, typer.Argument(metavar="[MODEL]", help="M
 )
 def simulate(
     model: Annotated[Path, typer.Argument(metavar="FILE", help="Scenario, or model file that a LOG goes with (TOML).")],
-    log: Annotated[Path | None, typer.Argument(metavar="LOG", help="Measured record (CSV), for a model file.")] = None,
+    log: Annotated[
+        Path | None, typer.Argument(metavar="LOG", help=f"Measured record ({FORMATS}), for a model file.")
+    ] = None,
     mode: Annotated[
         str | None,
         typer.Option(
@@ -144,6 +150,7 @@ def simulate(
         typer.Option(help=f"{', '.join(INTEGRATORS)}; auto by default, or what the scenario says."),
     ] = None,
     channels: Channels = None,
+    interpolate: Interpolate = False,
     out: Annotated[Path | None, typer.Option(help="Save the run or the runs (NPZ) here.")] = None,
     plot: Annotated[
         Path | None,
@@ -167,7 +174,7 @@ def simulate(
             "the key scenario"
         )
     else:
-        _simulate_log(model, log, mode or "free_run", integrator or "auto", channels, out, plot)
+        _simulate_log(model, log, mode or "free_run", integrator or "auto", channels, interpolate, out, plot)
 
 
 def _simulate_scenario(path: Path, out: Path | None, plot: Path | None) -> None:
@@ -189,12 +196,19 @@ def _simulate_scenario(path: Path, out: Path | None, plot: Path | None) -> None:
 
 
 def _simulate_log(
-    model: Path, log: Path, mode: str, integrator: str, channels: Path | None, out: Path | None, plot: Path | None
+    model: Path,
+    log: Path,
+    mode: str,
+    integrator: str,
+    channels: Path | None,
+    interpolate: bool,
+    out: Path | None,
+    plot: Path | None,
 ) -> None:
     from vpm.compare import compare as compare_run
     from vpm.simulate import simulate as simulate_log
 
-    machine, record = _load(model, log, channels)
+    machine, record = _load(model, log, channels, interpolate)
     with _warnings_told():
         run = simulate_log(machine, record, mode, integrator=integrator)
     console.print(repr(run), markup=False)
@@ -213,6 +227,7 @@ def compare(
     log: OneLog,
     mode: Mode = "inverse_dynamics",
     channels: Channels = None,
+    interpolate: Interpolate = False,
     cutoff: Cutoff = None,
     plot: Plot = None,
 ) -> None:
@@ -220,7 +235,7 @@ def compare(
     from vpm.compare import compare as compare_run
     from vpm.simulate import simulate as simulate_log
 
-    machine, record = _load(model, log, channels)
+    machine, record = _load(model, log, channels, interpolate)
     with _warnings_told():
         run = simulate_log(machine, record, mode, cutoff=cutoff)
     comparison = compare_run(run, record)
@@ -242,13 +257,14 @@ def identify(
     ] = None,
     mode: Mode = "inverse_dynamics",
     channels: Channels = None,
+    interpolate: Interpolate = False,
     cutoff: Cutoff = None,
     out: Annotated[Path | None, typer.Option(help="Write the fitted model (TOML) here.")] = None,
 ) -> None:
     """Fit parameters to one or several logs."""
     from vpm.identify import identify as fit_logs
 
-    machine, records = _load_all(model, logs, channels)
+    machine, records = _load_all(model, logs, channels, interpolate)
     with _progress() as tell:
         fit = fit_logs(
             machine,
@@ -280,14 +296,15 @@ def diagnose(
     out: Out = Path("report"),
     effect: Annotated[list[str] | None, typer.Option(help="Try only these effects; repeat.")] = None,
     channels: Channels = None,
+    interpolate: Interpolate = False,
     cutoff: Cutoff = None,
 ) -> None:
     """Name the physical effect that a model is missing, with evidence on unseen data."""
     from vpm.discrepancy import diagnose as find_missing
     from vpm.report import print_story, write_report
 
-    machine, records = _load_all(model, logs, channels)
-    unseen = [_record(path, machine, channels) for path in validate or []]
+    machine, records = _load_all(model, logs, channels, interpolate)
+    unseen = [_record(path, machine, channels, interpolate) for path in validate or []]
     with _progress() as tell:
         diagnosis = find_missing(machine, records, unseen or None, effects=effect or None, cutoff=cutoff, tell=tell)
     print_story(diagnosis, console)
@@ -317,12 +334,13 @@ def simplify(
     rate: Annotated[float, typer.Option(help="Rate of the controller, Hz.")] = 1000.0,
     tolerance: Annotated[float, typer.Option(help="Largest loss of accuracy, as a share of the signal.")] = 0.02,
     channels: Channels = None,
+    interpolate: Interpolate = False,
     out: Annotated[Path | None, typer.Option(help="Write the simplified model (TOML) here.")] = None,
 ) -> None:
     """Find the cheapest model that still tells the truth within a tolerance."""
     from vpm.simplify import simplify as find_cheapest
 
-    machine, records = _load_all(model, logs, channels)
+    machine, records = _load_all(model, logs, channels, interpolate)
     with _progress() as tell:
         ladder = find_cheapest(machine, records, rate=rate, tolerance=tolerance, tell=tell)
     console.print(str(ladder), markup=False)
@@ -379,20 +397,22 @@ def _model(path: Path) -> Model:
     return Model.load(path)
 
 
-def _record(path: Path, model: Model, channels: Path | None) -> Experiment:
+def _record(path: Path, model: Model, channels: Path | None, interpolate: bool) -> Experiment:
     from vpm.experiment import Experiment
 
-    return Experiment.load(path, channels=channels, model=model)
+    return Experiment.load(path, channels, model, irregular="interpolate" if interpolate else "error")
 
 
-def _load(model: Path, log: Path, channels: Path | None) -> tuple[Model, Experiment]:
+def _load(model: Path, log: Path, channels: Path | None, interpolate: bool) -> tuple[Model, Experiment]:
     machine = _model(model)
-    return machine, _record(log, machine, channels)
+    return machine, _record(log, machine, channels, interpolate)
 
 
-def _load_all(model: Path, logs: list[Path], channels: Path | None) -> tuple[Model, list[Experiment]]:
+def _load_all(
+    model: Path, logs: list[Path], channels: Path | None, interpolate: bool
+) -> tuple[Model, list[Experiment]]:
     machine = _model(model)
-    return machine, [_record(log, machine, channels) for log in logs]
+    return machine, [_record(log, machine, channels, interpolate) for log in logs]
 
 
 @contextmanager

@@ -117,6 +117,10 @@ class DiagnosisError(VpmError):
     """A diagnosis was asked for in a way that cannot be done: no record, unknown effect, no motion measured."""
 
 
+class ExcitationError(VpmError):
+    """An excitation was asked for that cannot be: a band that samples do not carry, limits that allow no motion."""
+
+
 class IdentificationError(VpmError):
     """The asked parameters cannot be found from the given records.
 

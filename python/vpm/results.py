@@ -124,7 +124,7 @@ class Result(Storable):
         try:
             from pandas import DataFrame
         except ImportError as error:
-            raise MissingExtraError("pandas", "logs") from error
+            raise MissingExtraError("pandas", "frames") from error
         return DataFrame(columns)
 
     def save(self, path: str | PathLike[str]) -> Path:

@@ -1,5 +1,6 @@
 """Measured records: reading and checking logs, filtering them, and the motion and the noise in them."""
 
+from vpm.experiment.campaign import Campaign
 from vpm.experiment.cutoff import CutoffChoice, choose_cutoff
 from vpm.experiment.motion import Motion, common_cutoff, motion
 from vpm.experiment.noise import noise_std, quantisation_step
@@ -7,6 +8,7 @@ from vpm.experiment.record import Experiment
 from vpm.experiment.signal import decimation_for, differentiate, lowpass, parallel_filter
 
 __all__ = [
+    "Campaign",
     "CutoffChoice",
     "Experiment",
     "Motion",

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
@@ -11,19 +10,16 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vpm.errors import ExperimentError, UnitError, near_match
+from vpm.errors import ExperimentError, near_match
+from vpm.experiment.draft import Draft, mapped_draft, plain_draft, to_si
 from vpm.experiment.grid import Source, check_finite, check_increasing, check_uniform, make_uniform
+from vpm.experiment.merge import merge_clocks
 from vpm.experiment.record import Experiment
-from vpm.experiment.table import Table, missing_column, read_header, read_table
-from vpm.units import parse_unit
 
 if TYPE_CHECKING:
     from vpm.model import ChannelEntry, Model
 
 Array = NDArray[np.float64]
-
-#: Names of a clock column where no channel table says which it is.
-TIME_COLUMNS = ("time", "time_s", "t")
 
 
 class Parts(NamedTuple):
@@ -38,19 +34,6 @@ class Parts(NamedTuple):
     unused_columns: tuple[str, ...]
 
 
-@dataclass
-class _Draft:
-    """A record under construction."""
-
-    source: Source
-    time: Array
-    columns: dict[str, Array] = field(default_factory=dict)
-    units: dict[str, str] = field(default_factory=dict)
-    delays: dict[str, float] = field(default_factory=dict)
-    history: list[str] = field(default_factory=list)
-    unused: tuple[str, ...] = ()
-
-
 def load_parts(
     path: str | PathLike[str],
     channels: Mapping[str, ChannelEntry] | str | PathLike[str] | None,
@@ -62,7 +45,7 @@ def load_parts(
 ) -> Parts:
     """Parts of the record in a file; see `Experiment.load`."""
     table = _channel_table(channels, model)
-    draft = _plain_draft(path) if table is None else _mapped_draft(path, table, model)
+    draft = plain_draft(path) if table is None else mapped_draft(path, table, model)
     return _finish(draft, name or Path(path).stem, irregular, resample)
 
 
@@ -86,7 +69,7 @@ def array_parts(
                 f'{name}: a unit is given for "{channel}", which has no values; {near_match(channel, values)}',
                 channel=channel,
             )
-    draft = _Draft(Source(name), clock)
+    draft = Draft(Source(name), clock)
     draft.history.append(f"Taken from arrays of {clock.size} samples.")
     for channel, given in values.items():
         column = np.asarray(given, dtype=np.float64)
@@ -97,7 +80,7 @@ def array_parts(
                 channel=channel,
             )
         unit = units.get(channel) or (model.channel_unit(channel) if model is not None else "1")
-        factor, draft.units[channel] = _to_si(unit, channel, model, name)
+        factor, draft.units[channel] = to_si(unit, channel, model, name)
         draft.columns[channel] = column * factor
         if factor != 1.0:
             draft.history.append(f"{channel} was converted from {unit} to {draft.units[channel]}.")
@@ -117,131 +100,17 @@ def _channel_table(
     return channels
 
 
-def _mapped_draft(path: str | PathLike[str], table: Mapping[str, ChannelEntry], model: Model | None) -> _Draft:
-    header, _ = read_header(path)
-    present = _present_columns(path, table, header)
-    content = read_table(path, list(present.values()))
-    source = Source(str(path), content.lines, str(path))
-    entry = table["time"]
-    clock_factor, _ = _to_si(entry.unit, "time", None, str(path), expected="s")
-    draft = _Draft(source, (content.columns[entry.column] * entry.scale + entry.offset) * clock_factor)
-    draft.history.append(f"Read {draft.time.size} rows of {Path(path).name}.")
-    draft.unused = tuple(column for column in header if column not in present.values())
-    for channel, entry in table.items():
-        if channel != "time":
-            _map_channel(draft, content, channel, entry, present=channel in present, model=model)
-    return draft
-
-
-def _present_columns(
-    path: str | PathLike[str], table: Mapping[str, ChannelEntry], header: tuple[str, ...]
-) -> dict[str, str]:
-    """Column of each channel that the file has; the others have to be optional."""
-    if "time" not in table:
-        raise ExperimentError(
-            f'{path}: the channel table maps no column to "time"; add time = {{ column = "...", unit = "s" }}',
-            path=str(path),
-        )
-    owners: dict[str, str] = {}
-    present = {}
-    for channel, entry in table.items():
-        if entry.column in owners:
-            raise ExperimentError(
-                f'{path}: the column "{entry.column}" is mapped to both "{owners[entry.column]}" and "{channel}"; '
-                "map it once",
-                path=str(path),
-                channel=channel,
-            )
-        owners[entry.column] = channel
-        if entry.column in header:
-            present[channel] = entry.column
-        elif not entry.optional or channel == "time":
-            raise missing_column(path, entry.column, header, channel)
-    return present
-
-
-def _map_channel(
-    draft: _Draft, content: Table, channel: str, entry: ChannelEntry, *, present: bool, model: Model | None
-) -> None:
-    """Scale, shift and convert one column: value = (column * scale + offset) in the unit of the entry."""
-    factor, unit = _to_si(entry.unit, channel, model, draft.source.name)
-    draft.units[channel] = unit
-    if not present:
-        draft.columns[channel] = np.zeros(draft.time.size)
-        draft.history.append(f'{channel} is zero, because the file has no column "{entry.column}" and it is optional.')
-        return
-    raw = content.columns[entry.column]
-    check_finite(raw, draft.time, f'column "{entry.column}" ({channel})', draft.source, channel=channel)
-    draft.columns[channel] = (raw * entry.scale + entry.offset) * factor
-    words = [f'{channel} is column "{entry.column}"']
-    if entry.scale != 1.0:
-        words.append(f"times {entry.scale:.9g}")
-    if entry.offset != 0.0:
-        words.append(f"plus {entry.offset:.9g} {entry.unit}")
-    words.append(f"in {entry.unit}" if factor == 1.0 else f"converted from {entry.unit} to {unit}")
-    draft.history.append(", ".join(words) + ".")
-    if entry.delay != 0.0:
-        draft.delays[channel] = entry.delay
-
-
-def _plain_draft(path: str | PathLike[str]) -> _Draft:
-    """Every column a channel of its own name; a unit may stand in brackets behind it."""
-    content = read_table(path)
-    names = {column: _bracketed(column) for column in content.header}
-    clocks = [column for column, (name, _) in names.items() if name in TIME_COLUMNS]
-    if not clocks:
-        raise ExperimentError(
-            f"{path} has no column named {', '.join(TIME_COLUMNS)}, its columns are {', '.join(content.header)}; "
-            "give a channel table that says which one is the clock",
-            path=str(path),
-        )
-    source = Source(str(path), content.lines, str(path))
-    clock_unit = names[clocks[0]][1]
-    factor, _ = _to_si(clock_unit or "s", "time", None, str(path), expected="s")
-    draft = _Draft(source, content.columns[clocks[0]] * factor)
-    draft.history.append(f'Read {draft.time.size} rows of {Path(path).name}; the clock is column "{clocks[0]}".')
-    for column, (name, stated) in names.items():
-        if column == clocks[0]:
-            continue
-        check_finite(content.columns[column], draft.time, f'column "{column}"', source, channel=name)
-        factor, draft.units[name] = _to_si(stated or "1", name, None, str(path))
-        draft.columns[name] = content.columns[column] * factor
-        how = f"converted from {stated} to {draft.units[name]}" if stated else "as it is, its unit is not stated"
-        draft.history.append(f'{name} is column "{column}", {how}.')
-    return draft
-
-
-def _bracketed(column: str) -> tuple[str, str]:
-    """Name and unit of ``q [mm]``; no unit without brackets."""
-    name, bracket, rest = column.partition("[")
-    return (name.strip(), rest[:-1].strip()) if bracket and rest.endswith("]") else (column, "")
-
-
-def _to_si(unit: str, channel: str, model: Model | None, where: str, expected: str | None = None) -> tuple[float, str]:
-    """Factor to SI and the SI unit, which has to be of the kind that the channel has in the model."""
-    wanted = model.channel_unit(channel) if model is not None else expected
-    try:
-        given = parse_unit(unit)
-    except UnitError as error:
-        raise UnitError(f"{where}, channel {channel}: {error}", unit=unit, expected=wanted) from error
-    if wanted is None:
-        return given.factor, given.si
-    target = parse_unit(wanted)
-    if given.dimension != target.dimension:
-        raise ExperimentError(
-            f'{where}: the channel "{channel}" is given in {unit} ({given.kind}), but it is in {wanted} '
-            f"({target.kind}); correct the unit or the column of its entry in the channel table",
-            channel=channel,
-        )
-    return given.factor / target.factor, wanted
-
-
-def _finish(draft: _Draft, name: str, irregular: str, resample: float | None) -> Parts:
+def _finish(draft: Draft, name: str, irregular: str, resample: float | None) -> Parts:
     """Check the clock, make it uniform if asked to, move back what lags, and resample."""
     if irregular not in {"error", "interpolate"}:
         raise ExperimentError(f'irregular="{irregular}" is not known; choose "error" or "interpolate"')
     check_finite(draft.time, draft.time, "the time", draft.source, channel="time")
     check_increasing(draft.time, draft.source)
+    if draft.clocks:
+        draft.time, draft.columns, merged = merge_clocks(
+            draft.time, draft.columns, draft.clocks, draft.source, irregular=irregular
+        )
+        draft.history += merged
     for channel, column in draft.columns.items():
         check_finite(column, draft.time, f'the channel "{channel}"', draft.source, channel=channel)
     channels = tuple(draft.columns)

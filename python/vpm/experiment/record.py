@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from os import PathLike
 from typing import TYPE_CHECKING, Literal, Self, TypedDict, Unpack
@@ -94,7 +94,10 @@ class Experiment(Result):
         resample: float | None = None,
         name: str | None = None,
     ) -> Self:
-        """Read a log from a CSV file, or one that `save` wrote.
+        """Read a log: CSV, Parquet, MATLAB, HDF5, a ROS bag or MCAP, or what `save` wrote.
+
+        The ending of the name says which. Formats beside CSV and MATLAB up to 7.2 need an extra (``parquet``,
+        ``hdf5``, ``ros``).
 
         A channel table says which column is which channel: ``value = (column * scale + offset)`` in its unit, which
         becomes SI, and a channel that lags the others by ``delay`` is moved back. Without any table every column is a
@@ -109,7 +112,7 @@ class Experiment(Result):
         model : Model, optional
             The channels have to be known to it and to have units of the right kind.
         irregular : {"error", "interpolate"}
-            What to do with missing samples and uneven steps.
+            What to do with missing samples, uneven steps, and channels that have clocks of their own.
         resample : float, optional
             Interpolate onto this rate, Hz, with an anti-aliasing filter where it is lower.
         name : str, optional
@@ -239,6 +242,23 @@ class Experiment(Result):
             sentence = f"Split at {fraction:g}: the {label} part, {time[0]:.6g} s ... {time[-1]:.6g} s."
             parts.append(self._changed(sentence, name=f"{self.name}-{label}", time=time, data=self.data[part]))
         return parts[0], parts[1]
+
+    def renamed(self, name: str) -> Self:
+        """The same record under another name."""
+        return replace(self, name=name)
+
+    def select(self, channels: Sequence[str]) -> Self:
+        """Record with some of its channels, in the order in which they are named."""
+        places = [self._index(channel) for channel in channels]
+        if places == list(range(len(self.channels))):
+            return self
+        left = [channel for channel in self.channels if channel not in channels]
+        return self._changed(
+            f"Left out {', '.join(left)}." if left else "The channels were put in another order.",
+            data=self.data[:, places],
+            channels=tuple(channels),
+            units=tuple(self.units[place] for place in places),
+        )
 
     def resample(self, rate: float) -> Self:
         """Record on a uniform grid of another rate, Hz.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import islice
 from os import PathLike
 from pathlib import Path
@@ -32,13 +32,22 @@ class Table:
         All column names.
     columns : dict of str to ndarray, shape (N,)
         Those that were asked for.
-    lines : ndarray of int, shape (N,)
-        Line of the file for each row; counts from 1.
+    lines : ndarray of int, shape (N,), or None
+        Line of the file for each row, which counts from 1; None where a file has no lines.
+    stamps : frozenset of str
+        Columns that are times and so are in seconds already.
+    clocks : dict of str to ndarray
+        Times of the samples of a column that has a clock of its own, s; such columns differ in length.
+    notes : tuple of str
+        Sentences for the history of the record.
     """
 
     header: tuple[str, ...]
     columns: dict[str, Array]
-    lines: NDArray[np.int64]
+    lines: NDArray[np.int64] | None
+    stamps: frozenset[str] = frozenset()
+    clocks: dict[str, Array] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
 
 
 def read_header(path: str | PathLike[str]) -> tuple[tuple[str, ...], str]:

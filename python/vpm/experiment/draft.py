@@ -1,0 +1,194 @@
+"""Columns of a file as channels: which column is which, in what unit, scaled, shifted and converted."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vpm.errors import ExperimentError, UnitError
+from vpm.experiment.grid import Source, check_finite
+from vpm.experiment.readers import open_log
+from vpm.experiment.readers.base import Log
+from vpm.experiment.table import Table
+from vpm.units import parse_unit
+
+if TYPE_CHECKING:
+    from vpm.model import ChannelEntry, Model
+
+Array = NDArray[np.float64]
+
+#: Names of a clock column where no channel table says which it is.
+TIME_COLUMNS = ("time", "time_s", "t")
+
+
+@dataclass
+class Draft:
+    """A record under construction."""
+
+    source: Source
+    time: Array
+    columns: dict[str, Array] = field(default_factory=dict)
+    units: dict[str, str] = field(default_factory=dict)
+    delays: dict[str, float] = field(default_factory=dict)
+    clocks: dict[str, Array] = field(default_factory=dict)
+    shift: float = 0.0
+    history: list[str] = field(default_factory=list)
+    unused: tuple[str, ...] = ()
+
+
+def mapped_draft(path: str | PathLike[str], table: Mapping[str, ChannelEntry], model: Model | None) -> Draft:
+    """Columns that a channel table names."""
+    log = open_log(path)
+    present = _present_columns(path, table, log)
+    content = log.read(list(present.values()), present["time"])
+    source = Source(str(path), content.lines, str(path))
+    entry = table["time"]
+    clock_factor, _ = to_si(entry.unit, "time", None, str(path), expected="s")
+    if present["time"] in content.stamps and clock_factor * entry.scale != 1.0:
+        raise ExperimentError(
+            f'{path}: the clock "{entry.column}" holds stamps, which are read in seconds, but its entry makes '
+            f'{clock_factor * entry.scale:g} s of each; write unit = "s" and no scale',
+            path=str(path),
+            channel="time",
+        )
+    draft = Draft(source, (content.columns[present["time"]] * entry.scale + entry.offset) * clock_factor)
+    draft.shift = entry.offset * clock_factor
+    draft.history += [f"Read {draft.time.size} rows of {Path(path).name}.", *content.notes]
+    draft.unused = tuple(column for column in log.header if column not in present.values())
+    for channel, entry in table.items():
+        if channel != "time":
+            _map_channel(draft, content, channel, entry, present.get(channel), model)
+    return draft
+
+
+def _present_columns(path: str | PathLike[str], table: Mapping[str, ChannelEntry], log: Log) -> dict[str, str]:
+    """Column of each channel that the file has, by its name there; the others have to be optional."""
+    if "time" not in table:
+        raise ExperimentError(
+            f'{path}: the channel table maps no column to "time"; add time = {{ column = "...", unit = "s" }}',
+            path=str(path),
+        )
+    owners: dict[str, str] = {}
+    present = {}
+    for channel, entry in table.items():
+        found = log.find(entry.column)
+        column = found or entry.column
+        if column in owners:
+            raise ExperimentError(
+                f'{path}: the column "{entry.column}" is mapped to both "{owners[column]}" and "{channel}"; '
+                "map it once",
+                path=str(path),
+                channel=channel,
+            )
+        owners[column] = channel
+        if found is not None:
+            present[channel] = found
+        elif not entry.optional or channel == "time" or entry.column in log.refused:
+            raise log.missing(entry.column, channel)
+    return present
+
+
+def _map_channel(
+    draft: Draft, content: Table, channel: str, entry: ChannelEntry, column: str | None, model: Model | None
+) -> None:
+    """Scale, shift and convert one column: value = (column * scale + offset) in the unit of the entry."""
+    factor, unit = to_si(entry.unit, channel, model, draft.source.name)
+    draft.units[channel] = unit
+    if column is None:
+        draft.columns[channel] = np.zeros(draft.time.size)
+        draft.history.append(f'{channel} is zero, because the file has no column "{entry.column}" and it is optional.')
+        return
+    raw = content.columns[column]
+    own = content.clocks.get(column)
+    if own is not None:
+        draft.clocks[channel] = own + draft.shift
+    check_finite(
+        raw, draft.time if own is None else own, f'column "{entry.column}" ({channel})', draft.source, channel=channel
+    )
+    draft.columns[channel] = (raw * entry.scale + entry.offset) * factor
+    words = [f'{channel} is column "{entry.column}"']
+    if entry.scale != 1.0:
+        words.append(f"times {entry.scale:.9g}")
+    if entry.offset != 0.0:
+        words.append(f"plus {entry.offset:.9g} {entry.unit}")
+    words.append(f"in {entry.unit}" if factor == 1.0 else f"converted from {entry.unit} to {unit}")
+    draft.history.append(", ".join(words) + ".")
+    if entry.delay != 0.0:
+        draft.delays[channel] = entry.delay
+
+
+def plain_draft(path: str | PathLike[str]) -> Draft:
+    """Every column a channel of its own name; a unit may stand in brackets behind it."""
+    log = open_log(path)
+    names = {column: _stated(column, log) for column in log.header}
+    clock = _clock_column(path, names)
+    content = log.read(log.header, clock)
+    source = Source(str(path), content.lines, str(path))
+    factor, _ = to_si(names[clock][1] or "s", "time", None, str(path), expected="s")
+    draft = Draft(source, content.columns[clock] * factor, clocks=dict(content.clocks))
+    draft.history.append(f'Read {draft.time.size} rows of {Path(path).name}; the clock is column "{clock}".')
+    draft.history += content.notes
+    for column, (name, stated) in names.items():
+        if column == clock:
+            continue
+        own = content.clocks.get(column, draft.time)
+        check_finite(content.columns[column], own, f'column "{column}"', source, channel=name)
+        factor, draft.units[name] = to_si(stated or "1", name, None, str(path))
+        draft.columns[name] = content.columns[column] * factor
+        how = f"converted from {stated} to {draft.units[name]}" if stated else "as it is, its unit is not stated"
+        draft.history.append(f'{name} is column "{column}", {how}.')
+    return draft
+
+
+def _clock_column(path: str | PathLike[str], names: Mapping[str, tuple[str, str]]) -> str:
+    """The column that is named like a clock; in files with groups, the only one whose last word is."""
+    clocks = [column for column, (name, _) in names.items() if name in TIME_COLUMNS]
+    inner = [column for column, (name, _) in names.items() if re.split(r"[./]", name)[-1] in TIME_COLUMNS]
+    if not clocks and len(inner) == 1:
+        clocks = inner
+    if not clocks:
+        raise ExperimentError(
+            f"{path} has no column named {', '.join(TIME_COLUMNS)}, its columns are {', '.join(names)}; "
+            "give a channel table that says which one is the clock",
+            path=str(path),
+        )
+    return clocks[0]
+
+
+def _stated(column: str, log: Log) -> tuple[str, str]:
+    """Name and unit of a column: the unit that the file states, or in brackets behind the name."""
+    if column in log.units:
+        return column, log.units[column]
+    return _bracketed(column) if log.bracketed_units else (column, "")
+
+
+def _bracketed(column: str) -> tuple[str, str]:
+    """Name and unit of ``q [mm]``; no unit without brackets."""
+    name, bracket, rest = column.partition("[")
+    return (name.strip(), rest[:-1].strip()) if bracket and rest.endswith("]") else (column, "")
+
+
+def to_si(unit: str, channel: str, model: Model | None, where: str, expected: str | None = None) -> tuple[float, str]:
+    """Factor to SI and the SI unit, which has to be of the kind that the channel has in the model."""
+    wanted = model.channel_unit(channel) if model is not None else expected
+    try:
+        given = parse_unit(unit)
+    except UnitError as error:
+        raise UnitError(f"{where}, channel {channel}: {error}", unit=unit, expected=wanted) from error
+    if wanted is None:
+        return given.factor, given.si
+    target = parse_unit(wanted)
+    if given.dimension != target.dimension:
+        raise ExperimentError(
+            f'{where}: the channel "{channel}" is given in {unit} ({given.kind}), but it is in {wanted} '
+            f"({target.kind}); correct the unit or the column of its entry in the channel table",
+            channel=channel,
+        )
+    return given.factor / target.factor, wanted

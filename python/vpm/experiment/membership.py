@@ -1,0 +1,53 @@
+"""Which files make a campaign, what their records are called, and whether they belong together."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from glob import glob, has_magic
+from os import PathLike
+from pathlib import Path
+
+from vpm.errors import ExperimentError
+from vpm.experiment.record import Experiment
+
+
+def check_channels(first: Experiment, record: Experiment) -> None:
+    """Refuse a record whose channels or units are not those of the first."""
+    for one, other in ((first, record), (record, first)):
+        lost = [channel for channel in one.channels if channel not in other]
+        if lost:
+            raise ExperimentError(
+                f'{other.name} has no channel "{lost[0]}", which {one.name} has; map the same channels in every file, '
+                "mark it optional in the channel table if zeros are meant, or load with common=True",
+                channel=lost[0],
+            )
+    for channel in first.channels:
+        if first.unit(channel) != record.unit(channel):
+            raise ExperimentError(
+                f'"{channel}" is in {first.unit(channel)} in {first.name} and in {record.unit(channel)} in '
+                f"{record.name}; state its unit in one channel table for all files",
+                channel=channel,
+            )
+
+
+def shared(records: Sequence[Experiment]) -> list[Experiment]:
+    """Records with the channels that all of them have, in the order of the first."""
+    common = [channel for channel in records[0].channels if all(channel in record for record in records)]
+    return [record.select(common) for record in records]
+
+
+def files_of(path: str | PathLike[str]) -> list[Path]:
+    """The file, or all that fit a pattern in the order of their names."""
+    if not has_magic(str(path)) or Path(path).exists():
+        return [Path(path)]
+    found = sorted(glob(str(path), recursive=True))  # noqa: PTH207  Path.glob refuses absolute patterns
+    if not found:
+        raise ExperimentError(f'no file fits the pattern "{path}"; check the folder', path=str(path))
+    return [Path(file) for file in found]
+
+
+def record_names(files: Sequence[Path]) -> list[str]:
+    """Names of the files without their ending, with the folder before them where that alone tells them apart."""
+    counts = Counter(file.stem for file in files)
+    return [file.stem if counts[file.stem] == 1 else f"{file.parent.name}/{file.stem}" for file in files]

@@ -1,0 +1,68 @@
+"""Files of logs: which reader takes which, told by the ending of the name."""
+
+from __future__ import annotations
+
+from os import PathLike
+from pathlib import Path
+
+from vpm.errors import ExperimentError
+from vpm.experiment.readers.base import Log
+
+#: Endings of the formats beside text.
+PARQUET = (".parquet", ".pq")
+MATLAB = (".mat",)
+HDF5 = (".h5", ".hdf5", ".hdf", ".he5")
+BAGS = (".bag", ".db3", ".mcap")
+ENDINGS = (".csv", ".tsv", ".txt", *PARQUET, *MATLAB, *HDF5, *BAGS)
+
+
+def open_log(path: str | PathLike[str]) -> Log:
+    """Reader for a file of a log: its columns by name, and their numbers.
+
+    Parameters
+    ----------
+    path : path-like
+        ``.csv`` and every ending that is not named here is text; ``.parquet`` and ``.pq`` need the extra ``parquet``;
+        ``.mat`` of MATLAB up to 7.2 needs none, of 7.3 the extra ``hdf5``, as do ``.h5``, ``.hdf5``, ``.hdf`` and
+        ``.he5``; ``.bag`` (ROS 1), ``.db3`` and ``.mcap`` and folders with a ``metadata.yaml`` (ROS 2) need the extra
+        ``ros``.
+
+    Returns
+    -------
+    Log
+
+    Raises
+    ------
+    ExperimentError
+        There is no such file, or its content is not what its ending says.
+    MissingExtraError
+        The library that reads this format is not installed.
+    """
+    file = Path(path)
+    ending = file.suffix.lower()
+    if ending in (*PARQUET, *MATLAB, *HDF5, *BAGS) and not file.exists():
+        raise ExperimentError(f"{path} does not exist; check the name and the folder", path=str(path))
+    if ending in PARQUET:
+        from vpm.experiment.readers.parquet import ParquetLog
+
+        return ParquetLog(path)
+    if ending in MATLAB:
+        from vpm.experiment.readers.mat import open_mat
+
+        return open_mat(path)
+    if ending in HDF5:
+        from vpm.experiment.readers.hdf5 import Hdf5Log
+
+        return Hdf5Log(path)
+    if ending in BAGS or (file / "metadata.yaml").is_file():
+        from vpm.experiment.readers.ros import BagLog
+
+        return BagLog(path)
+    if file.is_dir():
+        raise ExperimentError(
+            f"{path} cannot be read: it is a folder without a metadata.yaml, so no ROS 2 bag; give the path of a file",
+            path=str(path),
+        )
+    from vpm.experiment.readers.text import TextLog
+
+    return TextLog(path)

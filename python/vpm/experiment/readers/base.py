@@ -1,0 +1,66 @@
+"""What every reader of logs offers: names of columns, and their numbers."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from os import PathLike
+
+from vpm.errors import ExperimentError
+from vpm.experiment.table import Table, missing_column
+
+
+class Log(ABC):
+    """A file of a log.
+
+    Attributes
+    ----------
+    path : path-like
+    header : tuple of str
+        Names of all columns of numbers.
+    refused : mapping of str to str
+        What else is in the file, and why it is no column of numbers, as the end of a sentence with the repair.
+    units : mapping of str to str
+        Units that the file itself states.
+    bracketed_units : bool
+        Whether brackets behind a name hold a unit, ``q [deg]``; in the other formats they hold an index.
+    """
+
+    path: str | PathLike[str]
+    header: tuple[str, ...]
+    refused: Mapping[str, str]
+    units: Mapping[str, str]
+    bracketed_units = False
+
+    def find(self, column: str) -> str | None:
+        """Name in `header` of what a channel table calls ``column``; None where the file does not have it."""
+        return column if column in self.header else None
+
+    @abstractmethod
+    def read(self, columns: Sequence[str], clock: str) -> Table:
+        """Columns by their names in the header.
+
+        Parameters
+        ----------
+        columns : sequence of str
+            The clock among them.
+        clock : str
+            The column that holds the time.
+
+        Raises
+        ------
+        ExperimentError
+            A column holds something that is no number, or their lengths differ.
+        """
+
+    def missing(self, column: str, channel: str = "") -> ExperimentError:
+        """Error for a column that the file does not have, or that is no column of numbers."""
+        reason = self.refused.get(column)
+        if reason is None:
+            return missing_column(self.path, column, self.header, channel)
+        use = f' for the channel "{channel}"' if channel else ""
+        return self.error(f'{self.path}: "{column}"{use} {reason}', channel)
+
+    def error(self, message: str, channel: str = "") -> ExperimentError:
+        """Error that carries the path."""
+        return ExperimentError(message, path=str(self.path), channel=channel or None)
