@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,8 +12,14 @@ from scipy.optimize import least_squares, lsq_linear
 
 from vpm.errors import IdentificationError
 from vpm.experiment import Experiment
+from vpm.identify.engine import Found, fit_problem
 from vpm.identify.identifiability import Combination, column_lengths, unseen_combinations
-from vpm.identify.problem import InverseDynamicsProblem, OutputErrorProblem, gaps, problem, segments
+from vpm.identify.objective import AnyProblem
+from vpm.identify.parallel import worker_count
+from vpm.identify.problem import gaps, problem, segments
+from vpm.identify.remarks import constant_channels, remarks, touching
+from vpm.identify.settings import Fitting
+from vpm.identify.shooting import ShootingProblem
 from vpm.identify.statistics import NORMAL_95, robust_covariance
 from vpm.identify.ties import TiedProblem, check_ties
 from vpm.model import Model
@@ -24,7 +30,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
-AnyProblem = InverseDynamicsProblem | OutputErrorProblem | TiedProblem
 
 #: Evaluations after which a fit is ended as it stands.
 MOST_EVALUATIONS = 40
@@ -83,7 +88,7 @@ def estimate(
     progress : callable, optional
     """
     columns = [model.index(name) for name in free]
-    low, high = _bounds(model, free, bounds or {})
+    low, high = limits(model, free, bounds or {})
     counter = _Counter(model, data, columns, progress)
     start = np.clip(model.theta[columns], low, high)
     if columns:
@@ -179,7 +184,8 @@ def _strictly_inside(x: Array, low: Array, high: Array) -> Array:
     return np.clip(x, np.where(np.isfinite(low), low + 1e-9 * width, low), high - 1e-9 * np.minimum(width, 1e300))
 
 
-def _bounds(model: Model, free: Sequence[str], replaced: Mapping[str, tuple[float, float]]) -> tuple[Array, Array]:
+def limits(model: Model, free: Sequence[str], replaced: Mapping[str, tuple[float, float]]) -> tuple[Array, Array]:
+    """Least and largest value of each free parameter: as replaced, or of the model."""
     pairs = [replaced.get(n, _range(model, n, free)) for n in free]
     return np.array([p[0] for p in pairs], dtype=float), np.array([p[1] for p in pairs], dtype=float)
 
@@ -235,6 +241,23 @@ class Fit(Result):
         Estimates that rest on a bound: widen it or question the model.
     model : Model
         The model with the identified values.
+    warnings : tuple of str
+        What to know before the numbers are trusted, one sentence each: estimates on a bound, still at their start, not
+        identifiable, or collinear; too few samples; constant channels; a fit that Ctrl-C ended.
+    noise : dict
+        ``{channel: standard deviation}`` that residuals were divided by, SI; empty where it was the signal's spread.
+    states, states_std : dict
+        Fitted first states, ``{"record, 0 s: axis.position": value}``, and their standard deviations, SI.
+    costs : ndarray, shape (starts,)
+        Sum of squares that each start reached, the model's own values first.
+    agreeing : int
+        Starts that came within 1 % of the least sum of squares.
+    evaluations : int
+        Simulations of all records with derivatives.
+    ended : str
+        ``"converged"``, ``"evaluations"`` or ``"interrupted"``; empty for a fit without `Fitting`.
+    setup, fitting, ties
+        How it was done, for `profile_intervals` and `bootstrap`.
     """
 
     mode: str
@@ -250,6 +273,22 @@ class Fit(Result):
     unidentifiable: tuple[Combination, ...]
     at_bounds: tuple[str, ...]
     model: Model
+    warnings: tuple[str, ...] = ()
+    noise: dict[str, float] = field(default_factory=dict)
+    states: dict[str, float] = field(default_factory=dict)
+    states_std: dict[str, float] = field(default_factory=dict)
+    costs: Array = field(default_factory=lambda: np.zeros(0))
+    agreeing: int = 1
+    evaluations: int = 0
+    ended: str = ""
+    setup: Setup | None = None
+    fitting: Fitting | None = None
+    ties: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether Ctrl-C ended the fit; the values are the best until then."""
+        return self.ended == "interrupted"
 
     @property
     def intervals(self) -> Array:
@@ -298,6 +337,7 @@ def identify(
     ties: Mapping[str, str] | None = None,
     tolerance: float = 1e-8,
     progress: Progress | None = None,
+    fitting: Fitting | None = None,
 ) -> Fit:
     """Fit parameters of ``model`` to one or several experiments at once.
 
@@ -320,7 +360,9 @@ def identify(
     tolerance : float
         Relative change of parameters or of the sum of squares at which to stop.
     progress : callable, optional
-        Called with the number of evaluations and the weighted residual.
+        Called with the number of evaluations and the weighted residual; with several starts, from their threads.
+    fitting : Fitting, optional
+        Weights, losses, priors, bounds, several starts, unknown first states, pieces.
 
     Returns
     -------
@@ -337,12 +379,127 @@ def identify(
         raise IdentificationError(
             f"{model.name}: no parameter is free; give some an uncertainty in the model file or name them in free="
         )
-    untied = problem(model, records, mode, cutoff=cutoff, setup=setup)
+    data = comparison(model, records, mode, cutoff=cutoff, setup=setup, ties=ties, fitting=fitting)
     check_ties(model, ties or {}, names)
-    data = TiedProblem(untied, ties) if ties else untied
     before, _ = data.evaluate(model, model.theta)
-    result = estimate(model, data, names, tolerance=tolerance, progress=progress)
-    return fit_of(model, data, result, before, [e.name for e in records], ties or {})
+    if fitting is None:
+        result = estimate(model, data, names, tolerance=tolerance, progress=progress)
+        fit = fit_of(model, data, result, before, [e.name for e in records], ties or {})
+    else:
+        check_names(model, names, fitting)
+        box = limits(model, names, fitting.bounds)
+        found = fit_problem(model, data, names, box, fitting, tolerance=tolerance, progress=progress)
+        result = Estimate(
+            names,
+            found.values,
+            found.residual,
+            found.jacobian,
+            found.covariance,
+            found.unseen,
+            touching(names, found.values, *box),
+            found.evaluations,
+        )
+        fit = _with_details(fit_of(model, data, result, before, [e.name for e in records], ties or {}), data, found)
+    fit = replace(fit, setup=setup, fitting=fitting, ties=dict(ties or {}))
+    return replace(fit, warnings=_told(model, records, data, fit, result, (fitting or Fitting()).bounds))
+
+
+def comparison(
+    model: Model,
+    records: Sequence[Experiment],
+    mode: str,
+    *,
+    cutoff: float | None = None,
+    setup: Setup | None = None,
+    ties: Mapping[str, str] | None = None,
+    fitting: Fitting | None = None,
+) -> AnyProblem:
+    """Set up what a fit compares.
+
+    Parameters
+    ----------
+    model, records, mode, cutoff, setup, ties, fitting
+        As for `identify`.
+    """
+    chosen = fitting or Fitting()
+    workers = 1 if chosen.starts > 1 else worker_count(chosen.workers or None)  # starts take the threads instead
+    channels = chosen.channels or None
+    if chosen.states or chosen.piece > 0.0:
+        untied: AnyProblem = ShootingProblem(
+            model,
+            records,
+            mode,
+            states=chosen.states,
+            piece=chosen.piece,
+            continuity=chosen.continuity,
+            channels=channels,
+            setup=setup,
+            workers=workers,
+        )
+    else:
+        untied = problem(model, records, mode, cutoff=cutoff, setup=setup, channels=channels, workers=workers)
+    return TiedProblem(untied, ties) if ties and not isinstance(untied, TiedProblem) else untied
+
+
+def check_names(model: Model, free: Sequence[str], fitting: Fitting) -> None:
+    """Complain about bounds that cannot be meant.
+
+    Raises
+    ------
+    IdentificationError
+        Bounds of a parameter that is not free, or in the wrong order, or noise of a channel that is none.
+    """
+    for name, (low, high) in fitting.bounds.items():
+        if name not in free:
+            raise IdentificationError(f'bounds: "{name}" is not free; free are {", ".join(free)}')
+        if not low < high:
+            raise IdentificationError(f'bounds of "{name}" are {low:g} and {high:g}; give the lower one first')
+
+
+def _with_details(fit: Fit, data: AnyProblem, found: Found) -> Fit:
+    shooting = data.untied if isinstance(data, TiedProblem) else data
+    labels = shooting.labels if isinstance(shooting, ShootingProblem) else ()
+    return replace(
+        fit,
+        noise=found.noise,
+        states=dict(zip(labels, map(float, found.states), strict=True)),
+        states_std=dict(zip(labels, map(float, found.states_std), strict=True)),
+        costs=found.costs,
+        agreeing=found.agreeing,
+        evaluations=found.evaluations,
+        ended=found.ended,
+    )
+
+
+def _told(
+    model: Model,
+    records: Sequence[Experiment],
+    data: AnyProblem,
+    fit: Fit,
+    result: Estimate,
+    replaced: Mapping[str, tuple[float, float]],
+) -> tuple[str, ...]:
+    box = dict(zip(fit.names, zip(*limits(model, fit.names, replaced), strict=True), strict=True))
+    resting = {name: box[name] for name in result.at_bounds}
+    told = remarks(
+        fit.names,
+        fit.start,
+        fit.values,
+        fit.std,
+        fit.correlation,
+        fit.unidentifiable,
+        resting,
+        data.blocks,
+        len(fit.states),
+    )
+    told += constant_channels(model, records, data.blocks)
+    if fit.ended == "interrupted":
+        told.insert(0, f"stopped by Ctrl-C after {fit.evaluations} evaluations: the values are the best until then")
+    elif fit.ended == "evaluations":
+        told.insert(0, f"not converged after {fit.evaluations} evaluations: allow more with most_evaluations")
+    if fit.costs.size > 1 and 2 * fit.agreeing <= fit.costs.size:
+        told.append(f"only {fit.agreeing} of {fit.costs.size} starts agree: the best may not be the least")
+    return tuple(told)
 
 
 def fit_of(
