@@ -424,12 +424,13 @@ def comparison(
     chosen = fitting or Fitting()
     workers = 1 if chosen.starts > 1 else worker_count(chosen.workers or None)  # starts take the threads instead
     channels = chosen.channels or None
-    if chosen.states or chosen.piece > 0.0:
+    if chosen.states or chosen.known_states or chosen.piece > 0.0:
         untied: AnyProblem = ShootingProblem(
             model,
             records,
             mode,
             states=chosen.states,
+            known=chosen.known_states,
             piece=chosen.piece,
             continuity=chosen.continuity,
             channels=channels,

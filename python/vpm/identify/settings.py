@@ -44,6 +44,9 @@ class Fitting(Storable):
         Factor by which starts differ (one standard deviation) where neither an uncertainty nor bounds say it.
     states : tuple of str
         First states that are fitted, for each record by itself: names as in ``model.state_names``.
+    known_states : dict
+        ``{state: value}``, SI, of first states that are known, such as a rest: ``{"axis.velocity": 0.0}``. They
+        replace what the first samples of a record suggest, and hold for whole records.
     piece : float
         Length, s, of the pieces of multiple shooting, each with first states of its own; 0 for whole records.
     continuity : float
@@ -67,6 +70,7 @@ class Fitting(Storable):
     seed: int = 0
     spread: float = 3.0
     states: tuple[str, ...] = ()
+    known_states: dict[str, float] = field(default_factory=dict)
     piece: float = 0.0
     continuity: float = 10.0
     workers: int = 0
@@ -87,6 +91,9 @@ class Fitting(Storable):
         for name, low in (("starts", 1), ("workers", 0), ("most_evaluations", 1), ("seed", 0)):
             if getattr(self, name) < low:
                 raise IdentificationError(f"{name} is {getattr(self, name)}; give a whole number of at least {low}")
+        both = [name for name in self.known_states if name in self.states]
+        if both:
+            raise IdentificationError(f"{both[0]} is among known_states and among the fitted states; choose one")
         if not self.piece >= 0.0:
             raise IdentificationError(f"piece is {self.piece} s; give a positive time, or 0 for whole records")
 

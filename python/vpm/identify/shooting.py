@@ -8,7 +8,7 @@ no fitted states the pieces are restarts.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -53,7 +53,10 @@ class ShootingProblem(OutputErrorProblem):
     mode : {"free_run", "closed_loop"}
         Pieces need a free run.
     states : sequence of str
-        Fitted first states, ``"axis.position"``; the others are as for any simulation of the log.
+        Fitted first states, ``"axis.position"``; the others are as for any simulation of the log. With pieces, by
+        default all that an output shows.
+    known : mapping of str to float, optional
+        First states of whole records that are known, SI.
     piece : float
         Length of the pieces, s; 0 for whole records.
     continuity : float
@@ -68,7 +71,8 @@ class ShootingProblem(OutputErrorProblem):
         experiments: Sequence[Experiment],
         mode: str,
         *,
-        states: Sequence[str],
+        states: Sequence[str] = (),
+        known: Mapping[str, float] | None = None,
         piece: float = 0.0,
         continuity: float = 10.0,
         channels: Sequence[str] | None = None,
@@ -80,15 +84,20 @@ class ShootingProblem(OutputErrorProblem):
                 f"first states are fitted in the modes free_run and closed_loop, pieces in free_run, not in '{mode}'; "
                 "choose another mode or leave states and piece out"
             )
-        for name in states:
+        for name in (*states, *(known or {})):
             if name not in model.state_names:
                 raise IdentificationError(
                     f'states: {model.name} has no state "{name}"; {near_match(name, model.state_names)}'
                 )
+        if piece > 0.0 and not states:
+            states = [name for name in model.state_names if state_channel(model, name) is not None]
         self.states = tuple(states)
         self._places = [model.state_names.index(name) for name in states]
         self._seconds = piece
         self.pieces = tuple(_cut(model, e, piece) for e in experiments)
+        for pieces in self.pieces:
+            for name, value in (known or {}).items():
+                pieces.states[0, model.state_names.index(name)] = value
         super().__init__(model, experiments, mode, channels=channels, setup=setup, workers=workers)
         self._sizes = self._state_sizes(model)
         self._gap_columns = [
@@ -142,7 +151,7 @@ class ShootingProblem(OutputErrorProblem):
         counts = [len(p.starts) * len(self.states) for p in self.pieces]
         mine = np.split(unknown, np.cumsum(counts)[:-1])
         jobs = [
-            partial(self._record, model, theta, list(columns), k, values.reshape(-1, len(self.states)))
+            partial(self._record, model, theta, list(columns), k, values.reshape(len(self.pieces[k].starts), len(self.states)))
             for k, values in enumerate(mine)
         ]
         parts = in_order(jobs, self.workers)
@@ -165,7 +174,8 @@ class ShootingProblem(OutputErrorProblem):
         """Residual of the outputs and its derivative, then the gaps and theirs, of one record."""
         pieces, experiment = self.pieces[number], self.experiments[number]
         states = pieces.states.copy()
-        states[:, self._places] = values
+        if self.states:
+            states[:, self._places] = values
         outputs, by_theta = self._outputs(model, theta, experiment, pieces, states, columns)
         k, p = len(self.states), len(columns)
         by_state = np.zeros((*outputs.shape, k))
@@ -176,7 +186,8 @@ class ShootingProblem(OutputErrorProblem):
                 moved[:, place] += sign * DIFFERENCE * size
                 sides.append(self._outputs(model, theta, experiment, pieces, moved, [])[0])
             by_state[..., j] = (sides[0] - sides[1]) / (2.0 * DIFFERENCE * size)
-        mine = [block for block in self.blocks if block.samples in self._record_samples[number]]
+        channels = len(self._channels)
+        mine = self.blocks[number * channels : (number + 1) * channels]
         count = len(pieces.starts)
         residuals, jacobians = [], []
         for block in mine:
@@ -210,7 +221,7 @@ class ShootingProblem(OutputErrorProblem):
             following = slice(p + (piece + 1) * k, p + (piece + 2) * k)
             jacobian[piece, :, here] = (by_state[piece, -1][columns] * weights[:, None])
             jacobian[piece, :, following] = -(by_state[piece + 1, 0][columns] * weights[:, None])
-        return gaps.ravel(), jacobian.reshape(-1, p + count * k)
+        return gaps.ravel(), jacobian.reshape(gaps.size, p + count * k)
 
     def _outputs(
         self, model: Model, theta: Array, experiment: Experiment, pieces: Pieces, states: Array, columns: list[int]
@@ -251,18 +262,16 @@ class ShootingProblem(OutputErrorProblem):
         counted = [self._counted(experiment) for experiment in self.experiments]
         parts = list(zip(self.experiments, counted, strict=True))
         spread = {c: float(np.sqrt(np.mean([np.var(e[c][n]) for e, n in parts]))) for c in self._channels}
-        self._record_samples: list[list[slice]] = []
         for (experiment, counts), pieces in zip(parts, self.pieces, strict=True):
-            rows, mine = pieces.rows, []
+            rows = pieces.rows
             for channel in self._channels:
                 weight = 1.0 / spread[channel] if spread[channel] > 0.0 else 1.0
                 scale = float(np.sqrt(np.mean(experiment[channel][counts] ** 2)))
-                mine.append(slice(start, start + rows.size))
+                samples = slice(start, start + rows.size)
                 unit, moving = model.channel_unit(channel), counts[rows].astype(np.float64)
                 times = experiment.time[rows]
-                blocks.append(Block(experiment.name, channel, unit, mine[-1], times, scale, weight, moving))
+                blocks.append(Block(experiment.name, channel, unit, samples, times, scale, weight, moving))
                 start += rows.size
-            self._record_samples.append(mine)
         return tuple(blocks)
 
 
