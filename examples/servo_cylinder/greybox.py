@@ -47,7 +47,8 @@ BOUNDS = {
     "axis.spring.stiffness": (100.0, 1e9),
     "servo.cylinder.internal_leakage": (1e-18, 1e-5),
 }
-REST = {"axis.position": 0.0, "axis.velocity": 0.0}
+#: From the listing's start (oil twelve times too soft, hardly any friction) one fit of all six ends in a wrong valley.
+STARTS = 12
 #: Standard deviation and quantum of the sensors: place in m, pressures in Pa.
 NOISE = {"axis.position": 20e-6, "servo.pressure_a": 20e3, "servo.pressure_b": 20e3}
 QUANTUM = {"axis.position": 5e-6, "servo.pressure_a": 5e3, "servo.pressure_b": 5e3}
@@ -110,11 +111,10 @@ def fitted(record: Experiment, free: Sequence[str] = FREE, starts: int = 1, mode
     return identify(model or listing(free), record, free, mode="free_run", setup=FITTED, fitting=settings)
 
 
-def near(record: Experiment) -> Model:
-    """Start for all six: a fit that begins afresh from the measured state every 20 ms and so cannot be led far astray."""
-    settings = Fitting(log=True, bounds=BOUNDS)
-    setup = Setup(FITTED.integrator, FITTED.substeps, horizon=0.02)
-    return identify(listing(), record, FREE, mode="restarts", setup=setup, fitting=settings).model
+def off(share: float = 0.3) -> Model:
+    """The bench with all free parameters too small by a share of their true value."""
+    model = rig()
+    return model.with_parameters({name: (1.0 - share) * model.parameters[name].value for name in FREE})
 
 
 def table(fits: dict[str, Fit]) -> None:
@@ -136,7 +136,7 @@ def coverage(seeds: int, seconds: float = 0.5) -> Array:
     """Share of seeds (6,) in which the truth lies inside its own 95 % interval; every fit starts 30 % off."""
     truth = np.array([rig().parameters[name].value for name in FREE])
     hits = np.zeros(len(FREE))
-    start = rig().with_parameters({name: 0.7 * rig().parameters[name].value for name in FREE})
+    start = off()
     for seed in range(seeds):
         low, high = fitted(measured(random_gaussian(seconds), seed=seed), model=start).intervals.T
         hits += (low <= truth) & (truth <= high)
@@ -154,10 +154,12 @@ def main(seeds: int) -> None:
     for label, current in (("chirp, 5 s", chirp(5.0, 0.2e-3)), ("random Gaussian, 0.5 s", random_gaussian(0.5))):
         record = measured(current, seed=1, name=label)
         fits[f"{label}: two"] = fitted(record, two)
-        begin = near(record)
+        fits[f"{label}: six"] = six = fitted(record, starts=STARTS)
+        print(f"{label}: all six from the listing's start: {six.agreeing} of {STARTS} starts agree")
         began = time.perf_counter()
-        fits[f"{label}: six"] = fitted(record, model=begin)
-        print(f"{label}: six parameters in {time.perf_counter() - began:.2f} s")
+        alone = fitted(record, model=off())
+        spent = time.perf_counter() - began
+        print(f"{label}: all six from 30 % off in {spent:.2f} s and {alone.evaluations} evaluations")
     table(fits)
     for label in (label for label in fits if label.endswith("six")):
         fit = fits[label]

@@ -223,12 +223,12 @@ def _found(
 ) -> Found:
     p, states = len(free), objective.shooting
     labels = [*free, *(states.labels if states else ())]
-    every = unseen_combinations(point.jacobian, labels)
+    slopes = objective.slopes(point.x)
+    every = unseen_combinations(point.jacobian / slopes, labels)
     unseen = tuple(c for c in every if any(name in free for name in c.names))
     covariance = _covariance(objective, point, labels, every)
     std = np.sqrt(np.diag(covariance))
     residual, jacobian = point.raw
-    slopes = objective.slopes(point.x)
     return Found(
         objective.parameters(point.x),
         covariance[:p, :p],

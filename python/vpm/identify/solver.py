@@ -17,6 +17,8 @@ Array = NDArray[np.float64]
 
 #: Damping at the start, and beyond which no step is left to try.
 DAMPING, MOST_DAMPING = 1e-3, 1e12
+#: Columns from which on normal equations take the place of orthogonal triangles.
+MANY = 24
 
 
 @dataclass(frozen=True)
@@ -121,9 +123,9 @@ def _step(at: Point, low: Array, high: Array, reach: Array, damping: float) -> t
     if free.size == 0:
         return None
     scaled = at.jacobian[:, free] / lengths[free]
-    orthogonal, square = np.linalg.qr(scaled)
+    square, image = _root(scaled, at.residual)
     damped = np.vstack([square, np.sqrt(damping) * np.eye(free.size)])
-    target = np.concatenate([-orthogonal.T @ at.residual, np.zeros(free.size)])
+    target = np.concatenate([-image, np.zeros(free.size)])
     step = np.zeros_like(at.x)
     step[free] = np.linalg.lstsq(damped, target, rcond=None)[0] / lengths[free]
     step /= max(1.0, float(np.max(np.abs(step) / reach)))
@@ -131,3 +133,21 @@ def _step(at: Point, low: Array, high: Array, reach: Array, damping: float) -> t
     change = square @ (step[free] * lengths[free])
     predicted = -float(2.0 * gradient @ step + change @ change)
     return (step, predicted) if predicted > 1e-15 * at.cost and np.any(step) else None
+
+
+def _root(jacobian: Array, residual: Array) -> tuple[Array, Array]:
+    """Square ``R`` with ``R'R = J'J`` and the image ``q`` of the residual with ``R'q = J'r``.
+
+    By orthogonal triangles, which keep all digits; of many columns, whose triangles cost too much, by eigenvectors.
+    """
+    if jacobian.shape[1] <= MANY:
+        orthogonal, square = np.linalg.qr(jacobian)
+        return square, orthogonal.T @ residual
+    values, vectors = np.linalg.eigh(jacobian.T @ jacobian)
+    seen = values > 1e-13 * values[-1]
+    roots = np.sqrt(values[seen])
+    square = np.zeros((jacobian.shape[1], jacobian.shape[1]))
+    image = np.zeros(jacobian.shape[1])
+    square[: roots.size] = roots[:, None] * vectors[:, seen].T
+    image[: roots.size] = (vectors[:, seen].T @ (jacobian.T @ residual)) / roots
+    return square, image
