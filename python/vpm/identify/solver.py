@@ -122,17 +122,33 @@ def _step(at: Point, low: Array, high: Array, reach: Array, damping: float) -> t
     free = np.flatnonzero(~held & (lengths > 0.0))
     if free.size == 0:
         return None
-    scaled = at.jacobian[:, free] / lengths[free]
-    square, image = _root(scaled, at.residual)
+    square, image = _root(at.jacobian[:, free] / lengths[free], at.residual)
     damped = np.vstack([square, np.sqrt(damping) * np.eye(free.size)])
     target = np.concatenate([-image, np.zeros(free.size)])
+    below, above = ((edge - at.x)[free] * lengths[free] for edge in (low, high))
+    change = _boxed(damped, target, below, above)
+    change /= max(1.0, float(np.max(np.abs(change) / (lengths * reach)[free])))
     step = np.zeros_like(at.x)
-    step[free] = np.linalg.lstsq(damped, target, rcond=None)[0] / lengths[free]
-    step /= max(1.0, float(np.max(np.abs(step) / reach)))
+    step[free] = change / lengths[free]
     step = np.clip(at.x + step, low, high) - at.x
     change = square @ (step[free] * lengths[free])
     predicted = -float(2.0 * gradient @ step + change @ change)
     return (step, predicted) if predicted > 1e-15 * at.cost and np.any(step) else None
+
+
+def _boxed(matrix: Array, target: Array, low: Array, high: Array) -> Array:
+    """Least-squares solution in a box: what leaves it is put on its edge, and the others are found again."""
+    solution = np.zeros(matrix.shape[1])
+    inside = np.ones(solution.size, dtype=np.bool_)
+    while np.any(inside):
+        rest = target - matrix[:, ~inside] @ solution[~inside]
+        solution[inside] = np.linalg.lstsq(matrix[:, inside], rest, rcond=None)[0]
+        outside = inside & ((solution < low) | (solution > high))
+        if not np.any(outside):
+            break
+        solution[outside] = np.clip(solution, low, high)[outside]
+        inside &= ~outside
+    return solution
 
 
 def _root(jacobian: Array, residual: Array) -> tuple[Array, Array]:
