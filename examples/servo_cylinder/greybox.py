@@ -167,7 +167,9 @@ def main(seeds: int) -> None:
         for short, (name, _) in LISTING.items():
             k = fit.names.index(name)
             apart = (fit.values[k] - truth[name].value) / fit.std[k]
-            print(f"  {short:4s}{fit.values[k]:13.6g} +- {1.96 * fit.std[k]:9.2g} {fit.units[k]:18s}{apart:+5.1f} std off")
+            print(
+                f"  {short:4s}{fit.values[k]:13.6g} +- {1.96 * fit.std[k]:9.2g} {fit.units[k]:18s}{apart:+5.1f} std off"
+            )
         for sentence in fit.warnings:
             print(f"  {sentence}")
     if seeds:

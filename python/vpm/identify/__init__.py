@@ -1,6 +1,7 @@
 """Identification: parameters, their uncertainty, and what the data cannot see."""
 
-from vpm.identify.fit import Estimate, Fit, estimate, identify
+from vpm.identify.estimation import Estimate, estimate
+from vpm.identify.fit import Fit, identify
 from vpm.identify.identifiability import Combination, unseen_combinations
 from vpm.identify.intervals import Bootstrap, Profile, bootstrap, profile_intervals
 from vpm.identify.problem import Block, InverseDynamicsProblem, OutputErrorProblem, Problem, gaps, problem, segments

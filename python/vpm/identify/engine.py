@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -86,7 +86,9 @@ def fit_problem(
     begun = starts(model, free, search, fitting)
     descents = _search(search, begun, fitting, 1e2 * tolerance if _weighs_later(fitting) else tolerance)
     best = min(descents, key=lambda d: d.point.cost)
-    limit = (1.0 + AGREEING) * best.point.cost + ROUNDING * max(d.first_cost for d in descents if np.isfinite(d.first_cost))
+    limit = (1.0 + AGREEING) * best.point.cost + ROUNDING * max(
+        d.first_cost for d in descents if np.isfinite(d.first_cost)
+    )
     costs = np.array([d.point.cost for d in descents])
     point, ended = best.point, "interrupted" if any(d.interrupted for d in descents) else best.ended
     if _weighs_later(fitting):
@@ -101,8 +103,7 @@ def _weighs_later(fitting: Fitting) -> bool:
 
 def _plain(fitting: Fitting) -> Fitting:
     """The same search with squares of residuals over the spread of their channel."""
-    content = dict(fitting.to_stored()) | {"loss": "squares", "noise": "spread", "priors": False, "noise_levels": {}}
-    return Fitting(**content)  # type: ignore[arg-type]
+    return replace(fitting, loss="squares", noise="spread", priors=False, noise_levels={})
 
 
 def _search(objective: Objective, begun: Sequence[Array], fitting: Fitting, tolerance: float) -> list[Descent]:
@@ -164,9 +165,7 @@ def _onward(objective: Objective, first: Point, fitting: Fitting, tolerance: flo
     return onward(objective, first, objective.low, objective.high, fitting.most_evaluations, tolerance)
 
 
-def _reweighed(
-    objective: Objective, point: Point, fitting: Fitting, tolerance: float, ended: str
-) -> tuple[Point, str]:
+def _reweighed(objective: Objective, point: Point, fitting: Fitting, tolerance: float, ended: str) -> tuple[Point, str]:
     """Weights from the residual, a fit with them, and again until they stay."""
     for _ in range(ROUNDS):
         before = dict(objective.noise)
@@ -203,24 +202,24 @@ def starts(model: Model, free: Sequence[str], objective: Objective, fitting: Fit
     return drawn + [np.concatenate([row, objective.first]) for row in np.array(columns).T]
 
 
-def _spread(
-    u: Array, own: float, objective: Objective, k: int, uncertainty: float | None, fitting: Fitting
-) -> Array:
+def _spread(u: Array, own: float, objective: Objective, k: int, uncertainty: float | None, fitting: Fitting) -> Array:
     low, high, log = objective.low[k], objective.high[k], bool(objective.log[k])
     value = float(np.exp(own)) if log else own
     if uncertainty is not None and np.isfinite(uncertainty):
-        width = uncertainty / value if log else uncertainty
-        return np.asarray(np.clip(own + width * ndtri(u), low, high))
-    if np.isfinite(low) and np.isfinite(high) and (high - low < np.log(WIDE) if log else abs(value) * WIDE > high - low):
-        return low + u * (high - low)
+        deviation = uncertainty / value if log else uncertainty
+        return np.asarray(np.clip(own + deviation * ndtri(u), low, high))
+    if (
+        np.isfinite(low)
+        and np.isfinite(high)
+        and (high - low < np.log(WIDE) if log else abs(value) * WIDE > high - low)
+    ):
+        return np.asarray(low + u * (high - low))
     factor = np.log(fitting.spread) * ndtri(u)
     drawn = own + factor if log else own * np.exp(factor) if own else factor * 0.0
     return np.asarray(np.clip(drawn, low, high))
 
 
-def _found(
-    objective: Objective, point: Point, free: Sequence[str], costs: Array, agreeing: int, ended: str
-) -> Found:
+def _found(objective: Objective, point: Point, free: Sequence[str], costs: Array, agreeing: int, ended: str) -> Found:
     p, states = len(free), objective.shooting
     labels = [*free, *(states.labels if states else ())]
     slopes = objective.slopes(point.x)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from vpm.errors import IdentificationError
 from vpm.experiment import Experiment
 from vpm.identify.engine import onward
+from vpm.identify.estimation import limits
 from vpm.identify.objective import Objective
 from vpm.identify.parallel import in_order, worker_count
 from vpm.identify.problem import Block
@@ -135,7 +136,7 @@ def profile_intervals(
         if not np.isfinite(fit.std[fit.names.index(name)]):
             raise IdentificationError(f"the data of this fit cannot see {name}, so it has no profile; leave it out")
     objective, at = _again(fit, experiments, cutoff)
-    bread = np.linalg.pinv(at.jacobian.T @ at.jacobian, hermitian=True)
+    bread = np.asarray(np.linalg.pinv(at.jacobian.T @ at.jacobian, hermitian=True), dtype=np.float64)
     workers = worker_count((fit.fitting or Fitting()).workers or None)
     jobs = [partial(_profile, fit, objective, at, bread, fit.names.index(name)) for name in wanted]
     return tuple(in_order(jobs, workers if len(at.raw[0]) and objective.data.mode != "inverse_dynamics" else 1))
@@ -282,7 +283,7 @@ def _replicate(objective: Objective, at: Point, weights: Array, refit: bool) -> 
 
 def _again(fit: Fit, experiments: Experiment | Sequence[Experiment], cutoff: float | None) -> tuple[Objective, Point]:
     """The objective of a fit and the point where it ended."""
-    from vpm.identify.fit import comparison, limits
+    from vpm.identify.fit import comparison
 
     records = [experiments] if isinstance(experiments, Experiment) else list(experiments)
     if tuple(e.name for e in records) != fit.experiments:
@@ -290,11 +291,9 @@ def _again(fit: Fit, experiments: Experiment | Sequence[Experiment], cutoff: flo
             f"the fit is of {', '.join(fit.experiments)}, not of {', '.join(e.name for e in records)}; pass its records"
         )
     fitting = fit.fitting or Fitting()
-    content = dict(fitting.to_stored()) | {"starts": 2}  # one thread for each problem
     begun = fit.model.with_parameters(dict(zip(fit.names, map(float, fit.start), strict=True)))
-    data = comparison(
-        begun, records, fit.mode, cutoff=cutoff, setup=fit.setup, ties=fit.ties, fitting=Fitting(**content)
-    )
+    one = replace(fitting, workers=1)  # threads go to parameters and replicates instead
+    data = comparison(begun, records, fit.mode, cutoff=cutoff, setup=fit.setup, ties=fit.ties, fitting=one)
     objective = Objective(begun, data, fit.names, limits(begun, fit.names, fitting.bounds), fitting)
     objective.noise = dict(fit.noise)
     states = np.array(list(fit.states.values())) / objective.sizes if fit.states else None

@@ -22,6 +22,8 @@ AnyProblem = InverseDynamicsProblem | OutputErrorProblem | TiedProblem
 NORMAL_MEDIAN = 0.6744897501960817
 #: Least noise of a channel, as a share of its spread: what noise-free data are taken to have.
 LEAST_NOISE = 1e-9
+#: Residuals beyond this come from a simulation that left its machine.
+HUGE = 1e100
 
 
 class Objective:
@@ -100,7 +102,7 @@ class Objective:
             if self.count == 0:  # the start itself: an error of the input, not of a step
                 raise
             return Point(x, np.inf, np.zeros(0), np.zeros((0, x.size)), (np.zeros(0), np.zeros((0, x.size))))
-        if not (np.all(np.isfinite(residual)) and np.all(np.isfinite(jacobian))):
+        if not max(np.max(np.abs(residual)), np.max(np.abs(jacobian), initial=0.0)) < HUGE:  # nor NaN
             return Point(x, np.inf, np.zeros(0), np.zeros((0, x.size)), (np.zeros(0), np.zeros((0, x.size))))
         point = self.weigh(x, residual, jacobian * self.slopes(x))
         with self._lock:

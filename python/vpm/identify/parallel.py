@@ -1,4 +1,4 @@
-"""Jobs on threads, in order: the core computes without the interpreter's lock, so records and starts share the cores."""
+"""Jobs on threads, in order: the core computes without the interpreter's lock, so records and starts share cores."""
 
 from __future__ import annotations
 

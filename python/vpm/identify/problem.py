@@ -350,9 +350,7 @@ def problem(
         raise IdentificationError(f"unknown mode '{mode}'; choose one of {', '.join(MODES)}")
     if mode == "inverse_dynamics":
         return InverseDynamicsProblem(model, experiments, cutoff=cutoff)
-    return OutputErrorProblem(
-        model, experiments, mode, channels=channels, setup=setup, cutoff=cutoff, workers=workers
-    )
+    return OutputErrorProblem(model, experiments, mode, channels=channels, setup=setup, cutoff=cutoff, workers=workers)
 
 
 def _compared(model: Model, experiments: Sequence[Experiment], mode: str) -> tuple[str, ...]:

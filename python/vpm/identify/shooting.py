@@ -1,7 +1,7 @@
 """Output errors of records whose first states are unknown, whole or in pieces that have to meet.
 
-Multiple shooting: each piece of a record is simulated from a start state of its own, and the gaps between the end of one
-piece and the start of the next are residuals as well, with a weight (H. G. Bock, *Modelling of Chemical Reaction
+Multiple shooting: each piece of a record is simulated from a start state of its own, and the gaps between the end of
+one piece and the start of the next are residuals as well, with a weight (H. G. Bock, *Modelling of Chemical Reaction
 Systems*, Springer 1981; A. Ribeiro et al., *Automatica* 121, 2020, for what it does to the smoothness of the fit). With
 no fitted states the pieces are restarts.
 """
@@ -151,7 +151,14 @@ class ShootingProblem(OutputErrorProblem):
         counts = [len(p.starts) * len(self.states) for p in self.pieces]
         mine = np.split(unknown, np.cumsum(counts)[:-1])
         jobs = [
-            partial(self._record, model, theta, list(columns), k, values.reshape(len(self.pieces[k].starts), len(self.states)))
+            partial(
+                self._record,
+                model,
+                theta,
+                list(columns),
+                k,
+                values.reshape(len(self.pieces[k].starts), len(self.states)),
+            )
             for k, values in enumerate(mine)
         ]
         parts = in_order(jobs, self.workers)
@@ -205,9 +212,7 @@ class ShootingProblem(OutputErrorProblem):
         gaps, gap_jacobian = self._gaps(outputs, by_theta, by_state, pieces, p)
         return np.concatenate(residuals), np.concatenate(jacobians), gaps, gap_jacobian
 
-    def _gaps(
-        self, outputs: Array, by_theta: Array, by_state: Array, pieces: Pieces, p: int
-    ) -> tuple[Array, Array]:
+    def _gaps(self, outputs: Array, by_theta: Array, by_state: Array, pieces: Pieces, p: int) -> tuple[Array, Array]:
         """End of each piece minus start of the next, in the channels of the fitted states."""
         count, k = len(pieces.starts), len(self.states)
         columns = [column for column, _ in self._gap_columns]
@@ -219,7 +224,7 @@ class ShootingProblem(OutputErrorProblem):
         for piece in range(count - 1):
             here = slice(p + piece * k, p + (piece + 1) * k)
             following = slice(p + (piece + 1) * k, p + (piece + 2) * k)
-            jacobian[piece, :, here] = (by_state[piece, -1][columns] * weights[:, None])
+            jacobian[piece, :, here] = by_state[piece, -1][columns] * weights[:, None]
             jacobian[piece, :, following] = -(by_state[piece + 1, 0][columns] * weights[:, None])
         return gaps.ravel(), jacobian.reshape(gaps.size, p + count * k)
 
