@@ -1,4 +1,4 @@
-"""The servo-cylinder on its bench, identified as a grey box: acceptance, coverage, and what the listing's start does."""
+"""The servo-cylinder on its bench, identified as a grey box: acceptance, coverage, the start of the listing."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def test_one_fit_of_all_six_from_the_listing_fails_and_says_so_and_many_starts_d
 
 
 def test_intervals_cover_the_truth() -> None:
-    """Twelve seeds, six parameters: under 90 % each, less than 48 of 72 has a chance far below 1e-4."""
+    """Of 72 intervals, 68 are expected to hold the truth; fewer than 57 would be less than four in five."""
     assert np.sum(bench.coverage(12)) * 12 >= 57
 
 

@@ -235,8 +235,7 @@ def compare(
     epilog="Example:  vpm identify examples/emps/model.toml log.csv --free carriage.mass --free axis.friction.viscous"
     "\n\n"
     "Example:  vpm identify rig.toml a.csv b.csv --mode free_run --log --noise estimated --starts 12\n\n"
-    "Example:  vpm identify rig.toml a.csv --mode free_run --fit-state axis.velocity --piece 0.5 --loss huber "
-    "--profile slide.mass --bootstrap 200",
+    "Example:  vpm identify rig.toml a.csv --mode free_run --piece 0.5 --loss huber --profile slide.mass",
 )
 def identify(
     model: ModelPath,
@@ -286,7 +285,7 @@ def identify(
         seed=seed,
         workers=workers,
     )
-    asked = settings != Fitting(workers=workers, seed=seed) or noise is not None or loss is not None
+    asked = settings != Fitting(workers=workers, seed=seed) or noise or loss
     machine, records = _load_all(model, logs, channels)
     with shown(errors, starts) as tell:
         setup, chosen = Setup(integrator, substeps, horizon), settings if asked else None
