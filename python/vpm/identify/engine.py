@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
+from vpm.errors import IdentificationError
 from vpm.identify.identifiability import Combination, column_lengths, unseen_combinations
 from vpm.identify.objective import AnyProblem, Objective, noise_levels
 from vpm.identify.parallel import until_interrupted, worker_count
@@ -77,6 +78,8 @@ def fit_problem(
 
     Raises
     ------
+    IdentificationError
+        No start can be simulated.
     KeyboardInterrupt
         Ctrl-C before the first start was simulated.
     """
@@ -84,13 +87,17 @@ def fit_problem(
     # Starts are compared under weights that are the same for all; losses and noise are found from the best.
     search = Objective(model, data, free, bounds, _plain(fitting), progress) if _weighs_later(fitting) else objective
     begun = starts(model, free, search, fitting)
-    descents = _search(search, begun, fitting, 1e2 * tolerance if _weighs_later(fitting) else tolerance)
+    descents, interrupted = _search(search, begun, fitting, 1e2 * tolerance if _weighs_later(fitting) else tolerance)
     best = min(descents, key=lambda d: d.point.cost)
-    limit = (1.0 + AGREEING) * best.point.cost + ROUNDING * max(
-        d.first_cost for d in descents if np.isfinite(d.first_cost)
-    )
+    if not np.isfinite(best.point.cost):
+        raise IdentificationError(
+            f"the simulation leaves the finite numbers from all of {len(descents)} starts; take more substeps, shorter "
+            "pieces, or start values nearer to the truth"
+        )
+    highest = max(d.first_cost for d in descents if np.isfinite(d.first_cost))
+    limit = (1.0 + AGREEING) * best.point.cost + ROUNDING * highest
     costs = np.array([d.point.cost for d in descents])
-    point, ended = best.point, "interrupted" if any(d.interrupted for d in descents) else best.ended
+    point, ended = best.point, "interrupted" if interrupted else best.ended
     if _weighs_later(fitting):
         objective.count = search.count
         point, ended = _reweighed(objective, point, fitting, tolerance, ended)
@@ -106,15 +113,19 @@ def _plain(fitting: Fitting) -> Fitting:
     return replace(fitting, loss="squares", noise="spread", priors=False, noise_levels={})
 
 
-def _search(objective: Objective, begun: Sequence[Array], fitting: Fitting, tolerance: float) -> list[Descent]:
+def _search(
+    objective: Objective, begun: Sequence[Array], fitting: Fitting, tolerance: float
+) -> tuple[list[Descent], bool]:
+    """Descents that have a point, and whether Ctrl-C ended them."""
     jobs = [partial(_descent, objective, x, fitting, tolerance) for x in begun]
     if len(jobs) == 1:
-        return [jobs[0]()]
+        only = jobs[0]()
+        return [only], only.interrupted
     found, interrupted = until_interrupted(jobs, worker_count(fitting.workers or None))
     kept = [descent for descent in found if descent is not None]
     if interrupted and not kept:
         raise KeyboardInterrupt
-    return kept
+    return kept, interrupted
 
 
 def _descent(objective: Objective, x: Array, fitting: Fitting, tolerance: float) -> Descent:

@@ -36,6 +36,7 @@ class Estimate:
     unseen: tuple[Combination, ...]
     at_bounds: tuple[str, ...]
     evaluations: int
+    interrupted: bool = False
 
     @property
     def std(self) -> Array:
@@ -72,15 +73,27 @@ def estimate(
     linear_only : bool
         Stop after the first step.
     progress : callable, optional
+
+    Raises
+    ------
+    KeyboardInterrupt
+        Ctrl-C before the start was evaluated; later it ends the fit with the best values until then.
     """
     columns = [model.index(name) for name in free]
     low, high = limits(model, free, bounds or {})
     counter = _Counter(model, data, columns, progress)
     start = np.clip(model.theta[columns], low, high)
-    if columns:
-        start = _linear_step(counter, start, low, high)
-        start = start if linear_only else _refine(counter, start, low, high, tolerance)
-    residual, jacobian = counter(start)
+    interrupted = False
+    try:
+        if columns:
+            start = _linear_step(counter, start, low, high)
+            start = start if linear_only else _refine(counter, start, low, high, tolerance)
+        residual, jacobian = counter(start)
+    except KeyboardInterrupt:
+        if counter.best is None:
+            raise
+        start, (residual, jacobian) = counter.best
+        interrupted = True
     unseen = unseen_combinations(jacobian, free)
     covariance = _covariance(data, residual, jacobian, unseen, free)
     touching = tuple(
@@ -88,11 +101,11 @@ def estimate(
         for name, x, lo, hi in zip(free, start, low, high, strict=True)
         if np.isclose(x, lo, rtol=1e-6, atol=1e-12) or np.isclose(x, hi, rtol=1e-6, atol=1e-12)
     )
-    return Estimate(tuple(free), start, residual, jacobian, covariance, unseen, touching, counter.count)
+    return Estimate(tuple(free), start, residual, jacobian, covariance, unseen, touching, counter.count, interrupted)
 
 
 class _Counter:
-    """Evaluates the problem at given values of the free parameters; remembers the last point."""
+    """Evaluates the problem at given values of the free parameters; remembers the last point and the best."""
 
     def __init__(self, model: Model, data: AnyProblem, columns: list[int], progress: Progress | None) -> None:
         self.model, self.data, self.columns, self.progress = model, data, columns, progress
@@ -100,6 +113,8 @@ class _Counter:
         self.count = 0
         self._at: Array | None = None
         self._value: tuple[Array, Array] | None = None
+        self.best: tuple[Array, tuple[Array, Array]] | None = None
+        self._least = np.inf
 
     def __call__(self, x: Array) -> tuple[Array, Array]:
         if self._value is None or self._at is None or not np.array_equal(x, self._at):
@@ -108,6 +123,8 @@ class _Counter:
             self._value = self._evaluate(theta)
             self._at = x.copy()
             self.count += 1
+            if (cost := float(self._value[0] @ self._value[0])) < self._least:
+                self._least, self.best = cost, (self._at, self._value)
             if self.progress is not None:
                 self.progress(self.count, float(np.sqrt(np.mean(self._value[0] ** 2))))
         return self._value

@@ -196,6 +196,7 @@ def identify(
     if fitting is None:
         result = estimate(model, data, names, tolerance=tolerance, progress=progress)
         fit = fit_of(model, data, result, before, [e.name for e in records], ties or {})
+        fit = replace(fit, evaluations=result.evaluations, ended="interrupted" if result.interrupted else "")
     else:
         check_bounds(names, fitting)
         box = limits(model, names, fitting.bounds)

@@ -98,9 +98,7 @@ class Objective:
         given = {"unknown": x[len(self.columns) :] * self.sizes} if self.shooting else {}
         try:
             residual, jacobian = self.data.evaluate(self.model, theta, self.columns, **given)
-        except ValueError:
-            if self.count == 0:  # the start itself: an error of the input, not of a step
-                raise
+        except ValueError:  # of the core: values that make no machine; the model's own were simulated before
             return Point(x, np.inf, np.zeros(0), np.zeros((0, x.size)), (np.zeros(0), np.zeros((0, x.size))))
         if not max(np.max(np.abs(residual)), np.max(np.abs(jacobian), initial=0.0)) < HUGE:  # nor NaN
             return Point(x, np.inf, np.zeros(0), np.zeros((0, x.size)), (np.zeros(0), np.zeros((0, x.size))))
