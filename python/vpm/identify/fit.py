@@ -119,7 +119,8 @@ class Fit(Result):
 
     def _html_rows(self) -> Mapping[str, object]:
         rows = zip(self.names, self.values, self.std, self.units, strict=True)
-        return {name: f"{value:.6g} ± {std:.2g} {unit}" for name, value, std, unit in rows}
+        values = {name: f"{value:.6g} ± {std:.2g} {unit}" for name, value, std, unit in rows}
+        return {**values, **{f"warning {i}": sentence for i, sentence in enumerate(self.warnings, 1)}}
 
     def _frame_columns(self) -> Mapping[str, object]:
         return {

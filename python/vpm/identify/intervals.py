@@ -139,7 +139,7 @@ def profile_intervals(
     bread = np.asarray(np.linalg.pinv(at.jacobian.T @ at.jacobian, hermitian=True), dtype=np.float64)
     workers = worker_count((fit.fitting or Fitting()).workers or None)
     jobs = [partial(_profile, fit, objective, at, bread, fit.names.index(name)) for name in wanted]
-    return tuple(in_order(jobs, workers if len(at.raw[0]) and objective.data.mode != "inverse_dynamics" else 1))
+    return tuple(in_order(jobs, workers))
 
 
 def _profile(fit: Fit, objective: Objective, at: Point, bread: Array, place: int) -> Profile:
