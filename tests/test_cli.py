@@ -102,6 +102,40 @@ def test_identify_prints_values_and_writes_the_model(tmp_path: Path) -> None:
     assert vpm("info", fitted).returncode == 0
 
 
+def test_identify_takes_the_settings_of_the_engine() -> None:
+    name = "shoulder.friction.viscous"
+    words = (
+        "--free",
+        name,
+        "--mode",
+        "closed_loop",
+        "--substeps",
+        "2",
+        "--log",
+        "--noise",
+        "estimated",
+        "--starts",
+        "2",
+    )
+    more = (
+        "--bound",
+        f"{name}=1e-4:10",
+        "--known-state",
+        "shoulder.velocity=0",
+        "--profile",
+        name,
+        "--bootstrap",
+        "20",
+    )
+    done = vpm("identify", MODEL, TRAIN, *words, *more, "--loss", "huber")
+    assert done.returncode == 0, done.stderr
+    for sentence in ("of 2 starts agree", "noise of shoulder.position", f"{name}, profile:", f"{name}, bootstrap:"):
+        assert sentence in done.stdout
+    refused = vpm("identify", MODEL, TRAIN, "--bound", f"{name}=1")
+    assert refused.returncode == 1
+    assert "NAME=LOW:HIGH" in refused.stderr
+
+
 def test_diagnose_writes_its_report(tmp_path: Path) -> None:
     done = vpm("diagnose", MODEL, TRAIN, "--validate", VALIDATION, "--effect", "coulomb_friction", "--out", tmp_path)
     assert done.returncode == 0, done.stderr

@@ -17,7 +17,7 @@ from vpm.compare import Comparison, compare
 from vpm.discrepancy import Diagnosis, diagnose
 from vpm.errors import VpmError
 from vpm.experiment import Campaign, Experiment
-from vpm.identify import Fit, identify
+from vpm.identify import Fit, Fitting, identify
 from vpm.linear import LinearModel
 from vpm.model import Dynamics, Model
 from vpm.planar import PlanarArm
@@ -38,6 +38,7 @@ __all__ = [
     "Dynamics",
     "Experiment",
     "Fit",
+    "Fitting",
     "Ladder",
     "LinearModel",
     "Model",

@@ -17,6 +17,7 @@ from typer.core import TyperGroup
 from vpm import __version__
 from vpm.errors import ValidityWarning, VpmError
 from vpm.excite_command import app as excite_app
+from vpm.identify import options
 from vpm.simulate import INTEGRATORS
 
 if TYPE_CHECKING:
@@ -248,40 +249,66 @@ def compare(
 
 @app.command(
     epilog="Example:  vpm identify examples/emps/model.toml log.csv --free carriage.mass --free axis.friction.viscous"
+    "\n\n"
+    "Example:  vpm identify rig.toml a.csv b.csv --mode free_run --log --noise estimated --starts 12\n\n"
+    "Example:  vpm identify rig.toml a.csv --mode free_run --piece 0.5 --loss huber --profile slide.mass",
 )
 def identify(
     model: ModelPath,
     logs: Logs,
-    free: Annotated[
-        list[str] | None, typer.Option(help="Dotted parameter name; repeat. Default: all with an uncertainty.")
-    ] = None,
+    free: options.Free = None,
     mode: Mode = "inverse_dynamics",
     channels: Channels = None,
     interpolate: Interpolate = False,
     cutoff: Cutoff = None,
+    integrator: Integrator = "auto",
+    substeps: options.Substeps = 1,
+    horizon: options.Horizon = 0.25,
+    compare_only: options.Compared = None,
+    log: options.Log = False,
+    bound: options.Bound = None,
+    noise: options.Noise = None,
+    noise_level: options.NoiseLevel = None,
+    loss: options.Loss = None,
+    priors: options.Priors = False,
+    starts: options.Starts = 1,
+    seed: options.Seed = 0,
+    fit_state: options.FitState = None,
+    known_state: options.KnownState = None,
+    piece: options.Piece = 0.0,
+    profile: options.ProfileOf = None,
+    replicates: options.Replicates = 0,
+    workers: options.Workers = 0,
     out: Annotated[Path | None, typer.Option(help="Write the fitted model (TOML) here.")] = None,
 ) -> None:
-    """Fit parameters to one or several logs."""
+    """Fit parameters to one or several logs. Ctrl-C ends a fit and keeps the best until then."""
+    from vpm.identify import Fitting
     from vpm.identify import identify as fit_logs
+    from vpm.identify.words import numbers, ranges, shown, told, told_intervals
+    from vpm.simulate import Setup
 
+    settings = Fitting(
+        channels=tuple(compare_only or ()),
+        log=log,
+        bounds=ranges(bound, "--bound", "NAME=LOW:HIGH"),
+        noise="given" if noise_level else noise or "spread",
+        noise_levels=numbers(noise_level, "--noise-level", "CHANNEL=STD"),
+        loss=loss or "squares",
+        priors=priors,
+        starts=starts,
+        states=tuple(fit_state or ()),
+        known_states=numbers(known_state, "--known-state", "STATE=VALUE"),
+        piece=piece,
+        seed=seed,
+        workers=workers,
+    )
+    asked = settings != Fitting(workers=workers, seed=seed) or noise or loss
     machine, records = _load_all(model, logs, channels, interpolate)
-    with _progress() as tell:
-        fit = fit_logs(
-            machine,
-            records,
-            free,
-            mode=mode,
-            cutoff=cutoff,
-            progress=lambda n, r: tell(f"evaluation {n}: residual {r:.5g}"),
-        )
-    for name, value, std, unit in zip(fit.names, fit.values, fit.std, fit.units, strict=True):
-        console.print(f"  {name:40s} {value:14.6g} ± {std:<10.3g} {unit}", markup=False)
-    for combination in fit.unidentifiable:
-        console.print(f"  not seen by these data: {combination}", markup=False)
-    for name in fit.at_bounds:
-        console.print(f"  {name} rests on a bound: widen it or question the model", markup=False)
-    for channel, (rms, share, unit) in fit.after.items():
-        console.print(f"  residual {channel}: {rms:.4g} {unit}, {100 * share:.2f} % of the signal", markup=False)
+    with shown(errors, starts) as tell:
+        setup, chosen = Setup(integrator, substeps, horizon), settings if asked else None
+        fit = fit_logs(machine, records, free, mode=mode, cutoff=cutoff, setup=setup, progress=tell, fitting=chosen)
+    for line in told(fit) + told_intervals(fit, records, profile or [], replicates, seed, cutoff):
+        console.print(f"  {line}", markup=False)
     if out is not None:
         fit.model.save(out)
 

@@ -28,7 +28,7 @@ from vpm.experiment import Experiment, Motion, motion, parallel_filter
 from vpm.initial import initial_state as start
 from vpm.initial import joint_motion, measured_states, passive_joints
 from vpm.model import Model
-from vpm.results import Result
+from vpm.results import Result, Storable
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -44,7 +44,7 @@ INTEGRATORS = (AUTOMATIC, *FIXED_STEP, "guarded", "adaptive")
 
 
 @dataclass(frozen=True)
-class Setup:
+class Setup(Storable):
     """How a simulation steps.
 
     Attributes
@@ -486,6 +486,17 @@ def _inputs(model: Model, experiment: Experiment, mode: str) -> Array:
     """Commands and pressures of logged supplies, one column each; springs without a command keep their length."""
     _require(experiment, [name for name in model.input_channels if name not in model.optional_inputs], mode)
     return _optional(experiment, model.input_channels)
+
+
+def simulation_inputs(model: Model, experiment: Experiment) -> Array:
+    """What a free run holds between samples, shape (N, inputs): commands and pressures of logged supplies.
+
+    Raises
+    ------
+    ExperimentError
+        The log lacks a command.
+    """
+    return _inputs(model, experiment, "free_run")
 
 
 def _references(model: Model, experiment: Experiment, mode: str) -> tuple[Array, Array]:

@@ -1,24 +1,34 @@
 """Identification: parameters, their uncertainty, and what the data cannot see."""
 
-from vpm.identify.fit import Estimate, Fit, estimate, identify
+from vpm.identify.estimation import Estimate, estimate
+from vpm.identify.fit import Fit, identify
 from vpm.identify.identifiability import Combination, unseen_combinations
+from vpm.identify.intervals import Bootstrap, Profile, bootstrap, profile_intervals
 from vpm.identify.problem import Block, InverseDynamicsProblem, OutputErrorProblem, Problem, gaps, problem, segments
+from vpm.identify.settings import Fitting
+from vpm.identify.shooting import ShootingProblem
 from vpm.identify.statistics import Gain, gain, robust_covariance
 
 __all__ = [
     "Block",
+    "Bootstrap",
     "Combination",
     "Estimate",
     "Fit",
+    "Fitting",
     "Gain",
     "InverseDynamicsProblem",
     "OutputErrorProblem",
     "Problem",
+    "Profile",
+    "ShootingProblem",
+    "bootstrap",
     "estimate",
     "gain",
     "gaps",
     "identify",
     "problem",
+    "profile_intervals",
     "robust_covariance",
     "segments",
     "unseen_combinations",

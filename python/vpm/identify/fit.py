@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares, lsq_linear
 
 from vpm.errors import IdentificationError
 from vpm.experiment import Experiment
-from vpm.identify.identifiability import Combination, column_lengths, unseen_combinations
-from vpm.identify.problem import InverseDynamicsProblem, OutputErrorProblem, gaps, problem, segments
-from vpm.identify.statistics import NORMAL_95, robust_covariance
+from vpm.identify.engine import Found, fit_problem
+from vpm.identify.estimation import Estimate, Progress, estimate, limits
+from vpm.identify.identifiability import Combination
+from vpm.identify.objective import AnyProblem
+from vpm.identify.parallel import worker_count
+from vpm.identify.problem import gaps, problem
+from vpm.identify.remarks import constant_channels, remarks, touching
+from vpm.identify.settings import Fitting
+from vpm.identify.shooting import ShootingProblem
+from vpm.identify.statistics import NORMAL_95
 from vpm.identify.ties import TiedProblem, check_ties
 from vpm.model import Model
 from vpm.results import Result
@@ -24,195 +30,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
-AnyProblem = InverseDynamicsProblem | OutputErrorProblem | TiedProblem
-
-#: Evaluations after which a fit is ended as it stands.
-MOST_EVALUATIONS = 40
-
-#: Called after every evaluation with (evaluations so far, root mean square of the weighted residual).
-Progress = Callable[[int, float], None]
-
-
-@dataclass(frozen=True)
-class Estimate:
-    """Result of one least-squares run, as arrays over the free parameters."""
-
-    names: tuple[str, ...]
-    values: Array
-    residual: Array
-    jacobian: Array
-    covariance: Array
-    unseen: tuple[Combination, ...]
-    at_bounds: tuple[str, ...]
-    evaluations: int
-
-    @property
-    def std(self) -> Array:
-        """Standard deviation of each estimate; infinite where the data cannot see it."""
-        return np.sqrt(np.diag(self.covariance))
-
-
-def estimate(
-    model: Model,
-    data: AnyProblem,
-    free: Sequence[str],
-    *,
-    bounds: Mapping[str, tuple[float, float]] | None = None,
-    tolerance: float = 1e-8,
-    linear_only: bool = False,
-    progress: Progress | None = None,
-) -> Estimate:
-    """Move ``free`` parameters of ``model`` until the residual of ``data`` is least.
-
-    A first step solves the problem as if it were linear (which on the inverse-dynamics regressor it mostly is); the
-    trust-region reflective method of SciPy finishes where it is not.
-
-    Parameters
-    ----------
-    model : Model
-        Gives the structure, the start values and the bounds.
-    data : problem
-    free : sequence of str
-        Dotted parameter names.
-    bounds : mapping, optional
-        Bounds that replace those of the model, by parameter.
-    tolerance : float
-        Relative change of parameters or of the sum of squares at which to stop.
-    linear_only : bool
-        Stop after the first step.
-    progress : callable, optional
-    """
-    columns = [model.index(name) for name in free]
-    low, high = _bounds(model, free, bounds or {})
-    counter = _Counter(model, data, columns, progress)
-    start = np.clip(model.theta[columns], low, high)
-    if columns:
-        start = _linear_step(counter, start, low, high)
-        start = start if linear_only else _refine(counter, start, low, high, tolerance)
-    residual, jacobian = counter(start)
-    unseen = unseen_combinations(jacobian, free)
-    covariance = _covariance(data, residual, jacobian, unseen, free)
-    touching = tuple(
-        name
-        for name, x, lo, hi in zip(free, start, low, high, strict=True)
-        if np.isclose(x, lo, rtol=1e-6, atol=1e-12) or np.isclose(x, hi, rtol=1e-6, atol=1e-12)
-    )
-    return Estimate(tuple(free), start, residual, jacobian, covariance, unseen, touching, counter.count)
-
-
-class _Counter:
-    """Evaluates the problem at given values of the free parameters; remembers the last point."""
-
-    def __init__(self, model: Model, data: AnyProblem, columns: list[int], progress: Progress | None) -> None:
-        self.model, self.data, self.columns, self.progress = model, data, columns, progress
-        self.theta = model.theta.copy()
-        self.count = 0
-        self._at: Array | None = None
-        self._value: tuple[Array, Array] | None = None
-
-    def __call__(self, x: Array) -> tuple[Array, Array]:
-        if self._value is None or self._at is None or not np.array_equal(x, self._at):
-            theta = self.theta.copy()
-            theta[self.columns] = x
-            self._value = self._evaluate(theta)
-            self._at = x.copy()
-            self.count += 1
-            if self.progress is not None:
-                self.progress(self.count, float(np.sqrt(np.mean(self._value[0] ** 2))))
-        return self._value
-
-    def _evaluate(self, theta: Array) -> tuple[Array, Array]:
-        """Infinite where the values make no machine (an inertia that no body has): a step to there is not taken."""
-        try:
-            return self.data.evaluate(self.model, theta, self.columns)
-        except ValueError:
-            if self.count == 0:  # the start itself: an error of the input, not of a step
-                raise
-            rows = self.data.blocks[-1].samples.stop
-            return np.full(rows, np.inf), np.zeros((rows, len(self.columns)))
-
-    def residual(self, x: Array) -> Array:
-        return self(x)[0]
-
-    def jacobian(self, x: Array) -> Array:
-        return self(x)[1]
-
-
-def _linear_step(counter: _Counter, start: Array, low: Array, high: Array) -> Array:
-    """The bounded minimiser of the linearised problem, if it is indeed better than the start."""
-    residual, jacobian = counter(start)
-    lengths = column_lengths(jacobian)
-    orthogonal, square = np.linalg.qr(jacobian / lengths)
-    step = lsq_linear(square, -orthogonal.T @ residual, ((low - start) * lengths, (high - start) * lengths), tol=1e-14)
-    candidate = np.clip(start + step.x / lengths, low, high)
-    better = np.sum(counter(candidate)[0] ** 2) <= np.sum(residual**2)
-    return candidate if better else start
-
-
-def _refine(counter: _Counter, start: Array, low: Array, high: Array, tolerance: float) -> Array:
-    residual, jacobian = counter(start)
-    lengths = column_lengths(jacobian)
-    gradient = (jacobian / lengths).T @ residual
-    interior = (start > low) & (start < high)
-    # Nothing left to gain along any free direction: the problem was linear and the first step ended it.
-    if np.all(np.abs(gradient[interior]) <= 1e-9 * np.sqrt(residual @ residual)):
-        return start
-    result = least_squares(
-        counter.residual,
-        _strictly_inside(start, low, high),
-        jac=counter.jacobian,
-        bounds=(low, high),
-        method="trf",
-        x_scale=1.0 / lengths,
-        max_nfev=MOST_EVALUATIONS,
-        xtol=tolerance,
-        ftol=tolerance,
-        gtol=1e-12,
-    )
-    solution: Array = result.x
-    return solution if np.sum(counter(solution)[0] ** 2) <= np.sum(residual**2) else start
-
-
-def _strictly_inside(x: Array, low: Array, high: Array) -> Array:
-    """SciPy asks for a start that does not touch the bounds."""
-    width = np.where(np.isfinite(high - low), high - low, np.maximum(1.0, np.abs(x)))
-    return np.clip(x, np.where(np.isfinite(low), low + 1e-9 * width, low), high - 1e-9 * np.minimum(width, 1e300))
-
-
-def _bounds(model: Model, free: Sequence[str], replaced: Mapping[str, tuple[float, float]]) -> tuple[Array, Array]:
-    pairs = [replaced.get(n, _range(model, n, free)) for n in free]
-    return np.array([p[0] for p in pairs], dtype=float), np.array([p[1] for p in pairs], dtype=float)
-
-
-def _range(model: Model, name: str, free: Sequence[str]) -> tuple[float, float]:
-    """Bounds of the model file, and for a single free principal inertia what the other two allow.
-
-    No principal moment of a body exceeds the sum of the other two, nor is it less than their difference.
-    """
-    parameter = model.parameters[name]
-    body, _, axis = name.rpartition(".inertia.")
-    names = [f"{body}.inertia.{other}" for other in ("xx", "yy", "zz") if other != axis]
-    products = [f"{body}.inertia.{pair}" for pair in ("xy", "xz", "yz")]
-    alone = axis in {"xx", "yy", "zz"} and not any(n in free for n in (*names, *products))
-    if not alone or any(model.parameters[n].value for n in products):
-        return parameter.minimum, parameter.maximum
-    first, second = (model.parameters[n].value for n in names)
-    if first + second == 0.0:
-        return parameter.minimum, parameter.maximum
-    return max(parameter.minimum, abs(first - second)), min(parameter.maximum, first + second)
-
-
-def _covariance(
-    data: AnyProblem, residual: Array, jacobian: Array, unseen: tuple[Combination, ...], free: Sequence[str]
-) -> Array:
-    """Robust covariance; infinite variance for every parameter that takes part in an unseen combination."""
-    lengths = column_lengths(jacobian)
-    covariance = robust_covariance(jacobian / lengths, residual, segments(data)) / np.outer(lengths, lengths)
-    blind = [i for i, name in enumerate(free) if any(name in combination.names for combination in unseen)]
-    covariance[blind, :] = 0.0
-    covariance[:, blind] = 0.0
-    covariance[blind, blind] = np.inf
-    return covariance
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -235,6 +52,23 @@ class Fit(Result):
         Estimates that rest on a bound: widen it or question the model.
     model : Model
         The model with the identified values.
+    warnings : tuple of str
+        What to know before the numbers are trusted, one sentence each: estimates on a bound, still at their start, not
+        identifiable, or collinear; too few samples; constant channels; a fit that Ctrl-C ended.
+    noise : dict
+        ``{channel: standard deviation}`` that residuals were divided by, SI; empty where it was the signal's spread.
+    states, states_std : dict
+        Fitted first states, ``{"record, 0 s: axis.position": value}``, and their standard deviations, SI.
+    costs : ndarray, shape (starts,)
+        Sum of squares that each start reached, the model's own values first.
+    agreeing : int
+        Starts that came within 1 % of the least sum of squares.
+    evaluations : int
+        Simulations of all records with derivatives.
+    ended : str
+        ``"converged"``, ``"evaluations"`` or ``"interrupted"``; empty for a fit without `Fitting`.
+    setup, fitting, ties
+        How it was done, for `profile_intervals` and `bootstrap`.
     """
 
     mode: str
@@ -250,6 +84,22 @@ class Fit(Result):
     unidentifiable: tuple[Combination, ...]
     at_bounds: tuple[str, ...]
     model: Model
+    warnings: tuple[str, ...] = ()
+    noise: dict[str, float] = field(default_factory=dict)
+    states: dict[str, float] = field(default_factory=dict)
+    states_std: dict[str, float] = field(default_factory=dict)
+    costs: Array = field(default_factory=lambda: np.zeros(0))
+    agreeing: int = 1
+    evaluations: int = 0
+    ended: str = ""
+    setup: Setup | None = None
+    fitting: Fitting | None = None
+    ties: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether Ctrl-C ended the fit; the values are the best until then."""
+        return self.ended == "interrupted"
 
     @property
     def intervals(self) -> Array:
@@ -269,7 +119,8 @@ class Fit(Result):
 
     def _html_rows(self) -> Mapping[str, object]:
         rows = zip(self.names, self.values, self.std, self.units, strict=True)
-        return {name: f"{value:.6g} ± {std:.2g} {unit}" for name, value, std, unit in rows}
+        values = {name: f"{value:.6g} ± {std:.2g} {unit}" for name, value, std, unit in rows}
+        return {**values, **{f"warning {i}": sentence for i, sentence in enumerate(self.warnings, 1)}}
 
     def _frame_columns(self) -> Mapping[str, object]:
         return {
@@ -298,6 +149,7 @@ def identify(
     ties: Mapping[str, str] | None = None,
     tolerance: float = 1e-8,
     progress: Progress | None = None,
+    fitting: Fitting | None = None,
 ) -> Fit:
     """Fit parameters of ``model`` to one or several experiments at once.
 
@@ -320,7 +172,9 @@ def identify(
     tolerance : float
         Relative change of parameters or of the sum of squares at which to stop.
     progress : callable, optional
-        Called with the number of evaluations and the weighted residual.
+        Called with the number of evaluations and the weighted residual; with several starts, from their threads.
+    fitting : Fitting, optional
+        Weights, losses, priors, bounds, several starts, unknown first states, pieces.
 
     Returns
     -------
@@ -337,12 +191,129 @@ def identify(
         raise IdentificationError(
             f"{model.name}: no parameter is free; give some an uncertainty in the model file or name them in free="
         )
-    untied = problem(model, records, mode, cutoff=cutoff, setup=setup)
+    data = comparison(model, records, mode, cutoff=cutoff, setup=setup, ties=ties, fitting=fitting)
     check_ties(model, ties or {}, names)
-    data = TiedProblem(untied, ties) if ties else untied
     before, _ = data.evaluate(model, model.theta)
-    result = estimate(model, data, names, tolerance=tolerance, progress=progress)
-    return fit_of(model, data, result, before, [e.name for e in records], ties or {})
+    if fitting is None:
+        result = estimate(model, data, names, tolerance=tolerance, progress=progress)
+        fit = fit_of(model, data, result, before, [e.name for e in records], ties or {})
+        fit = replace(fit, evaluations=result.evaluations, ended="interrupted" if result.interrupted else "")
+    else:
+        check_bounds(names, fitting)
+        box = limits(model, names, fitting.bounds)
+        found = fit_problem(model, data, names, box, fitting, tolerance=tolerance, progress=progress)
+        result = Estimate(
+            names,
+            found.values,
+            found.residual,
+            found.jacobian,
+            found.covariance,
+            found.unseen,
+            touching(names, found.values, *box),
+            found.evaluations,
+        )
+        fit = _with_details(fit_of(model, data, result, before, [e.name for e in records], ties or {}), data, found)
+    fit = replace(fit, setup=setup, fitting=fitting, ties=dict(ties or {}))
+    return replace(fit, warnings=_told(model, records, data, fit, result, (fitting or Fitting()).bounds))
+
+
+def comparison(
+    model: Model,
+    records: Sequence[Experiment],
+    mode: str,
+    *,
+    cutoff: float | None = None,
+    setup: Setup | None = None,
+    ties: Mapping[str, str] | None = None,
+    fitting: Fitting | None = None,
+) -> AnyProblem:
+    """Set up what a fit compares.
+
+    Parameters
+    ----------
+    model, records, mode, cutoff, setup, ties, fitting
+        As for `identify`.
+    """
+    chosen = fitting or Fitting()
+    workers = 1 if chosen.starts > 1 else worker_count(chosen.workers or None)  # starts take the threads instead
+    channels = chosen.channels or None
+    if chosen.states or chosen.known_states or chosen.piece > 0.0:
+        untied: AnyProblem = ShootingProblem(
+            model,
+            records,
+            mode,
+            states=chosen.states,
+            known=chosen.known_states,
+            piece=chosen.piece,
+            continuity=chosen.continuity,
+            channels=channels,
+            setup=setup,
+            workers=workers,
+        )
+    else:
+        untied = problem(model, records, mode, cutoff=cutoff, setup=setup, channels=channels, workers=workers)
+    return TiedProblem(untied, ties) if ties and not isinstance(untied, TiedProblem) else untied
+
+
+def check_bounds(free: Sequence[str], fitting: Fitting) -> None:
+    """Complain about bounds that cannot be meant.
+
+    Raises
+    ------
+    IdentificationError
+        Bounds of a parameter that is not free, or in the wrong order.
+    """
+    for name, (low, high) in fitting.bounds.items():
+        if name not in free:
+            raise IdentificationError(f'bounds: "{name}" is not free; free are {", ".join(free)}')
+        if not low < high:
+            raise IdentificationError(f'bounds of "{name}" are {low:g} and {high:g}; give the lower one first')
+
+
+def _with_details(fit: Fit, data: AnyProblem, found: Found) -> Fit:
+    shooting = data.untied if isinstance(data, TiedProblem) else data
+    labels = shooting.labels if isinstance(shooting, ShootingProblem) else ()
+    return replace(
+        fit,
+        noise=found.noise,
+        states=dict(zip(labels, map(float, found.states), strict=True)),
+        states_std=dict(zip(labels, map(float, found.states_std), strict=True)),
+        costs=found.costs,
+        agreeing=found.agreeing,
+        evaluations=found.evaluations,
+        ended=found.ended,
+    )
+
+
+def _told(
+    model: Model,
+    records: Sequence[Experiment],
+    data: AnyProblem,
+    fit: Fit,
+    result: Estimate,
+    replaced: Mapping[str, tuple[float, float]],
+) -> tuple[str, ...]:
+    box = dict(zip(fit.names, zip(*limits(model, fit.names, replaced), strict=True), strict=True))
+    resting = {name: box[name] for name in result.at_bounds}
+    told = remarks(
+        fit.names,
+        fit.start,
+        fit.values,
+        fit.std,
+        fit.correlation,
+        fit.unidentifiable,
+        resting,
+        data.blocks,
+        len(fit.states),
+    )
+    told += constant_channels(model, records, data.blocks)
+    if fit.ended == "interrupted":
+        told.insert(0, f"stopped by Ctrl-C after {fit.evaluations} evaluations: the values are the best until then")
+    elif fit.ended == "evaluations":
+        told.insert(0, f"not converged after {fit.evaluations} evaluations: allow more with most_evaluations")
+    if fit.costs.size > 1 and 2 * fit.agreeing <= fit.costs.size:
+        told.append(f"only {fit.agreeing} of {fit.costs.size} starts agree: the best may not be the least")
+    return tuple(told)
 
 
 def fit_of(

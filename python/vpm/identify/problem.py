@@ -8,14 +8,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d
 
-from vpm.errors import IdentificationError
+from vpm.errors import IdentificationError, near_match
 from vpm.experiment import Experiment, Motion, motion, parallel_filter
+from vpm.identify.parallel import in_order
 from vpm.initial import joint_motion
 from vpm.model import Model
 from vpm.simulate import MODES, Setup, check_balance, copied_channels, simulate_arrays
@@ -247,6 +249,8 @@ class OutputErrorProblem:
         Integrator, substeps and horizon.
     cutoff : float, optional
         Of the motion that the joints follow, Hz.
+    workers : int
+        Records that are simulated at a time; the residual does not depend on it.
     """
 
     def __init__(
@@ -258,8 +262,10 @@ class OutputErrorProblem:
         channels: Sequence[str] | None = None,
         setup: Setup | None = None,
         cutoff: float | None = None,
+        workers: int = 1,
     ) -> None:
         self.mode = mode
+        self.workers = workers
         self.experiments = tuple(experiments)
         self._setup = setup or Setup()
         follows = mode == "prescribed_motion"
@@ -270,6 +276,7 @@ class OutputErrorProblem:
                 f"no measured channel to compare in mode '{mode}': the logs hold {', '.join(experiments[0].channels)}; "
                 "log a position or velocity, or choose another mode"
             )
+        _check_channels(model, experiments, self._channels)
         self.blocks = self._lay_out(model)
 
     def evaluate(self, model: Model, theta: Array, columns: Sequence[int] = ()) -> tuple[Array, Array]:
@@ -277,10 +284,14 @@ class OutputErrorProblem:
         residuals, jacobians = [], []
         index = [model.output_channels.index(channel) for channel in self._channels]
         blocks = iter(self.blocks)
-        for experiment, followed in zip(self.experiments, self._followed, strict=True):
-            result = simulate_arrays(
-                model, experiment, self.mode, theta=theta, columns=columns, setup=self._setup, followed=followed
+        jobs = [
+            partial(
+                simulate_arrays, model, e, self.mode, theta=theta, columns=columns, setup=self._setup, followed=followed
             )
+            for e, followed in zip(self.experiments, self._followed, strict=True)
+        ]
+        results = in_order(jobs, self.workers)
+        for experiment, result in zip(self.experiments, results, strict=True):
             for column, channel in zip(index, self._channels, strict=True):
                 block = next(blocks)
                 weight = block.weight * block.moving
@@ -326,15 +337,20 @@ def problem(
     *,
     cutoff: float | None = None,
     setup: Setup | None = None,
+    channels: Sequence[str] | None = None,
+    workers: int = 1,
 ) -> InverseDynamicsProblem | OutputErrorProblem:
-    """Set up the residual of ``model`` against ``experiments`` in one of the five modes."""
+    """Set up the residual of ``model`` against ``experiments`` in one of the five modes.
+
+    ``channels`` are the compared outputs of simulated modes, ``workers`` the records that are simulated at a time.
+    """
     if not experiments:
         raise IdentificationError("no experiment was given; pass at least one")
     if mode not in MODES:
         raise IdentificationError(f"unknown mode '{mode}'; choose one of {', '.join(MODES)}")
     if mode == "inverse_dynamics":
         return InverseDynamicsProblem(model, experiments, cutoff=cutoff)
-    return OutputErrorProblem(model, experiments, mode, setup=setup, cutoff=cutoff)
+    return OutputErrorProblem(model, experiments, mode, channels=channels, setup=setup, cutoff=cutoff, workers=workers)
 
 
 def _compared(model: Model, experiments: Sequence[Experiment], mode: str) -> tuple[str, ...]:
@@ -345,3 +361,17 @@ def _compared(model: Model, experiments: Sequence[Experiment], mode: str) -> tup
         for channel in model.output_channels
         if channel not in prescribed and all(channel in experiment for experiment in experiments)
     )
+
+
+def _check_channels(model: Model, experiments: Sequence[Experiment], channels: Sequence[str]) -> None:
+    """Complain about compared channels that the model does not give or a log does not hold."""
+    for channel in channels:
+        if channel not in model.output_channels:
+            repair = near_match(channel, model.output_channels)
+            raise IdentificationError(f'channels: {model.name} has no output "{channel}"; {repair}')
+        for experiment in experiments:
+            if channel not in experiment:
+                raise IdentificationError(
+                    f'channels: "{channel}" is not in {experiment.name}, which holds {", ".join(experiment.channels)}; '
+                    "leave it out"
+                )

@@ -29,17 +29,23 @@ class TiedProblem:
     def __init__(self, data: InverseDynamicsProblem | OutputErrorProblem, ties: Mapping[str, str]) -> None:
         self.mode: str = data.mode
         self.blocks: tuple[Block, ...] = data.blocks
-        self._data, self._ties = data, dict(ties)
+        self.untied, self._ties = data, dict(ties)
 
-    def evaluate(self, model: Model, theta: Array, columns: Sequence[int] = ()) -> tuple[Array, Array]:
-        """Residual and its derivative, those by the followers added to those by what they follow."""
+    def evaluate(
+        self, model: Model, theta: Array, columns: Sequence[int] = (), unknown: Array | None = None
+    ) -> tuple[Array, Array]:
+        """Residual and its derivative, those by the followers added to those by what they follow.
+
+        ``unknown`` are first states, for a `ShootingProblem`; derivatives by them come last.
+        """
         follows = {model.index(follower): model.index(leader) for follower, leader in self._ties.items()}
         theta = theta.copy()
         for follower, leader in follows.items():
             theta[follower] = theta[leader]
         wanted = [*columns, *(follower for follower, leader in follows.items() if leader in columns)]
-        residual, jacobian = self._data.evaluate(model, theta, wanted)
-        whole = jacobian[:, : len(columns)].copy()
+        given = {} if unknown is None else {"unknown": unknown}
+        residual, jacobian = self.untied.evaluate(model, theta, wanted, **given)
+        whole = np.delete(jacobian, range(len(columns), len(wanted)), axis=1)
         for place, follower in enumerate(wanted[len(columns) :], start=len(columns)):
             whole[:, list(columns).index(follows[follower])] += jacobian[:, place]
         return residual, whole

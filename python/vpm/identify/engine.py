@@ -1,0 +1,275 @@
+"""The fit itself: starts, weights found on the way, descent, covariance; whatever is asked of it by `Fitting`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtri
+
+from vpm.errors import IdentificationError
+from vpm.identify.identifiability import Combination, column_lengths, unseen_combinations
+from vpm.identify.objective import AnyProblem, Objective, noise_levels
+from vpm.identify.parallel import until_interrupted, worker_count
+from vpm.identify.problem import segments
+from vpm.identify.settings import Fitting
+from vpm.identify.solver import Descent, Point, descend
+from vpm.identify.statistics import robust_covariance
+from vpm.model import Model
+
+Array = NDArray[np.float64]
+Progress = Callable[[int, float], None]
+
+#: A start agrees with the best if its cost is within this share of it (and of rounding, beside where it began).
+AGREEING, ROUNDING = 0.01, 1e-12
+#: Rounds in which weights are found again, and the change of them that ends the rounds.
+ROUNDS, SETTLED = 5, 0.02
+#: Bounds further apart than this factor say nothing about where to start.
+WIDE = 1e4
+#: Largest change of a logarithm in one step.
+FARTHEST = float(np.log(30.0))
+
+
+@dataclass(frozen=True)
+class Found:
+    """Result of the engine, as arrays over the free parameters and the first states behind them."""
+
+    values: Array
+    covariance: Array
+    residual: Array
+    jacobian: Array
+    weighted: Point
+    unseen: tuple[Combination, ...]
+    states: Array
+    states_std: Array
+    noise: dict[str, float]
+    costs: Array
+    agreeing: int
+    evaluations: int
+    ended: str
+
+
+def fit_problem(
+    model: Model,
+    data: AnyProblem,
+    free: Sequence[str],
+    bounds: tuple[Array, Array],
+    fitting: Fitting,
+    *,
+    tolerance: float,
+    progress: Progress | None = None,
+) -> Found:
+    """Fit free parameters, and first states if the problem has them.
+
+    Parameters
+    ----------
+    model : Model
+    data : problem
+    free : sequence of str
+    bounds : tuple of ndarray
+        Least and largest value of each free parameter.
+    fitting : Fitting
+    tolerance : float
+        Relative change of parameters or cost at which to stop.
+    progress : callable, optional
+
+    Raises
+    ------
+    IdentificationError
+        No start can be simulated.
+    KeyboardInterrupt
+        Ctrl-C before the first start was simulated.
+    """
+    objective = Objective(model, data, free, bounds, fitting, progress)
+    # Starts are compared under weights that are the same for all; losses and noise are found from the best.
+    search = Objective(model, data, free, bounds, _plain(fitting), progress) if _weighs_later(fitting) else objective
+    begun = starts(model, free, search, fitting)
+    descents, interrupted = _search(search, begun, fitting, 1e2 * tolerance if _weighs_later(fitting) else tolerance)
+    best = min(descents, key=lambda d: d.point.cost)
+    if not np.isfinite(best.point.cost):
+        raise IdentificationError(
+            f"the simulation leaves the finite numbers from all of {len(descents)} starts; take more substeps, shorter "
+            "pieces, or start values nearer to the truth"
+        )
+    highest = max(d.first_cost for d in descents if np.isfinite(d.first_cost))
+    limit = (1.0 + AGREEING) * best.point.cost + ROUNDING * highest
+    costs = np.array([d.point.cost for d in descents])
+    point, ended = best.point, "interrupted" if interrupted else best.ended
+    if _weighs_later(fitting):
+        objective.count = search.count
+        point, ended = _reweighed(objective, point, fitting, tolerance, ended)
+    return _found(objective, point, free, costs, int(np.sum(costs <= limit)), ended)
+
+
+def _weighs_later(fitting: Fitting) -> bool:
+    return fitting.weighs_by_noise and fitting.noise != "given"
+
+
+def _plain(fitting: Fitting) -> Fitting:
+    """The same search with squares of residuals over the spread of their channel."""
+    return replace(fitting, loss="squares", noise="spread", priors=False, noise_levels={})
+
+
+def _search(
+    objective: Objective, begun: Sequence[Array], fitting: Fitting, tolerance: float
+) -> tuple[list[Descent], bool]:
+    """Descents that have a point, and whether Ctrl-C ended them."""
+    jobs = [partial(_descent, objective, x, fitting, tolerance) for x in begun]
+    if len(jobs) == 1:
+        only = jobs[0]()
+        return [only], only.interrupted
+    found, interrupted = until_interrupted(jobs, worker_count(fitting.workers or None))
+    kept = [descent for descent in found if descent is not None]
+    if interrupted and not kept:
+        raise KeyboardInterrupt
+    return kept, interrupted
+
+
+def _descent(objective: Objective, x: Array, fitting: Fitting, tolerance: float) -> Descent:
+    first = objective(np.clip(x, objective.low, objective.high))
+    if not np.isfinite(first.cost):
+        return Descent(first, first.cost, 1, "no machine")
+    return _onward(objective, first, fitting, tolerance)
+
+
+def onward(
+    objective: Objective,
+    first: Point,
+    low: Array,
+    high: Array,
+    most_evaluations: int,
+    tolerance: float,
+    evaluate: Callable[[Array], Point] | None = None,
+) -> Descent:
+    """Descend from a point of ``objective``, or of ``evaluate``, with the scales of its coordinates.
+
+    Parameters
+    ----------
+    objective : Objective
+    first : Point
+    low, high : ndarray
+        Box of the coordinates.
+    most_evaluations : int
+    tolerance : float
+    evaluate : callable, optional
+        Gives the points in place of the objective.
+    """
+    p = len(objective.columns)
+    lengths = column_lengths(first.jacobian)
+    size = np.where(objective.log, 1.0, np.maximum(np.abs(first.x[:p]), 1e-3 * np.sqrt(first.cost) / lengths[:p]))
+    return descend(
+        evaluate or objective,
+        first,
+        low,
+        high,
+        scale=np.concatenate([size, np.ones(first.x.size - p)]),
+        reach=np.concatenate([np.where(objective.log, FARTHEST, np.inf), np.full(first.x.size - p, np.inf)]),
+        tolerance=tolerance,
+        most_evaluations=most_evaluations,
+    )
+
+
+def _onward(objective: Objective, first: Point, fitting: Fitting, tolerance: float) -> Descent:
+    return onward(objective, first, objective.low, objective.high, fitting.most_evaluations, tolerance)
+
+
+def _reweighed(objective: Objective, point: Point, fitting: Fitting, tolerance: float, ended: str) -> tuple[Point, str]:
+    """Weights from the residual, a fit with them, and again until they stay."""
+    for _ in range(ROUNDS):
+        before = dict(objective.noise)
+        levels = noise_levels(objective.data.blocks, point.raw[0], robust=fitting.loss != "squares")
+        objective.noise = dict(levels)
+        point = objective.weigh(point.x, *point.raw)
+        if before and all(abs(np.log(levels[c] / before[c])) < SETTLED for c in levels):
+            break
+        if ended == "interrupted":
+            break
+        descent = _onward(objective, point, fitting, tolerance)
+        point, ended = descent.point, descent.ended
+    return point, ended
+
+
+def starts(model: Model, free: Sequence[str], objective: Objective, fitting: Fitting) -> list[Array]:
+    """Coordinates of all starts: the model's own values, then a Latin hypercube over what is thought possible.
+
+    Around the model's value with its uncertainty if it has one, evenly between bounds that are not wide apart (of a
+    positive parameter, evenly in its logarithm), else within a factor `Fitting.spread`.
+    (M. McKay, R. Beckman, W. Conover, *Technometrics* 21, 1979.)
+    """
+    own = objective.coordinates(model.theta[objective.columns])
+    random = np.random.default_rng(fitting.seed)
+    count = fitting.starts - 1
+    drawn = [own]
+    if count == 0:
+        return drawn
+    places = [(random.permutation(count) + random.random(count)) / count for _ in free]
+    columns = [
+        _spread(u, own[k], objective, k, model.parameters[name].uncertainty, fitting)
+        for k, (name, u) in enumerate(zip(free, places, strict=True))
+    ]
+    return drawn + [np.concatenate([row, objective.first]) for row in np.array(columns).T]
+
+
+def _spread(u: Array, own: float, objective: Objective, k: int, uncertainty: float | None, fitting: Fitting) -> Array:
+    low, high, log = objective.low[k], objective.high[k], bool(objective.log[k])
+    value = float(np.exp(own)) if log else own
+    if uncertainty is not None and np.isfinite(uncertainty):
+        deviation = uncertainty / value if log else uncertainty
+        return np.asarray(np.clip(own + deviation * ndtri(u), low, high))
+    if (
+        np.isfinite(low)
+        and np.isfinite(high)
+        and (high - low < np.log(WIDE) if log else abs(value) * WIDE > high - low)
+    ):
+        return np.asarray(low + u * (high - low))
+    factor = np.log(fitting.spread) * ndtri(u)
+    drawn = own + factor if log else own * np.exp(factor) if own else factor * 0.0
+    return np.asarray(np.clip(drawn, low, high))
+
+
+def _found(objective: Objective, point: Point, free: Sequence[str], costs: Array, agreeing: int, ended: str) -> Found:
+    p, states = len(free), objective.shooting
+    labels = [*free, *(states.labels if states else ())]
+    slopes = objective.slopes(point.x)
+    every = unseen_combinations(point.jacobian / slopes, labels)
+    unseen = tuple(c for c in every if any(name in free for name in c.names))
+    covariance = _covariance(objective, point, labels, every)
+    std = np.sqrt(np.diag(covariance))
+    residual, jacobian = point.raw
+    return Found(
+        objective.parameters(point.x),
+        covariance[:p, :p],
+        residual,
+        jacobian[:, :p] / slopes[:p],
+        point,
+        unseen,
+        point.x[p:] * objective.sizes,
+        std[p:],
+        dict(objective.noise),
+        costs,
+        agreeing,
+        objective.count,
+        ended,
+    )
+
+
+def _covariance(objective: Objective, point: Point, labels: Sequence[str], unseen: Sequence[Combination]) -> Array:
+    """Covariance of parameters and first states: sandwich over records, with priors as what they claim to be."""
+    lengths = column_lengths(point.jacobian)
+    scaled, rows = point.jacobian / lengths, len(point.residual)
+    data = rows - objective.priors
+    pieces = segments(objective.data) + [slice(k, k + 1) for k in range(objective.data.blocks[-1].samples.stop, data)]
+    expected = point.residual.copy()
+    expected[data:] = 1.0  # a prior is off by its own standard deviation, whatever it happens to be off by
+    pieces += [slice(k, k + 1) for k in range(data, rows)]
+    covariance = robust_covariance(scaled, expected, pieces) / np.outer(lengths, lengths)
+    slopes = objective.slopes(point.x)
+    covariance *= np.outer(slopes, slopes)
+    blind = [i for i, name in enumerate(labels) if any(name in combination.names for combination in unseen)]
+    covariance[blind, :] = 0.0
+    covariance[:, blind] = 0.0
+    covariance[blind, blind] = np.inf
+    return covariance

@@ -1,0 +1,227 @@
+"""Bounded least squares on any problem, with honest uncertainty: the descent of fits without `Fitting`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares, lsq_linear
+
+from vpm.identify.identifiability import Combination, column_lengths, unseen_combinations
+from vpm.identify.objective import AnyProblem
+from vpm.identify.problem import segments
+from vpm.identify.statistics import robust_covariance
+from vpm.model import Model
+
+Array = NDArray[np.float64]
+
+#: Evaluations after which a fit is ended as it stands.
+MOST_EVALUATIONS = 40
+
+#: Called after every evaluation with (evaluations so far, root mean square of the weighted residual).
+Progress = Callable[[int, float], None]
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Result of one least-squares run, as arrays over the free parameters."""
+
+    names: tuple[str, ...]
+    values: Array
+    residual: Array
+    jacobian: Array
+    covariance: Array
+    unseen: tuple[Combination, ...]
+    at_bounds: tuple[str, ...]
+    evaluations: int
+    interrupted: bool = False
+
+    @property
+    def std(self) -> Array:
+        """Standard deviation of each estimate; infinite where the data cannot see it."""
+        return np.sqrt(np.diag(self.covariance))
+
+
+def estimate(
+    model: Model,
+    data: AnyProblem,
+    free: Sequence[str],
+    *,
+    bounds: Mapping[str, tuple[float, float]] | None = None,
+    tolerance: float = 1e-8,
+    linear_only: bool = False,
+    progress: Progress | None = None,
+) -> Estimate:
+    """Move ``free`` parameters of ``model`` until the residual of ``data`` is least.
+
+    A first step solves the problem as if it were linear (which on the inverse-dynamics regressor it mostly is); the
+    trust-region reflective method of SciPy finishes where it is not.
+
+    Parameters
+    ----------
+    model : Model
+        Gives the structure, the start values and the bounds.
+    data : problem
+    free : sequence of str
+        Dotted parameter names.
+    bounds : mapping, optional
+        Bounds that replace those of the model, by parameter.
+    tolerance : float
+        Relative change of parameters or of the sum of squares at which to stop.
+    linear_only : bool
+        Stop after the first step.
+    progress : callable, optional
+
+    Raises
+    ------
+    KeyboardInterrupt
+        Ctrl-C before the start was evaluated; later it ends the fit with the best values until then.
+    """
+    columns = [model.index(name) for name in free]
+    low, high = limits(model, free, bounds or {})
+    counter = _Counter(model, data, columns, progress)
+    start = np.clip(model.theta[columns], low, high)
+    interrupted = False
+    try:
+        if columns:
+            start = _linear_step(counter, start, low, high)
+            start = start if linear_only else _refine(counter, start, low, high, tolerance)
+        residual, jacobian = counter(start)
+    except KeyboardInterrupt:
+        if counter.best is None:
+            raise
+        start, (residual, jacobian) = counter.best
+        interrupted = True
+    unseen = unseen_combinations(jacobian, free)
+    covariance = _covariance(data, residual, jacobian, unseen, free)
+    touching = tuple(
+        name
+        for name, x, lo, hi in zip(free, start, low, high, strict=True)
+        if np.isclose(x, lo, rtol=1e-6, atol=1e-12) or np.isclose(x, hi, rtol=1e-6, atol=1e-12)
+    )
+    return Estimate(tuple(free), start, residual, jacobian, covariance, unseen, touching, counter.count, interrupted)
+
+
+class _Counter:
+    """Evaluates the problem at given values of the free parameters; remembers the last point and the best."""
+
+    def __init__(self, model: Model, data: AnyProblem, columns: list[int], progress: Progress | None) -> None:
+        self.model, self.data, self.columns, self.progress = model, data, columns, progress
+        self.theta = model.theta.copy()
+        self.count = 0
+        self._at: Array | None = None
+        self._value: tuple[Array, Array] | None = None
+        self.best: tuple[Array, tuple[Array, Array]] | None = None
+        self._least = np.inf
+
+    def __call__(self, x: Array) -> tuple[Array, Array]:
+        if self._value is None or self._at is None or not np.array_equal(x, self._at):
+            theta = self.theta.copy()
+            theta[self.columns] = x
+            self._value = self._evaluate(theta)
+            self._at = x.copy()
+            self.count += 1
+            if (cost := float(self._value[0] @ self._value[0])) < self._least:
+                self._least, self.best = cost, (self._at, self._value)
+            if self.progress is not None:
+                self.progress(self.count, float(np.sqrt(np.mean(self._value[0] ** 2))))
+        return self._value
+
+    def _evaluate(self, theta: Array) -> tuple[Array, Array]:
+        """Infinite where the values make no machine (an inertia that no body has): a step to there is not taken."""
+        try:
+            return self.data.evaluate(self.model, theta, self.columns)
+        except ValueError:
+            if self.count == 0:  # the start itself: an error of the input, not of a step
+                raise
+            rows = self.data.blocks[-1].samples.stop
+            return np.full(rows, np.inf), np.zeros((rows, len(self.columns)))
+
+    def residual(self, x: Array) -> Array:
+        return self(x)[0]
+
+    def jacobian(self, x: Array) -> Array:
+        return self(x)[1]
+
+
+def _linear_step(counter: _Counter, start: Array, low: Array, high: Array) -> Array:
+    """The bounded minimiser of the linearised problem, if it is indeed better than the start."""
+    residual, jacobian = counter(start)
+    lengths = column_lengths(jacobian)
+    orthogonal, square = np.linalg.qr(jacobian / lengths)
+    step = lsq_linear(square, -orthogonal.T @ residual, ((low - start) * lengths, (high - start) * lengths), tol=1e-14)
+    candidate = np.clip(start + step.x / lengths, low, high)
+    better = np.sum(counter(candidate)[0] ** 2) <= np.sum(residual**2)
+    return candidate if better else start
+
+
+def _refine(counter: _Counter, start: Array, low: Array, high: Array, tolerance: float) -> Array:
+    residual, jacobian = counter(start)
+    lengths = column_lengths(jacobian)
+    gradient = (jacobian / lengths).T @ residual
+    interior = (start > low) & (start < high)
+    # Nothing left to gain along any free direction: the problem was linear and the first step ended it.
+    if np.all(np.abs(gradient[interior]) <= 1e-9 * np.sqrt(residual @ residual)):
+        return start
+    inside = _strictly_inside(start, low, high)
+    if not np.all(np.isfinite(counter(inside)[0])):  # a bound that the simulation does not bear, such as no friction
+        return start
+    result = least_squares(
+        counter.residual,
+        inside,
+        jac=counter.jacobian,
+        bounds=(low, high),
+        method="trf",
+        x_scale=1.0 / lengths,
+        max_nfev=MOST_EVALUATIONS,
+        xtol=tolerance,
+        ftol=tolerance,
+        gtol=1e-12,
+    )
+    solution: Array = result.x
+    return solution if np.sum(counter(solution)[0] ** 2) <= np.sum(residual**2) else start
+
+
+def _strictly_inside(x: Array, low: Array, high: Array) -> Array:
+    """SciPy asks for a start that does not touch the bounds."""
+    width = np.where(np.isfinite(high - low), high - low, np.maximum(1.0, np.abs(x)))
+    return np.clip(x, np.where(np.isfinite(low), low + 1e-9 * width, low), high - 1e-9 * np.minimum(width, 1e300))
+
+
+def limits(model: Model, free: Sequence[str], replaced: Mapping[str, tuple[float, float]]) -> tuple[Array, Array]:
+    """Least and largest value of each free parameter: as replaced, or of the model."""
+    pairs = [replaced.get(n, _range(model, n, free)) for n in free]
+    return np.array([p[0] for p in pairs], dtype=float), np.array([p[1] for p in pairs], dtype=float)
+
+
+def _range(model: Model, name: str, free: Sequence[str]) -> tuple[float, float]:
+    """Bounds of the model file, and for a single free principal inertia what the other two allow.
+
+    No principal moment of a body exceeds the sum of the other two, nor is it less than their difference.
+    """
+    parameter = model.parameters[name]
+    body, _, axis = name.rpartition(".inertia.")
+    names = [f"{body}.inertia.{other}" for other in ("xx", "yy", "zz") if other != axis]
+    products = [f"{body}.inertia.{pair}" for pair in ("xy", "xz", "yz")]
+    alone = axis in {"xx", "yy", "zz"} and not any(n in free for n in (*names, *products))
+    if not alone or any(model.parameters[n].value for n in products):
+        return parameter.minimum, parameter.maximum
+    first, second = (model.parameters[n].value for n in names)
+    if first + second == 0.0:
+        return parameter.minimum, parameter.maximum
+    return max(parameter.minimum, abs(first - second)), min(parameter.maximum, first + second)
+
+
+def _covariance(
+    data: AnyProblem, residual: Array, jacobian: Array, unseen: tuple[Combination, ...], free: Sequence[str]
+) -> Array:
+    """Robust covariance; infinite variance for every parameter that takes part in an unseen combination."""
+    lengths = column_lengths(jacobian)
+    covariance = robust_covariance(jacobian / lengths, residual, segments(data)) / np.outer(lengths, lengths)
+    blind = [i for i, name in enumerate(free) if any(name in combination.names for combination in unseen)]
+    covariance[blind, :] = 0.0
+    covariance[:, blind] = 0.0
+    covariance[blind, blind] = np.inf
+    return covariance

@@ -1,0 +1,95 @@
+"""What to know before the numbers of a fit are trusted: one sentence each, with the parameter's name."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vpm.experiment import Experiment
+from vpm.identify.identifiability import Combination
+from vpm.identify.problem import Block
+from vpm.model import Model
+
+Array = NDArray[np.float64]
+
+#: Correlation of two estimates beyond which they are called collinear.
+COLLINEAR = 0.99
+#: Samples per parameter below which there are too few.
+SAMPLES_EACH = 10
+#: A parameter has not moved if it changed by less than this share, and by less than this share of its deviation.
+STILL, STILL_STD = 1e-3, 1e-2
+#: Relative difference to a bound at which an estimate rests on it.
+TOUCHING = 1e-6
+
+
+def touching(names: Sequence[str], values: Array, low: Array, high: Array) -> tuple[str, ...]:
+    """Names of estimates that rest on a bound."""
+    near = np.isclose(values, low, rtol=TOUCHING, atol=1e-300) | np.isclose(values, high, rtol=TOUCHING, atol=1e-300)
+    return tuple(name for name, at in zip(names, near, strict=True) if at)
+
+
+def remarks(
+    names: Sequence[str],
+    start: Array,
+    values: Array,
+    std: Array,
+    correlation: Array,
+    unseen: Sequence[Combination],
+    limits: Mapping[str, tuple[float, float]],
+    blocks: Sequence[Block],
+    others: int = 0,
+) -> list[str]:
+    """Sentences about parameters.
+
+    Parameters
+    ----------
+    names : sequence of str
+    start, values, std : ndarray, shape (p,)
+    correlation : ndarray, shape (p, p)
+    unseen : sequence of Combination
+    limits : mapping
+        Bounds of the parameters that rest on one.
+    blocks : sequence of Block
+        What was compared.
+    others : int
+        Unknowns beside the parameters, such as first states.
+    """
+    told = []
+    for name, (low, high) in limits.items():
+        value = float(values[list(names).index(name)])
+        side = "lower" if abs(value - low) <= abs(value - high) else "upper"
+        told.append(f"{name} rests on its {side} bound {value:.6g}: widen it or question the model")
+    told += [f"not identifiable from these data: {combination}" for combination in unseen]
+    blind = {name for combination in unseen for name in combination.names}
+    for name, first, value, deviation in zip(names, start, values, std, strict=True):
+        moved = abs(value - first)
+        if name not in limits and name not in blind and moved <= min(STILL * abs(first), STILL_STD * deviation):
+            told.append(f"{name} is still at its start {first:.6g}: begin elsewhere and see whether it comes back")
+    told += [
+        f"{names[i]} and {names[j]} are collinear, correlation {correlation[i, j]:+.4f}: these data know one "
+        "combination of them much better than each"
+        for i in range(len(names))
+        for j in range(i)
+        if abs(correlation[i, j]) > COLLINEAR and not {names[i], names[j]} & blind
+    ]
+    count, unknowns = int(sum(block.moving.sum() for block in blocks)), len(names) + others
+    if count < SAMPLES_EACH * unknowns:
+        told.append(
+            f"{count} samples are too few for {unknowns} unknowns, {', '.join(names)} among them: record longer or "
+            "free less"
+        )
+    return told
+
+
+def constant_channels(model: Model, records: Sequence[Experiment], blocks: Sequence[Block]) -> list[str]:
+    """Sentences about compared channels and inputs of a record that never change."""
+    compared = list(dict.fromkeys((b.experiment, b.channel) for b in blocks))
+    inputs = [(e.name, c) for e in records for c in model.input_channels]
+    held = {e.name: e for e in records}
+    return [
+        f"{channel} is constant in {record}: it says nothing there"
+        for record, channel in [*compared, *inputs]
+        if channel in held[record] and np.ptp(held[record][channel]) == 0.0
+    ]

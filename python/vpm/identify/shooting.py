@@ -1,0 +1,311 @@
+"""Output errors of records whose first states are unknown, whole or in pieces that have to meet.
+
+Multiple shooting: each piece of a record is simulated from a start state of its own, and the gaps between the end of
+one piece and the start of the next are residuals as well, with a weight (H. G. Bock, *Modelling of Chemical Reaction
+Systems*, Springer 1981; A. Ribeiro et al., *Automatica* 121, 2020, for what it does to the smoothness of the fit). With
+no fitted states the pieces are restarts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vpm.errors import IdentificationError, near_match
+from vpm.experiment import Experiment
+from vpm.identify.parallel import in_order
+from vpm.identify.problem import FEWEST_SAMPLES, Block, OutputErrorProblem
+from vpm.initial import initial_state, measured_states
+from vpm.model import Model
+from vpm.simulate import Setup, simulate_arrays, simulation_inputs
+
+Array = NDArray[np.float64]
+
+#: Share of a state's size by which it is moved to find the derivative; errors of the difference are its square.
+DIFFERENCE = 1e-5
+
+
+@dataclass(frozen=True)
+class Pieces:
+    """Where the pieces of one record begin (rows), how many samples each has with both ends, and their first states."""
+
+    starts: NDArray[np.int64]
+    length: int
+    states: Array
+
+    @property
+    def rows(self) -> NDArray[np.int64]:
+        """Rows of the log that are compared: each piece without its last sample, which is the next one's first."""
+        return np.arange(self.starts[0], self.starts[-1] + self.length)
+
+
+class ShootingProblem(OutputErrorProblem):
+    """Measured minus simulated outputs from first states that are unknown, and the gaps between pieces.
+
+    Parameters
+    ----------
+    model : Model
+    experiments : sequence of Experiment
+    mode : {"free_run", "closed_loop"}
+        Pieces need a free run.
+    states : sequence of str
+        Fitted first states, ``"axis.position"``; the others are as for any simulation of the log. With pieces, by
+        default all that an output shows.
+    known : mapping of str to float, optional
+        First states of whole records that are known, SI.
+    piece : float
+        Length of the pieces, s; 0 for whole records.
+    continuity : float
+        Weight of a gap, in samples of a piece.
+    channels, setup, workers
+        As for `OutputErrorProblem`.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        experiments: Sequence[Experiment],
+        mode: str,
+        *,
+        states: Sequence[str] = (),
+        known: Mapping[str, float] | None = None,
+        piece: float = 0.0,
+        continuity: float = 10.0,
+        channels: Sequence[str] | None = None,
+        setup: Setup | None = None,
+        workers: int = 1,
+    ) -> None:
+        if mode != "free_run" and (piece > 0.0 or mode != "closed_loop"):
+            raise IdentificationError(
+                f"first states are fitted in the modes free_run and closed_loop, pieces in free_run, not in '{mode}'; "
+                "choose another mode or leave states and piece out"
+            )
+        for name in (*states, *(known or {})):
+            if name not in model.state_names:
+                raise IdentificationError(
+                    f'states: {model.name} has no state "{name}"; {near_match(name, model.state_names)}'
+                )
+        if piece > 0.0 and not states:
+            states = [name for name in model.state_names if state_channel(model, name) is not None]
+        self.states = tuple(states)
+        self._places = [model.state_names.index(name) for name in states]
+        self._seconds = piece
+        self.pieces = tuple(_cut(model, e, piece) for e in experiments)
+        for pieces in self.pieces:
+            for name, value in (known or {}).items():
+                pieces.states[0, model.state_names.index(name)] = value
+        super().__init__(model, experiments, mode, channels=channels, setup=setup, workers=workers)
+        self._sizes = self._state_sizes(model)
+        self._gap_columns = [
+            (model.output_channels.index(c), place)
+            for place, name in enumerate(states)
+            if (c := state_channel(model, name)) is not None
+        ]
+        compared = dict.fromkeys(block.channel for block in self.blocks)
+        weights = {block.channel: block.weight for block in self.blocks}
+        self.gap_channels = tuple(model.output_channels[column] for column, _ in self._gap_columns)
+        self._gap_weights = np.array(
+            [
+                np.sqrt(continuity) * (weights[c] if c in compared else 1.0 / self._sizes[place])
+                for c, (_, place) in zip(self.gap_channels, self._gap_columns, strict=True)
+            ]
+        )
+        self.labels = tuple(
+            f"{e.name}, {e.time[row]:g} s: {name}"
+            for e, p in zip(self.experiments, self.pieces, strict=True)
+            for row in p.starts
+            for name in self.states
+        )
+
+    @property
+    def first_states(self) -> Array:
+        """Fitted states as the log suggests them: records, pieces and states one after the other."""
+        return np.concatenate([p.states[:, self._places].ravel() for p in self.pieces])
+
+    @property
+    def state_sizes(self) -> Array:
+        """Natural size of each of `first_states`."""
+        return np.concatenate([np.tile(self._sizes, len(p.starts)) for p in self.pieces])
+
+    @property
+    def gap_rows(self) -> int:
+        """Number of gaps at the end of the residual."""
+        return sum(len(p.starts) - 1 for p in self.pieces) * len(self._gap_columns)
+
+    def evaluate(
+        self, model: Model, theta: Array, columns: Sequence[int] = (), unknown: Array | None = None
+    ) -> tuple[Array, Array]:
+        """Residual and its derivative by parameters and first states; see :class:`Problem`.
+
+        Returns
+        -------
+        residual : ndarray, shape (n,)
+            Outputs, then gaps.
+        jacobian : ndarray, shape (n, len(columns) + len(first_states))
+        """
+        unknown = self.first_states if unknown is None else unknown
+        counts = [len(p.starts) * len(self.states) for p in self.pieces]
+        mine = np.split(unknown, np.cumsum(counts)[:-1])
+        jobs = [
+            partial(
+                self._record,
+                model,
+                theta,
+                list(columns),
+                k,
+                values.reshape(len(self.pieces[k].starts), len(self.states)),
+            )
+            for k, values in enumerate(mine)
+        ]
+        parts = in_order(jobs, self.workers)
+        p = len(columns)
+        residual = np.concatenate([part[0] for part in parts] + [part[2] for part in parts])
+        jacobian = np.zeros((residual.size, p + sum(counts)))
+        row, column = 0, p
+        for side in (1, 3):
+            column = p
+            for part, count in zip(parts, counts, strict=True):
+                block = part[side]
+                jacobian[row : row + len(block), :p] = block[:, :p]
+                jacobian[row : row + len(block), column : column + count] = block[:, p:]
+                row, column = row + len(block), column + count
+        return residual, jacobian
+
+    def _record(
+        self, model: Model, theta: Array, columns: list[int], number: int, values: Array
+    ) -> tuple[Array, Array, Array, Array]:
+        """Residual of the outputs and its derivative, then the gaps and theirs, of one record."""
+        pieces, experiment = self.pieces[number], self.experiments[number]
+        states = pieces.states.copy()
+        if self.states:
+            states[:, self._places] = values
+        outputs, by_theta = self._outputs(model, theta, experiment, pieces, states, columns)
+        k, p = len(self.states), len(columns)
+        by_state = np.zeros((*outputs.shape, k))
+        for j, (place, size) in enumerate(zip(self._places, self._sizes, strict=True)):
+            sides = []
+            for sign in (1.0, -1.0):
+                moved = states.copy()
+                moved[:, place] += sign * DIFFERENCE * size
+                sides.append(self._outputs(model, theta, experiment, pieces, moved, [])[0])
+            by_state[..., j] = (sides[0] - sides[1]) / (2.0 * DIFFERENCE * size)
+        channels = len(self._channels)
+        mine = self.blocks[number * channels : (number + 1) * channels]
+        count = len(pieces.starts)
+        residuals, jacobians = [], []
+        for block in mine:
+            column = model.output_channels.index(block.channel)
+            weight = block.weight * block.moving
+            measured = experiment[block.channel][pieces.rows]
+            residuals.append((measured - _joined(outputs[:, :, column])) * weight)
+            jacobian = np.zeros((len(measured), p + count * k))
+            jacobian[:, :p] = -_joined(by_theta[:, :, column, :])
+            for piece in range(count):
+                last = pieces.length - (piece < count - 1)
+                rows = slice(piece * (pieces.length - 1), piece * (pieces.length - 1) + last)
+                jacobian[rows, p + piece * k : p + (piece + 1) * k] = -by_state[piece, :last, column, :]
+            jacobians.append(jacobian * weight[:, None])
+        gaps, gap_jacobian = self._gaps(outputs, by_theta, by_state, pieces, p)
+        return np.concatenate(residuals), np.concatenate(jacobians), gaps, gap_jacobian
+
+    def _gaps(self, outputs: Array, by_theta: Array, by_state: Array, pieces: Pieces, p: int) -> tuple[Array, Array]:
+        """End of each piece minus start of the next, in the channels of the fitted states."""
+        count, k = len(pieces.starts), len(self.states)
+        columns = [column for column, _ in self._gap_columns]
+        weights = self._gap_weights * np.sqrt(pieces.length)
+        gaps = (outputs[:-1, -1, :] - outputs[1:, 0, :])[:, columns] * weights
+        jacobian = np.zeros((count - 1, len(columns), p + count * k))
+        slopes = (by_theta[:-1, -1] - by_theta[1:, 0])[:, columns, :]
+        jacobian[:, :, :p] = slopes * weights[:, None]
+        for piece in range(count - 1):
+            here = slice(p + piece * k, p + (piece + 1) * k)
+            following = slice(p + (piece + 1) * k, p + (piece + 2) * k)
+            jacobian[piece, :, here] = by_state[piece, -1][columns] * weights[:, None]
+            jacobian[piece, :, following] = -(by_state[piece + 1, 0][columns] * weights[:, None])
+        return gaps.ravel(), jacobian.reshape(gaps.size, p + count * k)
+
+    def _outputs(
+        self, model: Model, theta: Array, experiment: Experiment, pieces: Pieces, states: Array, columns: list[int]
+    ) -> tuple[Array, Array]:
+        """Outputs (pieces, length, channels) and their derivative by ``columns``."""
+        if len(pieces.starts) == 1:
+            run = simulate_arrays(
+                model, experiment, self.mode, theta=theta, columns=columns, setup=self._setup, initial_state=states[0]
+            )
+            return run.outputs[None], run.jacobian[None]
+        setup = self._setup
+        inputs = simulation_inputs(model, experiment)
+        stepping = (experiment.dt, setup.substeps, setup.integrator, columns)
+        return model.core.restart(theta, states, pieces.starts, pieces.length, inputs, *stepping)
+
+    def _state_sizes(self, model: Model) -> Array:
+        """Spread of each fitted state in the log or, where it holds none, in a simulation; 1 if both are constant."""
+        sizes = []
+        simulated = [
+            self._outputs(model, model.theta, e, p, p.states, [])[0]
+            for e, p in zip(self.experiments, self.pieces, strict=True)
+        ]
+        for name, place in zip(self.states, self._places, strict=True):
+            channel = state_channel(model, name)
+            spread = 0.0
+            if channel is not None:
+                column = model.output_channels.index(channel)
+                spread = max(
+                    float(np.std(e[channel] if channel in e else outputs[:, :, column]))
+                    for e, outputs in zip(self.experiments, simulated, strict=True)
+                )
+            values = np.concatenate([p.states[:, place] for p in self.pieces])
+            sizes.append(spread or float(np.max(np.abs(values))) or 1.0)
+        return np.array(sizes)
+
+    def _lay_out(self, model: Model) -> tuple[Block, ...]:
+        blocks, start = [], 0
+        counted = [self._counted(experiment) for experiment in self.experiments]
+        parts = list(zip(self.experiments, counted, strict=True))
+        spread = {c: float(np.sqrt(np.mean([np.var(e[c][n]) for e, n in parts]))) for c in self._channels}
+        for (experiment, counts), pieces in zip(parts, self.pieces, strict=True):
+            rows = pieces.rows
+            for channel in self._channels:
+                weight = 1.0 / spread[channel] if spread[channel] > 0.0 else 1.0
+                scale = float(np.sqrt(np.mean(experiment[channel][counts] ** 2)))
+                samples = slice(start, start + rows.size)
+                unit, moving = model.channel_unit(channel), counts[rows].astype(np.float64)
+                times = experiment.time[rows]
+                blocks.append(Block(experiment.name, channel, unit, samples, times, scale, weight, moving))
+                start += rows.size
+        return tuple(blocks)
+
+
+def state_channel(model: Model, name: str) -> str | None:
+    """Output that shows a state: of the same name, or the pressure of a chamber."""
+    for channel in (name, name.replace(".chamber_", ".pressure_")):
+        if channel in model.output_channels:
+            return channel
+    return None
+
+
+def _cut(model: Model, experiment: Experiment, seconds: float) -> Pieces:
+    """Pieces of equal length that leave as little of a record as they can."""
+    samples = len(experiment)
+    if seconds == 0.0:
+        state = initial_state(model, experiment, model.theta)
+        return Pieces(np.zeros(1, dtype=np.int64), samples, state[None])
+    count = max(1, round((samples - 1) * experiment.dt / seconds))
+    length = (samples - 1) // count
+    if length < FEWEST_SAMPLES:
+        raise IdentificationError(
+            f"{experiment.name}: pieces of {seconds:g} s have {length} samples; make them at least "
+            f"{FEWEST_SAMPLES * experiment.dt:g} s long"
+        )
+    starts = np.arange(count, dtype=np.int64) * length
+    return Pieces(starts, length + 1, measured_states(model, experiment, model.theta, starts, None))
+
+
+def _joined(values: Array) -> Array:
+    """Pieces one after the other, each without its last sample but the last piece."""
+    pieces = [*values[:-1, :-1], values[-1]]
+    return np.concatenate(pieces)

@@ -1,0 +1,112 @@
+"""Fits on the command line: settings out of words, results as lines."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+from vpm.errors import IdentificationError
+from vpm.experiment import Experiment
+from vpm.identify.fit import Fit
+from vpm.identify.intervals import bootstrap, profile_intervals
+
+#: Evaluations that a fit mostly takes; where its progress bar ends.
+USUAL_EVALUATIONS = 15
+
+
+@contextmanager
+def shown(errors: Console, starts: int) -> Iterator[Callable[[int, float], None]]:
+    """A bar of the evaluations of a fit with its residual; a line each where the output goes to a file."""
+    if not errors.is_terminal:
+        yield lambda n, r: errors.print(f"evaluation {n}: residual {r:.5g}", markup=False)
+        return
+    words = TextColumn("evaluation {task.completed}: residual {task.fields[residual]:.5g}")
+    with Progress(TextColumn("fitting"), BarColumn(), words, TimeElapsedColumn(), console=errors) as bar:
+        task = bar.add_task("fitting", total=USUAL_EVALUATIONS * starts, residual=float("nan"))
+        yield lambda n, r: bar.update(task, completed=n, total=max(n, USUAL_EVALUATIONS * starts), residual=r)
+
+
+def told(fit: Fit) -> list[str]:
+    """Values with their deviations, first states, agreement of starts, noise, warnings and gaps, a line each."""
+    lines = [
+        f"{name:40s} {value:14.6g} ± {std:<10.3g} {unit}"
+        for name, value, std, unit in zip(fit.names, fit.values, fit.std, fit.units, strict=True)
+    ]
+    lines += [
+        f"{label:40s} {value:14.6g} ± {fit.states_std[label]:<10.3g} first state" for label, value in fit.states.items()
+    ]
+    if fit.costs.size > 1:
+        lines.append(f"{fit.agreeing} of {fit.costs.size} starts agree")
+    lines += [f"noise of {channel}: {level:.4g}" for channel, level in fit.noise.items()]
+    lines += fit.warnings
+    lines += [
+        f"residual {channel}: {rms:.4g} {unit}, {100 * share:.2f} % of the signal"
+        for channel, (rms, share, unit) in fit.after.items()
+    ]
+    return lines
+
+
+def told_intervals(
+    fit: Fit, records: Sequence[Experiment], profile: Sequence[str], replicates: int, seed: int, cutoff: float | None
+) -> list[str]:
+    """Intervals by profile of some parameters, and by bootstrap if ``replicates`` are asked for, a line each."""
+    lines = []
+    if profile:
+        lines += [
+            f"{found.name}, profile: {found.low:.6g} to {found.high:.6g} {found.unit}"
+            for found in profile_intervals(fit, records, profile, cutoff=cutoff)
+        ]
+    if replicates:
+        drawn = bootstrap(fit, records, replicates=replicates, seed=seed, cutoff=cutoff)
+        lines.append(f"bootstrap, {replicates} times {drawn.drawn}:")
+        lines += [
+            f"{name}, bootstrap: {low:.6g} to {high:.6g} {unit}"
+            for name, (low, high), unit in zip(drawn.names, drawn.intervals, drawn.units, strict=True)
+        ]
+    return lines
+
+
+def numbers(words: Sequence[str] | None, option: str, form: str) -> dict[str, float]:
+    """Read ``NAME=NUMBER`` words of an option.
+
+    Raises
+    ------
+    IdentificationError
+        A word has another form.
+    """
+    return {name: _number(value) for name, value in _pairs(words, option, form)}
+
+
+def ranges(words: Sequence[str] | None, option: str, form: str) -> dict[str, tuple[float, float]]:
+    """Read ``NAME=LOW:HIGH`` words of an option.
+
+    Raises
+    ------
+    IdentificationError
+        A word has another form.
+    """
+    found = {}
+    for name, word in _pairs(words, option, form):
+        low, sign, high = word.partition(":")
+        if not sign:
+            raise IdentificationError(f"{option} has '{word}' where a range belongs; write it as {form}")
+        found[name] = (_number(low), _number(high))
+    return found
+
+
+def _pairs(words: Sequence[str] | None, option: str, form: str) -> list[tuple[str, str]]:
+    pairs = [word.partition("=") for word in words or []]
+    for name, sign, value in pairs:
+        if not (name and sign and value):
+            raise IdentificationError(f"{option} is '{name}{sign}{value}'; write it as {form}")
+    return [(name, value) for name, _, value in pairs]
+
+
+def _number(word: str) -> float:
+    try:
+        return float(word)
+    except ValueError:
+        raise IdentificationError(f"'{word}' is no number; write one like 1e-3, in SI units") from None
