@@ -20,10 +20,14 @@ HYL = Path(__file__).resolve().parent.parent / "examples" / "hyl"
 SECONDS, REPEATS = 0.5, 7
 #: Integrator and steps per sample of 1 ms.
 CHOICES = (
+    ("guarded", 1),
+    ("adaptive(1e-2)", 1),
     ("adaptive(1e-3)", 1),
     ("adaptive(1e-5)", 1),
     ("adaptive", 1),
     ("adaptive(1e-8)", 1),
+    ("linearly_implicit", 1),
+    ("linearly_implicit", 2),
     ("linearly_implicit", 8),
     ("rosenbrock", 8),
     ("rk4", 2),
