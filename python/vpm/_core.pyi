@@ -241,6 +241,18 @@ class System:
         jacobian : ndarray, shape (N, n, k)
             Derivative of ``required - applied``.
         """
+    def delivered(
+        self, theta: ArrayLike, inputs: ArrayLike, time_step: float, sensitivities: Sequence[int] = ...
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Effort of ideal drives on the joints (N, n_joints) under ``inputs`` (N, m), as in `inverse_dynamics`.
+
+        Unlike there, the machine may have coordinates that nobody measured; all drives have to act on joints.
+
+        Returns
+        -------
+        applied, jacobian : ndarray
+            (N, n_joints), and its derivatives (N, n_joints, k).
+        """
     def forward_dynamics(
         self, theta: ArrayLike, position: ArrayLike, velocity: ArrayLike, effort: ArrayLike
     ) -> NDArray[np.float64]:
@@ -281,6 +293,34 @@ class System:
         -------
         outputs, states, jacobian : ndarray
             As in `simulate`; ``effort`` of a joint is the effort that the motion needs.
+        """
+    def simulate_drives(
+        self,
+        theta: ArrayLike,
+        position: ArrayLike,
+        velocity: ArrayLike,
+        acceleration: ArrayLike,
+        inputs: ArrayLike,
+        internal: ArrayLike,
+        places: Sequence[int],
+        seen: ArrayLike,
+        time_step: float,
+        substeps: int,
+        integrator: str,
+        sensitivities: Sequence[int] = ...,
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Joints follow a measured motion (N, n), drives and supplies answer to it and to ``inputs`` (N, nu).
+
+        They begin in the states ``internal`` (n_states - 2 n,). Position sensors are undone. States of drives that were
+        measured too are ``seen`` (N, len(places)), and ``places`` tells which of ``internal`` they are.
+
+        Returns
+        -------
+        outputs : ndarray, shape (N, ny + n)
+            As in `simulate`, ``effort`` of a joint being the effort that the motion needs; then the effort of the
+            drives on each joint, in the measured states where there are any.
+        states : ndarray, shape (N, nx)
+        jacobian : ndarray, shape (N, ny + n, k)
         """
     def internal_state(self, theta: ArrayLike, position: ArrayLike) -> NDArray[np.float64]:
         """What follows coordinates and rates in a state of a machine that has stood without commands.

@@ -145,14 +145,18 @@ def passive_joints(experiment: Experiment, model: Model) -> tuple[str, ...]:
     return tuple(name for name in model.joints if f"{name}.position" not in experiment and name not in driven)
 
 
-def joint_motion(experiment: Experiment, model: Model, cutoff: float | None = None) -> Motion:
-    """Filtered motion of the joints, as `vpm.experiment.motion` gives it, from a log that need not hold commands.
+def joint_motion(
+    experiment: Experiment, model: Model, cutoff: float | None = None, *, commanded: bool = False
+) -> Motion:
+    """Filtered motion of the joints, as `vpm.experiment.motion` gives it.
 
-    Of joints that are passive there (see `passive_joints`) it has no columns, as long as any joint is measured.
+    Of joints that are passive there (see `passive_joints`) it has no columns, as long as any joint is measured. The
+    log need not hold commands, unless the motion is to be ``commanded``.
     """
     passive = passive_joints(experiment, model)
     followed = tuple(name for name in model.joints if name not in passive)
-    return motion(experiment, _Joints(model.name, followed or model.joints), cutoff=cutoff)
+    inputs = (model.input_channels, tuple(model.optional_inputs)) if commanded else ((), ())
+    return motion(experiment, _Joints(model.name, followed or model.joints, *inputs), cutoff=cutoff)
 
 
 def _fit_start(experiment: Experiment, channel: str, samples: int = 15) -> tuple[float, float]:

@@ -74,6 +74,46 @@ pub fn inverse_dynamics(
     Ok(Efforts { required: pair.first, applied: pair.second, jacobian })
 }
 
+/// Efforts of ideal drives on the joints as in [`inverse_dynamics`], N x joints, and their derivatives; of a machine of which not every
+/// coordinate was measured, as long as all drives act on joints.
+pub fn delivered(
+    description: &Description,
+    theta: &[f64],
+    (inputs, time_step): (Table<'_>, f64),
+    sensitivities: &[usize],
+) -> Result<(Vec<f64>, Vec<f64>)> {
+    for actuator in &description.actuators {
+        let (name, drive) = (actuator.name.clone(), actuator.drive.name());
+        if !matches!(actuator.drive, Drive::Ideal(_)) {
+            return Err(DriveError::Effort { actuator: name, drive }.into());
+        }
+        if let Target::Line(line) = actuator.on {
+            let found = format!("the line `{}`", description.lines[line].name);
+            return Err(DriveError::Target { actuator: name, drive, found, needed: "a joint" }.into());
+        }
+    }
+    inputs.expect("inputs", inputs.rows(), description.n_inputs())?;
+    check_time_step(time_step)?;
+    let job = Delivered { description, inputs, time_step };
+    let (pair, jacobian) = differentiate(&job, theta, sensitivities, |pass: &Pair<_>, place| pass.first[place])?;
+    Ok((pair.first, jacobian))
+}
+
+struct Delivered<'a> {
+    description: &'a Description,
+    inputs: Table<'a>,
+    time_step: f64,
+}
+
+impl Job for Delivered<'_> {
+    fn run<S: Scalar>(&self, theta: &[S]) -> Result<Pair<S>> {
+        let values: Vec<f64> = theta.iter().map(Scalar::re).collect();
+        self.description.check_values(&values)?;
+        let dynamics = Build::dynamics(&self.description, theta)?;
+        Ok(Pair { first: applied(&dynamics, self.inputs, self.time_step, &[]), second: Vec::new() })
+    }
+}
+
 struct Inverse<'a> {
     description: &'a Description,
     motion: Motion<'a>,
@@ -87,7 +127,8 @@ impl Job for Inverse<'_> {
         let mut dynamics = Build::dynamics(&self.description, theta)?;
         let sensors = position_sensors(self.description, theta);
         let (required, levers) = self.required(&mut dynamics, &sensors)?;
-        Ok(Pair { first: required, second: self.applied(&dynamics, &levers) })
+        let applied = applied(&dynamics, self.motion.inputs, self.motion.time_step, &levers);
+        Ok(Pair { first: required, second: applied })
     }
 }
 
@@ -122,39 +163,39 @@ impl Inverse<'_> {
         }
         Ok((required, levers))
     }
+}
 
-    fn applied<S: Scalar>(&self, dynamics: &Dynamics<S>, levers: &[S]) -> Vec<S> {
-        let Motion { inputs, time_step, .. } = self.motion;
-        let (joints, lines) = (dynamics.joints(), dynamics.layout().lines);
-        let mut applied = vec![S::zero(); inputs.rows() * joints];
-        for (number, actuator) in dynamics.actuators.iter().enumerate() {
-            let Drive::Ideal(drive) = &actuator.drive else { continue };
-            let command = |sample: usize| S::from_f64(inputs.at(sample, number));
-            let (mut state, mut before) = (None, None);
-            for (k, row) in applied.chunks_exact_mut(joints).enumerate() {
-                let input = actuator.input(k, time_step, command);
-                let mean = match &actuator.lag {
-                    Some(lag) => {
-                        let (next, mean) = lag.interval(state.unwrap_or(input), input, time_step);
-                        state = Some(next);
-                        mean
-                    }
-                    None => input,
-                };
-                let effort = drive.effort(mean);
-                let delivered = (before.unwrap_or(effort) + effort) * 0.5;
-                match actuator.on {
-                    Target::Joint(joint) => row[joint] += delivered,
-                    Target::Line(line) => {
-                        let arms = &levers[(k * lines + line) * joints..];
-                        for (entry, &arm) in row.iter_mut().zip(arms) {
-                            *entry += arm * delivered;
-                        }
+/// Efforts of ideal drives on the joints, sample by sample, with the `levers` of lines where any acts on one.
+fn applied<S: Scalar>(dynamics: &Dynamics<S>, inputs: Table<'_>, time_step: f64, levers: &[S]) -> Vec<S> {
+    let (joints, lines) = (dynamics.joints(), dynamics.layout().lines);
+    let mut applied = vec![S::zero(); inputs.rows() * joints];
+    for (number, actuator) in dynamics.actuators.iter().enumerate() {
+        let Drive::Ideal(drive) = &actuator.drive else { continue };
+        let command = |sample: usize| S::from_f64(inputs.at(sample, number));
+        let (mut state, mut before) = (None, None);
+        for (k, row) in applied.chunks_exact_mut(joints).enumerate() {
+            let input = actuator.input(k, time_step, command);
+            let mean = match &actuator.lag {
+                Some(lag) => {
+                    let (next, mean) = lag.interval(state.unwrap_or(input), input, time_step);
+                    state = Some(next);
+                    mean
+                }
+                None => input,
+            };
+            let effort = drive.effort(mean);
+            let delivered = (before.unwrap_or(effort) + effort) * 0.5;
+            match actuator.on {
+                Target::Joint(joint) => row[joint] += delivered,
+                Target::Line(line) => {
+                    let arms = &levers[(k * lines + line) * joints..];
+                    for (entry, &arm) in row.iter_mut().zip(arms) {
+                        *entry += arm * delivered;
                     }
                 }
-                before = Some(effort);
             }
+            before = Some(effort);
         }
-        applied
     }
+    applied
 }

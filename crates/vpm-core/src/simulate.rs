@@ -1,12 +1,15 @@
 //! Simulation of a whole record: free run on commands, closed loop on references, restarts from many samples.
 
+mod along;
 mod control;
 mod names;
 mod prescribed;
+mod quintic;
 mod stability;
 mod start;
 mod stepper;
 
+pub use along::{Along, drives_along};
 pub(crate) use names::state_name;
 pub use prescribed::prescribed;
 pub(crate) use stability::{check_step, check_structure};

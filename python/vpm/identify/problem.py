@@ -16,11 +16,12 @@ from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d
 
 from vpm.errors import IdentificationError, near_match
-from vpm.experiment import Experiment, Motion, motion, parallel_filter
+from vpm.experiment import Experiment, Motion, parallel_filter
+from vpm.identify.along import check_along, respond, shown_channels
 from vpm.identify.parallel import in_order
 from vpm.initial import joint_motion
 from vpm.model import Model
-from vpm.simulate import MODES, Setup, check_balance, copied_channels, simulate_arrays
+from vpm.simulate import MODES, Setup, copied_channels, simulate_arrays
 
 Array = NDArray[np.float64]
 
@@ -95,6 +96,10 @@ class InverseDynamicsProblem:
     filtering of the inverse dynamic identification model (M. Gautier, *Annual Reviews in Control*, 1997; A. Janot et
     al., *IEEE Trans. Control Systems Technology* 22, 2014).
 
+    What nobody measures is worked out along the motion, see `vpm.identify.along`: states inside of drives, elastic
+    coordinates, joints without a sensor. Of what shows of it, all that the logs hold is compared too: pressures,
+    currents, strains.
+
     Samples at which a joint stands still do not count, as long as half of them remain: friction at rest takes whatever
     value holds the joint, which no balance can predict.
 
@@ -103,7 +108,7 @@ class InverseDynamicsProblem:
     model : Model
         Names the joints and actuators; its parameters do not enter.
     experiments : sequence of Experiment
-        Each with the position of every joint and the command of every actuator.
+        Each with the position of every joint that moves by an actuator, and the command of every actuator.
     cutoff : float, optional
         Cut-off frequency of the motion filter, Hz; chosen from each record if not given.
     """
@@ -111,104 +116,112 @@ class InverseDynamicsProblem:
     mode = "inverse_dynamics"
 
     def __init__(self, model: Model, experiments: Sequence[Experiment], *, cutoff: float | None = None) -> None:
-        check_balance(model)
         self.experiments = tuple(experiments)
-        self.motions: tuple[Motion, ...] = tuple(motion(e, model, cutoff=cutoff) for e in experiments)
+        self.motions: tuple[Motion, ...] = tuple(joint_motion(e, model, cutoff, commanded=True) for e in experiments)
+        for m in self.motions:
+            check_along(model, m.joints)
+        measured = self.motions[0].joints
         moved = {joint for name in model.actuators for joint in model.joints_of_actuator(name)}
-        driven = sorted(model.joints.index(joint) for joint in moved)
-        self._joints = driven or list(range(len(model.joints)))
+        self._joints = [place for place, joint in enumerate(measured) if joint in moved] or list(range(len(measured)))
+        self.joints = tuple(measured[place] for place in self._joints)
+        #: Channels beside the balance that are compared too: what shows inside of drives, strains of links.
+        self.shown = shown_channels(model, measured, experiments)
         self.blocks = self._lay_out(model)
 
     def evaluate(self, model: Model, theta: Array, columns: Sequence[int] = ()) -> tuple[Array, Array]:
         """Residual of the balance and its derivative; see :class:`Problem`."""
         residuals, jacobians = [], []
-        for m in self.motions:
-            required, applied, jacobian = model.core.inverse_dynamics(
-                theta, m.position, m.velocity, m.acceleration, m.inputs, m.dt, list(columns)
-            )
-            residuals.append(self._retained(m, (applied - required)[:, self._joints]))
-            flat = -jacobian[:, self._joints, :].reshape(len(required), -1)
-            kept = self._retained(m, flat) if columns else np.zeros((len(residuals[-1]), 0))
-            jacobians.append(kept.reshape(len(residuals[-1]), len(self._joints), len(columns)))
+        for m, experiment in zip(self.motions, self.experiments, strict=True):
+            answer = respond(model, theta, m, experiment, columns, self.shown)
+            measured = self._measured(experiment, m)
+            residual = np.hstack([(answer.applied - answer.required)[:, self._joints], measured - answer.seen])
+            residuals.append(parallel_filter(residual, m.decimation))
+            slopes = -np.concatenate([answer.balance[:, self._joints], answer.slopes], axis=1)
+            flat = slopes.reshape(len(residual), -1)
+            kept = parallel_filter(flat, m.decimation) if columns else np.zeros((len(residuals[-1]), 0))
+            jacobians.append(kept.reshape(len(residuals[-1]), residual.shape[1], len(columns)))
         return self._stack(residuals), self._stack(jacobians)
 
     def effort(self, model: Model, theta: Array, record: int) -> tuple[Array, Array, Array]:
         """Time, applied and required effort (n, joints) of one record, filtered as in the residual."""
         m = self.motions[record]
-        required, applied, _ = model.core.inverse_dynamics(
-            theta, m.position, m.velocity, m.acceleration, m.inputs, m.dt, []
-        )
-        pair = [self._retained(m, side[:, self._joints]) for side in (applied, required)]
+        answer = respond(model, theta, m, self.experiments[record], (), ())
+        pair = [parallel_filter(side[:, self._joints], m.decimation) for side in (answer.applied, answer.required)]
         return self._retained_time(m), pair[0], pair[1]
 
     def strength(self, model: Model) -> float:
         """Root mean square of the weighted applied effort over all records: what a relative error is relative to."""
-        power = 0.0
+        power, count = 0.0, 0.0
         for record in range(len(self.motions)):
             _, applied, _ = self.effort(model, model.theta, record)
-            blocks = self.blocks[record * len(self._joints) :]
-            power += sum(
-                float(np.sum((applied[:, c] * blocks[c].weight * blocks[c].moving) ** 2))
-                for c in range(len(self._joints))
-            )
-        return float(np.sqrt(power / sum(float(block.moving.sum()) for block in self.blocks)))
+            for block, column in zip(self._efforts(record), applied.T, strict=True):
+                power += float(np.sum((column * block.weight * block.moving) ** 2))
+                count += float(block.moving.sum())
+        return float(np.sqrt(power / count))
 
     def standstill(self, record: int) -> float:
         """Share of the samples of one record that do not count because a joint stands still."""
-        count = len(self._joints)
-        mine = self.blocks[record * count : (record + 1) * count]
-        return 1.0 - float(np.mean([block.moving.mean() for block in mine]))
+        return 1.0 - float(np.mean([block.moving.mean() for block in self._efforts(record)]))
 
     def state(self, record: int) -> tuple[Array, Array, Array]:
         """Position, velocity and acceleration (n, joints) of one record at the retained samples."""
         m = self.motions[record]
-        keep = slice(m.edge, len(m.time) - m.edge)
         position, velocity, acceleration = (
-            x[keep][:: m.decimation][:, self._joints] for x in (m.position, m.velocity, m.acceleration)
+            x[m.kept][:: m.decimation][:, self._joints] for x in (m.position, m.velocity, m.acceleration)
         )
         return position, velocity, acceleration
 
-    def _retained(self, m: Motion, values: Array) -> Array:
-        return parallel_filter(values[m.edge : len(values) - m.edge], m.decimation)
+    def _efforts(self, record: int) -> tuple[Block, ...]:
+        """Blocks of the balance of one record."""
+        first = record * (len(self._joints) + len(self.shown))
+        return self.blocks[first : first + len(self._joints)]
+
+    def _measured(self, experiment: Experiment, m: Motion) -> Array:
+        """Logged channels (n, shown) between the two ends."""
+        columns = [experiment[channel][m.kept] for channel in self.shown]
+        return np.column_stack(columns) if columns else np.zeros((len(m.time[m.kept]), 0))
 
     def _retained_time(self, m: Motion) -> Array:
-        return m.time[m.edge : len(m.time) - m.edge][:: m.decimation]
+        return m.time[m.kept][:: m.decimation]
 
     def _lay_out(self, model: Model) -> tuple[Block, ...]:
+        sizes, moving = self._sizes(model)
+        typical = np.sqrt(np.mean(np.square(sizes), axis=0))
+        channels = (*(f"{joint}.effort" for joint in self.joints), *self.shown)
         blocks, start = [], 0
-        powers, moving = [], self._moving()
-        for record, m in enumerate(self.motions):
-            _, applied, _ = self.effort(model, model.theta, record)
-            powers.append(np.sqrt(np.average(applied**2, axis=0, weights=moving[record])))
-            if len(applied) < FEWEST_SAMPLES:
-                raise IdentificationError(
-                    f"{self.experiments[record].name}: only {len(applied)} samples are left after filtering at "
-                    f"{m.cutoff:.3g} Hz; record longer or pass a higher cutoff"
-                )
-        typical = np.sqrt(np.mean(np.square(powers), axis=0))
         for record, m in enumerate(self.motions):
             time = self._retained_time(m)
-            for column, joint in enumerate(self._joints):
-                channel = f"{model.joints[joint]}.effort"
-                weight = 1.0 if len(self._joints) == 1 or typical[column] == 0.0 else 1.0 / float(typical[column])
-                blocks.append(
-                    Block(
-                        self.experiments[record].name,
-                        channel,
-                        model.channel_unit(channel),
-                        slice(start, start + time.size),
-                        time,
-                        float(powers[record][column]),
-                        weight,
-                        moving[record][:, column],
-                    )
-                )
+            for column, channel in enumerate(channels):
+                weight = 1.0 if len(channels) == 1 or typical[column] == 0.0 else 1.0 / float(typical[column])
+                scale, counts = float(sizes[record][column]), moving[record][:, column]
+                samples = slice(start, start + time.size)
+                name, unit = self.experiments[record].name, model.channel_unit(channel)
+                blocks.append(Block(name, channel, unit, samples, time, scale, weight, counts))
                 start += time.size
         return tuple(blocks)
 
+    def _sizes(self, model: Model) -> tuple[list[Array], list[Array]]:
+        """For each record the size of each channel, and (n, channels) which samples count.
+
+        Efforts are as large as what the drives deliver; of other channels, such as pressures, it is the spread.
+        """
+        sizes, moving = [], self._moving()
+        for record, (m, experiment) in enumerate(zip(self.motions, self.experiments, strict=True)):
+            _, applied, _ = self.effort(model, model.theta, record)
+            if len(applied) < FEWEST_SAMPLES:
+                raise IdentificationError(
+                    f"{experiment.name}: only {len(applied)} samples are left after filtering at "
+                    f"{m.cutoff:.3g} Hz; record longer or pass a higher cutoff"
+                )
+            efforts = np.sqrt(np.average(applied**2, axis=0, weights=moving[record]))
+            spread = np.std(parallel_filter(self._measured(experiment, m), m.decimation), axis=0)
+            sizes.append(np.concatenate([efforts, spread]))
+            moving[record] = np.hstack([moving[record], np.ones((len(applied), len(self.shown)))])
+        return sizes, moving
+
     def _moving(self) -> list[Array]:
         """For each record (n, joints): 1 where a joint moves, 0 where it stands still; all 1 if it mostly stands."""
-        speeds = [np.abs(m.velocity[m.edge : len(m.time) - m.edge][:, self._joints]) for m in self.motions]
+        speeds = [np.abs(m.velocity[m.kept][:, self._joints]) for m in self.motions]
         largest = np.max([np.quantile(speed, 0.999, axis=0) for speed in speeds], axis=0)
         masks = [
             ~_widened(_standing(speed, STANDSTILL_SHARE * largest, m.decimation), m)[:: m.decimation]
@@ -218,8 +231,8 @@ class InverseDynamicsProblem:
         return [np.where(mostly, mask, True).astype(np.float64) for mask in masks]
 
     def _stack(self, records: list[Array]) -> Array:
-        """Concatenate (n, joints, ...) arrays block by block and apply the weights."""
-        columns = [record[:, c] for record in records for c in range(len(self._joints))]
+        """Concatenate (n, channels, ...) arrays block by block and apply the weights."""
+        columns = [record[:, c] for record in records for c in range(record.shape[1])]
         scaled = zip(columns, self.blocks, strict=True)
         return np.concatenate([(x.T * (block.weight * block.moving)).T for x, block in scaled])
 

@@ -4,6 +4,7 @@ use super::Dynamics;
 use crate::actuator::hydraulic::{Chambers, DriveState, Source, Supply};
 use crate::actuator::{Actuator, Drive, Maxwell, SpringDamper, Target};
 use crate::data::LineSlot;
+use crate::dynamics::flexible;
 use crate::scalar::Scalar;
 
 /// What drives and supplies show beside their forces, in the state last evaluated.
@@ -52,6 +53,28 @@ impl<S: Scalar> Dynamics<S> {
         } else {
             let (q, v) = x[..first].split_at(self.coordinates());
             self.actuate_moving(&x[first..], &mut dxdt[first..], |on, lines| motion(on, q, v, lines));
+        }
+    }
+
+    /// The rates of the states of drives and supplies at state `x`, written into their place in `dxdt`, with all that they push.
+    pub(crate) fn drive(&mut self, x: &[S], dxdt: &mut [S]) {
+        let (q, v) = x[..2 * self.coordinates()].split_at(self.coordinates());
+        self.locate(q, v);
+        self.actuate(x, dxdt);
+    }
+
+    /// Holds what input `number` amounts to, see [`Dynamics::input`].
+    pub(crate) fn hold(&mut self, number: usize, input: S) {
+        self.inputs[number] = input;
+    }
+
+    /// Adds what the drives push to the efforts `loads` on all coordinates, after [`Dynamics::drive`] in the same state.
+    pub(crate) fn add_drives(&self, loads: &mut [S]) {
+        for (load, &effort) in loads.iter_mut().zip(&self.efforts) {
+            *load += effort;
+        }
+        if self.pulls {
+            flexible::add_line_forces(&self.data, &self.tensions, loads);
         }
     }
 

@@ -46,7 +46,7 @@ impl<S: Scalar> System<S> {
     #[inline]
     pub fn hold(&mut self, number: usize, input: S) {
         self.ready = false;
-        self.dynamics.inputs[number] = input;
+        self.dynamics.hold(number, input);
         self.tangent.hold(number, input);
     }
 }

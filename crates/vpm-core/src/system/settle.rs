@@ -72,7 +72,7 @@ impl<S: Scalar> Dynamics<S> {
     }
 
     /// Natural sizes of the states of drives and supplies, in SI units.
-    pub(super) fn drive_scales(&self, scales: &mut [f64]) {
+    pub(crate) fn drive_scales(&self, scales: &mut [f64]) {
         const STRETCH: f64 = 1e-3;
         const PRESSURE: f64 = 1e5;
         let mut scales = scales.iter_mut();

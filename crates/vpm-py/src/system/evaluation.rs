@@ -4,7 +4,7 @@ use numpy::{PyArray1, PyArray2, PyArray3};
 use pyo3::prelude::*;
 use vpm_core::beam::Beam;
 use vpm_core::evaluate;
-use vpm_core::inverse::{Motion, inverse_dynamics};
+use vpm_core::inverse::{Motion, delivered, inverse_dynamics};
 use vpm_core::linearize::linearize;
 
 use super::System;
@@ -54,6 +54,26 @@ impl System {
             matrix(py, efforts.applied, [rows, joints])?,
             cube(py, efforts.jacobian, [rows, joints, variables.len()])?,
         ))
+    }
+
+    /// Effort of ideal drives on the joints (N, n_joints) under `inputs`, and its derivatives (N, n_joints, k).
+    #[pyo3(signature = (theta, inputs, time_step, sensitivities=vec![]))]
+    fn delivered<'py>(
+        &self,
+        py: Python<'py>,
+        theta: &Any<'py>,
+        inputs: &Any<'py>,
+        time_step: f64,
+        sensitivities: Vec<i64>,
+    ) -> PyResult<(Table<'py>, Cube<'py>)> {
+        let theta = Numbers::vector("theta", theta)?;
+        let inputs = Numbers::table("inputs", inputs)?;
+        let variables = places("sensitivities", &sensitivities)?;
+        let (efforts, jacobian) = self.compute(py, |_| {
+            delivered(&self.description, theta.values(), (inputs.as_table()?, time_step), &variables)
+        })?;
+        let (rows, joints) = (inputs.rows(), self.description.n_joints());
+        Ok((matrix(py, efforts, [rows, joints])?, cube(py, jacobian, [rows, joints, variables.len()])?))
     }
 
     /// Accelerations (n,) of the rigid tree with its effects under efforts on the joints.

@@ -6,11 +6,11 @@ use pyo3::prelude::*;
 use vpm_core::description::Description;
 use vpm_core::motion::JointMotion;
 use vpm_core::sensitivity::Interrupt;
-use vpm_core::simulate::{Run, Setting, Stepping, closed_loop, free_run, prescribed, restarts};
+use vpm_core::simulate::{Run, Setting, Stepping, closed_loop, drives_along, free_run, prescribed, restarts};
 use vpm_core::timing::time_steps;
 
 use super::System;
-use crate::arrays::{Numbers, cube, matrix, places};
+use crate::arrays::{self, Numbers, cube, matrix, places};
 use crate::stepping::stepping;
 
 type Table<'py> = Bound<'py, PyArray2<f64>>;
@@ -166,6 +166,52 @@ impl System {
             prescribed(request.setting(&self.description, interrupt), motion, &passive)
         })?;
         self.run(py, run, sensitivities.len())
+    }
+
+    /// Joints follow a motion (N, n_joints) while drives and supplies answer to it and to `inputs`, from the states `internal`: outputs
+    /// with the effort of the drives on each joint behind them (N, ny + n_joints), states, derivatives of all these. The efforts are those
+    /// in the states of drives that were `seen` (N, len(places)).
+    #[pyo3(signature = (theta, position, velocity, acceleration, inputs, internal, places, seen, time_step, substeps, integrator, sensitivities=vec![]))]
+    #[expect(clippy::too_many_arguments, reason = "the arguments of the Python function")]
+    fn simulate_drives<'py>(
+        &self,
+        py: Python<'py>,
+        theta: &Any<'py>,
+        position: &Any<'py>,
+        velocity: &Any<'py>,
+        acceleration: &Any<'py>,
+        inputs: &Any<'py>,
+        internal: &Any<'py>,
+        places: Vec<i64>,
+        seen: &Any<'py>,
+        time_step: f64,
+        substeps: i64,
+        integrator: &str,
+        sensitivities: Vec<i64>,
+    ) -> PyResult<(Table<'py>, Table<'py>, Cube<'py>)> {
+        let request = Request::new(self, theta, (time_step, substeps, integrator), &sensitivities)?;
+        let position = Numbers::table("position", position)?;
+        let velocity = Numbers::table("velocity", velocity)?;
+        let acceleration = Numbers::table("acceleration", acceleration)?;
+        let inputs = Numbers::table("inputs", inputs)?;
+        let internal = Numbers::vector("internal", internal)?;
+        let (places, seen) = (arrays::places("places", &places)?, Numbers::table("seen", seen)?);
+        let run = self.compute(py, |interrupt| {
+            let motion = JointMotion {
+                position: position.as_table()?,
+                velocity: velocity.as_table()?,
+                acceleration: acceleration.as_table()?,
+            };
+            let setting = request.setting(&self.description, interrupt);
+            drives_along(setting, motion, inputs.as_table()?, internal.values(), (&places, seen.as_table()?))
+        })?;
+        let (width, states) = (self.description.n_outputs() + self.description.n_joints(), self.description.n_states());
+        let rows = run.states.len().checked_div(states).unwrap_or(0);
+        Ok((
+            matrix(py, run.outputs, [rows, width])?,
+            matrix(py, run.states, [rows, states])?,
+            cube(py, run.jacobian, [rows, width, sensitivities.len()])?,
+        ))
     }
 
     /// Duration in s of each of `count` steps, on the way through the inputs again and again.
