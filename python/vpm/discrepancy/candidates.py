@@ -188,13 +188,11 @@ def _ripple_periods(data: InverseDynamicsProblem, model: Model, joint: int, resi
     Evenly spaced frequencies from two periods per travel up to what the decimated samples resolve; N. Lomb,
     *Astrophysics and Space Science* 39, 1976.
     """
-    channel = f"{model.joints[joint]}.effort"
-    blocks = [(i, b) for i, b in enumerate(data.blocks) if b.channel == channel]
-    if not blocks:
-        blocks = [(0, data.blocks[0])]
-    count = len(data.blocks) // len(data.motions)
-    position = np.concatenate([data.state(i // count)[0][:, i % count] for i, _ in blocks])
-    values = np.concatenate([residual[b.samples] for _, b in blocks])
+    name = model.joints[joint]
+    column = data.joints.index(name) if name in data.joints else 0
+    records = range(len(data.motions))
+    position = np.concatenate([data.state(r)[0][:, column] for r in records])
+    values = np.concatenate([residual[data.efforts(r)[column].samples] for r in records])
     thin = max(1, len(values) // 4000)
     position, values = position[::thin], values[::thin]
     travel = max(float(np.ptp(position)), 1e-12)

@@ -30,7 +30,7 @@ from vpm.experiment import Experiment
 from vpm.identify import InverseDynamicsProblem, OutputErrorProblem, gain, gaps, segments
 from vpm.identify.fit import fit_of
 from vpm.model import Model
-from vpm.simulate import Setup, judging_mode, simulate
+from vpm.simulate import Run, Setup, judging_mode
 
 Array = NDArray[np.float64]
 
@@ -124,7 +124,7 @@ def diagnose(
         found.refused,
         found.ranking,
         ambiguities(found.accepted),
-        _where(recalibrated.model, unseen, cutoffs),
+        _where(recalibrated.model, data.unseen),
         tuple(_step(data, stage) for stage in found.stages),
         tuple(e.name for e in training),
         tuple(e.name for e in unseen),
@@ -303,20 +303,23 @@ def _step(data: Data, stage: Stage) -> Step:
     )
 
 
-def _where(model: Model, unseen: Sequence[Experiment], cutoffs: Sequence[float]) -> dict[str, tuple[str, ...]]:
-    comparison = compare(simulate(model, unseen[0], "inverse_dynamics", cutoff=cutoffs[0]), unseen[0])
-    return {channel.channel: channel.where.sentences for channel in comparison.channels}
+def _where(model: Model, unseen: InverseDynamicsProblem) -> dict[str, tuple[str, ...]]:
+    """Where the efforts of the first unseen record part, in words."""
+    time, applied, required = unseen.effort(model, model.theta, 0)
+    channels = tuple(f"{joint}.effort" for joint in unseen.joints)
+    units = tuple(model.channel_unit(channel) for channel in channels)
+    record = unseen.experiments[0]
+    run = Run(model.name, record.name, "inverse_dynamics", time, channels, units, required, applied)
+    return {channel.channel: channel.where.sentences for channel in compare(run, record).channels}
 
 
 def _pictures(data: Data, nominal: Judged, recalibrated: Judged, final: Judged) -> tuple[Picture, ...]:
     """One for each joint of the first unseen record."""
     pictures = []
     problem = data.unseen
-    joints = len(problem.blocks) // len(problem.motions)
     position, velocity, _ = problem.state(0)
     _, applied, _ = problem.effort(final.model, final.model.theta, 0)
-    for joint in range(joints):
-        block = problem.blocks[joint]
+    for joint, block in enumerate(problem.efforts(0)):
         residuals = [j.unseen[block.samples] / block.weight for j in (nominal, recalibrated, final)]
         unit = final.model.channel_unit(block.channel.replace(".effort", ".position"))
         pictures.append(

@@ -45,8 +45,8 @@ def structure(
     training: InverseDynamicsProblem, unseen: InverseDynamicsProblem, fitted: Array, residual: Array
 ) -> Structure:
     """Examine the residuals of a fitted model on training and unseen data."""
-    joints = len(training.blocks) // len(training.motions)
-    predicted = max(_predicted(training, unseen, fitted, residual, joint, joints) for joint in range(joints))
+    joints = range(len(training.joints))
+    predicted = max(_predicted(training, unseen, fitted, residual, joint) for joint in joints)
     slow = float(np.mean([_slow_share(residual[block.samples]) for block in unseen.blocks]))
     return Structure(predicted, slow)
 
@@ -57,12 +57,11 @@ def _predicted(
     fitted: Array,
     residual: Array,
     j: int,
-    joints: int,
 ) -> float:
     """Cross-validated share of one joint's residual that bins of its state explain."""
     states = [np.vstack([_state(problem, r, j) for r in range(len(problem.motions))]) for problem in (training, unseen)]
     targets = [
-        np.concatenate([values[block.samples] for block in problem.blocks[j::joints]])
+        np.concatenate([values[problem.efforts(r)[j].samples] for r in range(len(problem.motions))])
         for problem, values in ((training, fitted), (unseen, residual))
     ]
     edges = [np.quantile(column, np.linspace(0, 1, BINS + 1)[1:-1]) for column in states[0].T]

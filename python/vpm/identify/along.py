@@ -146,26 +146,26 @@ def _with_drives(
 ) -> Response:
     """Drives with states of their own, on the joints' motion."""
     setup, rows = Setup(), m.kept
-    first = np.array([m.edge], dtype=np.int64)
-    state = measured_states(model, experiment, theta, first, m.cutoff)[0]
-    motion = (m.position[rows], m.velocity[rows], m.acceleration[rows], m.inputs[rows])
-    places, seen = _measured_states(model, experiment, rows)
+    # From the beginning of the record: what nobody knows of the first state has the filter's settling to die away.
+    state = measured_states(model, experiment, theta, np.zeros(1, dtype=np.int64), m.cutoff)[0]
+    motion = (m.position, m.velocity, m.acceleration, m.inputs)
+    places, seen = _measured_states(model, experiment)
     stepping = (m.dt, setup.substeps, setup.method(model), list(columns))
     internal = state[2 * len(model.joints) :]
     outputs, _, jacobian = model.core.simulate_drives(theta, *motion, internal, places, seen, *stepping)
     effort = [model.output_channels.index(f"{name}.effort") for name in model.joints]
     drives = range(len(model.output_channels), outputs.shape[1])
-    seen = [model.output_channels.index(channel) for channel in channels]
+    shown = [model.output_channels.index(channel) for channel in channels]
     return Response(
-        outputs[:, effort],
-        outputs[:, drives],
-        jacobian[:, effort] - jacobian[:, drives],
-        outputs[:, seen],
-        jacobian[:, seen],
+        outputs[rows][:, effort],
+        outputs[rows][:, drives],
+        (jacobian[:, effort] - jacobian[:, drives])[rows],
+        outputs[rows][:, shown],
+        jacobian[rows][:, shown],
     )
 
 
-def _measured_states(model: Model, experiment: Experiment, rows: slice) -> tuple[list[int], Array]:
+def _measured_states(model: Model, experiment: Experiment) -> tuple[list[int], Array]:
     """Which states of drives the log holds, and their values: currents, and both pressures of a cylinder or none."""
     places: list[int] = []
     columns: list[Array] = []
@@ -173,10 +173,10 @@ def _measured_states(model: Model, experiment: Experiment, rows: slice) -> tuple
         owner, _, quantity = name.partition(".")
         pair = [f"{owner}.pressure_{side}" for side in "ab"]
         if quantity == "current" and name in experiment:
-            places, columns = [*places, place], [*columns, experiment[name][rows]]
+            places, columns = [*places, place], [*columns, experiment[name]]
         elif quantity == "chamber_a" and all(channel in experiment for channel in pair):
-            places, columns = [*places, place, place + 1], [*columns, *(experiment[channel][rows] for channel in pair)]
-    return places, np.column_stack(columns) if columns else np.zeros((len(experiment.time[rows]), 0))
+            places, columns = [*places, place, place + 1], [*columns, *(experiment[channel] for channel in pair)]
+    return places, np.column_stack(columns) if columns else np.zeros((len(experiment), 0))
 
 
 def _with_hidden(model: Model, theta: Array, m: Motion, columns: Sequence[int], channels: Sequence[str]) -> Response:
@@ -184,19 +184,18 @@ def _with_hidden(model: Model, theta: Array, m: Motion, columns: Sequence[int], 
     setup, rows = Setup(), m.kept
     measured = [place for place, joint in enumerate(model.joints) if joint in m.joints]
     passive = [place for place in range(len(model.joints)) if place not in measured]
-    motion = np.zeros((3, len(m.time[rows]), len(model.joints)))
+    motion = np.zeros((3, len(m.time), len(model.joints)))
     for order, values in enumerate((m.position, m.velocity, m.acceleration)):
-        motion[order][:, measured] = values[rows]
-    outputs, _, jacobian = model.core.simulate_prescribed(
-        theta, *motion, m.dt, setup.substeps, setup.method(model), list(columns), passive
-    )
+        motion[order][:, measured] = values
+    stepping = (m.dt, setup.substeps, setup.method(model), list(columns), passive)
+    outputs, _, jacobian = model.core.simulate_prescribed(theta, motion[0], motion[1], motion[2], *stepping)
     applied, slopes = model.core.delivered(theta, m.inputs, m.dt, list(columns))
     effort = [model.output_channels.index(f"{model.joints[place]}.effort") for place in measured]
     seen = [model.output_channels.index(channel) for channel in channels]
     return Response(
-        outputs[:, effort],
+        outputs[rows][:, effort],
         applied[rows][:, measured],
-        jacobian[:, effort] - slopes[rows][:, measured],
-        outputs[:, seen],
-        jacobian[:, seen],
+        (jacobian[:, effort] - slopes[:, measured])[rows],
+        outputs[rows][:, seen],
+        jacobian[rows][:, seen],
     )

@@ -154,14 +154,14 @@ class InverseDynamicsProblem:
         power, count = 0.0, 0.0
         for record in range(len(self.motions)):
             _, applied, _ = self.effort(model, model.theta, record)
-            for block, column in zip(self._efforts(record), applied.T, strict=True):
+            for block, column in zip(self.efforts(record), applied.T, strict=True):
                 power += float(np.sum((column * block.weight * block.moving) ** 2))
                 count += float(block.moving.sum())
         return float(np.sqrt(power / count))
 
     def standstill(self, record: int) -> float:
         """Share of the samples of one record that do not count because a joint stands still."""
-        return 1.0 - float(np.mean([block.moving.mean() for block in self._efforts(record)]))
+        return 1.0 - float(np.mean([block.moving.mean() for block in self.efforts(record)]))
 
     def state(self, record: int) -> tuple[Array, Array, Array]:
         """Position, velocity and acceleration (n, joints) of one record at the retained samples."""
@@ -171,10 +171,10 @@ class InverseDynamicsProblem:
         )
         return position, velocity, acceleration
 
-    def _efforts(self, record: int) -> tuple[Block, ...]:
-        """Blocks of the balance of one record."""
-        first = record * (len(self._joints) + len(self.shown))
-        return self.blocks[first : first + len(self._joints)]
+    def efforts(self, record: int) -> tuple[Block, ...]:
+        """Blocks of the balance of one record, one for each of `joints`."""
+        first = record * (len(self.joints) + len(self.shown))
+        return self.blocks[first : first + len(self.joints)]
 
     def _measured(self, experiment: Experiment, m: Motion) -> Array:
         """Logged channels (n, shown) between the two ends."""

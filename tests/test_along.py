@@ -1,0 +1,153 @@
+"""Efforts balanced along a measured motion, of machines that hold more than their joints show."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import vpm
+from vpm.errors import SimulationError
+from vpm.identify import InverseDynamicsProblem, gaps
+
+ROOT = Path(__file__).resolve().parent.parent
+DT = 1e-3
+
+
+def cylinder_record(
+    truth: vpm.Model, channels: tuple[str, ...] = ("servo.pressure_a", "servo.pressure_b")
+) -> vpm.Experiment:
+    """A cylinder that swings about the middle of its stroke, without noise."""
+    time = np.arange(3000) * DT
+    command = 0.3e-3 * np.sin(2 * np.pi * 2.0 * time) + 0.5e-3 * np.sin(2 * np.pi * 7.0 * time)
+    units = {"servo.command": "A", "axis.position": "m"} | dict.fromkeys(channels, "Pa")
+    given = vpm.Experiment.from_arrays(time, {"servo.command": command}, units={"servo.command": "A"})
+    run = vpm.simulate(truth, given)
+    data = {"servo.command": command, "axis.position": run["axis.position"]} | {c: run[c] for c in channels}
+    return vpm.Experiment.from_arrays(time, data, units=units)
+
+
+@pytest.fixture(scope="module")
+def cylinder() -> vpm.Model:
+    return vpm.Model.load(ROOT / "examples" / "servo_cylinder" / "rig.toml")
+
+
+def arm(level: str = "strain(4)") -> vpm.Model:
+    text = f"""
+name = "arm"
+gravity = [0.0, 0.0, 0.0]
+
+[bodies.hub]
+mass = 0.2
+inertia = [1e-3, 1e-3, 2e-3, 0.0, 0.0, 0.0]
+
+[joints.shoulder]
+type = "revolute"
+parent = "world"
+child = "hub"
+axis = [0.0, 0.0, 1.0]
+
+[beams.link]
+parent = "hub"
+rotation = [0.0, 1.5707963267948966, 0.0]
+level = "{level}"
+length = 0.5
+deforms = ["bending_x"]
+material = {{ young = 7e10, poisson = 0.35, density = 2700.0 }}
+section = {{ shape = "given", area = 6e-5, moment_x = 4e-11, moment_y = 4e-9, torsion = 8e-11 }}
+damping = {{ ratios = [0.03, 0.03, 0.03, 0.03] }}
+
+[actuators.motor]
+joint = "shoulder"
+gain = {{ value = 1.0, unit = "N m/A" }}
+command_unit = "A"
+"""
+    return vpm.Model.from_toml(text)
+
+
+def test_a_drives_own_run_balances(cylinder: vpm.Model) -> None:
+    problem = InverseDynamicsProblem(cylinder, [cylinder_record(cylinder)])
+    assert problem.shown == ("servo.pressure_a", "servo.pressure_b")
+    for channel, (_, share, _) in gaps(problem, problem.evaluate(cylinder, cylinder.theta)[0]).items():
+        assert share < 0.01, channel
+
+
+def test_faults_show_where_they_are(cylinder: vpm.Model) -> None:
+    """Friction in the mechanics leaves the pressures alone, a wrong valve leaves the efforts alone."""
+    rubbing = cylinder.with_effect("bias_force", at="axis", force=50.0)
+    valve = {"servo.valve.flow_gain": 1.2 * cylinder.parameters["servo.valve.flow_gain"].value}
+    wrong = cylinder.with_parameters(valve)
+    shares = {}
+    for name, truth in (("rubbing", rubbing), ("wrong", wrong)):
+        problem = InverseDynamicsProblem(cylinder, [cylinder_record(truth)])
+        residual, _ = problem.evaluate(cylinder, cylinder.theta)
+        shares[name] = {channel: share for channel, (_, share, _) in gaps(problem, residual).items()}
+    assert shares["rubbing"]["axis.effort"] > 0.2
+    assert shares["rubbing"]["servo.pressure_a"] < 0.02
+    assert shares["wrong"]["axis.effort"] < 0.01
+    assert shares["wrong"]["servo.pressure_a"] > 0.1
+
+
+def test_without_pressures_the_drive_is_simulated(cylinder: vpm.Model) -> None:
+    problem = InverseDynamicsProblem(cylinder, [cylinder_record(cylinder, ())])
+    assert problem.shown == ()
+    ((_, share, _),) = gaps(problem, problem.evaluate(cylinder, cylinder.theta)[0]).values()
+    assert share < 0.02
+
+
+def test_derivatives_are_slopes(cylinder: vpm.Model) -> None:
+    problem = InverseDynamicsProblem(cylinder, [cylinder_record(cylinder)])
+    names = (
+        "pump.oil.bulk_modulus",
+        "servo.valve.flow_gain",
+        "slide.mass",
+        "servo.cylinder.bore",
+        "axis.friction.viscous",
+    )
+    _, exact = problem.evaluate(cylinder, cylinder.theta, [cylinder.index(name) for name in names])
+    for column, name in enumerate(names):
+        size = 1e-4 * cylinder.parameters[name].value
+        sides = []
+        for sign in (1.0, -1.0):
+            theta = cylinder.theta.copy()
+            theta[cylinder.index(name)] += sign * size
+            sides.append(problem.evaluate(cylinder, theta)[0])
+        slope = (sides[0] - sides[1]) / (2.0 * size)
+        assert np.abs(slope - exact[:, column]).max() < 2e-3 * np.abs(slope).max(), name
+
+
+def test_an_elastic_link_balances_and_a_rigid_one_does_not() -> None:
+    model = arm()
+    time = np.arange(3000) * DT
+    torque = 0.4 * np.sin(2 * np.pi * 1.1 * time) + 0.3 * np.sin(2 * np.pi * 4.3 * time)
+    given = vpm.Experiment.from_arrays(time, {"motor.command": torque}, units={"motor.command": "A"})
+    run = vpm.simulate(model, given, substeps=2)
+    data = {"motor.command": torque, "shoulder.position": run["shoulder.position"]}
+    record = vpm.Experiment.from_arrays(time, data, units={"motor.command": "A", "shoulder.position": "rad"})
+    shares = {}
+    for level in ("strain(4)", "rigid"):
+        one = arm(level)
+        problem = InverseDynamicsProblem(one, [record], cutoff=40.0)
+        ((_, shares[level], _),) = gaps(problem, problem.evaluate(one, one.theta)[0]).values()
+    assert shares["strain(4)"] < 0.03  # of the effort
+    assert shares["rigid"] > 3.0 * shares["strain(4)"]
+
+
+def test_what_cannot_be_balanced_is_refused() -> None:
+    """A drive with states of its own on a link that bends."""
+    content = arm().to_dict()
+    content["actuators"]["motor"] = {
+        "type": "dc_motor",
+        "joint": "shoulder",
+        "command_unit": "V",
+        "resistance": 1.0,
+        "time_constant": 1e-3,
+        "torque_constant": 0.1,
+        "gear_ratio": 10.0,
+        "efficiency": 0.9,
+    }
+    model = vpm.Model.from_dict(content)
+    time = np.arange(500) * DT
+    data = {"motor.command": np.sin(time), "shoulder.position": np.sin(3 * time)}
+    record = vpm.Experiment.from_arrays(time, data, units={"motor.command": "V", "shoulder.position": "rad"})
+    with pytest.raises(SimulationError, match="leaves link free while the actuator motor has type dc_motor"):
+        InverseDynamicsProblem(model, [record])
