@@ -20,6 +20,8 @@ Array = NDArray[np.float64]
 
 #: Weight below which a dependent parameter is no part of a combination, on columns of equal length.
 SMALLEST_WEIGHT = 1e-6
+#: Length of a column, relative to the longest, that is nothing but rounding of terms that cancel.
+NOTHING = 1e-13
 #: Share of a column that those before it must leave, so that it is kept by preference.
 LEAST_REST = 1e-4
 
@@ -88,7 +90,8 @@ def find_base(columns: Array, *, tolerance: float = RANK_TOLERANCE, prefer: Sequ
         each other (QR with column pivoting: G. Golub and C. Van Loan, *Matrix Computations*, 4th ed., 5.4).
     """
     lengths = column_lengths(columns)
-    seen = np.flatnonzero(np.linalg.norm(columns, axis=0) > 0.0)
+    norms = np.linalg.norm(columns, axis=0)
+    seen = np.flatnonzero(norms > NOTHING * norms.max(initial=0.0))
     unseen = tuple(sorted(set(range(columns.shape[1])) - set(seen.tolist())))
     if not seen.size:
         return Base((), (), unseen, np.zeros((0, 0)), np.zeros(0))

@@ -255,6 +255,13 @@ def _small_sample(covariance: Array, rows: int, unknowns: int) -> Array:
     return covariance * (rows / max(rows - unknowns, 1))
 
 
+def _directions(regression: InertialRegression, noise: Array, size: Array, std: float) -> int:
+    """Singular directions of relative changes that noise leaves better known than ``std``; parameters of zero left out."""
+    table, _ = _weighted(regression, noise)
+    values = np.linalg.svd(np.linalg.qr(table.reshape(-1, size.size) * size, mode="r"), compute_uv=False)
+    return int(np.sum(values * std >= 1.0))
+
+
 def _result(
     regression: InertialRegression, base: Base, noise: Array, solution: _Solution, within: float, *, open_ended: bool
 ) -> InertialFit:
@@ -282,11 +289,13 @@ def _result(
         identifiable=tuple(words),
         base_names=tuple(regression.names[k] for k in base.kept),
         base_words=base.words(regression.names),
+        base_map=base.map,
         base_nominal=base.map @ regression.nominal,
         base_values=base.map @ solution.values,
         base_std=np.sqrt(np.maximum(np.diag(base.map @ solution.covariance @ base.map.T), 0.0)),
         singular_values=base.singular_values,
         condition=base.condition,
+        directions=_directions(regression, noise, np.abs(size), within / quantile),
         samples=len(effort),
         channels=regression.channels,
         noise=noise,

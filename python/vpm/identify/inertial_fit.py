@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from vpm.errors import IdentificationError, near_match
 from vpm.results import Result
@@ -40,12 +40,16 @@ class InertialFit(Result):
         combination`` with others; ``no``: without effect.
     base_names, base_words : tuple of str
         Base parameters: the parameter that each is called after, and the sum that it is.
+    base_map : ndarray, shape (rank, p)
+        From parameters to those sums.
     base_nominal, base_values, base_std : ndarray, shape (rank,)
         Of those sums; the deviation holds whatever the single parameters are.
     singular_values : ndarray
         Of the regressor with columns of equal length, relative to the largest, unseen columns left out.
     condition : float
         Of its independent directions.
+    directions : int
+        Independent combinations of relative changes that the data alone know as well as a parameter has to be known.
     samples, channels : int and tuple of str
         Instants, and the efforts at each.
     noise : ndarray, shape (n,)
@@ -70,11 +74,13 @@ class InertialFit(Result):
     identifiable: tuple[str, ...]
     base_names: tuple[str, ...]
     base_words: tuple[str, ...]
+    base_map: Array
     base_nominal: Array
     base_values: Array
     base_std: Array
     singular_values: Array
     condition: float
+    directions: int
     samples: int
     channels: tuple[str, ...]
     noise: Array
@@ -111,6 +117,10 @@ class InertialFit(Result):
         """Estimate over CAD value, less one, shape (p,); NaN without a CAD value or where it is zero."""
         return self.values / np.where(self.nominal == 0.0, np.nan, self.nominal) - 1.0
 
+    def combine(self, values: ArrayLike) -> Array:
+        """Base parameters (rank,) of parameters (p,), such as those of a machine that is known."""
+        return np.asarray(self.base_map @ np.asarray(values, dtype=np.float64))
+
     def __getitem__(self, name: str) -> float:
         if name not in self.names:
             raise IdentificationError(f'there is no parameter "{name}"; {near_match(name, self.names)}')
@@ -125,7 +135,8 @@ class InertialFit(Result):
         return (
             f"{self.method}; {self.samples} samples of {len(self.channels)} channels, worth {self.effective:.0f} "
             "independent equations",
-            f"rank {self.rank} of {len(self.names)}, condition number {self.condition:.3g}; {known} parameters are known",
+            f"rank {self.rank} of {len(self.names)}, condition number {self.condition:.3g}; {known} single parameters and "
+            f"{self.directions} of their combinations are known",
             f"residual: {shares}",
             "physically feasible" if not impossible else "not feasible, " + "; ".join(impossible),
         )

@@ -31,6 +31,8 @@ _OF_FILE = (
     *(f"center_of_mass.{axis}" for axis in "xyz"),
     *(f"inertia.{entry}" for entry in ("xx", "yy", "zz", "xy", "xz", "yz")),
 )
+#: A body of 1 kg with its centre of mass in the origin; some inertia, because the core moves no joint without.
+PLAIN = np.array([1.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
 #: Difference of efforts, relative to their size, below which they agree: rounding of long sums.
 AGREE = 1e-8
 
@@ -57,7 +59,7 @@ class InertialModel:
     With the centre of mass in the origin, the derivatives by mass, centre and inertia are those by the standard
     parameters, since then ``d(m c) = m dc`` and ``d(origin inertia) = d(inertia)`` (C. Atkeson, C. An, J. Hollerbach,
     "Estimation of inertial parameters of manipulator loads and links", *Int. J. Robotics Research* 5, 1986). So the
-    core is asked at bodies of 1 kg in their origins.
+    core is asked at bodies with their centres in their origins.
 
     Parameters
     ----------
@@ -85,7 +87,7 @@ class InertialModel:
         self.names = (*(f"{body}.{end}" for body in self.bodies for end in STANDARD), *self.others)
         self.units = (*UNITS * len(self.bodies), *(model.parameters[name].unit for name in self.others))
         self._plain = model.theta.copy()
-        self._plain[self._places] = np.tile([1.0] + [0.0] * 9, len(self.bodies))
+        self._plain[self._places] = np.tile(PLAIN, len(self.bodies))
 
     @property
     def nominal(self) -> Array:
@@ -98,21 +100,20 @@ class InertialModel:
         """What actuators give beyond what parts that are not sought need (N, n), and the regressor (N, n, p)."""
         core = self.model.core
         required, applied, table = core.inverse_dynamics(self._plain, *state, inputs, dt, self._columns)
-        plain = np.tile([1.0] + [0.0] * 9, len(self.bodies))
+        plain = np.tile(PLAIN, len(self.bodies))
         rest = self.model.theta[[self.model.index(name) for name in self.others]]
         return applied - required + table @ np.concatenate([plain, rest]), table
 
     def check(self, state: tuple[Array, Array, Array], inputs: Array, dt: float) -> None:
         """Complain if the effort is not linear in what is sought."""
         effort, table = self.lacking(state, inputs, dt)
-        core, theta = self.model.core, self.model.theta.copy()
         for name in (None, *self.others):
-            values = self.nominal
+            theta, values = self.model.theta.copy(), self.nominal
             if name is not None:
                 place = self.names.index(name)
                 changed = 1.5 * values[place] or 1.0
                 theta[self.model.index(name)], values[place] = changed, changed
-            required, applied, _ = core.inverse_dynamics(theta, *state, inputs, dt, [])
+            required, applied, _ = self.model.core.inverse_dynamics(theta, *state, inputs, dt, [])
             apart = np.abs(applied - required - (effort - table @ values)).max()
             size = np.abs(required).max() + np.abs(applied).max()
             if apart > AGREE * size:
