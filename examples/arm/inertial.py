@@ -2,8 +2,8 @@
 
 python examples/arm/inertial.py [FOLDER]
 
-The machine is not the model: its masses, centres and inertias are off by up to 20 %. It is simulated in eight steps to a
-sample under a controller that sees quantised positions; the currents of the record carry noise.
+The machine is not the model: its masses, centres and inertias are off by up to 20 %. It is simulated in eight steps to
+a sample under a controller that sees quantised positions; the currents of the record carry noise.
 """
 
 from __future__ import annotations
@@ -101,12 +101,12 @@ def main(folder: Path) -> None:
     record = measured(target)
     fit = vpm.identify_inertial(nominal(), record)
     print(*fit.summary, "", sep="\n")
-    print(f"{'CAD':>10s}{'identified':>12s}{'95 %':>10s}{'truth':>10s}{'off/std':>9s}  base parameter")
-    half = fit.quantile * fit.base_std
-    for row in zip(fit.base_nominal, fit.base_values, half, truth(fit), fit.base_words, strict=True):
-        print(
-            f"{row[0]:10.4f}{row[1]:12.4f}{row[2]:10.4f}{row[3]:10.4f}{(row[1] - row[3]) / row[2] * 1.96:+9.1f}  {row[4]}"
-        )
+    print(f"{'CAD':>10s}{'identified':>12s}{'std':>10s}{'truth':>10s}{'off/std':>9s}  base parameter")
+    true = truth(fit)
+    for k, words in enumerate(fit.base_words):
+        off = (fit.base_values[k] - true[k]) / fit.base_std[k]
+        numbers = f"{fit.base_nominal[k]:10.4f}{fit.base_values[k]:12.4f}{fit.base_std[k]:10.4f}{true[k]:10.4f}"
+        print(f"{numbers}{off:+9.1f}  {words}")
     physical = vpm.identify_inertial(nominal(), record, physical=True)
     print("\namong feasible bodies:", *physical.summary, "", physical.table(), sep="\n")
     folder.mkdir(parents=True, exist_ok=True)

@@ -95,11 +95,11 @@ def find_base(columns: Array, *, tolerance: float = RANK_TOLERANCE, prefer: Sequ
     unseen = tuple(sorted(set(range(columns.shape[1])) - set(seen.tolist())))
     if not seen.size:
         return Base((), (), unseen, np.zeros((0, 0)), np.zeros(0))
-    triangle = np.linalg.qr(columns[:, seen] / lengths[seen], mode="r")
+    triangle = np.asarray(np.linalg.qr(columns[:, seen] / lengths[seen], mode="r"))
     singular = np.linalg.svd(triangle, compute_uv=False)
     rank = int(np.sum(singular > tolerance * singular[0]))
     order = _preferred(triangle, [int(np.flatnonzero(seen == k)[0]) for k in prefer if k in seen], rank)
-    upper = np.linalg.qr(triangle[:, order], mode="r")
+    upper = np.asarray(np.linalg.qr(triangle[:, order], mode="r"))
     weights = solve_triangular(upper[:rank, :rank], upper[:rank, rank:])
     weights[np.abs(weights) <= SMALLEST_WEIGHT] = 0.0
     places = seen[order]
@@ -126,5 +126,5 @@ def _preferred(triangle: Array, prefer: Sequence[int], rank: int) -> list[int]:
             chosen.append(column)
     others = [k for k in range(triangle.shape[1]) if k not in chosen]
     rest = triangle[:, others] - span @ (span.T @ triangle[:, others])
-    pivots = qr(rest, mode="r", pivoting=True)[1] if others else []
+    pivots: Sequence[int] = qr(rest, mode="r", pivoting=True)[1].tolist() if others else []
     return [*chosen, *(others[k] for k in pivots)]

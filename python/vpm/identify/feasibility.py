@@ -1,13 +1,13 @@
 """Which inertial parameters a real body can have, and a least-squares fit among them.
 
 A body's ten parameters are those of a distribution of mass if and only if its pseudo-inertia is positive definite,
-``J = [[S, h], [h', m]]`` with the first moment h and ``S = tr(I)/2 - I`` for the inertia I about the frame's origin: mass is
-positive, and so are the principal moments about the centre of mass, none above the sum of the other two (P. Wensing,
+``J = [[S, h], [h', m]]`` with the first moment h and ``S = tr(I)/2 - I`` for the inertia I about the frame's origin: mass
+is positive, and so are the principal moments about the centre of mass, none above the sum of the other two (P. Wensing,
 S. Kim, J.-J. Slotine, "Linear matrix inequalities for physically consistent inertial parameter identification", *IEEE
 Robotics and Automation Letters* 3, 2018).
 
-``D(J, J0) = -log det(J / J0) + tr(J / J0) - 4`` is the distance to the nominal body that knows no units and no frames, and
-infinite at the border (T. Lee, P. Wensing, F. Park, "Geometric robot dynamic identification: a convex programming
+``D(J, J0) = -log det(J / J0) + tr(J / J0) - 4`` is the distance to the nominal body that knows no units and no frames,
+and infinite at the border (T. Lee, P. Wensing, F. Park, "Geometric robot dynamic identification: a convex programming
 approach", *IEEE Trans. Robotics* 36, 2020). Least squares with a small share of it is convex, so that Newton's method
 finds the one answer, inside the border (S. Boyd, L. Vandenberghe, *Convex Optimization*, 2004, section 11.3).
 """
@@ -26,8 +26,8 @@ Array = NDArray[np.float64]
 
 #: Radius of gyration that a body without extent gets as a start, m.
 LEAST_RADIUS = 0.01
-#: Weight of the distance to the nominal bodies beside squared residuals in units of noise. It moves a parameter that data
-#: know to a share s by about 0.01 s^2, and one that they do not know to its nominal value.
+#: Weight of the distance to the nominal bodies beside squared residuals in units of noise. It moves a parameter that
+#: data know to a share s by about 0.01 s^2, and one that they do not know to its nominal value.
 WEIGHT = 0.01
 #: Half the squared Newton step, in units of the cost, at which the last round ends, and that of the rounds before.
 SETTLED, NEARLY = 1e-8, 0.05
@@ -213,6 +213,6 @@ def _extended(ten: Array) -> Array:
 _UNITS = np.array([pseudo_inertia(unit) for unit in np.eye(10)])
 
 
-def _seen_from(factor: Array, change: Array) -> Array:
+def _seen_from(factor: NDArray[np.floating], change: Array) -> Array:
     half = solve_triangular(factor, change, lower=True)
     return np.asarray(solve_triangular(factor, half.T, lower=True))

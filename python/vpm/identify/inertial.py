@@ -1,14 +1,14 @@
 """Structural parameters by linear least squares: masses, first moments, inertias, friction.
 
-D'Imperio (2016), section 5.1.1, solves ``p = (F'F)^-1 F' tau``. Here the same problem is solved in base parameters, so that
-what the data cannot tell is named; equations are weighted by the noise of their channel; deviations hold under
+D'Imperio (2016), section 5.1.1, solves ``p = (F'F)^-1 F' tau``. Here the same problem is solved in base parameters, so
+that what the data cannot tell is named; equations are weighted by the noise of their channel; deviations hold under
 correlated noise; and a fit can be confined to parameters that a body can have.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ from scipy.stats import t as student
 from vpm.errors import IdentificationError, near_match
 from vpm.experiment import Experiment
 from vpm.identify.base_parameters import Base, find_base
-from vpm.identify.feasibility import WEIGHT, Distance, faults, nearest
+from vpm.identify.feasibility import Distance, faults, nearest
 from vpm.identify.identifiability import column_lengths, unseen_combinations
 from vpm.identify.inertial_fit import KNOWN, TOGETHER, UNSEEN, VAGUE, InertialFit
 from vpm.identify.inertial_model import inertial_regression
@@ -72,7 +72,8 @@ def identify_inertial(
     prior : float or mapping of str to float, optional
         Pulls towards the nominal values: their relative uncertainty, one for all, or standard deviations in SI by name.
     physical : bool
-        Only parameters that bodies can have: see `vpm.identify.feasibility`. Begins at the nominal values.
+        Only parameters that bodies can have: see `vpm.identify.feasibility`. Begins at the nominal values, which also
+        stand where the data say nothing. Deviations are those of the fit without it.
     complete : bool
         Refuse data that do not determine every parameter by itself.
     within : float
@@ -96,12 +97,12 @@ def identify_inertial(
         _refuse_incomplete(regression, base, noise, tolerance)
     nominal = np.where(np.isfinite(regression.nominal), regression.nominal, 0.0)
     deviations = _prior(regression, prior)
-    if physical:
-        solution = _physical(regression, noise, nominal, deviations)
-    elif deviations is not None:
-        solution = _pulled(regression, noise, nominal, deviations)
-    else:
+    if deviations is None:
         solution = _free(regression, base, noise, nominal)
+    else:
+        solution = _pulled(regression, noise, nominal, deviations)
+    if physical:
+        solution = _physical(regression, noise, nominal, deviations, solution)
     return _result(regression, base, noise, solution, within, open_ended=deviations is None)
 
 
@@ -159,8 +160,8 @@ def _refuse_incomplete(regression: InertialRegression, base: Base, noise: Array,
     found = unseen_combinations(table.reshape(-1, len(regression.names)), regression.names, tolerance)
     words = "; ".join(str(each) for each in found[:3]) + (f"; and {len(found) - 3} more" if len(found) > 3 else "")
     raise IdentificationError(
-        f"{base.rank} of {len(regression.names)} parameters can be told from these data: {words}; leave the parameter out, "
-        "move differently, or ask without complete=True for combinations",
+        f"{base.rank} of {len(regression.names)} parameters can be told from these data: {words}; leave the parameter "
+        "out, move differently, or ask without complete=True for combinations",
         parameters=dict.fromkeys(name for each in found for name in each.names),
     )
 
@@ -224,22 +225,22 @@ def _pulled(regression: InertialRegression, noise: Array, nominal: Array, deviat
     )
 
 
-def _physical(regression: InertialRegression, noise: Array, nominal: Array, deviations: Array | None) -> _Solution:
-    """Least squares among what bodies can have."""
+def _physical(
+    regression: InertialRegression, noise: Array, nominal: Array, deviations: Array | None, free: _Solution
+) -> _Solution:
+    """Least squares among what bodies can have.
+
+    Deviations stay those without the constraint. In the norm of the data an estimate in a convex set is no farther from
+    any truth in that set than the free one, while deviations at the border itself would promise far too much.
+    """
     table, effort = _weighted(regression, noise)
     count = len(nominal)
-    distance = Distance(regression)
     # The triangle of a QR factorisation stands for all samples, whatever their number.
-    triangle = np.linalg.qr(np.column_stack([table.reshape(-1, count), effort.ravel()]), mode="r")
+    triangle = np.asarray(np.linalg.qr(np.column_stack([table.reshape(-1, count), effort.ravel()]), mode="r"))
     known = np.zeros((count, count)) if deviations is None else np.diag(1.0 / deviations)
     columns = np.vstack([triangle[:, :count], known])
-    values = nearest(columns, np.concatenate([triangle[:, count], known @ nominal]), distance)
-    held = np.sqrt(WEIGHT) * distance.root(values)[0]
-    inverse = _inverse(np.vstack([columns, held]))
-    meat = _small_sample(score_covariance(table, effort - table @ values, regression.slices), effort.size, count)
-    covariance = inverse @ (meat + known**2 + held.T @ held) @ inverse
-    method = "least squares among feasible parameters" + ("" if deviations is None else " pulled to the nominal values")
-    return _Solution(values, covariance, np.diag(inverse), np.diag(covariance), method)
+    values = nearest(columns, np.concatenate([triangle[:, count], known @ nominal]), Distance(regression))
+    return replace(free, values=values, method=f"{free.method}, among feasible parameters")
 
 
 def _inverse(columns: Array) -> Array:
@@ -256,7 +257,7 @@ def _small_sample(covariance: Array, rows: int, unknowns: int) -> Array:
 
 
 def _directions(regression: InertialRegression, noise: Array, size: Array, std: float) -> int:
-    """Singular directions of relative changes that noise leaves better known than ``std``; parameters of zero left out."""
+    """Singular directions of relative changes that noise leaves better known than ``std``, without parameters of zero."""
     table, _ = _weighted(regression, noise)
     values = np.linalg.svd(np.linalg.qr(table.reshape(-1, size.size) * size, mode="r"), compute_uv=False)
     return int(np.sum(values * std >= 1.0))

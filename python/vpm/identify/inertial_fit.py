@@ -135,8 +135,8 @@ class InertialFit(Result):
         return (
             f"{self.method}; {self.samples} samples of {len(self.channels)} channels, worth {self.effective:.0f} "
             "independent equations",
-            f"rank {self.rank} of {len(self.names)}, condition number {self.condition:.3g}; {known} single parameters and "
-            f"{self.directions} of their combinations are known",
+            f"rank {self.rank} of {len(self.names)}, condition number {self.condition:.3g}; {known} single parameters "
+            f"and {self.directions} of their combinations are known",
             f"residual: {shares}",
             "physically feasible" if not impossible else "not feasible, " + "; ".join(impossible),
         )

@@ -80,7 +80,7 @@ class InertialModel:
                 )
             if name in own:
                 raise IdentificationError(
-                    f"{name} belongs to a body, and all ten parameters of every body are sought anyway; name only others"
+                    f"{name} belongs to a body, and all ten parameters of every body are sought anyway; name others"
                 )
         self._places = [model.index(f"{body}.{end}") for body in self.bodies for end in _OF_FILE]
         self._columns = [*self._places, *(model.index(name) for name in self.others)]
@@ -119,8 +119,8 @@ class InertialModel:
             if apart > AGREE * size:
                 what = f"{name}" if name else "the bodies' parameters"
                 raise IdentificationError(
-                    f"the effort of {self.model.name} is not linear in {what}: it misses the linear law by {apart:.2g} of "
-                    f"{size:.3g}; hold that parameter, or use vpm.identify, which needs no linear law",
+                    f"the effort of {self.model.name} is not linear in {what}: it misses the linear law by {apart:.2g} "
+                    f"of {size:.3g}; hold that parameter, or use vpm.identify, which needs no linear law",
                     parameters=() if name is None else (name,),
                 )
 
@@ -169,7 +169,8 @@ def inertial_regression(
     tables, efforts, count = [], [], len(model.joints)
     for at, m in enumerate(balance.motions):
         state = (m.position, m.velocity, m.acceleration)
-        linear.check(tuple(x[m.kept][:: m.decimation] for x in state), m.inputs[m.kept][:: m.decimation], m.dt)  # type: ignore[arg-type]
+        some = slice(m.edge, len(m.time) - m.edge, m.decimation)
+        linear.check((m.position[some], m.velocity[some], m.acceleration[some]), m.inputs[some], m.dt)
         effort, table = linear.lacking(state, m.inputs, m.dt)
         size = len(m.time[m.kept])
         blocks = balance.blocks[at * len(balance.blocks) // len(given) : (at + 1) * len(balance.blocks) // len(given)]
@@ -207,8 +208,9 @@ def _not_negative(model: Model, name: str) -> bool:
 def _check_motion(model: Model, records: Sequence[Experiment]) -> None:
     for joint in model.joints:
         channel = f"{joint}.position"
+        unit = model.channel_unit(channel)
         if all(np.ptp(record[channel]) == 0.0 for record in records):
             raise IdentificationError(
-                f"the joint {joint} never moves: {channel} is {records[0][channel][0]:.4g} {model.channel_unit(channel)} "
+                f"the joint {joint} never moves: {channel} is {records[0][channel][0]:.4g} {unit} "
                 "in all samples; move it in at least one record, or describe it as fixed"
             )

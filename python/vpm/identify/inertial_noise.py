@@ -6,14 +6,14 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-
-from vpm.identify.identifiability import column_lengths
-from vpm.identify.statistics import correlation_length, window_sums
+from scipy.fft import next_fast_len, rfft
+from scipy.linalg import solve_toeplitz
+from scipy.signal import lfilter
 
 Array = NDArray[np.float64]
 
-#: Largest autoregressive coefficient that is taken out of scores: closer to one the way back loses all digits.
-LARGEST_ROOT = 0.97
+#: Largest order of the noise's autoregression.
+MOST_ORDER = 30
 #: Residuals below this share of the effort are rounding.
 ROUNDING = 1e-11
 
@@ -23,16 +23,15 @@ def channel_noise(residual: Array, effort: Array, unknowns: int) -> Array:
     size = np.sqrt(np.mean(effort**2, axis=0))
     count = residual.size / max(residual.size - unknowns, 1)
     spread = np.sqrt(np.mean(residual**2, axis=0) * count)
-    return np.maximum(spread, ROUNDING * np.where(size > 0.0, size, 1.0))
+    return np.asarray(np.maximum(spread, ROUNDING * np.where(size > 0.0, size, 1.0)))
 
 
 def score_covariance(regressor: Array, residual: Array, records: Sequence[slice]) -> Array:
-    """Covariance (k, k) of ``sum_t regressor_t' residual_t``, whatever the noise's spectrum and its size along the way.
+    """Covariance (k, k) of ``sum_t regressor_t' noise_t`` for noise that is stationary but not white.
 
-    The channels of one sample are summed first, so that noise which they share is counted. The scores are whitened by an
-    autoregression of order one each, the rest is summed with Bartlett weights (W. Newey and K. West, *Econometrica* 55,
-    1987), and the whitening is undone (D. Andrews and J. Monahan, *Econometrica* 60, 1992): without it those weights cut
-    off slow noise and intervals are too short.
+    The noise of each channel is an autoregression, its order the one of least BIC, found from the residual by the
+    Yule-Walker equations; the innovations of the channels may resemble each other. Its spectra weigh the regressor's
+    Fourier transform, ``sum_f X(f)^H S(f) X(f)`` (P. Stoica, R. Moses, *Spectral Analysis of Signals*, 2005, 3.4).
 
     Parameters
     ----------
@@ -41,26 +40,51 @@ def score_covariance(regressor: Array, residual: Array, records: Sequence[slice]
     records : sequence of slice
         Correlation is not carried over from one to the next.
     """
-    count = regressor.shape[2]
-    # In orthogonal directions the whitening mixes nothing: what single scores say of nearly parallel columns is lost.
-    lengths = column_lengths(regressor.reshape(-1, count))
-    basis, triangle = np.linalg.qr(regressor.reshape(-1, count) / lengths)
-    basis, triangle = basis.reshape(*residual.shape, -1), triangle * lengths
-    total = np.zeros((basis.shape[2],) * 2)
+    channels = residual.shape[1]
+    models = [_autoregression(residual[:, c], records) for c in range(channels)]
+    memory = max(len(model) for model in models) - 1
+    parts = [
+        np.stack([lfilter(models[c], [1.0], residual[record, c])[memory:] for c in range(channels)], axis=1)
+        for record in records
+    ]
+    innovations = np.concatenate(parts)
+    spread = innovations.T @ innovations / max(len(innovations), 1)
+    total = np.zeros((regressor.shape[2],) * 2)
     for record in records:
-        score = np.einsum("tck,tc->tk", basis[record], residual[record])
-        power = np.sum(score[:-1] ** 2, axis=0)
-        root = np.sum(score[1:] * score[:-1], axis=0) / np.where(power > 0.0, power, 1.0)
-        root = np.clip(root, -LARGEST_ROOT, LARGEST_ROOT)
-        white = score.copy()
-        white[1:] -= root * score[:-1]
-        white[0] *= np.sqrt(1.0 - root**2)
-        length = max((correlation_length(column) for column in white.T), default=1)
-        sums = window_sums(white, length + 1)
-        back = 1.0 / (1.0 - root)
-        total += back[:, None] * (sums.T @ sums) * back
-    covariance: Array = triangle.T @ total @ triangle
-    return covariance
+        count = record.stop - record.start
+        length = next_fast_len(2 * count, real=True)
+        turned = rfft(regressor[record], length, axis=0)
+        for c, model in enumerate(models):
+            turned[:, c] /= rfft(model, length)[:, None].conj()
+        weight = np.full(len(turned), 2.0)
+        weight[0] = 1.0
+        weight[-1] = 1.0 if length % 2 == 0 else 2.0
+        colored = np.einsum("cd,fdk->fck", spread, turned) * weight[:, None, None]
+        flat, other = turned.reshape(-1, total.shape[0]), colored.reshape(-1, total.shape[0])
+        total += np.real(flat.conj().T @ other) / length
+    return np.asarray(0.5 * (total + total.T))
+
+
+def _autoregression(residual: Array, records: Sequence[slice]) -> Array:
+    """Coefficients ``1, a_1, ... a_p`` of the autoregression of least BIC."""
+    count = residual.size
+    most = max(0, min(MOST_ORDER, min(record.stop - record.start for record in records) // 10))
+    lags = np.zeros(most + 1)
+    for record in records:
+        part = residual[record]
+        lags += [float(part[: part.size - lag] @ part[lag:]) / count for lag in range(most + 1)]
+    best, chosen = count * np.log(max(lags[0], 1e-300)), np.ones(1)
+    for order in range(1, most + 1):
+        if not lags[0] > 0.0:
+            break
+        found = solve_toeplitz(lags[:order], -lags[1 : order + 1])
+        power = lags[0] + float(found @ lags[1 : order + 1])
+        if not power > 0.0:
+            break
+        score = count * np.log(power) + order * np.log(count)
+        if score < best:
+            best, chosen = score, np.array([1.0, *found])
+    return chosen
 
 
 def effective_samples(white: Array, robust: Array, rows: int) -> float:

@@ -126,15 +126,15 @@ class InertialRegression(Storable):
         equations, unknown = self.effort.size, len(self.names)
         if equations < 2 * unknown:
             raise IdentificationError(
-                f"{len(self.effort)} samples of {self.effort.shape[1]} channels are {equations} equations for {unknown} "
-                f"parameters; give at least {2 * unknown} equations, better a hundred for each parameter",
+                f"{len(self.effort)} samples of {self.effort.shape[1]} channels are {equations} equations for "
+                f"{unknown} parameters; give at least {2 * unknown} equations, better a hundred for each parameter",
                 parameters=self.names,
             )
         for column, channel in enumerate(self.channels):
             if np.ptp(self.effort[:, column]) == 0.0:
                 raise IdentificationError(
-                    f"the effort of {channel} is {self.effort[0, column]:.4g} in all {len(self.effort)} samples; a sensor "
-                    "that answers never gives that: check its column, or leave the channel out"
+                    f"the effort of {channel} is {self.effort[0, column]:.4g} in all {len(self.effort)} samples; a "
+                    "sensor that answers never gives that: check its column, or leave the channel out"
                 )
         if np.ptp(self.regressor, axis=0).max() == 0.0:
             raise IdentificationError(

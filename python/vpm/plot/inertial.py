@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+#: Half width of a 95 % interval, relative to the value, up to which a base parameter is drawn as known.
+KNOWN = 0.2
 #: Width of the axis in sizes of the value: wider intervals end in its frame, with their number beside it.
 WIDEST = 3.0
 
@@ -74,14 +76,17 @@ def plot_inertial(fit: InertialLike) -> Figure:
     """
     shown = np.array([k for k, word in enumerate(fit.identifiable) if word != "no"], dtype=int)
     rows = max(len(shown), len(fit.base_words))
-    figure, axes = panels(2, height=0.7 + 0.22 * rows, width=9.0)
+    combined = tuple(fit.base_words) != tuple(fit.names[k] for k in shown)
+    figure, axes = panels(2 if combined else 1, height=0.7 + 0.22 * rows, width=9.0)
     known = [fit.identifiable[k] == "yes" for k in shown]
     words = [f"{fit.names[k]} ({fit.identifiable[k]})" for k in shown]
     _bars(axes[0][0], words, fit.nominal[shown], fit.values[shown], fit.quantile * fit.std[shown], known)
     axes[0][0].set_title("parameters")
+    if not combined:
+        return figure
     short = [text if len(text) <= 60 else f"{text[:57]}..." for text in fit.base_words]
     half = fit.quantile * fit.base_std
-    _bars(axes[1][0], short, fit.base_nominal, fit.base_values, half, [True] * len(short))
+    _bars(axes[1][0], short, fit.base_nominal, fit.base_values, half, list(half <= KNOWN * np.abs(fit.base_values)))
     axes[1][0].set_title("base parameters")
     return figure
 
@@ -99,7 +104,7 @@ def _bars(axis: Axes, names: Sequence[str], nominal: Array, values: Array, half:
         for end, inside in ((low, low > -WIDEST), (high, high < WIDEST)):
             axis.plot([end], [row], "|" if inside else ("<" if end < 0.0 else ">"), color=INK, markersize=6)
         text = (
-            "open" if not np.isfinite(reach) else f"± {100.0 * reach:.2g} %" if reach < 10.0 else f"± {reach:.2g} times"
+            "open" if not np.isfinite(reach) else f"± {100.0 * reach:.3g} %" if reach < 10.0 else f"± {reach:.3g} times"
         )
         axis.annotate(text, (1.01, row), xycoords=("axes fraction", "data"), va="center", fontsize=7.5, color=SOFT)
     axis.axvline(1.0, color=SOFT, linewidth=1.0, linestyle="--")
