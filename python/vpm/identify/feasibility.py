@@ -1,10 +1,10 @@
 """Which inertial parameters a real body can have, and a least-squares fit among them.
 
 A body's ten parameters are those of a distribution of mass if and only if its pseudo-inertia is positive definite,
-``J = [[S, h], [h', m]]`` with the first moment h and ``S = tr(I)/2 - I`` for the inertia I about the frame's origin: mass
-is positive, and so are the principal moments about the centre of mass, none above the sum of the other two (P. Wensing,
-S. Kim, J.-J. Slotine, "Linear matrix inequalities for physically consistent inertial parameter identification", *IEEE
-Robotics and Automation Letters* 3, 2018).
+``J = [[S, h], [h', m]]`` with the first moment h and ``S = tr(I)/2 - I`` for the inertia I about the frame's origin.
+Then its mass is positive, and so are the principal moments about the centre of mass, none above the sum of the others
+(P. Wensing, S. Kim, J.-J. Slotine, "Linear matrix inequalities for physically consistent inertial parameter
+identification", *IEEE Robotics and Automation Letters* 3, 2018).
 
 ``D(J, J0) = -log det(J / J0) + tr(J / J0) - 4`` is the distance to the nominal body that knows no units and no frames,
 and infinite at the border (T. Lee, P. Wensing, F. Park, "Geometric robot dynamic identification: a convex programming

@@ -8,7 +8,6 @@ correlated noise; and a fit can be confined to parameters that a body can have.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,12 +16,13 @@ from scipy.stats import t as student
 from vpm.errors import IdentificationError, near_match
 from vpm.experiment import Experiment
 from vpm.identify.base_parameters import Base, find_base
-from vpm.identify.feasibility import Distance, faults, nearest
-from vpm.identify.identifiability import column_lengths, unseen_combinations
+from vpm.identify.feasibility import faults
+from vpm.identify.identifiability import unseen_combinations
 from vpm.identify.inertial_fit import KNOWN, TOGETHER, UNSEEN, VAGUE, InertialFit
 from vpm.identify.inertial_model import inertial_regression
-from vpm.identify.inertial_noise import channel_noise, effective_samples, score_covariance
+from vpm.identify.inertial_noise import channel_noise, effective_samples
 from vpm.identify.inertial_regression import InertialRegression
+from vpm.identify.inertial_solve import Solution, least_squares, solve_free, solve_physical, solve_pulled, weighted
 from vpm.model import Model
 
 Array = NDArray[np.float64]
@@ -34,17 +34,6 @@ RANK = 1e-8
 ROUNDS = 4
 #: Half width of a 95 % interval, relative to the value, up to which a parameter counts as known.
 WITHIN = 0.2
-
-
-@dataclass(frozen=True, eq=False)
-class _Solution:
-    """Parameters, the covariance of those that are sought in, and how they move the parameters."""
-
-    values: Array
-    covariance: Array
-    white: Array
-    robust: Array
-    method: str
 
 
 def identify_inertial(
@@ -98,11 +87,11 @@ def identify_inertial(
     nominal = np.where(np.isfinite(regression.nominal), regression.nominal, 0.0)
     deviations = _prior(regression, prior)
     if deviations is None:
-        solution = _free(regression, base, noise, nominal)
+        solution = solve_free(regression, base, noise, nominal)
     else:
-        solution = _pulled(regression, noise, nominal, deviations)
+        solution = solve_pulled(regression, noise, nominal, deviations)
     if physical:
-        solution = _physical(regression, noise, nominal, deviations, solution)
+        solution = solve_physical(regression, noise, nominal, deviations, solution)
     return _result(regression, base, noise, solution, within, open_ended=deviations is None)
 
 
@@ -124,10 +113,6 @@ def _regression(
     return inertial_regression(source, records, others=others, cutoff=cutoff)
 
 
-def _weighted(regression: InertialRegression, noise: Array) -> tuple[Array, Array]:
-    return regression.regressor / noise[:, None], regression.effort / noise
-
-
 def _base_and_noise(regression: InertialRegression, tolerance: float) -> tuple[Base, Array]:
     """Base parameters, and the noise of each channel about their best fit, by turns."""
     size = np.sqrt(np.mean(regression.effort**2, axis=0))
@@ -135,28 +120,23 @@ def _base_and_noise(regression: InertialRegression, tolerance: float) -> tuple[B
     count = len(regression.names)
     prefer = [regression.names.index(name) for name in regression.prefer]
     for _ in range(ROUNDS):
-        table, effort = _weighted(regression, noise)
+        table, effort = weighted(regression, noise)
         base = find_base(table.reshape(-1, count), tolerance=tolerance, prefer=prefer)
         if not base.kept:
             raise IdentificationError(
                 f"no effort depends on any of {', '.join(regression.names[:12])}; these data hold nothing about them",
                 parameters=regression.names,
             )
-        beta = _least_squares(table[:, :, list(base.kept)].reshape(-1, base.rank), effort.ravel())
+        beta = least_squares(table[:, :, list(base.kept)].reshape(-1, base.rank), effort.ravel())
         rest = regression.effort - regression.regressor[:, :, list(base.kept)] @ beta
         noise = channel_noise(rest, regression.effort, base.rank)
     return base, noise
 
 
-def _least_squares(columns: Array, right: Array) -> Array:
-    lengths = column_lengths(columns)
-    return np.asarray(np.linalg.lstsq(columns / lengths, right, rcond=None)[0] / lengths)
-
-
 def _refuse_incomplete(regression: InertialRegression, base: Base, noise: Array, tolerance: float) -> None:
     if base.rank == len(regression.names):
         return
-    table, _ = _weighted(regression, noise)
+    table, _ = weighted(regression, noise)
     found = unseen_combinations(table.reshape(-1, len(regression.names)), regression.names, tolerance)
     words = "; ".join(str(each) for each in found[:3]) + (f"; and {len(found) - 3} more" if len(found) > 3 else "")
     raise IdentificationError(
@@ -194,77 +174,15 @@ def _prior(regression: InertialRegression, prior: float | Mapping[str, float] | 
     return deviations
 
 
-def _free(regression: InertialRegression, base: Base, noise: Array, nominal: Array) -> _Solution:
-    """Base parameters by least squares; single parameters as near to the nominal ones as those allow."""
-    table, effort = _weighted(regression, noise)
-    mine = table[:, :, list(base.kept)]
-    columns = mine.reshape(-1, base.rank)
-    beta = _least_squares(columns, effort.ravel())
-    inverse = _inverse(columns)
-    robust = inverse @ score_covariance(mine, effort - mine @ beta, regression.slices) @ inverse
-    sizes = 1.0 / column_lengths(table.reshape(-1, len(nominal)))
-    scaled = base.map * sizes
-    spread = sizes[:, None] * np.linalg.pinv(scaled)
-    values = nominal + spread @ (beta - base.map @ nominal)
-    covariance = spread @ _small_sample(robust, effort.size, base.rank) @ spread.T
-    return _Solution(values, covariance, np.diag(inverse), np.diag(robust), "least squares in base parameters")
-
-
-def _pulled(regression: InertialRegression, noise: Array, nominal: Array, deviations: Array) -> _Solution:
-    """Least squares with one more equation for each parameter that is known beforehand."""
-    table, effort = _weighted(regression, noise)
-    count = len(nominal)
-    known = np.diag(1.0 / deviations)
-    columns = np.vstack([table.reshape(-1, count), known])
-    values = nominal + _least_squares(columns, np.concatenate([(effort - table @ nominal).ravel(), np.zeros(count)]))
-    inverse = _inverse(columns)
-    meat = _small_sample(score_covariance(table, effort - table @ values, regression.slices), effort.size, count)
-    covariance = inverse @ (meat + known**2) @ inverse
-    return _Solution(
-        values, covariance, np.diag(inverse), np.diag(covariance), "least squares pulled to the nominal values"
-    )
-
-
-def _physical(
-    regression: InertialRegression, noise: Array, nominal: Array, deviations: Array | None, free: _Solution
-) -> _Solution:
-    """Least squares among what bodies can have.
-
-    Deviations stay those without the constraint. In the norm of the data an estimate in a convex set is no farther from
-    any truth in that set than the free one, while deviations at the border itself would promise far too much.
-    """
-    table, effort = _weighted(regression, noise)
-    count = len(nominal)
-    # The triangle of a QR factorisation stands for all samples, whatever their number.
-    triangle = np.asarray(np.linalg.qr(np.column_stack([table.reshape(-1, count), effort.ravel()]), mode="r"))
-    known = np.zeros((count, count)) if deviations is None else np.diag(1.0 / deviations)
-    columns = np.vstack([triangle[:, :count], known])
-    values = nearest(columns, np.concatenate([triangle[:, count], known @ nominal]), Distance(regression))
-    return replace(free, values=values, method=f"{free.method}, among feasible parameters")
-
-
-def _inverse(columns: Array) -> Array:
-    """``(A'A)^-1`` by the singular values of A, columns of equal length."""
-    lengths = column_lengths(columns)
-    _, values, directions = np.linalg.svd(np.linalg.qr(columns / lengths, mode="r"), full_matrices=False)
-    usable = values > 1e-14 * values[0]
-    root = directions[usable].T / values[usable] / lengths[:, None]
-    return np.asarray(root @ root.T)
-
-
-def _small_sample(covariance: Array, rows: int, unknowns: int) -> Array:
-    return covariance * (rows / max(rows - unknowns, 1))
-
-
 def _directions(regression: InertialRegression, noise: Array, size: Array, std: float) -> int:
-    """Singular directions of relative changes that noise leaves better known than ``std``, without parameters of zero."""
-    table, _ = _weighted(regression, noise)
+    """Singular directions of relative changes that noise leaves better known than ``std``."""
+    table, _ = weighted(regression, noise)
     values = np.linalg.svd(np.linalg.qr(table.reshape(-1, size.size) * size, mode="r"), compute_uv=False)
     return int(np.sum(values * std >= 1.0))
 
 
 def _result(
-    regression: InertialRegression, base: Base, noise: Array, solution: _Solution, within: float, *, open_ended: bool
+    regression: InertialRegression, base: Base, noise: Array, solution: Solution, within: float, *, open_ended: bool
 ) -> InertialFit:
     effort = regression.effort
     effective = effective_samples(solution.white, solution.robust, effort.size)

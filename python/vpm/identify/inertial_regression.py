@@ -119,8 +119,9 @@ class InertialRegression(Storable):
             if not np.isfinite(table).all():
                 row, channel, *parameter = (int(k) for k in np.argwhere(~np.isfinite(table))[0])
                 of = f", parameter {self.names[parameter[0]]}" if parameter else ""
+                value = table[row, channel, *parameter]
                 raise IdentificationError(
-                    f"the {what} is {table[row, channel]} at sample {row}, channel {self.channels[channel]}{of}; leave "
+                    f"the {what} is {value} at sample {row}, channel {self.channels[channel]}{of}; leave "
                     "the sample out, or start a new record after the gap"
                 )
         equations, unknown = self.effort.size, len(self.names)
@@ -130,10 +131,10 @@ class InertialRegression(Storable):
                 f"{unknown} parameters; give at least {2 * unknown} equations, better a hundred for each parameter",
                 parameters=self.names,
             )
-        for column, channel in enumerate(self.channels):
+        for column, label in enumerate(self.channels):
             if np.ptp(self.effort[:, column]) == 0.0:
                 raise IdentificationError(
-                    f"the effort of {channel} is {self.effort[0, column]:.4g} in all {len(self.effort)} samples; a "
+                    f"the effort of {label} is {self.effort[0, column]:.4g} in all {len(self.effort)} samples; a "
                     "sensor that answers never gives that: check its column, or leave the channel out"
                 )
         if np.ptp(self.regressor, axis=0).max() == 0.0:
