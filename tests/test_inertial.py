@@ -227,6 +227,24 @@ def test_the_arm_of_three_links() -> None:
     assert physical.residual < 1.01
 
 
+def test_the_regressor_against_pinocchio() -> None:
+    pin: Any = pytest.importorskip("pinocchio", reason="the extra peers is not installed")
+    linear = InertialModel(example("arm")["nominal"](), [])
+    axes = {"waist": (pin.JointModelRZ, (0.0, 0.0, 0.0)), "shoulder": (pin.JointModelRY, (0.05, 0.0, 0.0))}
+    axes["elbow"] = (pin.JointModelRY, (0.40, 0.0, 0.0))
+    other, parent = pin.Model(), 0
+    for name, (kind, place) in axes.items():
+        parent = other.addJoint(parent, kind(), pin.SE3(np.eye(3), np.array(place)), name)
+    other.gravity.linear = np.array([0.0, 0.0, -GRAVITY])
+    data, random = other.createData(), np.random.default_rng(7)
+    order = [0, 1, 2, 3, 4, 6, 9, 5, 7, 8]  # theirs: m, mc, xx, xy, yy, xz, yz, zz
+    motion = tuple(random.uniform(-3.0, 3.0, (20, 3)) for _ in range(3))
+    _, table = linear.lacking(motion, np.zeros((20, 3)), 1.0)  # type: ignore[arg-type]  # three of them
+    for row, state in enumerate(zip(*motion, strict=True)):
+        theirs = np.array(pin.computeJointTorqueRegressor(other, data, *state)).reshape(3, 3, 10)[:, :, order]
+        np.testing.assert_allclose(table[row], theirs.reshape(3, 30), rtol=1e-9, atol=1e-10)
+
+
 # ---- intervals -------------------------------------------------------------------------------------------------------
 
 
