@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from vpm.errors import IdentificationError, near_match
 from vpm.experiment import Experiment
@@ -186,7 +186,7 @@ def _result(
 ) -> InertialFit:
     effort = regression.effort
     effective = effective_samples(solution.white, solution.robust, effort.size)
-    quantile = float(student.ppf(0.975, max(effective - base.rank, 1.0)))
+    quantile = float(stdtrit(max(effective - base.rank, 1.0), 0.975))
     std = np.sqrt(np.maximum(np.diag(solution.covariance), 0.0))
     alone = {base.kept[row] for row in range(base.rank) if not base.weights[row].any()}
     determined = np.array([k in alone for k in range(len(std))])

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import next_fast_len, rfft
 from scipy.linalg import solve_toeplitz
-from scipy.signal import lfilter
 
 Array = NDArray[np.float64]
 
@@ -44,7 +43,10 @@ def score_covariance(regressor: Array, residual: Array, records: Sequence[slice]
     models = [_autoregression(residual[:, c], records) for c in range(channels)]
     memory = max(len(model) for model in models) - 1
     parts = [
-        np.stack([lfilter(models[c], [1.0], residual[record, c])[memory:] for c in range(channels)], axis=1)
+        np.stack(
+            [np.convolve(residual[record, c], models[c])[memory : record.stop - record.start] for c in range(channels)],
+            axis=1,
+        )
         for record in records
     ]
     innovations = np.concatenate(parts)
