@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import runpy
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -227,6 +228,23 @@ def test_the_arm_of_three_links() -> None:
     assert physical.residual < 1.01
 
 
+def test_the_example_of_the_arm(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    example("arm")["main"](tmp_path)
+    printed = capsys.readouterr().out
+    assert "rank 21 of 36" in printed
+    assert "physically feasible" in printed
+    assert (tmp_path / "arm_inertial.png").stat().st_size > 5000
+
+
+def test_two_records_say_more_than_one() -> None:
+    model = vpm.Model.from_toml(MODEL)
+    one, two = record(Arm(), 10.0, 1), record(Arm(), 10.0, 2)
+    alone, both = vpm.identify_inertial(model, one), vpm.identify_inertial(model, [one, two])
+    assert both.samples > 1.9 * alone.samples
+    # Twice the samples: deviations smaller by the root of two, about.
+    assert 0.5 < np.exp(np.mean(np.log(both.base_std / alone.base_std))) < 0.95
+
+
 def test_the_regressor_against_pinocchio() -> None:
     pin: Any = pytest.importorskip("pinocchio", reason="the extra peers is not installed")
     linear = InertialModel(example("arm")["nominal"](), [])
@@ -381,6 +399,17 @@ def test_an_infeasible_estimate_becomes_a_feasible_one() -> None:
             for share in (0.001, 0.01, 0.1, 1.0):
                 assert cost(bound.values + share * (other - bound.values)) > cost(bound.values) - 0.2
     assert found >= 3
+
+
+def test_a_point_mass_of_a_model_is_a_start() -> None:
+    data, true = full_body(0.01, 3)
+    point = standard_parameters(float(true[0]), true[1:4] / true[0], np.zeros(6))
+    fit = vpm.identify_inertial(replace(data, nominal=point), physical=True)
+    assert fit.feasible
+    np.testing.assert_allclose(fit.values, true, atol=5.0 * fit.std.max())
+    wrong = standard_parameters(1.0, np.zeros(3), np.array([1.0, 1.0, 3.0, 0.0, 0.0, 0.0]))
+    with pytest.raises(IdentificationError, match="the nominal values of load are those of no body: principal"):
+        vpm.identify_inertial(replace(data, nominal=wrong), physical=True)
 
 
 def test_positive_parameters_against_nonnegative_least_squares() -> None:
