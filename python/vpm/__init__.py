@@ -17,7 +17,7 @@ from vpm.compare import Comparison, compare
 from vpm.discrepancy import Diagnosis, diagnose
 from vpm.errors import VpmError
 from vpm.experiment import Campaign, Experiment
-from vpm.identify import Fit, Fitting, identify
+from vpm.identify import Fit, Fitting, InertialFit, InertialRegression, identify, identify_inertial
 from vpm.linear import LinearModel
 from vpm.model import Dynamics, Model
 from vpm.planar import PlanarArm
@@ -39,6 +39,8 @@ __all__ = [
     "Experiment",
     "Fit",
     "Fitting",
+    "InertialFit",
+    "InertialRegression",
     "Ladder",
     "LinearModel",
     "Model",
@@ -56,6 +58,7 @@ __all__ = [
     "compare",
     "diagnose",
     "identify",
+    "identify_inertial",
     "linkages",
     "narx",
     "report",

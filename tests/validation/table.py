@@ -7,7 +7,7 @@ import subprocess
 from collections.abc import Callable
 from pathlib import Path
 
-from validation import beams, hydraulics, hyl, linkages, motions, tudor
+from validation import beams, hydraulics, hyl, inertial, linkages, motions, tudor
 from validation.row import Row, row
 
 ROOT = Path(__file__).resolve().parent.parent.parent
@@ -17,6 +17,7 @@ PAGE = ROOT / "docs" / "validation.md"
 PARTS: dict[str, Callable[[], list[Row]]] = {
     "KARL, a limb on two strokes": linkages.karl,
     "The leg of HyQ": linkages.leg,
+    "Masses and inertias by least squares": inertial.reference,
     "A hydraulic servo-cylinder": hydraulics.rig,
     "The HyL leg stands and falls": hyl.reference,
     "The HyL leg beside a solution without vpm": hyl.witnessed,

@@ -7,10 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import qr, solve_triangular
 
 from vpm.errors import ExcitationError, near_match
-from vpm.identify.identifiability import RANK_TOLERANCE, column_lengths
+from vpm.identify.base_parameters import find_base
 from vpm.model import Model
 from vpm.results import Storable
 from vpm.simulate import check_balance
@@ -19,9 +18,6 @@ Array = NDArray[np.float64]
 
 #: Random states at which a regressor shows its rank.
 STATES = 400
-
-#: Weight below which a dependent parameter is no part of a combination, on columns of equal length.
-SMALLEST_WEIGHT = 1e-6
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -120,22 +116,8 @@ def base_parameters(model: Model, free: Sequence[str] | None = None, *, seed: in
     shape = (STATES, len(model.joints))
     position, velocity, acceleration = (rng.uniform(-limit, limit, shape) for limit in (2.0, 5.0, 20.0))
     columns = regressor(model, position, velocity, acceleration, names).reshape(-1, len(names))
-    lengths = column_lengths(columns)
-    seen = np.flatnonzero(np.linalg.norm(columns, axis=0) > 0.0)
-    unseen = [name for at, name in enumerate(names) if at not in seen]
-    if not seen.size:
+    base = find_base(columns)
+    if not base.kept:
         raise ExcitationError(f"{model.name}: no motion shows any of {', '.join(names)}; free other parameters")
-    _, upper, order = qr(columns[:, seen] / lengths[seen], mode="economic", pivoting=True)
-    diagonal = np.abs(np.diag(upper))
-    rank = int(np.sum(diagonal > RANK_TOLERANCE * diagonal[0]))
-    weights = solve_triangular(upper[:rank, :rank], upper[:rank, rank:])
-    places = seen[order]
-    combinations = {}
-    for row, place in enumerate(places[:rank]):
-        words = names[place]
-        for column, other in enumerate(places[rank:]):
-            if abs(weights[row, column]) > SMALLEST_WEIGHT:
-                words += f" {weights[row, column] * lengths[other] / lengths[place]:+.4g} {names[other]}"
-        combinations[names[place]] = words
-    base = tuple(name for name in names if name in combinations)
-    return BaseParameters(base, tuple(combinations[name] for name in base), tuple(unseen))
+    kept = tuple(names[place] for place in base.kept)
+    return BaseParameters(kept, base.words(names), tuple(names[place] for place in base.unseen))

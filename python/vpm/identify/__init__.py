@@ -3,6 +3,10 @@
 from vpm.identify.estimation import Estimate, estimate
 from vpm.identify.fit import Fit, identify
 from vpm.identify.identifiability import Combination, unseen_combinations
+from vpm.identify.inertial import identify_inertial
+from vpm.identify.inertial_fit import InertialFit
+from vpm.identify.inertial_model import inertial_regression
+from vpm.identify.inertial_regression import InertialRegression
 from vpm.identify.intervals import Bootstrap, Profile, bootstrap, profile_intervals
 from vpm.identify.problem import Block, InverseDynamicsProblem, OutputErrorProblem, Problem, gaps, problem, segments
 from vpm.identify.settings import Fitting
@@ -17,6 +21,8 @@ __all__ = [
     "Fit",
     "Fitting",
     "Gain",
+    "InertialFit",
+    "InertialRegression",
     "InverseDynamicsProblem",
     "OutputErrorProblem",
     "Problem",
@@ -27,6 +33,8 @@ __all__ = [
     "gain",
     "gaps",
     "identify",
+    "identify_inertial",
+    "inertial_regression",
     "problem",
     "profile_intervals",
     "robust_covariance",

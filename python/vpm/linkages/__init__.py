@@ -14,10 +14,12 @@ from vpm.linkages.karl import Karl, KarlGeometry
 from vpm.linkages.karl_results import KarlPoses, KarlSingularities, KarlWorkspace
 from vpm.linkages.leg import Leg
 from vpm.linkages.leg_parameters import Attachment, Cylinder, LegParameters, LegPart, Segment
+from vpm.linkages.leg_regressor import INERTIAL_NAMES, inertial_values, with_inertial_values
 from vpm.linkages.leg_results import LegReactions, LegStrokes, LegTerms, ShareMap
 from vpm.linkages.load import load
 
 __all__ = [
+    "INERTIAL_NAMES",
     "Attachment",
     "Cylinder",
     "Karl",
@@ -33,5 +35,7 @@ __all__ = [
     "LegTerms",
     "Segment",
     "ShareMap",
+    "inertial_values",
     "load",
+    "with_inertial_values",
 ]

@@ -12,6 +12,7 @@ from vpm._core import Leg as _Leg
 from vpm.errors import ModelError, near_match
 from vpm.linkages.arrays import rowwise
 from vpm.linkages.leg_parameters import Cylinder, HyqSet, LegParameters, LegPart, Segment
+from vpm.linkages.leg_regressor import leg_regressor
 from vpm.linkages.leg_results import LegReactions, LegStrokes, LegTerms, ShareMap
 
 if TYPE_CHECKING:
@@ -177,6 +178,13 @@ class Leg:
         if derivation == "newton_euler":
             return self._rows(lambda q, v, a: self.reactions(q, v, a).torques, angles, rates, accelerations)
         return self._rows(lambda q, v, a: self.terms(q, v, derivation).torques(a), angles, rates, accelerations)
+
+    def regressor(self, angles: ArrayLike, rates: ArrayLike, accelerations: ArrayLike) -> Array:
+        """Derivative of the joint torques by the parameters of `INERTIAL_NAMES`, shape (2, 11) or (N, 2, 11).
+
+        Torques are this times `inertial_values`. Source: D'Imperio 2016, section 5.1.1.
+        """
+        return leg_regressor(self, angles, rates, accelerations)
 
     def accelerations(self, angles: ArrayLike, rates: ArrayLike, torques: ArrayLike) -> Array:
         """Joint accelerations (rad/s^2) under joint torques (N m), shape (2,) or (N, 2)."""

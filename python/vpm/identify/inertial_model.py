@@ -1,0 +1,216 @@
+"""The regression of a model file's machine: standard inertial parameters of its bodies, and what else is linear."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vpm.errors import IdentificationError, near_match
+from vpm.experiment import Experiment
+from vpm.experiment.signal import parallel_filter
+from vpm.identify.inertial_regression import InertialRegression
+from vpm.identify.problem import InverseDynamicsProblem
+from vpm.model import Model
+
+Array = NDArray[np.float64]
+
+#: The ten standard parameters of a body, in this order, and their units.
+STANDARD = (
+    "mass",
+    "first_moment.x",
+    "first_moment.y",
+    "first_moment.z",
+    *(f"origin_inertia.{entry}" for entry in ("xx", "yy", "zz", "xy", "xz", "yz")),
+)
+UNITS = ("kg", *("kg m",) * 3, *("kg m^2",) * 6)
+#: The same of a model file, where inertia is about the centre of mass.
+_OF_FILE = (
+    "mass",
+    *(f"center_of_mass.{axis}" for axis in "xyz"),
+    *(f"inertia.{entry}" for entry in ("xx", "yy", "zz", "xy", "xz", "yz")),
+)
+#: A body of 1 kg with its centre of mass in the origin; some inertia, because the core moves no joint without.
+PLAIN = np.array([1.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
+#: Difference of efforts, relative to their size, below which they agree: rounding of long sums.
+AGREE = 1e-8
+
+
+def standard_parameters(mass: float, center: Array, inertia: Array) -> Array:
+    """Mass, first moment and moments of inertia about the frame's origin, (10,).
+
+    Parameters
+    ----------
+    mass : float
+    center : ndarray, shape (3,)
+    inertia : ndarray, shape (6,)
+        About the centre of mass: xx yy zz xy xz yz, entries of the matrix.
+    """
+    shift = mass * (float(center @ center) * np.eye(3) - np.outer(center, center))
+    x, y, z = 0, 1, 2
+    entries = shift[[x, y, z, x, x, y], [x, y, z, y, z, z]]
+    return np.array([mass, *(mass * center), *(inertia + entries)])
+
+
+class InertialModel:
+    """A model's effort as ``offset + regressor @ parameters``, exact to rounding.
+
+    With the centre of mass in the origin, the derivatives by mass, centre and inertia are those by the standard
+    parameters, since then ``d(m c) = m dc`` and ``d(origin inertia) = d(inertia)`` (C. Atkeson, C. An, J. Hollerbach,
+    "Estimation of inertial parameters of manipulator loads and links", *Int. J. Robotics Research* 5, 1986). So the
+    core is asked at bodies with their centres in their origins.
+
+    Parameters
+    ----------
+    model : Model
+    others : sequence of str
+        Further parameters that are sought.
+    """
+
+    def __init__(self, model: Model, others: Sequence[str]) -> None:
+        self.model = model
+        self.bodies = tuple(name for name in model.bodies if f"{name}.mass" in model.parameters)
+        self.others = tuple(others)
+        own = {f"{body}.{end}" for body in self.bodies for end in _OF_FILE}
+        for name in self.others:
+            if name not in model.parameters:
+                raise IdentificationError(
+                    f'{model.name} has no parameter "{name}"; {near_match(name, model.parameters)}'
+                )
+            if name in own:
+                raise IdentificationError(
+                    f"{name} belongs to a body, and all ten parameters of every body are sought anyway; name others"
+                )
+        self._places = [model.index(f"{body}.{end}") for body in self.bodies for end in _OF_FILE]
+        self._columns = [*self._places, *(model.index(name) for name in self.others)]
+        self.names = (*(f"{body}.{end}" for body in self.bodies for end in STANDARD), *self.others)
+        self.units = (*UNITS * len(self.bodies), *(model.parameters[name].unit for name in self.others))
+        self._plain = model.theta.copy()
+        self._plain[self._places] = np.tile(PLAIN, len(self.bodies))
+
+    @property
+    def nominal(self) -> Array:
+        """Standard parameters of the model file (p,)."""
+        theta = self.model.theta[self._places].reshape(-1, 10)
+        tens = [standard_parameters(float(row[0]), row[1:4], row[4:]) for row in theta]
+        return np.concatenate([*tens, self.model.theta[[self.model.index(name) for name in self.others]]])
+
+    def lacking(self, state: tuple[Array, Array, Array], inputs: Array, dt: float) -> tuple[Array, Array]:
+        """What actuators give beyond what parts that are not sought need (N, n), and the regressor (N, n, p)."""
+        core = self.model.core
+        required, applied, table = core.inverse_dynamics(self._plain, *state, inputs, dt, self._columns)
+        plain = np.tile(PLAIN, len(self.bodies))
+        rest = self.model.theta[[self.model.index(name) for name in self.others]]
+        return applied - required + table @ np.concatenate([plain, rest]), table
+
+    def check(self, state: tuple[Array, Array, Array], inputs: Array, dt: float) -> None:
+        """Complain if the effort is not linear in what is sought."""
+        effort, table = self.lacking(state, inputs, dt)
+        for name in (None, *self.others):
+            theta, values = self.model.theta.copy(), self.nominal
+            if name is not None:
+                place = self.names.index(name)
+                changed = 1.5 * values[place] or 1.0
+                theta[self.model.index(name)], values[place] = changed, changed
+            required, applied, _ = self.model.core.inverse_dynamics(theta, *state, inputs, dt, [])
+            apart = np.abs(applied - required - (effort - table @ values)).max()
+            size = np.abs(required).max() + np.abs(applied).max()
+            if apart > AGREE * size:
+                what = f"{name}" if name else "the bodies' parameters"
+                raise IdentificationError(
+                    f"the effort of {self.model.name} is not linear in {what}: it misses the linear law by {apart:.2g} "
+                    f"of {size:.3g}; hold that parameter, or use vpm.identify, which needs no linear law",
+                    parameters=() if name is None else (name,),
+                )
+
+
+def inertial_regression(
+    model: Model,
+    records: Experiment | Sequence[Experiment],
+    *,
+    others: Sequence[str] | None = None,
+    cutoff: float | None = None,
+) -> InertialRegression:
+    """The regression of a model from its records: ten parameters for each body, and what else has an uncertainty.
+
+    Motion and efforts pass the same filters as in an identification by inverse dynamics, and samples at which a joint
+    stands still do not count, see `InverseDynamicsProblem`.
+
+    Parameters
+    ----------
+    model : Model
+        Rigid, with ideal actuators; its values are the nominal ones. Payloads, springs and rotors that it has are held.
+    records : Experiment or sequence of Experiment
+        Each with the position of every joint and the command of every actuator.
+    others : sequence of str, optional
+        Parameters beside those of bodies, such as ``shoulder.friction.viscous``; by default all with an uncertainty.
+    cutoff : float, optional
+        Hz, of the motion filter.
+
+    Returns
+    -------
+    InertialRegression
+
+    Raises
+    ------
+    IdentificationError
+        A joint never moves, a parameter is unknown, or the effort is not linear in it.
+    SimulationError
+        The model has elastic coordinates or actuators that are not ideal.
+    """
+    given = [records] if isinstance(records, Experiment) else list(records)
+    if not given:
+        raise IdentificationError("no record was given; pass at least one")
+    sought = [p.name for p in model.parameters.values() if p.adjustable and not _of_body(model, p.name)]
+    linear = InertialModel(model, sought if others is None else others)
+    balance = InverseDynamicsProblem(model, given, cutoff=cutoff)
+    _check_motion(model, given)
+    tables, efforts, count = [], [], len(model.joints)
+    for at, m in enumerate(balance.motions):
+        state = (m.position, m.velocity, m.acceleration)
+        some = slice(m.edge, len(m.time) - m.edge, m.decimation)
+        linear.check((m.position[some], m.velocity[some], m.acceleration[some]), m.inputs[some], m.dt)
+        effort, table = linear.lacking(state, m.inputs, m.dt)
+        size = len(m.time[m.kept])
+        blocks = balance.blocks[at * len(balance.blocks) // len(given) : (at + 1) * len(balance.blocks) // len(given)]
+        driven = [model.joints.index(block.channel.rpartition(".")[0]) for block in blocks]
+        counted = np.stack([block.moving for block in blocks], axis=1)
+        flat = parallel_filter(table[m.kept].reshape(size, -1), m.decimation)
+        tables.append(flat.reshape(len(flat), count, -1)[:, driven] * counted[:, :, None])
+        efforts.append(parallel_filter(effort[m.kept], m.decimation)[:, driven] * counted)
+    masses = tuple(f"{body}.mass" for body in linear.bodies)
+    moments = tuple(name for name in linear.names if ".first_moment." in name)
+    turning = tuple(name for name in linear.names if ".origin_inertia." in name)
+    return InertialRegression.from_arrays(
+        np.concatenate(tables),
+        np.concatenate(efforts),
+        linear.names,
+        nominal=linear.nominal,
+        units=linear.units,
+        channels=tuple(block.channel for block in blocks),
+        bodies={body: tuple(f"{body}.{end}" for end in STANDARD) for body in linear.bodies},
+        positive=tuple(name for name in linear.others if _not_negative(model, name)),
+        # As in the textbooks, masses and moments of outer links are regrouped with those of inner ones.
+        prefer=(*linear.others, *turning, *moments, *masses),
+        records=tuple(len(effort) for effort in efforts),
+    )
+
+
+def _of_body(model: Model, name: str) -> bool:
+    return any(name == f"{body}.{end}" for body in model.bodies for end in _OF_FILE)
+
+
+def _not_negative(model: Model, name: str) -> bool:
+    return model.parameters[name].minimum >= 0.0 and model.parameters[name].value > 0.0
+
+
+def _check_motion(model: Model, records: Sequence[Experiment]) -> None:
+    for joint in model.joints:
+        channel = f"{joint}.position"
+        unit = model.channel_unit(channel)
+        if all(np.ptp(record[channel]) == 0.0 for record in records):
+            raise IdentificationError(
+                f"the joint {joint} never moves: {channel} is {records[0][channel][0]:.4g} {unit} "
+                "in all samples; move it in at least one record, or describe it as fixed"
+            )
