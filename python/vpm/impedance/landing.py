@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from vpm.errors import IdentificationError
+from vpm.errors import ExperimentError, IdentificationError
 from vpm.experiment import noise_std
 from vpm.impedance.channels import RecordLike, Sense, check_moves, check_sense, columns
 from vpm.results import Result
@@ -94,7 +94,7 @@ def identify_landing(
     check_moves(found, displacement)
     steps = np.diff(found.time)
     if np.ptp(steps) > 0.01 * steps.mean():
-        raise IdentificationError(
+        raise ExperimentError(
             f"{found.name}: its steps lie between {steps.min():g} and {steps.max():g} s; bring it to an even grid first"
         )
     time, x, f = found.time, found.values[0], sign * found.values[1]
