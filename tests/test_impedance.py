@@ -113,7 +113,7 @@ def test_energy_of_a_motion_with_harmonics_weighs_them_with_the_square_of_their_
     w, parts = 2.0 * np.pi * 0.5, ((1, 5e-3, 0.0), (2, 2e-3, 0.7), (5, 0.5e-3, 2.0))
 
     def speed(t: Array) -> Array:
-        return np.sum([n * w * a * np.cos(n * w * t + p) for n, a, p in parts], axis=0)
+        return np.asarray(np.sum([n * w * a * np.cos(n * w * t + p) for n, a, p in parts], axis=0))
 
     t = np.arange(4000) / 500.0
     x = np.sum([a * np.sin(n * w * t + p) for n, a, p in parts], axis=0)
@@ -204,7 +204,7 @@ def test_what_may_be_wrong_is_said() -> None:
     assert "one sample (4 ms) of unknown delay of the force would change the damping by 320 N s/m" in late
     coarse = ellipse()
     coarse["x"] = 2e-3 * np.round(np.asarray(coarse["x"]) / 2e-3)
-    assert any("2.6 steps of the encoder" in note for note in impedance.identify_loop(coarse, "x", "f").notes)
+    assert any("steps of the encoder (0.002 m)" in note for note in impedance.identify_loop(coarse, "x", "f").notes)
     fading = ellipse(cycles=6.0)
     fading["f"] = np.asarray(fading["f"]) + C * np.pi * 5e-3 * np.cos(np.pi * np.asarray(fading["time"])) * np.linspace(
         0.0, 1.0, 3000
@@ -532,3 +532,25 @@ def test_tests_on_the_leg_find_the_gains_of_its_controllers(
             known = truths[joint]
             assert row.stiffness.mean == pytest.approx(known.stiffness, rel=within[0])
             assert row.damping.mean == pytest.approx(known.damping, rel=within[1])
+
+
+def test_the_example_prints_its_tables(
+    example: ModuleType, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    pytest.importorskip("matplotlib")
+    for name, value in {"CYCLES": 1, "FREQUENCY": 0.5, "SWEEP": (0.4, 0.8), "LEGS": {"ideal": "fcm.toml"}}.items():
+        monkeypatch.setattr(example, name, value)
+    example.main(2, tmp_path)
+    printed = capsys.readouterr().out
+    assert "ideal leg, 2 tests each" in printed
+    assert "force 5 ms late" in printed
+    assert {path.name for path in tmp_path.iterdir()} == {"impedance_ideal.png", "loops_ideal.png"}
+
+
+def test_a_late_load_cell_of_the_leg_costs_stiffness_times_delay(
+    example: ModuleType, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(example, "CYCLES", 2)
+    (_, now, _), (shift, late, told) = example.delays((0, 5))
+    assert late.damping - now.damping == pytest.approx(-now.stiffness * 1e-3 * shift, rel=0.03)
+    assert told.damping == pytest.approx(now.damping, rel=2e-3)

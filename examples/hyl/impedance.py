@@ -41,6 +41,8 @@ ENCODER = np.radians(0.045)
 
 #: Hand: first cycles that are left out, then those that count.
 SETTLING, CYCLES, FREQUENCY = 1, 4, 0.2
+#: Frequencies of the hand for the law of the loss, each at full and at half of its force.
+SWEEP = (0.1, 0.2, 0.4)
 #: Length of a landing, s.
 LANDING = 0.35
 
@@ -203,10 +205,10 @@ def landing(record: dict[str, Array]) -> impedance.Landing:
 
 
 def laws(leg: str, seed: int = 1) -> dict[str, impedance.LossLaw]:
-    """Law of the loss of each cylinder, from three frequencies at two forces."""
+    """Law of the loss of each cylinder, from some frequencies at two forces."""
     random = np.random.default_rng(seed)
     loops: dict[str, list[impedance.Loop]] = {joint: [] for joint in PINS}
-    for frequency in (0.1, 0.2, 0.4):
+    for frequency in SWEEP:
         for share in (1.0, 0.5):
             run = pushed(leg, "low", frequency, share)
             for joint, found in loops.items():

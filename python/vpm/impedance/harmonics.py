@@ -71,7 +71,7 @@ def evaluate(amplitudes: Complex, phase: Array) -> Array:
 
 
 def fundamental(time: Array, values: Array) -> float:
-    """Frequency (Hz) of the strongest line, refined by the best fit of three harmonics beside a line of drift."""
+    """Frequency (Hz) of the strongest line, refined by the best fit of up to eight harmonics beside a drift."""
     from scipy.optimize import minimize_scalar
 
     even = np.linspace(time[0], time[-1], time.size)
@@ -82,8 +82,11 @@ def fundamental(time: Array, values: Array) -> float:
     peak = float(lines[np.argmax(spectrum)])
     width = 0.5 / float(time[-1] - time[0])
 
+    # As many harmonics as the samples carry: those that the fit lacks would pull at the frequency.
+    count = min(max(int(0.25 / (peak * float(even[1] - even[0]))), 1), 8)
+
     def left(frequency: float) -> float:
-        return fourier(time, values, float(frequency), 3, 1).noise
+        return fourier(time, values, float(frequency), count, 1).noise
 
     low = max(peak - width, 0.2 * width)
     return float(minimize_scalar(left, bounds=(low, peak + width), method="bounded", options={"xatol": 1e-7 * peak}).x)
