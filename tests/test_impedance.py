@@ -90,7 +90,7 @@ def test_the_ellipse_of_a_spring_with_a_damper_gives_both_back(
     )
     assert loop.amplitude == pytest.approx(amplitude, rel=1e-4)
     assert loop.loss_factor == pytest.approx(lag, rel=1e-7 * max(1.0, 1.0 / lag))
-    assert loop.cycle_energy.size == round(cycles * per_cycle) // per_cycle
+    assert loop.cycle_energy.size == int(round(cycles * per_cycle) / per_cycle + 0.01)
 
 
 @settings(max_examples=30, deadline=None)
@@ -139,6 +139,7 @@ def test_the_energy_is_the_area_of_the_polygon_of_any_loop() -> None:
     assert loop.energy == pytest.approx(4.0 * 0.3, rel=1e-3)
     assert loop.coulomb_force == pytest.approx(0.3, rel=1e-3)
     assert loop.stiffness == pytest.approx(2.0 + 0.75, rel=1e-3)
+    assert any("harmonics that no linear spring" in note for note in loop.notes)
 
 
 @pytest.mark.parametrize("drift", [0, 1])

@@ -40,7 +40,7 @@ NOISE, QUANTUM, OFFSET, GAIN = 5.0, 2.5, 10.0, 0.0025
 ENCODER = np.radians(0.045)
 
 #: Hand: first cycles that are left out, then those that count.
-SETTLING, CYCLES, FREQUENCY = 1, 4, 0.2
+SETTLING, CYCLES, FREQUENCY = 2, 4, 0.2
 #: Frequencies of the hand for the law of the loss, each at full and at half of its force.
 SWEEP = (0.1, 0.2, 0.4)
 #: Length of a landing, s.
@@ -67,16 +67,16 @@ def lever(joint: str, angle: float, step: float = 1e-5) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class Truth:
-    """What the controller is at the cylinder, in the mean pose of a test.
+    """What the controller is at the cylinder in a test.
 
     Attributes
     ----------
     gain : float
-        ``P / l^2``, N/m.
+        ``P / l^2`` in the mean pose, N/m.
     stiffness : float
         ``P / l^2 + F (dl/dq) / l^2``: the lever changes under the load F, N/m.
     damping : float
-        ``D / l^2``, N s/m.
+        ``D int (dq/dt)^2 dt / int (ds/dt)^2 dt``: ``D / l^2`` as the motion weighs it, N s/m.
     """
 
     gain: float
@@ -84,11 +84,12 @@ class Truth:
     damping: float
 
 
-def truth(joint: str, proportional: float, angle: float, force: float) -> Truth:
-    """Gains seen at a cylinder that pushes with a force at an angle."""
-    arm, change = lever(joint, angle)
-    gain = proportional / arm**2
-    return Truth(gain, gain + force * change / arm**2, DERIVATIVE / arm**2)
+def truth(joint: str, proportional: float, run: vpm.Run, window: slice) -> Truth:
+    """Gains seen at a cylinder over a part of a run."""
+    arm, change = lever(joint, float(run[f"{joint}_rotation.position"][window].mean()))
+    gain, force = proportional / arm**2, float(run[f"{joint}_drive.force"][window].mean())
+    turned, moved = run[f"{joint}_rotation.velocity"][window], run[f"{joint}_cylinder.rate"][window]
+    return Truth(gain, gain + force * change / arm**2, DERIVATIVE * float(turned @ turned / (moved @ moved)))
 
 
 def simulated(file: str, leg: str, proportional: float, changes: dict[str, Any], hand: float = 1.0) -> vpm.Run:
@@ -183,12 +184,8 @@ def repeated(leg: str, impedance_name: str, repeats: int, seed: int = 0) -> Test
             found.landings[joint].append(landing(measured(fall, joint, windows[1], random)))
             found.stops[joint].append(first_stop(fall, joint, windows[1]))
             if repeat == 0:
-                for run, window, into in (
-                    (slow, windows[0], found.truths),
-                    (fall, windows[1], found.landing_truths),
-                ):
-                    angle = float(run[f"{joint}_rotation.position"][window].mean())
-                    into[joint] = truth(joint, proportional, angle, float(run[f"{joint}_drive.force"][window].mean()))
+                found.truths[joint] = truth(joint, proportional, slow, windows[0])
+                found.landing_truths[joint] = truth(joint, proportional, fall, windows[1])
     return found
 
 

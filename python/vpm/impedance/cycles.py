@@ -13,6 +13,8 @@ Array = NDArray[np.float64]
 
 #: Fewest samples in a cycle: two harmonics with twice as many samples as coefficients.
 FEWEST_PER_CYCLE = 8
+#: Share of a cycle that may be missing at the end: a series by least squares needs no exact end.
+MISSING = 0.01
 
 
 def whole_cycles(found: Columns, frequency: float | None) -> tuple[float, int, NDArray[np.bool_]]:
@@ -23,7 +25,7 @@ def whole_cycles(found: Columns, frequency: float | None) -> tuple[float, int, N
     rate = fundamental(time, x) if frequency is None else float(frequency)
     step = float(np.median(np.diff(time)))
     held = (float(time[-1] - time[0]) + step) * rate
-    cycles = int(held + 0.25 * step * rate + 1e-9)
+    cycles = int(held + MISSING)
     if cycles < (2 if frequency is None else 1):
         wanted = "two cycles to be estimated: give frequency=" if frequency is None else "one whole cycle: check it"
         raise IdentificationError(f"{found.name} holds {held:.3g} cycles of {rate:.4g} Hz, and it needs {wanted}")

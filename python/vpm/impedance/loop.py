@@ -62,6 +62,8 @@ class Loop(Result):
     cycle_stiffness, cycle_damping, cycle_energy : ndarray, shape (cycles,)
     displacement_harmonics, force_harmonics : ndarray of complex
         X_n, F_n with the force as an applied one and without its delay.
+    displacement_noise, force_noise : float
+        Standard deviations of what the series leave, m, N.
     displacement, force : ndarray, shape (N,)
         Samples of the whole cycles, less mean and drift.
     notes : tuple of str
@@ -87,6 +89,8 @@ class Loop(Result):
     cycle_energy: Array
     displacement_harmonics: Complex
     force_harmonics: Complex
+    displacement_noise: float
+    force_noise: float
     displacement: Array
     force: Array
     notes: tuple[str, ...] = ()
@@ -231,6 +235,8 @@ def identify_loop(
         cycle_energy=np.array([one.energy for one in each]),
         displacement_harmonics=moved.amplitudes[:count],
         force_harmonics=(pushed.amplitudes * turn)[:most],
+        displacement_noise=moved.noise,
+        force_noise=pushed.noise,
         displacement=x - moved.drift,
         force=f - pushed.drift,
     )

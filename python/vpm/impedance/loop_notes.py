@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from vpm.experiment import quantisation_step
 
 Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
 
 #: Share of the damping beyond which a possible error is worth a sentence.
 WORTH = 0.05
@@ -41,6 +42,26 @@ class LoopLike(Protocol):
     @property
     def cycle_energy(self) -> Array:
         """J."""
+
+    @property
+    def frequency(self) -> float:
+        """Hz."""
+
+    @property
+    def displacement_harmonics(self) -> Complex:
+        """Of the motion, m."""
+
+    @property
+    def force_harmonics(self) -> Complex:
+        """Of the force, N."""
+
+    @property
+    def force_noise(self) -> float:
+        """N."""
+
+    @property
+    def force(self) -> Array:
+        """N."""
 
     @property
     def energy_std(self) -> float:
@@ -87,6 +108,12 @@ def loop_notes(loop: LoopLike, displacement: Array, step: float, delay_std: floa
             f"the displacement repeats itself in {100.0 * explained:.0f} % of its variance only; give frequency=, or "
             "test with a steadier motion"
         )
+    bend = _bend(loop)
+    if bend > WORTH:
+        notes.append(
+            f"{100.0 * bend:.0f} % of the force's amplitude is in harmonics that no linear spring with a damper makes: "
+            "the stiffness is that of a chord and changes with amplitude and mean"
+        )
     spread = float(np.std(loop.cycle_energy, ddof=1)) if loop.cycle_energy.size > 2 else 0.0
     expected = loop.energy_std * np.sqrt(loop.cycle_energy.size)
     if spread > max(3.0 * expected, 0.02 * abs(loop.energy)):
@@ -97,3 +124,13 @@ def loop_notes(loop: LoopLike, displacement: Array, step: float, delay_std: floa
     if loop.cycle_energy.size == 1:
         notes.append("a single cycle cannot tell drift from loss; record more of them")
     return tuple(notes)
+
+
+def _bend(loop: LoopLike) -> float:
+    """Amplitude of the force that spring and damper leave, as a share of the whole, without what noise makes."""
+    whole, moved = loop.force_harmonics, loop.displacement_harmonics
+    orders = np.arange(1, moved.size + 1)
+    left = whole.copy()
+    left[: moved.size] -= (loop.stiffness + 2j * np.pi * loop.frequency * loop.damping * orders) * moved
+    noise = 4.0 * loop.force_noise**2 / loop.force.size * whole.size
+    return float(np.sqrt(max(np.sum(np.abs(left) ** 2) - noise, 0.0) / np.sum(np.abs(whole) ** 2)))
