@@ -539,9 +539,9 @@ def test_the_example_prints_its_tables(
     example: ModuleType, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     pytest.importorskip("matplotlib")
-    for name, value in {"CYCLES": 1, "FREQUENCY": 0.5, "SWEEP": (0.4, 0.8), "LEGS": {"ideal": "fcm.toml"}}.items():
+    for name, value in {"CYCLES": 1, "FREQUENCY": 0.5, "SWEEP": (0.4, 0.8)}.items():
         monkeypatch.setattr(example, name, value)
-    example.main(2, tmp_path)
+    example.main(2, tmp_path, ("ideal",))
     printed = capsys.readouterr().out
     assert "ideal leg, 2 tests each" in printed
     assert "force 5 ms late" in printed
@@ -555,3 +555,12 @@ def test_a_late_load_cell_of_the_leg_costs_stiffness_times_delay(
     (_, now, _), (shift, late, told) = example.delays((0, 5))
     assert late.damping - now.damping == pytest.approx(-now.stiffness * 1e-3 * shift, rel=0.03)
     assert told.damping == pytest.approx(now.damping, rel=2e-3)
+
+
+def test_damping_of_the_hydraulic_leg_is_what_the_valve_is_not_told_of_the_pistons_speed(
+    example: ModuleType, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(example, "CYCLES", 2)
+    (none, slow), (all_of_it, quick) = example.compensated((0.0, 10.67e-3))
+    # The force loop of 3e-7 A/N answers a speed that nothing compensates with (k_v' - k_v) / k_f newtons.
+    assert slow.damping - quick.damping == pytest.approx((all_of_it - none) / 3e-7, rel=0.25)
