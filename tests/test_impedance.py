@@ -154,6 +154,13 @@ def test_drift_is_taken_out(drift: int) -> None:
         assert abs(loop.stiffness / K - 1.0) > 1e-3
 
 
+def test_steps_need_not_be_even() -> None:
+    t = np.sort(np.random.default_rng(3).uniform(0.0, 8.0, 1500))
+    x, v = 5e-3 * np.sin(np.pi * t), 5e-3 * np.pi * np.cos(np.pi * t)
+    loop = impedance.identify_loop({"time": t, "x": x, "f": K * x + C * v}, "x", "f", frequency=0.5)
+    assert (loop.stiffness, loop.damping) == pytest.approx((K, C), rel=1e-6)
+
+
 def test_a_force_that_answers_is_the_same_loop() -> None:
     record = ellipse()
     turned = {**record, "f": 700.0 - np.asarray(record["f"])}
@@ -262,6 +269,9 @@ def test_tests_that_cannot_tell_say_which_ones_are_missing() -> None:
     assert same_frequency.law == "undecided"
     assert set(same_frequency.possible) == {"viscous", "structural"}
     assert "add frequencies that differ" in str(same_frequency)
+    along = impedance.identify_loss_law([planted("viscous", f, 2e-3 * f, 1) for f in (0.5, 1.0, 2.0)])
+    assert np.isnan([along.amplitude_exponent, along.frequency_exponent]).all()
+    assert "nan" not in str(along)
     same = impedance.identify_loss_law([planted("viscous", 0.5, 5e-3, seed) for seed in range(3)])
     assert "add amplitudes and frequencies" in str(same)
 
@@ -454,6 +464,8 @@ TIME = np.asarray(ellipse()["time"])
         ({"x": TIME, "f": TIME}, {}, IdentificationError, 'no channel "time"'),
         (ellipse(cycles=0.01), {}, ExperimentError, "has 5 samples, and this needs at least 8"),
         (ellipse(), {"sense": "pull"}, IdentificationError, 'sense is "pull"'),
+        (ellipse(), {"drift": -1}, IdentificationError, "drift is -1; give a degree of 0 to 5"),
+        (ellipse(), {"delay": np.inf}, IdentificationError, "delay is inf s"),
         (ellipse(), {"frequency": -1.0}, IdentificationError, "frequency is -1.0 Hz"),
     ],
 )

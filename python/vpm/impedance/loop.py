@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from vpm.errors import IdentificationError
 from vpm.impedance.channels import RecordLike, Sense, check_moves, check_sense, columns
 from vpm.impedance.cycles import FEWEST_PER_CYCLE, Sums, parts, visible, whole_cycles
 from vpm.impedance.harmonics import Complex, evaluate, fourier
@@ -157,9 +158,9 @@ def identify_loop(
 ) -> Loop:
     """Stiffness, damping and lost energy of a periodic test.
 
-    Independent white noise on both channels biases neither energy nor slope. A force that is recorded late by d looks
-    like damping that is smaller by k d, which no loop at a low frequency can tell from damping: give `delay` and its
-    uncertainty.
+    Samples need no even steps, and a hundredth of the last cycle may be missing. Independent white noise on both
+    channels biases neither energy nor slope. A force that is recorded late by d looks like damping that is smaller by
+    k d, which no loop at a low frequency can tell from damping: give `delay` and its uncertainty.
 
     Parameters
     ----------
@@ -189,6 +190,10 @@ def identify_loop(
         A channel holds values that are no numbers, or time does not increase.
     """
     sign = check_sense(sense)
+    if not (np.isfinite(delay) and np.isfinite(delay_std) and delay_std >= 0.0):
+        raise IdentificationError(f"delay is {delay} s with a standard deviation of {delay_std} s; give finite numbers")
+    if not 0 <= drift <= 5:
+        raise IdentificationError(f"drift is {drift}; give a degree of 0 to 5, higher ones would take the loop away")
     found = columns(record, (displacement, force), FEWEST_PER_CYCLE)
     check_moves(found, displacement)
     rate, cycles, used = whole_cycles(found, frequency)

@@ -167,16 +167,18 @@ def _sentence(
     exponents: tuple[float, float],
 ) -> str:
     """The outcome in words."""
+    grown = [
+        f"{name}^{value + 0.0:.2f}"
+        for name, value in zip(("X", "omega"), np.round(exponents, 2), strict=True)
+        if np.isfinite(value)
+    ]
+    power = f" (E ~ {' '.join(grown)})" if grown else ""
     if law in LAWS:
-        grown = [
-            f"{name}^{value:.2f}" for name, value in zip(("X", "omega"), exponents, strict=True) if np.isfinite(value)
-        ]
-        power = " ".join(grown)
         name = {"viscous": "damping", "structural": "loss factor times stiffness", "Coulomb": "dry friction"}[law]
-        return f"the loss is {law} (E ~ {power}): {name} {coefficients[law]:.4g} {LAWS[law]}"
+        return f"the loss is {law}{power}: {name} {coefficients[law]:.4g} {LAWS[law]}"
     if law == "mixed":
         parts = ", ".join(f"{100.0 * share:.0f} % {name}" for name, share in shares.items() if share > 0.005)
-        return f"no single law fits the loss (E ~ X^{exponents[0]:.2f} omega^{exponents[1]:.2f}); side by side: {parts}"
+        return f"no single law fits the loss{power}; side by side: {parts}"
     missing = []
     if "Coulomb" in possible and len(possible) > 1:
         missing.append("amplitudes")

@@ -114,7 +114,7 @@ def repeat(values: ArrayLike, name: str = "value", unit: str = "1", *, confidenc
     if not 0.0 < confidence < 1.0:
         raise IdentificationError(f"confidence is {confidence}; give a share between 0 and 1, such as 0.95")
     mean, std = float(given.mean()), float(given.std(ddof=1))
-    half = float(stdtrit(given.size - 1, 0.5 + 0.5 * confidence)) * std / np.sqrt(given.size)
+    half = float(stdtrit(given.size - 1, 0.5 + 0.5 * confidence)) * std / given.size**0.5
     return Repeated(name, unit, given, mean, std, (mean - half, mean + half), confidence)
 
 
@@ -220,7 +220,7 @@ class ImpedanceTable(Result):
 
 def _cells(one: Repeated) -> str:
     """Mean, half of the interval and relative standard deviation."""
-    return f"{one.mean:12.4g}{f'+- {one.half_width:.2g}':>14s}{100.0 * one.relative_std:6.1f} %"
+    return f"{one.mean:12.4g}{f'+- {one.half_width:.2g}':>14s}{100.0 * one.relative_std:6.2g} %"
 
 
 def _line(row: RepeatedTests) -> str:
