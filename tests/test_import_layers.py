@@ -142,7 +142,7 @@ import importlib, vpm
 for part in {parts}:
     importlib.import_module("vpm." + part)
 for name in vpm.__all__:
-    if name.islower() and name not in {{"__version__", "linkages", "narx"}}:
+    if name.islower() and name not in {{"__version__", "impedance", "linkages", "narx"}}:
         assert callable(getattr(vpm, name)), name
 """
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)

@@ -9,7 +9,7 @@ Each arrow is a function of this module, each result one frozen object.
 
 from importlib.metadata import version
 
-from vpm import linkages, narx
+from vpm import impedance, linkages, narx
 from vpm.batch import Trial, simulate_batch
 from vpm.budget import BudgetReport, budget
 from vpm.catalogue import EFFECTS
@@ -59,6 +59,7 @@ __all__ = [
     "diagnose",
     "identify",
     "identify_inertial",
+    "impedance",
     "linkages",
     "narx",
     "report",

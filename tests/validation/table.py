@@ -7,7 +7,7 @@ import subprocess
 from collections.abc import Callable
 from pathlib import Path
 
-from validation import beams, hydraulics, hyl, inertial, linkages, motions, tudor
+from validation import beams, hydraulics, hyl, impedance, inertial, linkages, motions, tudor
 from validation.row import Row, row
 
 ROOT = Path(__file__).resolve().parent.parent.parent
@@ -21,6 +21,7 @@ PARTS: dict[str, Callable[[], list[Row]]] = {
     "A hydraulic servo-cylinder": hydraulics.rig,
     "The HyL leg stands and falls": hyl.reference,
     "The HyL leg beside a solution without vpm": hyl.witnessed,
+    "Stiffness and damping from loops and landings": impedance.rows,
     "Vibrations of beams": beams.frequencies,
     "Beams at rest": beams.statics,
     "A two-link arm about its rest": beams.two_links,

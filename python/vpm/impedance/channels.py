@@ -1,0 +1,135 @@
+"""Records as this package reads them: a clock and some channels, checked once."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from vpm.errors import ExperimentError, IdentificationError, near_match
+from vpm.experiment import Experiment
+
+Array = NDArray[np.float64]
+
+#: A log, or arrays by name with their clock under ``"time"``.
+RecordLike: TypeAlias = "Experiment | Mapping[str, ArrayLike]"
+
+#: ``"applied"``: the force that moves the part, ``F = k x + c dx/dt``. ``"reaction"``: what the part answers with, as a
+#: cylinder's force that pushes its ends apart, ``F = k (x0 - x) - c dx/dt``.
+Sense: TypeAlias = Literal["applied", "reaction"]
+
+
+@dataclass(frozen=True)
+class Columns:
+    """Clock and channels of one record.
+
+    Attributes
+    ----------
+    name : str
+    time : ndarray, shape (N,)
+        s, strictly increasing.
+    values : tuple of ndarray, shape (N,)
+        In the order of the names asked for, finite.
+    """
+
+    name: str
+    time: Array
+    values: tuple[Array, ...]
+
+
+def columns(record: RecordLike, names: tuple[str, ...], fewest: int) -> Columns:
+    """Clock and channels of a record by name.
+
+    Parameters
+    ----------
+    record : Experiment or mapping of str to array-like, shape (N,)
+        A mapping has its clock under ``"time"``, s.
+    names : tuple of str
+    fewest : int
+        Samples that the question needs at least.
+
+    Returns
+    -------
+    Columns
+
+    Raises
+    ------
+    IdentificationError
+        A channel is missing.
+    ExperimentError
+        A channel has another length, holds a value that is no finite number, or the clock does not increase.
+    """
+    is_log = isinstance(record, Experiment)
+    title = record.name if isinstance(record, Experiment) else "record"
+    known = record.channels if isinstance(record, Experiment) else tuple(record)
+    for name in names if is_log else ("time", *names):
+        if name not in known:
+            raise IdentificationError(f'{title} has no channel "{name}"; {near_match(name, known, what="it has")}')
+    clock = record.time if isinstance(record, Experiment) else _numbers(title, "time", record["time"])
+    values = tuple(_numbers(title, name, record[name]) for name in names)
+    for name, column in zip(names, values, strict=True):
+        if column.shape != clock.shape:
+            raise ExperimentError(
+                f'{title}: "{name}" has {column.size} samples and its clock {clock.size}; give one for each time',
+                channel=name,
+            )
+    if clock.size < fewest:
+        raise ExperimentError(f"{title} has {clock.size} samples, and this needs at least {fewest}; record longer")
+    backward = np.flatnonzero(np.diff(clock) <= 0.0)
+    if backward.size:
+        at = int(backward[0]) + 1
+        raise ExperimentError(
+            f"{title}: time does not increase at sample {at} ({clock[at - 1]:g} s, then {clock[at]:g} s); sort the "
+            "samples and drop those that are there twice",
+            time=float(clock[at]),
+        )
+    return Columns(title, clock, values)
+
+
+def _numbers(title: str, name: str, given: ArrayLike) -> Array:
+    """One channel as a flat array of finite numbers."""
+    try:
+        column = np.asarray(given, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise ExperimentError(f'{title}: "{name}" holds something else than numbers: {error}', channel=name) from error
+    if column.ndim != 1:
+        raise ExperimentError(f'{title}: "{name}" has shape {column.shape}; give one number per sample', channel=name)
+    bad = np.flatnonzero(~np.isfinite(column))
+    if bad.size:
+        raise ExperimentError(
+            f'{title}: "{name}" is {column[bad[0]]} at sample {bad[0]}, one of {bad.size} that are no finite numbers; '
+            "cut them out or repair them before",
+            channel=name,
+        )
+    return column
+
+
+def check_sense(sense: str) -> float:
+    """Factor that makes a force an applied one.
+
+    Raises
+    ------
+    IdentificationError
+        The word is unknown.
+    """
+    if sense not in {"applied", "reaction"}:
+        raise IdentificationError(f'sense is "{sense}"; give "applied" for F = k x + c dx/dt, or "reaction" for -F')
+    return 1.0 if sense == "applied" else -1.0
+
+
+def check_moves(columns: Columns, displacement: str) -> None:
+    """Refuse a displacement that stands still.
+
+    Raises
+    ------
+    IdentificationError
+    """
+    x = columns.values[0]
+    if np.ptp(x) <= 16.0 * np.finfo(np.float64).eps * float(np.abs(x).max()):
+        raise IdentificationError(
+            f'{columns.name}: "{displacement}" is constant at {x[0]:g} m, and a part that does not move shows neither '
+            "stiffness nor damping; give the channel that moves"
+        )
