@@ -17,7 +17,7 @@ from vpm.compare import Comparison, compare
 from vpm.discrepancy import Diagnosis, diagnose
 from vpm.errors import VpmError
 from vpm.experiment import Campaign, Experiment
-from vpm.identify import Fit, Fitting, identify
+from vpm.identify import CylinderGeometry, Fit, Fitting, OilFit, identify, identify_oil
 from vpm.linear import LinearModel
 from vpm.model import Dynamics, Model
 from vpm.planar import PlanarArm
@@ -34,6 +34,7 @@ __all__ = [
     "BudgetReport",
     "Campaign",
     "Comparison",
+    "CylinderGeometry",
     "Diagnosis",
     "Dynamics",
     "Experiment",
@@ -42,6 +43,7 @@ __all__ = [
     "Ladder",
     "LinearModel",
     "Model",
+    "OilFit",
     "PlanarArm",
     "Report",
     "Run",
@@ -56,6 +58,7 @@ __all__ = [
     "compare",
     "diagnose",
     "identify",
+    "identify_oil",
     "linkages",
     "narx",
     "report",

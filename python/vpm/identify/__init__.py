@@ -4,6 +4,9 @@ from vpm.identify.estimation import Estimate, estimate
 from vpm.identify.fit import Fit, identify
 from vpm.identify.identifiability import Combination, unseen_combinations
 from vpm.identify.intervals import Bootstrap, Profile, bootstrap, profile_intervals
+from vpm.identify.oil import identify_oil
+from vpm.identify.oil_equations import CylinderGeometry, pressures_from_force
+from vpm.identify.oil_fit import OilFit
 from vpm.identify.problem import Block, InverseDynamicsProblem, OutputErrorProblem, Problem, gaps, problem, segments
 from vpm.identify.settings import Fitting
 from vpm.identify.shooting import ShootingProblem
@@ -13,11 +16,13 @@ __all__ = [
     "Block",
     "Bootstrap",
     "Combination",
+    "CylinderGeometry",
     "Estimate",
     "Fit",
     "Fitting",
     "Gain",
     "InverseDynamicsProblem",
+    "OilFit",
     "OutputErrorProblem",
     "Problem",
     "Profile",
@@ -27,6 +32,8 @@ __all__ = [
     "gain",
     "gaps",
     "identify",
+    "identify_oil",
+    "pressures_from_force",
     "problem",
     "profile_intervals",
     "robust_covariance",
