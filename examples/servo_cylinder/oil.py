@@ -13,9 +13,9 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,8 +60,7 @@ ESTIMATORS: dict[str, tuple[tuple[str, ...], Choice]] = {
 PRINTED, BEST = next(iter(ESTIMATORS)), list(ESTIMATORS)[-1]
 
 
-@dataclass(frozen=True)
-class Bench:
+class Bench(NamedTuple):
     """What the bench has that a clean one has not."""
 
     frequency: float = 1.2  # Hz, of the motion
@@ -129,8 +128,7 @@ def estimate(record: Mapping[str, Array], which: str = BEST, *, supply: bool = F
 BARE = "pressures, balance of the force, differences"
 
 
-@dataclass(frozen=True)
-class Suspect:
+class Suspect(NamedTuple):
     """One thing that may be wrong, all others being right."""
 
     bench: Bench = Bench()
@@ -204,11 +202,11 @@ def _mean(fits: list[vpm.OilFit], name: str) -> float:
     return float(np.mean([fit[name] for fit in fits]))
 
 
-def coverage(which: str, seeds: int, bench: Bench = Bench(), rate: float = 1000.0) -> tuple[float, float]:
+def coverage(which: str, seeds: int, rate: float = 1000.0) -> tuple[float, float]:
     """Share of seeds in which the truth lies inside the 95 % interval: of beta, and of K_v."""
     hits = np.zeros(2)
     for seed in range(seeds):
-        fit = estimate(measured(bench, rate, seed), which)
+        fit = estimate(measured(Bench(), rate, seed), which)
         for k, truth in enumerate((1.0 / BETA, GAIN)):
             hits[k] += fit.intervals[k, 0] <= truth <= fit.intervals[k, 1]
     return float(hits[0] / seeds), float(hits[1] / seeds)

@@ -190,14 +190,22 @@ def _once(rows: Rows, factor: Array, mixing: Array) -> tuple[Array, Array, Array
 
 def _walk(steps: Array, Z: Array, mixing: Array, factor: Array) -> Array:
     """Covariance of the normal equations by a random walk whose steps have the noise of `steps`, shape (e, n)."""
-    third = np.diff(steps, 3, axis=1)
-    # Where a valve reverses the flow itself has a corner; those differences are no noise.
-    size = np.abs(third) / np.maximum(np.median(np.abs(third), axis=1, keepdims=True), np.finfo(float).tiny)
-    quiet = third[:, size.max(axis=0) < OUTLYING]
-    noise = quiet @ quiet.T / (20.0 * max(1, quiet.shape[1]))
+    noise = _white_noise(steps)
     reach = np.einsum("fnp,fe,en->npe", Z, mixing, factor)
     ahead = np.cumsum(reach[::-1], axis=0)
     return np.asarray(np.einsum("npe,eg,nqg->pq", ahead, noise, ahead), dtype=np.float64)
+
+
+def _white_noise(signals: Array) -> Array:
+    """Covariance of the white noise on signals of shape (e, n).
+
+    A third difference leaves nothing of a parabola, and of white noise twenty times its variance. Where a valve
+    reverses, flow and pressure have corners; those differences are no noise.
+    """
+    third = np.diff(signals, 3, axis=1)
+    size = np.abs(third) / np.maximum(np.median(np.abs(third), axis=1, keepdims=True), np.finfo(float).tiny)
+    quiet = third[:, size.max(axis=0) < OUTLYING]
+    return np.asarray(quiet @ quiet.T / (20.0 * max(1, quiet.shape[1])), dtype=np.float64)
 
 
 def noise_share(rows: Rows, equations: Sequence[Equation], dt: float) -> float:
@@ -205,8 +213,7 @@ def noise_share(rows: Rows, equations: Sequence[Equation], dt: float) -> float:
     from_noise = power = 0.0
     integral = rows.constants.shape[1] > 0
     for k, equation in enumerate(equations):
-        # A third difference leaves nothing of a parabola, and of white noise twenty times its variance.
-        variance = float(np.median(np.diff(equation.stored, 3) ** 2)) / (20.0 * 0.4549)
+        variance = float(_white_noise(equation.stored[None])[0, 0])
         scale = rows.scale[k]
         column = rows.regressors[k, :, 0] / scale
         others = np.column_stack([rows.regressors[k, :, 1:], rows.constants]) / scale[:, None]
