@@ -174,6 +174,17 @@ def test_a_late_clock_looks_like_soft_oil() -> None:
     assert change == pytest.approx(25e-6 * 6742506.861 / 700.0, rel=0.1)
 
 
+def test_only_a_delay_makes_beta_fall_as_the_motion_gets_faster() -> None:
+    """The likeness to table 5.3, true by found beta of 1.05, 13 and 36: what docs/oil_and_valve.md says of 2 and "
+    "5 ms."""
+    for delay, said in ((2e-3, (3, 10, 15)), (5e-3, (6, 23, 35))):
+        fits = [
+            bench.tried(bench.Suspect(bench.Bench(frequency), 1000.0, late=-delay), bench.BARE)
+            for frequency in FREQUENCIES
+        ]
+        np.testing.assert_allclose([fit["compliance"] * BETA for fit in fits], said, atol=0.5)
+
+
 def test_the_spool_is_followed() -> None:
     model = bench.RIG
     current = 0.8e-3 * np.sin(2.0 * np.pi * 20.0 * (5e-5 * np.arange(4001) + 2.5e-5))

@@ -75,7 +75,7 @@ def draw() -> Figure:
     for which, name in ((BENCH.BARE, "balance of the force, differences"), (BENCH.BEST, "both chambers, integral")):
         axes[1][0].plot(1e3 * LATE, of_clock(which), marker="o", markersize=3, label=name)
         axes[1][2].plot(100.0 * RIPPLE, of_ripple(which, known=False), marker="o", markersize=3, label=name)
-    axes[1][2].plot(100.0 * RIPPLE, of_ripple(BENCH.BARE, known=True), "--", label="either, supply measured")
+    axes[1][2].plot(100.0 * RIPPLE, of_ripple(BENCH.BARE, known=True), "--", label="supply measured")
     for extra, name in ((("leakage",), "both chambers, integral"), (("leakage", "air"), "with the column of air")):
         axes[1][1].plot(100.0 * AIR, of_air(extra), marker="o", markersize=3, label=name)
     _titled(axes[1][0], "command logged late", label("late", "ms"))
