@@ -193,6 +193,15 @@ def test_the_spool_is_followed() -> None:
     np.testing.assert_allclose(through_spool(at_samples, 5e-5, SPOOL), run["servo.spool"], atol=2e-7)
 
 
+@pytest.mark.parametrize("missing", [{"extra": ()}, {"spool": None}])
+def test_what_the_balance_misses_is_said(missing: dict[str, object]) -> None:
+    log = bench.measured(bench.Bench(), 1000.0, 0)
+    assert bench.estimate(log).warnings == ()
+    fit = bench.estimate(log, **missing)
+    assert not inside(fit)
+    assert any("neither values nor intervals can be trusted" in sentence for sentence in fit.warnings)
+
+
 def test_air_has_a_column_of_its_own() -> None:
     log = bench.measured(bench.Bench(air=0.02), 1000.0, 0)
     without = bench.estimate(log)

@@ -118,7 +118,9 @@ def identify_oil(
         rows = rate_rows(equations, opening, columns, record.dt, None if estimator == "differences" else kept)
     values, covariance, residual = solve(rows, record.get("weights"), weighted=weighted)
     share = noise_share(rows, equations, record.dt)
-    warnings = check_answer(columns, values, covariance, share, rows, 1.0 / record.dt, ruled=not both, strict=strict)
+    warnings = check_answer(
+        columns, values, covariance, residual, share, rows, 1.0 / record.dt, ruled=not both, strict=strict
+    )
     return OilFit(
         columns,
         values,

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from vpm.errors import IdentificationError, near_match
 from vpm.identify.oil_equations import CylinderGeometry
-from vpm.identify.oil_solve import Rows
+from vpm.identify.oil_solve import Rows, unexplained
 from vpm.identify.statistics import NORMAL_95
 
 Array = NDArray[np.float64]
@@ -24,6 +24,8 @@ FEWEST = 60
 SUPPLIES = (5e4, 5e8)
 #: From this share of noise in the column of 1/beta on, plain least squares deserves a warning.
 NOISY = 0.05
+#: A residual this many times its white noise, and this share of the oil's compression, has a cause of its own.
+LEFT_OVER = (2.0, 0.2)
 
 
 class Channels(dict[str, Array]):
@@ -168,6 +170,7 @@ def check_answer(
     names: Sequence[str],
     values: Array,
     covariance: Array,
+    residual: Array,
     share: float,
     rows: Rows,
     rate: float,
@@ -201,7 +204,22 @@ def check_answer(
         raise IdentificationError(found[0], parameters=("bulk_modulus", "flow_gain"))
     if share > NOISY and rows.instruments is rows.regressors:
         found.append(f"plain least squares loses about {100.0 * share:.0f} % of 1/beta: {why}")
-    return tuple(found)
+    return (*found, *_left_over(rows, values, residual))
+
+
+def _left_over(rows: Rows, values: Array, residual: Array) -> tuple[str, ...]:
+    """A sentence about a residual of integrals that noise does not explain."""
+    if not rows.constants.shape[1]:
+        return ()
+    left, noise, compressed = unexplained(rows, values, residual)
+    if left < LEFT_OVER[0] * noise or left < LEFT_OVER[1] * compressed:
+        return ()
+    return (
+        f"the balance misses {left:.2g} m of the piston's place, where noise explains {noise:.2g} m and all "
+        "compression "
+        f"of the oil is {compressed:.2g} m: neither values nor intervals can be trusted; give the spool, take "
+        'extra=("leakage",), check the supply, and that command and sensors share one clock',
+    )
 
 
 def _reason(share: float, rate: float, *, ruled: bool, integral: bool) -> str:

@@ -224,6 +224,17 @@ def noise_share(rows: Rows, equations: Sequence[Equation], dt: float) -> float:
     return min(1.0, from_noise / power) if power > 0.0 else 1.0
 
 
+def unexplained(rows: Rows, values: Array, residual: Array) -> tuple[float, float, float]:
+    """Root mean squares of the residual, of its white noise, and of what 1/beta explains, in units of the place.
+
+    A residual that is neither white noise nor small beside the compression of the oil has a cause of its own.
+    """
+    noise = np.sqrt(np.trace(_white_noise(residual.T)))
+    column = rows.regressors[:, :, 0] / rows.scale * values[0]
+    compressed = np.sqrt(np.sum(np.var(column, axis=1)))
+    return float(np.sqrt(np.sum(np.mean(residual**2, axis=0)))), float(noise), float(compressed)
+
+
 def _integral(values: Array, dt: float) -> Array:
     """Of a sampled function from the first sample on, by the trapezoidal rule."""
     total = np.zeros_like(values)
