@@ -22,6 +22,9 @@ from vpm.identify.oil_solve import integral_rows, noise_share, rate_rows, solve
 
 Array = NDArray[np.float64]
 
+#: Absolute pressure (Pa) below which dissolved air comes out of oil or the oil boils.
+BOILING = 5e4
+
 
 def identify_oil(
     time: ArrayLike,
@@ -39,6 +42,7 @@ def identify_oil(
     estimator: str = "instrument",
     extra: Sequence[str] = (),
     spool: tuple[float, float] | None = None,
+    held: bool = False,
     cutoff: float | None = None,
     window: float | None = None,
     weights: ArrayLike | None = None,
@@ -78,6 +82,8 @@ def identify_oil(
         chambers alone); an offset of the valve, times K_v.
     spool : tuple of float, optional
         Natural frequency (rad/s) and damping ratio of the spool, through which a command passes first.
+    held : bool
+        With `spool`: each command is held until the next sample, as by a digital controller that logs at its own rate.
     cutoff : float, optional
         Of the filter of ``"filtered"``, Hz; without it a tenth of the rate.
     window : float, optional
@@ -107,7 +113,7 @@ def identify_oil(
     given = {"position": position, "command": command, "supply": supply, "tank": tank}
     optional = {"force": force, "pressure_a": pressure_a, "pressure_b": pressure_b, "weights": weights}
     record = check_record(time, geometry, {**given, **{k: v for k, v in optional.items() if v is not None}})
-    opening = record["command"] if spool is None else through_spool(record["command"], record.dt, spool)
+    opening = record["command"] if spool is None else through_spool(record["command"], record.dt, spool, held=held)
     equations, origin = _equations(record, geometry, opening, rule if not both else None, balance)
     columns = ("compliance", "flow_gain", *extra)
     if estimator in {"integral", "instrument"}:
@@ -130,7 +136,7 @@ def identify_oil(
         share,
         residual,
         len(opening),
-        _notes(opening, rule, both),
+        _notes(opening, rule, record),
         warnings,
     )
 
@@ -177,7 +183,7 @@ def _pieces(count: int, dt: float, window: float | None) -> tuple[slice, ...]:
     return tuple(slice(int(a), int(b)) for a, b in pairwise(edges))
 
 
-def _notes(opening: Array, rule: str, both: bool) -> tuple[str, ...]:
+def _notes(opening: Array, rule: str, record: Channels) -> tuple[str, ...]:
     notes = []
     outward = float(np.mean(opening > 0.0))
     if not 0.05 < outward < 0.95:
@@ -186,6 +192,14 @@ def _notes(opening: Array, rule: str, both: bool) -> tuple[str, ...]:
             f"The valve is open {side} in {100.0 * max(outward, 1.0 - outward):.0f} % of the samples: one edge of "
             "each side is seen."
         )
-    if not both and rule == "symmetric":
+    for name in ("pressure_a", "pressure_b"):
+        low = record.get(name, np.ones(1) * np.inf).min()
+        if low < BOILING:
+            notes.append(
+                f"{name} falls to {low:.3g} Pa: where oil boils or air comes out, no balance holds; leave those "
+                "pieces out."
+            )
+    ruled = sum(name in record for name in ("force", "pressure_a", "pressure_b")) < 2
+    if ruled and rule == "symmetric":
         notes.append("The pressures are those of pa + pb = ps + pt, which an unequal cylinder does not keep.")
     return tuple(notes)

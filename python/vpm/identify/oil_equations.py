@@ -1,4 +1,4 @@
-"""What the oil of a cylinder obeys, integrated once: no derivative of a measured signal is in it.
+"""What the oil of a cylinder obeys, integrated once.
 
 The pressure equations 4.11 and 4.12 of D'Imperio (2016), each divided by its volume and integrated over time::
 
@@ -234,8 +234,8 @@ def _air(pressure: Array) -> Array:
     return np.asarray(-((AIR_PRESSURE / np.maximum(pressure, 1.0)) ** (1.0 / AIR_EXPONENT)), dtype=np.float64)
 
 
-def through_spool(command: Array, dt: float, spool: tuple[float, float]) -> Array:
-    """Place of a spool of second order behind its command, which runs straight between samples.
+def through_spool(command: Array, dt: float, spool: tuple[float, float], *, held: bool = False) -> Array:
+    """Place of a spool of second order behind its command, exactly.
 
     Parameters
     ----------
@@ -244,6 +244,9 @@ def through_spool(command: Array, dt: float, spool: tuple[float, float]) -> Arra
         s.
     spool : tuple of float
         Natural frequency (rad/s) and damping ratio.
+    held : bool
+        Whether each sample is held until the next, as a digital controller does; else they are joined by straight
+        lines.
     """
     from scipy.signal import cont2discrete, lfilter, lfilter_zi
 
@@ -253,6 +256,6 @@ def through_spool(command: Array, dt: float, spool: tuple[float, float]) -> Arra
             f"a spool of {omega:g} rad/s and a damping ratio of {damping:g} does not follow; both have to be positive"
         )
     numerator, denominator = np.array([omega**2]), np.array([1.0, 2.0 * damping * omega, omega**2])
-    discrete = cont2discrete((numerator, denominator), dt, method="foh")
+    discrete = cont2discrete((numerator, denominator), dt, method="zoh" if held else "foh")
     b, a = np.ravel(discrete[0]), np.ravel(discrete[1])
     return np.asarray(lfilter(b, a, command, zi=lfilter_zi(b, a) * command[0])[0], dtype=np.float64)

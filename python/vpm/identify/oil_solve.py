@@ -132,13 +132,7 @@ def solve(rows: Rows, weights: Array | None, *, weighted: bool) -> tuple[Array, 
 
     The covariance counts the correlation of residuals in time (W. Newey and K. West, *Econometrica* 55, 1987) and of
     the balances at one instant. Integrals gather the noise of the pressures under their roots as a random walk, too
-    slow for that sum over lags; its share is computed from the noise of one step.
-
-    Returns
-    -------
-    values : ndarray, shape (p,)
-    covariance : ndarray, shape (p, p)
-    residual : ndarray, shape (n, e)
+    slow for that sum over lags; its share is computed from the noise of one step.    Shapes (p,), (p, p) and (n, e).
     """
     mixing = np.eye(len(rows.target))
     factor = (
