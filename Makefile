@@ -77,6 +77,7 @@ narx-peers: $(VENV)/.installed ## time a NARX model beside what is installed (C,
 figures: $(VENV)/.installed ## draw the pictures of docs/ anew, from the package
 	$(BIN)/python docs/figures/validity.py
 	$(BIN)/python docs/figures/hyl.py
+	$(BIN)/python docs/figures/oil.py
 
 docs: $(VENV)/.installed ## run every snippet of the documents; build the Rust documentation
 	$(BIN)/python -m pytest tests/test_docs.py $(PYTEST_ARGS)

@@ -60,3 +60,19 @@ def test_a_coordinate_buys_what_the_picture_shows(drawn: SimpleNamespace) -> Non
 def test_the_pictures_are_there(name: str) -> None:
     assert "<svg" in (FIGURES / name).read_text(encoding="utf-8")
     assert f"figures/{name}" in (ROOT / "docs" / "beams.md").read_text(encoding="utf-8")
+
+
+def test_the_picture_of_oil_and_valve_is_there() -> None:
+    assert "<svg" in (FIGURES / "oil.svg").read_text(encoding="utf-8")
+    assert "figures/oil.svg" in (ROOT / "docs" / "oil_and_valve.md").read_text(encoding="utf-8")
+
+
+def test_lines_of_oil_and_valve_are_what_the_page_says() -> None:
+    oil = SimpleNamespace(**runpy.run_path(str(FIGURES / "oil.py"), run_name="figure"))
+    # Straight in the lateness, through one where the clocks agree.
+    late = oil.of_clock(oil.BENCH.BARE)
+    assert late[3] == pytest.approx(1.0, abs=0.01)
+    np.testing.assert_allclose(late, np.polyval(np.polyfit(oil.LATE, late, 1), oil.LATE), atol=0.1)
+    assert np.all(np.diff(oil.of_air(("leakage",))) > 0.0)
+    np.testing.assert_allclose(oil.of_air(("leakage", "air")), 1.0, atol=0.01)
+    np.testing.assert_allclose(oil.of_ripple(oil.BENCH.BARE, known=True), 1.0, atol=0.01)

@@ -17,7 +17,17 @@ from vpm.compare import Comparison, compare
 from vpm.discrepancy import Diagnosis, diagnose
 from vpm.errors import VpmError
 from vpm.experiment import Campaign, Experiment
-from vpm.identify import Fit, Fitting, InertialFit, InertialRegression, identify, identify_inertial
+from vpm.identify import (
+    CylinderGeometry,
+    Fit,
+    Fitting,
+    InertialFit,
+    InertialRegression,
+    OilFit,
+    identify,
+    identify_inertial,
+    identify_oil,
+)
 from vpm.linear import LinearModel
 from vpm.model import Dynamics, Model
 from vpm.planar import PlanarArm
@@ -34,6 +44,7 @@ __all__ = [
     "BudgetReport",
     "Campaign",
     "Comparison",
+    "CylinderGeometry",
     "Diagnosis",
     "Dynamics",
     "Experiment",
@@ -44,6 +55,7 @@ __all__ = [
     "Ladder",
     "LinearModel",
     "Model",
+    "OilFit",
     "PlanarArm",
     "Report",
     "Run",
@@ -59,6 +71,7 @@ __all__ = [
     "diagnose",
     "identify",
     "identify_inertial",
+    "identify_oil",
     "impedance",
     "linkages",
     "narx",

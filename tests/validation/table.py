@@ -7,7 +7,7 @@ import subprocess
 from collections.abc import Callable
 from pathlib import Path
 
-from validation import beams, hydraulics, hyl, impedance, inertial, linkages, motions, tudor
+from validation import beams, hydraulics, hyl, impedance, inertial, linkages, motions, oil, tudor
 from validation.row import Row, row
 
 ROOT = Path(__file__).resolve().parent.parent.parent
@@ -19,6 +19,7 @@ PARTS: dict[str, Callable[[], list[Row]]] = {
     "The leg of HyQ": linkages.leg,
     "Masses and inertias by least squares": inertial.reference,
     "A hydraulic servo-cylinder": hydraulics.rig,
+    "Oil and valve of a cylinder by least squares": oil.least_squares,
     "The HyL leg stands and falls": hyl.reference,
     "The HyL leg beside a solution without vpm": hyl.witnessed,
     "Stiffness and damping from loops and landings": impedance.rows,

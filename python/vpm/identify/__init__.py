@@ -8,6 +8,9 @@ from vpm.identify.inertial_fit import InertialFit
 from vpm.identify.inertial_model import inertial_regression
 from vpm.identify.inertial_regression import InertialRegression
 from vpm.identify.intervals import Bootstrap, Profile, bootstrap, profile_intervals
+from vpm.identify.oil import identify_oil
+from vpm.identify.oil_equations import CylinderGeometry, pressures_from_force
+from vpm.identify.oil_fit import OilFit
 from vpm.identify.problem import Block, InverseDynamicsProblem, OutputErrorProblem, Problem, gaps, problem, segments
 from vpm.identify.settings import Fitting
 from vpm.identify.shooting import ShootingProblem
@@ -17,6 +20,7 @@ __all__ = [
     "Block",
     "Bootstrap",
     "Combination",
+    "CylinderGeometry",
     "Estimate",
     "Fit",
     "Fitting",
@@ -24,6 +28,7 @@ __all__ = [
     "InertialFit",
     "InertialRegression",
     "InverseDynamicsProblem",
+    "OilFit",
     "OutputErrorProblem",
     "Problem",
     "Profile",
@@ -34,7 +39,9 @@ __all__ = [
     "gaps",
     "identify",
     "identify_inertial",
+    "identify_oil",
     "inertial_regression",
+    "pressures_from_force",
     "problem",
     "profile_intervals",
     "robust_covariance",

@@ -69,13 +69,13 @@ def robust_covariance(jacobian: Array, residual: Array, segments: Iterable[slice
     bread = np.linalg.pinv(jacobian.T @ jacobian, hermitian=True)
     meat = np.zeros_like(bread)
     for segment in segments:
-        sums = _window_sums(jacobian[segment] * residual[segment, None], correlation_length(residual[segment]) + 1)
+        sums = window_sums(jacobian[segment] * residual[segment, None], correlation_length(residual[segment]) + 1)
         meat += sums.T @ sums
     covariance: Array = bread @ meat @ bread
     return 0.5 * (covariance + covariance.T)
 
 
-def _window_sums(score: Array, length: int) -> Array:
+def window_sums(score: Array, length: int) -> Array:
     """Sums over all windows of ``length`` rows, those that hang over the ends too, divided by ``sqrt(length)``.
 
     Two rows ``l`` apart share ``length - l`` windows, so the products of these sums carry the Bartlett weights

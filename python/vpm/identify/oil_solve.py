@@ -1,0 +1,259 @@
+"""Least squares over the balances of oil: rows as rates or as integrals, instruments, weights, covariance."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vpm.experiment.signal import differentiate, lowpass, settling_samples
+from vpm.identify.oil_equations import Equation
+from vpm.identify.statistics import correlation_length, window_sums
+
+Array = NDArray[np.float64]
+
+#: Lags (s) of the command that serve as instruments: a chamber fills within some milliseconds after the valve reverses.
+LAGS = (0.0, 1e-3, 2e-3, 4e-3, 8e-3, 16e-3, 32e-3)
+
+#: Least share of the residuals' variance that a combination of balances is given: more would trust rounding and
+#: quadrature.
+FLOOR = 1e-4
+
+#: Third differences this many times their median are no noise.
+OUTLYING = 6.0
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Regression of one or several balances on the same instants.
+
+    Attributes
+    ----------
+    regressors, instruments : ndarray, shape (e, n, p)
+        Columns of the unknowns; and what stands in for them in the normal equations.
+    target : ndarray, shape (e, n)
+    constants : ndarray, shape (n, c)
+        Columns that each balance has for itself.
+    scale : ndarray, shape (e, n)
+        Unit of the residual by that of the piston's place or speed.
+    kept : slice
+        Which samples of the record the rows stand for.
+    steps : ndarray, shape (e, n, p) or (0, 0, 0)
+        Of integrals: what each sample adds to them, whose noise they gather.
+    """
+
+    regressors: Array
+    instruments: Array
+    target: Array
+    constants: Array
+    scale: Array
+    kept: slice
+    steps: Array
+
+
+def _columns(equation: Equation, opening: Array, columns: Sequence[str]) -> tuple[list[Array], list[Array]]:
+    """What each unknown stores and what it lets flow, with its sign; zeros where it does not."""
+    zero = np.zeros_like(opening)
+    stored = {"compliance": equation.stored, "air": equation.air}
+    flows = {"flow_gain": -equation.flow * opening, "leakage": equation.leakage, "offset": -equation.flow}
+    return [stored.get(name, zero) for name in columns], [flows.get(name, zero) for name in columns]
+
+
+def integral_rows(
+    equations: Sequence[Equation],
+    opening: Array,
+    columns: Sequence[str],
+    dt: float,
+    pieces: Sequence[slice],
+    *,
+    instrument: bool,
+) -> Rows:
+    """Rows ``stored X + int(flow) X + c = -place``, each piece with a constant of its own."""
+    count = len(opening)
+    constants = np.zeros((count, len(pieces)))
+    for k, piece in enumerate(pieces):
+        constants[piece, k] = 1.0
+    regressors, instruments, steps = [], [], []
+    for equation in equations:
+        stored, flows = _columns(equation, opening, columns)
+        flowed = [_integral(flow, dt) for flow in flows]
+        steps.append(dt * np.column_stack(flows))
+        regressors.append(np.column_stack([s + f for s, f in zip(stored, flowed, strict=True)]))
+        if instrument:
+            replaced = regressors[-1].copy()
+            basis = np.column_stack([constants, *flowed, *_from_command(opening, dt)])
+            for k, name in enumerate(columns):
+                if name in {"compliance", "air"}:
+                    replaced[:, k] = _projected(stored[k], basis)
+            instruments.append(replaced)
+    target = np.stack([-equation.place for equation in equations])
+    scale = np.stack([equation.scale for equation in equations])
+    matrix = np.stack(regressors)
+    return Rows(
+        matrix,
+        np.stack(instruments) if instrument else matrix,
+        target,
+        constants,
+        scale,
+        slice(0, count),
+        np.stack(steps),
+    )
+
+
+def rate_rows(
+    equations: Sequence[Equation], opening: Array, columns: Sequence[str], dt: float, cutoff: float | None
+) -> Rows:
+    """Rows of rates: by central differences, or, with a cut-off frequency, all columns through the same filter."""
+    count = len(opening)
+    edge = 1 if cutoff is None else min(settling_samples(1.0 / dt, cutoff) + 2, count // 4)
+    kept = slice(edge, count - edge)
+
+    def smooth(values: Array) -> Array:
+        return values if cutoff is None else lowpass(values, 1.0 / dt, cutoff)
+
+    def rate(values: Array) -> Array:
+        return np.gradient(values, dt) if cutoff is None else differentiate(smooth(values), dt)
+
+    regressors, target = [], []
+    for equation in equations:
+        stored, flows = _columns(equation, opening, columns)
+        rows = [rate(s) + smooth(f) for s, f in zip(stored, flows, strict=True)]
+        regressors.append(np.column_stack(rows)[kept])
+        target.append(-rate(equation.place)[kept])
+    matrix = np.stack(regressors)
+    scale = np.stack([equation.scale[kept] for equation in equations])
+    return Rows(matrix, matrix, np.stack(target), np.zeros((count - 2 * edge, 0)), scale, kept, np.zeros((0, 0, 0)))
+
+
+def solve(rows: Rows, weights: Array | None, *, weighted: bool) -> tuple[Array, Array, Array]:
+    """Estimate, covariance, and residual in units of the place (or speed) of the piston.
+
+    The covariance counts the correlation of residuals in time (W. Newey and K. West, *Econometrica* 55, 1987) and of
+    the balances at one instant. Integrals gather the noise of the pressures under their roots as a random walk, too
+    slow for that sum over lags; its share is computed from the noise of one step.    Shapes (p,), (p, p) and (n, e).
+    """
+    mixing = np.eye(len(rows.target))
+    factor = (
+        1.0 / rows.scale
+        if weighted
+        else np.broadcast_to(1.0 / rows.scale.mean(axis=1, keepdims=True), rows.scale.shape)
+    )
+    if weights is not None:
+        factor = factor * np.sqrt(weights[rows.kept])
+    values, covariance, residual = _once(rows, factor, mixing)
+    if weighted and len(mixing) > 1:
+        # Noise of the place stands in both balances: their common part weighs less, what it does not touch weighs more.
+        common = np.cov(residual.T)
+        mixing = np.linalg.inv(np.linalg.cholesky(common / np.trace(common) + FLOOR * np.eye(len(mixing))))
+        values, covariance, residual = _once(rows, factor, mixing)
+    return values, covariance, residual
+
+
+def _once(rows: Rows, factor: Array, mixing: Array) -> tuple[Array, Array, Array]:
+    """Least squares for one weighting; columns are brought to one size first, for they differ by ten orders."""
+    constants = rows.constants[None] * factor[:, :, None]
+    spread = np.einsum("fe,enc->fnec", mixing, constants).reshape(len(mixing), factor.shape[1], -1)
+    size = np.sqrt(np.mean((rows.regressors * factor[:, :, None]) ** 2, axis=(0, 1)))
+    size = np.where(size > 0.0, size, 1.0)
+
+    def mixed(matrix: Array) -> Array:
+        columns = np.einsum("fe,enp->fnp", mixing, matrix * factor[:, :, None]) / size
+        return np.concatenate([columns, spread * np.max(np.abs(columns))], axis=2)
+
+    A, Z = mixed(rows.regressors), mixed(rows.instruments)
+    B = np.einsum("fe,en->fn", mixing, rows.target * factor)
+    q = A.shape[2]
+    normal = np.einsum("enp,enq->pq", Z, A)
+    inverse = np.linalg.pinv(normal, rcond=1e-14)
+    X = inverse @ np.einsum("enp,en->p", Z, B)
+    left = B - A @ X
+    score = np.einsum("enp,en->np", Z, left)
+    length = max(correlation_length(each) for each in left) + 1
+    sums = window_sums(score, length)
+    meat = sums.T @ sums
+    if rows.steps.size:
+        meat += _walk(rows.steps @ (X[: len(size)] / size), Z, mixing, factor)
+    covariance = inverse @ meat @ inverse.T
+    p = len(size)
+    # A fit of q numbers takes some of the residual with it.
+    covariance = covariance[:p, :p] / np.outer(size, size) * (left.size / max(1, left.size - q))
+    return X[:p] / size, 0.5 * (covariance + covariance.T), np.linalg.solve(mixing, left).T
+
+
+def _walk(steps: Array, Z: Array, mixing: Array, factor: Array) -> Array:
+    """Covariance of the normal equations by a random walk whose steps have the noise of `steps`, shape (e, n)."""
+    noise = _white_noise(steps)
+    reach = np.einsum("fnp,fe,en->npe", Z, mixing, factor)
+    ahead = np.cumsum(reach[::-1], axis=0)
+    return np.asarray(np.einsum("npe,eg,nqg->pq", ahead, noise, ahead), dtype=np.float64)
+
+
+def _white_noise(signals: Array) -> Array:
+    """Covariance of the white noise on signals of shape (e, n).
+
+    A third difference leaves nothing of a parabola, and of white noise twenty times its variance. Where a valve
+    reverses, flow and pressure have corners; those differences are no noise.
+    """
+    third = np.diff(signals, 3, axis=1)
+    size = np.abs(third) / np.maximum(np.median(np.abs(third), axis=1, keepdims=True), np.finfo(float).tiny)
+    quiet = third[:, size.max(axis=0) < OUTLYING]
+    return np.asarray(quiet @ quiet.T / (20.0 * max(1, quiet.shape[1])), dtype=np.float64)
+
+
+def noise_share(rows: Rows, equations: Sequence[Equation], dt: float) -> float:
+    """Share of the power of the first column, beside the other columns, that white noise of its sensor explains."""
+    from_noise = power = 0.0
+    integral = rows.constants.shape[1] > 0
+    for k, equation in enumerate(equations):
+        variance = float(_white_noise(equation.stored[None])[0, 0])
+        scale = rows.scale[k]
+        column = rows.regressors[k, :, 0] / scale
+        others = np.column_stack([rows.regressors[k, :, 1:], rows.constants]) / scale[:, None]
+        column = column - _projected(column, others)
+        weight = float(np.mean(1.0 / scale**2))
+        from_noise += weight * variance * (1.0 if integral else 0.5 / dt**2)
+        power += float(np.mean(column**2))
+    return min(1.0, from_noise / power) if power > 0.0 else 1.0
+
+
+def unexplained(rows: Rows, values: Array, residual: Array) -> tuple[float, float, float]:
+    """Root mean squares of the residual, of its white noise, and of what 1/beta explains, in units of the place.
+
+    A residual that is neither white noise nor small beside the compression of the oil has a cause of its own.
+    """
+    noise = np.sqrt(np.trace(_white_noise(residual.T)))
+    column = rows.regressors[:, :, 0] / rows.scale * values[0]
+    compressed = np.sqrt(np.sum(np.var(column, axis=1)))
+    return float(np.sqrt(np.sum(np.mean(residual**2, axis=0)))), float(noise), float(compressed)
+
+
+def _integral(values: Array, dt: float) -> Array:
+    """Of a sampled function from the first sample on, by the trapezoidal rule."""
+    total = np.zeros_like(values)
+    np.cumsum(0.5 * dt * (values[1:] + values[:-1]), out=total[1:])
+    return total
+
+
+def _from_command(opening: Array, dt: float) -> list[Array]:
+    """Functions of the command that move with the pressures, and of which none holds noise of a pressure sensor."""
+    size = float(np.abs(opening).max())
+    relative = opening / size
+    found = [_integral(relative, dt), _integral(np.abs(relative), dt)]
+    seen: set[int] = set()
+    for lag in LAGS:
+        shift = round(lag / dt)
+        if shift in seen:
+            continue
+        seen.add(shift)
+        past = np.concatenate([np.full(shift, relative[0]), relative[: len(relative) - shift]])
+        found += [past, np.abs(past), np.tanh(20.0 * past)]
+    return found
+
+
+def _projected(values: Array, basis: Array) -> Array:
+    """Part of a signal that a basis explains."""
+    size = np.sqrt(np.mean(basis**2, axis=0))
+    scaled = basis / np.where(size > 0.0, size, 1.0)
+    return np.asarray(scaled @ np.linalg.lstsq(scaled, values, rcond=1e-10)[0], dtype=np.float64)
