@@ -16,7 +16,7 @@ from vpm.narx.maxwell import MaxwellNarx
 from vpm.narx.maxwell_maps import COUNTS, Basis, MaxwellMap, fit_maxwell_map
 from vpm.narx.maxwell_motion import LEAST, descend_motion, element_values, motion_covariance
 from vpm.narx.maxwell_problem import OutputErrors, Parameters
-from vpm.narx.maxwell_records import MaxwellSignals, Samples, element_samples
+from vpm.narx.maxwell_records import MaxwellSignals, Samples, element_samples, smoothed
 from vpm.narx.maxwell_recursion import POWER_NAMES, POWERS, Scheme
 from vpm.narx.maxwell_windows import static_windows
 from vpm.narx.records import RecordLike, as_list
@@ -28,6 +28,10 @@ Records: TypeAlias = "RecordLike | Sequence[RecordLike]"
 
 #: A combination of parameters that moves the force by less than this share of what each of them does is not seen.
 UNSEEN = 1e-7
+#: Share by which a refinement has to be better, beyond rounding.
+BETTER = 1e-9
+#: A constant of k0 that is known to no better share leaves k0 and s0 hardly apart.
+HARDLY = 0.2
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -95,6 +99,7 @@ def identify_maxwell(
     width: int = 3,
     settle: float = 0.0,
     scheme: Scheme = "trapezoidal",
+    cutoff: float | None = None,
     step: float | None = None,
     refine: bool = True,
 ) -> MaxwellFit:
@@ -117,6 +122,9 @@ def identify_maxwell(
     settle : float
         Start of each test at rest that is left out, s.
     scheme : {"trapezoidal", "printed", "central_mean"}
+    cutoff : float, optional
+        Of a low-pass filter for the length of the tests in motion, Hz, well above the motion; by default none. Noise of
+        the length makes k1 too small.
     step : float, optional
         Time between samples of records without a clock, s.
     refine : bool
@@ -132,6 +140,7 @@ def identify_maxwell(
     """
     signals = signals or MaxwellSignals()
     at_rest, moving = (element_samples(each, signals, step) for each in (static, dynamic))
+    moving = [smoothed(one, cutoff) for one in moving]
     windows = static_windows(static, signals, width=width, settle=settle, step=step)
     degrees = degree if isinstance(degree, Mapping) else {"k0": degree, "s0": degree}
     k0, s0 = (fit_maxwell_map(windows, of, degrees.get(of)) for of in ("k0", "s0"))
@@ -248,13 +257,15 @@ def _refined(
     degree: int | None,
 ) -> MaxwellFit:
     wide, dropped = _widened(samples, bases, signals, degree)
+    wide, more_dropped = _told_apart(begun.staged, samples, wide)
+    dropped += more_dropped
     problem = OutputErrors(samples, begun.element.scheme, *wide)
     if problem.freedom < 2 * problem.count:
         raise IdentificationError(
             f"{problem.freedom} samples are too few for {problem.count} coefficients; give longer records or a lower degree"
         )
     e = begun.staged
-    first = Parameters(wide[0].from_plain(e.k0), wide[1].from_plain(e.s0), e.k1, e.relaxation_time).to_vector()
+    first = _vector(e, wide)
     found = least_squares(
         problem.residual, first, problem.jacobian, method="lm", x_scale="jac", xtol=1e-12, ftol=1e-12, gtol=1e-14, max_nfev=200
     )
@@ -267,7 +278,7 @@ def _refined(
         element, rmse = e, float("inf")
     notes = (*begun.notes, *dropped)
     parts = begun.drive_range, begun.length_range, int(found.nfev)
-    if not rmse < begun.staged_rmse:
+    if not rmse < (1.0 - BETTER) * begun.staged_rmse:
         words = f"the refinement is refused: {rmse:.4g} N in free run over the training records, {begun.staged_rmse:.4g} N without"
         own = begun.k0_std, begun.s0_std, begun.k1_std, begun.c1_std
         return MaxwellFit(e, e, False, begun.staged_rmse, rmse, *own, *parts, (*notes, words))
@@ -303,6 +314,39 @@ def _widened(
     return (made[0], made[1]), notes
 
 
+def _vector(e: MaxwellNarx, bases: tuple[Basis, Basis]) -> Array:
+    return Parameters(bases[0].from_plain(e.k0), bases[1].from_plain(e.s0), e.k1, e.relaxation_time).to_vector()
+
+
+def _names(bases: tuple[Basis, Basis]) -> list[str]:
+    return [f"{of}[{POWER_NAMES[t]}]" for of, b in zip(("k0", "s0"), bases, strict=True) for t in b.terms] + ["k1", "tau"]
+
+
+def _told_apart(
+    e: MaxwellNarx, samples: list[Samples], bases: tuple[Basis, Basis]
+) -> tuple[tuple[Basis, Basis], list[str]]:
+    """Bases without the terms of s0 in s that k0 and k1 can stand for.
+
+    ``k0 (s - s0)`` stays what it is if k0 grows by c and s0 becomes ``s - k0 (s - s0) / (k0 + c)``, and so does
+    ``k0 + k1`` if k1 falls by c: where that is a polynomial of the map, the records cannot tell these apart.
+    """
+    notes = []
+    while True:
+        jacobian = OutputErrors(samples, e.scheme, *bases).jacobian(_vector(e, bases))
+        sizes = np.linalg.norm(jacobian, axis=0)
+        _, values, rows = np.linalg.svd(jacobian / np.where(sizes > 0.0, sizes, 1.0), full_matrices=False)
+        terms, first = bases[1].terms, len(bases[0].terms)
+        share = np.abs(rows[-1][first:-2])
+        doubtful = [t for t, x in zip(terms, share, strict=True) if x > 0.01 and POWERS[t][1] > 0]
+        if values[-1] > UNSEEN * values[0] or not doubtful:
+            return bases, notes
+        names = [n for n, x in zip(_names(bases), np.abs(rows[-1]), strict=True) if x > 0.01]
+        out = f"s0[{POWER_NAMES[doubtful[-1]]}]"
+        others = ", ".join(name for name in names if name != out)
+        notes.append(f"{out} is left out: no record can tell it from {others}, which can stand for it")
+        bases = bases[0], Basis(bases[1].centre, bases[1].scale, tuple(t for t in terms if t != doubtful[-1]))
+
+
 def _errors(
     problem: OutputErrors, x: Array, bases: tuple[Basis, Basis]
 ) -> tuple[tuple[Array, Array, float, float], list[str]]:
@@ -312,8 +356,7 @@ def _errors(
     sizes[sizes == 0.0] = 1.0
     _, values, rows = np.linalg.svd(jacobian / sizes, full_matrices=False)
     seen = values > UNSEEN * values[0]
-    names = [f"{of}[{POWER_NAMES[t]}]" for of, b in zip(("k0", "s0"), bases, strict=True) for t in b.terms]
-    names += ["k1", "tau"]
+    names = _names(bases)
     notes = [
         "the records do not tell "
         + ", ".join(names[i] for i in np.flatnonzero(np.abs(row) > 0.1))
@@ -331,7 +374,13 @@ def _errors(
     for one in problem.records:
         pieces.append(slice(at, at + one.force.size))
         at += one.force.size
-    if sigma2 > 0.0 and not inside(autocorrelation(rest, pieces, problem.records[0].step, "F")):
+    if std[0] > HARDLY * abs(float(bases[0].to_plain()[0] @ x[: problem.terms])):
+        notes.append(
+            "k0 and s0 are hardly told apart by these records: the force k0 (s - s0) is known, single coefficients are not; "
+            "take lower degrees where these are wanted"
+        )
+    exact = np.sqrt(sigma2) < 1e-9 * max(float(np.abs(one.force).max()) for one in problem.records)
+    if not exact and not inside(autocorrelation(rest, pieces, problem.records[0].step, "F")):
         notes.append(
             "the residual of the free runs is not white, so that more than the noise of the force is left in it and the "
             "standard errors are too small"

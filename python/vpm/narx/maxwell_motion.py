@@ -13,7 +13,7 @@ from scipy.optimize import least_squares
 from vpm.errors import IdentificationError
 from vpm.narx.maxwell_maps import MaxwellMap
 from vpm.narx.maxwell_problem import OutputErrors, Parameters
-from vpm.narx.maxwell_records import MaxwellSignals, Samples, element_samples
+from vpm.narx.maxwell_records import MaxwellSignals, Samples, element_samples, smoothed
 from vpm.narx.maxwell_recursion import WEIGHTS, Recursion, Scheme, seen, stretch
 from vpm.narx.maxwell_windows import MaxwellWindows
 from vpm.narx.records import RecordLike
@@ -36,6 +36,7 @@ def dynamic_windows(
     width: float | None = None,
     method: Method = "output_error",
     scheme: Scheme = "trapezoidal",
+    cutoff: float | None = None,
     step: float | None = None,
 ) -> MaxwellWindows:
     """k1 and c1 from tests in motion, over windows that follow each other, with the maps of k0 and s0 given.
@@ -53,6 +54,9 @@ def dynamic_windows(
         with simulated instead of measured forces as instruments (P. Young, *Recursive Estimation*, 2011, chapter 6).
         ``"least_squares"``: the plain regression, in which the noise of the force makes tau too small.
     scheme : {"trapezoidal", "printed", "central_mean"}
+    cutoff : float, optional
+        Of a low-pass filter for the length, Hz, well above the motion; by default none. Noise of the length makes k1
+        too small.
     step : float, optional
         Time between samples of records without a clock, s.
 
@@ -71,7 +75,7 @@ def dynamic_windows(
     if method not in choices:
         raise IdentificationError(f'there is no method "{method}"; the choices are {", ".join(choices)}')
     found, notes = [], []
-    for one in _cut(element_samples(records, signals, step, LEAST), width):
+    for one in _cut([smoothed(one, cutoff) for one in element_samples(records, signals, step, LEAST)], width):
         problem = OutputErrors([one], scheme, k0.basis, s0.basis)
         values, covariance = _window(problem, k0, s0, method)
         if not (np.all(np.isfinite(values)) and values[0] * values[1] > 0.0 and np.all(np.isfinite(covariance))):

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from vpm.errors import DivergedError, SimulationError
 from vpm.narx.maxwell import MaxwellNarx
-from vpm.narx.maxwell_records import MaxwellSignals, Samples, element_samples
+from vpm.narx.maxwell_records import MaxwellSignals, Samples, element_samples, smoothed
 from vpm.narx.maxwell_recursion import one_step
 from vpm.narx.records import RecordLike
 from vpm.narx.run import NarxRun
@@ -126,7 +126,8 @@ class MaxwellErrors(Result):
     prediction_rmse : tuple of float
         One step ahead, N.
     white : tuple of bool
-        Whether the residual of the prediction is white: its autocorrelation lies **inside** ``1.96 / sqrt(N)``.
+        Whether the residual of the free run is white: its autocorrelation lies **inside** ``1.96 / sqrt(N)``. Noise on
+        the measured force is in that residual as it is; one step ahead it would appear twice, and never be white.
     independent : tuple of bool
         Whether it owes nothing to length and drive signal.
     notes : tuple of str
@@ -174,7 +175,11 @@ def thesis_sigma(run: NarxRun) -> float:
 
 
 def maxwell_errors(
-    element: MaxwellNarx, records: RecordLike | Sequence[RecordLike], signals: MaxwellSignals | None = None
+    element: MaxwellNarx,
+    records: RecordLike | Sequence[RecordLike],
+    signals: MaxwellSignals | None = None,
+    *,
+    cutoff: float | None = None,
 ) -> MaxwellErrors:
     """Free run and one-step prediction of an element on each test, apart from each other.
 
@@ -184,6 +189,8 @@ def maxwell_errors(
     records : Experiment, or mapping of str to array-like, or a sequence of them
         Tests that were not used for the fit.
     signals : MaxwellSignals, optional
+    cutoff : float, optional
+        Of a low-pass filter for the length, Hz; by default none.
 
     Returns
     -------
@@ -197,20 +204,20 @@ def maxwell_errors(
         A record has another step than the element.
     """
     signals = signals or MaxwellSignals()
-    tests = element_samples(records, signals, element.step)
+    tests = [smoothed(one, cutoff) for one in element_samples(records, signals, element.step)]
     rows, notes = [], []
     for one in tests:
         record = _as_record(one, signals)
         predicted = maxwell_one_step(element, record, signals)
-        residual = predicted.residual_tests()
         try:
             free = maxwell_free_run(element, record, signals)
             errors = thesis_sigma(free), free.fit, free.max_error, free.rmse
+            tests_of_residual = free.residual_tests()
+            verdict = tests_of_residual.white, tests_of_residual.independent_of_inputs
         except DivergedError as error:
             notes.append(error.message.replace("record record:", f"test {one.name}:", 1))
-            errors = float("-inf"), float("-inf"), float("inf"), float("inf")
-        size = predicted.residual.size
-        rows.append((one.name, size, *errors, predicted.rmse, residual.white, residual.independent_of_inputs))
+            errors, verdict = (float("-inf"), float("-inf"), float("inf"), float("inf")), (False, False)
+        rows.append((one.name, predicted.residual.size, *errors, predicted.rmse, *verdict))
     columns = tuple(zip(*rows, strict=True))
     return MaxwellErrors(*columns, notes=tuple(notes))
 

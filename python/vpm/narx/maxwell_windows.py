@@ -17,8 +17,8 @@ Array = NDArray[np.float64]
 
 #: Largest change over a test at rest, as a share of its noise's standard error of that change.
 UNSETTLED = 4.0
-#: A change that small beside the force is rest whatever the noise.
-REST = 1e-6
+#: A change that small beside the range over all tests, or beside the largest value, is rest whatever the noise.
+REST, ROUNDING = 1e-3, 1e-9
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -127,8 +127,8 @@ def static_windows(
     if settle < 0.0:
         raise IdentificationError(f"the time to settle is {settle:g} s; give a time of zero or more")
     tests = element_samples(records, signals, step)
-    # What is small is judged beside the largest of all tests, because the force of one pose may be zero.
-    scales = tuple(max(float(np.abs(column).max()) for column in columns) for columns in _both(tests))
+    # What is small is judged beside all tests, because the force of one pose may be zero.
+    scales = tuple(_small(np.concatenate(columns)) for columns in _both(tests))
     poses = [_pose(one, signals, settle, scales) for one in tests]
     found = []
     lone = []
@@ -150,6 +150,10 @@ def _both(tests: list[Samples]) -> tuple[list[Array], list[Array]]:
     return [one.force for one in tests], [one.length for one in tests]
 
 
+def _small(values: Array) -> float:
+    return max(REST * float(np.ptp(values)), ROUNDING * float(np.abs(values).max()))
+
+
 def _pose(one: Samples, signals: MaxwellSignals, settle: float, scales: tuple[float, ...]) -> _Pose:
     skip = round(settle / one.step)
     if one.force.size - skip < 3:
@@ -159,17 +163,17 @@ def _pose(one: Samples, signals: MaxwellSignals, settle: float, scales: tuple[fl
         )
     force, length, drive = one.force[skip:], one.length[skip:], one.drive[skip:]
     errors = []
-    for channel, column, scale in zip((signals.force, signals.length), (force, length), scales, strict=True):
+    for channel, column, small in zip((signals.force, signals.length), (force, length), scales, strict=True):
         time = np.linspace(-0.5, 0.5, column.size)
         slope = float(12.0 * np.mean(time * (column - column.mean())))
         noise = float(np.std(column - column.mean() - slope * time))
         error = noise / np.sqrt(column.size)
-        if abs(slope) > UNSETTLED * np.sqrt(12.0) * error + REST * scale:
+        if abs(slope) > UNSETTLED * np.sqrt(12.0) * error + small:
             raise IdentificationError(
                 f'record {one.name} is not at rest: "{channel}" changes by {slope:.3g} from its start to its end, with '
                 f"{noise:.3g} of noise; leave out more of its start with settle=, or give it as a test in motion"
             )
-        errors.append(error if noise > 1e-12 * scale else 0.0)
+        errors.append(error if noise > ROUNDING * small else 0.0)
     return _Pose(one.name, float(drive.mean()), float(length.mean()), float(force.mean()), *errors, force.size)
 
 
