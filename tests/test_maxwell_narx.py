@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import importlib.util
-import sys
+import runpy
 from dataclasses import replace
 from pathlib import Path
-from types import ModuleType
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -56,16 +55,6 @@ def motions(e: MaxwellNarx, noise: float = 0.0, seed: int = 1, samples: int = 20
     return [made(e, u, 0.33 + 0.01 * np.sin(2.0 * np.pi * f * time), noise, random) for u, f in cases]
 
 
-def example() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("maxwell_narx_example", EXAMPLE)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module  # dataclasses look their module up
-    spec.loader.exec_module(module)
-    return module
-
-
 # ---- recovery --------------------------------------------------------------------------------------------------------
 
 
@@ -110,7 +99,7 @@ def test_derivatives_are_those_of_differences(scheme: Any) -> None:
         difference = (problem.residual(up) - problem.residual(down)) / (2.0 * step)
         # Kaufman's derivatives leave out how the best start turns with tau; the gradient of the cost stays exact.
         gradient, wanted = exact[:, at] @ problem.residual(x), difference @ problem.residual(x)
-        assert gradient == pytest.approx(wanted, rel=1e-5, abs=1e-5 * np.linalg.norm(exact[:, at]))
+        assert gradient == pytest.approx(wanted, rel=1e-5, abs=1e-5 * float(np.linalg.norm(exact[:, at])))
         if at < x.size - 1:
             scale = np.abs(difference).max()
             np.testing.assert_allclose(exact[:, at], difference, rtol=0.0, atol=1e-5 * scale)
@@ -123,14 +112,14 @@ def test_noise_of_the_force_shortens_tau_of_plain_least_squares_only() -> None:
     e = element()
     windows = narx.static_windows(poses(e, 1.0), SIGNALS, step=STEP)
     maps = narx.fit_maxwell_map(windows, "k0", 1), narx.fit_maxwell_map(windows, "s0", 1)
-    record = motions(e, 1.0)[3]  # 2 Hz at u = 0
+    record = motions(e, 3.0, samples=10_000)[3]  # 2 Hz at u = 0
     tau = {}
     for method in ("least_squares", "instrumental", "output_error"):
         found = narx.dynamic_windows(record, *maps, SIGNALS, method=method, step=STEP)
         tau[method] = found.values[0, 1] / found.values[0, 0]
         if method != "least_squares":
             assert np.all(np.abs(found.values[0] - [K1, C1]) < 3.0 * found.std[0])
-    assert tau["least_squares"] < 3e-3
+    assert tau["least_squares"] < 2e-3
     assert tau["instrumental"] == pytest.approx(4e-3, rel=0.03)
     assert tau["output_error"] == pytest.approx(4e-3, rel=0.03)
 
@@ -170,8 +159,10 @@ def test_noise_of_the_length_is_filtered_and_not_that_of_the_force() -> None:
     random = np.random.default_rng(5)
     time = STEP * np.arange(6000)
     record = made(e, 0.0, 0.33 + 0.01 * np.sin(4.0 * np.pi * time), 0.5, random)
-    record["s"] = record["s"] + 3e-6 * random.standard_normal(time.size)
-    windows = narx.static_windows([made(e, 0.0, np.full(200, s), 0.0, random) for s in (0.31, 0.35)], signals, step=STEP)
+    record["s"] = record["s"] + 1e-5 * random.standard_normal(time.size)
+    windows = narx.static_windows(
+        [made(e, 0.0, np.full(200, s), 0.0, random) for s in (0.31, 0.35)], signals, step=STEP
+    )
     maps = narx.fit_maxwell_map(windows, "k0", 0), narx.fit_maxwell_map(windows, "s0", 0)
     raw = narx.dynamic_windows(record, *maps, signals, step=STEP)
     filtered = narx.dynamic_windows(record, *maps, signals, cutoff=25.0, step=STEP)
@@ -232,7 +223,7 @@ def test_terms_that_windows_cannot_tell_are_named() -> None:
     found = narx.fit_maxwell_map(windows, "k0", 2)
     assert found.coefficients[3] == 0.0
     assert found.notes == (
-        "in the map of k0, u^2 cannot be told from the terms before it over these 8 windows and is left out; add tests "
+        "in the map of k0, u^2 cannot be told from the terms before over these 8 windows and is left out; add tests "
         "at other values",
     )
 
@@ -263,12 +254,12 @@ def test_one_step_and_free_run_are_two_things(scheme: Any) -> None:
 def test_divergence_is_reported_with_the_run_before() -> None:
     e = element(k0=np.array([1e5, 0, 0, 0, 0, 0, 0, 0, 0, 1e12]))
     record = {"F": np.full(50, 10.0), "s": np.linspace(0.3, 30.0, 50), "u": np.zeros(50)}
-    with pytest.raises(DivergedError, match="record record: .*diverged at sample") as caught:
+    with pytest.raises(DivergedError, match="on record `record 0` diverged at sample 2") as caught:
         narx.maxwell_free_run(e, record, SIGNALS)
     assert isinstance(caught.value.run, narx.NarxRun)
     table = narx.maxwell_errors(e, record, SIGNALS)
     assert table.rmse == (float("inf"),)
-    assert table.notes[0].startswith("test record 0: ")
+    assert "record `record 0` diverged" in table.notes[0]
 
 
 def test_measures_of_the_table() -> None:
@@ -277,7 +268,7 @@ def test_measures_of_the_table() -> None:
     table = narx.maxwell_errors(e, record, SIGNALS)
     run = narx.maxwell_free_run(e, record, SIGNALS)
     f, g = np.abs(run.measured[2:]), np.abs(run.values[2:])
-    assert table.sigma == (pytest.approx(100.0 * sum((a - b) / a for a, b in zip(f, g, strict=True)) / f.size),)
+    assert table.sigma[0] == pytest.approx(100.0 * sum((a - b) / a for a, b in zip(f, g, strict=True)) / f.size)
     assert table.fit == (run.fit,)
     assert (table.white, table.independent) == ((True,), (True,))
     assert table.rmse[0] == pytest.approx(2.0, rel=0.05)
@@ -311,7 +302,10 @@ def moving_pose() -> list[Record]:
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda: narx.static_windows(poses(element())[0], SIGNALS, step=STEP), "rank 2 of 3 and only k0 \\(s - s0\\) ="),
+        (
+            lambda: narx.static_windows(poses(element())[0], SIGNALS, step=STEP),
+            r"rank 2 of 3 and only k0 \(s - s0\)",
+        ),
         (lambda: narx.static_windows(poses(element())[0], SIGNALS), "has no clock; give the time between"),
         (lambda: narx.static_windows([], SIGNALS), "there is no record"),
         (lambda: narx.static_windows(poses(element()), SIGNALS, step=STEP, width=1), "take 2 poses or more"),
@@ -342,8 +336,8 @@ def moving_pose() -> list[Record]:
             "a cut-off of 900 Hz is not between zero and half",
         ),
         (
-            lambda: narx.maxwell_errors(element(), {"F": [1.0, np.nan, 1.0], "s": np.ones(3), "u": np.ones(3)}, SIGNALS),
-            '"F" of record record 0 is nan at sample 1',
+            lambda: narx.maxwell_errors(element(), {**motions(element())[0], "F": np.full(2000, np.nan)}, SIGNALS),
+            '"F" of record record 0 is nan at sample 0',
         ),
     ],
 )
@@ -356,7 +350,7 @@ def test_bad_inputs_are_refused_in_one_sentence(call: Any, message: str) -> None
 def test_records_of_another_clock_are_refused() -> None:
     record = motions(element(), samples=50)[0]
     other = Experiment.from_arrays(np.arange(50) * 2e-3, record, name="slow")
-    with pytest.raises(SimulationError, match="record slow is sampled every 0.002 s, but the element every 0.001 s"):
+    with pytest.raises(SimulationError, match=r"record slow is sampled every 0\.002 s, but the element every 0\.001 s"):
         narx.maxwell_free_run(element(), other, SIGNALS)
     first = Experiment.from_arrays(np.arange(50) * 1e-3, record, name="fast")
     with pytest.raises(IdentificationError, match="a difference equation has one step"):
@@ -380,8 +374,8 @@ def test_results_have_the_common_manners(tmp_path: Path) -> None:
 
 
 def test_example_finds_the_strut_of_its_model_file() -> None:
-    module = example()
-    fit, errors = module.fitted(module.strut())
+    bench = SimpleNamespace(**runpy.run_path(str(EXAMPLE), run_name="bench"))
+    fit, errors = bench.fitted(bench.strut())
     e = fit.element
     assert e.k0[0] == pytest.approx(2e4, rel=5e-4)
     assert e.s0[:2] == pytest.approx([0.32, 1.0], rel=1e-3)

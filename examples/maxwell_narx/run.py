@@ -122,7 +122,7 @@ def in_motion(bench: Bench, seed: int | None = 100) -> list[Experiment]:
 
 
 def unseen(bench: Bench, seed: int | None = 200) -> list[Experiment]:
-    """Combined motions for validation: two frequencies between those of the training, u held elsewhere, and u moving."""
+    """Combined motions for validation: two frequencies between those of the training; u held elsewhere, u moving."""
     time = np.arange(5000) * STEP
     place = 0.006 * np.sin(2.0 * np.pi * 0.7 * time) + 0.003 * np.sin(2.0 * np.pi * 1.6 * time)
     shifts = {"u = 2.5 mm": np.full(time.size, 0.0025), "u moving at 0.3 Hz": 0.004 * np.sin(0.6 * np.pi * time)}
@@ -143,8 +143,7 @@ def fitted(bench: Bench, seed: int | None = 0) -> tuple[narx.MaxwellFit, narx.Ma
 def show(title: str, fit: narx.MaxwellFit, errors: narx.MaxwellErrors) -> None:
     """Print coefficients with their standard errors, notes, and errors of the validation."""
     print(f"\n{title}")
-    columns = fit._frame_columns()
-    for name, value, std in zip(columns["coefficient"], columns["value"], columns["std"], strict=True):
+    for name, value, std in fit.coefficients:
         if value != 0.0:
             print(f"  {name:10s}{value:14.6g} +- {1.96 * std:.2g}")
     for note in fit.notes:

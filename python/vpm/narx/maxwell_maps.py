@@ -182,8 +182,8 @@ def fit_maxwell_map(windows: MaxwellWindows, of: str, degree: int | None = None)
     values, std = windows.values[:, at], windows.std[:, at]
     if windows.drive_name and values.size > 1 and np.ptp(windows.drive) == 0.0 and degree != 0:
         raise IdentificationError(
-            f'the drive signal "{windows.drive_name}" is {windows.drive[0]:g} in all {values.size} windows, so that no map '
-            "can depend on it; leave it out of the signals or add tests at another value"
+            f'the drive signal "{windows.drive_name}" is {windows.drive[0]:g} in all {values.size} windows, so that no '
+            "map can depend on it; leave it out of the signals or add tests at another value"
         )
     std = np.maximum(std, EXACT * max(float(np.abs(values).max()), np.finfo(float).tiny))
     wanted = range(4) if degree is None else (degree,)
@@ -206,7 +206,9 @@ def _enough(windows: MaxwellWindows, of: str, degree: int, asked: int | None) ->
     )
 
 
-def _fitted(windows: MaxwellWindows, of: str, values: Array, std: Array, degree: int) -> tuple[MaxwellMap, float, float]:
+def _fitted(
+    windows: MaxwellWindows, of: str, values: Array, std: Array, degree: int
+) -> tuple[MaxwellMap, float, float]:
     u, s, weights = windows.drive, windows.length, 1.0 / std
     whole = Basis.around(u, s)
     asked = [term for term in range(COUNTS[degree]) if windows.drive_name or POWERS[term][0] == 0]
@@ -243,5 +245,7 @@ def _fitted(windows: MaxwellWindows, of: str, values: Array, std: Array, degree:
 
 def _collinear(of: str, dropped: tuple[int, ...], count: int) -> str:
     names = ", ".join(POWER_NAMES[term] for term in dropped)
-    verb = "cannot be told from the terms before it" if len(dropped) == 1 else "cannot be told from the terms before them"
-    return f"in the map of {of}, {names} {verb} over these {count} windows and is left out; add tests at other values"
+    return (
+        f"in the map of {of}, {names} cannot be told from the terms before over these {count} windows and "
+        f"{'is' if len(dropped) == 1 else 'are'} left out; add tests at other values"
+    )

@@ -131,10 +131,16 @@ def descend_motion(problem: OutputErrors, x: Array) -> Array:
     def whole(part: Array) -> Array:
         return np.concatenate([x[:-2], part * scale])
 
+    def errors(part: Array) -> Array:
+        return problem.residual(whole(part))
+
+    def derivatives(part: Array) -> Array:
+        return np.asarray(problem.jacobian(whole(part))[:, -2:] * scale)
+
     found = least_squares(
-        lambda part: problem.residual(whole(part)),
+        errors,
         start[-2:] / scale,
-        lambda part: problem.jacobian(whole(part))[:, -2:] * scale,
+        derivatives,
         method="lm",
         xtol=1e-14,
         ftol=1e-14,

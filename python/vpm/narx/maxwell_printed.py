@@ -88,10 +88,10 @@ def printed_dynamic_regression(
 ) -> tuple[float, float]:
     """k1 and c1 by the least squares of D'Imperio (2016), eq 5.63 to 5.66, as corrected.
 
-    Columns ``F_el = k0 (s - s0)`` (without the factor D, which the print counts twice), ``ds/dt`` and ``F[k-1] / (2 h)``
-    with coefficients ``D``, ``tau (k0 + k1) D`` and ``tau D``; then 5.66 as three equations for k1 and c1, solved by
-    least squares. The measured force stands among the columns, so that its noise biases the result: errors in
-    variables. Use `dynamic_windows` for measured records.
+    Columns ``F_el = k0 (s - s0)`` (without the factor D, which the print counts twice), ``ds/dt`` and
+    ``F[k-1] / (2 h)`` with coefficients ``D``, ``tau (k0 + k1) D`` and ``tau D``; then 5.66 as three equations for k1
+    and c1, solved by least squares. The measured force stands among the columns, so that its noise biases the result:
+    errors in variables. Use `dynamic_windows` for measured records.
 
     Parameters
     ----------
@@ -118,8 +118,8 @@ def printed_dynamic_regression(
     sizes = np.linalg.norm(columns, axis=0)
     if sizes.min() == 0.0 or np.linalg.matrix_rank(columns / sizes, tol=1e-12 * len(f)) < 3:
         raise IdentificationError(
-            "force, stretch and its rate cannot be told apart in this record, so that k1 and c1 have no estimate; give a "
-            "record in which the length moves"
+            "force, stretch and its rate cannot be told apart in this record, so that k1 and c1 have no estimate; give "
+            "a record in which the length moves"
         )
     solution, *_ = np.linalg.lstsq(columns / sizes, f[2:], rcond=None)
     b1, b2, b3 = solution / sizes

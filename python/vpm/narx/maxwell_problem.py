@@ -1,4 +1,4 @@
-"""Output errors of the element over records and their exact derivatives; the starting forces are solved for on the way."""
+"""Output errors of the element over records, with exact derivatives; starting forces are solved for on the way."""
 
 from __future__ import annotations
 

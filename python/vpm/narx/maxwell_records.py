@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-
 from scipy.signal import butter, sosfiltfilt
 
 from vpm.errors import IdentificationError
@@ -80,8 +79,8 @@ def element_samples(
     other = int(np.argmax(np.abs(steps - steps[0])))
     if abs(steps[other] - steps[0]) > 1e-6 * steps[0]:
         raise IdentificationError(
-            f"record {found[other].name} is sampled every {steps[other]:g} s, but {found[0].name} every {steps[0]:g} s; "
-            "a difference equation has one step: resample one of them"
+            f"record {found[other].name} is sampled every {steps[other]:g} s, but {found[0].name} every {steps[0]:g} "
+            "s; a difference equation has one step: resample one of them"
         )
     return found
 
@@ -101,7 +100,8 @@ def _samples(record: RecordLike, signals: MaxwellSignals, step: float | None, na
         wrong = np.flatnonzero(~np.isfinite(column))
         if wrong.size:
             raise IdentificationError(
-                f'"{channel}" of record {given.name} is {column[wrong[0]]} at sample {wrong[0]}; repair it or cut it off'
+                f'"{channel}" of record {given.name} is {column[wrong[0]]} at sample {wrong[0]}; repair it or '
+                "cut it off"
             )
     drive = given.inputs[:, 1].copy() if signals.drive else np.zeros(given.output.size)
     unit = record.unit(signals.force) if isinstance(record, Experiment) else "1"
@@ -135,8 +135,8 @@ def smoothed(one: Samples, cutoff: float | None) -> Samples:
     end = round(2.0 / (cutoff * one.step))
     if one.length.size < 4 * end:
         raise IdentificationError(
-            f"record {one.name} has {one.length.size} samples, but a cut-off of {cutoff:g} Hz takes {end} from each end; "
-            "give a longer record or a higher cut-off"
+            f"record {one.name} has {one.length.size} samples, but a cut-off of {cutoff:g} Hz takes {end} from each "
+            "end; give a longer record or a higher cut-off"
         )
     sections = butter(4, cutoff, fs=1.0 / one.step, output="sos")
     length = sosfiltfilt(sections, one.length)

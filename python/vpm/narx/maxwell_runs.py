@@ -43,9 +43,7 @@ def maxwell_one_step(element: MaxwellNarx, record: RecordLike, signals: MaxwellS
         The record has another step than the element.
     """
     signals = signals or MaxwellSignals()
-    one = _sampled(element, record, signals)
-    values = one_step(element, one.force, one.length, one.drive)
-    return _run("one-step prediction", one, values, signals)
+    return _ahead(element, _sampled(element, record, signals), signals)
 
 
 def maxwell_free_run(
@@ -75,7 +73,14 @@ def maxwell_free_run(
         The force left the limit; `run` has the samples before.
     """
     signals = signals or MaxwellSignals()
-    one = _sampled(element, record, signals)
+    return _free(element, _sampled(element, record, signals), signals, limit)
+
+
+def _ahead(element: MaxwellNarx, one: Samples, signals: MaxwellSignals) -> NarxRun:
+    return _run("one-step prediction", one, one_step(element, one.force, one.length, one.drive), signals)
+
+
+def _free(element: MaxwellNarx, one: Samples, signals: MaxwellSignals, limit: float | None = None) -> NarxRun:
     bound = FAR * float(np.abs(one.force).max()) if limit is None else limit
     start = float(one.force[0]), float(one.force[1])
     try:
@@ -83,23 +88,26 @@ def maxwell_free_run(
     except DivergedError as error:
         kept = np.asarray(error.run)
         part = slice(0, kept.size)
-        cut = Samples(
-            one.name, one.unit, one.time[part], one.step, one.force[part], one.length[part], one.drive[part]
-        )
+        arrays = one.force[part], one.length[part], one.drive[part]
+        cut = Samples(one.name, one.unit, one.time[part], one.step, *arrays)
+        message = error.message.replace("record `arrays`", f"record `{one.name}`", 1)
         at = float(one.time[kept.size])
-        message = f"record {one.name}: {error.message}"
         raise DivergedError(message, run=_run("free run", cut, kept, signals), time=at) from error
     return _run("free run", one, values, signals)
 
 
 def _sampled(element: MaxwellNarx, record: RecordLike, signals: MaxwellSignals) -> Samples:
     one = element_samples(record, signals, element.step)[0]
+    _same_clock(element, one)
+    return one
+
+
+def _same_clock(element: MaxwellNarx, one: Samples) -> None:
     if abs(one.step - element.step) > 1e-6 * element.step:
         raise SimulationError(
-            f"record {one.name} is sampled every {one.step:g} s, but the element every {element.step:g} s; resample the "
-            "record, or give the element that step: k0, s0, k1 and c1 are physical and stay"
+            f"record {one.name} is sampled every {one.step:g} s, but the element every {element.step:g} s; resample "
+            "the record, or give the element that step: k0, s0, k1 and c1 are physical and stay"
         )
-    return one
 
 
 def _run(kind: str, one: Samples, values: Array, signals: MaxwellSignals) -> NarxRun:
@@ -207,21 +215,17 @@ def maxwell_errors(
     tests = [smoothed(one, cutoff) for one in element_samples(records, signals, element.step)]
     rows, notes = [], []
     for one in tests:
-        record = _as_record(one, signals)
-        predicted = maxwell_one_step(element, record, signals)
+        _same_clock(element, one)
+        predicted = _ahead(element, one, signals)
         try:
-            free = maxwell_free_run(element, record, signals)
+            free = _free(element, one, signals)
             errors = thesis_sigma(free), free.fit, free.max_error, free.rmse
             tests_of_residual = free.residual_tests()
             verdict = tests_of_residual.white, tests_of_residual.independent_of_inputs
         except DivergedError as error:
-            notes.append(error.message.replace("record record:", f"test {one.name}:", 1))
+            notes.append(error.message)
             errors, verdict = (float("-inf"), float("-inf"), float("inf"), float("inf")), (False, False)
         rows.append((one.name, predicted.residual.size, *errors, predicted.rmse, *verdict))
-    columns = tuple(zip(*rows, strict=True))
+    names, samples, sigma, fit, largest, rmse, ahead, white, independent = zip(*rows, strict=True)
+    columns = names, samples, sigma, fit, largest, rmse, ahead, white, independent
     return MaxwellErrors(*columns, notes=tuple(notes))
-
-
-def _as_record(one: Samples, signals: MaxwellSignals) -> dict[str, Array]:
-    drive = {signals.drive: one.drive} if signals.drive else {}
-    return {signals.force: one.force, signals.length: one.length, **drive}

@@ -174,7 +174,9 @@ def _pose(one: Samples, signals: MaxwellSignals, settle: float, scales: tuple[fl
                 f"{noise:.3g} of noise; leave out more of its start with settle=, or give it as a test in motion"
             )
         errors.append(error if noise > ROUNDING * small else 0.0)
-    return _Pose(one.name, float(drive.mean()), float(length.mean()), float(force.mean()), *errors, force.size)
+    return _Pose(
+        one.name, float(drive.mean()), float(length.mean()), float(force.mean()), errors[0], errors[1], force.size
+    )
 
 
 def _rows(poses: list[_Pose], tolerance: float) -> list[list[_Pose]]:
