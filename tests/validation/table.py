@@ -7,7 +7,7 @@ import subprocess
 from collections.abc import Callable
 from pathlib import Path
 
-from validation import beams, hydraulics, hyl, linkages, motions, tudor
+from validation import beams, hydraulics, hyl, linkages, maxwell_narx, motions, tudor
 from validation.row import Row, row
 
 ROOT = Path(__file__).resolve().parent.parent.parent
@@ -18,6 +18,7 @@ PARTS: dict[str, Callable[[], list[Row]]] = {
     "KARL, a limb on two strokes": linkages.karl,
     "The leg of HyQ": linkages.leg,
     "A hydraulic servo-cylinder": hydraulics.rig,
+    "A Maxwell element from records": maxwell_narx.rows,
     "The HyL leg stands and falls": hyl.reference,
     "The HyL leg beside a solution without vpm": hyl.witnessed,
     "Vibrations of beams": beams.frequencies,
