@@ -228,6 +228,28 @@ def test_terms_that_windows_cannot_tell_are_named() -> None:
     )
 
 
+def test_an_exact_polynomial_through_all_windows_is_no_choice() -> None:
+    """Three windows and three coefficients leave nothing out: the constant is what can be judged."""
+    signals, random = MaxwellSignals("F", "s"), np.random.default_rng(2)
+    e = element(k0=np.array([1e5]), s0=np.array([0.3]))
+    rest = [made(e, 0.0, np.full(300, s), 1.0, random) for s in (0.31, 0.32, 0.33, 0.34)]
+    windows = narx.static_windows(rest, signals, step=STEP, width=2)
+    found = narx.fit_maxwell_map(windows, "k0")
+    assert (windows.drive.size, found.degree) == (3, 0)
+    assert narx.fit_maxwell_map(windows, "k0", 2).misfit < 1e-6
+
+
+def test_windows_of_motion_map_k1_and_c1_as_the_constants_they_are() -> None:
+    e = element()
+    windows = narx.static_windows(poses(e, 0.5), SIGNALS, step=STEP)
+    maps = narx.fit_maxwell_map(windows, "k0", 1), narx.fit_maxwell_map(windows, "s0", 1)
+    moving = narx.dynamic_windows(motions(e, 0.5), *maps, SIGNALS, width=0.5, step=STEP)
+    assert moving.drive.size == 24
+    found = narx.fit_maxwell_map(moving, "c1")
+    assert found.degree == 0
+    assert abs(found.coefficients[0] - C1) < 3.0 * found.std[0]
+
+
 def test_what_k0_can_stand_for_is_left_out_of_s0_and_named() -> None:
     e = element(k0=np.array([1e5]))
     fit = narx.identify_maxwell(poses(e), motions(e), SIGNALS, step=STEP, degree={"k0": 0, "s0": 1})
@@ -281,7 +303,7 @@ def test_measures_of_the_table() -> None:
 # ---- refinement, sentences, manners ----------------------------------------------------------------------------------
 
 
-def test_refinement_is_refused_where_it_is_no_better() -> None:
+def test_refinement_is_refused_where_it_is_no_better(tmp_path: Path) -> None:
     e = element()
     records = motions(e, 1.0)
     once = narx.refine_maxwell(element(k0=np.array([9e4, 1e4])), records, SIGNALS)
@@ -292,11 +314,17 @@ def test_refinement_is_refused_where_it_is_no_better() -> None:
     assert not again.refined
     assert again.element == once.element
     assert any("the refinement is refused" in note for note in again.notes)
+    assert narx.MaxwellFit.load(again.save(tmp_path / "kept.npz")).element == once.element  # NaN and all
 
 
 def moving_pose() -> list[Record]:
     ramp = made(element(), 0.0, np.linspace(0.31, 0.32, 400), 0.1, np.random.default_rng(0))
     return [*poses(element(), 0.1)[:3], ramp]
+
+
+def nonsense() -> Record:
+    record = motions(element())[0]
+    return {**record, "F": np.random.default_rng(0).standard_normal(2000)}
 
 
 @pytest.mark.parametrize(
@@ -330,6 +358,10 @@ def moving_pose() -> list[Record]:
         (
             lambda: narx.refine_maxwell(element(), motions(element(), samples=20)[:1], SIGNALS, degree=3),
             "samples are too few for .* coefficients",
+        ),
+        (
+            lambda: narx.identify_maxwell(poses(element()), [nonsense()], SIGNALS, step=STEP),
+            "whose relaxation time no record in steps of 0.001 s can show",
         ),
         (
             lambda: narx.identify_maxwell(poses(element()), motions(element()), SIGNALS, step=STEP, cutoff=900.0),

@@ -45,11 +45,11 @@ def _element(step: float, scheme: Any = "trapezoidal", k1: float = K1, c1: float
     return MaxwellNarx(np.array([K0]), np.array([S0]), k1, c1, step, scheme)
 
 
-def _length(time: Array) -> Array:
+def _length(time: NDArray[np.floating[Any]]) -> Array:
     return np.asarray(0.32 + 0.01 * np.sin(OMEGA * time))
 
 
-def _exact(time: Array) -> Array:
+def _exact(time: NDArray[np.floating[Any]]) -> Array:
     tau = C1 / K1
     gain = (K0 + tau * (K0 + K1) * 1j * OMEGA) / (1.0 + tau * 1j * OMEGA)
     return np.asarray(K0 * 0.02 + 0.01 * np.imag(gain * np.exp(1j * OMEGA * time)))

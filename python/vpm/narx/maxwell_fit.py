@@ -27,6 +27,8 @@ Records: TypeAlias = "RecordLike | Sequence[RecordLike]"
 
 #: Share by which a refinement has to be better, beyond rounding.
 BETTER = 1e-9
+#: Relaxation times that records can show: this share of a step, and so many times the longest record.
+SHOWN = (0.01, 10.0)
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -42,9 +44,11 @@ class MaxwellFit(Result):
     refined : bool
         Whether `element` is the refined one.
     staged_rmse, refined_rmse : float
-        Of free runs over all training records, N; infinite where one diverges.
+        Of free runs over all training records, N; infinite where one diverges or the descent came to no end, NaN
+        without refinement.
     k0_std, s0_std : ndarray, shape (10,)
-        Standard errors of the element's coefficients; zero where a term is not used.
+        Standard errors of the element's coefficients; zero where a term is not used, NaN where nothing is known because
+        a given element was kept.
     k1_std, c1_std : float
     drive_range, length_range : tuple of two floats
         Of the training records, beyond which the maps are guesses.
@@ -141,6 +145,11 @@ def identify_maxwell(
     """
     signals = signals or MaxwellSignals()
     at_rest, moving = (element_samples(each, signals, step) for each in (static, dynamic))
+    if abs(at_rest[0].step - moving[0].step) > 1e-6 * moving[0].step:
+        raise IdentificationError(
+            f"the tests at rest are sampled every {at_rest[0].step:g} s, those in motion every {moving[0].step:g} s; a "
+            "difference equation has one step: resample one of them"
+        )
     moving = [smoothed(one, cutoff) for one in moving]
     windows = static_windows(static, signals, width=width, settle=settle, step=step)
     degrees = degree if isinstance(degree, Mapping) else {"k0": degree, "s0": degree}
@@ -213,15 +222,20 @@ def _staged(moving: list[Samples], k0: MaxwellMap, s0: MaxwellMap, scheme: Schem
     maps = [one.basis.from_plain(one.coefficients) for one in (k0, s0)]
     x = descend_motion(problem, np.concatenate([*maps, [0.0, 0.0]]))
     k1, c1 = element_values(x)
-    if not (np.isfinite(k1) and k1 != 0.0 and np.isfinite(c1)):
+    if not (np.isfinite(k1) and k1 != 0.0 and np.isfinite(c1) and _shown(float(c1 / k1), moving)):
         raise IdentificationError(
-            f"the tests in motion give k1 = {k1:g} N/m and c1 = {c1:g} N s/m, which is no element; give tests with "
-            "more and faster motion"
+            f"the tests in motion ask for k1 = {k1:.3g} N/m and c1 = {c1:.3g} N s/m, whose relaxation time no record "
+            f"in steps of {moving[0].step:g} s can show; give tests with more and faster motion, or check the force"
         )
     covariance = motion_covariance(problem, x, problem.jacobian(x), (k0, s0))
     std = np.sqrt(np.diag(covariance))
     element = MaxwellNarx(k0.coefficients, s0.coefficients, float(k1), float(c1), moving[0].step, scheme)
     return element, float(std[0]), float(std[1])
+
+
+def _shown(tau: float, samples: list[Samples]) -> bool:
+    longest = max(one.force.size * one.step for one in samples)
+    return SHOWN[0] * samples[0].step < tau < SHOWN[1] * longest
 
 
 def _training_rmse(element: MaxwellNarx, samples: list[Samples]) -> float:
@@ -276,11 +290,10 @@ def _refined(
     )
     end = Parameters.from_vector(np.asarray(found.x), problem.terms)
     maps = wide[0].to_plain() @ end.k0, wide[1].to_plain() @ end.s0
-    try:
+    element, rmse = e, float("inf")
+    if found.success and end.k1 != 0.0 and np.all(np.isfinite(found.x)) and _shown(end.tau, samples):
         element = MaxwellNarx(*maps, end.k1, end.k1 * end.tau, e.step, e.scheme)
         rmse = _training_rmse(element, samples)
-    except (IdentificationError, FloatingPointError):
-        element, rmse = e, float("inf")
     notes = (*begun.notes, *dropped)
     parts = begun.drive_range, begun.length_range, int(found.nfev)
     said = f"{rmse:.4g} N in free run over the training records, {begun.staged_rmse:.4g} N without"
@@ -288,8 +301,6 @@ def _refined(
         words = f"the refinement is refused: {said}"
         own = begun.k0_std, begun.s0_std, begun.k1_std, begun.c1_std
         return MaxwellFit(e, e, False, begun.staged_rmse, rmse, *own, *parts, (*notes, words))
-    words = (
-        f"the refinement is kept: {rmse:.4g} N in free run over the training records, {begun.staged_rmse:.4g} N without"
-    )
+    words = f"the refinement is kept: {said}"
     std, more = standard_errors(problem, np.asarray(found.x), wide)
     return MaxwellFit(element, e, True, begun.staged_rmse, rmse, *std, *parts, (*notes, words, *more))

@@ -237,7 +237,9 @@ def _fitted(
         notes,
     )
     leverage = np.einsum("ij,ji->i", weighted, np.linalg.pinv(weighted))
-    left_out = (weights * rest) / np.maximum(1.0 - leverage, EXACT)
+    if leverage.max() > 1.0 - EXACT:  # a window that alone decides a coefficient is predicted by no other
+        return made, float("inf"), 0.0
+    left_out = (weights * rest) / (1.0 - leverage)
     # Errors below what each window knows are no merit; without that floor exact data would ask for the highest degree.
     squares = np.maximum(left_out**2, 1.0)
     return made, float(squares.mean()), float(squares.std() / np.sqrt(squares.size))

@@ -14,6 +14,9 @@ from vpm.narx.maxwell_recursion import Recursion, Scheme, seen, stretch
 
 Array = NDArray[np.float64]
 
+#: Logarithms of the shortest and longest relaxation time, s, that a descent may try.
+LIMITS = (-40.0, 20.0)
+
 
 @dataclass(frozen=True)
 class Parameters:
@@ -27,7 +30,7 @@ class Parameters:
     @classmethod
     def from_vector(cls, x: Array, terms: int) -> Parameters:
         """From k0, s0, k1 and the logarithm of tau in one array; k0 has `terms` coefficients."""
-        return cls(x[:terms], x[terms:-2], float(x[-2]), float(np.exp(x[-1])))
+        return cls(x[:terms], x[terms:-2], float(x[-2]), float(np.exp(np.clip(x[-1], *LIMITS))))
 
     def to_vector(self) -> Array:
         """The same array."""
