@@ -70,6 +70,30 @@ def test_stages_recover_exact_records(scheme: Any) -> None:
     assert not fit.refined
 
 
+def test_a_pose_without_force_is_no_divergence() -> None:
+    e = element(k0=np.array([1e5, 2e4, 2e5]))
+    rest = poses(e)
+    lengths = 0.3 + 0.01 * np.array([one["u"][0] for one in rest])
+    for one, free in zip(rest[2::5], lengths[2::5], strict=True):  # in each row one pose at the free length
+        one["s"], one["F"] = np.full(400, free), 1e-12 * np.cos(np.arange(400.0))
+    fit = narx.identify_maxwell(rest, motions(e), SIGNALS, step=STEP, degree={"k0": 1, "s0": 1})
+    assert fit.refined
+    assert np.isfinite(fit.staged_rmse)
+
+
+def test_noise_of_the_length_at_rest_is_no_motion() -> None:
+    """Noise of 1 um in 25 tests at rest would make k1 too small by several standard errors if it counted."""
+    e, off = element(), []
+    for seed in range(6):
+        random = np.random.default_rng(seed)
+        rest = poses(e, 0.5, seed)
+        for one in rest:
+            one["s"] = one["s"] + 1e-6 * random.standard_normal(400)
+        fit = narx.identify_maxwell(rest, motions(e, 0.5, seed + 50), SIGNALS, step=STEP, degree={"k0": 1, "s0": 1})
+        off.append((fit.element.k1 - K1) / fit.k1_std)
+    assert abs(np.mean(off)) < 3.0 / np.sqrt(6.0)
+
+
 def test_refinement_recovers_maps_in_the_length_that_windows_cannot_give() -> None:
     """Windows see the tangent of k0 (s - s0), which is not k0 where that depends on s."""
     e = element(k0=np.array([1e5, 2e4, 2e5]))

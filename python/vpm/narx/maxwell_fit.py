@@ -8,7 +8,6 @@ from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
 from vpm.errors import DivergedError, IdentificationError
 from vpm.narx.maxwell import MaxwellNarx
@@ -18,6 +17,7 @@ from vpm.narx.maxwell_motion import LEAST, descend_motion, element_values, motio
 from vpm.narx.maxwell_problem import OutputErrors, Parameters
 from vpm.narx.maxwell_records import MaxwellSignals, Samples, element_samples, smoothed
 from vpm.narx.maxwell_recursion import POWER_NAMES, Scheme
+from vpm.narx.maxwell_runs import FAR
 from vpm.narx.maxwell_windows import static_windows
 from vpm.narx.records import RecordLike
 from vpm.results import Result
@@ -44,7 +44,7 @@ class MaxwellFit(Result):
     refined : bool
         Whether `element` is the refined one.
     staged_rmse, refined_rmse : float
-        Of free runs over all training records, N; infinite where one diverges or the descent came to no end, NaN
+        Of free runs over all training records, N; infinite where one diverges or tau is none that records show, NaN
         without refinement.
     k0_std, s0_std : ndarray, shape (10,)
         Standard errors of the element's coefficients; zero where a term is not used, NaN where nothing is known because
@@ -202,7 +202,9 @@ def refine_maxwell(
 
 
 def _after(one: Samples, skip: int) -> Samples:
-    arrays = (one.force[skip:], one.length[skip:], one.drive[skip:])
+    # At rest the length is one number: its noise would count as motion, and make k1 too small.
+    rest = np.full(one.length.size - skip, one.length[skip:].mean())
+    arrays = (one.force[skip:], rest, one.drive[skip:])
     return Samples(one.name, one.unit, one.time[skip:], one.step, *arrays)
 
 
@@ -240,8 +242,9 @@ def _shown(tau: float, samples: list[Samples]) -> bool:
 
 def _training_rmse(element: MaxwellNarx, samples: list[Samples]) -> float:
     total, count = 0.0, 0
+    # Of all records: at some pose the force may be zero.
+    bound = FAR * max(float(np.abs(one.force).max()) for one in samples) or np.inf
     for one in samples:
-        bound = 1e3 * float(np.abs(one.force).max()) or np.inf
         try:
             run = element.simulate_free_run(one.length, (one.force[0], one.force[1]), one.drive, limit=bound)
         except DivergedError:
@@ -276,6 +279,8 @@ def _refined(
             f"{problem.freedom} samples are too few for {problem.count} coefficients; give longer records or a lower "
             "degree"
         )
+    from scipy.optimize import least_squares
+
     e = begun.staged
     found = least_squares(
         problem.residual,
@@ -291,10 +296,12 @@ def _refined(
     end = Parameters.from_vector(np.asarray(found.x), problem.terms)
     maps = wide[0].to_plain() @ end.k0, wide[1].to_plain() @ end.s0
     element, rmse = e, float("inf")
-    if found.success and end.k1 != 0.0 and np.all(np.isfinite(found.x)) and _shown(end.tau, samples):
+    if end.k1 != 0.0 and np.all(np.isfinite(found.x)) and _shown(end.tau, samples):
         element = MaxwellNarx(*maps, end.k1, end.k1 * end.tau, e.step, e.scheme)
         rmse = _training_rmse(element, samples)
     notes = (*begun.notes, *dropped)
+    if found.status == 0:
+        notes = (*notes, f"the refinement was stopped after {found.nfev} evaluations, before its steps were small")
     parts = begun.drive_range, begun.length_range, int(found.nfev)
     said = f"{rmse:.4g} N in free run over the training records, {begun.staged_rmse:.4g} N without"
     if not rmse < (1.0 - BETTER) * begun.staged_rmse:

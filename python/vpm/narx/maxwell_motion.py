@@ -8,7 +8,6 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
 from vpm.errors import IdentificationError
 from vpm.narx.maxwell_maps import MaxwellMap
@@ -124,6 +123,8 @@ def _window(problem: OutputErrors, k0: MaxwellMap, s0: MaxwellMap, method: Metho
 
 def descend_motion(problem: OutputErrors, x: Array) -> Array:
     """k1 and tau of least output error with the maps as they are."""
+    from scipy.optimize import least_squares
+
     size = min(one.force.size for one in problem.records)
     start = problem.search(x, GRID[size / 3.0 >= GRID])
     scale = np.array([max(abs(start[-2]), 1e-6), 1.0])

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import butter, sosfiltfilt
 
 from vpm.errors import IdentificationError
 from vpm.experiment import Experiment
@@ -138,6 +137,8 @@ def smoothed(one: Samples, cutoff: float | None) -> Samples:
             f"record {one.name} has {one.length.size} samples, but a cut-off of {cutoff:g} Hz takes {end} from each "
             "end; give a longer record or a higher cut-off"
         )
+    from scipy.signal import butter, sosfiltfilt
+
     sections = butter(4, cutoff, fs=1.0 / one.step, output="sos")
     length = sosfiltfilt(sections, one.length)
     inner = slice(end, one.length.size - end)

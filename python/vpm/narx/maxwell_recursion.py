@@ -7,7 +7,6 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 from vpm.narx.maxwell import MaxwellNarx
 
@@ -77,6 +76,8 @@ class Recursion:
 
     def filtered(self, right: Array) -> Array:
         """Solution of ``(alpha + beta r) y[k] = right[k] + (gamma + delta r) y[k - lag]``, along the first axis."""
+        from scipy.signal import lfilter
+
         w, r = self.weights, self.ratio
         denominator = np.zeros(w.lag + 1)
         denominator[0], denominator[-1] = w.alpha + w.beta * r, -(w.gamma + w.delta * r)
