@@ -413,6 +413,19 @@ def test_records_of_another_clock_are_refused() -> None:
         narx.refine_maxwell(element(), [first, other], SIGNALS)
 
 
+def test_a_damper_without_spring_has_the_shortest_tau_and_a_note() -> None:
+    """F = k0 (s - s0) + c1 ds/dt is the element with an infinite k1: c1 comes back, k1 has a lower bound."""
+    random, time = np.random.default_rng(4), STEP * np.arange(4000)
+    poses_at = [np.full(300, s) for s in (0.31, 0.33, 0.35)]
+    rest = [{"F": 1e5 * (s - 0.3) + 0.1 * random.standard_normal(300), "s": s} for s in poses_at]
+    length = 0.33 + 0.01 * np.sin(12.0 * time)
+    force = 1e5 * (length - 0.3) + C1 * 0.12 * np.cos(12.0 * time) + 0.1 * random.standard_normal(time.size)
+    fit = narx.identify_maxwell(rest, {"F": force, "s": length}, MaxwellSignals("F", "s"), step=STEP)
+    assert fit.element.relaxation_time == pytest.approx(0.5 * STEP, rel=1e-2)
+    assert fit.element.c1 == pytest.approx(C1, rel=1e-3)
+    assert any("tau stands at half a step" in note for note in fit.notes)
+
+
 def test_results_have_the_common_manners(tmp_path: Path) -> None:
     e = element()
     windows = narx.static_windows(poses(e), SIGNALS, step=STEP)

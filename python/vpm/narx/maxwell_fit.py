@@ -27,8 +27,8 @@ Records: TypeAlias = "RecordLike | Sequence[RecordLike]"
 
 #: Share by which a refinement has to be better, beyond rounding.
 BETTER = 1e-9
-#: Relaxation times that records can show: this share of a step, and so many times the longest record.
-SHOWN = (0.01, 10.0)
+#: Relative distance of tau from what records can show that counts as none.
+NEAR = 1e-3
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -224,7 +224,7 @@ def _staged(moving: list[Samples], k0: MaxwellMap, s0: MaxwellMap, scheme: Schem
     maps = [one.basis.from_plain(one.coefficients) for one in (k0, s0)]
     x = descend_motion(problem, np.concatenate([*maps, [0.0, 0.0]]))
     k1, c1 = element_values(x)
-    if not (np.isfinite(k1) and k1 != 0.0 and np.isfinite(c1) and _shown(float(c1 / k1), moving)):
+    if not (np.isfinite(k1) and k1 != 0.0 and np.isfinite(c1) and x[-1] < problem.limits[1] - NEAR):
         raise IdentificationError(
             f"the tests in motion ask for k1 = {k1:.3g} N/m and c1 = {c1:.3g} N s/m, whose relaxation time no record "
             f"in steps of {moving[0].step:g} s can show; give tests with more and faster motion, or check the force"
@@ -233,11 +233,6 @@ def _staged(moving: list[Samples], k0: MaxwellMap, s0: MaxwellMap, scheme: Schem
     std = np.sqrt(np.diag(covariance))
     element = MaxwellNarx(k0.coefficients, s0.coefficients, float(k1), float(c1), moving[0].step, scheme)
     return element, float(std[0]), float(std[1])
-
-
-def _shown(tau: float, samples: list[Samples]) -> bool:
-    longest = max(one.force.size * one.step for one in samples)
-    return SHOWN[0] * samples[0].step < tau < SHOWN[1] * longest
 
 
 def _training_rmse(element: MaxwellNarx, samples: list[Samples]) -> float:
@@ -282,11 +277,15 @@ def _refined(
     from scipy.optimize import least_squares
 
     e = begun.staged
+    low, high = np.full(problem.count, -np.inf), np.full(problem.count, np.inf)
+    low[-1], high[-1] = problem.limits
+    first = start_vector(e, wide)
+    first[-1] = np.clip(first[-1], low[-1] + NEAR, high[-1] - NEAR)
     found = least_squares(
         problem.residual,
-        start_vector(e, wide),
+        first,
         problem.jacobian,
-        method="lm",
+        bounds=(low, high),
         x_scale="jac",
         xtol=1e-12,
         ftol=1e-12,
@@ -296,7 +295,7 @@ def _refined(
     end = Parameters.from_vector(np.asarray(found.x), problem.terms)
     maps = wide[0].to_plain() @ end.k0, wide[1].to_plain() @ end.s0
     element, rmse = e, float("inf")
-    if end.k1 != 0.0 and np.all(np.isfinite(found.x)) and _shown(end.tau, samples):
+    if end.k1 != 0.0 and np.all(np.isfinite(found.x)) and found.x[-1] < high[-1] - NEAR:
         element = MaxwellNarx(*maps, end.k1, end.k1 * end.tau, e.step, e.scheme)
         rmse = _training_rmse(element, samples)
     notes = (*begun.notes, *dropped)
@@ -310,4 +309,9 @@ def _refined(
         return MaxwellFit(e, e, False, begun.staged_rmse, rmse, *own, *parts, (*notes, words))
     words = f"the refinement is kept: {said}"
     std, more = standard_errors(problem, np.asarray(found.x), wide)
+    if found.x[-1] < low[-1] + NEAR:
+        more.append(
+            f"tau stands at half a step, {end.tau:g} s: the force relaxes faster than the samples show, so that c1 is "
+            "known and k1 is a lower bound"
+        )
     return MaxwellFit(element, e, True, begun.staged_rmse, rmse, *std, *parts, (*notes, words, *more))

@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 Method = Literal["output_error", "instrumental", "least_squares"]
 
 #: Relaxation times that a descent may start from, in samples.
-GRID = np.geomspace(0.3, 300.0, 16)
+GRID = np.geomspace(0.6, 300.0, 16)
 #: Fewest samples of a window.
 LEAST = 20
 
@@ -142,7 +142,8 @@ def descend_motion(problem: OutputErrors, x: Array) -> Array:
         errors,
         start[-2:] / scale,
         derivatives,
-        method="lm",
+        bounds=([-np.inf, problem.limits[0]], [np.inf, problem.limits[1]]),
+        x_scale="jac",
         xtol=1e-14,
         ftol=1e-14,
         gtol=1e-14,

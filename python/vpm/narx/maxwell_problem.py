@@ -14,8 +14,9 @@ from vpm.narx.maxwell_recursion import Recursion, Scheme, seen, stretch
 
 Array = NDArray[np.float64]
 
-#: Logarithms of the shortest and longest relaxation time, s, that a descent may try.
-LIMITS = (-40.0, 20.0)
+#: Relaxation times that records can show: half a step, below which samples alternate in the trapezoidal form, and so
+#: many times the longest record.
+SHORTEST, LONGEST = 0.5, 10.0
 
 
 @dataclass(frozen=True)
@@ -30,7 +31,7 @@ class Parameters:
     @classmethod
     def from_vector(cls, x: Array, terms: int) -> Parameters:
         """From k0, s0, k1 and the logarithm of tau in one array; k0 has `terms` coefficients."""
-        return cls(x[:terms], x[terms:-2], float(x[-2]), float(np.exp(np.clip(x[-1], *LIMITS))))
+        return cls(x[:terms], x[terms:-2], float(x[-2]), float(np.exp(x[-1])))
 
     def to_vector(self) -> Array:
         """The same array."""
@@ -60,6 +61,12 @@ class OutputErrors:
         self.count = self.terms + len(s0.terms) + 2
         self._columns = [(k0.columns(one.drive, one.length), s0.columns(one.drive, one.length)) for one in self.records]
         self._stretch = [stretch(scheme, one.length) for one in self.records]
+
+    @property
+    def limits(self) -> tuple[float, float]:
+        """Logarithms of the relaxation times that the records can show."""
+        longest = max(one.force.size * one.step for one in self.records)
+        return float(np.log(SHORTEST * self.records[0].step)), float(np.log(LONGEST * longest))
 
     @property
     def freedom(self) -> int:
