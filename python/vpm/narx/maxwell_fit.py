@@ -3,24 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vpm.errors import DivergedError, IdentificationError
+from vpm.errors import IdentificationError
 from vpm.narx.maxwell import MaxwellNarx
 from vpm.narx.maxwell_identifiability import basis_around, standard_errors, start_vector, told_apart, widened
 from vpm.narx.maxwell_maps import Basis, MaxwellMap, fit_maxwell_map
 from vpm.narx.maxwell_motion import LEAST, descend_motion, element_values, motion_covariance
 from vpm.narx.maxwell_problem import OutputErrors, Parameters
 from vpm.narx.maxwell_records import MaxwellSignals, Samples, element_samples, smoothed
-from vpm.narx.maxwell_recursion import POWER_NAMES, Scheme
-from vpm.narx.maxwell_runs import FAR
+from vpm.narx.maxwell_recursion import Scheme
+from vpm.narx.maxwell_result import MaxwellFit, training_rmse, unrefined
 from vpm.narx.maxwell_windows import static_windows
 from vpm.narx.records import RecordLike
-from vpm.results import Result
 
 Array = NDArray[np.float64]
 Records: TypeAlias = "RecordLike | Sequence[RecordLike]"
@@ -29,69 +27,6 @@ Records: TypeAlias = "RecordLike | Sequence[RecordLike]"
 BETTER = 1e-9
 #: Relative distance of tau from what records can show that counts as none.
 NEAR = 1e-3
-
-
-@dataclass(frozen=True, repr=False, eq=False)
-class MaxwellFit(Result):
-    """An element from records, with what is known of its coefficients.
-
-    Attributes
-    ----------
-    element : MaxwellNarx
-        The better of both on the training records.
-    staged : MaxwellNarx
-        From windows at rest, maps through them, then k1 and c1.
-    refined : bool
-        Whether `element` is the refined one.
-    staged_rmse, refined_rmse : float
-        Of free runs over all training records, N; infinite where one diverges or tau is none that records show, NaN
-        without refinement.
-    k0_std, s0_std : ndarray, shape (10,)
-        Standard errors of the element's coefficients; zero where a term is not used, NaN where nothing is known because
-        a given element was kept.
-    k1_std, c1_std : float
-    drive_range, length_range : tuple of two floats
-        Of the training records, beyond which the maps are guesses.
-    evaluations : int
-        Of the refinement.
-    notes : tuple of str
-        What was chosen and why, and what the records cannot tell.
-    """
-
-    element: MaxwellNarx
-    staged: MaxwellNarx
-    refined: bool
-    staged_rmse: float
-    refined_rmse: float
-    k0_std: Array
-    s0_std: Array
-    k1_std: float
-    c1_std: float
-    drive_range: tuple[float, float]
-    length_range: tuple[float, float]
-    evaluations: int
-    notes: tuple[str, ...]
-
-    def _headline(self) -> Mapping[str, object]:
-        return {
-            "element": self.element,
-            "refined": self.refined,
-            "staged_rmse": self.staged_rmse,
-            "refined_rmse": self.refined_rmse,
-        }
-
-    @property
-    def coefficients(self) -> tuple[tuple[str, float, float], ...]:
-        """Name, value and standard error of each: both maps in the order of `MaxwellNarx`, k1, c1."""
-        e = self.element
-        names = [f"{of}[{power}]" for of in ("k0", "s0") for power in POWER_NAMES] + ["k1", "c1"]
-        values = [*map(float, e.k0), *map(float, e.s0), e.k1, e.c1]
-        std = [*map(float, self.k0_std), *map(float, self.s0_std), self.k1_std, self.c1_std]
-        return tuple(zip(names, values, std, strict=True))
-
-    def _frame_columns(self) -> Mapping[str, object]:
-        names, values, std = zip(*self.coefficients, strict=True)
-        return {"coefficient": names, "value": values, "std": std}
 
 
 def identify_maxwell(
@@ -158,7 +93,7 @@ def identify_maxwell(
     notes = (*windows.notes, *k0.notes, *s0.notes)
     skip = round(settle / at_rest[0].step)
     kept = [_after(one, skip) for one in at_rest]
-    begun = _fit(staged, kept + moving, (k0.std, s0.std, k1_std, c1_std), notes)
+    begun = unrefined(staged, kept + moving, (k0.std, s0.std, k1_std, c1_std), notes)
     if not refine:
         return begun
     return _refined(begun, kept + moving, (k0.basis, s0.basis), signals, refined_degree)
@@ -197,7 +132,7 @@ def refine_maxwell(
         for c in (element.k0, element.s0)
     )
     nothing = np.full(10, np.nan)
-    begun = _fit(element, samples, (nothing, nothing, np.nan, np.nan), ())
+    begun = unrefined(element, samples, (nothing, nothing, np.nan, np.nan), ())
     return _refined(begun, samples, (bases[0], bases[1]), signals, degree)
 
 
@@ -233,29 +168,6 @@ def _staged(moving: list[Samples], k0: MaxwellMap, s0: MaxwellMap, scheme: Schem
     std = np.sqrt(np.diag(covariance))
     element = MaxwellNarx(k0.coefficients, s0.coefficients, float(k1), float(c1), moving[0].step, scheme)
     return element, float(std[0]), float(std[1])
-
-
-def _training_rmse(element: MaxwellNarx, samples: list[Samples]) -> float:
-    total, count = 0.0, 0
-    # Of all records: at some pose the force may be zero.
-    bound = FAR * max(float(np.abs(one.force).max()) for one in samples) or np.inf
-    for one in samples:
-        try:
-            run = element.simulate_free_run(one.length, (one.force[0], one.force[1]), one.drive, limit=bound)
-        except DivergedError:
-            return float("inf")
-        total += float(np.sum((run - one.force)[2:] ** 2))
-        count += one.force.size - 2
-    return float(np.sqrt(total / count))
-
-
-def _fit(
-    element: MaxwellNarx, samples: list[Samples], std: tuple[Array, Array, float, float], notes: tuple[str, ...]
-) -> MaxwellFit:
-    drive, length = (np.concatenate([getattr(one, name) for one in samples]) for name in ("drive", "length"))
-    ranges = [(float(x.min()), float(x.max())) for x in (drive, length)]
-    rmse = _training_rmse(element, samples)
-    return MaxwellFit(element, element, False, rmse, float("nan"), *std, ranges[0], ranges[1], 0, notes)
 
 
 def _refined(
@@ -297,7 +209,7 @@ def _refined(
     element, rmse = e, float("inf")
     if end.k1 != 0.0 and np.all(np.isfinite(found.x)) and found.x[-1] < high[-1] - NEAR:
         element = MaxwellNarx(*maps, end.k1, end.k1 * end.tau, e.step, e.scheme)
-        rmse = _training_rmse(element, samples)
+        rmse = training_rmse(element, samples)
     notes = (*begun.notes, *dropped)
     if found.status == 0:
         notes = (*notes, f"the refinement was stopped after {found.nfev} evaluations, before its steps were small")
