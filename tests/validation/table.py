@@ -7,7 +7,7 @@ import subprocess
 from collections.abc import Callable
 from pathlib import Path
 
-from validation import beams, hydraulics, hyl, impedance, inertial, linkages, motions, oil, tudor
+from validation import beams, hydraulics, hyl, impedance, inertial, linkages, maxwell_narx, motions, oil, tudor
 from validation.row import Row, row
 
 ROOT = Path(__file__).resolve().parent.parent.parent
@@ -20,6 +20,7 @@ PARTS: dict[str, Callable[[], list[Row]]] = {
     "Masses and inertias by least squares": inertial.reference,
     "A hydraulic servo-cylinder": hydraulics.rig,
     "Oil and valve of a cylinder by least squares": oil.least_squares,
+    "A Maxwell element from records": maxwell_narx.rows,
     "The HyL leg stands and falls": hyl.reference,
     "The HyL leg beside a solution without vpm": hyl.witnessed,
     "Stiffness and damping from loops and landings": impedance.rows,
