@@ -1,4 +1,4 @@
-"""The residual of a model against data, in any of the five modes, with its exact derivative.
+"""The residual of a model against data, in the modes of simulation, with its exact derivative.
 
 A problem fixes the data and how they are compared; the model may change under it. That is what lets one problem judge
 the nominal model, the recalibrated one and every candidate effect on the same samples.
@@ -20,7 +20,7 @@ from vpm.experiment import Experiment, Motion, motion, parallel_filter
 from vpm.identify.parallel import in_order
 from vpm.initial import joint_motion
 from vpm.model import Model
-from vpm.simulate import MODES, Setup, check_balance, copied_channels, simulate_arrays
+from vpm.simulate import Setup, check_balance, copied_channels, simulate_arrays
 
 Array = NDArray[np.float64]
 
@@ -270,13 +270,7 @@ class OutputErrorProblem:
         self._setup = setup or Setup()
         follows = mode == "prescribed_motion"
         self._followed = [joint_motion(e, model, cutoff) if follows else None for e in self.experiments]
-        self._channels = tuple(channels) if channels is not None else _compared(model, experiments, mode)
-        if not self._channels:
-            raise IdentificationError(
-                f"no measured channel to compare in mode '{mode}': the logs hold {', '.join(experiments[0].channels)}; "
-                "log a position or velocity, or choose another mode"
-            )
-        _check_channels(model, experiments, self._channels)
+        self._channels = compared_channels(model, experiments, mode, channels)
         self.blocks = self._lay_out(model)
 
     def evaluate(self, model: Model, theta: Array, columns: Sequence[int] = ()) -> tuple[Array, Array]:
@@ -330,27 +324,24 @@ class OutputErrorProblem:
         return np.asarray(counted)
 
 
-def problem(
-    model: Model,
-    experiments: Sequence[Experiment],
-    mode: str = "inverse_dynamics",
-    *,
-    cutoff: float | None = None,
-    setup: Setup | None = None,
-    channels: Sequence[str] | None = None,
-    workers: int = 1,
-) -> InverseDynamicsProblem | OutputErrorProblem:
-    """Set up the residual of ``model`` against ``experiments`` in one of the five modes.
+def compared_channels(
+    model: Model, experiments: Sequence[Experiment], mode: str, channels: Sequence[str] | None
+) -> tuple[str, ...]:
+    """Outputs that are compared: those given, or all that every log holds and the mode does not copy from it.
 
-    ``channels`` are the compared outputs of simulated modes, ``workers`` the records that are simulated at a time.
+    Raises
+    ------
+    IdentificationError
+        There is none, or one is not in the model or a log.
     """
-    if not experiments:
-        raise IdentificationError("no experiment was given; pass at least one")
-    if mode not in MODES:
-        raise IdentificationError(f"unknown mode '{mode}'; choose one of {', '.join(MODES)}")
-    if mode == "inverse_dynamics":
-        return InverseDynamicsProblem(model, experiments, cutoff=cutoff)
-    return OutputErrorProblem(model, experiments, mode, channels=channels, setup=setup, cutoff=cutoff, workers=workers)
+    chosen = tuple(channels) if channels is not None else _compared(model, experiments, mode)
+    if not chosen:
+        raise IdentificationError(
+            f"no measured channel to compare in mode '{mode}': the logs hold {', '.join(experiments[0].channels)}; "
+            "log a position or velocity, or choose another mode"
+        )
+    _check_channels(model, experiments, chosen)
+    return chosen
 
 
 def _compared(model: Model, experiments: Sequence[Experiment], mode: str) -> tuple[str, ...]:
