@@ -17,10 +17,11 @@ from scipy.ndimage import maximum_filter1d
 
 from vpm.errors import IdentificationError, near_match
 from vpm.experiment import Experiment, Motion, motion, parallel_filter
+from vpm.identify.first_state import add_first_state, first_state_slopes
 from vpm.identify.parallel import in_order
-from vpm.initial import joint_motion
+from vpm.initial import initial_state, joint_motion
 from vpm.model import Model
-from vpm.simulate import Setup, check_balance, copied_channels, simulate_arrays
+from vpm.simulate import Setup, SimulatedArrays, check_balance, copied_channels, simulate_arrays
 
 Array = NDArray[np.float64]
 
@@ -28,6 +29,8 @@ Array = NDArray[np.float64]
 STANDSTILL_SHARE = 0.005
 #: A record with fewer samples after decimation says nothing about anything.
 FEWEST_SAMPLES = 12
+#: Modes that simulate a record as a whole from its first sample.
+WHOLE = ("free_run", "closed_loop")
 
 
 @dataclass(frozen=True)
@@ -279,9 +282,7 @@ class OutputErrorProblem:
         index = [model.output_channels.index(channel) for channel in self._channels]
         blocks = iter(self.blocks)
         jobs = [
-            partial(
-                simulate_arrays, model, e, self.mode, theta=theta, columns=columns, setup=self._setup, followed=followed
-            )
+            partial(self._simulated, model, e, theta, list(columns), followed)
             for e, followed in zip(self.experiments, self._followed, strict=True)
         ]
         results = in_order(jobs, self.workers)
@@ -292,6 +293,19 @@ class OutputErrorProblem:
                 residuals.append((experiment[channel][result.rows] - result.outputs[:, column]) * weight)
                 jacobians.append(-result.jacobian[:, column, :] * weight[:, None])
         return np.concatenate(residuals), np.concatenate(jacobians)
+
+    def _simulated(
+        self, model: Model, experiment: Experiment, theta: Array, columns: list[int], followed: Motion | None
+    ) -> SimulatedArrays:
+        """Simulation of one record; its derivative knows what parameters do to the first state of a whole record."""
+        run = partial(simulate_arrays, model, experiment, self.mode, theta=theta, setup=self._setup)
+        if not columns or self.mode not in WHOLE:
+            return run(columns=columns, followed=followed)
+        state = initial_state(model, experiment, theta)
+        result = run(columns=columns, initial_state=state)
+        slopes = first_state_slopes(partial(initial_state, model, experiment), theta, columns)
+        add_first_state(result.jacobian, lambda x: run(initial_state=x).outputs, state, slopes, theta[columns])
+        return result
 
     def _lay_out(self, model: Model) -> tuple[Block, ...]:
         blocks, start = [], 0
