@@ -64,7 +64,8 @@ class Case:
 
     def log(self, seed: int = 0) -> Experiment:
         """Record with noise."""
-        model, time = self.truth, self.step * np.arange(self.samples)
+        model = self.truth
+        time: Array = np.asarray(self.step * np.arange(self.samples), dtype=np.float64)
         channels = dict(self.inputs(time))
         held = Experiment.from_arrays(time, channels, model=model, name=Path(self.model).stem)
         closed = any(name.endswith(".reference") for name in channels)
@@ -130,8 +131,8 @@ FALLING = {
 }
 BEFORE_THE_FALL = {
     "hand.command": lambda t: 0.0 * t,
-    "hip_drive.reference": lambda t: np.full_like(t, np.radians(40.0)),
-    "knee_drive.reference": lambda t: np.full_like(t, np.radians(-80.0)),
+    "hip_drive.reference": lambda t: 0.0 * t + np.radians(40.0),
+    "knee_drive.reference": lambda t: 0.0 * t + np.radians(-80.0),
 }
 AT_REST = (*FALLING, *(name.replace("position", "velocity") for name in FALLING))
 LEG = {"slider.position": 1e-4, "hip_rotation.position": 2e-4, "knee_rotation.position": 2e-4}

@@ -7,7 +7,7 @@ import subprocess
 from collections.abc import Callable
 from pathlib import Path
 
-from validation import beams, hydraulics, hyl, linkages, motions, tudor
+from validation import beams, hydraulics, hyl, identification, linkages, motions, tudor
 from validation.row import Row, row
 
 ROOT = Path(__file__).resolve().parent.parent.parent
@@ -29,6 +29,7 @@ PARTS: dict[str, Callable[[], list[Row]]] = {
     "TUDOR at rest": tudor.static,
     "TUDOR in motion": tudor.dynamic,
     "TUDOR, the published table": tudor.published,
+    "Parameters of the examples from noisy logs": identification.recovered,
 }
 
 _HEAD = """# Validation
