@@ -17,7 +17,7 @@ from vpm.identify.estimation import Estimate, Progress, estimate, limits
 from vpm.identify.identifiability import Combination
 from vpm.identify.objective import AnyProblem
 from vpm.identify.problem import gaps
-from vpm.identify.remarks import constant_channels, remarks, touching
+from vpm.identify.remarks import constant_channels, lost_channels, remarks, touching
 from vpm.identify.settings import Fitting
 from vpm.identify.shooting import ShootingProblem
 from vpm.identify.statistics import NORMAL_95
@@ -192,6 +192,9 @@ def identify(
         raise IdentificationError(
             f"{model.name}: no parameter is free; give some an uncertainty in the model file or name them in free="
         )
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise IdentificationError(f'"{twice[0]}" is named {names.count(twice[0])} times in free=; name it once')
     data = comparison(model, records, mode, cutoff=cutoff, setup=setup, ties=ties, fitting=fitting)
     check_ties(model, ties or {}, names)
     before, _ = data.evaluate(model, model.theta)
@@ -270,6 +273,7 @@ def _told(
         len(fit.states),
     )
     told += constant_channels(model, records, data.blocks)
+    told += lost_channels(fit.mode, fit.names, fit.after)
     if fit.ended == "interrupted":
         told.insert(0, f"stopped by Ctrl-C after {fit.evaluations} evaluations: the values are the best until then")
     elif fit.ended == "evaluations":
