@@ -121,4 +121,6 @@ $(VENV)/.tools: pyproject.toml | $(VENV)/.made
 $(VENV)/.installed: pyproject.toml $(RUST_SOURCES) | $(VENV)/.tools
 	@echo 'building the core and installing vpm into $(VENV); the first time this takes a few minutes'
 	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/python -m pip install --quiet --no-build-isolation --editable '.[dev]'
+	@# A peer of the tests, of pure Python; its list of dependencies, all there already, would hold NumPy back.
+	$(BIN)/python -m pip install --quiet --no-deps 'sysidentpy>=0.9'
 	@touch $@

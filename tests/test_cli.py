@@ -136,6 +136,48 @@ def test_identify_takes_the_settings_of_the_engine() -> None:
     assert "NAME=LOW:HIGH" in refused.stderr
 
 
+def test_identify_writes_a_folder_and_judges_unseen_records(tmp_path: Path) -> None:
+    name, folder = "shoulder.friction.viscous", tmp_path / "fitted"
+    words = ("--free", name, "--free", "arm.inertia.yy", "--fix", "arm.inertia.yy", "--validate", VALIDATION)
+    done = vpm("identify", MODEL, TRAIN, *words, "--out", folder, "--plot", tmp_path / "fit.svg")
+    assert done.returncode == 0, done.stderr
+    assert "unseen shoulder.effort" in done.stdout
+    names = {"model.toml", "parameters.csv", "report.md", "fit.npz", "fit.png"}
+    assert {path.name for path in folder.iterdir()} == names
+    header, row, *rest = (folder / "parameters.csv").read_text(encoding="utf-8").splitlines()
+    assert header == "name,start,value,std,low,high,unit"
+    assert row.startswith(name)
+    assert not rest
+    report = (folder / "report.md").read_text(encoding="utf-8")
+    assert f"| {name} |" in report
+    assert "unseen shoulder.effort" in report
+    assert vpm("info", folder / "model.toml").returncode == 0
+    assert (tmp_path / "fit.svg").is_file()
+
+
+def test_identify_turns_a_model_round() -> None:
+    words = ("--free", "shoulder.friction.viscous", "--mode", "input_error", "--horizon", "0.2")
+    done = vpm("identify", MODEL, TRAIN, *words)
+    assert done.returncode == 0, done.stderr
+    assert "residual motor.command" in done.stdout
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of another kind")
+def test_ctrl_c_keeps_the_best_of_a_fit_and_writes_it(tmp_path: Path) -> None:
+    words = ["--mode", "closed_loop", "--substeps", "20", "--log", "--starts", "1000", "--workers", "1"]
+    command = [sys.executable, "-m", "vpm", "identify", str(MODEL), str(TRAIN), *words, "--out", str(tmp_path / "f")]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stderr is not None
+        for line in process.stderr:
+            if line.startswith("evaluation 25:"):
+                break
+        process.send_signal(signal.SIGINT)
+        out, _ = process.communicate(timeout=60)
+    assert process.returncode == 0
+    assert "stopped by Ctrl-C" in out
+    assert (tmp_path / "f" / "model.toml").is_file()
+
+
 def test_diagnose_writes_its_report(tmp_path: Path) -> None:
     done = vpm("diagnose", MODEL, TRAIN, "--validate", VALIDATION, "--effect", "coulomb_friction", "--out", tmp_path)
     assert done.returncode == 0, done.stderr
@@ -180,6 +222,9 @@ def test_demo_tells_the_story(tmp_path: Path) -> None:
         (("simulate", STEP, "--plot", "step.jpg"), "step.jpg is no name of a picture"),
         (("diagnose", MODEL, TRAIN, "--effect", "coulomb"), "coulomb_friction"),
         (("identify", MODEL, TRAIN, "--free", "shoulder.viscous"), "shoulder.friction.viscous"),
+        (("identify", MODEL, TRAIN, "--fix", "shoulder.viscous"), '--fix: "shoulder.viscous" is not among the free'),
+        (("identify", MODEL, TRAIN, "--tie", "a"), "FOLLOWER=LEADER"),
+        (("identify", MODEL, TRAIN, "--out", MODEL / "in"), "name another folder"),
         (("budget", MODEL, "--rate", "-5"), "a rate of -5 Hz"),
     ],
 )

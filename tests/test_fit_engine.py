@@ -13,7 +13,7 @@ import pytest
 from numpy.typing import NDArray
 
 from synthetic import Truth, nominal, simulate_axis
-from vpm.errors import IdentificationError
+from vpm.errors import DivergedError, IdentificationError
 from vpm.experiment import Experiment
 from vpm.identify import Fit, Fitting, bootstrap, identify, problem, profile_intervals
 from vpm.identify.objective import Objective, losses_and_weights
@@ -284,6 +284,32 @@ def test_warnings_name_the_parameter() -> None:
     few = fitted(recorded(n=20), known_states=REST)
     assert any("20 samples are too few for 3 unknowns" in w for w in few.warnings)
     assert fitted(record, known_states=REST).warnings == ()
+
+
+def test_a_free_run_that_loses_an_unstable_machine_is_told_with_its_parameters() -> None:
+    free = ("rod.inertia.yy", "foot.friction.viscous")
+    fit = identify(inverted(), balanced(20.0), free, mode="free_run", setup=SETUP)
+    (told,) = [w for w in fit.warnings if "loses the record" in w]
+    assert told.startswith("foot.position is ")
+    assert "rod.inertia.yy, foot.friction.viscous mean nothing; take restarts, pieces" in told
+
+
+def test_a_free_run_that_leaves_the_finite_numbers_is_one_sentence() -> None:
+    stiff = oscillator(slide__spring__stiffness=1e7)
+    for settings in (None, Fitting(log=True)):
+        with pytest.raises(DivergedError, match=r"`slide` is no longer finite .* use more substeps"):
+            identify(stiff, recorded(n=2000), [MASS], mode="free_run", setup=SETUP, fitting=settings)
+
+
+def test_a_pair_that_shows_together_is_named() -> None:
+    """Ten samples of one push: mass, friction and spring all slow the block down in much the same way."""
+    fit = fitted(recorded(n=60).trim(0.0, 0.195), known_states=REST)
+    assert any("are collinear, correlation" in w and VISCOUS in w for w in fit.warnings)
+
+
+def test_a_name_that_comes_twice_is_refused() -> None:
+    with pytest.raises(IdentificationError, match=r'"block\.mass" is named 2 times in free=; name it once'):
+        identify(wrong(), recorded(), [MASS, MASS], mode="free_run", setup=SETUP)
 
 
 def test_warnings_tell_what_cannot_be_seen() -> None:

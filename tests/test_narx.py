@@ -321,5 +321,25 @@ def test_terms_and_coefficients_are_those_of_sysidentpy() -> None:
         assert ours[term] == pytest.approx(value, rel=1e-6)
 
 
+def test_a_linear_model_is_the_arx_model_that_least_squares_and_control_give() -> None:
+    """Coefficients by SciPy, and the free run of the transfer function by python-control."""
+    from scipy.linalg import lstsq
+
+    record = noisy(3, 600, 0.01)
+    y, u = np.asarray(record["y"]), np.asarray(record["u"])
+    model = identify(record, output="y", inputs=["u"], degree=1, constant=False, n_terms="all")
+    table = np.column_stack([y[1:-1], y[:-2], u[1:-1], u[:-2]])
+    expected = lstsq(table, y[2:])[0]
+    theta = dict(zip(model.term_names, model.coefficients, strict=True))
+    names = ("y[k-1]", "y[k-2]", "u[k-1]", "u[k-2]")
+    np.testing.assert_allclose([theta[name] for name in names], expected, rtol=1e-9)
+    control = pytest.importorskip("control")
+    a1, a2, b1, b2 = expected
+    transfer = control.tf([b1, b2], [1.0, -a1, -a2], dt=1.0)
+    theirs = control.forced_response(transfer, np.arange(50.0), u[:50]).outputs
+    ours = model.simulate_free_run({"y": theirs, "u": u[:50]}).values
+    np.testing.assert_allclose(ours, theirs[-ours.size :], atol=1e-9 * np.abs(theirs).max())
+
+
 def test_module_is_reachable_from_the_package() -> None:
     assert narx.identify is identify

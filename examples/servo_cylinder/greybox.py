@@ -1,6 +1,7 @@
 """Grey-box identification of the servo-cylinder on its bench: six physical parameters from two pressures and a place.
 
 python examples/servo_cylinder/greybox.py                 one record of each input, table of estimates
+python examples/servo_cylinder/greybox.py --tests 5       table 5.4 in its own layout, five records of each input
 python examples/servo_cylinder/greybox.py --seeds 100     how often the truth lies inside its own 95 % interval
 
 The data are simulated in steps a quarter as long as those of the fitted model, with noise and quantisation.
@@ -132,6 +133,17 @@ def table(fits: dict[str, Fit]) -> None:
     print(f"{'simulated with':24s}{cells[0] + ' ' * 12:>24s}{cells[1] + ' ' * 12:>26s}")
 
 
+def five_tests(tests: int = 5) -> None:
+    """Table 5.4 in its own layout: a row for each test, all six parameters free, from the listing's start."""
+    print(f"{'test':6s}{'chirp beta/1e7':>18s}{'K_v/1e-5':>12s}{'Gaussian beta/1e7':>20s}{'K_v/1e-5':>12s}")
+    for test in range(1, tests + 1):
+        cells = []
+        for current in (chirp(5.0, 0.2e-3), random_gaussian(0.5, seed=test)):
+            fit = fitted(measured(current, seed=test), starts=STARTS)
+            cells += [fit[FREE[0]] / 1e7, fit[FREE[1]] / 1e-5]
+        print(f"{test:<6d}{cells[0]:18.3f}{cells[1]:12.5f}{cells[2]:20.3f}{cells[3]:12.5f}", flush=True)
+
+
 def coverage(seeds: int, seconds: float = 0.5) -> Array:
     """Share of seeds (6,) in which the truth lies inside its own 95 % interval; every fit starts 30 % off."""
     truth = np.array([rig().parameters[name].value for name in FREE])
@@ -180,4 +192,9 @@ def main(seeds: int) -> None:
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seeds", type=int, default=0, help="seeds of the coverage")
-    main(parser.parse_args().seeds)
+    parser.add_argument("--tests", type=int, default=0, help="tests of the table, in place of all else")
+    asked = parser.parse_args()
+    if asked.tests:
+        five_tests(asked.tests)
+    else:
+        main(asked.seeds)

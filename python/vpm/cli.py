@@ -4,31 +4,40 @@ from __future__ import annotations
 
 import sys
 import warnings
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
-from functools import partial
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
-from rich.console import Console
 from typer.core import TyperGroup
 
-from vpm import __version__
+from vpm import __version__, identify_command
+from vpm.command import (
+    BESIDE,
+    FORMATS,
+    PICTURES,
+    Channels,
+    Cutoff,
+    Integrator,
+    Interpolate,
+    Logs,
+    Mode,
+    ModelPath,
+    OneLog,
+    Plot,
+    console,
+    errors,
+    load_all,
+    load_model,
+    load_pair,
+    load_record,
+    progress,
+    save_plot,
+    warnings_told,
+)
 from vpm.errors import ValidityWarning, VpmError
 from vpm.excite_command import app as excite_app
-from vpm.identify import options
 from vpm.simulate import INTEGRATORS
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from vpm.experiment import Experiment
-    from vpm.model import Model
-
-#: What ``--plot`` without a file name stands for, and the endings by which such a name is told from a model or a log.
-BESIDE = "*.png"
-PICTURES = (".png", ".svg", ".pdf")
 
 
 class _Commands(TyperGroup):
@@ -72,33 +81,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 app.add_typer(excite_app, name="excite")
-console = Console(highlight=False, soft_wrap=True)
-errors = Console(stderr=True, highlight=False, soft_wrap=True)
-
-ModelPath = Annotated[Path, typer.Argument(metavar="MODEL", help="Model file (TOML).")]
-FORMATS = "CSV, Parquet, MAT, HDF5, ROS bag, MCAP"
-Logs = Annotated[list[Path], typer.Argument(metavar="LOG...", help=f"Measured records ({FORMATS}).")]
-OneLog = Annotated[Path, typer.Argument(metavar="LOG", help=f"Measured record ({FORMATS}).")]
-Interpolate = Annotated[bool, typer.Option("--interpolate", help="Bring uneven steps and clocks to one grid.")]
-Channels = Annotated[
-    Path | None, typer.Option(help="Channel table (TOML); by default the [channels] table of the model file.")
-]
-Cutoff = Annotated[
-    float | None, typer.Option(help="Cut-off frequency of the motion filter, Hz; by default chosen from the record.")
-]
-Mode = Annotated[
-    str,
-    typer.Option(
-        help="free_run, inverse_dynamics, restarts, closed_loop or prescribed_motion.",
-        metavar="MODE",
-        show_default=True,
-    ),
-]
-Integrator = Annotated[
-    str,
-    typer.Option(help="auto, linearly_implicit, rosenbrock, rk4, semi_implicit, guarded, adaptive, adaptive(1e-8)."),
-]
-Plot = Annotated[Path | None, typer.Option(help="Write the plot to this file (PNG, SVG or PDF).")]
+app.command(epilog=identify_command.EXAMPLES)(identify_command.identify)
 Out = Annotated[Path, typer.Option(help="Folder for report.json, report.html and the repaired model.")]
 
 
@@ -182,14 +165,14 @@ def _simulate_scenario(path: Path, out: Path | None, plot: Path | None) -> None:
     from vpm.scenario import Scenario
 
     scenario = Scenario.load(path)
-    with _progress() as tell, warnings.catch_warnings():
+    with progress() as tell, warnings.catch_warnings():
         warnings.simplefilter("ignore", ValidityWarning)  # they stand in the notes of the runs
         tell(f"{scenario.name}: {len(scenario.models)} runs")
         result = scenario.run(progress=lambda done, total: tell(f"{done} of {total} runs"))
     console.print(str(result), markup=False)
     if out is not None:
         result.save(out)
-    _save_plot(result.plot, plot, path)
+    save_plot(result.plot, plot, path)
     if result.failures:
         raise VpmError(
             f"{path}: {len(result.failures)} of {len(scenario.models)} runs failed: {'; '.join(result.told)}"
@@ -209,8 +192,8 @@ def _simulate_log(
     from vpm.compare import compare as compare_run
     from vpm.simulate import simulate as simulate_log
 
-    machine, record = _load(model, log, channels, interpolate)
-    with _warnings_told():
+    machine, record = load_pair(model, log, channels, interpolate)
+    with warnings_told():
         run = simulate_log(machine, record, mode, integrator=integrator)
     console.print(repr(run), markup=False)
     try:
@@ -219,7 +202,7 @@ def _simulate_log(
         console.print(f"not compared: {error}", markup=False)
     if out is not None:
         run.save(out)
-    _save_plot(run.plot, plot, log)
+    save_plot(run.plot, plot, log)
 
 
 @app.command(epilog="Example:  vpm compare examples/emps/model.toml log.csv --mode inverse_dynamics")
@@ -236,81 +219,15 @@ def compare(
     from vpm.compare import compare as compare_run
     from vpm.simulate import simulate as simulate_log
 
-    machine, record = _load(model, log, channels, interpolate)
-    with _warnings_told():
+    machine, record = load_pair(model, log, channels, interpolate)
+    with warnings_told():
         run = simulate_log(machine, record, mode, cutoff=cutoff)
     comparison = compare_run(run, record)
     console.print(str(comparison), markup=False)
     for channel in comparison.channels:
         for sentence in channel.where.sentences:
             console.print(f"  {channel.channel}: {sentence}", markup=False)
-    _save_plot(comparison.plot, plot)
-
-
-@app.command(
-    epilog="Example:  vpm identify examples/emps/model.toml log.csv --free carriage.mass --free axis.friction.viscous"
-    "\n\n"
-    "Example:  vpm identify rig.toml a.csv b.csv --mode free_run --log --noise estimated --starts 12\n\n"
-    "Example:  vpm identify rig.toml a.csv --mode free_run --piece 0.5 --loss huber --profile slide.mass",
-)
-def identify(
-    model: ModelPath,
-    logs: Logs,
-    free: options.Free = None,
-    mode: Mode = "inverse_dynamics",
-    channels: Channels = None,
-    interpolate: Interpolate = False,
-    cutoff: Cutoff = None,
-    integrator: Integrator = "auto",
-    substeps: options.Substeps = 1,
-    horizon: options.Horizon = 0.25,
-    compare_only: options.Compared = None,
-    log: options.Log = False,
-    bound: options.Bound = None,
-    noise: options.Noise = None,
-    noise_level: options.NoiseLevel = None,
-    loss: options.Loss = None,
-    priors: options.Priors = False,
-    starts: options.Starts = 1,
-    seed: options.Seed = 0,
-    fit_state: options.FitState = None,
-    known_state: options.KnownState = None,
-    piece: options.Piece = 0.0,
-    profile: options.ProfileOf = None,
-    replicates: options.Replicates = 0,
-    workers: options.Workers = 0,
-    out: Annotated[Path | None, typer.Option(help="Write the fitted model (TOML) here.")] = None,
-) -> None:
-    """Fit parameters to one or several logs. Ctrl-C ends a fit and keeps the best until then."""
-    from vpm.identify import Fitting
-    from vpm.identify import identify as fit_logs
-    from vpm.identify.words import numbers, ranges, shown, told, told_intervals
-    from vpm.simulate import Setup
-
-    settings = Fitting(
-        channels=tuple(compare_only or ()),
-        log=log,
-        bounds=ranges(bound, "--bound", "NAME=LOW:HIGH"),
-        noise="given" if noise_level else noise or "spread",
-        noise_levels=numbers(noise_level, "--noise-level", "CHANNEL=STD"),
-        loss=loss or "squares",
-        priors=priors,
-        starts=starts,
-        states=tuple(fit_state or ()),
-        known_states=numbers(known_state, "--known-state", "STATE=VALUE"),
-        piece=piece,
-        seed=seed,
-        workers=workers,
-    )
-    asked = settings != Fitting(workers=workers, seed=seed) or noise or loss
-    machine, records = _load_all(model, logs, channels, interpolate)
-    with shown(errors, starts) as tell:
-        setup, chosen = Setup(integrator, substeps, horizon), settings if asked else None
-        fit = fit_logs(machine, records, free, mode=mode, cutoff=cutoff, setup=setup, progress=tell, fitting=chosen)
-    for line in told(fit) + told_intervals(fit, records, profile or [], replicates, seed, cutoff):
-        console.print(f"  {line}", markup=False)
-    if out is not None:
-        fit.model.save(out)
+    save_plot(comparison.plot, plot)
 
 
 @app.command(epilog="Example:  vpm diagnose model.toml train.csv --validate test.csv --out report/")
@@ -330,9 +247,9 @@ def diagnose(
     from vpm.discrepancy import diagnose as find_missing
     from vpm.report import print_story, write_report
 
-    machine, records = _load_all(model, logs, channels, interpolate)
-    unseen = [_record(path, machine, channels, interpolate) for path in validate or []]
-    with _progress() as tell:
+    machine, records = load_all(model, logs, channels, interpolate)
+    unseen = [load_record(path, machine, channels, interpolate) for path in validate or []]
+    with progress() as tell:
         diagnosis = find_missing(machine, records, unseen or None, effects=effect or None, cutoff=cutoff, tell=tell)
     print_story(diagnosis, console)
     for path in write_report(diagnosis, out):
@@ -367,8 +284,8 @@ def simplify(
     """Find the cheapest model that still tells the truth within a tolerance."""
     from vpm.simplify import simplify as find_cheapest
 
-    machine, records = _load_all(model, logs, channels, interpolate)
-    with _progress() as tell:
+    machine, records = load_all(model, logs, channels, interpolate)
+    with progress() as tell:
         ladder = find_cheapest(machine, records, rate=rate, tolerance=tolerance, tell=tell)
     console.print(str(ladder), markup=False)
     if out is not None:
@@ -388,7 +305,7 @@ def budget(
     """Time one step of the model against a controller's period; exit code 1 if it does not fit."""
     from vpm.budget import budget as time_steps
 
-    report = time_steps(_model(model), rate=rate, share=share, steps=steps, integrator=integrator)
+    report = time_steps(load_model(model), rate=rate, share=share, steps=steps, integrator=integrator)
     console.print(str(report), markup=False)
     if not report.holds:
         raise typer.Exit(1)
@@ -406,7 +323,7 @@ def linkage(
     console.print(repr(found), markup=False)
     for sentence in found.summary:
         console.print(f"  {sentence}", markup=False)
-    _save_plot(found.plot, plot)
+    save_plot(found.plot, plot)
 
 
 @app.command(epilog="Example:  vpm demo --out demo-report")
@@ -414,61 +331,5 @@ def demo(out: Out = Path("demo-report")) -> None:
     """Find the effect that is hidden in a log that comes with the package."""
     from vpm.demo import run_demo
 
-    with _progress() as tell:
+    with progress() as tell:
         run_demo(out, console, tell)
-
-
-def _model(path: Path) -> Model:
-    from vpm.model import Model
-
-    return Model.load(path)
-
-
-def _record(path: Path, model: Model, channels: Path | None, interpolate: bool) -> Experiment:
-    from vpm.experiment import Experiment
-
-    return Experiment.load(path, channels, model, irregular="interpolate" if interpolate else "error")
-
-
-def _load(model: Path, log: Path, channels: Path | None, interpolate: bool) -> tuple[Model, Experiment]:
-    machine = _model(model)
-    return machine, _record(log, machine, channels, interpolate)
-
-
-def _load_all(
-    model: Path, logs: list[Path], channels: Path | None, interpolate: bool
-) -> tuple[Model, list[Experiment]]:
-    machine = _model(model)
-    return machine, [_record(log, machine, channels, interpolate) for log in logs]
-
-
-@contextmanager
-def _progress() -> Iterator[Callable[[str], None]]:
-    """A line on the terminal that says what is being done; a line each where the output goes to a file."""
-    if not errors.is_terminal:
-        yield partial(errors.print, markup=False)
-        return
-    with errors.status("starting") as status:
-        yield status.update
-
-
-@contextmanager
-def _warnings_told() -> Iterator[None]:
-    """Warnings as one sentence each, without the line of the program that they come from."""
-    with warnings.catch_warnings(record=True) as told:
-        warnings.simplefilter("always", ValidityWarning)
-        try:
-            yield
-        finally:
-            for warning in told:
-                errors.print(f"warning: {warning.message}", markup=False)
-
-
-def _save_plot(draw: Callable[[], Figure], path: Path | None, named: Path | None = None) -> None:
-    """Draw to a file; one that is to be named after another file is a PNG in the working directory."""
-    if path is not None:
-        path = Path(f"{named.stem}.png") if named is not None and str(path) == BESIDE else path
-        if path.suffix.lower() not in PICTURES:
-            raise VpmError(f"{path} is no name of a picture; give it one of the endings {', '.join(PICTURES)}")
-        draw().savefig(path)
-        console.print(f"wrote {path}", markup=False)

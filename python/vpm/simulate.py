@@ -326,7 +326,7 @@ def _dispatch(
         return SimulatedArrays(outputs, jacobian, rows, begin, states)
     if mode == "restarts":
         inputs = _inputs(model, experiment, mode)
-        starts, length = _restart_grid(experiment, setup.horizon)
+        starts, length = restart_grid(experiment, setup.horizon)
         states = measured_states(model, experiment, theta, starts, cutoff)
         outputs, jacobian = model.core.restart(theta, states, starts, length, inputs, *stepping)
         rows = (starts[:, None] + np.arange(length)).ravel()
@@ -529,7 +529,14 @@ def _check_controllers(model: Model) -> None:
         )
 
 
-def _restart_grid(experiment: Experiment, horizon: float) -> tuple[NDArray[np.int64], int]:
+def restart_grid(experiment: Experiment, horizon: float) -> tuple[NDArray[np.int64], int]:
+    """Rows at which pieces of a horizon (s) begin, and the samples of each, both ends among them.
+
+    Raises
+    ------
+    SimulationError
+        The horizon is longer than the log.
+    """
     length = max(2, round(horizon / experiment.dt) + 1)
     if length > len(experiment):
         raise SimulationError(

@@ -7,7 +7,19 @@ import subprocess
 from collections.abc import Callable
 from pathlib import Path
 
-from validation import beams, hydraulics, hyl, impedance, inertial, linkages, maxwell_narx, motions, oil, tudor
+from validation import (
+    beams,
+    hydraulics,
+    hyl,
+    identification,
+    impedance,
+    inertial,
+    linkages,
+    maxwell_narx,
+    motions,
+    oil,
+    tudor,
+)
 from validation.row import Row, row
 
 ROOT = Path(__file__).resolve().parent.parent.parent
@@ -33,6 +45,7 @@ PARTS: dict[str, Callable[[], list[Row]]] = {
     "TUDOR at rest": tudor.static,
     "TUDOR in motion": tudor.dynamic,
     "TUDOR, the published table": tudor.published,
+    "Parameters of the examples from noisy logs": identification.recovered,
 }
 
 _HEAD = """# Validation

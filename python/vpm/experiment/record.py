@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from os import PathLike
+from pathlib import Path
 from typing import TYPE_CHECKING, Literal, Self, TypedDict, Unpack
 
 import numpy as np
@@ -355,6 +357,21 @@ class Experiment(Result):
         lost = len(self) - int(inside.sum())
         sentence = f"Moved back {', '.join(moved)}; {lost} samples at the ends, which have no value there, were cut."
         return self._changed(sentence, time=self.time[inside], data=data)
+
+    def to_csv(self, path: str | PathLike[str]) -> Path:
+        """Write a table, ``time [s]`` and each channel with its unit in brackets, as `load` reads it by itself.
+
+        Parameters
+        ----------
+        path : path-like
+        """
+        target = Path(path)
+        with target.open("w", encoding="utf-8", newline="") as file:
+            writer = csv.writer(file)
+            writer.writerow(["time [s]", *(f"{channel} [{self.unit(channel)}]" for channel in self)])
+            columns = [self.time, *(self[channel] for channel in self)]
+            writer.writerows([repr(float(value)) for value in row] for row in zip(*columns, strict=True))
+        return target
 
     def plot(self) -> Figure:
         """All channels over time. Needs the extra ``plot``."""

@@ -1,5 +1,6 @@
 """Identification: parameters, their uncertainty, and what the data cannot see."""
 
+from vpm.identify.comparison import FIT_MODES, problem
 from vpm.identify.estimation import Estimate, estimate
 from vpm.identify.fit import Fit, identify
 from vpm.identify.identifiability import Combination, unseen_combinations
@@ -7,6 +8,7 @@ from vpm.identify.inertial import identify_inertial
 from vpm.identify.inertial_fit import InertialFit
 from vpm.identify.inertial_model import inertial_regression
 from vpm.identify.inertial_regression import InertialRegression
+from vpm.identify.input_error import InputErrorProblem
 from vpm.identify.intervals import Bootstrap, Profile, bootstrap, profile_intervals
 from vpm.identify.oil import identify_oil
 from vpm.identify.oil_equations import CylinderGeometry, pressures_from_force
@@ -15,8 +17,11 @@ from vpm.identify.problem import Block, InverseDynamicsProblem, OutputErrorProbl
 from vpm.identify.settings import Fitting
 from vpm.identify.shooting import ShootingProblem
 from vpm.identify.statistics import Gain, gain, robust_covariance
+from vpm.identify.unseen import judged_on
+from vpm.identify.written import write_fit
 
 __all__ = [
+    "FIT_MODES",
     "Block",
     "Bootstrap",
     "Combination",
@@ -27,6 +32,7 @@ __all__ = [
     "Gain",
     "InertialFit",
     "InertialRegression",
+    "InputErrorProblem",
     "InverseDynamicsProblem",
     "OilFit",
     "OutputErrorProblem",
@@ -41,10 +47,12 @@ __all__ = [
     "identify_inertial",
     "identify_oil",
     "inertial_regression",
+    "judged_on",
     "pressures_from_force",
     "problem",
     "profile_intervals",
     "robust_covariance",
     "segments",
     "unseen_combinations",
+    "write_fit",
 ]

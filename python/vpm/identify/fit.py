@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 
 from vpm.errors import IdentificationError
 from vpm.experiment import Experiment
+from vpm.identify.comparison import comparison
 from vpm.identify.engine import Found, fit_problem
 from vpm.identify.estimation import Estimate, Progress, estimate, limits
 from vpm.identify.identifiability import Combination
 from vpm.identify.objective import AnyProblem
-from vpm.identify.parallel import worker_count
-from vpm.identify.problem import gaps, problem
-from vpm.identify.remarks import constant_channels, remarks, touching
+from vpm.identify.problem import gaps
+from vpm.identify.remarks import constant_channels, lost_channels, remarks, touching
 from vpm.identify.settings import Fitting
 from vpm.identify.shooting import ShootingProblem
 from vpm.identify.statistics import NORMAL_95
@@ -159,9 +159,10 @@ def identify(
     experiments : Experiment or sequence of Experiment
     free : sequence of str, optional
         Dotted names; by default every parameter that the model file gives an uncertainty.
-    mode : {"inverse_dynamics", "free_run", "restarts", "closed_loop", "prescribed_motion"}
-        Inverse dynamics is the linear regression of effort on motion; the others are output-error fits through the
-        simulation, with sensitivities exact to rounding.
+    mode : {"inverse_dynamics", "free_run", "restarts", "closed_loop", "prescribed_motion", "input_error"}
+        Inverse dynamics is the linear regression of effort on motion; input error compares the logged commands with
+        those that lead to what was measured; the others are output-error fits through the simulation. Sensitivities
+        are exact to rounding, those of input error near the truth.
     cutoff : float, optional
         Cut-off frequency of the motion filter, Hz.
     setup : Setup, optional
@@ -191,6 +192,9 @@ def identify(
         raise IdentificationError(
             f"{model.name}: no parameter is free; give some an uncertainty in the model file or name them in free="
         )
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise IdentificationError(f'"{twice[0]}" is named {names.count(twice[0])} times in free=; name it once')
     data = comparison(model, records, mode, cutoff=cutoff, setup=setup, ties=ties, fitting=fitting)
     check_ties(model, ties or {}, names)
     before, _ = data.evaluate(model, model.theta)
@@ -215,44 +219,6 @@ def identify(
         fit = _with_details(fit_of(model, data, result, before, [e.name for e in records], ties or {}), data, found)
     fit = replace(fit, setup=setup, fitting=fitting, ties=dict(ties or {}))
     return replace(fit, warnings=_told(model, records, data, fit, result, (fitting or Fitting()).bounds))
-
-
-def comparison(
-    model: Model,
-    records: Sequence[Experiment],
-    mode: str,
-    *,
-    cutoff: float | None = None,
-    setup: Setup | None = None,
-    ties: Mapping[str, str] | None = None,
-    fitting: Fitting | None = None,
-) -> AnyProblem:
-    """Set up what a fit compares.
-
-    Parameters
-    ----------
-    model, records, mode, cutoff, setup, ties, fitting
-        As for `identify`.
-    """
-    chosen = fitting or Fitting()
-    workers = 1 if chosen.starts > 1 else worker_count(chosen.workers or None)  # starts take the threads instead
-    channels = chosen.channels or None
-    if chosen.states or chosen.known_states or chosen.piece > 0.0:
-        untied: AnyProblem = ShootingProblem(
-            model,
-            records,
-            mode,
-            states=chosen.states,
-            known=chosen.known_states,
-            piece=chosen.piece,
-            continuity=chosen.continuity,
-            channels=channels,
-            setup=setup,
-            workers=workers,
-        )
-    else:
-        untied = problem(model, records, mode, cutoff=cutoff, setup=setup, channels=channels, workers=workers)
-    return TiedProblem(untied, ties) if ties and not isinstance(untied, TiedProblem) else untied
 
 
 def check_bounds(free: Sequence[str], fitting: Fitting) -> None:
@@ -307,6 +273,7 @@ def _told(
         len(fit.states),
     )
     told += constant_channels(model, records, data.blocks)
+    told += lost_channels(fit.mode, fit.names, fit.after)
     if fit.ended == "interrupted":
         told.insert(0, f"stopped by Ctrl-C after {fit.evaluations} evaluations: the values are the best until then")
     elif fit.ended == "evaluations":

@@ -283,7 +283,7 @@ def _replicate(objective: Objective, at: Point, weights: Array, refit: bool) -> 
 
 def _again(fit: Fit, experiments: Experiment | Sequence[Experiment], cutoff: float | None) -> tuple[Objective, Point]:
     """The objective of a fit and the point where it ended."""
-    from vpm.identify.fit import comparison
+    from vpm.identify.comparison import comparison
 
     records = [experiments] if isinstance(experiments, Experiment) else list(experiments)
     if tuple(e.name for e in records) != fit.experiments:

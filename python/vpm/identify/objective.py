@@ -8,6 +8,7 @@ from threading import Lock
 import numpy as np
 from numpy.typing import NDArray
 
+from vpm.identify.input_error import InputErrorProblem
 from vpm.identify.problem import Block, InverseDynamicsProblem, OutputErrorProblem
 from vpm.identify.settings import Fitting
 from vpm.identify.shooting import ShootingProblem
@@ -16,7 +17,7 @@ from vpm.identify.ties import TiedProblem
 from vpm.model import Model
 
 Array = NDArray[np.float64]
-AnyProblem = InverseDynamicsProblem | OutputErrorProblem | TiedProblem
+AnyProblem = InverseDynamicsProblem | OutputErrorProblem | InputErrorProblem | TiedProblem
 
 #: Median of absolute values of a normal variable, in standard deviations.
 NORMAL_MEDIAN = 0.6744897501960817

@@ -1,4 +1,4 @@
-"""The residual of a model against data, in any of the five modes, with its exact derivative.
+"""The residual of a model against data, in the modes of simulation, with its exact derivative.
 
 A problem fixes the data and how they are compared; the model may change under it. That is what lets one problem judge
 the nominal model, the recalibrated one and every candidate effect on the same samples.
@@ -18,10 +18,11 @@ from scipy.ndimage import maximum_filter1d
 from vpm.errors import IdentificationError, near_match
 from vpm.experiment import Experiment, Motion, parallel_filter
 from vpm.identify.along import check_along, respond, shown_channels
+from vpm.identify.first_state import add_first_state, first_state_slopes
 from vpm.identify.parallel import in_order
-from vpm.initial import joint_motion
+from vpm.initial import initial_state, joint_motion
 from vpm.model import Model
-from vpm.simulate import MODES, Setup, copied_channels, simulate_arrays
+from vpm.simulate import Setup, SimulatedArrays, copied_channels, simulate_arrays
 
 Array = NDArray[np.float64]
 
@@ -29,6 +30,8 @@ Array = NDArray[np.float64]
 STANDSTILL_SHARE = 0.005
 #: A record with fewer samples after decimation says nothing about anything.
 FEWEST_SAMPLES = 12
+#: Modes that simulate a record as a whole from its first sample.
+WHOLE = ("free_run", "closed_loop")
 
 
 @dataclass(frozen=True)
@@ -283,13 +286,7 @@ class OutputErrorProblem:
         self._setup = setup or Setup()
         follows = mode == "prescribed_motion"
         self._followed = [joint_motion(e, model, cutoff) if follows else None for e in self.experiments]
-        self._channels = tuple(channels) if channels is not None else _compared(model, experiments, mode)
-        if not self._channels:
-            raise IdentificationError(
-                f"no measured channel to compare in mode '{mode}': the logs hold {', '.join(experiments[0].channels)}; "
-                "log a position or velocity, or choose another mode"
-            )
-        _check_channels(model, experiments, self._channels)
+        self._channels = compared_channels(model, experiments, mode, channels)
         self.blocks = self._lay_out(model)
 
     def evaluate(self, model: Model, theta: Array, columns: Sequence[int] = ()) -> tuple[Array, Array]:
@@ -298,9 +295,7 @@ class OutputErrorProblem:
         index = [model.output_channels.index(channel) for channel in self._channels]
         blocks = iter(self.blocks)
         jobs = [
-            partial(
-                simulate_arrays, model, e, self.mode, theta=theta, columns=columns, setup=self._setup, followed=followed
-            )
+            partial(self._simulated, model, e, theta, list(columns), followed)
             for e, followed in zip(self.experiments, self._followed, strict=True)
         ]
         results = in_order(jobs, self.workers)
@@ -311,6 +306,19 @@ class OutputErrorProblem:
                 residuals.append((experiment[channel][result.rows] - result.outputs[:, column]) * weight)
                 jacobians.append(-result.jacobian[:, column, :] * weight[:, None])
         return np.concatenate(residuals), np.concatenate(jacobians)
+
+    def _simulated(
+        self, model: Model, experiment: Experiment, theta: Array, columns: list[int], followed: Motion | None
+    ) -> SimulatedArrays:
+        """Simulation of one record; its derivative knows what parameters do to the first state of a whole record."""
+        run = partial(simulate_arrays, model, experiment, self.mode, theta=theta, setup=self._setup)
+        if not columns or self.mode not in WHOLE:
+            return run(columns=columns, followed=followed)
+        state = initial_state(model, experiment, theta)
+        result = run(columns=columns, initial_state=state)
+        slopes = first_state_slopes(partial(initial_state, model, experiment), theta, columns)
+        add_first_state(result.jacobian, lambda x: run(initial_state=x).outputs, state, slopes, theta[columns])
+        return result
 
     def _lay_out(self, model: Model) -> tuple[Block, ...]:
         blocks, start = [], 0
@@ -343,27 +351,24 @@ class OutputErrorProblem:
         return np.asarray(counted)
 
 
-def problem(
-    model: Model,
-    experiments: Sequence[Experiment],
-    mode: str = "inverse_dynamics",
-    *,
-    cutoff: float | None = None,
-    setup: Setup | None = None,
-    channels: Sequence[str] | None = None,
-    workers: int = 1,
-) -> InverseDynamicsProblem | OutputErrorProblem:
-    """Set up the residual of ``model`` against ``experiments`` in one of the five modes.
+def compared_channels(
+    model: Model, experiments: Sequence[Experiment], mode: str, channels: Sequence[str] | None
+) -> tuple[str, ...]:
+    """Outputs that are compared: those given, or all that every log holds and the mode does not copy from it.
 
-    ``channels`` are the compared outputs of simulated modes, ``workers`` the records that are simulated at a time.
+    Raises
+    ------
+    IdentificationError
+        There is none, or one is not in the model or a log.
     """
-    if not experiments:
-        raise IdentificationError("no experiment was given; pass at least one")
-    if mode not in MODES:
-        raise IdentificationError(f"unknown mode '{mode}'; choose one of {', '.join(MODES)}")
-    if mode == "inverse_dynamics":
-        return InverseDynamicsProblem(model, experiments, cutoff=cutoff)
-    return OutputErrorProblem(model, experiments, mode, channels=channels, setup=setup, cutoff=cutoff, workers=workers)
+    chosen = tuple(channels) if channels is not None else _compared(model, experiments, mode)
+    if not chosen:
+        raise IdentificationError(
+            f"no measured channel to compare in mode '{mode}': the logs hold {', '.join(experiments[0].channels)}; "
+            "log a position or velocity, or choose another mode"
+        )
+    _check_channels(model, experiments, chosen)
+    return chosen
 
 
 def _compared(model: Model, experiments: Sequence[Experiment], mode: str) -> tuple[str, ...]:

@@ -22,6 +22,8 @@ SAMPLES_EACH = 10
 STILL, STILL_STD = 1e-3, 1e-2
 #: Relative difference to a bound at which an estimate rests on it.
 TOUCHING = 1e-6
+#: Share of a measured signal beyond which a simulation has lost it: silence would be nearer.
+LOST = 1.0
 
 
 def touching(names: Sequence[str], values: Array, low: Array, high: Array) -> tuple[str, ...]:
@@ -90,6 +92,27 @@ def constant_channels(model: Model, records: Sequence[Experiment], blocks: Seque
     held = {e.name: e for e in records}
     return [
         f"{channel} is constant in {record}: it says nothing there"
-        for record, channel in [*compared, *inputs]
+        for record, channel in dict.fromkeys([*compared, *inputs])
         if channel in held[record] and np.ptp(held[record][channel]) == 0.0
+    ]
+
+
+def lost_channels(mode: str, names: Sequence[str], after: Mapping[str, tuple[float, float, str]]) -> list[str]:
+    """Sentence about the output that a fitted simulation is furthest from, if it is off by more than its whole size.
+
+    Parameters
+    ----------
+    mode : str
+    names : sequence of str
+        Free parameters.
+    after : mapping
+        ``{channel: (root mean square, share of the measured signal, unit)}`` after the fit.
+    """
+    channel, share = max(((c, s) for c, (_, s, _) in after.items()), key=lambda pair: pair[1], default=("", 0.0))
+    if mode in {"inverse_dynamics", "input_error"} or not share > LOST:
+        return []
+    return [
+        f"{channel} is {share:.3g} times its own size off after the fit: the simulation loses the record (unstable, "
+        f"integrating, or a wrong valley), and {', '.join(names)} mean nothing; take restarts, pieces, a closed loop, "
+        "or more starts"
     ]

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from vpm.errors import IdentificationError, near_match
 from vpm.experiment import Experiment
+from vpm.identify.first_state import add_first_state, first_state_slopes
 from vpm.identify.parallel import in_order
 from vpm.identify.problem import FEWEST_SAMPLES, Block, OutputErrorProblem
 from vpm.initial import initial_state, measured_states
@@ -94,10 +95,11 @@ class ShootingProblem(OutputErrorProblem):
         self.states = tuple(states)
         self._places = [model.state_names.index(name) for name in states]
         self._seconds = piece
+        self._known = {model.state_names.index(name): value for name, value in (known or {}).items()}
         self.pieces = tuple(_cut(model, e, piece) for e in experiments)
         for pieces in self.pieces:
-            for name, value in (known or {}).items():
-                pieces.states[0, model.state_names.index(name)] = value
+            for place, value in self._known.items():
+                pieces.states[0, place] = value
         super().__init__(model, experiments, mode, channels=channels, setup=setup, workers=workers)
         self._sizes = self._state_sizes(model)
         self._gap_columns = [
@@ -181,9 +183,16 @@ class ShootingProblem(OutputErrorProblem):
         """Residual of the outputs and its derivative, then the gaps and theirs, of one record."""
         pieces, experiment = self.pieces[number], self.experiments[number]
         states = pieces.states.copy()
+        if len(pieces.starts) == 1:
+            states[0] = self._begun(model, experiment, theta)
         if self.states:
             states[:, self._places] = values
         outputs, by_theta = self._outputs(model, theta, experiment, pieces, states, columns)
+        if len(pieces.starts) == 1:
+            fixed = [*self._known, *self._places]
+            slopes = first_state_slopes(partial(self._begun, model, experiment), theta, columns, fixed)
+            again = partial(self._outputs, model, theta, experiment, pieces, columns=[])
+            add_first_state(by_theta[0], lambda x: again(x[None])[0][0], states[0], slopes, theta[columns])
         k, p = len(self.states), len(columns)
         by_state = np.zeros((*outputs.shape, k))
         for j, (place, size) in enumerate(zip(self._places, self._sizes, strict=True)):
@@ -211,6 +220,17 @@ class ShootingProblem(OutputErrorProblem):
             jacobians.append(jacobian * weight[:, None])
         gaps, gap_jacobian = self._gaps(outputs, by_theta, by_state, pieces, p)
         return np.concatenate(residuals), np.concatenate(jacobians), gaps, gap_jacobian
+
+    def _begun(self, model: Model, experiment: Experiment, theta: Array) -> Array:
+        """First state of a whole record, as the log suggests it at these parameters, or known."""
+        state = initial_state(model, experiment, theta)
+        places, values = list(self._known), list(self._known.values())
+        state[places] = values
+        joints, coordinates = len(model.joints), len(model.coordinates)
+        if coordinates > joints and any(place < joints for place in places):  # links hang as the known joints have them
+            state[:coordinates] = model.core.equilibrium(theta, state[:joints])[0]
+            state[places] = values
+        return state
 
     def _gaps(self, outputs: Array, by_theta: Array, by_state: Array, pieces: Pieces, p: int) -> tuple[Array, Array]:
         """End of each piece minus start of the next, in the channels of the fitted states."""

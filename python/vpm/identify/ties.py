@@ -8,11 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.errors import IdentificationError, near_match
+from vpm.identify.input_error import InputErrorProblem
 from vpm.identify.problem import Block, InverseDynamicsProblem, OutputErrorProblem
 from vpm.model import Model
 from vpm.units import parse_unit
 
 Array = NDArray[np.float64]
+
+
+Untied = InverseDynamicsProblem | OutputErrorProblem | InputErrorProblem
 
 
 class TiedProblem:
@@ -26,7 +30,7 @@ class TiedProblem:
         Following parameter to the one whose value it takes; see `check_ties`.
     """
 
-    def __init__(self, data: InverseDynamicsProblem | OutputErrorProblem, ties: Mapping[str, str]) -> None:
+    def __init__(self, data: Untied, ties: Mapping[str, str]) -> None:
         self.mode: str = data.mode
         self.blocks: tuple[Block, ...] = data.blocks
         self.untied, self._ties = data, dict(ties)

@@ -12,6 +12,7 @@ from vpm.errors import IdentificationError
 from vpm.experiment import Experiment
 from vpm.identify.fit import Fit
 from vpm.identify.intervals import bootstrap, profile_intervals
+from vpm.identify.unseen import Gaps
 
 #: Evaluations that a fit mostly takes; where its progress bar ends.
 USUAL_EVALUATIONS = 15
@@ -47,6 +48,15 @@ def told(fit: Fit) -> list[str]:
         for channel, (rms, share, unit) in fit.after.items()
     ]
     return lines
+
+
+def told_unseen(judged: tuple[Gaps, Gaps]) -> list[str]:
+    """Gaps on records that were never fitted, before and after, a line each."""
+    before, after = judged
+    return [
+        f"unseen {channel}: {rms:.4g} {unit}, {100 * share:.2f} % of the signal; before it {before[channel][0]:.4g}"
+        for channel, (rms, share, unit) in after.items()
+    ]
 
 
 def told_intervals(
@@ -95,6 +105,17 @@ def ranges(words: Sequence[str] | None, option: str, form: str) -> dict[str, tup
             raise IdentificationError(f"{option} has '{word}' where a range belongs; write it as {form}")
         found[name] = (_number(low), _number(high))
     return found
+
+
+def names(words: Sequence[str] | None, option: str, form: str) -> dict[str, str]:
+    """Read ``NAME=NAME`` words of an option.
+
+    Raises
+    ------
+    IdentificationError
+        A word has another form.
+    """
+    return dict(_pairs(words, option, form))
 
 
 def _pairs(words: Sequence[str] | None, option: str, form: str) -> list[tuple[str, str]]:

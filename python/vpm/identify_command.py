@@ -1,0 +1,159 @@
+"""Command line of identification: ``vpm identify``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from vpm.command import (
+    Channels,
+    Cutoff,
+    Integrator,
+    Interpolate,
+    Logs,
+    ModelPath,
+    Plot,
+    console,
+    errors,
+    load_all,
+    load_record,
+    save_plot,
+)
+from vpm.errors import IdentificationError, near_match
+from vpm.identify import options
+
+if TYPE_CHECKING:
+    from vpm.identify import Fit
+    from vpm.model import Model
+
+EXAMPLES = (
+    "Example:  vpm identify examples/emps/model.toml log.csv --free carriage.mass --free axis.friction.viscous\n\n"
+    "Example:  vpm identify rig.toml a.csv b.csv --mode free_run --log --noise estimated --starts 12\n\n"
+    "Example:  vpm identify rig.toml a.csv --mode free_run --piece 0.5 --loss huber --profile slide.mass\n\n"
+    "Example:  vpm identify rig.toml a.csv --mode input_error --horizon 0.02 --validate b.csv --out fitted/"
+)
+
+
+def identify(
+    model: ModelPath,
+    logs: Logs,
+    free: options.Free = None,
+    fix: options.Fixed = None,
+    tie: options.Tie = None,
+    mode: options.FitMode = "inverse_dynamics",
+    channels: Channels = None,
+    interpolate: Interpolate = False,
+    cutoff: Cutoff = None,
+    integrator: Integrator = "auto",
+    substeps: options.Substeps = 1,
+    horizon: options.Horizon = 0.25,
+    settling: options.Settling = 0.0,
+    compare_only: options.Compared = None,
+    log: options.Log = False,
+    bound: options.Bound = None,
+    noise: options.Noise = None,
+    noise_level: options.NoiseLevel = None,
+    loss: options.Loss = None,
+    loss_scale: options.LossScale = 1.345,
+    priors: options.Priors = False,
+    starts: options.Starts = 1,
+    spread: options.Spread = 3.0,
+    seed: options.Seed = 0,
+    fit_state: options.FitState = None,
+    known_state: options.KnownState = None,
+    piece: options.Piece = 0.0,
+    continuity: options.Continuity = 10.0,
+    evaluations: options.Evaluations = 60,
+    profile: options.ProfileOf = None,
+    replicates: options.Replicates = 0,
+    workers: options.Workers = 0,
+    validate: options.Validate = None,
+    out: options.Out = None,
+    plot: Plot = None,
+) -> None:
+    """Fit parameters to one or several logs. Ctrl-C ends a fit and keeps the best until then."""
+    from vpm.identify import Fitting, judged_on
+    from vpm.identify import identify as fit_logs
+    from vpm.identify.words import names, numbers, ranges, shown, told, told_intervals, told_unseen
+    from vpm.simulate import Setup
+
+    settings = Fitting(
+        channels=tuple(compare_only or ()),
+        log=log,
+        bounds=ranges(bound, "--bound", "NAME=LOW:HIGH"),
+        noise="given" if noise_level else noise or "spread",
+        noise_levels=numbers(noise_level, "--noise-level", "CHANNEL=STD"),
+        loss=loss or "squares",
+        loss_scale=loss_scale,
+        priors=priors,
+        starts=starts,
+        spread=spread,
+        states=tuple(fit_state or ()),
+        known_states=numbers(known_state, "--known-state", "STATE=VALUE"),
+        piece=piece,
+        continuity=continuity,
+        seed=seed,
+        workers=workers,
+        most_evaluations=evaluations,
+    )
+    asked = settings != Fitting(workers=workers, seed=seed) or noise or loss
+    machine, records = load_all(model, logs, channels, interpolate)
+    unseen = [load_record(path, machine, channels, interpolate) for path in validate or []]
+    setup = Setup(integrator, substeps, horizon, settling)
+    with shown(errors, starts) as tell:
+        fit = fit_logs(
+            machine,
+            records,
+            _without(machine, free, fix),
+            mode=mode,
+            cutoff=cutoff,
+            setup=setup,
+            ties=names(tie, "--tie", "FOLLOWER=LEADER"),
+            progress=tell,
+            fitting=settings if asked else None,
+        )
+    lines = told(fit)
+    if unseen:
+        lines += told_unseen(judged_on(fit, machine, unseen, cutoff=cutoff))
+    for line in lines:  # at once: intervals may take long, and Ctrl-C then still leaves the values
+        console.print(f"  {line}", markup=False)
+    intervals: list[str] = []
+    try:
+        intervals = told_intervals(fit, records, profile or [], replicates, seed, cutoff)
+    except KeyboardInterrupt:
+        intervals = ["stopped by Ctrl-C: no intervals by profile or bootstrap"]
+    for line in intervals:
+        console.print(f"  {line}", markup=False)
+    save_plot(fit.plot, plot)
+    if out is not None:
+        _write(fit, out, lines + intervals)
+
+
+def _without(model: Model, free: list[str] | None, fixed: list[str] | None) -> list[str] | None:
+    """Free parameters, less those that are to stay.
+
+    Raises
+    ------
+    IdentificationError
+        A name that is to stay was never free.
+    """
+    if not fixed:
+        return free
+    given = free if free is not None else [p.name for p in model.parameters.values() if p.adjustable]
+    for name in fixed:
+        if name not in given:
+            raise IdentificationError(f'--fix: "{name}" is not among the free parameters; {near_match(name, given)}')
+    return [name for name in given if name not in fixed]
+
+
+def _write(fit: Fit, out: Path, lines: list[str]) -> None:
+    """The fitted model alone, or a folder with it and what tells of the fit."""
+    from vpm.identify.written import write_fit
+
+    if out.suffix == ".toml":
+        fit.model.save(out)
+        written = [out]
+    else:
+        written = write_fit(fit, out, lines)
+    for path in written:
+        console.print(f"wrote {path}", markup=False)
