@@ -24,10 +24,8 @@ def sampled_problems(document: Document, structure: Structure) -> Iterator[Probl
             continue
         for position, effect in enumerate(document.effects):
             if effect.type == "actuator_lag" and effect.at == name:
-                rest = (
-                    f'is a lag at "{name}", a {actuator.type}, which acts at its own samples and cannot see what goes '
-                )
-                yield Problem(place("effects", position), f"{rest}on between; remove it, or identify it with the model")
+                rest = f'is a lag at "{name}", a {actuator.type}, which sees its own samples and no lag between them; '
+                yield Problem(place("effects", position), f"{rest}remove it, or identify it with the model")
         if isinstance(actuator, Narx):
             yield from _input_problems(name, actuator, document, structure)
             yield from _model_problems(name, actuator)

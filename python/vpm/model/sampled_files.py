@@ -6,6 +6,7 @@ A model is complete in itself then: it can be saved elsewhere, and its file does
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -48,11 +49,12 @@ def with_files(document: Document, path: str | None) -> tuple[Document, list[Pro
         target = Path(actuator.file) if path is None else Path(path).parent / actuator.file
         kind = type(actuator).__name__
         try:
-            saved: Any = Result.load(target)
-            if type(saved).__name__ != kind:
+            result = Result.load(target)
+            if type(result).__name__ != kind:
                 raise VpmError(
-                    f'{target} is a saved {type(saved).__name__}, but type = "{actuator.type}" needs a {kind}'
+                    f"{target} is a saved {type(result).__name__}, but the type {actuator.type} needs a {kind}"
                 )
+            saved: Mapping[str, Any] = result.to_stored()
             read = _narx(actuator, saved) if isinstance(actuator, Narx) else _maxwell(actuator, saved)
         except VpmError as error:
             problems.append(Problem(where, f"is wrong: {error}"))
@@ -61,25 +63,27 @@ def with_files(document: Document, path: str | None) -> tuple[Document, list[Pro
     return document.model_copy(update={"actuators": actuators}), problems
 
 
-def _narx(actuator: Narx, saved: Any) -> Narx:
-    if OUTPUT in saved.inputs:
+def _narx(actuator: Narx, saved: Mapping[str, Any]) -> Narx:
+    if OUTPUT in saved["inputs"]:
         raise VpmError(f'an input of the model is called "{OUTPUT}" like its output; identify it under another name')
-    names = (OUTPUT, *saved.inputs)
-    terms = {written(term, names): float(value) for term, value in zip(saved.terms, saved.coefficients, strict=True)}
-    limit = float(saved.limit) if actuator.limit is None and math.isfinite(saved.limit) else actuator.limit
-    channels = {name: actuator.inputs.get(name, name) for name in saved.inputs} | actuator.inputs
+    names = (OUTPUT, *saved["inputs"])
+    terms = {
+        written(term, names): float(value) for term, value in zip(saved["terms"], saved["coefficients"], strict=True)
+    }
+    limit = float(saved["limit"]) if actuator.limit is None and math.isfinite(saved["limit"]) else actuator.limit
+    channels = {name: actuator.inputs.get(name, name) for name in saved["inputs"]} | actuator.inputs
     return actuator.model_copy(update={"file": None, "terms": terms, "limit": limit, "inputs": channels})
 
 
-def _maxwell(actuator: MaxwellNarx, saved: Any) -> MaxwellNarx:
-    given, step = actuator.sample_time, float(saved.step)
+def _maxwell(actuator: MaxwellNarx, saved: Mapping[str, Any]) -> MaxwellNarx:
+    given, step = actuator.sample_time, float(saved["step"])
     if given is not None and abs(given - step) > _SLACK * step:
         raise VpmError(
             f"its element is sampled every {step:g} s, but sample_time is {given:g} s; remove sample_time, or fit the "
             "element at the other step"
         )
-    maps = {key: _short([float(value) for value in getattr(saved, key)]) for key in ("k0", "s0")}
-    numbers = {"k1": float(saved.k1), "c1": float(saved.c1), "scheme": saved.scheme, "sample_time": step}
+    maps = {key: _short([float(value) for value in saved[key]]) for key in ("k0", "s0")}
+    numbers = {"k1": float(saved["k1"]), "c1": float(saved["c1"]), "scheme": saved["scheme"], "sample_time": step}
     return actuator.model_copy(update={"file": None, **maps, **numbers})
 
 
