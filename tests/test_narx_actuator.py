@@ -270,7 +270,7 @@ def test_modes_that_cannot_work_say_so() -> None:
     off = build(sample_time=3e-3 / 2.0)
     with pytest.raises(VpmError, match=r"actuator `valve` samples every 0\.0015 s.*sample_time 0\.002 s"):
         vpm.simulate(off, log, mode="free_run")
-    with pytest.raises(VpmError, match="no linear model in continuous time"):
+    with pytest.raises(ValueError, match="no linear model in continuous time"):
         model.linearize()
     with pytest.raises(VpmError, match="does not follow from its command alone"):
         vpm.simulate(model, log, mode="inverse_dynamics")
@@ -279,4 +279,4 @@ def test_modes_that_cannot_work_say_so() -> None:
     uncertain = model.to_dict()
     uncertain["bodies"]["carriage"]["mass"] = {"value": 8.0, "unit": "kg", "uncertainty": 1.0}
     with pytest.raises(VpmError, match="no derivatives by parameters"):
-        vpm.calibrate(vpm.Model.from_dict(uncertain), log, mode="free_run")
+        vpm.identify(vpm.Model.from_dict(uncertain), log, mode="free_run")
