@@ -37,6 +37,7 @@ fn narx(sample_time: f64) -> Value {
         "inputs": [["u", "command"], ["q", {"position": 0}], ["v", {"velocity": 0}]]})
 }
 
+#[cfg(test)]
 fn beside() -> Narx {
     let term = |factors: &[(usize, usize)]| {
         Term::new(factors.iter().map(|&(signal, delay)| Factor { signal, delay }).collect())
@@ -87,6 +88,7 @@ fn efforts_are_those_of_the_model_beside_the_machine() {
     }
 }
 
+#[cfg(test)]
 fn live(machine: &Machine, method: Method) -> Live {
     let description = machine.build();
     let theta = description.parameters.clone();
@@ -197,6 +199,7 @@ fn a_closed_loop_runs_through_a_sampled_drive() {
     assert!((last - 0.5).abs() < 2e-3, "{last}");
 }
 
+#[cfg(test)]
 fn error_of(result: vpm_core::Result<impl Sized>) -> Error {
     result.err().unwrap()
 }

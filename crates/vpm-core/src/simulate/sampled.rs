@@ -37,7 +37,7 @@ struct SampledDrive {
 
 #[derive(Clone, Debug)]
 enum Law {
-    Narx(Box<Narx>),
+    Narx(Narx),
     Maxwell(Maxwell),
 }
 
@@ -63,7 +63,7 @@ impl SampledDrives {
         let layout = description.layout();
         let drives = description.actuators.iter().map(|actuator| {
             let (law, sample_time, limit) = match &actuator.drive {
-                Drive::Narx(drive) => (Law::Narx(Box::new(Narx::new(drive, layout)?)), drive.sample_time, drive.limit),
+                Drive::Narx(drive) => (Law::Narx(Narx::new(drive, layout)?), drive.sample_time, drive.limit),
                 Drive::MaxwellNarx(drive) => {
                     let length = match actuator.on {
                         Target::Joint(joint) => Channel::Position { joint },
@@ -152,8 +152,7 @@ impl SampledDrive {
     fn step(&mut self, command: f64, see: impl Fn(usize) -> f64) -> f64 {
         let first = !std::mem::replace(&mut self.started, true);
         match &mut self.law {
-            Law::Narx(narx) => {
-                let Narx { stepper, reads, row, initial } = &mut **narx;
+            Law::Narx(Narx { stepper, reads, row, initial }) => {
                 for (place, column) in row.iter_mut().zip(&*reads) {
                     *place = column.map_or(command, &see);
                 }
