@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 import vpm
 from vpm import narx
-from vpm.errors import DivergedError, ModelError, VpmError
+from vpm.errors import DivergedError, ModelError, SimulationError, VpmError
 from vpm.scenario import Scenario
 
 CARRIAGE: dict[str, Any] = {
@@ -80,6 +80,21 @@ def test_the_held_effort_does_not_know_the_steps_of_the_integrator() -> None:
         held = run["valve.force"].reshape(-1, 5)
         assert np.ptp(held, axis=1).max() == 0.0
         assert np.all(np.diff(held[:, 0]) != 0.0)
+
+
+def test_a_restored_simulation_goes_on_to_the_last_bit() -> None:
+    model, inputs = build(sample_time=3e-4), np.sin(np.arange(200) * 0.05)
+    sim = vpm.Simulation(model, 1e-4)
+    sim.run(inputs[:100])
+    kept = sim.snapshot()
+    assert kept.time == sim.time
+    first = sim.run(inputs[100:]).values
+    for again in (sim, vpm.Simulation(model, 1e-4)):
+        again.restore(kept)
+        assert again.time == kept.time
+        np.testing.assert_array_equal(again.run(inputs[100:]).values, first)
+    with pytest.raises(SimulationError, match="of another model, other parameters or other steps"):
+        vpm.Simulation(model, 3e-4).restore(kept)
 
 
 @settings(max_examples=25, deadline=None)

@@ -73,6 +73,13 @@ impl Live {
         &self.description
     }
 
+    /// Whether the other is a simulation of the same machine with the same parameters and steps, at whatever time.
+    pub fn is_alike(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.description, &other.description)
+            && self.stepping == other.stepping
+            && self.theta == other.theta
+    }
+
     /// The state now.
     pub fn state(&self) -> &[f64] {
         &self.state
