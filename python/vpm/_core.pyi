@@ -118,6 +118,18 @@ class Simulation:
         """A step for each row of ``inputs`` (N, n_inputs); outputs (N, n_outputs)."""
     def reset(self, state: ArrayLike) -> None:
         """Begin again at time zero in ``state`` (n_states,), with nothing remembered."""
+    def snapshot(self) -> Snapshot:
+        """All that it is now, with what delays and sampled drives remember."""
+    def restore(self, snapshot: Snapshot) -> None:
+        """Go back to where it was when the snapshot was taken."""
+
+@final
+class Snapshot:
+    """A simulation as it was at one time."""
+
+    @property
+    def time(self) -> float:
+        """Time of the simulation when it was taken, s."""
 
 @final
 class System:

@@ -7,12 +7,14 @@ mod connections;
 mod controllers;
 mod drives;
 mod entry;
+mod sampled;
 
 use serde::Deserialize;
 
 pub use connections::LoadCell;
 pub(crate) use drives::piston_outside;
 pub use entry::{ControllerEntry, EffectEntry};
+pub(crate) use sampled::{maxwell_of, narx_of};
 
 use crate::actuator::hydraulic::Supply;
 use crate::actuator::{Actuator, Drive, Target};

@@ -263,14 +263,16 @@ pub enum Error {
     /// A contact, a bushing or a load cell that has no physical meaning.
     #[error("{0}")]
     Connection(#[from] ConnectionError),
-    /// A controller whose samples fall between those of the record.
+    /// A controller or a drive whose samples fall between those of the record.
     #[error(
-        "controller `{controller}` samples every {sample_time} s, which is no whole multiple of the record's time step of {time_step} s; \
+        "{kind} `{name}` samples every {sample_time} s, which is no whole multiple of the record's time step of {time_step} s; \
          give it the sample_time {nearest} s, or resample the record"
     )]
     SampleTime {
-        /// Name of the controller.
-        controller: String,
+        /// What it is: controller or actuator.
+        kind: &'static str,
+        /// Its name.
+        name: String,
         /// Time between its samples, s.
         sample_time: f64,
         /// Time between the samples of the record, s.

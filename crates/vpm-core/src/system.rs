@@ -16,7 +16,7 @@ pub use connections::Connections;
 pub use ode::System;
 
 use crate::actuator::hydraulic::Supply;
-use crate::actuator::{Actuator, Drive, Target};
+use crate::actuator::{Actuator, Target};
 use crate::contact::ContactFriction;
 use crate::data::Data;
 use crate::dynamics::{aba, flexible, lines, motion, poses};
@@ -78,7 +78,7 @@ impl<S: Scalar> Dynamics<S> {
             data: Data::new(&model),
             inputs,
             internal: actuators.iter().map(Actuator::n_states).sum::<usize>() + sagging,
-            ideal: supplies.is_empty() && actuators.iter().all(|actuator| matches!(actuator.drive, Drive::Ideal(_))),
+            ideal: supplies.is_empty() && actuators.iter().all(|actuator| actuator.drive.is_direct()),
             shown: Shown::new(&actuators, &supplies),
             seals: vec![None; actuators.len()],
             forces: zeros(actuators.len()),

@@ -63,7 +63,7 @@ class DriveComponents:
         return bool(document.contacts) or any(entry.type == "hydraulic" for entry in document.actuators.values())
 
     def actuator_type(self, actuator: str) -> str:
-        """Type of an actuator: "ideal", "dc_motor", "spring_damper", "maxwell" or "hydraulic".
+        """Type of an actuator: "ideal", "dc_motor", "spring_damper", "maxwell", "hydraulic", "narx" or "maxwell_narx".
 
         Raises
         ------
