@@ -1,0 +1,16 @@
+"""The machines of the proving ground, one file each."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from blind.machine import Machine
+from blind.machines import axis
+
+MACHINES: Mapping[str, Machine] = MappingProxyType(
+    {machine.name: machine for machine in (axis.LINEAR, axis.ROTARY)},
+)
+"""Every machine by name."""
+
+__all__ = ["MACHINES"]
