@@ -202,7 +202,7 @@ def _simulate(plans: Sequence[_Plan]) -> list[Case]:
     noisy = [signal.name for signal in (*machine.layout.commands, *machine.layout.sensors)]
     for plan in plans:
         for kind in RECORDS:
-            time = np.arange(round(float(plan.generator.uniform(9.0, 12.0)) / dt)) * dt
+            time = np.arange(round(float(plan.generator.uniform(9.0, 12.0)) / dt), dtype=np.float64) * dt
             path = machine.reference(plan.generator, plan.draft, time, kind)
             plan.references.append(path)
             members = _columns(plan, noisy)

@@ -36,6 +36,8 @@ class JointLoads:
         self._dry: list[Callable[[Array, Array, float, Array], Array]] = []
         self._scale: Callable[[float], Array] | None = None
         self._step = step
+        self.seal: Array | None = None
+        """Dry friction of seals, which depends on pressures; a hydraulic machine sets it at each step."""
 
         def get(name: str, default: float = 0.0) -> Array:
             return stack(columns, joints, name, default)
@@ -59,10 +61,10 @@ class JointLoads:
 
     def dry(self, q: Array, v: Array, time: float, effort: Array) -> Array | None:
         """Largest dry friction, or None if there is nowhere any."""
-        if not self._dry:
+        if not self._dry and self.seal is None:
             return None
-        total = self._dry[0](q, v, time, effort)
-        for law in self._dry[1:]:
+        total = np.zeros_like(q) if self.seal is None else self.seal
+        for law in self._dry:
             total = total + law(q, v, time, effort)
         if self._scale is not None:
             total = total * self._scale(time)

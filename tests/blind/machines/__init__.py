@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 from blind.machine import Machine
-from blind.machines import axis
+from blind.machines import axis, servo_cylinder
 
 MACHINES: Mapping[str, Machine] = MappingProxyType(
-    {machine.name: machine for machine in (axis.LINEAR, axis.ROTARY)},
+    {machine.name: machine for machine in (axis.LINEAR, axis.ROTARY, servo_cylinder.ServoCylinder())},
 )
 """Every machine by name."""
 
