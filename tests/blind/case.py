@@ -16,7 +16,7 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from blind.effects import EFFECTS
-from blind.loop import Actuators, Sensors, closed_loop
+from blind.loop import Actuators, Inputs, Sensors, closed_loop
 from blind.machine import Draft, Layout, Machine
 from blind.machines import MACHINES
 from blind.noise import normal
@@ -32,8 +32,10 @@ RECORDS = ("train", "train", "validate")
 OFF, CLEARLY_OFF = 0.1, (0.1, 0.25)
 #: Relative step of the oracle's sensitivities.
 NUDGE = 0.02
-#: Columns of one batch, for the sake of memory.
-LARGEST_BATCH = 400
+#: Numbers that the outputs of one batch may have, for the sake of memory, and columns beyond which nothing is won.
+LARGEST_BATCH, MOST_COLUMNS = 4e7, 1200
+#: Longest record [s].
+LONGEST = 12.0
 NOTHING, PARAMETERS = "none", "parameters"
 
 
@@ -137,7 +139,10 @@ def make_cases(
     cases: dict[int, Case] = {}
     for rate in sorted({plan.draft.rate for plan in plans}):
         chosen = [k for k, plan in enumerate(plans) if plan.draft.rate == rate]
-        size = max(1, LARGEST_BATCH // (len(RECORDS) * 8))
+        layout = MACHINES[machine].layout
+        width = len(RECORDS) * max(3 + len(plans[k].free) for k in chosen)
+        numbers = LONGEST * rate * (len(layout.sensors) + len(layout.commands))
+        size = max(1, int(min(MOST_COLUMNS, LARGEST_BATCH / numbers) / width))
         for begin in range(0, len(chosen), size):
             part = chosen[begin : begin + size]
             cases.update(zip(part, _simulate([plans[k] for k in part]), strict=True))
@@ -198,35 +203,38 @@ def _simulate(plans: Sequence[_Plan]) -> list[Case]:
     """Run all records of plans with one sampling rate side by side."""
     machine, dt = plans[0].machine, 1.0 / plans[0].draft.rate
     fine = max(5, round(dt / machine.step))
-    columns, references, noise = [], [], []
+    columns: list[dict[str, float]] = []
+    references: list[Array] = []
+    noise: list[Array] = []
+    owner: list[int] = []
+    loud: list[int] = []
     noisy = [signal.name for signal in (*machine.layout.commands, *machine.layout.sensors)]
     for plan in plans:
         for kind in RECORDS:
-            time = np.arange(round(float(plan.generator.uniform(9.0, 12.0)) / dt), dtype=np.float64) * dt
+            time = np.arange(round(float(plan.generator.uniform(9.0, LONGEST)) / dt), dtype=np.float64) * dt
             path = machine.reference(plan.generator, plan.draft, time, kind)
             plan.references.append(path)
             members = _columns(plan, noisy)
+            loud.append(len(columns))
+            owner += [len(references)] * len(members)
             columns += members
-            references += [path] * len(members)
+            references.append(path)
             noise.append(normal(plan.generator, len(time), len(noisy)))
-            noise += [np.zeros_like(noise[-1])] * (len(members) - 1)
     longest = max(len(n) for n in noise)
     held = np.stack([np.pad(path, ((0, 0), (0, longest - path.shape[1])), mode="edge").T for path in references], -1)
-    loud = np.stack([np.pad(n, ((0, longest - len(n)), (0, 0))) for n in noise], -1)
+    padded = np.stack([np.pad(n, ((0, longest - len(n)), (0, 0))) for n in noise], -1)
     drives = [signal.name for signal in machine.layout.commands]
     sensors = [signal.name for signal in machine.layout.sensors]
     with np.errstate(all="ignore"):
-        runs = closed_loop(
+        both = closed_loop(
             machine.plant(columns, dt / fine),
             machine.controller(columns, dt),
             Actuators(drives, columns, dt, fine),
             Sensors(sensors, columns, dt, fine),
-            held,
-            loud,
+            Inputs(held, np.array(owner), padded, np.array(loud)),
             dt,
             fine,
         )
-    both = np.concatenate(runs, 1)
     cases, place = [], 0
     for plan in plans:
         width = 3 + len(plan.free)
@@ -262,6 +270,7 @@ def _case(plan: _Plan, pieces: list[Array], dt: float) -> Case:
     deviations = np.array([plan.without[f"{signal.name}.noise"] for signal in layout.sensors]) * plan.noise_level
     sensed = np.hypot(deviations, quanta / np.sqrt(12.0))
     nominal = {**plan.without, **plan.truth.nominal}
+    mixed = plan.machine.mixed(plan.without)
     return Case(
         machine=plan.machine.name,
         seed=plan.seed,
@@ -270,7 +279,7 @@ def _case(plan: _Plan, pieces: list[Array], dt: float) -> Case:
         train=tuple(r for r, kind in zip(records, RECORDS, strict=True) if kind == "train"),
         validate=tuple(r for r, kind in zip(records, RECORDS, strict=True) if kind == "validate"),
         truth=plan.truth,
-        oracle=judge(channels, sensed, pieces, [kind == "train" for kind in RECORDS], NUDGE, dt),
+        oracle=judge(channels, sensed, pieces, [kind == "train" for kind in RECORDS], NUDGE, dt, mixed),
     )
 
 

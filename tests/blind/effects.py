@@ -33,6 +33,8 @@ class Scale:
         Of a body: mass [kg], and distance of a load on it from its joint [m].
     coulomb, viscous : float
         Friction that is there anyway [E, E s/C].
+    centre : float
+        Middle of the motion [C].
     """
 
     effort: float = 1.0
@@ -44,6 +46,7 @@ class Scale:
     lever: float = 0.0
     coulomb: float = 0.0
     viscous: float = 0.0
+    centre: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -99,7 +102,7 @@ def _compliance(g: Generator, s: Scale) -> dict[str, float]:
 def _end_stop(g: Generator, s: Scale) -> dict[str, float]:
     stiffness = between(g, 20.0, 300.0) * s.effort / s.way
     place = float(g.uniform(0.6, 0.95)) * s.way
-    high, low = (place, -1e9) if g.uniform() < 0.5 else (1e9, -place)
+    high, low = (s.centre + place, -1e9) if g.uniform() < 0.5 else (1e9, s.centre - place)
     return {"stiffness": stiffness, "damping": 0.3 * stiffness / s.speed, "low": low, "high": high}
 
 
@@ -126,7 +129,7 @@ _ALL = (
         "joint",
         lambda g, s: {
             "stiffness": between(g, 0.005, 0.5) * s.effort / s.way,
-            "rest": float(g.uniform(-0.3, 0.3)) * s.way,
+            "rest": s.centre + float(g.uniform(-0.3, 0.3)) * s.way,
         },
     ),
     Effect("torque_ripple", "joint", _ripple),
@@ -152,7 +155,7 @@ _ALL = (
     Effect("saturation", "actuator", lambda g, s: {"limit": float(g.uniform(0.9, 2.2)) * s.command}),
     Effect("actuator_lag", "actuator", lambda g, _s: {"time_constant": between(g, 5e-4, 1.5e-2)}),
     Effect("valve_dynamics", "valve", lambda g, _s: {"frequency": between(g, 15.0, 100.0)}),
-    Effect("internal_leakage", "cylinder", lambda g, _s: {"coefficient": between(g, 3e-13, 3e-11)}),
+    Effect("internal_leakage", "cylinder", lambda g, _s: {"coefficient": between(g, 5e-14, 3e-12)}),
     Effect("entrained_air", "supply", lambda g, _s: {"fraction": between(g, 2e-3, 5e-2)}),
     Effect("supply_drop", "supply", lambda g, _s: {"resistance": between(g, 2e9, 6e10), "capacitance": 5e-12}),
     Effect("sensor_offset", "sensor", lambda g, s: {"value": _sign(g) * between(g, 2e-3, 5e-2) * s.way}),

@@ -19,6 +19,8 @@ from blind.loads import Column, stack
 Array = NDArray[np.float64]
 #: Drop around which the flow through an edge turns from laminar to turbulent [Pa].
 LAMINAR = 1e4
+#: Contact of the piston with the ends of its stroke [N/m, N s/m].
+STOP_STIFFNESS, STOP_DAMPING = 1e8, 1e4
 AIR_PRESSURE, AIR_EXPONENT = 101325.0, 1.4
 
 
@@ -92,9 +94,9 @@ class Cylinders:
         qa = self.gain * z * root(np.where(out, ps - pa, pa - self.pt))
         qb = self.gain * z * root(np.where(out, pb - self.pt, ps - pb))
         leak = self.leak * (pa - pb)
-        va = self.line_a + self.area * (0.5 * self.stroke + x)
         small = self.ratio * self.area
-        vb = self.line_b + small * (0.5 * self.stroke - x)
+        va = self.line_a + self.area * np.maximum(0.5 * self.stroke + x, 0.0)
+        vb = self.line_b + small * np.maximum(0.5 * self.stroke - x, 0.0)
         da = self._bulk(pa) / va * (qa - self.area * v - leak)
         db = self._bulk(pb) / vb * (small * v + leak - qb)
         if not self.sags:
@@ -113,7 +115,9 @@ class Cylinders:
         self._command = np.clip(command, -self.limit, self.limit)
         self._middle = self._gone_on(self._rates(z, x, v, (self.pa, self.pb, self.ps)), 0.5 * self.step)
         pa, pb, _ = self._middle
-        return np.asarray(self.area * (pa - self.ratio * pb))
+        beyond = x - np.clip(x, -0.5 * self.stroke, 0.5 * self.stroke)
+        stop = np.where(beyond != 0.0, STOP_STIFFNESS * beyond + STOP_DAMPING * v, 0.0)
+        return np.asarray(self.area * (pa - self.ratio * pb) - np.where(stop * beyond > 0.0, stop, 0.0))
 
     def finish(self, x: Array, v: Array) -> None:
         """Step the chambers with place and speed in the middle."""

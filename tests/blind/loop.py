@@ -154,32 +154,48 @@ class Controller(Protocol):
     def __call__(self, reference: Array, reading: Array) -> Array: ...
 
 
-def closed_loop(
-    plant: Plant,
-    controller: Controller,
-    actuators: Actuators,
-    sensors: Sensors,
-    references: Array,
-    noise: Array,
-    dt: float,
-    fine: int,
-) -> tuple[Array, Array]:
-    """Readings (samples, sensors, columns) and commands (samples, actuators, columns).
+@dataclass(frozen=True)
+class Inputs:
+    """What comes from outside.
 
-    The first sensors are those that the controller sees, one for each actuator. ``references`` has the shape (samples,
-    actuators, columns), ``noise`` holds standard normal numbers of shape (samples, actuators and sensors, columns).
-    That of a drive is not in its logged command: the effort that it delivers is not quite what it was told.
+    Attributes
+    ----------
+    references : ndarray, shape (samples, actuators, records)
+    owner : ndarray, shape (columns,)
+        The record whose reference a column follows.
+    noise : ndarray, shape (samples, actuators and sensors, records)
+        Standard normal numbers. That of a drive is not in its logged command: the effort that it delivers is not quite
+        what it was told.
+    loud : ndarray, shape (records,)
+        The column of each record that has this noise.
     """
-    samples, drives = references.shape[:2]
-    readings, commands = np.zeros_like(noise[:, drives:]), np.zeros(references.shape)
+
+    references: Array
+    owner: NDArray[np.int64]
+    noise: Array
+    loud: NDArray[np.int64]
+
+
+def closed_loop(
+    plant: Plant, controller: Controller, actuators: Actuators, sensors: Sensors, inputs: Inputs, dt: float, fine: int
+) -> Array:
+    """Readings and commands, shape (samples, sensors and actuators, columns).
+
+    The first sensors are those that the controllers see, one for each actuator.
+    """
+    samples, drives = inputs.references.shape[:2]
+    channels, columns = inputs.noise.shape[1], len(inputs.owner)
+    seen, noise = np.zeros((samples, channels, columns)), np.zeros((channels, columns))
+    sensed = channels - drives
     sensors.keep(plant.outputs())
     step = dt / fine
     for k in range(samples):
-        readings[k] = sensors.read(plant.outputs(), noise[k, drives:])
-        commands[k] = controller(references[k], readings[k, :drives])
-        actuators.sample(k, commands[k], noise[k, :drives])
+        noise[:, inputs.loud] = inputs.noise[k]
+        seen[k, :sensed] = sensors.read(plant.outputs(), noise[drives:])
+        seen[k, sensed:] = controller(inputs.references[k][:, inputs.owner], seen[k, :drives])
+        actuators.sample(k, seen[k, sensed:], noise[:drives])
         for j in range(fine):
             plant.advance(actuators.step(j), k * dt + j * step)
             if sensors.delayed:
                 sensors.keep(plant.outputs())
-    return readings, commands
+    return seen

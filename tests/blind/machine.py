@@ -89,6 +89,9 @@ class Machine(Protocol):
     def controller(self, columns: Sequence[Column], dt: float) -> Controller:
         """What commands its drives."""
 
+    def mixed(self, values: Mapping[str, float]) -> Mapping[str, Mapping[str, float]]:
+        """Weighted sums of channels that say more than each of them, such as the force of a cylinder."""
+
     def reference(self, generator: Generator, draft: Draft, time: Array, kind: str) -> Array:
         """References of a record of the kind ``"train"`` or ``"validate"``, shape (actuators, samples)."""
 

@@ -37,7 +37,8 @@ class Oracle:
         Standard deviation, below 25 Hz, that noise brings into each channel of the closed loop.
     gap, recalibrated : mapping
         Root mean square, on the validation records and below 25 Hz, of what the effect changes in each channel, and of
-        what is left of it after a recalibration, both in units of ``noise``.
+        what is left of it after a recalibration, both in units of ``noise``. Beside the channels there may be weighted
+        sums of them that show an effect better, such as the force of a cylinder.
     """
 
     with_effect: tuple[Mapping[str, Array], ...]
@@ -65,6 +66,7 @@ def judge(
     training: Sequence[bool],
     nudge: float,
     dt: float,
+    mixed: Mapping[str, Mapping[str, float]],
 ) -> Oracle:
     """Oracle of a case.
 
@@ -82,11 +84,15 @@ def judge(
         Relative change of the parameters.
     dt : float
         Sampling interval [s].
+    mixed : mapping of str to mapping
+        Further channels as weighted sums.
     """
+    judged = [*channels, *mixed]
+    weights = np.vstack([np.eye(len(channels)), *([[w.get(c, 0.0) for c in channels]] for w in mixed.values())])
     rate = 1.0 / dt
     sections = butter(4, min(BAND, 0.4 * rate), fs=rate, output="sos")
     stride = max(1, int(rate / (4.0 * BAND)))
-    slow = [sosfiltfilt(sections, piece, axis=0)[::stride] for piece in pieces]
+    slow = [np.einsum("ij,njk->nik", weights, sosfiltfilt(sections, piece, axis=0)[::stride]) for piece in pieces]
     noise = np.sqrt(np.mean(np.concatenate([(p[:, :, 0] - p[:, :, 1]) ** 2 for p in slow]), 0))
     noise = np.maximum(noise, 1e-300)
     gaps = [(p[:, :, 1] - p[:, :, 2]) / noise for p in slow]
@@ -102,7 +108,7 @@ def judge(
     left = [gaps[k] - slopes[k] @ change for k in unseen]
 
     def size(parts: Sequence[Array]) -> dict[str, float]:
-        return dict(zip(channels, np.sqrt(np.mean(np.concatenate(parts) ** 2, 0)).tolist(), strict=True))
+        return dict(zip(judged, np.sqrt(np.mean(np.concatenate(parts) ** 2, 0)).tolist(), strict=True))
 
     def named(column: int) -> tuple[dict[str, Array], ...]:
         order = [*learned, *unseen]
@@ -112,7 +118,7 @@ def judge(
         with_effect=named(1),
         without_effect=named(2),
         sensor_noise=dict(zip(channels, sensed.tolist(), strict=False)),
-        noise=dict(zip(channels, noise.tolist(), strict=True)),
+        noise=dict(zip(judged, noise.tolist(), strict=True)),
         gap=size([gaps[k] for k in unseen]),
         recalibrated=size(left),
     )

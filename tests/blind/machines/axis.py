@@ -204,6 +204,11 @@ limit = {show("servo.limit", command)}
         outer, inner, limit = (stack(columns, servo, name) for name in ("position_gain", "velocity_gain", "limit"))
         return Cascade(outer, inner, limit, dt)
 
+    def mixed(self, values: Mapping[str, float]) -> Mapping[str, Mapping[str, float]]:
+        """See `Machine`."""
+        del values
+        return {}
+
     def reference(self, generator: Generator, draft: Draft, time: Array, kind: str) -> Array:
         """See `Machine`."""
         shape = moves if kind == "validate" else sines

@@ -211,6 +211,11 @@ limit = {show("servo.limit", "A")}
         del dt
         return Proportional(stack(columns, ["loop"], "proportional"), stack(columns, ["servo"], "limit"))
 
+    def mixed(self, values: Mapping[str, float]) -> Mapping[str, Mapping[str, float]]:
+        """See `Machine`."""
+        area = values["servo.area"]
+        return {"servo.force": {"servo.pressure_a": area, "servo.pressure_b": -area * values["servo.ratio"]}}
+
     def reference(self, generator: Generator, draft: Draft, time: Array, kind: str) -> Array:
         """See `Machine`."""
         shape = moves if kind == "validate" else sines
