@@ -164,9 +164,13 @@ def _plan(machine: Machine, hidden: str | Sequence[str], seed: int, noise_level:
     base = tuple((name, site) for name, site in draft.base if f"{name}@{site}" not in absent)
     keys = {f"{h.site}.{h.name}.{p}": value for h in found for p, value in h.parameters.items()}
     without = {k: v for k, v in draft.values.items() if k not in keys}
-    free = {k: v for k, v in without.items() if k in draft.calibratable}
+    for hidden_effect in found:
+        for parameter, value in machine.layout.absent.get(hidden_effect.name, {}).items():
+            without[f"{hidden_effect.site}.{hidden_effect.name}.{parameter}"] = value
+    stiff = {f"{h.site}.bending" for h in found if h.name == "link_flexibility"}
+    free = {k: v for k, v in without.items() if k in draft.calibratable and k not in stiff}
     nominal, wrong = _nominal(generator, free, names)
-    truth = Truth(tuple(map(_as_catalogued, found)), free, nominal, wrong)
+    truth = Truth(tuple(_as_catalogued(h, draft.values) for h in found), free, nominal, wrong)
     return _Plan(machine, seed, noise_level, draft, base, truth, {**without, **keys}, without, generator)
 
 
@@ -192,11 +196,14 @@ def _nominal(
     return {key: value * (1.0 + off[key]) for key, value in true.items()}, wrong
 
 
-def _as_catalogued(hidden: Hidden) -> Hidden:
-    """The same with the parameters of the catalogue: the gain of a sensor in place of what exceeds one."""
-    if hidden.name != "sensor_gain":
-        return hidden
-    return Hidden(hidden.name, hidden.site, {"value": 1.0 + hidden.parameters["excess"]}, hidden.known)
+def _as_catalogued(hidden: Hidden, values: Mapping[str, float]) -> Hidden:
+    """The same with parameters that say what is there: the gain of a sensor, the stiffness of a link [N m^2]."""
+    if hidden.name == "sensor_gain":
+        return Hidden(hidden.name, hidden.site, {"value": 1.0 + hidden.parameters["excess"]}, hidden.known)
+    if hidden.name == "link_flexibility":
+        bending = values[f"{hidden.site}.bending"] * hidden.parameters["share"]
+        return Hidden(hidden.name, hidden.site, {"bending": bending}, hidden.known)
+    return hidden
 
 
 def _simulate(plans: Sequence[_Plan]) -> list[Case]:

@@ -146,9 +146,9 @@ _ALL = (
     Effect(
         "link_flexibility",
         "link",
-        lambda g, _s: {"frequency": between(g, 4.0, 40.0), "damping_ratio": float(g.uniform(0.005, 0.03))},
+        lambda g, _s: {"share": between(g, 0.4, 1.2)},
     ),
-    Effect("structural_damping", "link", lambda g, _s: {"time": between(g, 5e-4, 1e-2)}),
+    Effect("structural_damping", "link", lambda g, _s: {"time": between(g, 5e-5, 1.2e-3)}),
     Effect("gravity_tilt", "base", lambda g, _s: {"angle": _sign(g) * between(g, np.radians(0.3), np.radians(8.0))}),
     Effect("input_delay", "actuator", lambda g, _s: {"time": between(g, 5e-4, 8e-3)}),
     Effect("dead_zone", "actuator", lambda g, s: {"width": between(g, 0.003, 0.3) * s.command}),

@@ -53,13 +53,26 @@ class Signal:
 
 @dataclass(frozen=True)
 class Layout:
-    """Signals of a machine. The first sensors are those that the controllers see, one for each actuator."""
+    """Signals and sites of a machine.
+
+    Attributes
+    ----------
+    sensors, commands, references : tuple of Signal
+        The first sensors are those that the controllers see, one for each actuator.
+    sites : mapping
+        Sites of each kind.
+    without : tuple of str
+        Effects that make no sense on the machine.
+    absent : mapping
+        Parameters that an effect has where it is not there, other than zero.
+    """
 
     sensors: tuple[Signal, ...]
     commands: tuple[Signal, ...]
     references: tuple[Signal, ...]
     sites: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     without: tuple[str, ...] = ()
+    absent: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
 
 class Machine(Protocol):

@@ -6,20 +6,18 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 from blind.machine import Machine
-from blind.machines import arm2r, axis, hydraulic_leg, servo_cylinder
+from blind.machines import arm2r, axis, flexible_arm, hydraulic_leg, servo_cylinder
 
-MACHINES: Mapping[str, Machine] = MappingProxyType(
-    {
-        machine.name: machine
-        for machine in (
-            axis.LINEAR,
-            axis.ROTARY,
-            servo_cylinder.ServoCylinder(),
-            arm2r.Arm2R(),
-            hydraulic_leg.HydraulicLeg(),
-        )
-    },
+_ALL: tuple[Machine, ...] = (
+    axis.LINEAR,
+    axis.ROTARY,
+    arm2r.Arm2R(),
+    flexible_arm.FlexibleArm(),
+    servo_cylinder.ServoCylinder(),
+    hydraulic_leg.HydraulicLeg(),
 )
+
+MACHINES: Mapping[str, Machine] = MappingProxyType({machine.name: machine for machine in _ALL})
 """Every machine by name."""
 
 __all__ = ["MACHINES"]
