@@ -91,11 +91,8 @@ class _Plan:
     without: dict[str, float]
     generator: Generator
     references: list[Array] = field(default_factory=list)
-
-    @property
-    def free(self) -> tuple[str, ...]:
-        """Parameters that may be calibrated, with which the oracle does so."""
-        return tuple(self.truth.nominal)
+    free: tuple[str, ...] = ()
+    """Parameters that the oracle recalibrates."""
 
 
 def sites_of(machine: str, effect: str) -> tuple[str, ...]:
@@ -110,13 +107,19 @@ def hideable(machine: str, *, known: bool | None = None) -> tuple[str, ...]:
     return tuple(name for name in names if sites_of(machine, name))
 
 
-def make_case(machine: str, hidden: str | Sequence[str], seed: int, noise_level: float = 1.0) -> Case:
+def make_case(
+    machine: str, hidden: str | Sequence[str], seed: int, noise_level: float = 1.0, *, recalibrate: bool = True
+) -> Case:
     """One case; see `make_cases`, which is much quicker for many."""
-    return make_cases(machine, [(hidden, seed)], noise_level)[0]
+    return make_cases(machine, [(hidden, seed)], noise_level, recalibrate=recalibrate)[0]
 
 
 def make_cases(
-    machine: str, requests: Iterable[tuple[str | Sequence[str], int]], noise_level: float = 1.0
+    machine: str,
+    requests: Iterable[tuple[str | Sequence[str], int]],
+    noise_level: float = 1.0,
+    *,
+    recalibrate: bool = True,
 ) -> list[Case]:
     """Cases of one machine.
 
@@ -129,6 +132,10 @@ def make_cases(
         name of an effect, or several. ``"coulomb_friction@elbow"`` says where; otherwise the seed does.
     noise_level : float
         Factor of the noise of all sensors and drives; the counts of encoders stay.
+    recalibrate : bool
+        Whether the oracle allows for other values of the calibratable parameters. That takes a column for each of them,
+        which makes machines with many parameters three times as slow; without it, its recalibrated gap is the plain
+        one.
 
     Raises
     ------
@@ -136,6 +143,8 @@ def make_cases(
         An effect makes no sense on the machine.
     """
     plans = [_plan(MACHINES[machine], hidden, seed, noise_level) for hidden, seed in requests]
+    for plan in plans:
+        plan.free = tuple(plan.truth.nominal) if recalibrate else ()
     cases: dict[int, Case] = {}
     for rate in sorted({plan.draft.rate for plan in plans}):
         chosen = [k for k, plan in enumerate(plans) if plan.draft.rate == rate]
@@ -153,12 +162,12 @@ def _plan(machine: Machine, hidden: str | Sequence[str], seed: int, noise_level:
     """Draw everything that a case needs."""
     names = (hidden,) if isinstance(hidden, str) else tuple(hidden)
     generator = np.random.default_rng([seed, zlib.crc32(machine.name.encode())])
-    effects = [_placed(machine, name, generator) for name in names if name not in {NOTHING, PARAMETERS}]
+    effects = [_placed(machine, name, seed) for name in names if name not in {NOTHING, PARAMETERS}]
     needs = [f"{need}@{site}" for name, site in effects for need in EFFECTS[name].needs]
     draft = machine.draft(generator, needs)
     found = []
     for name, site in effects:
-        drawn = EFFECTS[name].draw(generator, draft.scales[site])
+        drawn = EFFECTS[name].draw(_own_generator(machine, name, seed), draft.scales[site])
         found.append(Hidden(name, site, drawn, EFFECTS[name].known))
     absent = {f"{name}@{site}" for name, site in effects} - set(needs)
     base = tuple((name, site) for name, site in draft.base if f"{name}@{site}" not in absent)
@@ -174,12 +183,18 @@ def _plan(machine: Machine, hidden: str | Sequence[str], seed: int, noise_level:
     return _Plan(machine, seed, noise_level, draft, base, truth, {**without, **keys}, without, generator)
 
 
-def _placed(machine: Machine, name: str, generator: Generator) -> tuple[str, str]:
+def _own_generator(machine: Machine, name: str, seed: int) -> Generator:
+    """Numbers for one effect: all effects of a seed act on one machine, but are not all large or all small."""
+    return np.random.default_rng([seed, zlib.crc32(f"{machine.name} {name}".encode())])
+
+
+def _placed(machine: Machine, name: str, seed: int) -> tuple[str, str]:
+    """Effect and site of a request such as ``"coulomb_friction@elbow"``; without a site, the seed says where."""
     effect, _, site = name.partition("@")
     sites = sites_of(machine.name, effect) if effect in EFFECTS else ()
     if not sites or (site and site not in sites):
         raise ValueError(f'"{name}" makes no sense on {machine.name}; it has {", ".join(hideable(machine.name))}')
-    return effect, site or str(generator.choice(sites))
+    return effect, site or str(_own_generator(machine, f"place of {effect}", seed).choice(sites))
 
 
 def _nominal(

@@ -81,7 +81,7 @@ class FlexibleArm:
         values: dict[str, float] = {
             "motion.way": way,
             "motion.speed": speed,
-            "elbow.housing_inertia": 5e-3,
+            "elbow.housing_inertia": 2e-2,
             "upper.width": width,
         }
         calibratable: dict[str, float] = {}
@@ -123,7 +123,7 @@ class FlexibleArm:
             scale = Scale(effort, speed, way, felt[k], effort / gain, tips[k], lengths[k], coulomb, viscous)
             scales |= dict.fromkeys((joint, link, drive, ENCODERS[k], "base"), scale)
             scales |= {BRIDGES[k]: Scale(way=4e-4)}
-        return Draft(values, calibratable, tuple(base), scales, float(g.choice((250.0, 500.0, 1000.0))))
+        return Draft(values, calibratable, tuple(base), scales, float(g.choice((500.0, 1000.0))))
 
     def text(self, values: Mapping[str, float], draft: Draft, base: Sequence[tuple[str, str]]) -> str:
         """See `Machine`."""
