@@ -27,6 +27,16 @@ def sines(generator: Generator, time: Array, reach: float, speed: float) -> Arra
     return np.asarray(reach * path / np.abs(path).max())
 
 
+def jumps(generator: Generator, time: Array, size: float) -> Array:
+    """Small jumps to and fro at irregular times, none near both ends, which make flexible links ring."""
+    path, begin, side = np.zeros_like(time), 0.6, 1.0
+    while begin < time[-1] - 1.0:
+        end = begin + float(generator.uniform(0.5, 1.0))
+        path += side * size * ((time >= begin) & (time < min(end, time[-1] - 0.5)))
+        begin, side = end + float(generator.uniform(0.2, 0.8)), -side
+    return path
+
+
 def moves(generator: Generator, time: Array, reach: float, speed: float) -> Array:
     """Moves from place to place, each followed by a rest; the first two go to both ends of the reach."""
     path, place, begin = np.zeros_like(time), 0.0, 0.4

@@ -14,7 +14,7 @@ from blind.effects import Scale
 from blind.loads import Column, stack
 from blind.loop import Cascade
 from blind.machine import Draft, Layout, Signal, Writer
-from blind.motion import moves, sines
+from blind.motion import jumps, moves, sines
 from blind.noise import converter, encoder
 
 Array = NDArray[np.float64]
@@ -22,6 +22,8 @@ DRIVES, ENCODERS, BRIDGES, SERVOS = (tuple(f"{n}_{k}" for k in (1, 2)) for n in 
 DENSITY = 2700.0
 #: How much stiffer than it is a link is where the oracle takes its flexibility away; stiffer takes finer steps.
 NEARLY_RIGID = 2.2
+#: Jumps of the references, which make the links ring [rad].
+JUMP = 0.03
 _SITES = {
     "joint": JOINTS,
     "link": LINKS,
@@ -212,4 +214,5 @@ limit = {show(f"{SERVOS[k]}.limit", "A")}""")
     def reference(self, generator: Generator, draft: Draft, time: Array, kind: str) -> Array:
         """See `Machine`."""
         shape, values = (moves if kind == "validate" else sines), draft.values
-        return np.array([shape(generator, time, values["motion.way"], values["motion.speed"]) for _ in JOINTS])
+        paths = [shape(generator, time, values["motion.way"], values["motion.speed"]) for _ in JOINTS]
+        return np.array([path + jumps(generator, time, JUMP) for path in paths])
