@@ -18,12 +18,14 @@ from vpm.simulate import simulate
 Array = NDArray[np.float64]
 
 #: For each machine a seed whose base has no dry friction, which the two simulations write differently, and the largest
-#: difference of both simulations relative to the largest value of the channel.
+#: difference of both simulations relative to the largest value of the channel. That of the flexible arm is the error
+#: of its eight segments and falls with the square of their number: the strain of the outer link differs by 1.0 % (root
+#: mean square) with 8 and by 0.47 % with 12.
 EXACT = {
     "axis_linear": (0, {"position": 1e-7, "command": 1e-6}),
     "axis_rotary": (0, {"position": 1e-6, "command": 1e-5}),
     "arm2r": (3, {"position": 1e-6, "command": 1e-5}),
-    "flexible_arm": (3, {"position": 5e-4, "strain": 5e-3, "command": 5e-3}),
+    "flexible_arm": (3, {"position": 5e-4, "strain": 2.5e-2, "command": 1e-2}),
     "hydraulic_leg": (5, {"position": 1e-5, "pressure_a": 1e-3, "pressure_b": 1e-3, "command": 1e-4}),
     "servo_cylinder": (1, {"position": 1e-6, "pressure_a": 1e-4, "pressure_b": 1e-4, "command": 1e-6}),
 }

@@ -14,7 +14,12 @@ diagnosis finds, it finds in somebody else's data.
 
     make_cases("axis_linear", [(name, seed) for name in hideable("axis_linear") for seed in range(5)])
 
-A batch is simulated side by side and takes little longer than one case, so ask for many at once.
+A batch is simulated side by side and takes little longer than one case, so ask for many at once. The machines with many
+parameters are three times as quick with ``recalibrate=False``, which leaves their oracle without a recalibration.
+Beside effects there are the cases ``"none"`` and ``"parameters"``, and several effects as a tuple.
+
+The sites are those of the model files, but for ``"base"``: a tilt turns gravity about the axis of a joint in the
+vertical plane (positive angles as those of the joint), and in the flexible arm into the level plane, towards -y.
 
 =================  ===================================================================================================
 ``case.py``        ``make_case``, ``make_cases``, the truth
@@ -24,6 +29,8 @@ A batch is simulated side by side and takes little longer than one case, so ask 
 ``machines/``      one file each
 ``loads.py``       friction, springs, ripple, hysteresis, stops of joints
 ``driveline.py``   rotors, gears and the links behind them in time
+``chain.py``       flexible links
+``hydraulics.py``  valves, cylinders, pump
 ``loop.py``        sensors, controllers, drives
 ``motion.py``      references
 ``noise.py``       noise and counts
