@@ -4,6 +4,7 @@
 mod common;
 
 use common::{ALWAYS, Bench, Machine, close};
+use serde_json::json;
 use vpm_core::effect::Hysteresis;
 use vpm_core::integrator::Method;
 use vpm_core::inverse::{Motion, inverse_dynamics};
@@ -201,7 +202,6 @@ fn linearly_implicit_steps_far_beyond_the_stiffness_stay_bounded() {
         close(sign * (velocity[last] - velocity[last - 10]), 0.5 * 10.0 * 5e-3, 1e-4);
     }
 }
-}
 
 #[test]
 fn the_state_jacobian_is_that_of_differences() {
@@ -209,8 +209,14 @@ fn the_state_jacobian_is_that_of_differences() {
     let law = [("force", 1.5), ("displacement", 0.02), ("shape", 0.4)];
     let mut wide = Machine::new(&double_pendulum([1.0, 0.7], [0.5, 0.4]));
     wide.effect("hysteresis", 1, &law).effect("hysteresis", 0, &law).actuator(0, &[("gain", 2.0), ("lag", 0.02)]);
-    let states = [vec![0.1, 0.3, -0.4], vec![0.2, -0.3, 0.7, -0.4, 0.5, 0.6, -0.2]];
-    for (machine, x) in [&rough(0.4), &wide].into_iter().zip(&states) {
+    let mut driven = Machine::new(&double_pendulum([1.0, 0.7], [0.5, 0.4]));
+    let motor = json!({"type": "dc_motor", "resistance": 0.5, "time_constant": 2e-3, "torque_constant": 0.06,
+        "back_emf": 0.06, "gear_ratio": 50.0, "efficiency": 0.8, "transition_velocity": 1e-3, "rotor_inertia": 2e-5});
+    driven.add("actuators", json!({"name": "hip", "on": {"joint": 0}}), json!({"drive": motor}));
+    driven.effect("hysteresis", 1, &law).effect("hysteresis", 0, &law);
+    let of_two = vec![0.2, -0.3, 0.7, -0.4, 0.5, 0.6, -0.2];
+    let states = [vec![0.1, 0.3, -0.4], of_two.clone(), of_two];
+    for (machine, x) in [&rough(0.4), &wide, &driven].into_iter().zip(&states) {
         let mut system = machine.system();
         let dim = system.dim();
         assert_eq!(dim, x.len());
