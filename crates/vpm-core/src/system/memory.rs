@@ -29,7 +29,7 @@ impl<S: Scalar> Memories<S> {
 
     /// Laws with their joints and memories.
     #[inline]
-    pub(super) fn iter(&self) -> impl Iterator<Item = (usize, &Hysteresis<S>, S)> {
+    pub(crate) fn iter(&self) -> impl Iterator<Item = (usize, &Hysteresis<S>, S)> {
         self.laws.iter().zip(&self.values).map(|((joint, law), &value)| (*joint, law, value))
     }
 
