@@ -16,6 +16,7 @@ __all__ = [
     "NarxStepper",
     "PlanarArm",
     "Simulation",
+    "Snapshot",
     "System",
     "check_integrator",
     "hyq_parameters",
