@@ -17,6 +17,8 @@ from types import MappingProxyType
 from vpm.catalogue.elsewhere import ACTUATOR_EFFECTS, BODY_EFFECTS, SENSOR_EFFECTS
 from vpm.catalogue.joint import JOINT_EFFECTS
 from vpm.catalogue.kinds import POSITIVE, SITE_KINDS, EffectParameter, EffectType, JointKind, Scale, SiteKind
+from vpm.catalogue.link import LINK_EFFECTS
+from vpm.catalogue.world import WORLD_EFFECTS
 from vpm.errors import ModelError, near_match
 
 __all__ = [
@@ -32,10 +34,10 @@ __all__ = [
     "effects_for_site",
 ]
 
-#: Every effect by name, in the order in which a page should list them.
-EFFECTS: Mapping[str, EffectType] = MappingProxyType(
-    {effect.name: effect for effect in (*JOINT_EFFECTS, *BODY_EFFECTS, *ACTUATOR_EFFECTS, *SENSOR_EFFECTS)}
-)
+_BUILT_IN = (*JOINT_EFFECTS, *BODY_EFFECTS, *LINK_EFFECTS, *WORLD_EFFECTS, *ACTUATOR_EFFECTS, *SENSOR_EFFECTS)
+_ENTRIES = {effect.name: effect for effect in _BUILT_IN}
+#: Every effect by name, in the order in which a page should list them; `register` adds to it.
+EFFECTS: Mapping[str, EffectType] = MappingProxyType(_ENTRIES)
 
 
 def effect_type(name: str) -> EffectType:
@@ -63,7 +65,7 @@ def effects_for_site(kind: str) -> tuple[EffectType, ...]:
 
     Parameters
     ----------
-    kind : {"joint", "body", "actuator", "sensor"}
+    kind : {"joint", "body", "link", "beam", "actuator", "sensor", "world"}
 
     Raises
     ------

@@ -35,6 +35,11 @@ class Components(DriveComponents):
         return self._checked.structure.joints
 
     @property
+    def added_joints(self) -> tuple[str, ...]:
+        """Joints that effects have split off others, ``axis_deflection``: nobody drives and nobody measures them."""
+        return self._checked.structure.added
+
+    @property
     def bodies(self) -> tuple[str, ...]:
         """Bodies, parents before children."""
         return self._checked.structure.bodies
@@ -78,8 +83,9 @@ class Components(DriveComponents):
 
     @cached_property
     def levels(self) -> Mapping[str, str]:
-        """Level of detail of each beam, as `at` takes it."""
-        return MappingProxyType({name: str(self._checked.document.beams[name].detail) for name in self.beams})
+        """Level of detail of each beam, as `at` takes it; a rigid one that an effect bends has a level that bends."""
+        beams = self._checked.structure.document.beams
+        return MappingProxyType({name: str(beams[name].detail) for name in self.beams})
 
     @property
     def sensors(self) -> tuple[str, ...]:
