@@ -95,9 +95,7 @@ def _worked_out(model: Model, theta: Array, m: Motion) -> tuple[Array, Array, Ar
     return full[0], full[1], full[2]
 
 
-def _along(
-    model: Model, theta: Array, given: tuple[Array, Array, Array], joints: tuple[str, ...], dt: float
-) -> Array:
+def _along(model: Model, theta: Array, given: tuple[Array, Array, Array], joints: tuple[str, ...], dt: float) -> Array:
     """Outputs (N, channels) along a motion of some joints, the others passive."""
     followed = [place for place, name in enumerate(model.joints) if name in joints]
     passive = [place for place in range(len(model.joints)) if place not in followed]

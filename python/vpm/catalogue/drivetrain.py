@@ -56,8 +56,8 @@ JOINT_COMPLIANCE = EffectType(
     ),
     law="tau = -stiffness d - damping dd/dt on the wind-up d, with inertia on the motor side",
     sentence=(
-        "{at} is elastic between motor and link: it winds up with {stiffness}, damped with {damping}, with {inertia} on the"
-        " side of the motor."
+        "{at} is elastic between motor and link: it winds up with {stiffness}, damped with {damping}, with {inertia} on"
+        " the side of the motor."
     ),
     impossible="a negative stiffness would drive motor and link apart, a negative damping would feed energy in",
     confused_with={
@@ -127,9 +127,9 @@ ROTOR_INERTIA = EffectType(
     ),
     law="tau = -inertia d^2q/dt^2, without gravity or gyroscopic effects",
     sentence="{at} has to accelerate {inertia} more than its links have: that of a rotor, which no gravity acts on.",
-    impossible="a negative inertia of a rotor would mean that the links are lighter than described: correct their inertia",
+    impossible="a negative inertia of a rotor would mean that the links are too heavy: correct their inertia",
     confused_with={
-        "payload": "both need effort to accelerate; a payload weighs something and loads the joints before it too",
+        "payload": "both need effort to accelerate; a payload has weight and loads the joints before it too",
         "sensor_gain": "both scale the effort that an acceleration needs; a record with a known load parts them",
         "joint_compliance": "far below the resonance only the inertias show; faster motion parts them",
     },
@@ -166,7 +166,9 @@ END_STOP = EffectType(
         "tau = -stiffness (p(q - high) r(damping v) - p(low - q) r(-damping v)), p(x) = 1/2 (x + sqrt(x^2 + width^2)),"
         " r(y) = 1 + y, rounded above 0"
     ),
-    sentence="{at} runs against stops at {low} and {high}, which push back with {stiffness} and grow by {damping} in impact.",
+    sentence=(
+        "{at} runs against stops at {low} and {high}, which push back with {stiffness}, harder by {damping} in impact."
+    ),
     impossible="a negative stiffness would pull the joint beyond its end",
     confused_with={
         "spring": "they agree over a way beyond the end alone; motion on both sides of it parts them",

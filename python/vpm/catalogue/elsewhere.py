@@ -49,7 +49,7 @@ PAYLOAD = EffectType(
     impossible="a negative payload would mean that the body is lighter than described: correct the mass of the body",
     confused_with={
         "gravity_tilt": "both change the load of gravity; fast motion shows the payload's inertia",
-        "rotor_inertia": "both need effort to accelerate; a payload weighs something and loads the joints before it too",
+        "rotor_inertia": "both need effort to accelerate; a payload has weight and loads the joints before it too",
         "bias_force": "they agree where gravity's lever does not change; other poses or fast motion part them",
         "spring": "near the hanging position gravity acts like a spring; large angles or fast motion part them",
         "torque_ripple": "gravity on a revolute joint repeats once per turn; a vertical axis or fast motion parts them",

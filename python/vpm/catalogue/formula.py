@@ -140,8 +140,8 @@ class _Compiler:
             case ast.Call(func=ast.Name(id=name), args=[argument], keywords=[]) if name in FUNCTIONS:
                 return self._after(argument, name)
         raise ModelError(
-            f'the law "{self.text}" has "{ast.unparse(node)}", which the core does not know; use + - * /, whole powers, '
-            f"{', '.join(FUNCTIONS)} of q, v, pi and {', '.join(self.names)}"
+            f'the law "{self.text}" has "{ast.unparse(node)}", which the core does not know; use + - * /, whole '
+            f"powers, {', '.join(FUNCTIONS)} of q, v, pi and {', '.join(self.names)}"
         )
 
     def _after(self, operand: ast.expr, instruction: Instruction) -> int:
@@ -157,9 +157,8 @@ class _Compiler:
         elif name in self.names:
             self.program.append({"parameter": self.names.index(name)})
         else:
-            raise ModelError(
-                f'the law "{self.text}" names {name}, which is no parameter; it has q, v, pi and {", ".join(self.names)}'
-            )
+            known = ", ".join(self.names)
+            raise ModelError(f'the law "{self.text}" names {name}, which is no parameter; it has q, v, pi and {known}')
         return 1
 
     def _constant(self, value: float) -> int:

@@ -162,7 +162,14 @@ class EffectType:
 
 
 def size(
-    name: str, suffix: str, unit: str, scale: Scale, meaning: str, *, physical: Range = ANY, neutral: float = 0.0,
+    name: str,
+    suffix: str,
+    unit: str,
+    scale: Scale,
+    meaning: str,
+    *,
+    physical: Range = ANY,
+    neutral: float = 0.0,
     linear: bool = True,
 ) -> EffectParameter:
     """Size of a law that can be evaluated for every number; the effort is linear in it unless said otherwise."""

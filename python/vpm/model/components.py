@@ -39,6 +39,22 @@ class Components(DriveComponents):
         """Joints that effects have split off others, ``axis_deflection``: nobody drives and nobody measures them."""
         return self._checked.structure.added
 
+    def joint_before(self, site: str) -> str:
+        """Joint with one coordinate that moves a body or a beam, or a joint itself.
+
+        Raises
+        ------
+        ModelError
+            There is no such component, or nothing moves it.
+        """
+        structure = self._checked.structure
+        if site in structure.joints:
+            return site
+        joint = structure.joint_at("body", site) if site in structure.frames else None
+        if joint is None:
+            raise ModelError(f'{self.name} has no joint that moves "{site}"; name a joint, or what hangs on one')
+        return joint
+
     @property
     def bodies(self) -> tuple[str, ...]:
         """Bodies, parents before children."""

@@ -67,7 +67,7 @@ def splitting_problems(document: Document, names: Mapping[str, str]) -> Iterator
         earlier = split.setdefault(joint, position)
         if earlier != position:
             other = document.effects[earlier].type
-            rest = f'splits joint "{joint}" a second time, after {other} in effects[{earlier}], and no inertia is between'
+            rest = f'splits joint "{joint}" again, after {other} in effects[{earlier}], and no inertia is between'
             yield Problem(where, f"{rest}; keep one of them")
         added = f"{entry.at}_bending" if bends else f"{entry.at}_deflection"
         if added in {*document.joints, *document.bodies, *document.beams, *document.actuators, *document.sensors}:
