@@ -143,6 +143,8 @@ def _candidate(effect: EffectType, site: str, model: Model, data: InverseDynamic
 
 def _payload_places(model: Model, body: str) -> tuple[Mapping[str, float], ...]:
     """At the origin of the body, at its centre of mass, and twice as far out."""
+    if body in model.beams:  # in the frame of its tip
+        return ({},)
     centre = {axis: model.parameters[f"{body}.center_of_mass.{axis}"].value for axis in "xyz"}
     factors = (0.0, 1.0, 2.0) if any(centre.values()) else (0.0,)
     return tuple({axis: factor * value for axis, value in centre.items()} for factor in factors)

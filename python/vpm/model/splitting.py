@@ -83,6 +83,16 @@ def splitting_problems(document: Document, names: Mapping[str, str]) -> Iterator
                 )
 
 
+def stop_problems(document: Document, values: Mapping[str, float]) -> Iterator[Problem]:
+    """End stops that leave no way between them."""
+    for position, entry in enumerate(document.effects):
+        if entry.type == "end_stop":
+            low, high = (values[f"{entry.at}.end_stop.{end}"] for end in ("low", "high"))
+            if low >= high:
+                rest = f"is {low:g}, but the upper end is {high:g} (SI); the lower one has to be below"
+                yield Problem(place("effects", position, "low"), rest)
+
+
 def _has_rotor(document: Document, joint: str) -> bool:
     """Whether the motor side of a joint has an inertia of its own."""
     described = document.joints.get(joint)

@@ -104,7 +104,8 @@ impl<S: Scalar> TreeEffect<S> {
                 let entry = &mut parts.beams[beam];
                 if let Some(root) = entry.sections.first() {
                     let properties = root.shape.properties(entry.material.poisson)?;
-                    let about_x = !matches!(entry.deforms.first(), Some(Component::BendingY));
+                    let bends = |component: &&Component| matches!(component, Component::BendingX | Component::BendingY);
+                    let about_x = !matches!(entry.deforms.iter().find(bends), Some(Component::BendingY));
                     let moment = if about_x { properties.moment_x } else { properties.moment_y };
                     entry.material.young = stiffness * (entry.length / 3.0) / moment;
                 }
