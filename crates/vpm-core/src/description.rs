@@ -136,10 +136,10 @@ impl Description {
         self.actuators.len() + self.supplies.iter().filter(|supply| supply.is_logged()).count()
     }
 
-    /// Length of the state: coordinates, rates, the states of each actuator (lag, then drive), pressures of supplies that sag.
+    /// Length of the state: coordinates, rates, the states of each actuator (lag, then drive), states of each supply.
     pub fn n_states(&self) -> usize {
-        let sagging = self.supplies.iter().filter(|supply| supply.is_sagging()).count();
-        2 * self.n_coordinates() + self.actuators.iter().map(Actuator::n_states).sum::<usize>() + sagging
+        let of_supplies: usize = self.supplies.iter().map(|supply| supply.states().count()).sum();
+        2 * self.n_coordinates() + self.actuators.iter().map(Actuator::n_states).sum::<usize>() + of_supplies
     }
 
     /// Number of output channels.

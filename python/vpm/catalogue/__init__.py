@@ -15,6 +15,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 from vpm.catalogue.elsewhere import ACTUATOR_EFFECTS, BODY_EFFECTS, SENSOR_EFFECTS
+from vpm.catalogue.hydraulic import CYLINDER_EFFECTS, SUPPLY_EFFECTS
 from vpm.catalogue.joint import JOINT_EFFECTS
 from vpm.catalogue.kinds import POSITIVE, SITE_KINDS, EffectParameter, EffectType, JointKind, Scale, SiteKind
 from vpm.errors import ModelError, near_match
@@ -34,7 +35,18 @@ __all__ = [
 
 #: Every effect by name, in the order in which a page should list them.
 EFFECTS: Mapping[str, EffectType] = MappingProxyType(
-    {effect.name: effect for effect in (*JOINT_EFFECTS, *BODY_EFFECTS, *ACTUATOR_EFFECTS, *SENSOR_EFFECTS)}
+    {
+        effect.name: effect
+        for effects in (
+            JOINT_EFFECTS,
+            BODY_EFFECTS,
+            ACTUATOR_EFFECTS,
+            CYLINDER_EFFECTS,
+            SUPPLY_EFFECTS,
+            SENSOR_EFFECTS,
+        )
+        for effect in effects
+    }
 )
 
 
@@ -63,7 +75,7 @@ def effects_for_site(kind: str) -> tuple[EffectType, ...]:
 
     Parameters
     ----------
-    kind : {"joint", "body", "actuator", "sensor"}
+    kind : {"joint", "body", "actuator", "cylinder", "supply", "sensor"}
 
     Raises
     ------

@@ -9,8 +9,9 @@ from typing import Literal
 
 from vpm.errors import ModelError, near_match
 
-SiteKind = Literal["joint", "body", "actuator", "sensor"]
-SITE_KINDS: tuple[SiteKind, ...] = ("joint", "body", "actuator", "sensor")
+#: A cylinder is a hydraulic actuator with its valve, named as it.
+SiteKind = Literal["joint", "body", "actuator", "cylinder", "supply", "sensor"]
+SITE_KINDS: tuple[SiteKind, ...] = ("joint", "body", "actuator", "cylinder", "supply", "sensor")
 
 JointKind = Literal["prismatic", "revolute", "helical"]
 
@@ -25,6 +26,8 @@ Scale = Literal[
     "time",
     "command",
     "channel",
+    "leakage",
+    "resistance",
     "one",
 ]
 
@@ -100,7 +103,7 @@ class EffectType:
     Attributes
     ----------
     name : str
-    site : {"joint", "body", "actuator", "sensor"}
+    site : {"joint", "body", "actuator", "cylinder", "supply", "sensor"}
         Kind of component that it sits at; what sits at a body may sit at a beam too, in the frame of its tip.
     group : str
         First part of the suffix of its parameters.

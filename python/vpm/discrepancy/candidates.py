@@ -104,7 +104,7 @@ def candidates(
 
 def _candidate(effect: EffectType, site: str, model: Model, data: InverseDynamicsProblem, residual: Array) -> Candidate:
     joint = _joint_of(effect.site, site, model)
-    seen = _excitation(data, model, joint, site if effect.site == "actuator" else None)
+    seen = _excitation(data, model, joint, site if effect.site in {"actuator", "cylinder"} else None)
     if effect.name == "coulomb_friction":
         return Candidate(effect, site, _grid("transition_velocity", TRANSITION_SHARES, seen.speed), _slow(seen))
     if effect.name == "asymmetric_friction":
@@ -161,7 +161,7 @@ def _known_transition(model: Model, site: str, seen: Excitation) -> float:
 def _joint_of(kind: str, site: str, model: Model) -> int:
     if kind == "joint":
         return model.joints.index(site)
-    if kind == "actuator":
+    if kind in {"actuator", "cylinder"}:
         return model.joints.index(model.joints_of_actuator(site)[0])
     return 0
 

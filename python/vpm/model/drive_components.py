@@ -106,10 +106,9 @@ class DriveComponents:
 
     @cached_property
     def internal_names(self) -> tuple[str, ...]:
-        """States beside coordinates and their rates: per actuator lag and drive, then supplies that sag."""
-        supplies = self._checked.document.supplies
-        sagging = (f"{name}.pressure" for name, supply in supplies.items() if supply.source == "sagging")
-        return (*(state for name in self.actuators for state in self._states_of(name)), *sagging)
+        """States beside coordinates and their rates: per actuator lag and drive, then per supply pressure and drop."""
+        of_drives = (state for name in self.actuators for state in self._states_of(name))
+        return (*of_drives, *(state for name in self.supplies for state in self._states_of_supply(name)))
 
     def _states_of(self, actuator: str) -> Iterator[str]:
         if self.has_lag(actuator):
@@ -117,10 +116,18 @@ class DriveComponents:
         for state in DRIVE_STATES.get(self.actuator_type(actuator), ()):
             yield f"{actuator}.{state}"
 
+    def _states_of_supply(self, supply: str) -> Iterator[str]:
+        """Its pressure if it sags, and what is lost on the way to the valves if anything is."""
+        document = self._checked.document
+        if document.supplies[supply].source == "sagging":
+            yield f"{supply}.pressure"
+        if any(e.type == "supply_drop" and e.at == supply for e in document.effects):
+            yield f"{supply}.drop"
+
     def internal_unit(self, state: str) -> str:
         """SI unit of a state of `internal_names`."""
         owner, _, name = state.partition(".")
-        units = {"current": "A", "stretch": "m", "chamber_a": "Pa", "chamber_b": "Pa", "pressure": "Pa"}
+        units = {"current": "A", "stretch": "m", "chamber_a": "Pa", "chamber_b": "Pa", "pressure": "Pa", "drop": "Pa"}
         if name in units:
             return units[name]
         command = self._checked.structure.unit(f"{owner}.command")

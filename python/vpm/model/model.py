@@ -250,7 +250,7 @@ class Model(Evaluations, Storable):
 
         Parameters
         ----------
-        kind : {"joint", "body", "actuator", "sensor"}
+        kind : {"joint", "body", "actuator", "cylinder", "supply", "sensor"}
         """
         for known in SITE_KINDS:
             if kind == known:

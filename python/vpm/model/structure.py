@@ -147,6 +147,8 @@ class Structure:
             "joint": self.joints,
             "body": (*self.bodies, *self.beams),
             "actuator": tuple(self.document.actuators),
+            "cylinder": self.driven_by("hydraulic"),
+            "supply": tuple(self.document.supplies),
             "sensor": tuple(self.document.sensors),
         }
         return sites[kind]
@@ -161,8 +163,10 @@ class Structure:
             return site
         if kind == "body":
             return self._mover(site)
-        if kind == "actuator":
+        if kind in {"actuator", "cylinder"}:
             return self.document.actuators[site].joint
+        if kind == "supply":
+            return None
         owner = self.document.sensors[site].measures.partition(".")[0]
         return owner if owner in self.joints else None
 

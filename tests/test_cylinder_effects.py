@@ -1,0 +1,240 @@
+"""Effects at servo-cylinders and supplies: against a solution without vpm, along a motion, and found from records."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+
+import vpm
+from hydraulic_reference import AREA, RATIO, SUPPLY, TANK, VALUES
+from vpm.identify import InverseDynamicsProblem, gaps
+
+Array = NDArray[np.float64]
+
+ROOT = Path(__file__).resolve().parent.parent
+DT = 1e-3
+BETA, GAIN, LEAKAGE = 1.2e9, float(VALUES["hyd.Kv"]["value"]), 1.7e-13
+SPOOL, DAMPING = 2.0 * np.pi * 250.0, 0.7
+
+#: Each effect with a size that a record of a few seconds shows: name, site, values.
+EFFECTS: dict[str, tuple[str, dict[str, float]]] = {
+    "internal_leakage": ("servo", {"coefficient": 4e-13}),
+    "valve_dynamics": ("servo", {"time": 1.0 / (2.0 * np.pi * 40.0) - 1.0 / SPOOL}),
+    "entrained_air": ("pump", {"fraction": 0.02}),
+    "supply_drop": ("pump", {"resistance": 2e10, "time_constant": 0.05}),
+}
+
+
+@pytest.fixture(scope="module")
+def rig() -> vpm.Model:
+    return vpm.Model.load(ROOT / "examples" / "servo_cylinder" / "rig.toml")
+
+
+def command(time: Array) -> Array:
+    return 0.3e-3 * np.sin(2 * np.pi * 2.0 * time) + 0.5e-3 * np.sin(2 * np.pi * 7.0 * time + 0.3)
+
+
+def record(truth: vpm.Model, seconds: float = 3.0, noise: float = 0.0) -> vpm.Experiment:
+    """A cylinder that swings about the middle of its stroke: place and both pressures."""
+    time = np.arange(round(seconds / DT)) * DT
+    given = vpm.Experiment.from_arrays(time, {"servo.command": command(time)}, units={"servo.command": "A"})
+    run = vpm.simulate(truth, given, integrator="adaptive(1e-7)")
+    units = {"axis.position": "m", "servo.pressure_a": "Pa", "servo.pressure_b": "Pa"}
+    draw = np.random.default_rng(1)
+    size = {"axis.position": 2e-6 * noise, "servo.pressure_a": 2e4 * noise, "servo.pressure_b": 2e4 * noise}
+    data = {c: run[c] + size[c] * draw.normal(size=time.size) for c in units}
+    return vpm.Experiment.from_arrays(
+        time, {"servo.command": command(time), **data}, units={"servo.command": "A", **units}
+    )
+
+
+def with_effect(model: vpm.Model, name: str) -> vpm.Model:
+    site, values = EFFECTS[name]
+    return model.with_effect(name, at=site, **values)
+
+
+def own_rates(state: Array, current: float) -> list[float]:
+    """Rates of pressures a and b, place, velocity, spool, spool rate and drop, with all four effects."""
+    pa, pb, x, v, spool, spool_rate, drop = state
+    at_valve = SUPPLY - drop
+
+    def flow(pressure: float) -> float:
+        return float(np.sign(pressure) * np.sqrt(abs(pressure)) * GAIN * abs(spool))
+
+    if spool > 0.0:
+        into_a, out_of_b = flow(at_valve - pa), flow(pb - TANK)
+        drawn = into_a
+    else:
+        into_a, out_of_b = -flow(pa - TANK), -flow(at_valve - pb)
+        drawn = -out_of_b
+
+    def stiffness(pressure: float) -> float:
+        air = EFFECTS["entrained_air"][1]["fraction"] * (101325.0 / pressure) ** (1.0 / 1.4)
+        return (1.0 + air) / (1.0 / BETA + air / (1.4 * pressure))
+
+    leak = (LEAKAGE + EFFECTS["internal_leakage"][1]["coefficient"]) * (pa - pb)
+    va, vb = 2.9e-6 + AREA * (0.04 + x), 2.9e-6 + RATIO * AREA * (0.04 - x)
+    frequency = 2.0 * np.pi * 40.0
+    hoses = EFFECTS["supply_drop"][1]
+    return [
+        stiffness(pa) / va * (into_a - AREA * v - leak),
+        stiffness(pb) / vb * (-out_of_b + RATIO * AREA * v + leak),
+        v,
+        (AREA * (pa - RATIO * pb) - 700.0 * v - 589.927 * x) / 3.0,
+        spool_rate,
+        frequency**2 * (current - spool) - 2.0 * DAMPING * frequency * spool_rate,
+        (hoses["resistance"] * drawn - drop) / hoses["time_constant"],
+    ]
+
+
+def test_all_effects_together_against_a_solution_without_vpm(rig: vpm.Model) -> None:
+    model = rig
+    for name in EFFECTS:
+        model = with_effect(model, name)
+    time = np.arange(151) * DT
+    held = command(time)
+    given = vpm.Experiment.from_arrays(time, {"servo.command": held}, units={"servo.command": "A"})
+    run = vpm.simulate(model, given, integrator="adaptive(1e-8)")
+    side_b = (SUPPLY + TANK) / (1.0 + RATIO)
+    states = [np.array([RATIO * side_b, side_b, 0.0, 0.0, 0.0, 0.0, 0.0])]
+    for current in held[:-1]:
+        right: Callable[[float, Array], list[float]] = lambda _, y, u=current: own_rates(y, u)  # noqa: E731
+        scale = np.array([1.0, 1.0, 1e-9, 1e-8, 1e-10, 1e-7, 1.0])
+        found = solve_ivp(right, (0.0, DT), states[-1], method="LSODA", rtol=1e-9, atol=scale)
+        states.append(found.y[:, -1])
+    solved = np.array(states)
+    for column, channel, floor in (
+        (0, "servo.pressure_a", 1e-5 * SUPPLY),
+        (1, "servo.pressure_b", 1e-5 * SUPPLY),
+        (2, "axis.position", 1e-8),
+        (4, "servo.spool", 1e-8),
+    ):
+        assert np.abs(run[channel] - solved[:, column]).max() < floor, channel
+    assert solved[:, 6].max() > 1e5  # the drop matters
+
+
+@pytest.mark.parametrize("name", EFFECTS)
+def test_nothing_at_its_neutral_value(rig: vpm.Model, name: str) -> None:
+    site, values = EFFECTS[name]
+    idle = with_effect(rig, name).with_parameters(
+        {rig.with_effect(name, at=site, **values).effects[-1].parameter_names[next(iter(values))]: 0.0}
+    )
+    time = np.arange(200) * DT
+    given = vpm.Experiment.from_arrays(time, {"servo.command": command(time)}, units={"servo.command": "A"})
+    runs = [vpm.simulate(model, given, integrator="rosenbrock") for model in (rig, idle)]
+    for channel in rig.output_channels:
+        size = np.abs(runs[0][channel]).max()
+        assert np.abs(runs[0][channel] - runs[1][channel]).max() <= 1e-9 * size, channel
+
+
+@pytest.mark.parametrize("name", EFFECTS)
+def test_the_balance_vanishes_with_the_effect_and_not_without(rig: vpm.Model, name: str) -> None:
+    truth = with_effect(rig, name)
+    problem = InverseDynamicsProblem(rig, [record(truth)])
+    pressures = ("servo.pressure_a", "servo.pressure_b")
+    without = gaps(problem, problem.evaluate(rig, rig.theta)[0])
+    within = gaps(problem, problem.evaluate(truth, truth.theta)[0])
+    for channel in pressures:
+        assert within[channel][1] < 0.02
+    assert max(without[c][1] / within[c][1] for c in pressures) > 4.0
+    # The effort comes from the measured pressures: the faults are not in it.
+    assert without["axis.effort"][1] < 0.02
+
+
+@pytest.mark.parametrize("start", ["neutral", "there"])
+@pytest.mark.parametrize("name", EFFECTS)
+def test_derivatives_are_slopes(rig: vpm.Model, name: str, start: str) -> None:
+    truth = with_effect(rig, name)
+    problem = InverseDynamicsProblem(rig, [record(truth, 1.0)])
+    dotted = list(truth.effects[-1].parameter_names.values())
+    theta, size = truth.theta.copy(), {n: truth.parameters[n].value for n in dotted}
+    if start == "neutral":
+        dotted = dotted[:1]
+        theta[truth.index(dotted[0])] = 0.0
+    _, exact = problem.evaluate(truth, theta, [truth.index(n) for n in dotted])
+    for column, dotted_name in enumerate(dotted):
+        step = 1e-3 * size[dotted_name]
+        one_sided = start == "neutral" and truth.parameters[dotted_name].minimum == 0.0
+
+        def at(side: float, dotted_name: str = dotted_name, step: float = step) -> Array:
+            moved = theta.copy()
+            moved[truth.index(dotted_name)] += side * step
+            return problem.evaluate(truth, moved)[0]
+
+        if one_sided:
+            slope = (-3.0 * at(0.0) + 4.0 * at(1.0) - at(2.0)) / (2.0 * step)
+        else:
+            slope = (at(1.0) - at(-1.0)) / (2.0 * step)
+        assert np.abs(slope).max() > 0.0
+        assert np.abs(slope - exact[:, column]).max() < 5e-3 * np.abs(slope).max(), dotted_name
+
+
+@pytest.mark.parametrize("name", EFFECTS)
+def test_planted_sizes_are_recovered(rig: vpm.Model, name: str) -> None:
+    truth, (site, values) = with_effect(rig, name), EFFECTS[name]
+    first = next(iter(values))
+    start = {first: 0.0} | {key: 0.5 * value for key, value in values.items() if key != first}
+    guess = rig.with_effect(name, at=site, **start)
+    wanted = [guess.effects[-1].parameter_names[key] for key in values]
+    fit = vpm.identify(guess, [record(truth, noise=1.0)], free=wanted, mode="inverse_dynamics")
+    for key, dotted in zip(values, wanted, strict=True):
+        assert fit.model.parameters[dotted].value == pytest.approx(values[key], rel=0.05), dotted
+
+
+@pytest.mark.parametrize("source", ["constant", "logged", "sagging"])
+def test_a_drop_needs_no_kind_of_supply(rig: vpm.Model, source: str, tmp_path: Path) -> None:
+    content = rig.to_dict()
+    content["supplies"]["pump"]["source"] = source
+    if source == "sagging":
+        content["supplies"]["pump"] |= {"resistance": 1e10, "capacitance": 1e-12}
+    model = with_effect(vpm.Model.from_dict(content), "supply_drop")
+    assert model.internal_names[-1] == "pump.drop"
+    model.save(tmp_path / "dropping.toml")
+    assert vpm.Model.load(tmp_path / "dropping.toml") == model
+    time = np.arange(4000) * DT
+    columns = {"servo.command": np.full(time.size, 0.3e-3)}
+    units = {"servo.command": "A"}
+    if source == "logged":
+        columns["pump.pressure"], units["pump.pressure"] = np.full(time.size, SUPPLY), "Pa"
+    run = vpm.simulate(
+        model, vpm.Experiment.from_arrays(time[:800], {k: v[:800] for k, v in columns.items()}, units=units)
+    )
+    # Steady on the way out: the drop is resistance times flow.
+    flow = run["pump.flow"][-1]
+    assert flow > 0.0
+    lost = 2e10 * flow
+    opening = GAIN * 0.3e-3
+    at_valve = (run["servo.flow_a"][-1] / opening) ** 2 + run["servo.pressure_a"][-1]
+    assert run["pump.pressure"][-1] - at_valve == pytest.approx(lost, rel=0.05)
+
+
+def sensed(model: vpm.Model, **errors: tuple[str, dict[str, float]]) -> vpm.Model:
+    content = model.to_dict()
+    content["sensors"] = {"gauge": {"measures": "servo.pressure_a"}}
+    changed = vpm.Model.from_dict(content)
+    for name, (site, values) in errors.items():
+        changed = changed.with_effect(name, at=site, **values)
+    return changed
+
+
+@pytest.mark.parametrize(
+    ("name", "values"),
+    [("sensor_offset", {"value": 5e5}), ("sensor_gain", {"value": 1.1}), ("sensor_delay", {"time": 2.4e-3})],
+)
+def test_a_pressure_sensor_is_read_before_the_effort(rig: vpm.Model, name: str, values: dict[str, float]) -> None:
+    nominal = sensed(rig)
+    truth = nominal.with_effect(name, at="gauge", **values)
+    problem = InverseDynamicsProblem(nominal, [record(truth)])
+    without = gaps(problem, problem.evaluate(nominal, nominal.theta)[0])
+    within = gaps(problem, problem.evaluate(truth, truth.theta)[0])
+    assert within["axis.effort"][1] < 0.02
+    assert without["axis.effort"][1] > 4.0 * within["axis.effort"][1]
+    ((key, value),) = values.items()
+    start = {"sensor_gain": 1.0}.get(name, 0.0)
+    guess = nominal.with_effect(name, at="gauge", **{key: start})
+    dotted = guess.effects[-1].parameter_names[key]
+    fit = vpm.identify(guess, [record(truth, noise=1.0)], free=[dotted], mode="inverse_dynamics")
+    assert fit.model.parameters[dotted].value == pytest.approx(value, rel=0.05)
