@@ -1,6 +1,6 @@
 """Effects at servo-cylinders and supplies: against a solution without vpm, along a motion, and found from records."""
 
-from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +10,7 @@ from scipy.integrate import solve_ivp
 
 import vpm
 from hydraulic_reference import AREA, RATIO, SUPPLY, TANK, VALUES
+from vpm.errors import IdentificationError
 from vpm.identify import InverseDynamicsProblem, gaps
 
 Array = NDArray[np.float64]
@@ -21,7 +22,7 @@ SPOOL, DAMPING = 2.0 * np.pi * 250.0, 0.7
 
 #: Each effect with a size that a record of a few seconds shows: name, site, values.
 EFFECTS: dict[str, tuple[str, dict[str, float]]] = {
-    "internal_leakage": ("servo", {"coefficient": 4e-13}),
+    "internal_leakage": ("servo", {"coefficient": 2e-13}),
     "valve_dynamics": ("servo", {"time": 1.0 / (2.0 * np.pi * 40.0) - 1.0 / SPOOL}),
     "entrained_air": ("pump", {"fraction": 0.02}),
     "supply_drop": ("pump", {"resistance": 2e10, "time_constant": 0.05}),
@@ -39,7 +40,7 @@ def command(time: Array) -> Array:
 
 def record(truth: vpm.Model, seconds: float = 3.0, noise: float = 0.0) -> vpm.Experiment:
     """A cylinder that swings about the middle of its stroke: place and both pressures."""
-    time = np.arange(round(seconds / DT)) * DT
+    time = DT * np.arange(round(seconds / DT), dtype=np.float64)
     given = vpm.Experiment.from_arrays(time, {"servo.command": command(time)}, units={"servo.command": "A"})
     run = vpm.simulate(truth, given, integrator="adaptive(1e-7)")
     units = {"axis.position": "m", "servo.pressure_a": "Pa", "servo.pressure_b": "Pa"}
@@ -56,7 +57,7 @@ def with_effect(model: vpm.Model, name: str) -> vpm.Model:
     return model.with_effect(name, at=site, **values)
 
 
-def own_rates(state: Array, current: float) -> list[float]:
+def own_rates(current: float, _: float, state: Array) -> list[float]:
     """Rates of pressures a and b, place, velocity, spool, spool rate and drop, with all four effects."""
     pa, pb, x, v, spool, spool_rate, drop = state
     at_valve = SUPPLY - drop
@@ -72,7 +73,7 @@ def own_rates(state: Array, current: float) -> list[float]:
         drawn = -out_of_b
 
     def stiffness(pressure: float) -> float:
-        air = EFFECTS["entrained_air"][1]["fraction"] * (101325.0 / pressure) ** (1.0 / 1.4)
+        air = EFFECTS["entrained_air"][1]["fraction"] * float((101325.0 / pressure) ** (1.0 / 1.4))
         return (1.0 + air) / (1.0 / BETA + air / (1.4 * pressure))
 
     leak = (LEAKAGE + EFFECTS["internal_leakage"][1]["coefficient"]) * (pa - pb)
@@ -94,14 +95,14 @@ def test_all_effects_together_against_a_solution_without_vpm(rig: vpm.Model) -> 
     model = rig
     for name in EFFECTS:
         model = with_effect(model, name)
-    time = np.arange(151) * DT
+    time = DT * np.arange(151, dtype=np.float64)
     held = command(time)
     given = vpm.Experiment.from_arrays(time, {"servo.command": held}, units={"servo.command": "A"})
     run = vpm.simulate(model, given, integrator="adaptive(1e-8)")
     side_b = (SUPPLY + TANK) / (1.0 + RATIO)
     states = [np.array([RATIO * side_b, side_b, 0.0, 0.0, 0.0, 0.0, 0.0])]
     for current in held[:-1]:
-        right: Callable[[float, Array], list[float]] = lambda _, y, u=current: own_rates(y, u)  # noqa: E731
+        right = partial(own_rates, current)
         scale = np.array([1.0, 1.0, 1e-9, 1e-8, 1e-10, 1e-7, 1.0])
         found = solve_ivp(right, (0.0, DT), states[-1], method="LSODA", rtol=1e-9, atol=scale)
         states.append(found.y[:, -1])
@@ -122,7 +123,7 @@ def test_nothing_at_its_neutral_value(rig: vpm.Model, name: str) -> None:
     idle = with_effect(rig, name).with_parameters(
         {rig.with_effect(name, at=site, **values).effects[-1].parameter_names[next(iter(values))]: 0.0}
     )
-    time = np.arange(200) * DT
+    time = DT * np.arange(200, dtype=np.float64)
     given = vpm.Experiment.from_arrays(time, {"servo.command": command(time)}, units={"servo.command": "A"})
     runs = [vpm.simulate(model, given, integrator="rosenbrock") for model in (rig, idle)]
     for channel in rig.output_channels:
@@ -238,3 +239,23 @@ def test_a_pressure_sensor_is_read_before_the_effort(rig: vpm.Model, name: str, 
     dotted = guess.effects[-1].parameter_names[key]
     fit = vpm.identify(guess, [record(truth, noise=1.0)], free=[dotted], mode="inverse_dynamics")
     assert fit.model.parameters[dotted].value == pytest.approx(value, rel=0.05)
+
+
+def test_a_piston_at_its_stop_does_not_count(rig: vpm.Model) -> None:
+    """A drift into the end of the stroke: an encoder's noise of 2 um is a kilonewton there."""
+    drifting = rig.with_effect("internal_leakage", at="servo", coefficient=6e-13)
+    hit = record(drifting, noise=1.0)
+    assert hit["axis.position"].max() > 0.0399
+    problem = InverseDynamicsProblem(drifting, [hit])
+    (block,) = problem.efforts(0)
+    assert 0.3 < block.moving.mean() < 0.97
+    counted = np.interp(block.time[block.moving > 0.0], hit.time, hit["axis.position"])
+    assert counted.max() < 0.04
+    assert gaps(problem, problem.evaluate(drifting, drifting.theta)[0])["axis.effort"][1] < 0.1  # 0.93 with the stop
+    # Within the stroke everything counts.
+    within = InverseDynamicsProblem(rig, [record(rig, noise=1.0)])
+    assert within.efforts(0)[0].moving.all()
+    # A stroke that the record never leaves the end of is refused.
+    short = rig.with_parameters({"servo.retracted_length": -0.12})
+    with pytest.raises(IdentificationError, match="touch an end of its stroke"):
+        InverseDynamicsProblem(short, [record(rig)])
