@@ -16,8 +16,20 @@ _ATMOSPHERE, _ADIABATIC = 101325.0, 1.4
 _HOSES = 0.02
 
 
-def _size(name: str, suffix: str, unit: str, scale: Scale, meaning: str, evaluable: Range = ANY) -> EffectParameter:
-    return nonlinear(name, suffix, unit, scale, meaning, neutral=0.0, physical=NOT_NEGATIVE, evaluable=evaluable)
+def _size(
+    name: str, suffix: str, unit: str, scale: Scale, meaning: str, typical: float, evaluable: Range = ANY
+) -> EffectParameter:
+    return nonlinear(
+        name,
+        suffix,
+        unit,
+        scale,
+        meaning,
+        neutral=0.0,
+        physical=NOT_NEGATIVE,
+        evaluable=evaluable,
+        typical=typical,
+    )
 
 
 INTERNAL_LEAKAGE = EffectType(
@@ -31,6 +43,7 @@ INTERNAL_LEAKAGE = EffectType(
             "m^3/(s Pa)",
             "leakage",
             "laminar flow past the piston per difference of the pressures, on top of the described one",
+            1e-12,
         ),
     ),
     law="q_leak = coefficient (p_a - p_b)",
@@ -53,6 +66,7 @@ VALVE_DYNAMICS = EffectType(
             "s",
             "time",
             "what is added to the inverse of the spool's natural frequency (in rad/s)",
+            1e-3,
             NOT_NEGATIVE,
         ),
     ),
@@ -119,6 +133,7 @@ SUPPLY_DROP = EffectType(
             "Pa s/m^3",
             "resistance",
             "pressure lost on the way to the valves per flow that they draw",
+            1e10,
         ),
         shape(
             "time_constant",

@@ -70,6 +70,8 @@ class EffectParameter:
         The effort that a motion needs is linear in this parameter, the shape parameters being fixed.
     shape : bool
         Shapes a law whose size another parameter gives; has no meaning where that size is zero.
+    typical : float
+        Order of magnitude (SI) of a value that matters, for numbers that are far from 1 by their unit.
     """
 
     name: str
@@ -83,6 +85,7 @@ class EffectParameter:
     evaluable: Range
     linear: bool
     shape: bool
+    typical: float = 1.0
 
     def default(self, kind: JointKind | None = None) -> float | None:
         """Value when none is given (SI), at a site on a joint of this kind; None if it has to be given.
@@ -200,7 +203,16 @@ def shape(
 
 
 def nonlinear(
-    name: str, suffix: str, unit: str, scale: Scale, meaning: str, *, neutral: float, physical: Range, evaluable: Range
+    name: str,
+    suffix: str,
+    unit: str,
+    scale: Scale,
+    meaning: str,
+    *,
+    neutral: float,
+    physical: Range,
+    evaluable: Range,
+    typical: float = 1.0,
 ) -> EffectParameter:
     """Size of an effect in which nothing is linear."""
     return EffectParameter(
@@ -215,4 +227,5 @@ def nonlinear(
         evaluable=evaluable,
         linear=False,
         shape=False,
+        typical=typical,
     )

@@ -23,6 +23,8 @@ STRIBECK_SHARES = (0.08, 0.25, 0.6)
 #: Lags tried, in sampling intervals, and saturation limits, as shares of the largest command.
 LAG_INTERVALS = (1.0, 4.0, 16.0)
 LIMIT_SHARES = (0.95, 0.7, 0.4)
+#: Times tried in which hoses and filters lose their pressure, s.
+DROP_TIMES = (0.01, 0.05, 0.2)
 #: Number of ripple periods proposed by the periodogram.
 PERIODS = 3
 
@@ -129,6 +131,11 @@ def _candidate(effect: EffectType, site: str, model: Model, data: InverseDynamic
     if effect.name == "saturation":
         starts = tuple({"limit": share * seen.command} for share in LIMIT_SHARES)
         return Candidate(effect, site, starts, {"limit": (0.02 * seen.command, seen.command)}, neutral=False)
+    if effect.name == "supply_drop":
+        return Candidate(effect, site, tuple({"time_constant": t} for t in DROP_TIMES), {"time_constant": (1e-3, 5.0)})
+    if effect.name == "entrained_air":
+        # Data hardly show in which way air is compressed.
+        return Candidate(effect, site, ({},), fixed=("exponent", "reference_pressure"))
     return Candidate(effect, site, ({},))
 
 
