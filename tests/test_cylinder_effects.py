@@ -12,6 +12,8 @@ import vpm
 from hydraulic_reference import AREA, RATIO, SUPPLY, TANK, VALUES
 from vpm.errors import IdentificationError
 from vpm.identify import InverseDynamicsProblem, gaps
+from vpm.initial import measured_states
+from vpm.model.commanded import commanded_states
 
 Array = NDArray[np.float64]
 
@@ -259,3 +261,36 @@ def test_a_piston_at_its_stop_does_not_count(rig: vpm.Model) -> None:
     short = rig.with_parameters({"servo.retracted_length": -0.12})
     with pytest.raises(IdentificationError, match="touch an end of its stroke"):
         InverseDynamicsProblem(short, [record(rig)])
+
+
+@pytest.mark.parametrize("lagging", [False, True])
+def test_spools_follow_the_commands_before_a_start(rig: vpm.Model, lagging: bool) -> None:
+    """Spool, its rate and lag in the middle of a record as a simulation of the whole has them."""
+    model = with_effect(rig, "valve_dynamics").with_effect("input_delay", at="servo", time=2e-3)
+    model = model.with_effect("dead_zone", at="servo", width=2e-5).with_effect("saturation", at="servo", limit=6e-4)
+    if lagging:
+        model = model.with_effect("actuator_lag", at="servo", time_constant=0.01)
+    given = record(model, 0.4)
+    run = vpm.simulate(model, given, integrator="adaptive(1e-9)")
+    held = given["servo.command"][:, None]
+    found = commanded_states(model, model.theta, held, DT)
+    place = model.internal_names.index("servo.spool")
+    # A spool behind a lag gets its mean over each millisecond.
+    allowed = 2e-3 if lagging else 1e-6
+    # The simulation began with a spool at rest in the middle, which is forgotten after 150 ms.
+    gap = (found["servo.spool"] - run["servo.spool"])[150:]
+    assert np.abs(gap).max() < allowed * np.abs(run["servo.spool"]).max()
+    states = measured_states(model, given, model.theta, np.array([200, 350]), None)
+    internal = 2 * len(model.joints)
+    assert np.allclose(states[:, internal + place], run["servo.spool"][[200, 350]], rtol=0, atol=allowed * 6e-4)
+    slope = np.gradient(run["servo.spool"], DT)
+    assert np.abs(found["servo.spool_rate"] - slope)[150:-2].max() < 0.05 * np.abs(slope).max()
+
+
+def test_pressures_at_a_start_are_those_behind_the_readings(rig: vpm.Model) -> None:
+    truth = sensed(rig).with_effect("sensor_offset", at="gauge", value=5e5)
+    truth = truth.with_effect("sensor_gain", at="gauge", value=1.1)
+    log = record(truth, 0.4)
+    states = measured_states(truth, log, truth.theta, np.array([200]), None)
+    place = 2 * len(truth.joints) + truth.internal_names.index("servo.chamber_a")
+    assert states[0, place] == pytest.approx((log["servo.pressure_a"][200] - 5e5) / 1.1, rel=1e-12)
