@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 
 import vpm
 from hydraulic_reference import AREA, RATIO, SUPPLY, TANK, VALUES
-from vpm.errors import IdentificationError
+from vpm.errors import IdentificationError, ModelError
 from vpm.identify import InverseDynamicsProblem, gaps
 from vpm.initial import measured_states
 from vpm.model.commanded import commanded_states
@@ -40,13 +40,13 @@ def command(time: Array) -> Array:
     return 0.3e-3 * np.sin(2 * np.pi * 2.0 * time) + 0.5e-3 * np.sin(2 * np.pi * 7.0 * time + 0.3)
 
 
-def record(truth: vpm.Model, seconds: float = 3.0, noise: float = 0.0) -> vpm.Experiment:
+def record(truth: vpm.Model, seconds: float = 3.0, noise: float = 0.0, seed: int = 1) -> vpm.Experiment:
     """A cylinder that swings about the middle of its stroke: place and both pressures."""
     time = DT * np.arange(round(seconds / DT), dtype=np.float64)
     given = vpm.Experiment.from_arrays(time, {"servo.command": command(time)}, units={"servo.command": "A"})
     run = vpm.simulate(truth, given, integrator="adaptive(1e-7)")
     units = {"axis.position": "m", "servo.pressure_a": "Pa", "servo.pressure_b": "Pa"}
-    draw = np.random.default_rng(1)
+    draw = np.random.default_rng(seed)
     size = {"axis.position": 2e-6 * noise, "servo.pressure_a": 2e4 * noise, "servo.pressure_b": 2e4 * noise}
     data = {c: run[c] + size[c] * draw.normal(size=time.size) for c in units}
     return vpm.Experiment.from_arrays(
@@ -294,3 +294,103 @@ def test_pressures_at_a_start_are_those_behind_the_readings(rig: vpm.Model) -> N
     states = measured_states(truth, log, truth.theta, np.array([200]), None)
     place = 2 * len(truth.joints) + truth.internal_names.index("servo.chamber_a")
     assert states[0, place] == pytest.approx((log["servo.pressure_a"][200] - 5e5) / 1.1, rel=1e-12)
+
+
+MOTOR = """
+name = "geared axis"
+gravity = [0.0, 0.0, 0.0]
+
+[bodies.wheel]
+mass = 1.0
+inertia = [0.5, 0.5, 0.5, 0.0, 0.0, 0.0]
+
+[joints.axis]
+type = "revolute"
+parent = "world"
+child = "wheel"
+axis = [0.0, 0.0, 1.0]
+
+[actuators.motor]
+type = "dc_motor"
+joint = "axis"
+resistance = 1.2
+time_constant = 2e-3
+torque_constant = 0.05
+gear_ratio = 50.0
+
+[sensors.shunt]
+measures = "motor.current"
+
+[[effects]]
+type = "viscous_friction"
+at = "axis"
+viscous = 3.0
+"""
+
+#: Of a command of 6 V and of 0.8 mA, and of a current of some amperes.
+DRIVE_EFFECTS = {
+    "input_delay": {"time": 4.3e-3},
+    "dead_zone": {"width": 0.07},
+    "saturation": {"limit": 0.6},
+    "actuator_lag": {"time_constant": 5e-3},
+}
+
+
+def turned(truth: vpm.Model) -> vpm.Experiment:
+    time = DT * np.arange(2000, dtype=np.float64)
+    voltage = 3.0 * np.sin(2 * np.pi * 1.3 * time) + 3.0 * np.sin(2 * np.pi * 5.1 * time)
+    given = vpm.Experiment.from_arrays(time, {"motor.command": voltage}, units={"motor.command": "V"})
+    run = vpm.simulate(truth, given, integrator="adaptive(1e-8)")
+    data = {"motor.command": voltage} | {c: run[c] for c in ("axis.position", "motor.current")}
+    return vpm.Experiment.from_arrays(
+        time, data, units={"motor.command": "V", "axis.position": "rad", "motor.current": "A"}
+    )
+
+
+@pytest.mark.parametrize("drive", ["servo", "motor"])
+@pytest.mark.parametrize("name", DRIVE_EFFECTS)
+def test_effects_of_any_actuator_balance_along_a_motion(rig: vpm.Model, drive: str, name: str) -> None:
+    """Delay, dead zone, saturation and lag show in what the drive holds, and their sizes are found there."""
+    nominal, size = (rig, 0.8e-3) if drive == "servo" else (vpm.Model.from_toml(MOTOR), 6.0)
+    values = {k: v if k in {"time", "time_constant"} else v * size for k, v in DRIVE_EFFECTS[name].items()}
+    truth = nominal.with_effect(name, at=drive, **values)
+    log = record(truth) if drive == "servo" else turned(truth)
+    shown = "servo.pressure_a" if drive == "servo" else "motor.current"
+    problem = InverseDynamicsProblem(nominal, [log])
+    without = gaps(problem, problem.evaluate(nominal, nominal.theta)[0])[shown][1]
+    within = gaps(problem, problem.evaluate(truth, truth.theta)[0])[shown][1]
+    assert within < 0.02
+    assert without > 4.0 * within
+    ((key, value),) = values.items()
+    guess = nominal.with_effect(name, at=drive, **{key: 0.8 * value})
+    fit = vpm.identify(guess, [log], free=[guess.effects[-1].parameter_names[key]], mode="inverse_dynamics")
+    assert fit.model.parameters[guess.effects[-1].parameter_names[key]].value == pytest.approx(value, rel=0.02)
+
+
+def test_a_current_is_read_before_the_effort() -> None:
+    nominal = vpm.Model.from_toml(MOTOR)
+    truth = nominal.with_effect("sensor_offset", at="shunt", value=0.4).with_effect(
+        "sensor_gain", at="shunt", value=1.2
+    )
+    problem = InverseDynamicsProblem(nominal, [turned(truth)])
+    without = gaps(problem, problem.evaluate(nominal, nominal.theta)[0])
+    within = gaps(problem, problem.evaluate(truth, truth.theta)[0])
+    assert within["axis.effort"][1] < 0.02
+    assert without["axis.effort"][1] > 0.15
+
+
+@pytest.mark.parametrize("name", ["internal_leakage", "supply_drop", "sensor_offset"])
+def test_a_diagnosis_names_it(rig: vpm.Model, name: str) -> None:
+    site, values = {**EFFECTS, "sensor_offset": ("gauge", {"value": 3e5})}[name]
+    nominal = sensed(rig)
+    truth = nominal.with_effect(name, at=site, **values)
+    why = vpm.diagnose(nominal, record(truth, 2.0, noise=1.0), record(truth, 1.5, noise=1.0, seed=2))
+    assert [(e.name, e.site) for e in why.effects] == [(name, site)]
+    first = next(iter(values))
+    dotted = truth.effects[-1].parameter_names[first]
+    assert why.model.parameters[dotted].value == pytest.approx(values[first], rel=0.05)
+
+
+def test_friction_of_seals_is_sought_at_the_joint(rig: vpm.Model) -> None:
+    with pytest.raises(ModelError, match=r"the seals of servo rub at the joint that it moves; .*axis"):
+        rig.with_effect("coulomb_friction", at="servo", coulomb=1.0)
