@@ -12,7 +12,8 @@ import vpm
 from hydraulic_reference import AREA, RATIO, SUPPLY, TANK, VALUES
 from vpm.errors import IdentificationError, ModelError
 from vpm.identify import InverseDynamicsProblem, gaps
-from vpm.initial import measured_states
+from vpm.identify.stops import at_stops
+from vpm.initial import joint_motion, measured_states
 from vpm.model.commanded import commanded_states
 
 Array = NDArray[np.float64]
@@ -327,6 +328,9 @@ at = "axis"
 viscous = 3.0
 """
 
+#: Tables of a model file that ask for drives.
+DRIVEN = {"actuators", "supplies", "controllers", "sensors", "contacts", "effects", "channels"}
+
 #: Of a command of 6 V and of 0.8 mA, and of a current of some amperes.
 DRIVE_EFFECTS = {
     "input_delay": {"time": 4.3e-3},
@@ -394,3 +398,35 @@ def test_a_diagnosis_names_it(rig: vpm.Model, name: str) -> None:
 def test_friction_of_seals_is_sought_at_the_joint(rig: vpm.Model) -> None:
     with pytest.raises(ModelError, match=r"the seals of servo rub at the joint that it moves; .*axis"):
         rig.with_effect("coulomb_friction", at="servo", coulomb=1.0)
+
+
+def test_pistons_on_lines_are_followed_to_their_stops() -> None:
+    """The leg HyL: a course of the knee that leaves the stroke of its cylinder, as lengths of a machine at rest say."""
+    model = vpm.Model.load(ROOT / "examples" / "hyl" / "hydraulic.toml")
+    knee = next(name for name in model.joints if "knee" in name)
+    (drive,) = (name for name in model.actuators if model.joints_of_actuator(name) == (knee,))
+    home = model.state()
+    start = float(home[model.joints.index(knee)])
+    time = DT * np.arange(1500, dtype=np.float64)
+    course = start + 0.8 * np.sin(2 * np.pi * 0.7 * time)
+    positions = {f"{name}.position": np.full(time.size, home[k]) for k, name in enumerate(model.joints)}
+    positions[f"{knee}.position"] = course
+    log = vpm.Experiment.from_arrays(
+        time, positions, units={channel: model.channel_unit(channel) for channel in positions}
+    )
+    found = at_stops(model, log, joint_motion(log, model))[drive]
+    line, stroke, drawn_in = (
+        model.line_of_actuator(drive),
+        model.parameters[f"{drive}.cylinder.stroke"].value,
+        model.parameters[f"{drive}.retracted_length"].value,
+    )
+    picks = range(100, 1400, 50)
+    lengths = []
+    for k in picks:
+        place = {f"{name}.position": float(positions[f"{name}.position"][k]) for name in model.joints}
+        bare = vpm.Model.from_dict({key: value for key, value in model.to_dict().items() if key not in DRIVEN})
+        lengths.append(vpm.Simulation(bare, DT, state=place)[f"{line}.length"] - drawn_in)
+    outside = np.array([not 1e-5 < length < stroke - 1e-5 for length in lengths])
+    assert outside.any()
+    assert not outside.all()
+    assert np.array_equal(found[list(picks)], outside)
