@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import cont2discrete, lfilter
 
 if TYPE_CHECKING:
     from vpm.model.evaluation import Evaluations
@@ -70,6 +69,8 @@ def _through_links(command: Array, name: str, value: Value, dt: float) -> Array:
 
 def _lagged(held: Array, time_constant: float, dt: float) -> tuple[Array, Array]:
     """A lag at every sample, and its mean over the interval that follows."""
+    from scipy.signal import lfilter  # slow to import, and seldom needed
+
     decay = float(np.exp(-dt / time_constant))
     state = held[0] + np.asarray(lfilter([0.0, 1.0 - decay], [1.0, -decay], held - held[0]))
     return state, held + (state - held) * time_constant / dt * (1.0 - decay)
@@ -77,6 +78,8 @@ def _lagged(held: Array, time_constant: float, dt: float) -> tuple[Array, Array]
 
 def _spool(held: Array, name: str, value: Value, dt: float) -> tuple[Array, Array]:
     """Place and rate of a spool at every sample."""
+    from scipy.signal import cont2discrete, lfilter
+
     frequency = value(f"{name}.valve.frequency", 1.0)
     frequency /= 1.0 + frequency * value(f"{name}.valve_dynamics.time", 0.0)
     damping = value(f"{name}.valve.damping", 0.0)
