@@ -51,6 +51,36 @@ def machine(kind: str, sensed: str = "position", site: str = "joint") -> Model:
     )
 
 
+def servo() -> Model:
+    """A slide that a servo-cylinder pushes."""
+    valve = {"flow_gain": 6.7e-6, "frequency": 1500.0, "stroke": 0.01}
+    cylinder = {"bore": 0.016, "rod": 0.01, "stroke": 0.08, "line_a": 2.9e-6, "line_b": 2.9e-6}
+    return Model.from_dict(
+        {
+            "name": "servo",
+            "gravity": [0, 0, 0],
+            "bodies": {"slide": {"mass": 2.0}},
+            "joints": {"axis": {"type": "prismatic", "parent": "world", "child": "slide", "axis": [1, 0, 0]}},
+            "supplies": {"pump": {"pressure": 16e6, "tank_pressure": 1e5, "oil": {"bulk_modulus": 1.2e9}}},
+            "actuators": {
+                "ram": {
+                    "type": "hydraulic",
+                    "joint": "axis",
+                    "supply": "pump",
+                    "retracted_length": -0.04,
+                    "valve": valve,
+                    "cylinder": cylinder,
+                }
+            },
+        }
+    )
+
+
+def home(effect: EffectType, kind: str) -> Model:
+    """A machine that has a site for an effect."""
+    return servo() if effect.site in {"cylinder", "supply"} else machine(kind, site=effect.site)
+
+
 SITES = {
     "joint": "axis",
     "body": "link",
@@ -59,6 +89,8 @@ SITES = {
     "actuator": "drive",
     "sensor": "encoder",
     "world": "world",
+    "cylinder": "ram",
+    "supply": "pump",
 }
 
 
@@ -106,7 +138,7 @@ def test_dotted_names_do_not_meet_at_a_site(site: str) -> None:
 def test_every_effect_can_be_added_and_its_units_fit_its_law(effect: EffectType, kind: str) -> None:
     if (effect.site, kind) == ("link", "prismatic"):
         pytest.skip("a link bends about the axis that turns it")
-    bare = machine(kind, site=effect.site)
+    bare = home(effect, kind)
     model = bare.with_effect(effect.name, at=SITES[effect.site], **given(effect))
     added = model.effects[-1]
     for short, dotted in added.parameter_names.items():

@@ -197,8 +197,6 @@ def test_efforts_that_commands_do_not_say_are_not_balanced() -> None:
         SimulationError, match=r"that of motor \(type dc_motor\) does not follow from its command alone"
     ):
         simulate(motor(), record, "inverse_dynamics")
-    with pytest.raises(SimulationError, match=r"identify instead of diagnose"):
-        vpm.diagnose(motor(), record)
 
 
 def test_ideal_drives_on_lines_are_diagnosed() -> None:

@@ -25,7 +25,7 @@ from hydraulic_reference import (
 )
 from model_texts import changed
 from vpm.batch import Trial, simulate_batch
-from vpm.errors import DiagnosisError, DivergedError, ExperimentError, SimulationError
+from vpm.errors import DivergedError, ExperimentError, SimulationError
 from vpm.experiment import Experiment
 from vpm.identify import identify
 from vpm.model import Model
@@ -262,7 +262,5 @@ def test_balances_of_effort_are_refused_in_one_sentence(rig: Model) -> None:
     record = held(rig, 1e-3, chirp(time), axis__position=1e-3 * np.sin(6.0 * time))
     with pytest.raises(SimulationError, match=r"that of servo \(type hydraulic\) does not follow from its command"):
         simulate(rig, record, "inverse_dynamics")
-    with pytest.raises((SimulationError, DiagnosisError), match=r"identify instead of diagnose"):
-        vpm.diagnose(rig, record)
     # Inverse dynamics of one state asks for no command, so drives do not matter.
     assert rig.inverse_dynamics([0.0], [0.1], [2.0]) == pytest.approx([3.0 * 2.0 + 700.0 * 0.1])

@@ -54,7 +54,7 @@ def inertias(draw: st.DrawFn) -> list[float]:
 @st.composite
 def effects(draw: st.DrawFn, sites: dict[str, list[str]], units: dict[tuple[str, str], dict[str, str]]) -> list[Any]:
     """Effects of the catalogue at sites, none of them twice."""
-    places = [(effect, at) for effect in EFFECTS.values() for at in sites[effect.site]]
+    places = [(effect, at) for effect in EFFECTS.values() for at in sites.get(effect.site, [])]
     chosen = draw(st.lists(st.sampled_from(places), max_size=5, unique_by=lambda place: (place[0].name, place[1])))
 
     def entry(effect: EffectType, at: str) -> dict[str, Any]:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from vpm.experiment import Experiment, Motion, motion
 from vpm.model import Model
+from vpm.model.commanded import commanded_states
 from vpm.model.settled import follow, rest
 
 Array = NDArray[np.float64]
@@ -22,14 +23,15 @@ def measured_states(
 ) -> Array:
     """States (len(rows), nx) at some samples of the measured motion.
 
-    Sensor errors are undone; flexible links are deflected as in equilibrium; lags, spools and currents have settled on
-    the held command, and chambers are without net force, unless the log holds what is inside of a drive. Hystereses
-    remember the way since the first sample. Joints that effects have split off are where the measured motion of the
-    others takes them.
+    Sensor errors are undone; flexible links are deflected as in equilibrium; lags and spools have followed the commands
+    from the beginning of the log, currents have settled on the held one, and chambers are without net force, unless the
+    log holds what is inside of a drive. Hystereses remember the way since the first sample. Joints that effects have
+    split off are where the measured motion of the others takes them.
     """
     m = whole_motion(model, experiment, theta, cutoff)
     gain, offset = sensor_errors(model, theta)
     states = np.zeros((len(rows), model.core.n_states))
+    followed = commanded_states(model, theta, m.inputs, m.dt)
     joints, coordinates = len(model.joints), len(model.coordinates)
     states[:, :joints] = (m.position[rows] - offset) / gain
     states[:, coordinates : coordinates + joints] = m.velocity[rows] / gain
@@ -38,6 +40,9 @@ def measured_states(
             state[:coordinates] = model.core.equilibrium(theta, state[:joints])[0]
         internal = _internal(model, experiment, theta, state[:coordinates], int(row))
         follow(model, theta, internal, m.inputs[row], state[coordinates : coordinates + joints])
+        for place, name in enumerate(model.internal_names):
+            if name in followed:
+                internal[place] = followed[name][row]
         state[2 * coordinates :] = _seen(model, experiment, theta, state[:coordinates], internal, int(row))
     memories = sum(name.endswith(".memory") for name in model.internal_names)
     if memories:  # what the joints remember of their way until then
@@ -135,7 +140,7 @@ def _seen(model: Model, experiment: Experiment, theta: Array, state: Array, inte
     for place, name in enumerate(model.internal_names):
         owner, _, quantity = name.partition(".")
         if quantity in {"spool", "current"} and name in experiment:
-            internal[place] = experiment[name][row]
+            internal[place] = _reading(model, experiment, theta, name, row)
         elif quantity == "chamber_a":
             internal[place : place + 2] = _chambers(model, experiment, theta, owner, state, internal[place:], row)
     return internal
@@ -149,7 +154,10 @@ def _chambers(
     Where the log holds one of them, and the cylinder moves a joint by itself, the other is that which holds the machine
     at rest, between the pressures of tank and supply.
     """
-    logged = [experiment[c][row] if (c := f"{name}.pressure_{side}") in experiment else np.nan for side in "ab"]
+    logged = [
+        _reading(model, experiment, theta, c, row) if (c := f"{name}.pressure_{side}") in experiment else np.nan
+        for side in "ab"
+    ]
     if not np.any(np.isnan(logged)):
         return np.array(logged)
     alone = model.line_of_actuator(name) is None and [
@@ -165,6 +173,17 @@ def _chambers(
     supply = model.supply_of_actuator(name)
     bounds = [theta[model.index(f"{supply}.{kind}")] for kind in ("tank_pressure", "pressure")]
     return np.where(np.isnan(logged), np.clip(balanced, *bounds), logged)
+
+
+def _reading(model: Model, experiment: Experiment, theta: Array, channel: str, row: int) -> float:
+    """True value behind a reading, without its sensor's offset and gain."""
+    sensor = model.sensor_of(channel)
+
+    def error(suffix: str, none: float) -> float:
+        name = f"{sensor}.{suffix}"
+        return float(theta[model.index(name)]) if name in model.parameters else none
+
+    return (float(experiment[channel][row]) - error("offset.value", 0.0)) / error("gain.value", 1.0)
 
 
 def _areas(model: Model, theta: Array, name: str) -> tuple[float, float]:

@@ -430,9 +430,8 @@ def check_balance(model: Model) -> None:
         kind = model.actuator_type(name)
         if kind != "ideal":
             raise SimulationError(
-                f"mode 'inverse_dynamics' and a diagnosis balance efforts sample by sample, but that of {name} (type "
-                f"{kind}) does not follow from its command alone; use the mode 'free_run' or 'restarts', and identify "
-                "instead of diagnose, or describe it as an ideal actuator"
+                f"mode 'inverse_dynamics' gives efforts sample by sample, but that of {name} (type {kind}) does not "
+                "follow from its command alone; use the mode 'free_run' or 'restarts', or describe it as ideal"
             )
     if model.core.n_elastic:
         elastic = [name for name in model.beams if model.levels[name] != "rigid"]

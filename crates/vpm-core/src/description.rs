@@ -140,12 +140,12 @@ impl Description {
         self.actuators.len() + self.supplies.iter().filter(|supply| supply.is_logged()).count()
     }
 
-    /// Length of the state: coordinates, rates, the states of each actuator (lag, then drive), pressures of supplies that sag,
+    /// Length of the state: coordinates, rates, the states of each actuator (lag, then drive), states of each supply,
     /// memories of hystereses.
     pub fn n_states(&self) -> usize {
-        let sagging = self.supplies.iter().filter(|supply| supply.is_sagging()).count();
+        let of_supplies: usize = self.supplies.iter().map(|supply| supply.states().count()).sum();
         let drives = self.actuators.iter().map(Actuator::n_states).sum::<usize>();
-        2 * self.n_coordinates() + drives + sagging + self.remembering().count()
+        2 * self.n_coordinates() + drives + of_supplies + self.remembering().count()
     }
 
     /// Numbers of the joints with hysteresis, one for each.

@@ -1,8 +1,9 @@
 //! Measured motions of joints, and the true ones behind them.
 
+use crate::actuator::Drive;
 use crate::description::Description;
 use crate::scalar::Scalar;
-use crate::sensor::{Channel, Sensor};
+use crate::sensor::{Channel, HydraulicQuantity, Sensor};
 use crate::table::Table;
 
 /// Motion of the joints, sample by sample.
@@ -21,6 +22,45 @@ pub(crate) fn position_sensors<S: Scalar>(description: &Description, theta: &[S]
     let sensors = description.sensors(theta);
     let on = |joint| sensors.iter().find(|sensor| sensor.channel == Channel::Position { joint }).cloned();
     (0..description.n_joints()).map(on).collect()
+}
+
+/// The sensor on each of the states of drives and supplies at `places`, if there is one.
+pub(crate) fn state_sensors<S: Scalar>(
+    description: &Description,
+    theta: &[S],
+    places: &[usize],
+) -> Vec<Option<Sensor<S>>> {
+    let (sensors, channels) = (description.sensors(theta), state_channels(description));
+    let on = |&place: &usize| {
+        let channel = channels.get(place).copied().flatten()?;
+        sensors.iter().find(|sensor| sensor.channel == channel).cloned()
+    };
+    places.iter().map(on).collect()
+}
+
+/// The channel that shows each state of the drives, if one does.
+fn state_channels(description: &Description) -> Vec<Option<Channel>> {
+    let (mut hydraulic, mut dc_motor, mut channels) = (0, 0, Vec::new());
+    for actuator in &description.actuators {
+        if actuator.lag.is_some() {
+            channels.push(None);
+        }
+        match &actuator.drive {
+            Drive::Ideal(_) | Drive::SpringDamper(_) | Drive::Narx(_) | Drive::MaxwellNarx(_) => {}
+            Drive::Maxwell(_) => channels.push(None),
+            Drive::DcMotor(_) => {
+                channels.push(Some(Channel::Current { dc_motor }));
+                dc_motor += 1;
+            }
+            Drive::Hydraulic(_) => {
+                let one = |quantity| Some(Channel::Hydraulic { hydraulic, quantity });
+                let [a, b] = [HydraulicQuantity::PressureA, HydraulicQuantity::PressureB].map(one);
+                channels.extend([one(HydraulicQuantity::Spool), None, a, b]);
+                hydraulic += 1;
+            }
+        }
+    }
+    channels
 }
 
 impl JointMotion<'_> {

@@ -30,7 +30,8 @@ use drives::Shown;
 /// The right-hand side: everything that acts, in one number type, with its buffers.
 ///
 /// Law: with x = [q, v, s], `dq/dt = v`, `M(q) dv/dt + h(q, v) + K q + D v = sum of actuator and effect efforts`; s are the states of
-/// each actuator in order (lag, then drive), then the pressures of supplies that sag, then the memories of hystereses.
+/// each actuator in order (lag, then drive), then those of each supply (pressure where it sags, then its drop), then the memories of
+/// hystereses.
 #[derive(Clone, Debug)]
 pub struct Dynamics<S> {
     /// The tree with its payloads.
@@ -77,11 +78,11 @@ impl<S: Scalar> Dynamics<S> {
         let zeros = |count: usize| vec![S::zero(); count];
         let mut inputs = zeros(actuators.len());
         inputs.extend(supplies.iter().filter(|supply| supply.is_logged()).map(|supply| supply.pressure));
-        let sagging = supplies.iter().filter(|supply| supply.is_sagging()).count();
+        let of_supplies: usize = supplies.iter().map(|supply| supply.states().count()).sum();
         Self {
             data: Data::new(&model),
             inputs,
-            internal: actuators.iter().map(Actuator::n_states).sum::<usize>() + sagging,
+            internal: actuators.iter().map(Actuator::n_states).sum::<usize>() + of_supplies,
             ideal: supplies.is_empty() && actuators.iter().all(|actuator| actuator.drive.is_direct()),
             shown: Shown::new(&actuators, &supplies),
             seals: vec![None; actuators.len()],

@@ -13,7 +13,7 @@ mod values;
 use allocation_counter::measure;
 use common::{Bench, Machine, close};
 use hydraulics::{Chirp, nominal};
-use serde_json::json;
+use serde_json::{Value, json};
 use servo_machine::{MIDDLE, On, leg, machine, rest};
 use vpm_core::actuator::hydraulic::{EntrainedAir, SealFriction};
 use vpm_core::actuator::hydraulic::{ServoCylinder, ServoRig, ServoState};
@@ -91,8 +91,11 @@ fn outputs_show_the_drive() {
 fn complete() -> ServoCylinder<f64> {
     let mut servo = nominal();
     servo.fluid.air = Some(EntrainedAir { fraction: 0.005, exponent: 1.4, reference_pressure: 101_325.0 });
+    servo.fluid.more_air = Some(EntrainedAir { fraction: 0.003, exponent: 1.2, reference_pressure: 1e5 });
     servo.valve.overlap.width = 2e-4;
+    servo.valve.delay = Some(4e-4);
     servo.cylinder.external_leakage = 5e-14;
+    servo.cylinder.worn_leakage = Some(3e-13);
     servo.cylinder.seal = SealFriction {
         viscous: Some(ViscousFriction { viscous: 120.0 }),
         coulomb: Some(CoulombFriction { coulomb: 30.0, transition_velocity: 0.01 }),
@@ -142,14 +145,28 @@ fn moving(start: &[f64]) -> Vec<f64> {
     x
 }
 
+/// Supplies of every kind, with the number of their states.
+fn sources() -> [(Value, usize); 4] {
+    let sag = json!({"sagging": {"resistance": 2e10, "capacitance": 1e-12}});
+    let lost = |own: Value| json!({"own": own, "drop": {"resistance": 1e10, "time_constant": 0.02}});
+    [(json!("constant"), 0), (sag.clone(), 1), (lost(json!("constant")), 1), (lost(sag), 2)]
+}
+
 #[test]
 fn state_jacobian_is_that_of_differences() {
-    let sag = json!({"sagging": {"resistance": 2e10, "capacitance": 1e-12}});
-    let (machine, start) = leg(&complete(), sag);
-    let (mut system, x) = (machine.system(), moving(&start));
+    for (source, states) in sources() {
+        check_jacobian(source, states);
+    }
+}
+
+fn check_jacobian(source: Value, states: usize) {
+    let (machine, start) = leg(&complete(), source);
+    let (mut system, mut x) = (machine.system(), moving(&start));
     system.hold(0, 3e-3);
     let dim = x.len();
-    assert_eq!(dim, 8);
+    assert_eq!(dim, 7 + states);
+    // Of a drop something is lost.
+    x.iter_mut().skip(7).for_each(|state| *state += 3e5);
     let (mut exact, mut sizes) = (vec![0.0; dim * dim], vec![0.0; dim]);
     system.jacobian(&x, &mut exact);
     system.scales(&mut sizes);
@@ -220,10 +237,11 @@ fn check_sensitivities(machine: &Machine, start: &[f64], inputs: &[f64], method:
 
 #[test]
 fn sensitivities_are_those_of_differences() {
-    let sag = json!({"sagging": {"resistance": 2e10, "capacitance": 1e-12}});
-    let (machine, start) = leg(&complete(), sag);
-    for method in [Method::LinearlyImplicit, Method::Rosenbrock] {
-        check_sensitivities(&machine, &moving(&start), &[3e-3; 12], method);
+    for (source, _) in &sources()[1..] {
+        let (machine, start) = leg(&complete(), source.clone());
+        for method in [Method::LinearlyImplicit, Method::Rosenbrock] {
+            check_sensitivities(&machine, &moving(&start), &[3e-3; 12], method);
+        }
     }
 }
 
@@ -269,5 +287,9 @@ fn natural_sizes_are_those_of_the_parts() {
     let mut sizes = [0.0; 8];
     machine.system().scales(&mut sizes);
     let valve = &complete().valve;
-    assert_eq!(sizes, [1e-2, 1.0, 5e-3, valve.stroke, valve.stroke * valve.frequency, 1e5, 1e5, 1e5]);
+    // The spool as it is: 0.4 ms come on top of the inverse of its frequency.
+    let rate = valve.stroke / (1.0 / valve.frequency + 4e-4);
+    close(sizes[4], rate, 1e-12 * rate);
+    sizes[4] = 0.0;
+    assert_eq!(sizes, [1e-2, 1.0, 5e-3, valve.stroke, 0.0, 1e5, 1e5, 1e5]);
 }

@@ -66,6 +66,7 @@ INPUT_DELAY = EffectType(
     sentence="{at} acts on a command {time} late.",
     impossible="a negative delay would mean that the drive acts before it is told to: check the time stamps of the log",
     confused_with={
+        "valve_dynamics": "they agree for slow commands; steps and fast commands part them",
         "actuator_lag": "they agree for slow commands; steps and fast commands part them",
         "sensor_delay": "from commands to readings only their sum shows; a second sensor or time stamps part them",
     },
@@ -117,6 +118,7 @@ SATURATION = EffectType(
     impossible="a limit of zero or less would mean that the drive never acts",
     confused_with={
         "end_stop": "both stop the motion at large commands; the same command in the middle of the way parts them",
+        "supply_drop": "both limit the speed; a log of the pressure at the valve parts them",
         "viscous_friction": "both weaken large commands; large commands at low speed part them",
     },
 )
@@ -142,6 +144,8 @@ ACTUATOR_LAG = EffectType(
     impossible="a negative time constant would mean a drive that runs away from its command",
     confused_with={
         "joint_compliance": "both delay the motion of the link; free vibration after a stop shows the spring alone",
+        "valve_dynamics": "a lag is a pole before the spool, that is the spool itself; fast commands part them",
+        "entrained_air": "both delay the force behind the command; pressures at a loaded piston part them",
         "input_delay": "they agree for slow commands; steps and fast commands part them",
         "sensor_delay": "they agree for slow motion; steps and fast motion part them",
         "viscous_friction": "both weaken fast motion; steady motion at several speeds shows the friction alone",

@@ -50,6 +50,8 @@ VISCOUS_FRICTION = EffectType(
     impossible="a negative viscous friction would feed energy into the motion instead of taking it out",
     confused_with={
         "structural_damping": "both calm vibrations; friction also brakes motion that does not bend the link",
+        "internal_leakage": "both let a loaded piston give way; the pressures of both chambers part them",
+        "supply_drop": "both weaken fast motion; the pressures of both chambers part them",
         "coulomb_friction": "motion at one speed alone does not part them; records at several speeds do",
         "actuator_lag": "both weaken fast motion; steady motion at several speeds shows the friction alone",
         "saturation": "both weaken large commands; large commands at low speed part them",

@@ -10,8 +10,19 @@ from typing import Literal
 from vpm.catalogue.formula import Formula
 from vpm.errors import ModelError, near_match
 
-SiteKind = Literal["joint", "body", "link", "beam", "actuator", "sensor", "world"]
-SITE_KINDS: tuple[SiteKind, ...] = ("joint", "body", "link", "beam", "actuator", "sensor", "world")
+#: A cylinder is a hydraulic actuator with its valve, named as it.
+SiteKind = Literal["joint", "body", "link", "beam", "actuator", "cylinder", "supply", "sensor", "world"]
+SITE_KINDS: tuple[SiteKind, ...] = (
+    "joint",
+    "body",
+    "link",
+    "beam",
+    "actuator",
+    "cylinder",
+    "supply",
+    "sensor",
+    "world",
+)
 
 JointKind = Literal["prismatic", "revolute", "helical"]
 
@@ -28,6 +39,8 @@ Scale = Literal[
     "time",
     "command",
     "channel",
+    "leakage",
+    "resistance",
     "one",
 ]
 
@@ -72,6 +85,8 @@ class EffectParameter:
         Shapes a law whose size another parameter gives; has no meaning where that size is zero.
     learnt : bool
         Shape that nobody knows beforehand, so that data decide unless a value is given: adjustable in an added effect.
+    typical : float
+        Order of magnitude (SI) of a value that matters, for numbers that are far from 1 by their unit.
     """
 
     name: str
@@ -86,6 +101,7 @@ class EffectParameter:
     linear: bool
     shape: bool
     learnt: bool = False
+    typical: float = 1.0
 
     def default(self, kind: JointKind | None = None) -> float | None:
         """Value when none is given (SI), at a site on a joint of this kind; None if it has to be given.
@@ -106,7 +122,7 @@ class EffectType:
     Attributes
     ----------
     name : str
-    site : {"joint", "body", "link", "beam", "actuator", "sensor", "world"}
+    site : {"joint", "body", "link", "beam", "actuator", "cylinder", "supply", "sensor", "world"}
         Kind of component that it sits at; what sits at a body may sit at a beam too, in the frame of its tip. A link is
         a body that its joint turns, or a beam; the world is one site, where there is gravity.
     group : str
@@ -217,7 +233,16 @@ def shape(
 
 
 def nonlinear(
-    name: str, suffix: str, unit: str, scale: Scale, meaning: str, *, neutral: float, physical: Range, evaluable: Range
+    name: str,
+    suffix: str,
+    unit: str,
+    scale: Scale,
+    meaning: str,
+    *,
+    neutral: float,
+    physical: Range,
+    evaluable: Range,
+    typical: float = 1.0,
 ) -> EffectParameter:
     """Size of an effect in which nothing is linear."""
     return EffectParameter(
@@ -232,4 +257,5 @@ def nonlinear(
         evaluable=evaluable,
         linear=False,
         shape=False,
+        typical=typical,
     )

@@ -26,6 +26,8 @@ LAG_INTERVALS = (1.0, 4.0, 16.0)
 LIMIT_SHARES = (0.95, 0.7, 0.4)
 #: Ways over which a hysteresis turns round that are tried, as shares of the travel.
 PRESLIDING_SHARES = (0.004, 0.02, 0.1)
+#: Times tried in which hoses and filters lose their pressure, s.
+DROP_TIMES = (0.01, 0.05, 0.2)
 #: Number of ripple periods proposed by the periodogram.
 PERIODS = 3
 
@@ -107,7 +109,7 @@ def candidates(
 
 def _candidate(effect: EffectType, site: str, model: Model, data: InverseDynamicsProblem, residual: Array) -> Candidate:
     joint = _joint_of(effect.site, site, model)
-    seen = _excitation(data, model, joint, site if effect.site == "actuator" else None)
+    seen = _excitation(data, model, joint, site if effect.site in {"actuator", "cylinder"} else None)
     if effect.name in STRUCTURAL:
         starts, bounds = structural_starts(effect.name, site, model, seen.middle, seen.travel)
         return Candidate(effect, site, starts, bounds, neutral=effect.name == "end_stop")
@@ -140,6 +142,11 @@ def _candidate(effect: EffectType, site: str, model: Model, data: InverseDynamic
     if effect.name == "saturation":
         starts = tuple({"limit": share * seen.command} for share in LIMIT_SHARES)
         return Candidate(effect, site, starts, {"limit": (0.02 * seen.command, seen.command)}, neutral=False)
+    if effect.name == "supply_drop":
+        return Candidate(effect, site, tuple({"time_constant": t} for t in DROP_TIMES), {"time_constant": (1e-3, 5.0)})
+    if effect.name == "entrained_air":
+        # Data hardly show in which way air is compressed.
+        return Candidate(effect, site, ({},), fixed=("exponent", "reference_pressure"))
     return Candidate(effect, site, ({},))
 
 
@@ -174,7 +181,7 @@ def _known_transition(model: Model, site: str, seen: Excitation) -> float:
 def _joint_of(kind: str, site: str, model: Model) -> int:
     if kind == "joint":
         return model.joints.index(site)
-    if kind == "actuator":
+    if kind in {"actuator", "cylinder"}:
         return model.joints.index(model.joints_of_actuator(site)[0])
     return 0
 

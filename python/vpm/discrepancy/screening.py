@@ -124,7 +124,7 @@ def _probe_start(
         all_columns = [model.index(name) for name in base.free] + columns
         residual, jacobian = data.evaluate(model, model.theta, all_columns)
         known, fresh = jacobian[:, : len(base.free)], jacobian[:, len(base.free) :]
-    keep, held, invisible = _sort_columns(added, fresh, known, base.free, residual)
+    keep, held, invisible = _sort_columns(added, fresh, known, base.free, residual, _sizes(model, candidate, base.free))
     chosen = np.column_stack([known, fresh[:, keep]])
     names = (*base.free, *(added[i] for i in keep))
     start_values = np.concatenate([np.zeros(len(base.free)), model.theta[[columns[i] for i in keep]]])
@@ -143,6 +143,12 @@ def _probe_start(
     )
 
 
+def _sizes(model: Model, candidate: Candidate, known: Sequence[str]) -> tuple[Array, Array]:
+    """Orders of magnitude of the known parameters and of those of the candidate."""
+    values = np.array([abs(model.parameters[name].value) or 1.0 for name in known])
+    return values, np.array([parameter.typical for parameter in candidate.effect.parameters])
+
+
 def _added(model: Model, candidate: Candidate) -> tuple[str, ...]:
     for effect in model.effects:
         if effect.name == candidate.effect.name and effect.at == candidate.site:
@@ -151,11 +157,20 @@ def _added(model: Model, candidate: Candidate) -> tuple[str, ...]:
 
 
 def _sort_columns(
-    added: Sequence[str], fresh: Array, known: Array, known_names: Sequence[str], residual: Array
+    added: Sequence[str],
+    fresh: Array,
+    known: Array,
+    known_names: Sequence[str],
+    residual: Array,
+    sizes: tuple[Array, Array],
 ) -> tuple[list[int], tuple[Alias, ...], tuple[str, ...]]:
-    """Split the new columns into those the data see, those they confuse with others, and those without influence."""
-    largest = float(np.max(np.linalg.norm(np.column_stack([known, fresh]), axis=0), initial=0.0))
-    visible = [i for i in range(len(added)) if np.linalg.norm(fresh[:, i]) > 1e-12 * largest]
+    """Split the new columns into those the data see, those they confuse with others, and those without influence.
+
+    ``sizes`` are those of known and fresh parameters, without which SI units would decide what is small.
+    """
+    lengths = np.linalg.norm(fresh, axis=0) * sizes[1]
+    largest = float(np.max([*(np.linalg.norm(known, axis=0) * sizes[0]), *lengths], initial=0.0))
+    visible = [i for i in range(len(added)) if lengths[i] > 1e-12 * largest]
     invisible = tuple(added[i] for i in range(len(added)) if i not in visible)
     keep, held = list(visible), []
     for i in visible:

@@ -20,6 +20,7 @@ from vpm.experiment import Experiment, Motion, parallel_filter
 from vpm.identify.along import check_along, respond, shown_channels
 from vpm.identify.first_state import add_first_state, first_state_slopes
 from vpm.identify.parallel import in_order
+from vpm.identify.stops import at_stops, check_left
 from vpm.initial import initial_state, joint_motion
 from vpm.model import Model
 from vpm.simulate import Setup, SimulatedArrays, copied_channels, simulate_arrays
@@ -104,7 +105,7 @@ class InverseDynamicsProblem:
     currents, strains.
 
     Samples at which a joint stands still do not count, as long as half of them remain: friction at rest takes whatever
-    value holds the joint, which no balance can predict.
+    value holds the joint, which no balance can predict. Nor do those at which a piston touches an end of its stroke.
 
     Parameters
     ----------
@@ -208,7 +209,7 @@ class InverseDynamicsProblem:
 
         Efforts are as large as what the drives deliver; of other channels, such as pressures, it is the spread.
         """
-        sizes, moving = [], self._moving()
+        sizes, moving = [], self._moving(model)
         for record, (m, experiment) in enumerate(zip(self.motions, self.experiments, strict=True)):
             _, applied, _ = self.effort(model, model.theta, record)
             if len(applied) < FEWEST_SAMPLES:
@@ -222,8 +223,11 @@ class InverseDynamicsProblem:
             moving[record] = np.hstack([moving[record], np.ones((len(applied), len(self.shown)))])
         return sizes, moving
 
-    def _moving(self) -> list[Array]:
-        """For each record (n, joints): 1 where a joint moves, 0 where it stands still; all 1 if it mostly stands."""
+    def _moving(self, model: Model) -> list[Array]:
+        """For each record (n, joints): 1 where a joint moves, 0 where it stands still; all 1 if it mostly stands.
+
+        0 as well where a piston that moves it touches an end of its stroke.
+        """
         speeds = [np.abs(m.velocity[m.kept][:, self._joints]) for m in self.motions]
         largest = np.max([np.quantile(speed, 0.999, axis=0) for speed in speeds], axis=0)
         masks = [
@@ -231,7 +235,23 @@ class InverseDynamicsProblem:
             for m, speed in zip(self.motions, speeds, strict=True)
         ]
         mostly = np.mean(np.vstack(masks), axis=0) >= 0.5
-        return [np.where(mostly, mask, True).astype(np.float64) for mask in masks]
+        free = [self._free(model, record) for record in range(len(masks))]
+        return [
+            (np.where(mostly, mask, True) & away).astype(np.float64) for mask, away in zip(masks, free, strict=True)
+        ]
+
+    def _free(self, model: Model, record: int) -> NDArray[np.bool_]:
+        """Where (n, joints) no piston of one record touches an end, as far as the filters carry the touch."""
+        m, experiment = self.motions[record], self.experiments[record]
+        away = np.ones((len(self._retained_time(m)), len(self.joints)), dtype=np.bool_)
+        for name, touching in at_stops(model, experiment, m).items():
+            # An impact rings, in the oil and in the filters: three times as long as the ends of the record settle.
+            near = maximum_filter1d(touching.view(np.uint8), 6 * m.edge + 1)[m.kept][:: m.decimation] > 0
+            for column, joint in enumerate(self.joints):
+                if near.any() and joint in model.joints_of_actuator(name):
+                    away[:, column] &= ~near
+                    check_left(experiment, joint, name, int(away[:, column].sum()), FEWEST_SAMPLES)
+        return away
 
     def _stack(self, records: list[Array]) -> Array:
         """Concatenate (n, channels, ...) arrays block by block and apply the weights."""

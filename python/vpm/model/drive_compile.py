@@ -26,9 +26,16 @@ def supply_json(name: str, supply: Supply, index: Index) -> dict[str, Any]:
             "bulk_modulus": index[f"{name}.oil.bulk_modulus"],
             "vapour_pressure": index[f"{name}.oil.vapour_pressure"],
             "air": None if supply.oil.air is None else air,
+            "more_air": _optional(f"{name}.entrained_air", tuple(air), index),
         },
         "source": {"sagging": sagging} if supply.source == "sagging" else supply.source,
+        "drop": _optional(f"{name}.drop", ("resistance", "time_constant"), index),
     }
+
+
+def _optional(way: str, keys: tuple[str, ...], index: Index) -> dict[str, int] | None:
+    """What an effect adds, if it is there."""
+    return {key: index[f"{way}.{key}"] for key in keys} if f"{way}.{keys[0]}" in index else None
 
 
 def drive_json(name: str, actuator: Actuator, structure: Structure, index: Index) -> dict[str, Any]:
@@ -53,7 +60,7 @@ def drive_json(name: str, actuator: Actuator, structure: Structure, index: Index
             law = {
                 "supply": tuple(structure.document.supplies).index(actuator.supply),
                 "retracted_length": index[f"{name}.retracted_length"],
-                "valve": _valve(f"{name}.valve", index),
+                "valve": {**_valve(f"{name}.valve", index), "delay": index.get(f"{name}.valve_dynamics.time")},
                 "cylinder": _cylinder(name, actuator, index),
             }
         case Narx():
@@ -77,6 +84,7 @@ def _cylinder(name: str, actuator: Hydraulic, index: Index) -> dict[str, Any]:
     return {
         "size": {key: index[f"{way}.{key}"] for key in sizes},
         **{key: index[f"{way}.{key}"] for key in keys},
+        "worn_leakage": index.get(f"{name}.internal_leakage.coefficient"),
         "stop": {key: index[f"{way}.stop_{key}"] for key in ("stiffness", "damping")},
         "seal": _seal(f"{name}.friction", index),
     }

@@ -106,11 +106,11 @@ class DriveComponents:
 
     @cached_property
     def internal_names(self) -> tuple[str, ...]:
-        """States beside coordinates and rates: per actuator lag and drive, then supplies that sag, then memories."""
-        supplies = self._checked.document.supplies
-        sagging = (f"{name}.pressure" for name, supply in supplies.items() if supply.source == "sagging")
+        """States beside coordinates and rates: of actuators (lag, drive), of supplies (pressure, drop), memories."""
+        of_drives = (state for name in self.actuators for state in self._states_of(name))
+        of_supplies = (state for name in self.supplies for state in self._states_of_supply(name))
         memories = (f"{effect.at}.memory" for effect in self._checked.document.effects if effect.type == "hysteresis")
-        return (*(state for name in self.actuators for state in self._states_of(name)), *sagging, *memories)
+        return (*of_drives, *of_supplies, *memories)
 
     def _states_of(self, actuator: str) -> Iterator[str]:
         if self.has_lag(actuator):
@@ -118,10 +118,19 @@ class DriveComponents:
         for state in DRIVE_STATES.get(self.actuator_type(actuator), ()):
             yield f"{actuator}.{state}"
 
+    def _states_of_supply(self, supply: str) -> Iterator[str]:
+        """Its pressure if it sags, and what is lost on the way to the valves if anything is."""
+        document = self._checked.document
+        if document.supplies[supply].source == "sagging":
+            yield f"{supply}.pressure"
+        if any(e.type == "supply_drop" and e.at == supply for e in document.effects):
+            yield f"{supply}.drop"
+
     def internal_unit(self, state: str) -> str:
         """SI unit of a state of `internal_names`."""
         owner, _, name = state.partition(".")
-        units = {"current": "A", "stretch": "m", "chamber_a": "Pa", "chamber_b": "Pa", "pressure": "Pa", "memory": "1"}
+        pressures = dict.fromkeys(("chamber_a", "chamber_b", "pressure", "drop"), "Pa")
+        units = {"current": "A", "stretch": "m", "memory": "1"} | pressures
         if name in units:
             return units[name]
         command = self._checked.structure.unit(f"{owner}.command")

@@ -52,6 +52,8 @@ def effect_problems(document: Document, structure: Structure) -> Iterator[Proble
         sites = structure.sites(effect.site)
         if entry.at not in sites:
             repair = near_match(entry.at, sites, what="it has")
+            if effect.site == "joint" and entry.at in structure.sites("cylinder"):
+                repair = f"the seals of {entry.at} rub at the joint that it moves; {repair}"
             rest = f'is "{entry.at}", which is no {effect.site} of the model; {effect.name} sits at one, {repair}'
             yield Problem(place(*keys, "at"), rest)
         earlier = seen.setdefault((entry.type, entry.at), position)

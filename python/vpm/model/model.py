@@ -277,7 +277,7 @@ class Model(Evaluations, Storable):
 
         Parameters
         ----------
-        kind : {"joint", "body", "link", "beam", "actuator", "sensor", "world"}
+        kind : {"joint", "body", "link", "beam", "actuator", "cylinder", "supply", "sensor", "world"}
         """
         for known in SITE_KINDS:
             if kind == known:

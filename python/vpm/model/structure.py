@@ -172,6 +172,8 @@ class Structure:
             "beam": self.beams,
             "world": (WORLD,) if any(self.document.gravity) else (),
             "actuator": tuple(self.document.actuators),
+            "cylinder": self.driven_by("hydraulic"),
+            "supply": tuple(self.document.supplies),
             "sensor": tuple(self.document.sensors),
         }
         return sites[kind]
@@ -188,8 +190,10 @@ class Structure:
             return self._mover(site)
         if kind in {"link", "beam", "world"}:
             return None
-        if kind == "actuator":
+        if kind in {"actuator", "cylinder"}:
             return self.document.actuators[site].joint
+        if kind == "supply":
+            return None
         owner = self.document.sensors[site].measures.partition(".")[0]
         return owner if owner in self.joints else None
 

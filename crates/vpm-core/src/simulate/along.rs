@@ -5,7 +5,7 @@ use super::{Setting, Stepping, check_starts, halted, names};
 use crate::description::Description;
 use crate::error::{Diverged, Error, Result};
 use crate::integrator::{Halt, Integrator, Stuck};
-use crate::motion::{JointMotion, position_sensors};
+use crate::motion::{JointMotion, position_sensors, state_sensors};
 use crate::ode::Ode;
 use crate::scalar::{Dual, Scalar};
 use crate::sensitivity::{Interrupt, Job, Pair, differentiate};
@@ -37,8 +37,8 @@ pub struct Along {
 /// with position, velocity and acceleration of both. The outputs `effort` of the joints are the efforts that the motion needs, as in
 /// [`super::prescribed`]; those of the drives follow after all outputs. Unlike in a free run no error of a force moves the machine, so that
 /// what is wrong with a drive and what is wrong with the machine show apart. Where states of drives were measured too, as pressures of
-/// chambers, `seen` tells them (N x their number) and `places` which states they are: the efforts of the drives are those of the
-/// measured ones. Checked: a free run gives its drives' states back.
+/// chambers, `seen` gives their readings (N x their number) and `places` which states they are: the efforts of the drives are those of what
+/// is behind these readings. Checked: a free run gives its drives' states back.
 pub fn drives_along(
     setting: Setting<'_>,
     motion: JointMotion<'_>,
@@ -106,6 +106,7 @@ struct Way<'a, S> {
     stepping: Stepping,
     sensors: Vec<Sensor<S>>,
     of_joints: Vec<Option<Sensor<S>>>,
+    of_states: Vec<Option<Sensor<S>>>,
     ode: Answer<S>,
     integrator: Integrator<S>,
     /// States of drives and supplies, time since the last sample.
@@ -139,6 +140,7 @@ impl<'a, S: Scalar> Way<'a, S> {
             stepping: setting.stepping,
             sensors: description.sensors(theta),
             of_joints: position_sensors(description, theta),
+            of_states: state_sensors(description, theta, places),
             integrator: Integrator::new(setting.stepping.method, state.len()),
             ode,
             state,
@@ -234,8 +236,12 @@ impl<'a, S: Scalar> Way<'a, S> {
         let state = &mut states[row * dim..(row + 1) * dim];
         state.copy_from_slice(x);
         let wrong = |number: &S| !number.is_finite();
-        for (column, &place) in self.places.iter().enumerate() {
-            x[2 * joints + place] = S::from_f64(self.seen.at(row, column));
+        for (column, (&place, sensor)) in self.places.iter().zip(&self.of_states).enumerate() {
+            let reading = |sample| S::from_f64(self.seen.at(sample, column));
+            x[2 * joints + place] = match sensor {
+                Some(sensor) => sensor.undo(row, self.seen.rows() - 1, self.stepping.time_step, reading),
+                None => reading(row),
+            };
         }
         if !self.places.is_empty() {
             dynamics.drive(x, rate);

@@ -17,8 +17,8 @@ pub(crate) fn state_name(description: &Description, place: usize) -> String {
         description.actuators.iter().flat_map(|actuator| actuator.states().map(move |state| (state, actuator)));
     let of_drives =
         of_drives.map(|(state, actuator)| format!("{} of actuator `{}`", state.replace('_', " "), actuator.name));
-    let sagging = description.supplies.iter().filter(|supply| supply.is_sagging());
-    let of_supplies = sagging.map(|supply| format!("pressure of supply `{}`", supply.name));
+    let states = description.supplies.iter().flat_map(|supply| supply.states().map(move |state| (state, supply)));
+    let of_supplies = states.map(|(state, supply)| format!("{state} of supply `{}`", supply.name));
     let of_effects = description
         .remembering()
         .map(|joint| format!("hysteresis of joint `{}`", description.bodies[joint].joint.name));

@@ -1,10 +1,9 @@
 //! The state Jacobian of a machine whose drives have states of their own, by the chain rule through the forces of its drives.
 
-use super::places::{Place, places, pressures};
+use super::places::{Place, all_fed, places};
 use super::tangent::Laws;
 use super::{Build, Dynamics};
-use crate::actuator::hydraulic::Source;
-use crate::actuator::{Actuator, Drive, Target};
+use crate::actuator::Target;
 use crate::dynamics::{flexible, project, reach, weigh};
 use crate::scalar::{Dual, Scalar};
 use crate::spatial::Twist;
@@ -95,8 +94,13 @@ impl<S: Scalar> Driven<S> {
                 *state = Dual::variable(value, lane);
             }
         }
-        for (state, &value) in lifted {
-            *state = Dual::variable(value, PRESSURE);
+        for supply in &machine.supplies {
+            // The pressure at the valves is the one direction of a supply: its pressure rises with it, or a drop falls.
+            let slope = if supply.is_sagging() { S::one() } else { -S::one() };
+            for (number, (state, &value)) in lifted.by_ref().take(supply.states().count()).enumerate() {
+                *state = Dual::constant(value);
+                state.gradient[PRESSURE] = if number == 0 { slope } else { S::zero() };
+            }
         }
         let lines = &machine.data.composite.lines;
         let moving = |on| {
@@ -114,8 +118,12 @@ impl<S: Scalar> Driven<S> {
         for (place, (actuator, force)) in places(machine).zip(dynamics.actuators.iter().zip(&dynamics.forces)) {
             let drawn = if place.draws(actuator) { drawn.next() } else { None };
             let Place { first, count, supply } = place;
-            let own = (0..count).map(|lane| (first + lane, lane));
-            if count + supply.iter().count() == 0 {
+            let fed = || supply.iter().flatten();
+            let lanes = || {
+                let own = (0..count).map(move |lane| (first + lane, lane, 1.0));
+                own.chain(fed().map(|state| (state.at, PRESSURE, state.sign)))
+            };
+            if count == 0 {
                 continue;
             }
             column.fill(S::zero());
@@ -124,26 +132,22 @@ impl<S: Scalar> Driven<S> {
                 Target::Line(line) => machine.data.line_load(line, S::one(), column),
             }
             machine.data.solve(column);
-            for (at, lane) in own.clone().chain(supply.map(|at| (at, PRESSURE))) {
+            for (at, lane, sign) in lanes() {
                 for (row, &pushed) in matrix[n * dim..].chunks_exact_mut(dim).zip(&*column) {
-                    row[2 * n + at] += pushed * force.gradient[lane];
+                    row[2 * n + at] += pushed * force.gradient[lane] * sign;
                 }
                 for row in first..first + count {
-                    matrix[(2 * n + row) * dim + 2 * n + at] = rate[2 * n + row].gradient[lane];
+                    matrix[(2 * n + row) * dim + 2 * n + at] = rate[2 * n + row].gradient[lane] * sign;
                 }
             }
-            if let (Some(at), Some(drawn)) = (supply, drawn) {
-                let drop = dynamics.drop(actuator);
-                for (column, lane) in own {
-                    matrix[(2 * n + at) * dim + 2 * n + column] += drop * drawn.gradient[lane];
+            for (row, drawn) in fed().zip(drawn.into_iter().cycle()) {
+                for (at, lane, sign) in lanes() {
+                    matrix[(2 * n + row.at) * dim + 2 * n + at] += row.by_flow * drawn.gradient[lane] * sign;
                 }
-                // The flow of all that draw from it is in the rate of its pressure already.
-                matrix[(2 * n + at) * dim + 2 * n + at] = rate[2 * n + at].gradient[PRESSURE];
             }
         }
-        // A supply that nothing draws from.
-        for at in pressures(machine) {
-            matrix[(2 * n + at) * dim + 2 * n + at] = rate[2 * n + at].gradient[PRESSURE];
+        for state in all_fed(machine) {
+            matrix[(2 * n + state.at) * dim + 2 * n + state.at] += state.by_itself;
         }
     }
 
@@ -242,20 +246,9 @@ impl<S: Scalar> Driven<S> {
             for row in place.first..place.first + place.count {
                 add(row, &rate[2 * n + row], S::one());
             }
-            if let (Some(row), Some(drawn)) = (place.supply, drawn) {
-                add(row, drawn, dynamics.drop(actuator));
+            for (state, drawn) in place.supply.iter().flatten().zip(drawn.into_iter().cycle()) {
+                add(state.at, drawn, state.by_flow);
             }
-        }
-    }
-}
-
-impl<S: Scalar> Dynamics<Number<S>> {
-    /// How the rate of pressure of an actuator's supply changes with the flow that is drawn.
-    fn drop(&self, actuator: &Actuator<Number<S>>) -> S {
-        let Drive::Hydraulic(law) = &actuator.drive else { return S::zero() };
-        match &self.supplies[law.supply].source {
-            Source::Sagging(law) => -law.capacitance.value.recip(),
-            Source::Constant | Source::Logged => S::zero(),
         }
     }
 }

@@ -16,6 +16,8 @@ pub(super) struct Shown<S> {
     pub(super) currents: Vec<S>,
     /// Pressure (Pa) of each supply, and the flow (m^3/s) drawn from it.
     pub(super) supplies: Vec<[S; 2]>,
+    /// What is lost between each supply and its valves, Pa.
+    pub(super) drops: Vec<S>,
     /// Flow (m^3/s) that each hydraulic drive draws.
     pub(super) drawn: Vec<S>,
 }
@@ -28,6 +30,7 @@ impl<S: Scalar> Shown<S> {
             hydraulics: vec![[S::zero(); 5]; cylinders],
             drawn: vec![S::zero(); cylinders],
             currents: vec![S::zero(); count(|drive| matches!(drive, Drive::DcMotor(_)))],
+            drops: vec![S::zero(); supplies.len()],
             supplies: supplies.iter().map(|supply| [supply.pressure, S::zero()]).collect(),
         }
     }
@@ -150,9 +153,10 @@ impl<S: Scalar> Dynamics<S> {
                 Drive::Hydraulic(law) => {
                     let [length, rate] = moving();
                     let (piston, [pressure, drawn]) = (law.piston(length), &mut shown.supplies[law.supply]);
+                    let pressure = *pressure - shown.drops[law.supply];
                     let [spool, spool_rate, a, b] = [0, 1, 2, 3].map(|k| states[at + k]);
                     let state = DriveState { spool, spool_rate, chambers: Chambers { a, b } };
-                    let action = law.action(state, input, [piston, rate], (&supplies[law.supply], *pressure));
+                    let action = law.action(state, input, [piston, rate], (&supplies[law.supply], pressure));
                     rates[at..at + 4].copy_from_slice(&action.rates);
                     *drawn += action.flows.supply;
                     shown.drawn[cylinders] = action.flows.supply;
@@ -181,26 +185,35 @@ impl<S: Scalar> Dynamics<S> {
     fn feed(&mut self, states: &[S]) {
         let Self { supplies, inputs, shown, actuators, internal, .. } = self;
         let mut logged = inputs[actuators.len()..].iter();
-        let sagging = supplies.iter().filter(|supply| supply.is_sagging()).count();
-        let mut own = states[*internal - sagging..].iter();
-        for (supply, shown) in supplies.iter().zip(&mut shown.supplies) {
+        let count: usize = supplies.iter().map(|supply| supply.states().count()).sum();
+        let mut own = states[*internal - count..].iter();
+        for ((supply, shown), lost) in supplies.iter().zip(&mut shown.supplies).zip(&mut shown.drops) {
             let pressure = match supply.source {
                 Source::Constant => None,
                 Source::Logged => logged.next(),
                 Source::Sagging(_) => own.next(),
             };
             *shown = [pressure.copied().unwrap_or(supply.pressure), S::zero()];
+            let drop = if supply.drop.is_some() { own.next() } else { None };
+            *lost = drop.copied().unwrap_or_default();
         }
     }
 
-    /// The rates of the pressures that are states.
+    /// The rates of the states of supplies.
     fn sag(&self, rates: &mut [S]) {
         let mut rates = rates.iter_mut();
-        for (supply, &[pressure, flow]) in self.supplies.iter().zip(&self.shown.supplies) {
+        for ((supply, &[pressure, flow]), &drop) in
+            self.supplies.iter().zip(&self.shown.supplies).zip(&self.shown.drops)
+        {
             if let Source::Sagging(law) = &supply.source
                 && let Some(rate) = rates.next()
             {
                 *rate = law.rate(pressure, supply.pressure, flow);
+            }
+            if let Some(law) = &supply.drop
+                && let Some(rate) = rates.next()
+            {
+                *rate = law.rate(drop, flow);
             }
         }
     }

@@ -8,7 +8,7 @@ use crate::scalar::Scalar;
 
 impl<S: Scalar> Dynamics<S> {
     /// Writes the states of drives and supplies of a machine that has stood at `q` without commands: lags, currents and spools 0,
-    /// visco-elastic elements settled, chambers without net force, supplies at their pressure; memories relaxed.
+    /// visco-elastic elements settled, chambers without net force, supplies at their pressure, of which nothing is lost; memories relaxed.
     pub fn settle_drives(&mut self, q: &[S], states: &mut [S]) {
         let zero = vec![S::zero(); q.len()];
         self.locate(q, &zero);
@@ -29,7 +29,14 @@ impl<S: Scalar> Dynamics<S> {
                 }
             }
         }
-        self.supplies.iter().filter(|supply| supply.is_sagging()).for_each(|supply| next(supply.pressure));
+        for supply in &self.supplies {
+            if supply.is_sagging() {
+                next(supply.pressure);
+            }
+            if supply.drop.is_some() {
+                next(S::zero());
+            }
+        }
         at.for_each(|memory| *memory = S::zero());
     }
 
@@ -87,12 +94,12 @@ impl<S: Scalar> Dynamics<S> {
                 Drive::DcMotor(_) => next(1.0),
                 Drive::Maxwell(_) => next(STRETCH),
                 Drive::Hydraulic(law) => {
-                    let (stroke, frequency) = (law.valve.stroke.re(), law.valve.frequency.re());
+                    let (stroke, frequency) = (law.valve.stroke.re(), law.valve.own_frequency().re());
                     [stroke, stroke * frequency, PRESSURE, PRESSURE].into_iter().for_each(&mut next);
                 }
             }
         }
-        self.supplies.iter().filter(|supply| supply.is_sagging()).for_each(|_| next(PRESSURE));
+        self.supplies.iter().flat_map(|supply| supply.states()).for_each(|_| next(PRESSURE));
         scales.for_each(|memory| *memory = 1.0);
     }
 }

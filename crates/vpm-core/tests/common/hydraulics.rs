@@ -17,16 +17,18 @@ pub fn nominal() -> ServoCylinder<f64> {
         line_a: 2.9e-6,
         line_b: 2.9e-6,
         internal_leakage: 1.7e-13,
+        worn_leakage: None,
         external_leakage: 0.0,
         stop: EndStop { stiffness: 5e8, damping: 2e4 },
         seal: SealFriction { viscous: None, coulomb: None, stribeck: None },
     };
     ServoCylinder {
-        fluid: Fluid { bulk_modulus: 1.2e9, vapour_pressure: 1e3, air: None },
+        fluid: Fluid { bulk_modulus: 1.2e9, vapour_pressure: 1e3, air: None, more_air: None },
         valve: Valve {
             gain: 1.0,
             frequency: std::f64::consts::TAU * 250.0,
             damping: 0.7,
+            delay: None,
             stroke: 0.01,
             overlap: DeadZone { width: 0.0 },
             orifice: Orifice { gain, transition_pressure: 1e4 },

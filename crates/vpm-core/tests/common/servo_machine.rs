@@ -2,7 +2,7 @@
 #![allow(dead_code, reason = "each test file uses its own part of this")]
 
 use serde_json::{Value, json};
-use vpm_core::actuator::hydraulic::{PistonSize, ServoCylinder};
+use vpm_core::actuator::hydraulic::{EntrainedAir, PistonSize, ServoCylinder};
 use vpm_core::evaluate::internal_state;
 use vpm_core::samples::{pendulum, slider};
 
@@ -19,11 +19,16 @@ pub enum On {
 }
 
 pub fn supply(servo: &ServoCylinder<f64>, source: Value) -> Value {
-    let air = servo.fluid.air.map(
-        |air| json!({"fraction": air.fraction, "exponent": air.exponent, "reference_pressure": air.reference_pressure}),
-    );
-    json!({"pressure": servo.supply_pressure, "tank_pressure": servo.tank_pressure, "source": source,
-        "oil": {"bulk_modulus": servo.fluid.bulk_modulus, "vapour_pressure": servo.fluid.vapour_pressure, "air": air}})
+    let bubbles = |air: EntrainedAir<f64>| json!({"fraction": air.fraction, "exponent": air.exponent, "reference_pressure": air.reference_pressure});
+    let [air, more_air] = [servo.fluid.air, servo.fluid.more_air].map(|air| air.map(bubbles));
+    // A source that has a drop says both.
+    let (own, drop) = match source.get("own") {
+        Some(own) => (own.clone(), source["drop"].clone()),
+        None => (source, Value::Null),
+    };
+    json!({"pressure": servo.supply_pressure, "tank_pressure": servo.tank_pressure, "source": own, "drop": drop,
+        "oil": {"bulk_modulus": servo.fluid.bulk_modulus, "vapour_pressure": servo.fluid.vapour_pressure, "air": air,
+            "more_air": more_air}})
 }
 
 pub fn drive(servo: &ServoCylinder<f64>) -> Value {
@@ -34,10 +39,10 @@ pub fn drive(servo: &ServoCylinder<f64>) -> Value {
     };
     json!({"type": "hydraulic", "supply": 0, "retracted_length": MIDDLE - 0.5 * cylinder.stroke,
         "valve": {"gain": valve.gain, "frequency": valve.frequency, "damping": valve.damping, "stroke": valve.stroke,
-            "overlap": valve.overlap.width,
+            "overlap": valve.overlap.width, "delay": valve.delay,
             "orifice": {"gain": valve.orifice.gain, "transition_pressure": valve.orifice.transition_pressure}},
         "cylinder": {"size": size, "stroke": cylinder.stroke, "line_a": cylinder.line_a, "line_b": cylinder.line_b,
-            "internal_leakage": cylinder.internal_leakage, "external_leakage": cylinder.external_leakage,
+            "internal_leakage": cylinder.internal_leakage, "worn_leakage": cylinder.worn_leakage, "external_leakage": cylinder.external_leakage,
             "stop": {"stiffness": cylinder.stop.stiffness, "damping": cylinder.stop.damping}, "seal": seal(servo)}})
 }
 

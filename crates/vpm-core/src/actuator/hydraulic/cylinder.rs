@@ -19,7 +19,7 @@ pub struct Chambers<S> {
 ///
 /// Law: areas A and `alpha A`, see [`PistonSize`]; volumes `va = line_a + A (L/2 + x)` and
 /// `vb = line_b + alpha A (L/2 - x)`, never below those of the lines; `pa' = beta_e/va (qa - A v - leak - leak_a)` and
-/// `pb' = beta_e/vb (-qb + alpha A v + leak - leak_b)` (4.11, 4.12 with the sign of A v corrected), `leak = C_i (pa - pb)`,
+/// `pb' = beta_e/vb (-qb + alpha A v + leak - leak_b)` (4.11, 4.12 with the sign of A v corrected), `leak = (C_i + C_w) (pa - pb)`,
 /// `leak_k = C_e (pk - pt)`. Force on the piston `A pa - alpha A pb` (N), friction of the seals and stops apart.
 /// Beyond an end the closed chamber's volume stays that of its line, and does not change with v.
 /// Source: D'Imperio 2016, section 4.1 and appendix A. Checked: stroke, lines and stiffness of the stop are positive,
@@ -37,6 +37,9 @@ pub struct Cylinder<P> {
     pub line_b: P,
     /// Laminar leakage past the piston, m^3/(s Pa).
     pub internal_leakage: P,
+    /// What worn seals add to it, m^3/(s Pa).
+    #[serde(default = "crate::actuator::none")]
+    pub worn_leakage: Option<P>,
     /// Laminar leakage of each chamber to the tank, m^3/(s Pa).
     pub external_leakage: P,
     /// The ends of the stroke.
@@ -54,6 +57,7 @@ impl<P> Cylinder<P> {
             line_a: f(&self.line_a),
             line_b: f(&self.line_b),
             internal_leakage: f(&self.internal_leakage),
+            worn_leakage: self.worn_leakage.as_ref().map(&mut *f),
             external_leakage: f(&self.external_leakage),
             stop: EndStop { stiffness: f(&self.stop.stiffness), damping: f(&self.stop.damping) },
             seal: self.seal.map(f),
@@ -72,6 +76,7 @@ impl<P> Cylinder<P> {
             ("cylinder.stop.stiffness", &self.stop.stiffness, Domain::Positive),
             ("cylinder.stop.damping", &self.stop.damping, Domain::NonNegative),
         ]);
+        domains.extend(self.worn_leakage.as_ref().map(|size| ("cylinder.worn_leakage", size, Domain::Any)));
         domains.extend(self.seal.domains());
         domains
     }
@@ -127,7 +132,8 @@ impl<S: Scalar> Cylinder<S> {
     /// What leaves each chamber past piston and rod in m^3/s.
     #[inline]
     pub fn leakage(&self, pressures: Chambers<S>, tank: S) -> Chambers<S> {
-        let inside = self.internal_leakage * (pressures.a - pressures.b);
+        let laminar = self.worn_leakage.map_or(self.internal_leakage, |worn| self.internal_leakage + worn);
+        let inside = laminar * (pressures.a - pressures.b);
         Chambers {
             a: inside + self.external_leakage * (pressures.a - tank),
             b: -inside + self.external_leakage * (pressures.b - tank),

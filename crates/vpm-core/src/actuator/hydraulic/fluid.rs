@@ -18,10 +18,29 @@ pub struct EntrainedAir<P> {
     pub reference_pressure: P,
 }
 
-/// Oil of a chamber, with air bubbles if it has any.
+impl<P> EntrainedAir<P> {
+    /// The same air over another number type.
+    fn map<T>(&self, f: &mut impl FnMut(&P) -> T) -> EntrainedAir<T> {
+        EntrainedAir {
+            fraction: f(&self.fraction),
+            exponent: f(&self.exponent),
+            reference_pressure: f(&self.reference_pressure),
+        }
+    }
+}
+
+impl<S: Scalar> EntrainedAir<S> {
+    /// Volume of air per volume of oil at a `pressure` (Pa).
+    #[inline]
+    fn share(&self, pressure: S) -> S {
+        self.fraction * ((self.reference_pressure / pressure).ln() / self.exponent).exp()
+    }
+}
+
+/// Oil of a chamber, with air bubbles if it has any, and more of them than described.
 ///
 /// Law: `beta_e = beta (1 + a) / (1 + a beta / (kappa p))` with `a = fraction (p0 / p)^(1 / kappa)`, all in Pa, p absolute (4.15
-/// corrected); without air `beta_e = beta`.
+/// corrected); without air `beta_e = beta`. More air adds to both sums: `(1 + a + b) / (1 + beta (a / kappa_a + b / kappa_b) / p)`.
 /// A chamber's state is what its pressure would be if oil could be pulled: below the vapour pressure the pressure stays there and the
 /// state counts the void with the stiffness of the oil alone, `rate of ln(density) = state rate / beta_e`. So no oil is lost while
 /// a chamber cavitates, and the void has to be filled before pressure builds up.
@@ -37,6 +56,9 @@ pub struct Fluid<P> {
     /// Air in the oil.
     #[serde(default = "crate::actuator::none")]
     pub air: Option<EntrainedAir<P>>,
+    /// Air beyond that.
+    #[serde(default = "crate::actuator::none")]
+    pub more_air: Option<EntrainedAir<P>>,
 }
 
 impl<P> Fluid<P> {
@@ -45,11 +67,8 @@ impl<P> Fluid<P> {
         Fluid {
             bulk_modulus: f(&self.bulk_modulus),
             vapour_pressure: f(&self.vapour_pressure),
-            air: self.air.as_ref().map(|air| EntrainedAir {
-                fraction: f(&air.fraction),
-                exponent: f(&air.exponent),
-                reference_pressure: f(&air.reference_pressure),
-            }),
+            air: self.air.as_ref().map(|air| air.map(f)),
+            more_air: self.more_air.as_ref().map(|air| air.map(f)),
         }
     }
 
@@ -59,7 +78,7 @@ impl<P> Fluid<P> {
             ("fluid.bulk_modulus", &self.bulk_modulus, Domain::Positive),
             ("fluid.vapour_pressure", &self.vapour_pressure, Domain::Positive),
         ];
-        if let Some(air) = &self.air {
+        for air in self.air.iter().chain(&self.more_air) {
             domains.push(("fluid.air.fraction", &air.fraction, Domain::NonNegative));
             domains.push(("fluid.air.exponent", &air.exponent, Domain::Positive));
             domains.push(("fluid.air.reference_pressure", &air.reference_pressure, Domain::Positive));
@@ -78,12 +97,15 @@ impl<S: Scalar> Fluid<S> {
     /// Effective bulk modulus in Pa of a chamber in a `state` (Pa).
     #[inline]
     pub fn effective_bulk_modulus(&self, state: S) -> S {
-        let Some(air) = &self.air else { return self.bulk_modulus };
-        if state < self.vapour_pressure {
+        if (self.air.is_none() && self.more_air.is_none()) || state < self.vapour_pressure {
             return self.bulk_modulus;
         }
-        let pressure = state;
-        let share = air.fraction * ((air.reference_pressure / pressure).ln() / air.exponent).exp();
-        self.bulk_modulus * (share + 1.0) / (share * self.bulk_modulus / (air.exponent * pressure) + 1.0)
+        let (mut share, mut softness) = (S::zero(), S::zero());
+        for air in self.air.iter().chain(&self.more_air) {
+            let own = air.share(state);
+            share += own;
+            softness += own / (air.exponent * state);
+        }
+        self.bulk_modulus * (share + 1.0) / (softness * self.bulk_modulus + 1.0)
     }
 }

@@ -21,7 +21,7 @@ pub use orifice::Orifice;
 pub use piston::{EndStop, SealFriction};
 pub use servo::{Load, ServoCylinder, ServoRig, ServoState};
 pub use size::PistonSize;
-pub use supply::{Sagging, Source, Supply};
+pub use supply::{Sagging, Source, Supply, SupplyDrop};
 pub use valve::{Flows, Valve};
 
 use crate::effect::Domain;

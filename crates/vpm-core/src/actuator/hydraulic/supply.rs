@@ -22,6 +22,9 @@ pub struct Supply<P> {
     pub oil: Fluid<P>,
     /// How the pressure answers to what is drawn.
     pub source: Source<P>,
+    /// What hoses and filters take off on the way to the valves.
+    #[serde(default = "crate::actuator::none")]
+    pub drop: Option<SupplyDrop<P>>,
 }
 
 /// How the pressure of a supply comes about.
@@ -50,6 +53,21 @@ pub struct Sagging<P> {
     pub capacitance: P,
 }
 
+/// Pressure that is lost between a supply and its valves.
+///
+/// Law: `time_constant dd/dt = resistance flow - d`, d in Pa taken off the supply's pressure, the flow in m^3/s that of all its valves: a laminar
+/// resistance behind which hoses give way. With `time_constant = resistance capacitance` and a constant supply the pressure at the valves is
+/// that of [`Sagging`]; unlike there, no resistance is no drop. Source: Merritt 1967, "Hydraulic Control Systems", sections 3-2 and 3-3.
+/// Checked: the time constant is positive.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SupplyDrop<P> {
+    /// Loss of pressure per flow, Pa s/m^3.
+    pub resistance: P,
+    /// Time after which 63 % of a loss are there, s.
+    pub time_constant: P,
+}
+
 impl<P> Supply<P> {
     /// The same supply over another number type.
     pub fn map<T>(&self, f: &mut impl FnMut(&P) -> T) -> Supply<T> {
@@ -65,6 +83,10 @@ impl<P> Supply<P> {
                     Source::Sagging(Sagging { resistance: f(&law.resistance), capacitance: f(&law.capacitance) })
                 }
             },
+            drop: self
+                .drop
+                .as_ref()
+                .map(|law| SupplyDrop { resistance: f(&law.resistance), time_constant: f(&law.time_constant) }),
         }
     }
 
@@ -75,7 +97,16 @@ impl<P> Supply<P> {
         if let Source::Sagging(Sagging { resistance, capacitance }) = &self.source {
             domains.extend([(resistance, Domain::Positive), (capacitance, Domain::Positive)]);
         }
+        if let Some(SupplyDrop { resistance, time_constant }) = &self.drop {
+            domains.extend([(resistance, Domain::Any), (time_constant, Domain::Positive)]);
+        }
         domains
+    }
+
+    /// Names of its states, in their order.
+    pub fn states(&self) -> impl Iterator<Item = &'static str> {
+        let (sagging, drop) = (self.is_sagging().then_some("pressure"), self.drop.as_ref().map(|_| "drop"));
+        sagging.into_iter().chain(drop)
     }
 
     /// Whether its pressure is an input.
@@ -86,6 +117,14 @@ impl<P> Supply<P> {
     /// Whether its pressure is a state.
     pub fn is_sagging(&self) -> bool {
         matches!(self.source, Source::Sagging(_))
+    }
+}
+
+impl<S: Scalar> SupplyDrop<S> {
+    /// Change in Pa/s of a `drop` (Pa) with `flow` (m^3/s) drawn.
+    #[inline]
+    pub fn rate(&self, drop: S, flow: S) -> S {
+        (self.resistance * flow - drop) / self.time_constant
     }
 }
 

@@ -22,7 +22,7 @@ pub struct Flows<S> {
 
 /// 4-way servovalve with a spool of second order.
 ///
-/// Law: `z'' = w^2 (sat(gain i) - z) - 2 D w z'`, i the current in A, z the spool's place in a unit of the user's choice (`gain` units
+/// Law: `z'' = w^2 (sat(gain i) - z) - 2 D w z'` with `1/w = 1/frequency + delay`, i the current in A, z the spool's place in a unit of the user's choice (`gain` units
 /// of z per A), sat the limit `±stroke`. What opens is `u = dead_zone(sat(z))`: an overshoot beyond the stroke, at most
 /// `e^(-pi D / sqrt(1 - D^2))` of a step, opens no more. u > 0: supply to a, b to tank; u < 0: a to tank, supply to b (4.1, 4.2, both
 /// directions of each edge): `qa = flow(u, ps - pa)` and `qb = flow(u, pb - pt)`, or `qa = -flow(-u, pa - pt)` and
@@ -39,6 +39,9 @@ pub struct Valve<P> {
     pub frequency: P,
     /// Damping ratio of the spool.
     pub damping: P,
+    /// How much slower than that a worn or cold valve is, s: it adds to the inverse of the frequency.
+    #[serde(default = "crate::actuator::none")]
+    pub delay: Option<P>,
     /// Largest place of the spool, spool unit.
     pub stroke: P,
     /// How far the spool moves before it opens, spool unit.
@@ -54,6 +57,7 @@ impl<P> Valve<P> {
             gain: f(&self.gain),
             frequency: f(&self.frequency),
             damping: f(&self.damping),
+            delay: self.delay.as_ref().map(&mut *f),
             stroke: f(&self.stroke),
             overlap: self.overlap.map(f),
             orifice: self.orifice.map(f),
@@ -70,17 +74,24 @@ impl<P> Valve<P> {
             ("valve.overlap", &self.overlap.width, Domain::NonNegative),
         ];
         domains.extend(self.orifice.domains());
+        domains.extend(self.delay.as_ref().map(|delay| ("valve.delay", delay, Domain::NonNegative)));
         domains
     }
 }
 
 impl<S: Scalar> Valve<S> {
+    /// Natural frequency of the spool as it is, rad/s.
+    #[inline]
+    pub fn own_frequency(&self) -> S {
+        self.delay.map_or(self.frequency, |delay| self.frequency / (self.frequency * delay + 1.0))
+    }
+
     /// Acceleration of a spool at `place` with `rate` under a `current` (A), spool unit/s^2.
     #[inline]
     pub fn spool_acceleration(&self, place: S, rate: S, current: S) -> S {
-        let square = self.frequency * self.frequency;
+        let frequency = self.own_frequency();
         let target = Saturation { limit: self.stroke }.apply(self.gain * current);
-        square * (target - place) - self.damping * self.frequency * rate * 2.0
+        frequency * frequency * (target - place) - self.damping * frequency * rate * 2.0
     }
 
     /// What a spool at `place` opens, in spool units: positive from supply to a.
