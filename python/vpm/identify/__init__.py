@@ -13,7 +13,7 @@ from vpm.identify.intervals import Bootstrap, Profile, bootstrap, profile_interv
 from vpm.identify.oil import identify_oil
 from vpm.identify.oil_equations import CylinderGeometry, pressures_from_force
 from vpm.identify.oil_fit import OilFit
-from vpm.identify.problem import Block, InverseDynamicsProblem, OutputErrorProblem, Problem, gaps, problem, segments
+from vpm.identify.problem import Block, InverseDynamicsProblem, OutputErrorProblem, Problem, gaps, segments
 from vpm.identify.settings import Fitting
 from vpm.identify.shooting import ShootingProblem
 from vpm.identify.statistics import Gain, gain, robust_covariance
