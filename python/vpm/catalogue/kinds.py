@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
+from vpm.catalogue.signature import Signature, signature_of
 from vpm.errors import ModelError, near_match
 
 SiteKind = Literal["joint", "body", "actuator", "sensor"]
@@ -117,6 +118,8 @@ class EffectType:
         Effect that has to be at the same site before this one is worth looking for: it is a correction of that one.
     screened : bool
         Whether a diagnosis tries it; not one that asks for a joint of its own.
+    shows : Signature or None
+        Where it shows, for an entry without a row in `vpm.catalogue.signature`.
     """
 
     name: str
@@ -129,6 +132,12 @@ class EffectType:
     confused_with: Mapping[str, str]
     requires: str | None = None
     screened: bool = True
+    shows: Signature | None = None
+
+    @property
+    def signature(self) -> Signature:
+        """Where it shows: the state that its picture is drawn over, and what is to be seen there."""
+        return self.shows or signature_of(self.name)
 
     @property
     def title(self) -> str:

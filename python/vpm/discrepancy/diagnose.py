@@ -21,14 +21,17 @@ from vpm.discrepancy.diagnosis import (
     Picture,
     Step,
 )
+from vpm.discrepancy.evidence import gather
 from vpm.discrepancy.floor import noise_floor
 from vpm.discrepancy.refusal import FALSE_ALARM_LEVEL, LEAST_GAIN
 from vpm.discrepancy.search import Accepted, Search, Stage, ambiguities, search
+from vpm.discrepancy.side_by_side import Progress, SideBySide
 from vpm.discrepancy.structure import Structure, structure
 from vpm.errors import DiagnosisError, DivergedError, near_match
 from vpm.experiment import Experiment
 from vpm.identify import InverseDynamicsProblem, OutputErrorProblem, gain, gaps, segments
 from vpm.identify.fit import fit_of
+from vpm.identify.parallel import worker_count
 from vpm.model import Model
 from vpm.simulate import Run, Setup, judging_mode
 
@@ -40,6 +43,8 @@ HELD_OUT = 0.3
 FLOOR_FACTOR = 1.3
 #: Neither has one below this share of the measured effort.
 NEGLIGIBLE = 0.01
+#: What an interrupted diagnosis says of itself.
+STOPPED = "stopped by Ctrl-C before every candidate was tried: this is what was known until then"
 #: Parameters that move by more of their stated uncertainties than this are reported.
 FAR = 3.0
 
@@ -55,7 +60,9 @@ def diagnose(
     cutoff: float | None = None,
     setup: Setup | None = None,
     limit: int = 6,
+    workers: int | None = None,
     tell: Tell | None = None,
+    progress: Progress | None = None,
 ) -> Diagnosis:
     """Name the physics that ``model`` is missing, with evidence on data that were not fitted.
 
@@ -80,12 +87,17 @@ def diagnose(
         Integrator, substeps and horizon of the simulations.
     limit : int
         Most effects to accept.
+    workers : int, optional
+        Candidates that are worked on at a time; one per core if not given. The result does not depend on it.
     tell : callable, optional
         Called with a sentence at every step; an exception raised there ends the diagnosis.
+    progress : callable, optional
+        Called after every candidate with what is being done, its name, how many are done, and how many there are.
 
     Returns
     -------
     Diagnosis
+        Ctrl-C during the search gives what is known until then, with ``interrupted``; earlier it raises.
 
     Raises
     ------
@@ -97,6 +109,7 @@ def diagnose(
     began = time.perf_counter()
     say = tell or (lambda _: None)
     _check_effects(effects)
+    worker_count(workers)
     training, unseen, notes = _records(experiments, validate)
     # A record cut off in the middle of a motion does not say what its controller remembers.
     mode = "restarts" if notes else judging_mode(model, unseen)
@@ -109,7 +122,9 @@ def diagnose(
         notes.append("the model file gives no parameter an uncertainty, so none was recalibrated")
     recalibrated = judge(model, free, data, {})
     notes.extend(_moved_far(model, recalibrated))
-    found = search(recalibrated, data, effects, limit, say)
+    found = search(recalibrated, data, effects, limit, say, SideBySide(workers, progress))
+    if found.interrupted:
+        notes.append(STOPPED)
     say("measuring the noise floor")
     cutoffs = tuple(m.cutoff for m in data.unseen.motions)
     floor = noise_floor(found.final.model, unseen, cutoffs)
@@ -118,7 +133,7 @@ def diagnose(
     verdict, summary = _verdict(data, nominal, recalibrated, found, gap, left)
     return Diagnosis(
         verdict,
-        summary,
+        f"Stopped before every candidate was tried. {summary}" if found.interrupted else summary,
         tuple(_accepted_effect(entry, found.final) for entry in found.accepted),
         gap,
         found.refused,
@@ -133,6 +148,8 @@ def diagnose(
         fit_of(found.final.model, data.training, found.final.fit, nominal.fit.residual, [e.name for e in training]),
         _pictures(data, nominal, recalibrated, found.final),
         time.perf_counter() - began,
+        found.interrupted,
+        gather(found.final.model, [entry.key for entry in found.accepted], data.unseen, floor),
     )
 
 
