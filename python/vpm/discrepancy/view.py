@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from vpm.catalogue import effect_type
+from vpm.catalogue import EFFECTS
+from vpm.catalogue.signature import signature_of
 from vpm.experiment import parallel_filter
 from vpm.identify import InverseDynamicsProblem
 from vpm.identify.along import respond
@@ -59,7 +60,8 @@ class View:
         """The axis of the effect's signature that explains most of ``part``; the earlier one if it hardly matters."""
         best: Seen | None = None
         most = 0.0
-        for axis in effect_type(self.key[0]).signature.lives_in:
+        entry = EFFECTS.get(self.key[0])
+        for axis in (entry.signature if entry is not None else signature_of(self.key[0])).lives_in:
             found = self.along(axis)
             if found is None:
                 continue
