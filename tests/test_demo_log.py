@@ -69,7 +69,7 @@ def test_free_run_agrees_with_an_adaptive_integrator() -> None:
 
 
 def test_hidden_friction_really_sticks() -> None:
-    machine = replace(generate.HIDDEN["coulomb_friction"], encoder_noise=0.0)
+    machine = replace(generate.HIDDEN["coulomb_friction"].machine, encoder_noise=0.0)
     # The controller's push at a standing error e is kv kp e; this one stays at 0.9 of what the friction holds.
     held = 0.9 * machine.coulomb / (machine.torque_per_current * machine.velocity_gain * machine.position_gain)
     stuck = generate.record(machine, lambda _: held, 0.5, np.random.default_rng(0))
