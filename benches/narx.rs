@@ -1,14 +1,21 @@
-//! What one step of a polynomial NARX model of twenty terms costs: in a loop, over a record, and the Maxwell element.
+//! What one step of a polynomial NARX model of twenty terms costs: in a loop, over a record, as an actuator of a machine, and the Maxwell
+//! element.
 
 use std::hint::black_box;
+use std::sync::Arc;
 use std::time::Duration;
 
 use criterion::Criterion;
+use serde_json::{Value, json};
 use vpm_core::Result;
+use vpm_core::description::Description;
+use vpm_core::integrator::Method;
+use vpm_core::live::Live;
 use vpm_core::narx::{
     Lags, MaxwellNarx, MaxwellScheme, Narx, Record, Stop, Structure, Surface, Term, candidates, select,
 };
 use vpm_core::samples::Random;
+use vpm_core::simulate::Stepping;
 
 /// Samples per call, so that the clock does not count.
 const SAMPLES: usize = 1000;
@@ -59,6 +66,45 @@ fn maxwell_steps(criterion: &mut Criterion, inputs: &[f64]) -> Result<()> {
     Ok(())
 }
 
+/// A carriage of 10 kg with friction, behind a drive.
+fn carriage(drive: &Value) -> Result<Description> {
+    let description = json!({
+        "gravity": [0.0, 0.0, 0.0],
+        "parameters": [10.0, 0.0, 20.0, 4.0],
+        "parameter_names": ["carriage.mass", "nothing", "axis.friction.viscous", "drive.gain"],
+        "bodies": [{"name": "carriage", "on": "world",
+            "inertia": {"mass": 0, "center_of_mass": [1, 1, 1], "moments": [1, 1, 1, 1, 1, 1]},
+            "joint": {"name": "axis", "kind": "prismatic", "axis": [1.0, 0.0, 0.0], "translation": [0.0, 0.0, 0.0],
+                "rotation": [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]}}],
+        "effects": [{"type": "viscous_friction", "joint": 0, "viscous": 2}],
+        "actuators": [{"name": "drive", "on": {"joint": 0}, "drive": drive}],
+    });
+    Description::from_json(&description.to_string())
+}
+
+/// One step of 0.1 ms of a machine that somebody else drives, with a NARX actuator of twenty terms and with an ideal one.
+fn machine_steps(criterion: &mut Criterion) -> Result<()> {
+    let model = twenty()?;
+    let factors = |term: &Term| term.factors().iter().map(|factor| (factor.signal, factor.delay)).collect::<Vec<_>>();
+    let narx = json!({"type": "narx", "sample_time": 1e-4, "inputs": [["u", "command"]],
+        "terms": model.structure().terms().iter().map(factors).collect::<Vec<_>>(), "coefficients": model.coefficients()});
+    for (name, drive) in [("ideal", json!({"type": "ideal", "gain": 3})), ("narx_of_20_terms", narx)] {
+        for method in [Method::Rk4, Method::LinearlyImplicit] {
+            let (description, stepping) = (carriage(&drive)?, Stepping::new(1e-4, 1, method)?);
+            let theta = description.parameters.clone();
+            let mut live = Live::new(Arc::new(description), &theta, &[0.0, 0.0], stepping)?;
+            let mut sign = 1.0;
+            criterion.bench_function(&format!("narx/machine_step_{}/{name}", method.name()), |b| {
+                b.iter(|| {
+                    sign = -sign;
+                    live.step(black_box(&[sign])).map(<[f64]>::len)
+                });
+            });
+        }
+    }
+    Ok(())
+}
+
 fn main() -> Result<()> {
     let mut criterion = Criterion::default()
         .warm_up_time(Duration::from_millis(300))
@@ -67,6 +113,7 @@ fn main() -> Result<()> {
     let inputs = Random::new(3).numbers(SAMPLES, 1.0);
     model_steps(&mut criterion, &inputs)?;
     maxwell_steps(&mut criterion, &inputs)?;
+    machine_steps(&mut criterion)?;
     criterion.final_summary();
     Ok(())
 }

@@ -118,6 +118,18 @@ class Simulation:
         """A step for each row of ``inputs`` (N, n_inputs); outputs (N, n_outputs)."""
     def reset(self, state: ArrayLike) -> None:
         """Begin again at time zero in ``state`` (n_states,), with nothing remembered."""
+    def snapshot(self) -> Snapshot:
+        """All that it is now, with what delays and sampled drives remember."""
+    def restore(self, snapshot: Snapshot) -> None:
+        """Go back to where it was when the snapshot was taken."""
+
+@final
+class Snapshot:
+    """A simulation as it was at one time."""
+
+    @property
+    def time(self) -> float:
+        """Time of the simulation when it was taken, s."""
 
 @final
 class System:
@@ -328,6 +340,8 @@ class System:
         It stood at ``position`` (n_coordinates,). Shape (n_states - 2 n_coordinates,): lags, currents and spools zero,
         visco-elastic elements settled, chambers without net force, sagging supplies at their pressure.
         """
+    def memories(self, theta: ArrayLike, position: ArrayLike) -> NDArray[np.float64]:
+        """Memories (N, hystereses) at every sample of a path of the joints (N, n), relaxed at the first."""
     def equilibrium(self, theta: ArrayLike, position: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Coordinates (n_coordinates,) at rest with the joints held at ``position``, and the holding efforts (n,)."""
     def natural_frequencies(self, theta: ArrayLike, position: ArrayLike) -> NDArray[np.float64]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,6 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 from vpm.errors import DivergedError, SimulationError, near_match
 from vpm.model import Model
 from vpm.simulate import AUTOMATIC, Run, Setup, judged
+
+if TYPE_CHECKING:
+    from vpm._core import Snapshot
 
 Array = NDArray[np.float64]
 
@@ -218,6 +222,35 @@ class Simulation:
         start = self._start if state is None else self._model.state(state)
         try:
             self._core.reset(start)
+        except ValueError as error:
+            raise SimulationError(str(error)) from None
+        self._outputs = self._core.outputs
+
+    def snapshot(self) -> Snapshot:
+        """Take note of all that the simulation is now, with what delays and sampled actuators remember.
+
+        Returns
+        -------
+        Snapshot
+            For `restore`, as often as wanted; it does not change as the simulation goes on.
+        """
+        return self._core.snapshot()
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Go back to where the simulation was when the snapshot was taken: what follows is the same to the last bit.
+
+        Parameters
+        ----------
+        snapshot : Snapshot
+            Of this simulation, or of one of the same model object with the same steps.
+
+        Raises
+        ------
+        SimulationError
+            The snapshot is of another model or of other steps.
+        """
+        try:
+            self._core.restore(snapshot)
         except ValueError as error:
             raise SimulationError(str(error)) from None
         self._outputs = self._core.outputs

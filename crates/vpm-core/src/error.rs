@@ -96,6 +96,15 @@ pub enum Error {
         /// Name of the first such beam.
         beam: String,
     },
+    /// A prescribed motion of a machine with hysteresis.
+    #[error(
+        "joint `{joint}` has hysteresis, whose memory a simulation with prescribed motion does not carry; balance the efforts of the joints \
+         (inverse dynamics) or simulate it on its commands"
+    )]
+    Memory {
+        /// Name of the first such joint.
+        joint: String,
+    },
     /// A payload sits on a body that does not exist.
     #[error(
         "payload number {payload} sits on body number {body}, but the model has {bodies} bodies; use a number below {bodies}"
@@ -263,14 +272,16 @@ pub enum Error {
     /// A contact, a bushing or a load cell that has no physical meaning.
     #[error("{0}")]
     Connection(#[from] ConnectionError),
-    /// A controller whose samples fall between those of the record.
+    /// A controller or a drive whose samples fall between those of the record.
     #[error(
-        "controller `{controller}` samples every {sample_time} s, which is no whole multiple of the record's time step of {time_step} s; \
+        "{kind} `{name}` samples every {sample_time} s, which is no whole multiple of the record's time step of {time_step} s; \
          give it the sample_time {nearest} s, or resample the record"
     )]
     SampleTime {
-        /// Name of the controller.
-        controller: String,
+        /// What it is: controller or actuator.
+        kind: &'static str,
+        /// Its name.
+        name: String,
         /// Time between its samples, s.
         sample_time: f64,
         /// Time between the samples of the record, s.

@@ -12,6 +12,9 @@ use crate::table::Table;
 /// Directions per pass: the gradient of a number then fills one 256-bit register.
 const LANES: usize = 4;
 
+/// What a sampled drive takes away.
+const NO_LINEAR_MODEL: &str = "the machine has no linear model in continuous time";
+
 /// A number with its derivatives along some of the states and inputs.
 type Number = Dual<f64, LANES>;
 
@@ -40,6 +43,7 @@ pub struct Linearization {
 /// Source: forward accumulation, see [`crate::scalar`]. Checked: the state has to be finite; tested against difference quotients
 /// and against the response of the simulation to small steps.
 pub fn linearize(description: &Description, theta: &[f64], state: &[f64], inputs: &[f64]) -> Result<Linearization> {
+    description.refuse_sampled(NO_LINEAR_MODEL, "linearise the machine with an ideal drive in its place")?;
     check_state("state", description, state)?;
     Table::vector("inputs", inputs, description.n_inputs(), "actuator and logged supply")?;
     let mut tangent = Tangent::new(description, theta)?;

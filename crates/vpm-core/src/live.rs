@@ -7,7 +7,7 @@ use crate::error::{Diverged, Error, Result};
 use crate::integrator::Integrator;
 use crate::ode::Ode;
 use crate::sensor::Sensor;
-use crate::simulate::{Stepping, check_pistons, check_state, check_step, halted, state_name};
+use crate::simulate::{SampledDrives, Stepping, check_pistons, check_state, check_step, halted, state_name};
 use crate::system::System;
 use crate::table::Table;
 
@@ -28,6 +28,7 @@ pub struct Live {
     system: System<f64>,
     integrator: Integrator<f64>,
     sensors: Vec<Sensor<f64>>,
+    sampled: SampledDrives,
     state: Vec<f64>,
     rate: Vec<f64>,
     outputs: Vec<f64>,
@@ -53,6 +54,7 @@ impl Live {
             system,
             integrator: Integrator::new(stepping.method, dim),
             sensors,
+            sampled: SampledDrives::new(&description, stepping.time_step)?,
             state: vec![0.0; dim],
             rate: vec![0.0; dim],
             outputs: vec![0.0; outputs],
@@ -69,6 +71,13 @@ impl Live {
     /// The machine.
     pub fn description(&self) -> &Description {
         &self.description
+    }
+
+    /// Whether the other is a simulation of the same machine with the same parameters and steps, at whatever time.
+    pub fn is_alike(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.description, &other.description)
+            && self.stepping == other.stepping
+            && self.theta == other.theta
     }
 
     /// The state now.
@@ -96,7 +105,8 @@ impl Live {
         self.integrator.reset();
         self.commands.fill(0.0);
         self.feed();
-        self.hold();
+        self.sampled.restart();
+        self.rest();
         self.observe()
     }
 
@@ -118,7 +128,7 @@ impl Live {
         let width = inputs.len();
         let row = self.sample % self.depth;
         self.commands[row * width..(row + 1) * width].copy_from_slice(inputs);
-        self.hold();
+        self.hold()?;
         let (pieces, sample) = ((self.stepping.time_step, self.stepping.substeps), self.sample);
         self.integrator
             .advance(&mut self.system, &mut self.state, pieces, &|| false)
@@ -128,15 +138,40 @@ impl Live {
         Ok(&self.outputs)
     }
 
-    /// Puts on actuators and supplies what the inputs until now amount to over the coming interval.
-    fn hold(&mut self) {
-        let Self { system, commands, depth, sample, .. } = self;
-        let inputs = self.description.n_inputs();
-        for number in 0..inputs {
-            let command = |sample: usize| commands[(sample % *depth) * inputs + number];
-            let input = system.dynamics().input(number, *sample, self.stepping.time_step, command);
-            system.hold(number, input);
+    /// Puts on actuators and supplies what the inputs until now amount to over the coming interval; sampled drives that are due act.
+    fn hold(&mut self) -> Result<()> {
+        for number in 0..self.description.n_inputs() {
+            let input = self.arrived(number);
+            let Self { description, sampled, truth, outputs, stepping, sample, depth, .. } = self;
+            let truth = &truth[*sample % *depth * outputs.len()..];
+            let effort = sampled.sample(number, *sample, input, |column| truth[column]).map_err(|astray| {
+                let at = (*sample as f64 * stepping.time_step, *sample);
+                astray.error(description, at, stepping.method.to_string(), stepping.step())
+            })?;
+            self.system.hold(number, effort.unwrap_or(input));
         }
+        Ok(())
+    }
+
+    /// As [`Live::hold`] before the first command.
+    fn rest(&mut self) {
+        if !self.sampled.is_empty() && self.state.iter().all(|number| number.is_finite()) {
+            let (state, width) = (&self.state, self.outputs.len());
+            self.system.dynamics().observe_motion(state, &mut self.truth[..width]);
+        }
+        for number in 0..self.description.n_inputs() {
+            let input = self.arrived(number);
+            let effort = self.sampled.rest(number, input, |column| self.truth[column]);
+            self.system.hold(number, effort.unwrap_or(input));
+        }
+    }
+
+    /// What input `number` amounts to over the coming interval.
+    fn arrived(&mut self, number: usize) -> f64 {
+        let Self { system, commands, depth, sample, description, .. } = self;
+        let inputs = description.n_inputs();
+        let command = |sample: usize| commands[(sample % *depth) * inputs + number];
+        system.dynamics().input(number, *sample, self.stepping.time_step, command)
     }
 
     fn observe(&mut self) -> Result<()> {

@@ -5,6 +5,7 @@ mod control;
 mod names;
 mod prescribed;
 mod quintic;
+mod sampled;
 mod stability;
 mod start;
 mod stepper;
@@ -12,6 +13,7 @@ mod stepper;
 pub use along::{Along, drives_along};
 pub(crate) use names::state_name;
 pub use prescribed::prescribed;
+pub(crate) use sampled::SampledDrives;
 pub(crate) use stability::{check_step, check_structure};
 pub(crate) use start::check_pistons;
 pub(crate) use stepper::{Drive, Plan, Stepper};
@@ -23,6 +25,7 @@ use crate::scalar::Scalar;
 use crate::sensitivity::{Interrupt, Job, Pair, differentiate};
 use crate::system::Build;
 use crate::table::Table;
+use sampled::Astray;
 
 /// How time advances.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -128,6 +131,10 @@ pub fn restarts(
     inputs: Table<'_>,
 ) -> Result<Run> {
     let description = setting.description;
+    description.refuse_sampled(
+        "a simulation cannot start again from a state in the middle of a record",
+        "simulate the record as a whole",
+    )?;
     inputs.expect("inputs", inputs.rows(), description.n_inputs())?;
     initial_states.expect("initial_states", starts.len(), description.n_states())?;
     if horizon == 0 || horizon > inputs.rows() {
@@ -169,6 +176,12 @@ impl Job for Simulation<'_> {
 
 fn execute(setting: Setting<'_>, plan: Plan<'_>) -> Result<Run> {
     let dim = setting.description.n_states();
+    if !setting.sensitivities.is_empty() {
+        setting.description.refuse_sampled(
+            "a simulation has no derivatives by parameters",
+            "ask for none, or identify the machine with an ideal drive that is given the measured effort",
+        )?;
+    }
     if let Some(first) = plan.initial.get(..dim) {
         check_step(setting.description, setting.theta, setting.stepping, first)?;
         check_starts(setting, plan.initial)?;
@@ -190,6 +203,19 @@ pub(crate) fn check_starts(setting: Setting<'_>, initial: &[f64]) -> Result<()> 
     initial
         .chunks_exact(description.n_states().max(1))
         .try_for_each(|state| check_pistons(description, theta, &mut dynamics, state))
+}
+
+/// A sampled drive whose effort went astray at sample `row` of the piece that begins at `start`.
+pub(crate) fn strayed<S: Scalar>(stepper: &Stepper<'_, S>, astray: Astray, (row, start): (usize, usize)) -> Error {
+    let stepping = stepper.stepping();
+    let at = ((start + row) as f64 * stepping.time_step, start + row);
+    match astray.error(stepper.description(), at, stepping.method.to_string(), stepping.step()) {
+        Error::Diverged(diverged) => {
+            let (outputs, states) = stepper.before(row);
+            Error::Diverged(Box::new(Diverged { outputs, states, ..*diverged }))
+        }
+        other => other,
+    }
 }
 
 /// What stopped being finite, in the words of the model.

@@ -30,7 +30,7 @@ mod _core {
     #[pymodule_export]
     use crate::planar::PlanarArm;
     #[pymodule_export]
-    use crate::stepping::{Simulation, check_integrator};
+    use crate::stepping::{Simulation, Snapshot, check_integrator};
     #[pymodule_export]
     use crate::system::System;
 }

@@ -34,6 +34,25 @@ pub(crate) fn check_integrator(name: &str) -> PyResult<()> {
     Method::from_name(name).map(|_| ()).map_err(|error| PyValueError::new_err(error.to_string()))
 }
 
+/// A simulation as it was at one time.
+#[pyclass(frozen, module = "vpm._core")]
+pub(crate) struct Snapshot {
+    live: Live,
+}
+
+#[pymethods]
+impl Snapshot {
+    /// Time of the simulation when it was taken, s.
+    #[getter]
+    fn time(&self) -> f64 {
+        self.live.time()
+    }
+
+    fn __repr__(&self) -> String {
+        format!("Snapshot(time={} s)", self.live.time())
+    }
+}
+
 /// A simulation that goes on one sample at a time.
 ///
 /// Parameters
@@ -137,6 +156,23 @@ impl Simulation {
         let mut live = self.live()?;
         let result = unbroken(|| live.reset(state.values()))?;
         checked(py, live.description(), result)
+    }
+
+    /// All that it is now, with what delays and sampled drives remember.
+    fn snapshot(&self) -> PyResult<Snapshot> {
+        Ok(Snapshot { live: self.live()?.clone() })
+    }
+
+    /// Goes back to where it was when the snapshot was taken; complains about that of another simulation.
+    fn restore(&self, snapshot: &Snapshot) -> PyResult<()> {
+        let mut live = self.live()?;
+        if !live.is_alike(&snapshot.live) {
+            return Err(PyValueError::new_err(
+                "the snapshot is of another model, other parameters or other steps; restore one that this simulation or its like has taken",
+            ));
+        }
+        live.clone_from(&snapshot.live);
+        Ok(())
     }
 
     fn __repr__(&self) -> PyResult<String> {

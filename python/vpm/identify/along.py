@@ -21,6 +21,9 @@ from vpm.simulate import Setup, copied_channels
 
 Array = NDArray[np.float64]
 
+#: Drives that go by samples of their own and remember the last ones.
+SAMPLED_TYPES = ("narx", "maxwell_narx")
+
 
 @dataclass(frozen=True)
 class Response:
@@ -62,6 +65,12 @@ def check_along(model: Model, joints: Sequence[str]) -> None:
     ------
     SimulationError
     """
+    for name in model.actuators:
+        if model.actuator_type(name) in SAMPLED_TYPES:
+            raise SimulationError(
+                f"no effort can be balanced along a motion for the actuator {name} (type {model.actuator_type(name)}), "
+                "which goes by samples of its own; compare in the mode free_run or closed_loop"
+            )
     if not has_hidden(model, joints):
         return
     hidden = [name for name in model.beams if model.levels[name] != "rigid"]

@@ -17,6 +17,7 @@ from vpm.model.form import schema_problems
 from vpm.model.messages import Problem, place, raise_first
 from vpm.model.parameters import Parameter, Slot, slots, table
 from vpm.model.references import gauge_problems, reference_problems
+from vpm.model.sampled_files import with_files
 from vpm.model.schema import Document
 from vpm.model.structure import Structure, build_structure
 from vpm.model.tree import joint_problems, name_problems, tree_problems
@@ -57,6 +58,8 @@ def check_document(content: Mapping[str, object], path: str | None = None) -> Ch
         document = Document.model_validate(content)
     except ValidationError as error:
         raise_first(schema_problems(error), path)
+    document, unread = with_files(document, path)
+    _stop_at(unread, path)
     _stop_at([*_empty_problems(document), *name_problems(document), *beam_problems(document)], path)
     _stop_at([*tree_problems(document), *joint_problems(document), *gauge_problems(document)], path)
     structure = build_structure(document)

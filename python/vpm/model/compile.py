@@ -179,7 +179,7 @@ def _actuator(name: str, structure: Structure, index: Mapping[str, int]) -> dict
         "on": {"line": list(structure.document.lines).index(actuator.line)}
         if actuator.line is not None
         else {"joint": structure.joints.index(actuator.joint or "")},
-        "drive": drive_json(name, actuator, tuple(structure.document.supplies), index),
+        "drive": drive_json(name, actuator, structure, index),
         "delay": index.get(f"{name}.delay.time"),
         "dead_zone": index.get(f"{name}.dead_zone.width"),
         "saturation": index.get(f"{name}.saturation.limit"),

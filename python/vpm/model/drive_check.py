@@ -12,6 +12,7 @@ from vpm.model.entry import Quantity
 from vpm.model.hydraulic import Cylinder, Hydraulic, Supply, Valve
 from vpm.model.messages import Problem, place
 from vpm.model.parameters import Parameter
+from vpm.model.sampled_check import sampled_problems
 from vpm.model.schema import Document
 from vpm.model.structure import Structure
 from vpm.units import convert, parse_unit, require_dimension, si_unit
@@ -29,6 +30,7 @@ def drive_problems(document: Document, structure: Structure) -> Iterator[Problem
             yield from _supply_problems(name, actuator, document)
             yield from _alternatives(("actuators", name, "cylinder"), actuator.cylinder)
             yield from _rating_keys(("actuators", name, "valve"), actuator.valve)
+    yield from sampled_problems(document, structure)
 
 
 def _source_problems(name: str, supply: Supply) -> Iterator[Problem]:

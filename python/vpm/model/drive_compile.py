@@ -7,6 +7,9 @@ from typing import Any
 
 from vpm.model.drives import Actuator, DcMotor, Ideal, Maxwell, SpringDamper
 from vpm.model.hydraulic import Hydraulic, Supply
+from vpm.model.sampled import MaxwellNarx, Narx
+from vpm.model.sampled_compile import maxwell_json, narx_json
+from vpm.model.structure import Structure
 
 Index = Mapping[str, int]
 
@@ -28,7 +31,7 @@ def supply_json(name: str, supply: Supply, index: Index) -> dict[str, Any]:
     }
 
 
-def drive_json(name: str, actuator: Actuator, supplies: tuple[str, ...], index: Index) -> dict[str, Any]:
+def drive_json(name: str, actuator: Actuator, structure: Structure, index: Index) -> dict[str, Any]:
     """Law of an actuator."""
 
     def numbers(*keys: str, way: str = name) -> dict[str, int | None]:
@@ -48,11 +51,15 @@ def drive_json(name: str, actuator: Actuator, supplies: tuple[str, ...], index: 
             law = numbers("stiffness", "free_length", "fast_stiffness", "relaxation_time")
         case Hydraulic():
             law = {
-                "supply": supplies.index(actuator.supply),
+                "supply": tuple(structure.document.supplies).index(actuator.supply),
                 "retracted_length": index[f"{name}.retracted_length"],
                 "valve": _valve(f"{name}.valve", index),
                 "cylinder": _cylinder(name, actuator, index),
             }
+        case Narx():
+            law = narx_json(name, actuator, structure)
+        case MaxwellNarx():
+            law = maxwell_json(actuator)
     return {"type": actuator.type, **law}
 
 

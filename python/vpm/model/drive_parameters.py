@@ -10,6 +10,7 @@ from vpm.catalogue import POSITIVE, JointKind
 from vpm.model.drives import Actuator, DcMotor, Ideal, Maxwell, SpringDamper
 from vpm.model.entry import Entry, Quantity
 from vpm.model.hydraulic import Hydraulic, Supply
+from vpm.model.sampled import MaxwellNarx, Narx
 from vpm.units import si_unit
 
 Range = tuple[float, float]
@@ -161,6 +162,8 @@ def actuator_rows(actuator: Actuator, effort: str, kind: JointKind | None) -> It
             yield from _rows((), actuator, _MAXWELL)
         case Hydraulic():
             yield from _hydraulic_rows(actuator, command)
+        case Narx() | MaxwellNarx():
+            return  # their numbers belong together, so that none is a parameter of its own
 
 
 def _hydraulic_rows(actuator: Hydraulic, command: str) -> Iterator[Row]:

@@ -7,9 +7,10 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, Discriminator, Tag
 
-from vpm.model import hydraulic
+from vpm.model import hydraulic, sampled
 from vpm.model.entry import Entry, ParameterValue, Quantity, Text
 from vpm.model.hydraulic import Hydraulic
+from vpm.model.sampled import MaxwellNarx, Narx
 
 ONE = Quantity(value=1.0)
 
@@ -78,7 +79,9 @@ Actuator = Annotated[
     | Annotated[DcMotor, Tag("dc_motor")]
     | Annotated[SpringDamper, Tag("spring_damper")]
     | Annotated[Maxwell, Tag("maxwell")]
-    | Annotated[Hydraulic, Tag("hydraulic")],
+    | Annotated[Hydraulic, Tag("hydraulic")]
+    | Annotated[Narx, Tag("narx")]
+    | Annotated[MaxwellNarx, Tag("maxwell_narx")],
     Discriminator(_type_of),
 ]
 
@@ -91,11 +94,14 @@ ACTUATOR_TYPES: Mapping[str, type[Entry]] = {
     "spring_damper": SpringDamper,
     "maxwell": Maxwell,
     "hydraulic": Hydraulic,
+    "narx": Narx,
+    "maxwell_narx": MaxwellNarx,
 }
 
 #: How a key is written, for messages about missing ones.
 EXAMPLES: Mapping[str, str] = {
     **hydraulic.EXAMPLES,
+    **sampled.EXAMPLES,
     "actuators.gain": 'gain = { value = 1.0, unit = "N/V" }',
     "actuators.resistance": 'resistance = { value = 1.2, unit = "Ohm" }',
     "actuators.time_constant": 'time_constant = { value = 2, unit = "ms" }',

@@ -327,7 +327,7 @@ class Evaluations(Components):
         ModelError
             A name or a length is wrong.
         ValueError
-            A derivative is not finite there.
+            A derivative is not finite there, or an actuator acts at samples of its own.
         """
         command = self.command(inputs)
         place = self._settled(state, command)

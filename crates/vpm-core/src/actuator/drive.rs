@@ -3,8 +3,9 @@
 use serde::Deserialize;
 
 use super::hydraulic::HydraulicDrive;
-use super::{DcMotor, Ideal, Maxwell, SpringDamper};
+use super::{DcMotor, Ideal, Maxwell, MaxwellNarxDrive, NarxDrive, SpringDamper};
 use crate::effect::Domain;
+use crate::scalar::Scalar;
 
 /// Any drive.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -20,6 +21,10 @@ pub enum Drive<P> {
     Maxwell(Maxwell<P>),
     /// A cylinder behind a servovalve; the command is the current in the valve.
     Hydraulic(Box<HydraulicDrive<P>>),
+    /// A polynomial NARX model; its input in the equations of motion is the effort that it holds.
+    Narx(Box<NarxDrive>),
+    /// A Maxwell element in sampled time; likewise.
+    MaxwellNarx(Box<MaxwellNarxDrive>),
 }
 
 impl<P> Drive<P> {
@@ -31,6 +36,8 @@ impl<P> Drive<P> {
             Self::SpringDamper(law) => Drive::SpringDamper(law.map(f)),
             Self::Maxwell(law) => Drive::Maxwell(law.map(f)),
             Self::Hydraulic(law) => Drive::Hydraulic(Box::new(law.map(f))),
+            Self::Narx(law) => Drive::Narx(law.clone()),
+            Self::MaxwellNarx(law) => Drive::MaxwellNarx(law.clone()),
         }
     }
 
@@ -42,6 +49,7 @@ impl<P> Drive<P> {
             Self::SpringDamper(law) => law.domains(),
             Self::Maxwell(law) => law.domains(),
             Self::Hydraulic(law) => law.domains(),
+            Self::Narx(_) | Self::MaxwellNarx(_) => Vec::new(),
         }
     }
 
@@ -53,16 +61,40 @@ impl<P> Drive<P> {
             Self::SpringDamper(_) => "spring_damper",
             Self::Maxwell(_) => "maxwell",
             Self::Hydraulic(_) => "hydraulic",
+            Self::Narx(_) => "narx",
+            Self::MaxwellNarx(_) => "maxwell_narx",
         }
     }
 
     /// Names of its states, in their order.
     pub fn states(&self) -> &'static [&'static str] {
         match self {
-            Self::Ideal(_) | Self::SpringDamper(_) => &[],
+            Self::Ideal(_) | Self::SpringDamper(_) | Self::Narx(_) | Self::MaxwellNarx(_) => &[],
             Self::DcMotor(_) => &["current"],
             Self::Maxwell(_) => &["stretch"],
             Self::Hydraulic(_) => &["spool", "spool_rate", "chamber_a", "chamber_b"],
+        }
+    }
+
+    /// Whether it acts at samples of its own and holds its effort in between.
+    pub fn is_sampled(&self) -> bool {
+        matches!(self, Self::Narx(_) | Self::MaxwellNarx(_))
+    }
+
+    /// Whether its effort follows from its input alone, without states and motion.
+    pub fn is_direct(&self) -> bool {
+        matches!(self, Self::Ideal(_)) || self.is_sampled()
+    }
+}
+
+impl<S: Scalar> Drive<S> {
+    /// Effort of a drive that [`Drive::is_direct`] under `input`; none of the others.
+    #[inline]
+    pub fn direct(&self, input: S) -> Option<S> {
+        match self {
+            Self::Ideal(law) => Some(law.effort(input)),
+            Self::Narx(_) | Self::MaxwellNarx(_) => Some(input),
+            _ => None,
         }
     }
 }

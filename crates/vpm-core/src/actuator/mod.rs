@@ -8,6 +8,7 @@ mod ideal;
 mod input_delay;
 mod lag;
 mod maxwell;
+mod sampled;
 mod saturation;
 mod spring_damper;
 
@@ -20,6 +21,7 @@ pub use ideal::Ideal;
 pub use input_delay::InputDelay;
 pub use lag::Lag;
 pub use maxwell::Maxwell;
+pub use sampled::{MaxwellNarxDrive, NarxDrive, Reading, Scheme};
 pub use saturation::Saturation;
 pub use spring_damper::SpringDamper;
 

@@ -2,6 +2,7 @@
 
 use super::Description;
 use super::check::within;
+use super::sampled;
 use crate::actuator::hydraulic::PistonSize;
 use crate::actuator::{Actuator, Drive, Target};
 use crate::error::{DriveError, Error, Result};
@@ -15,6 +16,7 @@ pub(super) fn references(description: &Description) -> Result<()> {
             within(&what, "supply", law.supply, description.supplies.len())?;
         }
         target(description, actuator)?;
+        sampled::references(description, actuator)?;
     }
     Ok(())
 }
@@ -25,7 +27,9 @@ fn target(description: &Description, actuator: &Actuator<usize>) -> Result<()> {
     let needed = match (&actuator.drive, actuator.on) {
         (Drive::DcMotor(_), Target::Line(_)) => "a joint",
         (Drive::SpringDamper(_) | Drive::Maxwell(_), Target::Joint(_)) => "a line",
-        (Drive::Hydraulic(_), Target::Joint(joint)) if !sliding(joint) => "a line or a prismatic joint",
+        (Drive::Hydraulic(_) | Drive::MaxwellNarx(_), Target::Joint(joint)) if !sliding(joint) => {
+            "a line or a prismatic joint"
+        }
         _ => return Ok(()),
     };
     let found = measured(description, actuator.on).1;

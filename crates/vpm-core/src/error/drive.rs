@@ -51,6 +51,20 @@ pub enum DriveError {
         /// Its value at the end of chamber b, m.
         most: f64,
     },
+    /// A drive in sampled time where only continuous time will do.
+    #[error(
+        "actuator `{actuator}` of type {drive} acts at samples of its own and remembers the last ones, so {what}; {repair}"
+    )]
+    Sampled {
+        /// Name of the actuator.
+        actuator: String,
+        /// Type of its drive.
+        drive: &'static str,
+        /// What is not possible.
+        what: &'static str,
+        /// What to do.
+        repair: &'static str,
+    },
     /// Inverse dynamics with a drive that has a life of its own.
     #[error(
         "the effort of actuator `{actuator}` of type {drive} does not follow from its command alone, so that it cannot be balanced sample \

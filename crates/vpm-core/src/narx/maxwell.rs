@@ -91,6 +91,12 @@ impl MaxwellNarx {
         MaxwellState { force, length, elastic, stiffness }
     }
 
+    /// Force in N of an element that has stood at drive signal `u` and length `s` (m): that of its spring.
+    #[inline]
+    pub fn settled(&self, u: f64, s: f64) -> f64 {
+        self.elastic(u, s).0
+    }
+
     /// `k_0 (s - s_0)` and `k_0` at (u, s).
     #[inline]
     fn elastic(&self, u: f64, s: f64) -> (f64, f64) {

@@ -51,6 +51,17 @@ impl Stepper {
         Ok(())
     }
 
+    /// Sets a past in which output and inputs stood; numbers missing in `inputs` count as zero.
+    pub fn stand(&mut self, output: f64, inputs: &[f64]) {
+        self.from = 0;
+        for row in self.buffer.chunks_exact_mut(self.program.stride).take(self.longest) {
+            row[0] = output;
+            for (at, place) in row[1..].iter_mut().enumerate() {
+                *place = inputs.get(at).copied().unwrap_or(0.0);
+            }
+        }
+    }
+
     /// How many inputs a step takes.
     pub fn inputs(&self) -> usize {
         self.program.stride - 1

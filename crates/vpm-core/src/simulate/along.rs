@@ -16,6 +16,9 @@ use crate::table::Table;
 /// Derivatives taken in one sweep.
 const LANES: usize = 8;
 
+/// What a sampled drive takes away.
+const NO_STATES: &str = "its effort cannot be worked out along a given motion";
+
 /// What drives do along a motion, each table row by row.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Along {
@@ -45,6 +48,7 @@ pub fn drives_along(
 ) -> Result<Along> {
     let Setting { description, theta, .. } = setting;
     let (rows, joints) = (motion.position.rows(), description.n_joints());
+    description.refuse_sampled(NO_STATES, "simulate it in the mode free_run or closed_loop")?;
     if let Some((beam, _)) = description.beams.iter().zip(description.elastic()).find(|(_, len)| **len > 0) {
         return Err(Error::Flexible { beam: beam.name.clone() });
     }

@@ -127,7 +127,7 @@ impl<S: Scalar> Control<S> {
 
 impl<S: Scalar> Loop<S> {
     fn new(entry: &ControllerEntry, description: &Description, theta: &[S], time_step: f64) -> Result<Self> {
-        let every = samples_between(&entry.name, entry.sample_time, time_step)?;
+        let every = samples_between("controller", &entry.name, entry.sample_time, time_step)?;
         let pairs = entry.actuators.iter().zip(&entry.measures);
         Ok(Self {
             law: entry.law.map(&mut |&index| theta[index]),

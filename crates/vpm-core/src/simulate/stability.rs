@@ -2,7 +2,6 @@
 
 use super::Stepping;
 use super::names::{coordinate, state_name};
-use crate::actuator::Drive;
 use crate::description::Description;
 use crate::error::Result;
 use crate::integrator::Method;
@@ -16,7 +15,7 @@ use crate::system::System;
 /// Judged with the drives where they stand in that state; what friction, end stops, opening valves and contacts that
 /// are open add later is left to the run.
 pub(crate) fn check_step(description: &Description, theta: &[f64], stepping: Stepping, state: &[f64]) -> Result<()> {
-    if description.actuators.iter().all(|actuator| matches!(actuator.drive, Drive::Ideal(_))) {
+    if description.actuators.iter().all(|actuator| actuator.drive.is_direct()) {
         return check_structure(description, theta, stepping, state, &[]);
     }
     let explicit = matches!(stepping.method, Method::Rk4 | Method::SemiImplicit);

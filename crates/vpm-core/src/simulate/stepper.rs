@@ -2,7 +2,8 @@
 
 use super::control::{Control, reading};
 use super::names::{output_name, state_name};
-use super::{Setting, Stepping, diverged, halted, leapt};
+use super::sampled::{Astray, SampledDrives};
+use super::{Setting, Stepping, diverged, halted, leapt, strayed};
 use crate::description::Description;
 use crate::error::Result;
 use crate::integrator::{Integrator, Method};
@@ -46,6 +47,7 @@ pub(crate) struct Stepper<'a, S> {
     sensors: Vec<(usize, Sensor<S>)>,
     /// The controllers, if there is a loop to close.
     control: Option<Control<S>>,
+    sampled: SampledDrives,
     state: Vec<S>,
     rate: Vec<S>,
     /// Inputs of the whole record, row by row; given ones from the beginning, a controller's as time goes by.
@@ -79,6 +81,7 @@ impl<'a, S: Scalar> Stepper<'a, S> {
             integrator: Integrator::new(setting.stepping.method, dim),
             sensors: sensors.collect(),
             control,
+            sampled: SampledDrives::new(description, setting.stepping.time_step)?,
             system,
             state: vec![zero; dim],
             rate: vec![zero; dim],
@@ -87,6 +90,10 @@ impl<'a, S: Scalar> Stepper<'a, S> {
             states: vec![zero; rows * dim],
             outputs: vec![zero; rows * description.n_outputs()],
         })
+    }
+
+    pub(crate) fn description(&self) -> &'a Description {
+        self.description
     }
 
     pub(crate) fn stepping(&self) -> Stepping {
@@ -130,6 +137,7 @@ impl<'a, S: Scalar> Stepper<'a, S> {
             *state = S::from_f64(value);
         }
         self.integrator.reset();
+        self.sampled.restart();
         if let Some(control) = &mut self.control {
             control.restart();
         }
@@ -144,7 +152,7 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         self.check_stops(row, start)?;
         self.states[row * dim..(row + 1) * dim].copy_from_slice(&self.state);
         let stands = self.control(row, start);
-        self.hold(row + start);
+        self.hold(row, start).map_err(|astray| strayed(self, astray, (row, start)))?;
         if stands {
             self.system.dynamics().rhs_here(&self.state, &mut self.rate);
         } else {
@@ -215,15 +223,18 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         stands
     }
 
-    /// Holds what every input amounts to over the interval that begins at sample `k` of the record.
-    fn hold(&mut self, k: usize) {
-        let Self { system, commands, stepping, description, .. } = self;
-        let inputs = description.n_inputs();
+    /// Holds what every input amounts to over the interval that begins at sample `row` of the piece; of a sampled drive its effort.
+    fn hold(&mut self, row: usize, start: usize) -> std::result::Result<(), Astray> {
+        let Self { system, commands, stepping, description, sampled, truth, .. } = self;
+        let (inputs, k) = (description.n_inputs(), row + start);
+        let truth = &truth[row * description.n_outputs()..];
         for number in 0..inputs {
             let command = |sample: usize| commands[sample * inputs + number];
             let input = system.dynamics().input(number, k, stepping.time_step, command);
-            system.hold(number, input);
+            let effort = sampled.sample(number, row, input.re(), |column| truth[column].re())?;
+            system.hold(number, effort.map_or(input, S::from_f64));
         }
+        Ok(())
     }
 
     fn record_efforts(&mut self, row: usize, start: usize) {

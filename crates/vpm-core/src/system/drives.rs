@@ -56,11 +56,13 @@ impl<S: Scalar> Dynamics<S> {
         }
     }
 
-    /// The rates of the states of drives and supplies at state `x`, written into their place in `dxdt`, with all that they push.
+    /// The rates of the states of drives, supplies and memories at state `x`, written into their place in `dxdt`, with all that they push.
     pub(crate) fn drive(&mut self, x: &[S], dxdt: &mut [S]) {
         let (q, v) = x[..2 * self.coordinates()].split_at(self.coordinates());
         self.locate(q, v);
         self.actuate(x, dxdt);
+        let first = self.first_memory();
+        self.memories.rates(&x[first..], v, &mut dxdt[first..]);
     }
 
     /// Holds what input `number` amounts to, see [`Dynamics::input`].
@@ -85,14 +87,16 @@ impl<S: Scalar> Dynamics<S> {
         self.tensions.fill(S::zero());
         let mut states = lags.iter().zip(rates);
         for ((actuator, &input), force) in self.actuators.iter().zip(&self.inputs).zip(&mut self.forces) {
-            let Drive::Ideal(drive) = &actuator.drive else { continue };
-            *force = match (&actuator.lag, if actuator.lag.is_some() { states.next() } else { None }) {
+            let input = match (&actuator.lag, if actuator.lag.is_some() { states.next() } else { None }) {
                 (Some(lag), Some((&state, rate))) => {
                     *rate = lag.rate(state, input);
-                    drive.effort(state)
+                    state
                 }
-                _ => drive.effort(input),
+                _ => input,
             };
+            // Drives of no other kind come here.
+            let Some(effort) = actuator.drive.direct(input) else { continue };
+            *force = effort;
             match actuator.on {
                 Target::Joint(joint) => self.efforts[joint] += *force,
                 Target::Line(line) => self.tensions[line] += *force,
@@ -124,6 +128,7 @@ impl<S: Scalar> Dynamics<S> {
             let moving = || motion(actuator.on, &data.composite.lines);
             let force = match &actuator.drive {
                 Drive::Ideal(law) => law.effort(input),
+                Drive::Narx(_) | Drive::MaxwellNarx(_) => input,
                 Drive::DcMotor(law) => {
                     let (current, [_, rate]) = (states[at], moving());
                     rates[at] = law.current_rate(current, input, rate);

@@ -1,0 +1,139 @@
+"""What a machine of the proving ground has to say of itself, and what it draws for one case."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import NDArray
+
+from blind.effects import Scale
+from blind.loads import Column
+from blind.loop import Controller, Plant
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Draft:
+    """One example of a machine, without a hidden effect.
+
+    Attributes
+    ----------
+    values : mapping
+        Everything that is true of it, as ``site.name`` or ``site.effect.parameter``.
+    calibratable : mapping
+        Relative uncertainty of what the model file leaves to be calibrated, by the same keys.
+    base : tuple of (effect, site)
+        Effects that the model file knows.
+    scales : mapping
+        What is usual at a site.
+    rate : float
+        Sampling rate [Hz].
+    """
+
+    values: Mapping[str, float]
+    calibratable: Mapping[str, float]
+    base: tuple[tuple[str, str], ...]
+    scales: Mapping[str, Scale]
+    rate: float
+
+
+@dataclass(frozen=True)
+class Signal:
+    """A logged signal: name of the sensor or actuator, channel of the record, unit, column of a file."""
+
+    name: str
+    channel: str
+    unit: str
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Signals and sites of a machine.
+
+    Attributes
+    ----------
+    sensors, commands, references : tuple of Signal
+        The first sensors are those that the controllers see, one for each actuator.
+    sites : mapping
+        Sites of each kind.
+    without : tuple of str
+        Effects that make no sense on the machine.
+    absent : mapping
+        Parameters that an effect has where it is not there, other than zero.
+    """
+
+    sensors: tuple[Signal, ...]
+    commands: tuple[Signal, ...]
+    references: tuple[Signal, ...]
+    sites: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    without: tuple[str, ...] = ()
+    absent: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+
+
+class Machine(Protocol):
+    """One machine: draws examples of itself, describes them as model files, and moves."""
+
+    @property
+    def name(self) -> str:
+        """Name in the proving ground."""
+
+    @property
+    def layout(self) -> Layout:
+        """Signals and sites."""
+
+    @property
+    def step(self) -> float:
+        """Fine time step [s]."""
+
+    def draft(self, generator: Generator, needs: Sequence[str]) -> Draft:
+        """An example that has the base effects ``needs``, as ``effect@site``."""
+
+    def text(self, values: Mapping[str, float], draft: Draft, base: Sequence[tuple[str, str]]) -> str:
+        """Model file with these values of the nominal parameters and these known effects."""
+
+    def plant(self, columns: Sequence[Column], step: float) -> Plant:
+        """The machine in continuous time, many columns side by side."""
+
+    def controller(self, columns: Sequence[Column], dt: float) -> Controller:
+        """What commands its drives."""
+
+    def mixed(self, values: Mapping[str, float]) -> Mapping[str, Mapping[str, float]]:
+        """Weighted sums of channels that say more than each of them, such as the force of a cylinder."""
+
+    def reference(self, generator: Generator, draft: Draft, time: Array, kind: str) -> Array:
+        """References of a record of the kind ``"train"`` or ``"validate"``, shape (actuators, samples)."""
+
+
+def number(value: float, unit: str, deviation: float | None = None) -> str:
+    """A parameter of a model file; one with a deviation may be calibrated."""
+    if deviation is None:
+        return f'{{ value = {value!r}, unit = "{unit}" }}'
+    return f'{{ value = {value!r}, unit = "{unit}", uncertainty = {deviation!r} }}'
+
+
+class Writer:
+    """Values as a model file shows them: with an uncertainty where they may be calibrated."""
+
+    def __init__(self, values: Mapping[str, float], calibratable: Mapping[str, float]) -> None:
+        self.values, self.calibratable = values, calibratable
+
+    def __call__(self, key: str, unit: str) -> str:
+        value = float(self.values[key])
+        share = self.calibratable.get(key)
+        return number(value, unit, None if share is None else share * abs(value))
+
+    def effects(self, base: Sequence[tuple[str, str]], kinds: Mapping[str, tuple[str, str]]) -> str:
+        """Tables of the known joint frictions; ``kinds`` gives the units (effort, coordinate) of each joint."""
+        lines = []
+        for effect, site in base:
+            effort, coordinate = kinds[site]
+            parameter = {"viscous_friction": "viscous", "coulomb_friction": "coulomb"}[effect]
+            unit = f"{effort} s/{coordinate}" if parameter == "viscous" else effort
+            lines.append(f'[[effects]]\ntype = "{effect}"\nat = "{site}"')
+            lines.append(f"{parameter} = {self(f'{site}.{effect}.{parameter}', unit)}\n")
+        return "\n".join(lines)

@@ -1,0 +1,124 @@
+"""Whether a case can be solved: how far the hidden effect stands clear of the noise, for one who knows everything.
+
+The generator itself runs each record once more without noise and once more without the effect. The difference of the
+two is what the effect does to the record; what is left of it after the best change of the calibratable parameters
+(least squares with sensitivities by finite differences, on the training records) is what only the effect can explain.
+Both are compared with what noise does to the same channel in the same loop, all of it below ``BAND``, since the
+difference quotients of a controller make noise that is mostly above.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import butter, sosfiltfilt
+
+Array = NDArray[np.float64]
+#: Frequency below which effects and noise are compared [Hz].
+BAND = 25.0
+#: Root mean square of the recalibrated gap, in deviations of the noise, from which a case counts as solvable.
+CLEAR = 1.0
+
+
+@dataclass(frozen=True)
+class Oracle:
+    """What only the generator knows.
+
+    Attributes
+    ----------
+    with_effect, without_effect : tuple of mapping
+        Outputs without noise and counts of each record (training records first), by channel.
+    sensor_noise : mapping
+        Standard deviation of noise and counts of each sensed channel.
+    noise : mapping
+        Standard deviation, below 25 Hz, that noise brings into each channel of the closed loop.
+    gap, recalibrated : mapping
+        Root mean square, on the validation records and below 25 Hz, of what the effect changes in each channel, and of
+        what is left of it after a recalibration, both in units of ``noise``. Beside the channels there may be weighted
+        sums of them that show an effect better, such as the force of a cylinder.
+    """
+
+    with_effect: tuple[Mapping[str, Array], ...]
+    without_effect: tuple[Mapping[str, Array], ...]
+    sensor_noise: Mapping[str, float]
+    noise: Mapping[str, float]
+    gap: Mapping[str, float]
+    recalibrated: Mapping[str, float]
+
+    @property
+    def strength(self) -> float:
+        """Largest recalibrated gap of all channels in units of the noise."""
+        return max(self.recalibrated.values())
+
+    @property
+    def solvable(self) -> bool:
+        """Whether the effect is visible behind noise and free parameters at all."""
+        return self.strength > CLEAR
+
+
+def judge(
+    channels: Sequence[str],
+    sensed: Array,
+    pieces: Sequence[Array],
+    training: Sequence[bool],
+    nudge: float,
+    dt: float,
+    mixed: Mapping[str, Mapping[str, float]],
+) -> Oracle:
+    """Oracle of a case.
+
+    Parameters
+    ----------
+    channels : sequence of str
+        Sensed channels, then commands.
+    sensed : ndarray, shape (sensors,)
+        Standard deviations of the sensors.
+    pieces : sequence of ndarray, shape (samples, channels, 3 + parameters)
+        As measured, without noise, without the effect, and that with each parameter ``nudge`` larger.
+    training : sequence of bool
+        Which pieces a calibration may use.
+    nudge : float
+        Relative change of the parameters.
+    dt : float
+        Sampling interval [s].
+    mixed : mapping of str to mapping
+        Further channels as weighted sums.
+    """
+    judged = [*channels, *mixed]
+    weights = np.vstack([np.eye(len(channels)), *([[w.get(c, 0.0) for c in channels]] for w in mixed.values())])
+    rate = 1.0 / dt
+    sections = butter(4, min(BAND, 0.4 * rate), fs=rate, output="sos")
+    stride = max(1, int(rate / (4.0 * BAND)))
+    slow = [np.einsum("ij,njk->nik", weights, sosfiltfilt(sections, piece, axis=0)[::stride]) for piece in pieces]
+    noise = np.sqrt(np.mean(np.concatenate([(p[:, :, 0] - p[:, :, 1]) ** 2 for p in slow]), 0))
+    noise = np.maximum(noise, 1e-300)
+    gaps = [(p[:, :, 1] - p[:, :, 2]) / noise for p in slow]
+    slopes = [(p[:, :, 3:] - p[:, :, 2:3]) / noise[:, None] / nudge for p in slow]
+    learned = [k for k, used in enumerate(training) if used]
+    unseen = [k for k, used in enumerate(training) if not used]
+    width = slopes[0].shape[2]
+    change = np.zeros(width)
+    if width:
+        matrix = np.concatenate([slopes[k].reshape(-1, width) for k in learned])
+        target = np.concatenate([gaps[k].ravel() for k in learned])
+        change = np.linalg.lstsq(matrix, target, rcond=1e-9)[0]
+    left = [gaps[k] - slopes[k] @ change for k in unseen]
+
+    def size(parts: Sequence[Array]) -> dict[str, float]:
+        return dict(zip(judged, np.sqrt(np.mean(np.concatenate(parts) ** 2, 0)).tolist(), strict=True))
+
+    def named(column: int) -> tuple[dict[str, Array], ...]:
+        order = [*learned, *unseen]
+        return tuple({c: pieces[k][:, j, column].copy() for j, c in enumerate(channels)} for k in order)
+
+    return Oracle(
+        with_effect=named(1),
+        without_effect=named(2),
+        sensor_noise=dict(zip(channels, sensed.tolist(), strict=False)),
+        noise=dict(zip(judged, noise.tolist(), strict=True)),
+        gap=size([gaps[k] for k in unseen]),
+        recalibrated=size(left),
+    )
