@@ -300,10 +300,19 @@ def linkage(
     save_plot(found.plot, plot)
 
 
-@app.command(epilog="Example:  vpm demo --out demo-report")
-def demo(out: Out = Path("demo-report")) -> None:
-    """Find the effect that is hidden in a log that comes with the package."""
-    from vpm.demo import run_demo
+@app.command(epilog="Example:  vpm demo --out demo-report\n\nExample:  vpm demo --hide torque_ripple")
+def demo(
+    out: Out = Path("demo-report"),
+    hide: Annotated[
+        str | None, typer.Option(metavar="EFFECT", help="Hide another effect: makes its log first, into OUT/log.")
+    ] = None,
+    listing: Annotated[bool, typer.Option("--list", help="List what can be hidden, and stop.")] = False,
+) -> None:
+    """Find the effect that is hidden in a log that comes with the package, or in one that is made on request."""
+    from vpm.demo import print_list, run_demo
 
+    if listing:
+        print_list(console)
+        return
     with progress() as tell:
-        run_demo(out, console, tell)
+        run_demo(out, console, tell, hide)

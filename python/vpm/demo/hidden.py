@@ -98,3 +98,34 @@ HIDDEN: Mapping[str, Hidden] = MappingProxyType(
     }
 )
 """What can be hidden, by the name of the effect."""
+
+LISTED = (
+    "coulomb_friction",
+    "asymmetric_friction",
+    "stribeck_friction",
+    "bias_force",
+    "spring",
+    "torque_ripple",
+    "hysteresis",
+    "dead_zone",
+    "saturation",
+    "input_delay",
+    "actuator_lag",
+    "sensor_gain",
+    "none",
+)
+"""What ``vpm demo --hide`` takes: the diagnosis names each of these on the two records, and its site."""
+
+_TURNED = "on a single link a load beside its axis, a tilted base and a shifted zero all turn gravity by an angle"
+
+UNDECIDABLE: Mapping[str, str] = MappingProxyType(
+    {
+        "viscous_friction": "the model has it already, with another value",
+        "payload": _TURNED,
+        "gravity_tilt": _TURNED,
+        "sensor_offset": _TURNED,
+        "sensor_delay": "from commands to readings it shows only in its sum with a delay of the drive",
+        "rotor_inertia": "on a single link it is a part of the link's inertia, which the model knows only roughly",
+    }
+)
+"""What no record of this machine can show on its own, and why."""
