@@ -49,7 +49,7 @@ _SLOW_AND_FAST = "Motion in both directions at several constant speeds, with slo
 SIGNATURES: Mapping[str, Signature] = MappingProxyType(
     {
         "viscous_friction": Signature(
-            ("velocity",), "A straight line through zero, falling with speed", "Motion at several constant speeds"
+            ("velocity",), "A straight line through zero", "Motion at several constant speeds"
         ),
         "coulomb_friction": Signature(
             ("velocity",), "Two levels of opposite sign, one for each direction, with a step at rest", _SLOW_AND_FAST
