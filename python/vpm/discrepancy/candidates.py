@@ -151,8 +151,12 @@ def _grid(name: str, shares: Sequence[float], size: float) -> tuple[Mapping[str,
 
 
 def _slow(seen: Excitation) -> dict[str, tuple[float, float]]:
-    """A transition velocity is a detail of small speeds: between 1/5000 and 1/10 of the largest."""
-    return {"transition_velocity": (2e-4 * seen.speed, 0.1 * seen.speed)}
+    return {"transition_velocity": slow_speeds(seen.speed)}
+
+
+def slow_speeds(fastest: float) -> tuple[float, float]:
+    """Bounds of a transition velocity, a detail of small speeds: between 1/5000 and 1/10 of the largest."""
+    return 2e-4 * fastest, 0.1 * fastest
 
 
 def _around(seen: Excitation) -> tuple[float, float]:

@@ -12,6 +12,7 @@ from scipy.special import ndtri
 
 from vpm.catalogue import EFFECTS
 from vpm.compare import compare
+from vpm.discrepancy.candidates import slow_speeds
 from vpm.discrepancy.confirmation import Data, Judged, is_clear, judge
 from vpm.discrepancy.diagnosis import (
     AcceptedEffect,
@@ -110,7 +111,8 @@ def diagnose(
     free = tuple(p.name for p in model.parameters.values() if p.adjustable)
     if not free:
         notes.append("the model file gives no parameter an uncertainty, so none was recalibrated")
-    recalibrated = judge(model, free, data, {})
+    transitions = _transitions(model, data.training)
+    recalibrated = judge(model, (*free, *transitions), data, transitions)
     notes.extend(_moved_far(model, recalibrated))
     found = search(recalibrated, data, effects, limit, say)
     say("measuring the noise floor")
@@ -192,6 +194,21 @@ def _nominal(model: Model, data: Data, notes: list[str]) -> Judged:
     except DivergedError as error:
         notes.append(f"the nominal model could not simulate the unseen records: {error}")
         return judge(model, (), replace(data, simulation=None), {})
+
+
+def _transitions(model: Model, data: InverseDynamicsProblem) -> dict[str, tuple[float, float]]:
+    """Transition velocities of the dry friction that the model has, with bounds from the data.
+
+    Nobody knows them beforehand, and a wrong one leaves a gap at every reversal, where the finer effects live.
+    """
+    found = {}
+    for effect in model.effects:
+        name = effect.parameter_names.get("transition_velocity")
+        if effect.name == "coulomb_friction" and name is not None and effect.at in data.joints:
+            joint = data.joints.index(effect.at)
+            speeds = np.concatenate([np.abs(data.state(record)[1][:, joint]) for record in range(len(data.motions))])
+            found[name] = slow_speeds(float(np.quantile(speeds, 0.999)))
+    return found
 
 
 def _moved_far(model: Model, recalibrated: Judged) -> list[str]:
