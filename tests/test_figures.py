@@ -2,11 +2,13 @@
 
 import json
 import runpy
+from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from vpm.catalogue import EFFECTS
 from vpm.catalogue.signature import SIGNATURES
@@ -107,7 +109,7 @@ def test_every_entry_of_the_catalogue_has_its_section_and_picture(effects: Simpl
 
 
 #: Laws that stand in one state, written once more, and where that is.
-LAWS = {
+LAWS: dict[str, Callable[[NDArray[np.float64]], NDArray[np.float64]]] = {
     "viscous_friction": lambda v: 0.3 * v,
     "coulomb_friction": lambda v: 0.5 * np.tanh(v / 0.02),
     "spring": lambda q: 1.5 * (q - 0.3),
