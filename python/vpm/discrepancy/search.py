@@ -21,7 +21,7 @@ from vpm.errors import DivergedError
 from vpm.identify import gain, segments
 
 #: Candidates refitted in one round.
-SHORT_LIST = 6
+SHORT_LIST = 7
 #: An instrument is blamed for what the machine may have done only if it leaves less than this share of the gap.
 SENSOR_SHARE = 0.25
 
