@@ -123,7 +123,7 @@ def test_lag_follows_its_command_exactly() -> None:
 
 
 def test_a_soft_gear_moves_as_two_masses() -> None:
-    stiffness, damping, rotor = 80.0, 0.1, 0.03
+    stiffness, damping, rotor = 80.0, 0.6, 0.03
     _, angles = pushed(Machine(gear_stiffness=stiffness, gear_damping=damping, rotor=rotor), 0.5)
 
     def rate(_time: float, x: np.ndarray) -> list[float]:

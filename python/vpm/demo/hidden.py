@@ -74,7 +74,7 @@ HIDDEN: Mapping[str, Hidden] = MappingProxyType(
             {"shoulder.backlash.gap": 0.03, "shoulder.backlash.inertia": 0.02},
         ),
         "joint_compliance": Hidden(
-            Machine(gear_stiffness=80.0, gear_damping=0.1, rotor=0.03),
+            Machine(gear_stiffness=80.0, gear_damping=0.6, rotor=0.03),
             "shoulder",
             {"shoulder.compliance.stiffness": 80.0, "shoulder.compliance.inertia": 0.03},
         ),
@@ -107,6 +107,8 @@ LISTED = (
     "spring",
     "torque_ripple",
     "hysteresis",
+    "joint_compliance",
+    "end_stop",
     "dead_zone",
     "saturation",
     "input_delay",

@@ -13,7 +13,7 @@ from vpm.discrepancy.confirmation import Data, Judged, Trial, confirm, judge
 from vpm.discrepancy.diagnosis import Ambiguity, RankedCandidate, RefusedEffect
 from vpm.discrepancy.refusal import LEAST_GAIN, Thresholds, refuse_probe, refuse_trial
 from vpm.discrepancy.screening import Probe, probe
-from vpm.discrepancy.side_by_side import SideBySide
+from vpm.discrepancy.side_by_side import Failure, SideBySide
 from vpm.errors import DivergedError
 from vpm.identify import gain, segments
 
@@ -120,8 +120,13 @@ class _Round:
         listed = [c for c in found if c.key not in without]
         self.tell(f"round {self.number}: screening {len(listed)} candidates")
         screen = partial(probe, current.baseline, data.training)
-        for result in self.each(f"round {self.number}: screening", screen, listed, lambda c: c.label):
-            key = result.candidate.key
+        results = self.each(f"round {self.number}: screening", screen, listed, lambda c: c.label)
+        for candidate, result in zip(listed, results, strict=True):
+            key = candidate.key
+            if isinstance(result, Failure):
+                self._ranking[key] = RankedCandidate(*key, self.number, 0.0, float("nan"), accepted=False)
+                self.refused[key] = result.reason
+                continue
             self._ranking[key] = RankedCandidate(*key, self.number, result.drop, float("nan"), accepted=False)
             if reason := refuse_probe(result):
                 self.refused[key] = reason
@@ -137,8 +142,12 @@ class _Round:
         tried = len(self._ranking) * self.number
         thresholds = Thresholds(tried, min(m.dt for m in self.data.training.motions))
         refit = partial(confirm, self.current, self.data)
-        for trial in self.each(f"round {self.number}: refitting", refit, short_list, lambda p: p.candidate.label):
-            key = trial.probe.candidate.key
+        trials = self.each(f"round {self.number}: refitting", refit, short_list, lambda p: p.candidate.label)
+        for tried_one, trial in zip(short_list, trials, strict=True):
+            key = tried_one.candidate.key
+            if isinstance(trial, Failure):
+                self.refused[key] = trial.reason
+                continue
             self._ranking[key] = replace(self._ranking[key], unseen=trial.unseen.relative)
             if reason := refuse_trial(trial, thresholds):
                 self.refused[key] = reason

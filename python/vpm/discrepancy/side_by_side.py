@@ -10,6 +10,7 @@ from typing import TypeVar
 
 from threadpoolctl import threadpool_limits
 
+from vpm.errors import VpmError
 from vpm.identify.parallel import in_order, worker_count
 
 Item = TypeVar("Item")
@@ -17,6 +18,16 @@ Outcome = TypeVar("Outcome")
 
 #: Called with what is being done, the candidate that is done with, how many are, and how many there are.
 Progress = Callable[[str, str, int, int], None]
+
+
+@dataclass(frozen=True)
+class Failure:
+    """A candidate that cannot be computed with this machine or on these records, and why.
+
+    It is one that is refused, and no reason to give up all the others.
+    """
+
+    reason: str
 
 
 @dataclass(frozen=True)
@@ -36,16 +47,20 @@ class SideBySide:
 
     def __call__(
         self, what: str, work: Callable[[Item], Outcome], items: Sequence[Item], name: Callable[[Item], str]
-    ) -> list[Outcome]:
+    ) -> list[Outcome | Failure]:
         """Outcomes in the order of the items. Ctrl-C stops all of them and raises KeyboardInterrupt here.
 
         The linear algebra inside is small: with threads of its own it would only take the cores from the others.
         """
         lock, done = Lock(), 0
 
-        def one(item: Item) -> Outcome:
+        def one(item: Item) -> Outcome | Failure:
             nonlocal done
-            outcome = work(item)
+            outcome: Outcome | Failure
+            try:
+                outcome = work(item)
+            except (VpmError, ValueError, ArithmeticError) as error:
+                outcome = Failure(f"it cannot be computed here: {error}")
             with lock:
                 done += 1
                 if self.progress is not None:
