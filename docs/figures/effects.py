@@ -37,12 +37,12 @@ SHOWN: Mapping[str, dict[str, float]] = {
     "spring": {"stiffness": 1.5, "rest": 0.3},
     "torque_ripple": {"period": 0.39, "cosine": 0.3, "sine": 0.25},
     "hysteresis": {"force": 0.5, "displacement": 0.2},
-    "joint_compliance": {"stiffness": 60.0, "damping": 0.1, "inertia": 0.02},
-    "backlash": {"gap": 0.5, "stiffness": 5.0, "damping": 0.02},
+    "joint_compliance": {"stiffness": 60.0, "damping": 0.3, "inertia": 0.02},
+    "backlash": {"gap": 0.05, "stiffness": 300.0, "damping": 4.0, "inertia": 0.01},
     "rotor_inertia": {"inertia": 0.02},
     "end_stop": {"stiffness": 20.0, "damping": 0.1, "low": -10.0, "high": 0.7},
     "payload": {"mass": 0.4, "x": 0.3, "y": 0.0, "z": 0.1},
-    "link_flexibility": {"stiffness": 60.0, "time": 0.001},
+    "link_flexibility": {"stiffness": 60.0, "time": 0.005},
     "structural_damping": {"time": 0.001},
     "gravity_tilt": {"first": 0.0, "second": 0.1},
     "input_delay": {"time": 0.005},
@@ -54,44 +54,80 @@ SHOWN: Mapping[str, dict[str, float]] = {
     "sensor_delay": {"time": 0.005},
 }
 
-SITES = {"joint": "shoulder", "body": "arm", "actuator": "motor", "sensor": "encoder", "world": "world"}
+SITES = {
+    "joint": "shoulder",
+    "body": "arm",
+    "link": "arm",
+    "beam": "strip",
+    "actuator": "motor",
+    "sensor": "encoder",
+    "world": "world",
+}
+
+#: A strip of aluminium at the end of the link: its first bending at about 5 Hz.
+STRIP = {
+    "parent": "arm",
+    "translation": [0.3, 0.0, 0.0],
+    "rotation": [0.0, np.pi / 2, 0.0],
+    "length": 0.5,
+    "level": "modal(1)",
+    "deforms": ["bending_y"],
+    "material": {"young": 7e10, "poisson": 0.33, "density": 2700.0},
+    "section": {"shape": "rectangle", "width": 0.0015, "height": 0.03},
+}
 
 SINES = ((0.62, 1.3, 0.0), (0.38, 2.9, 1.9), (0.22, 5.3, 0.6), (0.10, 9.1, 2.4), (0.05, 15.7, 4.0))
 
 
 def nominal(effect: str) -> vpm.Model:
-    """One link on a horizontal axis, with what the effect is a correction of."""
-    model = vpm.Model.from_dict(
-        {
-            "name": "arm",
-            "gravity": [0.0, 0.0, -9.81],
-            "bodies": {"arm": {"mass": 1.8, "center_of_mass": [0.22, 0, 0], "inertia": [0.03, 0.035, 0.05, 0, 0, 0]}},
-            "joints": {
-                "shoulder": {
-                    "type": "revolute",
-                    "parent": "world",
-                    "child": "arm",
-                    "axis": [0, 1, 0],
-                    "rotation": [0, np.pi / 2, 0],
-                }
-            },
-            "actuators": {"motor": {"joint": "shoulder", "gain": 1.6, "command_unit": "A"}},
-            "sensors": {"encoder": {"measures": "shoulder.position"}},
-        }
-    )
+    """One link on a horizontal axis, with what the effect is a correction of; a beam for what beams alone have."""
+    content = {
+        "name": "arm",
+        "gravity": [0.0, 0.0, -9.81],
+        "bodies": {"arm": {"mass": 1.8, "center_of_mass": [0.22, 0, 0], "inertia": [0.03, 0.035, 0.05, 0, 0, 0]}},
+        "joints": {
+            "shoulder": {
+                "type": "revolute",
+                "parent": "world",
+                "child": "arm",
+                "axis": [0, 1, 0],
+                "rotation": [0, np.pi / 2, 0],
+            }
+        },
+        "actuators": {"motor": {"joint": "shoulder", "gain": 1.6, "command_unit": "A"}},
+        "sensors": {"encoder": {"measures": "shoulder.position"}},
+    }
+    if EFFECTS[effect].site == "beam":
+        content["beams"] = {"strip": STRIP}
     requires = EFFECTS[effect].requires
+    model = vpm.Model.from_dict(content)
     return model if requires is None else model.with_effect(requires, at="shoulder", **SHOWN[requires])
 
 
-def followed(model: vpm.Model, seconds: float = 12.0, step: float = 0.002) -> vpm.Experiment:
-    """A motion of five sines, and the commands that the model needs for it."""
-    time = np.arange(0.0, seconds, step)
-    waves = [[a * w**k * np.sin(w * time + p + k * np.pi / 2) for a, w, p in SINES] for k in range(3)]
-    q, v, a = (np.sum(each, axis=0)[:, None] for each in waves)
-    idle = np.zeros((time.size, 1))
-    required = model.core.inverse_dynamics(model.theta, q, v, a, idle, step, [])[0]
-    values = {"shoulder.position": q[:, 0], "motor.command": required[:, 0] / 1.6}
+def followed(model: vpm.Model, kind: str, step: float = 0.002) -> vpm.Experiment:
+    """Five sines, the same slowly, or a chirp up to 40 Hz of equal acceleration, and the commands that it needs."""
+    model = model.at("rigid") if model.beams else model
+    if kind == "chirp":
+        time = np.arange(0.0, 20.0, step)
+        rate = 2.0 * np.pi * (1.0 + 39.0 * time / 20.0)
+        q = 40.0 * np.sin(np.cumsum(rate) * step) / rate**2
+        v, a = np.gradient(q, step), np.gradient(np.gradient(q, step), step)
+    else:
+        time = np.arange(0.0, 12.0, step)
+        slow = 0.4 if kind == "slow" else 1.0
+        sines = [(size, slow * rate, phase) for size, rate, phase in SINES]
+        q, v, a = (sum(c * w**k * np.sin(w * time + p + k * np.pi / 2) for c, w, p in sines) for k in range(3))
+    columns = [each[:, None] for each in (q, v, a, np.zeros(time.size))]
+    required = model.core.inverse_dynamics(model.theta, *columns, step, [])[0]
+    values = {"shoulder.position": q, "motor.command": required[:, 0] / 1.6}
     return vpm.Experiment.from_arrays(time, values, {"shoulder.position": "rad", "motor.command": "A"}, model=model)
+
+
+def motion_for(name: str) -> str:
+    """The motion that shows an effect."""
+    if EFFECTS[name].signature.lives_in[0] == "frequency":
+        return "chirp"
+    return "slow" if name == "backlash" else "sines"
 
 
 def view(name: str) -> tuple[View, Array]:
@@ -99,7 +135,8 @@ def view(name: str) -> tuple[View, Array]:
     without = nominal(name)
     site = SITES[EFFECTS[name].site]
     model = without.with_effect(name, at=site, **SHOWN[name])
-    problem = InverseDynamicsProblem(without, [followed(without)], cutoff=40.0)
+    kind = motion_for(name)
+    problem = InverseDynamicsProblem(without, [followed(without, kind)], cutoff=100.0 if kind == "chirp" else 40.0)
     seen = View(model, (name, site), problem, 0, "shoulder.effort", fine=True)
     return seen, seen.channel(without) - seen.channel(model)
 
@@ -115,15 +152,17 @@ def draw(name: str) -> Figure:
         from scipy.signal import welch
 
         time = values
-        values, power = welch(added, 1.0 / float(time[1] - time[0]), nperseg=1024)
-        values, added = values[1:200], np.sqrt(power[1:200])
+        values, power = welch(added, 1.0 / float(time[1] - time[0]), nperseg=2048)
+        # A modelled beam without damping rings on at its first frequency, and at multiples of it where it bends far.
+        shown = (values > 1.0) & (values < (10.0 if EFFECTS[name].site == "beam" else 36.0))
+        values, added = values[shown], np.sqrt(power[shown])
         words, unit = "frequency", "Hz"
         axis.set_yscale("log")
-    thin = slice(None, None, 3)
+    thin = slice(None, None, 1 if kind == "frequency" else 3)
     axis.plot(values[thin], added[thin], color=BLUE, linewidth=1.1)
     axis.axhline(0.0, color=SOFT, linewidth=0.7)
     axis.set_xlabel(label(words.replace(" of shoulder", "").replace(" of motor", ""), unit))
-    axis.set_ylabel(label("residual", "N m"))
+    axis.set_ylabel(label("residual", "N m/√Hz" if kind == "frequency" else "N m"))
     return figure
 
 
@@ -133,10 +172,10 @@ INTRODUCTION = """# The catalogue of effects
 
 Every effect that a model file may contain and a diagnosis may name. Each section has the law; its parameters (bounds
 are what physics allows; *slanted* is what shapes a law whose size another parameter gives); what the effect adds to a
-residual, applied less required effort, drawn for one link on a horizontal axis that follows five sines; and what
-records may take it for, with what parts the two. Units follow the site: C is m or rad, E is N or N m, U the unit of
-the command, S that of the sensor. Keys of a model file: [model-file.md](model-file.md); what a diagnosis does with the
-entries: [diagnosis.md](diagnosis.md).
+residual, applied less required effort, drawn for one link on a horizontal axis that follows five sines or a chirp; and
+what records may take it for, with what parts the two. Units follow the site: C is m or rad, E is N or N m, U the unit
+of the command, S that of the sensor. Keys of a model file: [model-file.md](model-file.md); what a diagnosis does with
+the entries: [diagnosis.md](diagnosis.md).
 """
 
 

@@ -86,7 +86,7 @@ HIDDEN: Mapping[str, Hidden] = MappingProxyType(
         "payload": Hidden(
             Machine(payload=0.5), "arm", {"arm.payload.mass": 0.5, "arm.payload.x": 0.15, "arm.payload.z": 0.12}
         ),
-        "gravity_tilt": Hidden(Machine(tilt=math.radians(4.0)), "world", {"world.tilt.second": math.radians(4.0)}),
+        "gravity_tilt": Hidden(Machine(tilt=math.radians(4.0)), "world", {"world.tilt.second": -math.radians(4.0)}),
         "dead_zone": Hidden(Machine(dead_zone=0.25), "motor", {"motor.dead_zone.width": 0.25}),
         "saturation": Hidden(Machine(saturation=2.2), "motor", {"motor.saturation.limit": 2.2}),
         "input_delay": Hidden(Machine(delay=0.005), "motor", {"motor.delay.time": 0.005}),
@@ -109,6 +109,7 @@ LISTED = (
     "hysteresis",
     "joint_compliance",
     "end_stop",
+    "gravity_tilt",
     "dead_zone",
     "saturation",
     "input_delay",
@@ -124,7 +125,6 @@ UNDECIDABLE: Mapping[str, str] = MappingProxyType(
     {
         "viscous_friction": "the model has it already, with another value",
         "payload": _TURNED,
-        "gravity_tilt": _TURNED,
         "sensor_offset": _TURNED,
         "sensor_delay": "from commands to readings it shows only in its sum with a delay of the drive",
         "rotor_inertia": "on a single link it is a part of the link's inertia, which the model knows only roughly",
