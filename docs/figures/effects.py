@@ -52,6 +52,10 @@ SHOWN: Mapping[str, dict[str, float]] = {
     "sensor_offset": {"value": 0.06},
     "sensor_gain": {"value": 1.08},
     "sensor_delay": {"time": 0.005},
+    "internal_leakage": {"coefficient": 3e-12},
+    "valve_dynamics": {"time": 0.002},
+    "entrained_air": {"fraction": 0.02},
+    "supply_drop": {"resistance": 3e10, "time_constant": 0.002},
 }
 
 SITES = {
@@ -61,6 +65,8 @@ SITES = {
     "beam": "strip",
     "actuator": "motor",
     "sensor": "encoder",
+    "cylinder": "servo",
+    "supply": "pump",
     "world": "world",
 }
 
@@ -76,11 +82,17 @@ STRIP = {
     "section": {"shape": "rectangle", "width": 0.0015, "height": 0.03},
 }
 
+#: What sits at these is shown on the rig of a servo-cylinder, by the pressure of its first chamber.
+HYDRAULIC = ("cylinder", "supply")
+RIG = HERE.parent.parent / "examples" / "servo_cylinder" / "rig.toml"
+
 SINES = ((0.62, 1.3, 0.0), (0.38, 2.9, 1.9), (0.22, 5.3, 0.6), (0.10, 9.1, 2.4), (0.05, 15.7, 4.0))
 
 
 def nominal(effect: str) -> vpm.Model:
-    """One link on a horizontal axis, with what the effect is a correction of; a beam for what beams alone have."""
+    """One link on a horizontal axis, with what the effect is a correction of; a beam or a cylinder for what needs it."""
+    if EFFECTS[effect].site in HYDRAULIC:
+        return vpm.Model.load(RIG)
     content = {
         "name": "arm",
         "gravity": [0.0, 0.0, -9.81],
@@ -123,6 +135,23 @@ def followed(model: vpm.Model, kind: str, step: float = 0.002) -> vpm.Experiment
     return vpm.Experiment.from_arrays(time, values, {"shoulder.position": "rad", "motor.command": "A"}, model=model)
 
 
+def pumped(model: vpm.Model, step: float = 0.0005) -> vpm.Experiment:
+    """The servo-cylinder under three sines of current, with its pressures, as the model simulates it."""
+    time = np.arange(0.0, 2.0, step)
+    current = 1e-3 * (1.2 * np.cos(9.0 * time) + 0.6 * np.sin(31.0 * time + 1.0) + 0.3 * np.sin(77.0 * time))
+    given = vpm.Experiment.from_arrays(
+        time,
+        {"servo.command": current, "axis.position": 0.0 * time},
+        {"servo.command": "A", "axis.position": "m"},
+        model=model,
+    )
+    run = vpm.simulate(model, given, "free_run")
+    shown = ("axis.position", "servo.pressure_a", "servo.pressure_b")
+    values = {"servo.command": current, **{name: run[name] for name in shown}}
+    units = {"servo.command": "A", "axis.position": "m", "servo.pressure_a": "Pa", "servo.pressure_b": "Pa"}
+    return vpm.Experiment.from_arrays(time, values, units, model=model)
+
+
 def motion_for(name: str) -> str:
     """The motion that shows an effect."""
     if EFFECTS[name].signature.lives_in[0] == "frequency":
@@ -135,6 +164,10 @@ def view(name: str) -> tuple[View, Array]:
     without = nominal(name)
     site = SITES[EFFECTS[name].site]
     model = without.with_effect(name, at=site, **SHOWN[name])
+    if EFFECTS[name].site in HYDRAULIC:
+        problem = InverseDynamicsProblem(without, [pumped(without)], cutoff=300.0)
+        seen = View(model, (name, site), problem, 0, "servo.pressure_a", fine=True)
+        return seen, seen.channel(without) - seen.channel(model)
     kind = motion_for(name)
     problem = InverseDynamicsProblem(without, [followed(without, kind)], cutoff=100.0 if kind == "chirp" else 40.0)
     seen = View(model, (name, site), problem, 0, "shoulder.effort", fine=True)
@@ -162,7 +195,8 @@ def draw(name: str) -> Figure:
     axis.plot(values[thin], added[thin], color=BLUE, linewidth=1.1)
     axis.axhline(0.0, color=SOFT, linewidth=0.7)
     axis.set_xlabel(label(words.replace(" of shoulder", "").replace(" of motor", ""), unit))
-    axis.set_ylabel(label("residual", "N m/√Hz" if kind == "frequency" else "N m"))
+    effort = "Pa" if EFFECTS[name].site in HYDRAULIC else "N m"
+    axis.set_ylabel(label("residual", f"{effort}/√Hz" if kind == "frequency" else effort))
     return figure
 
 
@@ -172,8 +206,8 @@ INTRODUCTION = """# The catalogue of effects
 
 Every effect that a model file may contain and a diagnosis may name. Each section has the law; its parameters (bounds
 are what physics allows; *slanted* is what shapes a law whose size another parameter gives); what the effect adds to a
-residual, applied less required effort, drawn for one link on a horizontal axis that follows five sines or a chirp; and
-what records may take it for, with what parts the two. Units follow the site: C is m or rad, E is N or N m, U the unit
+residual, applied less required effort, drawn for one link on a horizontal axis that follows five sines or a chirp, or
+for a servo-cylinder; and what records may take it for, with what parts the two. Units follow the site: C is m or rad, E is N or N m, U the unit
 of the command, S that of the sensor. Keys of a model file: [model-file.md](model-file.md); what a diagnosis does with
 the entries: [diagnosis.md](diagnosis.md).
 """
