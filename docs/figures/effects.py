@@ -90,7 +90,7 @@ SINES = ((0.62, 1.3, 0.0), (0.38, 2.9, 1.9), (0.22, 5.3, 0.6), (0.10, 9.1, 2.4),
 
 
 def nominal(effect: str) -> vpm.Model:
-    """One link on a horizontal axis, with what the effect is a correction of; a beam or a cylinder for what needs it."""
+    """One link on a horizontal axis, with what the effect corrects; a beam or a cylinder for what needs it."""
     if EFFECTS[effect].site in HYDRAULIC:
         return vpm.Model.load(RIG)
     content = {
@@ -207,9 +207,9 @@ INTRODUCTION = """# The catalogue of effects
 Every effect that a model file may contain and a diagnosis may name. Each section has the law; its parameters (bounds
 are what physics allows; *slanted* is what shapes a law whose size another parameter gives); what the effect adds to a
 residual, applied less required effort, drawn for one link on a horizontal axis that follows five sines or a chirp, or
-for a servo-cylinder; and what records may take it for, with what parts the two. Units follow the site: C is m or rad, E is N or N m, U the unit
-of the command, S that of the sensor. Keys of a model file: [model-file.md](model-file.md); what a diagnosis does with
-the entries: [diagnosis.md](diagnosis.md).
+for a servo-cylinder; and what records may take it for, with what parts the two. Units follow the site: C is m or rad, E
+is N or N m, U the unit of the command, S that of the sensor. Keys of a model file: [model-file.md](model-file.md); what
+a diagnosis does with the entries: [diagnosis.md](diagnosis.md).
 """
 
 
