@@ -15,7 +15,7 @@ from scipy.integrate import solve_ivp
 
 from vpm.catalogue import EFFECTS
 from vpm.demo import generate, print_list, run_demo
-from vpm.demo.hidden import HIDDEN, LISTED, UNDECIDABLE
+from vpm.demo.hidden import HIDDEN, LISTED, REFUSED
 from vpm.demo.machine import Machine, State, advance
 from vpm.errors import DiagnosisError
 
@@ -31,7 +31,7 @@ CLOSE, SHARED = 0.05, 0.2
 def test_every_listed_effect_can_be_made_and_is_in_the_catalogue() -> None:
     assert set(LISTED) <= set(HIDDEN)
     assert set(LISTED) - {"none"} <= set(EFFECTS)
-    assert not set(LISTED) & set(UNDECIDABLE)
+    assert not set(LISTED) & set(REFUSED)
     assert LISTED[0] == "coulomb_friction"
     buffer = StringIO()
     print_list(Console(file=buffer, width=400))

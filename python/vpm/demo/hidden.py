@@ -121,8 +121,9 @@ LISTED = (
 
 _TURNED = "on a single link a load beside its axis, a tilted base and a shifted zero all turn gravity by an angle"
 
-UNDECIDABLE: Mapping[str, str] = MappingProxyType(
+REFUSED: Mapping[str, str] = MappingProxyType(
     {
+        "backlash": "on these records the diagnosis does not name a play yet",
         "viscous_friction": "the model has it already, with another value",
         "payload": _TURNED,
         "sensor_offset": _TURNED,
@@ -130,4 +131,4 @@ UNDECIDABLE: Mapping[str, str] = MappingProxyType(
         "rotor_inertia": "on a single link it is a part of the link's inertia, which the model knows only roughly",
     }
 )
-"""What no record of this machine can show on its own, and why."""
+"""What ``vpm demo --hide`` does not take, and why: mostly what no record of one link can show on its own."""

@@ -12,7 +12,7 @@ from vpm.catalogue import EFFECTS
 from vpm.compare import compare
 from vpm.demo.files import FOLDER, MODEL, TRAIN, TRUTH, VALIDATION
 from vpm.demo.generate import generate
-from vpm.demo.hidden import HIDDEN, LISTED, UNDECIDABLE
+from vpm.demo.hidden import HIDDEN, LISTED, REFUSED
 from vpm.discrepancy import Diagnosis, diagnose
 from vpm.errors import DiagnosisError, near_match
 from vpm.experiment import Experiment
@@ -77,8 +77,8 @@ def check_hidden(name: str) -> None:
     """
     if name in LISTED:
         return
-    if name in UNDECIDABLE:
-        raise DiagnosisError(f"the demo cannot hide {name}: {UNDECIDABLE[name]}; choose from vpm demo --list")
+    if name in REFUSED:
+        raise DiagnosisError(f"the demo cannot hide {name}: {REFUSED[name]}; choose from vpm demo --list")
     raise DiagnosisError(f'the demo cannot hide "{name}"; {near_match(name, LISTED)}')
 
 
