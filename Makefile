@@ -78,6 +78,7 @@ figures: $(VENV)/.installed ## draw the pictures of docs/ anew, from the package
 	$(BIN)/python docs/figures/validity.py
 	$(BIN)/python docs/figures/hyl.py
 	$(BIN)/python docs/figures/oil.py
+	$(BIN)/python docs/figures/effects.py
 
 docs: $(VENV)/.installed ## run every snippet of the documents; build the Rust documentation
 	$(BIN)/python -m pytest tests/test_docs.py $(PYTEST_ARGS)

@@ -191,6 +191,39 @@ def test_diagnose_writes_its_report(tmp_path: Path) -> None:
     assert first == second
 
 
+def test_diagnose_leaves_effects_out_and_stops_at_a_limit(tmp_path: Path) -> None:
+    words = ("--validate", VALIDATION, "--workers", "1", "--out", tmp_path)
+    done = vpm("diagnose", MODEL, TRAIN, *words, "--without", "coulomb_friction")
+    assert done.returncode == 0, done.stderr
+    assert "coulomb_friction" not in done.stdout
+    assert "screening 1 of " in done.stderr
+    assert "coulomb_friction" not in done.stderr
+    none = vpm("diagnose", MODEL, TRAIN, *words, "--limit", "0")
+    assert none.returncode == 0, none.stderr
+    assert json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))["effects"] == []
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of another kind")
+def test_ctrl_c_reports_what_a_diagnosis_knows(tmp_path: Path) -> None:
+    """The first round is over, the second is not: its effect stands in the report and in the repaired model."""
+    words = ["--validate", str(VALIDATION), "--substeps", "20", "--out", str(tmp_path)]
+    command = [sys.executable, "-m", "vpm", "diagnose", str(MODEL), str(TRAIN), *words]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stderr is not None
+        for line in process.stderr:
+            if line.startswith("round 2: screening"):
+                break
+        process.send_signal(signal.SIGINT)
+        out, _ = process.communicate(timeout=120)
+    assert process.returncode == 0
+    assert "stopped by Ctrl-C" in out
+    document = json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))
+    assert document["interrupted"] is True
+    assert [(e["name"], e["site"]) for e in document["effects"]] == [("coulomb_friction", "shoulder")]
+    assert "coulomb" in (tmp_path / "model.toml").read_text(encoding="utf-8")
+    assert (tmp_path / "report.html").is_file()
+
+
 def test_budget_exit_code_says_whether_it_holds() -> None:
     assert vpm("budget", MODEL, "--steps", "5000").returncode == 0
     assert vpm("budget", MODEL, "--steps", "5000", "--rate", "1e9").returncode == 1
@@ -221,6 +254,8 @@ def test_demo_tells_the_story(tmp_path: Path) -> None:
         (("simulate", STEP, "--mode", "free_run"), "is a scenario, which needs no --mode"),
         (("simulate", STEP, "--plot", "step.jpg"), "step.jpg is no name of a picture"),
         (("diagnose", MODEL, TRAIN, "--effect", "coulomb"), "coulomb_friction"),
+        (("diagnose", MODEL, TRAIN, "--without", "coulomb"), '--without: "coulomb" is not among'),
+        (("diagnose", MODEL, TRAIN, "--effect", "spring", "--without", "spring"), "leaves no effect to try"),
         (("identify", MODEL, TRAIN, "--free", "shoulder.viscous"), "shoulder.friction.viscous"),
         (("identify", MODEL, TRAIN, "--fix", "shoulder.viscous"), '--fix: "shoulder.viscous" is not among the free'),
         (("identify", MODEL, TRAIN, "--tie", "a"), "FOLLOWER=LEADER"),

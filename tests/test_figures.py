@@ -2,11 +2,16 @@
 
 import json
 import runpy
+from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
+
+from vpm.catalogue import EFFECTS
+from vpm.catalogue.signature import SIGNATURES
 
 ROOT = Path(__file__).resolve().parent.parent
 FIGURES = ROOT / "docs" / "figures"
@@ -76,3 +81,48 @@ def test_lines_of_oil_and_valve_are_what_the_page_says() -> None:
     assert np.all(np.diff(oil.of_air(("leakage",))) > 0.0)
     np.testing.assert_allclose(oil.of_air(("leakage", "air")), 1.0, atol=0.01)
     np.testing.assert_allclose(oil.of_ripple(oil.BENCH.BARE, known=True), 1.0, atol=0.01)
+
+
+@pytest.fixture(scope="module")
+def effects() -> SimpleNamespace:
+    return SimpleNamespace(**runpy.run_path(str(FIGURES / "effects.py"), run_name="figure"))
+
+
+def test_the_page_of_the_catalogue_is_what_the_catalogue_says(effects: SimpleNamespace) -> None:
+    """Written by ``make figures``: a new entry, or another word in one, has to be written again."""
+    assert (ROOT / "docs" / "catalogue.md").read_text(encoding="utf-8") == effects.page()
+
+
+@pytest.mark.parametrize("name", EFFECTS)
+def test_every_entry_of_the_catalogue_has_its_section_and_picture(effects: SimpleNamespace, name: str) -> None:
+    assert name in SIGNATURES
+    page = (ROOT / "docs" / "catalogue.md").read_text(encoding="utf-8")
+    section = page.split(f"\n## {name}\n", 1)[1].split("\n## ", 1)[0]
+    assert EFFECTS[name].law in section
+    for parameter in EFFECTS[name].parameters:
+        assert f"`{parameter.name}`" in section
+    for other in EFFECTS[name].confused_with:
+        assert f"(#{other})" in section
+    assert name in effects.SHOWN
+    assert f"figures/effects/{name}.svg" in section
+    assert "<svg" in (FIGURES / "effects" / f"{name}.svg").read_text(encoding="utf-8")
+
+
+#: Laws that stand in one state, written once more, and where that is.
+LAWS: dict[str, Callable[[NDArray[np.float64]], NDArray[np.float64]]] = {
+    "viscous_friction": lambda v: 0.3 * v,
+    "coulomb_friction": lambda v: 0.5 * np.tanh(v / 0.02),
+    "spring": lambda q: 1.5 * (q - 0.3),
+    "torque_ripple": lambda q: 0.3 * np.cos(2 * np.pi * q / 0.39) + 0.25 * np.sin(2 * np.pi * q / 0.39),
+    "bias_force": lambda t: 0.4 + 0.0 * t,
+    "sensor_offset": lambda q: 1.8 * 9.81 * 0.22 * (np.sin(q - 0.06) - np.sin(q)),
+}
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_signatures_are_the_laws_over_the_state_that_they_live_in(effects: SimpleNamespace, name: str) -> None:
+    """Effort applied less effort required lacks what the effect takes; the motion is filtered at 40 Hz."""
+    seen, added = effects.view(name)
+    axis, _, _, values = seen.best(added, np.ones(added.size, dtype=bool))
+    assert axis == EFFECTS[name].signature.lives_in[0]
+    np.testing.assert_allclose(added, LAWS[name](values), atol=2e-3 * np.abs(added).max())

@@ -6,6 +6,7 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import vpm
@@ -26,6 +27,41 @@ def diagnosis() -> vpm.Diagnosis:
 def page(diagnosis: vpm.Diagnosis, tmp_path_factory: pytest.TempPathFactory) -> str:
     path = vpm.report(diagnosis).save(tmp_path_factory.mktemp("report") / "report.html")
     return Path(path).read_text(encoding="utf-8")
+
+
+def test_one_core_and_four_find_the_same(diagnosis: vpm.Diagnosis) -> None:
+    model = vpm.Model.load(MODEL)
+    train, test = (vpm.Experiment.load(path, model=model) for path in (TRAIN, VALIDATION))
+    told: list[tuple[str, str, int, int]] = []
+    documents = []
+    for workers in (1, 4):
+        why = vpm.diagnose(model, train, test, workers=workers, progress=lambda *each: told.append(each))
+        documents.append(repr({**why.to_dict(), "seconds": 0.0}))  # to the last digit
+    assert documents[0] == documents[1] == repr({**diagnosis.to_dict(), "seconds": 0.0})
+    # Every candidate is told once, and the count goes up to the number of them.
+    first = [each for each in told[: len(told) // 2] if each[0] == "round 1: screening"]
+    assert [each[2] for each in first] == list(range(1, first[0][3] + 1))
+    assert len({each[1] for each in first}) == len(first) > 5
+
+
+def test_each_finding_has_its_evidence_on_unseen_data(diagnosis: vpm.Diagnosis) -> None:
+    """Dry friction: two levels over the velocity, of the size that was hidden; what is left is far smaller."""
+    (evidence,) = diagnosis.evidence
+    assert (evidence.effect, evidence.site) == ("coulomb_friction", "shoulder")
+    assert (evidence.record, evidence.channel) == ("validation", "shoulder.effort")
+    assert (evidence.axis, evidence.axis_unit, evidence.unit) == ("velocity", "rad/s", "N m")
+    fast = np.abs(evidence.values) > 0.3
+    np.testing.assert_allclose(evidence.without[fast] * np.sign(evidence.values[fast]), 0.55, atol=0.12)
+    assert np.sqrt(np.mean(evidence.repaired[fast] ** 2)) < 0.06
+    moving = np.abs(evidence.law_values) > 0.1
+    fitted = diagnosis.model.parameters["shoulder.friction.coulomb"].value
+    np.testing.assert_allclose(evidence.law[moving], fitted * np.sign(evidence.law_values[moving]), atol=1e-6)
+
+
+def test_evidence_stands_on_the_page_with_its_law(page: str, diagnosis: vpm.Diagnosis) -> None:
+    assert page.count('class="evidence"') == len(diagnosis.effects) == 1
+    assert "coulomb tanh(v/transition_velocity)" in page
+    assert "which was never fitted" in page
 
 
 def test_page_needs_no_other_file(page: str) -> None:

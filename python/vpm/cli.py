@@ -11,7 +11,7 @@ from typing import Annotated
 import typer
 from typer.core import TyperGroup
 
-from vpm import __version__, identify_command
+from vpm import __version__, diagnose_command, identify_command
 from vpm.command import (
     BESIDE,
     FORMATS,
@@ -30,7 +30,6 @@ from vpm.command import (
     load_all,
     load_model,
     load_pair,
-    load_record,
     progress,
     save_plot,
     warnings_told,
@@ -82,6 +81,7 @@ app = typer.Typer(
 )
 app.add_typer(excite_app, name="excite")
 app.command(epilog=identify_command.EXAMPLES)(identify_command.identify)
+app.command(epilog=diagnose_command.EXAMPLES)(diagnose_command.diagnose)
 Out = Annotated[Path, typer.Option(help="Folder for report.json, report.html and the repaired model.")]
 
 
@@ -230,32 +230,6 @@ def compare(
     save_plot(comparison.plot, plot)
 
 
-@app.command(epilog="Example:  vpm diagnose model.toml train.csv --validate test.csv --out report/")
-def diagnose(
-    model: ModelPath,
-    logs: Logs,
-    validate: Annotated[
-        list[Path] | None, typer.Option(help="Record that is never fitted; repeat. Default: 30 % of each log.")
-    ] = None,
-    out: Out = Path("report"),
-    effect: Annotated[list[str] | None, typer.Option(help="Try only these effects; repeat.")] = None,
-    channels: Channels = None,
-    interpolate: Interpolate = False,
-    cutoff: Cutoff = None,
-) -> None:
-    """Name the physical effect that a model is missing, with evidence on unseen data."""
-    from vpm.discrepancy import diagnose as find_missing
-    from vpm.report import print_story, write_report
-
-    machine, records = load_all(model, logs, channels, interpolate)
-    unseen = [load_record(path, machine, channels, interpolate) for path in validate or []]
-    with progress() as tell:
-        diagnosis = find_missing(machine, records, unseen or None, effects=effect or None, cutoff=cutoff, tell=tell)
-    print_story(diagnosis, console)
-    for path in write_report(diagnosis, out):
-        console.print(f"wrote {path}", markup=False)
-
-
 @app.command(epilog="Example:  vpm report report/diagnosis.npz --out report/")
 def report(
     diagnosis: Annotated[Path, typer.Argument(metavar="DIAGNOSIS", help="The diagnosis.npz of an earlier run.")],
@@ -326,10 +300,19 @@ def linkage(
     save_plot(found.plot, plot)
 
 
-@app.command(epilog="Example:  vpm demo --out demo-report")
-def demo(out: Out = Path("demo-report")) -> None:
-    """Find the effect that is hidden in a log that comes with the package."""
-    from vpm.demo import run_demo
+@app.command(epilog="Example:  vpm demo --out demo-report\n\nExample:  vpm demo --hide torque_ripple")
+def demo(
+    out: Out = Path("demo-report"),
+    hide: Annotated[
+        str | None, typer.Option(metavar="EFFECT", help="Hide another effect: makes its log first, into OUT/log.")
+    ] = None,
+    listing: Annotated[bool, typer.Option("--list", help="List what can be hidden, and stop.")] = False,
+) -> None:
+    """Find the effect that is hidden in a log that comes with the package, or in one that is made on request."""
+    from vpm.demo import print_list, run_demo
 
+    if listing:
+        print_list(console)
+        return
     with progress() as tell:
-        run_demo(out, console, tell)
+        run_demo(out, console, tell, hide)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from vpm.catalogue.formula import Formula
+from vpm.catalogue.signature import Signature, signature_of
 from vpm.errors import ModelError, near_match
 
 #: A cylinder is a hydraulic actuator with its valve, named as it.
@@ -140,6 +141,8 @@ class EffectType:
         Effect that has to be at the same site before this one is worth looking for: it is a correction of that one.
     screened : bool
         Whether a diagnosis tries it.
+    shows : Signature or None
+        Where it shows, for an entry without a row in `vpm.catalogue.signature`.
     formula : Formula or None
         Law of an entry that a user wrote, see `vpm.catalogue.register`.
     """
@@ -154,7 +157,13 @@ class EffectType:
     confused_with: Mapping[str, str]
     requires: str | None = None
     screened: bool = True
+    shows: Signature | None = None
     formula: Formula | None = None
+
+    @property
+    def signature(self) -> Signature:
+        """Where it shows: the state that its picture is drawn over, and what is to be seen there."""
+        return self.shows or signature_of(self.name)
 
     @property
     def title(self) -> str:

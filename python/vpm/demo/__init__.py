@@ -4,6 +4,6 @@ The files stand in `FOLDER`; ``README.md`` there tells what they are, and `vpm.d
 """
 
 from vpm.demo.files import FOLDER, MODEL, TRAIN, TRUTH, VALIDATION
-from vpm.demo.story import run_demo
+from vpm.demo.story import print_list, run_demo
 
-__all__ = ["FOLDER", "MODEL", "TRAIN", "TRUTH", "VALIDATION", "run_demo"]
+__all__ = ["FOLDER", "MODEL", "TRAIN", "TRUTH", "VALIDATION", "print_list", "run_demo"]

@@ -1,19 +1,6 @@
 """Make the demo's log: a simulation of its own, which shares no code with the models that have to explain it.
 
-The machine is one link on a horizontal axis, hanging down at ``q = 0``, driven by a geared motor with a sampled
-cascade controller and measured by a noisy encoder:
-
-    ``(J + m l^2) dv/dt = k u_motor - m g l sin(q) - b v - tau_hidden``
-
-Time runs in steps of 50 microseconds, forty for each sample of the controller, by Moreau's midpoint rule. The hidden
-Coulomb friction is set-valued, so that the link really stands still while the drive pushes less than the friction
-holds: each step takes the friction impulse as far as it goes toward stopping the link and no further. The catalogue's
-Coulomb friction is a smooth approximation of that, so the diagnosis is not handed its own formula back.
-
-References
-----------
-.. [1] J. J. Moreau, "Unilateral contact and dry friction in finite freedom dynamics", 1988.
-.. [2] V. Acary, B. Brogliato, "Numerical Methods for Nonsmooth Dynamical Systems", 2008, chapter 10.
+The machine of `vpm.demo.machine`, under a sampled cascade controller, measured by a noisy encoder.
 
 Run it with ``python -m vpm.demo.generate --hidden torque_ripple --out some-folder``.
 """
@@ -22,83 +9,19 @@ import argparse
 import math
 import shutil
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
-SAMPLE_TIME = 0.002
-"""Time between two samples of controller and log [s]."""
-
-STEPS_PER_SAMPLE = 40
-"""Steps of the simulation for each sample: 20 kHz."""
+from vpm.demo.hidden import HIDDEN
+from vpm.demo.machine import SAMPLE_TIME, Machine, State, advance
 
 SEED = 20
 """Seed of the shipped log's encoder noise."""
 
 COLUMNS = ("time_s", "q_rad", "u_A", "qref_rad")
 """Columns of the log: time, encoder reading, motor current command as applied, reference of the controller."""
-
-
-@dataclass(frozen=True)
-class Machine:
-    """The true machine. The model file that ships beside it knows some of these values only roughly.
-
-    It has room for every hidden effect; one that it does not have is zero.
-    """
-
-    mass: float = 1.8
-    """Mass of the link [kg]."""
-    center_of_mass: float = 0.221
-    """Distance from the axis to the centre of mass [m]."""
-    inertia: float = 0.0345
-    """Moment of inertia about the centre of mass, around the axis [kg m^2]."""
-    gravity: float = 9.81
-    """[m/s^2]."""
-    torque_per_current: float = 1.6
-    """Torque on the joint for each ampere of command, gear included [N m/A]."""
-    viscous: float = 0.135
-    """Viscous friction [N m s/rad]."""
-
-    coulomb: float = 0.0
-    """Coulomb friction, set-valued at standstill [N m]."""
-    ripple: float = 0.0
-    """Amplitude of the torque ripple [N m]."""
-    ripple_period: float = math.tau / 16.0
-    """Period of the torque ripple along the joint [rad]."""
-    ripple_phase: float = 0.7
-    """The ripple is ``ripple cos(2 pi q / period - phase)`` [rad]."""
-    bias: float = 0.0
-    """Constant torque that the drive has to overcome [N m]."""
-    dead_zone: float = 0.0
-    """The motor answers only to the part of the command beyond this current [A]."""
-    delay: float = 0.0
-    """Time until a command reaches the motor [s]."""
-
-    position_gain: float = 12.0
-    """Outer gain of the controller [1/s]."""
-    velocity_gain: float = 2.0
-    """Inner gain of the controller [A s/rad]."""
-    current_limit: float = 6.0
-    """Largest command of the controller [A]."""
-
-    encoder_counts: int = 65536
-    """Counts for each turn of the joint."""
-    encoder_noise: float = 5e-5
-    """Standard deviation of the noise ahead of the encoder's rounding [rad]."""
-
-
-HIDDEN = {
-    "coulomb_friction": Machine(coulomb=0.55),
-    "viscous_friction": Machine(viscous=0.45),
-    "torque_ripple": Machine(ripple=0.40),
-    "bias_force": Machine(bias=0.60),
-    "dead_zone": Machine(dead_zone=0.25),
-    "input_delay": Machine(delay=0.005),
-    "none": Machine(),
-}
-"""What can be hidden: for each name the machine that has it."""
 
 
 def train_reference(time: float) -> float:
@@ -171,46 +94,29 @@ def record(
         One row per sample, shape (samples, 4), in the order of `COLUMNS`.
     """
     samples = round(duration / SAMPLE_TIME) + 1
-    count = math.tau / machine.encoder_counts
     rows = np.empty((samples, len(COLUMNS)))
     commands: list[float] = []
     readings: list[float] = []
-    position, velocity = 0.0, 0.0
+    state = State()
     for k, disturbance in enumerate(noise.normal(0.0, machine.encoder_noise, samples).tolist()):
         wanted = round(reference(k * SAMPLE_TIME), 6)
-        readings.append(count * round((position + disturbance) / count))
+        state.positions.append(state.position)
+        readings.append(_reading(machine, state, disturbance))
         rate = (readings[k] - readings[max(k - 2, 0)]) / (2.0 * SAMPLE_TIME)
         command = machine.velocity_gain * (machine.position_gain * (wanted - readings[k]) - rate)
         # The drive takes its command in steps of 0.1 mA, so the log holds exactly what was applied.
         commands.append(round(min(max(command, -machine.current_limit), machine.current_limit), 4))
         rows[k] = k * SAMPLE_TIME, readings[k], commands[k], wanted
-        position, velocity = _one_sample(machine, position, velocity, commands)
+        advance(machine, state, commands)
     return rows
 
 
-def _one_sample(machine: Machine, position: float, velocity: float, commands: list[float]) -> tuple[float, float]:
-    """Move the machine from the sample of the last command to the next one."""
-    step = SAMPLE_TIME / STEPS_PER_SAMPLE
-    inertia = machine.inertia + machine.mass * machine.center_of_mass**2
-    weight = machine.mass * machine.gravity * machine.center_of_mass
-    damping = 0.5 * step * machine.viscous / inertia
-    stopping = step * machine.coulomb / inertia
-    late = round(machine.delay / step)
-    for i in range(STEPS_PER_SAMPLE):
-        # The command that was given `late` steps ago; before the record starts, its first one.
-        command = commands[max(len(commands) - 1 + (i - late) // STEPS_PER_SAMPLE, 0)]
-        middle = position + 0.5 * step * velocity
-        torque = (
-            machine.torque_per_current * math.copysign(max(abs(command) - machine.dead_zone, 0.0), command)
-            - weight * math.sin(middle)
-            - machine.bias
-            - machine.ripple * math.cos(math.tau * middle / machine.ripple_period - machine.ripple_phase)
-        )
-        free = (1.0 - damping) * velocity + step * torque / inertia
-        # Set-valued friction: it takes off as much speed as it can and never turns the motion round.
-        velocity = math.copysign(max(abs(free) - stopping, 0.0), free) / (1.0 + damping)
-        position = middle + 0.5 * step * velocity
-    return position, velocity
+def _reading(machine: Machine, state: State, disturbance: float) -> float:
+    """What the encoder reads of the angle at a sample, or of an earlier one [rad]."""
+    late = round(machine.sensor_delay / SAMPLE_TIME)
+    angle = state.positions[max(len(state.positions) - 1 - late, 0)]
+    count = math.tau / machine.encoder_counts
+    return count * round((machine.sensor_gain * angle + machine.sensor_offset + disturbance) / count)
 
 
 def write_log(path: Path, rows: npt.NDArray[np.float64]) -> None:
@@ -241,24 +147,8 @@ def truth(hidden: str) -> str:
     str
         A TOML document. Its parameter names are those of the model.
     """
-    machine = HIDDEN[hidden]
-    effects: dict[str, tuple[str, dict[str, float]]] = {
-        "coulomb_friction": ("shoulder", {"shoulder.friction.coulomb": machine.coulomb}),
-        "viscous_friction": ("shoulder", {"shoulder.friction.viscous": machine.viscous}),
-        "torque_ripple": (
-            "shoulder",
-            {
-                "shoulder.ripple.period": machine.ripple_period,
-                "shoulder.ripple.cosine": machine.ripple * math.cos(machine.ripple_phase),
-                "shoulder.ripple.sine": machine.ripple * math.sin(machine.ripple_phase),
-            },
-        ),
-        "bias_force": ("shoulder", {"shoulder.bias.force": machine.bias}),
-        "dead_zone": ("motor", {"motor.dead_zone.width": machine.dead_zone}),
-        "input_delay": ("motor", {"motor.delay.time": machine.delay}),
-        "none": ("", {}),
-    }
-    site, parameters = effects[hidden]
+    entry = HIDDEN[hidden]
+    machine = entry.machine
     known = {
         "arm.center_of_mass.x": machine.center_of_mass,
         "arm.inertia.yy": machine.inertia,
@@ -269,10 +159,11 @@ def truth(hidden: str) -> str:
         "",
         "[hidden]",
         f'effect = "{hidden}"',
-        f'at = "{site}"',
+        f'at = "{entry.site}"',
+        *(f"beside = {[list(pair) for pair in entry.beside]!r}" for _ in entry.beside[:1]),
         "",
         "[hidden.parameters]",
-        *(f'"{name}" = {value:.12g}' for name, value in parameters.items()),
+        *(f'"{name}" = {value:.12g}' for name, value in entry.parameters.items()),
         "",
         "[parameters]",
         *(f'"{name}" = {value:.12g}' for name, value in known.items()),
@@ -299,7 +190,7 @@ def generate(folder: Path, hidden: str = "coulomb_friction", seed: int = SEED) -
     """
     if hidden not in HIDDEN:
         raise ValueError(f"'{hidden}' is no effect that the demo can hide; take one of: {', '.join(HIDDEN)}.")
-    machine = HIDDEN[hidden]
+    machine = HIDDEN[hidden].machine
     noise = np.random.default_rng(seed)
     folder.mkdir(parents=True, exist_ok=True)
     write_log(folder / "train.csv", record(machine, train_reference, 15.0, noise))

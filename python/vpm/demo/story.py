@@ -8,16 +8,20 @@ from pathlib import Path
 
 from rich.console import Console
 
+from vpm.catalogue import EFFECTS
 from vpm.compare import compare
-from vpm.demo.files import MODEL, TRAIN, TRUTH, VALIDATION
+from vpm.demo.files import FOLDER, MODEL, TRAIN, TRUTH, VALIDATION
+from vpm.demo.generate import generate
+from vpm.demo.hidden import HIDDEN, LISTED, REFUSED
 from vpm.discrepancy import Diagnosis, diagnose
+from vpm.errors import DiagnosisError, near_match
 from vpm.experiment import Experiment
 from vpm.model import Model
 from vpm.report import print_story, write_report
 from vpm.simulate import simulate
 
 
-def run_demo(out: Path, console: Console, tell: Callable[[str], None]) -> Diagnosis:
+def run_demo(out: Path, console: Console, tell: Callable[[str], None], hide: str | None = None) -> Diagnosis:
     """Diagnose the demo's log, tell the story, write the report, and only then show what was hidden.
 
     Parameters
@@ -27,13 +31,26 @@ def run_demo(out: Path, console: Console, tell: Callable[[str], None]) -> Diagno
     console : rich.console.Console
     tell : callable
         Called with a sentence at every step.
+    hide : str, optional
+        Another effect to hide, of `vpm.demo.hidden.LISTED`; its log is made first, into the folder ``log`` in ``out``.
+
+    Raises
+    ------
+    DiagnosisError
+        ``hide`` cannot be hidden here.
     """
 
     def say(text: str = "") -> None:
         console.print(text, markup=False)
 
-    model = Model.load(MODEL)
-    training, unseen = (Experiment.load(path, model=model) for path in (TRAIN, VALIDATION))
+    folder = FOLDER
+    if hide is not None:
+        check_hidden(hide)
+        tell(f"simulating a machine with {hide}")
+        folder = out / "log"
+        generate(folder, hide)
+    model = Model.load(folder / MODEL.name)
+    training, unseen = (Experiment.load(folder / path.name, model=model) for path in (TRAIN, VALIDATION))
     say(f"1. The model file describes {model.name}: {', '.join(model.bodies)} on {', '.join(model.joints)}.")
     say(f"2. Two logs of the machine: {training.name} to learn from, {unseen.name} to judge by.")
     tell("simulating the nominal model in closed loop")
@@ -45,18 +62,46 @@ def run_demo(out: Path, console: Console, tell: Callable[[str], None]) -> Diagno
     diagnosis = diagnose(model, training, unseen, tell=tell)
     print_story(diagnosis, console)
     say()
-    _reveal(diagnosis, say)
+    _reveal(diagnosis, folder / TRUTH.name, say)
     for path in write_report(diagnosis, out):
         say(f"wrote {path}")
     return diagnosis
 
 
-def _reveal(diagnosis: Diagnosis, say: Callable[[str], None]) -> None:
+def check_hidden(name: str) -> None:
+    """Complain about an effect that the demo cannot hide.
+
+    Raises
+    ------
+    DiagnosisError
+    """
+    if name in LISTED:
+        return
+    if name in REFUSED:
+        raise DiagnosisError(f"the demo cannot hide {name}: {REFUSED[name]}; choose from vpm demo --list")
+    raise DiagnosisError(f'the demo cannot hide "{name}"; {near_match(name, LISTED)}')
+
+
+def print_list(console: Console) -> None:
+    """Print what can be hidden, a line each, with site and law.
+
+    Parameters
+    ----------
+    console : rich.console.Console
+    """
+    for name in LISTED:
+        law = EFFECTS[name].law if name in EFFECTS else "nothing is missing; three values of the model are wrong"
+        console.print(f"{name:22s}{HIDDEN[name].site:10s}{law}", markup=False)
+
+
+def _reveal(diagnosis: Diagnosis, path: Path, say: Callable[[str], None]) -> None:
     """Compare with the truth, which nothing above has read."""
-    truth = tomllib.loads(TRUTH.read_text(encoding="utf-8"))
+    truth = tomllib.loads(path.read_text(encoding="utf-8"))
     hidden = truth["hidden"]
     found = [f"{e.name} at {e.site}" for e in diagnosis.effects]
-    say(f"what was hidden in the log: {hidden['effect']} at {hidden['at']}; found: {', '.join(found) or 'nothing'}")
+    true = [f"{name} at {site}" for name, site in hidden.get("beside", [])]
+    true += [f"{hidden['effect']} at {hidden['at']}"] if hidden["at"] else []
+    say(f"what was hidden in the log: {', '.join(true) or 'nothing'}; found: {', '.join(found) or 'nothing'}")
     for name, value in {**hidden["parameters"], **truth["parameters"]}.items():
         if name in diagnosis.model.parameters:
             parameter = diagnosis.model.parameters[name]

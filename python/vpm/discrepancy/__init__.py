@@ -11,6 +11,7 @@ from vpm.discrepancy.diagnosis import (
     RefusedEffect,
     Step,
 )
+from vpm.discrepancy.evidence import Evidence
 
 __all__ = [
     "AcceptedEffect",
@@ -18,6 +19,7 @@ __all__ = [
     "ChannelGap",
     "Diagnosis",
     "EffectParameterEstimate",
+    "Evidence",
     "RankedCandidate",
     "RefusedEffect",
     "Step",

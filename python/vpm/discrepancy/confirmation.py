@@ -208,7 +208,17 @@ def _release(
 
 
 def is_clear(judged: Judged, own: tuple[str, ...]) -> bool:
-    """Whether an effect's linear parameters (its size) differ from zero together."""
+    """Whether an effect's linear parameters (its size) differ from zero together, for the shape that was found.
+
+    Size and shape of a law often make up for each other (a friction close to rest that is higher and fades sooner), and
+    where there is no size, there is no shape to be uncertain of.
+    """
     size = [n for n in own if judged.model.parameters[n].kind == "linear"] or list(own)
+    shape = [judged.free.index(name) for name in own if name not in size]
     index = [judged.free.index(name) for name in size]
-    return size_is_clear(size, judged.fit.values[index], judged.fit.covariance[np.ix_(index, index)])
+    full = judged.fit.covariance
+    covariance = full[np.ix_(index, index)]
+    if shape and np.all(np.isfinite(full[np.ix_(index + shape, index + shape)])):
+        across = full[np.ix_(index, shape)]
+        covariance = covariance - across @ np.linalg.pinv(full[np.ix_(shape, shape)], hermitian=True) @ across.T
+    return size_is_clear(size, judged.fit.values[index], covariance)

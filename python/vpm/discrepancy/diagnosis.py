@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from vpm.discrepancy.evidence import Evidence
 from vpm.identify import Fit
 from vpm.model import Model
 from vpm.results import Result, Storable
@@ -213,6 +214,10 @@ class Diagnosis(Result):
     pictures : tuple of Picture
     seconds : float
         Time it took.
+    interrupted : bool
+        Ctrl-C ended the search before every candidate was tried.
+    evidence : tuple of Evidence
+        For each accepted effect the residual over the state that it lives in, without it and with it.
     """
 
     verdict: str
@@ -231,6 +236,8 @@ class Diagnosis(Result):
     fit: Fit
     pictures: tuple[Picture, ...]
     seconds: float
+    interrupted: bool = False
+    evidence: tuple[Evidence, ...] = ()
 
     def to_dict(self) -> dict[str, object]:
         """Content of ``report.json``: plain numbers and text, SI; what is not known is null."""
@@ -266,6 +273,7 @@ class Diagnosis(Result):
             "steps": [_fields(step) for step in self.steps],
             "notes": list(self.notes),
             "seconds": self.seconds,
+            "interrupted": self.interrupted,
         }
         return document
 

@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TypeVar
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from vpm.discrepancy.candidates import Key, candidates
 from vpm.discrepancy.confirmation import Data, Judged, Trial, confirm, judge
 from vpm.discrepancy.diagnosis import Ambiguity, RankedCandidate, RefusedEffect
 from vpm.discrepancy.refusal import LEAST_GAIN, Thresholds, refuse_probe, refuse_trial
 from vpm.discrepancy.screening import Probe, probe
+from vpm.discrepancy.side_by_side import Failure, SideBySide
 from vpm.errors import DivergedError
 from vpm.identify import gain, segments
 
@@ -25,8 +22,8 @@ SHORT_LIST = 7
 #: An instrument is blamed for what the machine may have done only if it leaves less than this share of the gap.
 SENSOR_SHARE = 0.25
 
-Item = TypeVar("Item")
-Outcome = TypeVar("Outcome")
+#: A refinement leaves less than this share of the mean square that the plainer effect leaves.
+REFINED = 0.5
 
 #: Called with a sentence on what is being done.
 Tell = Callable[[str], None]
@@ -57,12 +54,13 @@ class Stage:
 
 @dataclass(frozen=True)
 class Search:
-    """Outcome of the whole search."""
+    """Outcome of the whole search, or of what was done of it when Ctrl-C was pressed."""
 
     stages: tuple[Stage, ...]
     accepted: tuple[Accepted, ...]
     refused: tuple[RefusedEffect, ...]
     ranking: tuple[RankedCandidate, ...]
+    interrupted: bool = False
 
     @property
     def final(self) -> Judged:
@@ -70,33 +68,46 @@ class Search:
         return self.stages[-1].judged
 
 
-def search(start: Judged, data: Data, effects: Sequence[str] | None, limit: int, tell: Tell) -> Search:
+def search(
+    start: Judged, data: Data, effects: Sequence[str] | None, limit: int, tell: Tell, each: SideBySide
+) -> Search:
     """Add effects one at a time, and drop earlier ones that later ones replace, until none is believed any more."""
     stages = [Stage("recalibrated", "", "", start)]
     accepted: list[Accepted] = []
     ranking: list[RankedCandidate] = []
     dropped: dict[Key, str] = {}
+    refused: dict[Key, str] = {}
+    interrupted = False
     for number in range(1, 2 * limit + 2):
-        outcome = _Round(stages[-1].judged, data, number, tell)
-        outcome.screen(effects, set(dropped))
-        outcome.confirm()
+        outcome = _Round(stages[-1].judged, data, number, tell, each)
+        try:
+            outcome.screen(effects, set(dropped))
+            outcome.confirm()
+        except KeyboardInterrupt:  # what the rounds before have found still holds
+            interrupted = True
+            break
         best = outcome.best() if len(accepted) < limit else None
         ranking += outcome.ranked()
+        refused = {**dropped, **outcome.refused}
         if best is None:
             break
         accepted.append(best)
         stages.append(Stage("added", *best.key, best.trial.judged))
         tell(f"round {number}: accepted {best.trial.probe.candidate.label}")
-        _drop_replaced(stages, accepted, data, dropped)
-    refused = {**dropped, **outcome.refused}
-    return Search(tuple(stages), tuple(accepted), _listed(refused), tuple(ranking))
+        try:
+            _drop_replaced(stages, accepted, data, dropped)
+        except KeyboardInterrupt:
+            interrupted = True
+            break
+    refused = {**dropped, **refused}
+    return Search(tuple(stages), tuple(accepted), _listed(refused), tuple(ranking), interrupted)
 
 
 class _Round:
     """One round of the search."""
 
-    def __init__(self, current: Judged, data: Data, number: int, tell: Tell) -> None:
-        self.current, self.data, self.number, self.tell = current, data, number, tell
+    def __init__(self, current: Judged, data: Data, number: int, tell: Tell, each: SideBySide) -> None:
+        self.current, self.data, self.number, self.tell, self.each = current, data, number, tell, each
         self.refused: dict[Key, str] = {}
         self._ranking: dict[Key, RankedCandidate] = {}
         self._promising: list[Probe] = []
@@ -108,8 +119,14 @@ class _Round:
         found = candidates(current.model, data.training, current.fit.residual, effects)
         listed = [c for c in found if c.key not in without]
         self.tell(f"round {self.number}: screening {len(listed)} candidates")
-        for result in _side_by_side(partial(probe, current.baseline, data.training), listed):
-            key = result.candidate.key
+        screen = partial(probe, current.baseline, data.training)
+        results = self.each(f"round {self.number}: screening", screen, listed, lambda c: c.label)
+        for candidate, result in zip(listed, results, strict=True):
+            key = candidate.key
+            if isinstance(result, Failure):
+                self._ranking[key] = RankedCandidate(*key, self.number, 0.0, float("nan"), accepted=False)
+                self.refused[key] = result.reason
+                continue
             self._ranking[key] = RankedCandidate(*key, self.number, result.drop, float("nan"), accepted=False)
             if reason := refuse_probe(result):
                 self.refused[key] = reason
@@ -124,8 +141,13 @@ class _Round:
             self.tell(f"round {self.number}: refitting with {', '.join(p.candidate.label for p in short_list)}")
         tried = len(self._ranking) * self.number
         thresholds = Thresholds(tried, min(m.dt for m in self.data.training.motions))
-        for trial in _side_by_side(partial(confirm, self.current, self.data), short_list):
-            key = trial.probe.candidate.key
+        refit = partial(confirm, self.current, self.data)
+        trials = self.each(f"round {self.number}: refitting", refit, short_list, lambda p: p.candidate.label)
+        for tried_one, trial in zip(short_list, trials, strict=True):
+            key = tried_one.candidate.key
+            if isinstance(trial, Failure):
+                self.refused[key] = trial.reason
+                continue
             self._ranking[key] = replace(self._ranking[key], unseen=trial.unseen.relative)
             if reason := refuse_trial(trial, thresholds):
                 self.refused[key] = reason
@@ -137,10 +159,15 @@ class _Round:
             )
 
     def best(self) -> Accepted | None:
-        """The candidate with the largest unseen gain per number; of those that are as good, the best simulation."""
+        """The candidate that leaves least for its numbers; of those that are as good, the best simulation.
+
+        One that refines another only takes its place if it leaves less than ``REFINED`` of what that leaves.
+        """
         if not self._believed:
             return None
-        first = max(self._believed, key=lambda t: t.score)
+        first = min(self._believed, key=_cost)
+        plain = [t for t in self._believed if _plainer(t, first)]
+        first = min(plain, key=_cost) if plain else first
         equals = [t for t in self._believed if _as_good(t, first)]
         chosen = min(equals, key=_evidence)
         key = chosen.probe.candidate.key
@@ -150,6 +177,25 @@ class _Round:
     def ranked(self) -> list[RankedCandidate]:
         """Candidates of this round, the most promising first."""
         return sorted(self._ranking.values(), key=lambda c: -c.screened)
+
+
+def _left(trial: Trial) -> float:
+    """Share of the unseen mean square that a trial leaves."""
+    return max(1.0 - trial.unseen.relative, 1e-12)
+
+
+def _cost(trial: Trial) -> float:
+    """Information criterion of G. Schwarz (*Annals of Statistics* 6, 1978) per independent piece of the unseen data."""
+    pieces = max(trial.unseen.pieces, 3)
+    return float(np.log(_left(trial)) + len(trial.parameters) * np.log(pieces) / pieces)
+
+
+def _plainer(trial: Trial, first: Trial) -> bool:
+    """Whether a trial says in fewer numbers nearly what ``first`` says, at the same site and confusable with it."""
+    mine, other = trial.probe.candidate, first.probe.candidate
+    alike = other.effect.name in mine.effect.confused_with or mine.effect.name in other.effect.confused_with
+    fewer = len(trial.parameters) < len(first.parameters)
+    return mine.site == other.site and alike and fewer and REFINED * _left(trial) <= _left(first)
 
 
 def _as_good(trial: Trial, first: Trial) -> bool:
@@ -192,15 +238,6 @@ def _drop_replaced(stages: list[Stage], accepted: list[Accepted], data: Data, dr
             accepted.remove(entry)
             stages.append(Stage("removed", *entry.key, reduced))
             dropped[entry.key] = f"it is not needed any more beside {newest.trial.probe.candidate.label}"
-
-
-def _side_by_side(work: Callable[[Item], Outcome], items: Sequence[Item]) -> list[Outcome]:
-    """Results in the order of the items; the core lets go of the interpreter, so threads use all processors.
-
-    The linear algebra inside is small: with threads of its own it would only take the processors from the others.
-    """
-    with threadpool_limits(1, user_api="blas"), ThreadPoolExecutor(os.cpu_count()) as pool:
-        return list(pool.map(work, items))
 
 
 def _listed(refused: dict[Key, str]) -> tuple[RefusedEffect, ...]:

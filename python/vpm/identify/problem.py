@@ -13,7 +13,7 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import maximum_filter1d
+from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from vpm.errors import IdentificationError, near_match
 from vpm.experiment import Experiment, Motion, parallel_filter
@@ -29,10 +29,15 @@ Array = NDArray[np.float64]
 
 #: A joint stands still where it is slower than this share of its largest speed for two decimated samples on end.
 STANDSTILL_SHARE = 0.005
+#: A drive rests where its joint is slower than this share of its largest speed, in the mean over this time, s.
+REST_SHARE, REST_TIME = 0.03, 0.1
 #: A record with fewer samples after decimation says nothing about anything.
 FEWEST_SAMPLES = 12
 #: Modes that simulate a record as a whole from its first sample.
 WHOLE = ("free_run", "closed_loop")
+#: Retained samples at each end of a record in which the parallel filter settles: its ringing falls to a fifth or less
+#: from one retained sample to the next.
+SETTLING = 4
 
 
 @dataclass(frozen=True)
@@ -220,13 +225,37 @@ class InverseDynamicsProblem:
             efforts = np.sqrt(np.average(applied**2, axis=0, weights=moving[record]))
             spread = np.std(parallel_filter(self._measured(experiment, m), m.decimation), axis=0)
             sizes.append(np.concatenate([efforts, spread]))
-            moving[record] = np.hstack([moving[record], np.ones((len(applied), len(self.shown)))])
+            settled = _settled(len(applied), m.decimation)
+            columns = [self._counts(model, channel, record, settled) for channel in self.shown]
+            moving[record] = np.column_stack([moving[record], *columns])
         return sizes, moving
+
+    def _counts(self, model: Model, channel: str, record: int, settled: Array) -> Array:
+        """Which samples of a shown channel count: those of a drive not while its joint rests.
+
+        What a shut valve encloses drifts with the smallest leak, and whatever load dry friction takes up does not show.
+        """
+        owner = channel.rpartition(".")[0]
+        if owner not in model.actuators:
+            return settled
+        joints = [self.joints.index(joint) for joint in model.joints_of_actuator(owner) if joint in self.joints]
+        return np.asarray(settled * np.prod(self._busy(record)[:, joints], axis=1))
+
+    def _busy(self, record: int) -> Array:
+        """(n, joints): 0 where a joint is slow in the mean over ``REST_TIME``: noise does not pass for motion."""
+        speeds = [np.abs(m.velocity[m.kept][:, self._joints]) for m in self.motions]
+        largest = np.max([np.quantile(speed, 0.999, axis=0) for speed in speeds], axis=0)
+        m = self.motions[record]
+        width = max(1, round(REST_TIME / m.dt))
+        mean = np.abs(uniform_filter1d(m.velocity[m.kept][:, self._joints], width, axis=0))
+        moving = maximum_filter1d(mean, width, axis=0) > REST_SHARE * largest
+        busy = moving[:: m.decimation].astype(np.float64)
+        return busy if busy.mean() >= 0.5 else np.ones_like(busy)
 
     def _moving(self, model: Model) -> list[Array]:
         """For each record (n, joints): 1 where a joint moves, 0 where it stands still; all 1 if it mostly stands.
 
-        0 as well where a piston that moves it touches an end of its stroke.
+        Zero too where the parallel filter settles, and where a piston that moves it touches an end of its stroke.
         """
         speeds = [np.abs(m.velocity[m.kept][:, self._joints]) for m in self.motions]
         largest = np.max([np.quantile(speed, 0.999, axis=0) for speed in speeds], axis=0)
@@ -237,7 +266,8 @@ class InverseDynamicsProblem:
         mostly = np.mean(np.vstack(masks), axis=0) >= 0.5
         free = [self._free(model, record) for record in range(len(masks))]
         return [
-            (np.where(mostly, mask, True) & away).astype(np.float64) for mask, away in zip(masks, free, strict=True)
+            (np.where(mostly, mask, True) & away) * _settled(len(mask), m.decimation)[:, None]
+            for mask, away, m in zip(masks, free, self.motions, strict=True)
         ]
 
     def _free(self, model: Model, record: int) -> NDArray[np.bool_]:
@@ -258,6 +288,16 @@ class InverseDynamicsProblem:
         columns = [record[:, c] for record in records for c in range(record.shape[1])]
         scaled = zip(columns, self.blocks, strict=True)
         return np.concatenate([(x.T * (block.weight * block.moving)).T for x, block in scaled])
+
+
+def _settled(samples: int, decimation: int) -> Array:
+    """1 for retained samples behind and ahead of which the parallel filter has all that it needs, else 0.
+
+    A short record keeps its ends: what little there is has to do.
+    """
+    ends = SETTLING if decimation > 1 and samples >= 3 * FEWEST_SAMPLES else 0
+    place = np.arange(samples)
+    return ((place >= ends) & (place < samples - ends)).astype(np.float64)
 
 
 def _standing(speed: Array, limit: Array, samples: int) -> NDArray[np.bool_]:

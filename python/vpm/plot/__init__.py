@@ -1,6 +1,7 @@
 """Pictures of results. Needs the extra ``plot``; each function returns a matplotlib figure and opens no window."""
 
 from vpm.plot.bars import plot_candidates, plot_gap, plot_ladder, plot_parameters, plot_step_cost
+from vpm.plot.evidence import plot_evidence
 from vpm.plot.impedance import plot_impedances, plot_loops
 from vpm.plot.inertial import plot_inertial
 from vpm.plot.linear import plot_bode, plot_poles
@@ -24,6 +25,7 @@ __all__ = [
     "plot_channels",
     "plot_comparison",
     "plot_correlation",
+    "plot_evidence",
     "plot_gap",
     "plot_impedances",
     "plot_inertial",

@@ -8,9 +8,20 @@ from math import isnan
 from os import PathLike
 from pathlib import Path
 
-from vpm.discrepancy import Diagnosis
+import numpy as np
+
+from vpm.catalogue import EFFECTS
+from vpm.catalogue.signature import signature_of
+from vpm.discrepancy import Diagnosis, Evidence
 from vpm.errors import MissingExtraError
-from vpm.plot import figure_to_svg, plot_candidates, plot_gap, plot_residual_against, plot_residual_time
+from vpm.plot import (
+    figure_to_svg,
+    plot_candidates,
+    plot_evidence,
+    plot_gap,
+    plot_residual_against,
+    plot_residual_time,
+)
 from vpm.report.story import VERDICT_WORDS
 from vpm.simplify import Ladder
 
@@ -83,7 +94,35 @@ def render_html(diagnosis: Diagnosis, ladder: Ladder | None = None) -> str:
     template = environment.from_string((files("vpm.report") / "report.html.jinja").read_text(encoding="utf-8"))
     words = VERDICT_WORDS[diagnosis.verdict]
     way_down = figure_to_svg(ladder.plot()) if ladder is not None else ""
-    return template.render(d=diagnosis, words=words, figures=_figures(diagnosis), ladder=ladder, way_down=way_down)
+    return template.render(
+        d=diagnosis,
+        words=words,
+        evidence=_evidence(diagnosis),
+        figures=_figures(diagnosis),
+        ladder=ladder,
+        way_down=way_down,
+    )
+
+
+def _evidence(diagnosis: Diagnosis) -> dict[tuple[str, str], tuple[str, str]]:
+    """Picture and caption of each finding, by effect and site."""
+    return {(e.effect, e.site): (figure_to_svg(plot_evidence(e)), _caption(e)) for e in diagnosis.evidence}
+
+
+def _caption(evidence: Evidence) -> str:
+    """What is to be seen, what is drawn, and what it is not."""
+    entry = EFFECTS.get(evidence.effect)
+    looks = (entry.signature if entry is not None else signature_of(evidence.effect)).looks
+    law = f" {entry.law}" if entry is not None else ""
+    unit = evidence.unit
+    before, after = (float(np.sqrt(np.mean(r**2))) for r in (evidence.without, evidence.repaired))
+    floor = "" if isnan(evidence.noise_floor) else f"; noise alone leaves {evidence.noise_floor:.3g} {unit}"
+    return (
+        f"{evidence.effect} at {evidence.site} on {evidence.record}, which was never fitted. What it looks like: "
+        f"{looks[0].lower()}{looks[1:]}. Points: residual of {evidence.channel} at the retained samples, without the "
+        f"effect (all other parameters as fitted with it) and with it. Black: the fitted law{law}. Root mean square "
+        f"{before:.3g} {unit} without it, {after:.3g} {unit} with it{floor}."
+    )
 
 
 def _figures(diagnosis: Diagnosis) -> list[tuple[str, str]]:

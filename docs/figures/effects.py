@@ -1,0 +1,289 @@
+"""The page docs/catalogue.md and its pictures: what each effect of the catalogue does to a residual, by the package.
+
+python docs/figures/effects.py [FOLDER]
+
+A machine follows a motion of several sines, under the commands that its nominal model needs for that. Drawn is what the
+effect adds to the residual, effort applied less effort required, at every sample. A new entry needs a line in `SHOWN`.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from matplotlib import rc_context
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+import vpm
+from vpm.catalogue import EFFECTS, EffectParameter, EffectType
+from vpm.discrepancy.view import View
+from vpm.identify import InverseDynamicsProblem
+from vpm.plot.style import BLUE, SOFT, label, panels, styled
+
+HERE = Path(__file__).resolve().parent
+
+Array = NDArray[np.float64]
+
+#: Values that are drawn, and what the machine has besides; a link of 1.8 kg swings by about 1 rad under 1.6 N m/A.
+SHOWN: Mapping[str, dict[str, float]] = {
+    "viscous_friction": {"viscous": 0.3},
+    "coulomb_friction": {"coulomb": 0.5, "transition_velocity": 0.02},
+    "asymmetric_friction": {"coulomb_difference": 0.2, "viscous_difference": 0.2, "transition_velocity": 0.05},
+    "stribeck_friction": {"stribeck": 0.4, "stribeck_velocity": 0.6, "transition_velocity": 0.05},
+    "bias_force": {"force": 0.4},
+    "spring": {"stiffness": 1.5, "rest": 0.3},
+    "torque_ripple": {"period": 0.39, "cosine": 0.3, "sine": 0.25},
+    "hysteresis": {"force": 0.5, "displacement": 0.2},
+    "joint_compliance": {"stiffness": 60.0, "damping": 0.3, "inertia": 0.02},
+    "backlash": {"gap": 0.05, "stiffness": 300.0, "damping": 4.0, "inertia": 0.01},
+    "rotor_inertia": {"inertia": 0.02},
+    "end_stop": {"stiffness": 20.0, "damping": 0.1, "low": -10.0, "high": 0.7},
+    "payload": {"mass": 0.4, "x": 0.3, "y": 0.0, "z": 0.1},
+    "link_flexibility": {"stiffness": 60.0, "time": 0.005},
+    "structural_damping": {"time": 0.001},
+    "gravity_tilt": {"first": 0.0, "second": 0.1},
+    "input_delay": {"time": 0.005},
+    "dead_zone": {"width": 0.25},
+    "saturation": {"limit": 1.5},
+    "actuator_lag": {"time_constant": 0.02},
+    "sensor_offset": {"value": 0.06},
+    "sensor_gain": {"value": 1.08},
+    "sensor_delay": {"time": 0.005},
+    "internal_leakage": {"coefficient": 3e-12},
+    "valve_dynamics": {"time": 0.002},
+    "entrained_air": {"fraction": 0.02},
+    "supply_drop": {"resistance": 3e10, "time_constant": 0.002},
+}
+
+SITES = {
+    "joint": "shoulder",
+    "body": "arm",
+    "link": "arm",
+    "beam": "strip",
+    "actuator": "motor",
+    "sensor": "encoder",
+    "cylinder": "servo",
+    "supply": "pump",
+    "world": "world",
+}
+
+#: A strip of aluminium at the end of the link: its first bending at about 5 Hz.
+STRIP = {
+    "parent": "arm",
+    "translation": [0.3, 0.0, 0.0],
+    "rotation": [0.0, np.pi / 2, 0.0],
+    "length": 0.5,
+    "level": "modal(1)",
+    "deforms": ["bending_y"],
+    "material": {"young": 7e10, "poisson": 0.33, "density": 2700.0},
+    "section": {"shape": "rectangle", "width": 0.0015, "height": 0.03},
+}
+
+#: What sits at these is shown on the rig of a servo-cylinder, by the pressure of its first chamber.
+HYDRAULIC = ("cylinder", "supply")
+RIG = HERE.parent.parent / "examples" / "servo_cylinder" / "rig.toml"
+
+SINES = ((0.62, 1.3, 0.0), (0.38, 2.9, 1.9), (0.22, 5.3, 0.6), (0.10, 9.1, 2.4), (0.05, 15.7, 4.0))
+
+
+def nominal(effect: str) -> vpm.Model:
+    """One link on a horizontal axis, with what the effect corrects; a beam or a cylinder for what needs it."""
+    if EFFECTS[effect].site in HYDRAULIC:
+        return vpm.Model.load(RIG)
+    content = {
+        "name": "arm",
+        "gravity": [0.0, 0.0, -9.81],
+        "bodies": {"arm": {"mass": 1.8, "center_of_mass": [0.22, 0, 0], "inertia": [0.03, 0.035, 0.05, 0, 0, 0]}},
+        "joints": {
+            "shoulder": {
+                "type": "revolute",
+                "parent": "world",
+                "child": "arm",
+                "axis": [0, 1, 0],
+                "rotation": [0, np.pi / 2, 0],
+            }
+        },
+        "actuators": {"motor": {"joint": "shoulder", "gain": 1.6, "command_unit": "A"}},
+        "sensors": {"encoder": {"measures": "shoulder.position"}},
+    }
+    if EFFECTS[effect].site == "beam":
+        content["beams"] = {"strip": STRIP}
+    requires = EFFECTS[effect].requires
+    model = vpm.Model.from_dict(content)
+    return model if requires is None else model.with_effect(requires, at="shoulder", **SHOWN[requires])
+
+
+def followed(model: vpm.Model, kind: str, step: float = 0.002) -> vpm.Experiment:
+    """Five sines, the same slowly, or a chirp up to 40 Hz of equal acceleration, and the commands that it needs."""
+    model = model.at("rigid") if model.beams else model
+    if kind == "chirp":
+        time = np.arange(0.0, 20.0, step)
+        rate = 2.0 * np.pi * (1.0 + 39.0 * time / 20.0)
+        q = 40.0 * np.sin(np.cumsum(rate) * step) / rate**2
+        v, a = np.gradient(q, step), np.gradient(np.gradient(q, step), step)
+    else:
+        time = np.arange(0.0, 12.0, step)
+        slow = 0.4 if kind == "slow" else 1.0
+        sines = [(size, slow * rate, phase) for size, rate, phase in SINES]
+        q, v, a = (sum(c * w**k * np.sin(w * time + p + k * np.pi / 2) for c, w, p in sines) for k in range(3))
+    columns = [each[:, None] for each in (q, v, a, np.zeros(time.size))]
+    required = model.core.inverse_dynamics(model.theta, *columns, step, [])[0]
+    values = {"shoulder.position": q, "motor.command": required[:, 0] / 1.6}
+    return vpm.Experiment.from_arrays(time, values, {"shoulder.position": "rad", "motor.command": "A"}, model=model)
+
+
+def pumped(model: vpm.Model, step: float = 0.0005) -> vpm.Experiment:
+    """The servo-cylinder under three sines of current, with its pressures, as the model simulates it."""
+    time = np.arange(0.0, 2.0, step)
+    current = 1e-3 * (1.2 * np.cos(9.0 * time) + 0.6 * np.sin(31.0 * time + 1.0) + 0.3 * np.sin(77.0 * time))
+    given = vpm.Experiment.from_arrays(
+        time,
+        {"servo.command": current, "axis.position": 0.0 * time},
+        {"servo.command": "A", "axis.position": "m"},
+        model=model,
+    )
+    run = vpm.simulate(model, given, "free_run")
+    shown = ("axis.position", "servo.pressure_a", "servo.pressure_b")
+    values = {"servo.command": current, **{name: run[name] for name in shown}}
+    units = {"servo.command": "A", "axis.position": "m", "servo.pressure_a": "Pa", "servo.pressure_b": "Pa"}
+    return vpm.Experiment.from_arrays(time, values, units, model=model)
+
+
+def motion_for(name: str) -> str:
+    """The motion that shows an effect."""
+    if EFFECTS[name].signature.lives_in[0] == "frequency":
+        return "chirp"
+    return "slow" if name == "backlash" else "sines"
+
+
+def view(name: str) -> tuple[View, Array]:
+    """The record as seen from the effect, and what the effect adds to the residual of the joint at every sample."""
+    without = nominal(name)
+    site = SITES[EFFECTS[name].site]
+    model = without.with_effect(name, at=site, **SHOWN[name])
+    if EFFECTS[name].site in HYDRAULIC:
+        problem = InverseDynamicsProblem(without, [pumped(without)], cutoff=300.0)
+        seen = View(model, (name, site), problem, 0, "servo.pressure_a", fine=True)
+        return seen, seen.channel(without) - seen.channel(model)
+    kind = motion_for(name)
+    problem = InverseDynamicsProblem(without, [followed(without, kind)], cutoff=100.0 if kind == "chirp" else 40.0)
+    seen = View(model, (name, site), problem, 0, "shoulder.effort", fine=True)
+    return seen, seen.channel(without) - seen.channel(model)
+
+
+@styled
+def draw(name: str) -> Figure:
+    """The signature of one effect over the state that it lives in."""
+    seen, added = view(name)
+    figure, axes = panels(1, height=2.0, width=5.0)
+    axis = axes[0][0]
+    kind, words, unit, values = seen.best(added, np.ones(added.size, dtype=np.bool_))
+    if kind == "frequency":
+        from scipy.signal import welch
+
+        time = values
+        values, power = welch(added, 1.0 / float(time[1] - time[0]), nperseg=2048)
+        # A modelled beam without damping rings on at its first frequency, and at multiples of it where it bends far.
+        shown = (values > 1.0) & (values < (10.0 if EFFECTS[name].site == "beam" else 36.0))
+        values, added = values[shown], np.sqrt(power[shown])
+        words, unit = "frequency", "Hz"
+        axis.set_yscale("log")
+    thin = slice(None, None, 1 if kind == "frequency" else 3)
+    axis.plot(values[thin], added[thin], color=BLUE, linewidth=1.1)
+    axis.axhline(0.0, color=SOFT, linewidth=0.7)
+    axis.set_xlabel(label(words.replace(" of shoulder", "").replace(" of motor", ""), unit))
+    effort = "Pa" if EFFECTS[name].site in HYDRAULIC else "N m"
+    axis.set_ylabel(label("residual", f"{effort}/√Hz" if kind == "frequency" else effort))
+    return figure
+
+
+INTRODUCTION = """# The catalogue of effects
+
+<!-- Written by docs/figures/effects.py (make figures) from vpm.catalogue: change it there. -->
+
+Every effect that a model file may contain and a diagnosis may name. Each section has the law; its parameters (bounds
+are what physics allows; *slanted* is what shapes a law whose size another parameter gives); what the effect adds to a
+residual, applied less required effort, drawn for one link on a horizontal axis that follows five sines or a chirp, or
+for a servo-cylinder; and what records may take it for, with what parts the two. Units follow the site: C is m or rad, E
+is N or N m, U the unit of the command, S that of the sensor. Keys of a model file: [model-file.md](model-file.md); what
+a diagnosis does with the entries: [diagnosis.md](diagnosis.md).
+"""
+
+
+def page() -> str:
+    """Text of docs/catalogue.md, a section for each entry."""
+    lines = [INTRODUCTION]
+    for site in dict.fromkeys(effect.site for effect in EFFECTS.values()):
+        names = [f"[{e.name}](#{e.name})" for e in EFFECTS.values() if e.site == site]
+        lines.append(f"- at {_article(site)}: {', '.join(names)}")
+    for effect in EFFECTS.values():
+        lines += ["", *_section(effect)]
+    return "\n".join(lines) + "\n"
+
+
+def _section(effect: EffectType) -> list[str]:
+    signature = effect.signature
+    lines = [
+        f"## {effect.name}",
+        "",
+        f"{effect.title[0].upper()}{effect.title[1:]}, at {_article(effect.site)}: `{effect.law}`",
+        "",
+    ]
+    if effect.requires:
+        lines += [f"A correction of [{effect.requires}](#{effect.requires}), which has to be there.", ""]
+    if effect.name in SHOWN:
+        lines += [f"![What {effect.title} does to a residual](figures/effects/{effect.name}.svg)", ""]
+    axes = ", ".join(axis.replace("_", " ") for axis in signature.lives_in)
+    lines += [f"**Looks like**, over {axes}: {signature.looks[0].lower()}{signature.looks[1:]}.", ""]
+    lines += ["| parameter | unit | bounds | meaning |", "| --- | --- | --- | --- |"]
+    lines += [_row(parameter) for parameter in effect.parameters]
+    lines += [
+        "",
+        f"**Impossible:** {effect.impossible}.",
+        "",
+        f"**Shown best by:** {signature.excite[0].lower()}{signature.excite[1:]}.",
+    ]
+    if effect.confused_with:
+        lines += ["", "**Taken for:**", ""]
+        lines += [f"- [{other}](#{other}): {how}." for other, how in effect.confused_with.items()]
+    return lines
+
+
+def _article(site: str) -> str:
+    if site == "world":
+        return "the world"
+    return f"an {site}" if site[0] in "aeiou" else f"a {site}"
+
+
+def _row(parameter: EffectParameter) -> str:
+    unit = parameter.unit.replace("{", "").replace("}", "")
+    name = f"*`{parameter.name}`*" if parameter.shape else f"`{parameter.name}`"
+    low, high = parameter.physical
+    if np.isinf(low) and np.isinf(high):
+        bounds = "any"
+    elif np.isinf(high):
+        bounds = "above 0" if low > 0.0 else f"{low:g} or more"
+    else:
+        bounds = f"{low:.3g} to {high:.3g}"
+    return f"| {name} | {unit} | {bounds} | {parameter.meaning} |"
+
+
+def main(folder: Path) -> None:
+    """Write the pictures, and the page beside their folder."""
+    pictures = folder / "effects"
+    pictures.mkdir(parents=True, exist_ok=True)
+    for name in EFFECTS:
+        if name in SHOWN:
+            with rc_context({"svg.fonttype": "none", "svg.hashsalt": name}):
+                draw(name).savefig(pictures / f"{name}.svg", metadata={"Date": None, "Creator": None})
+            print(f"wrote {pictures / name}.svg")
+    text = folder.parent / "catalogue.md"
+    text.write_text(page(), encoding="utf-8", newline="\n")
+    print(f"wrote {text}")
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]) if len(sys.argv) > 1 else HERE)

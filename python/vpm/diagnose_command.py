@@ -1,0 +1,136 @@
+"""Command line of the diagnosis: ``vpm diagnose``."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+from vpm.command import (
+    Channels,
+    Cutoff,
+    Integrator,
+    Interpolate,
+    Logs,
+    ModelPath,
+    console,
+    errors,
+    load_all,
+    load_record,
+)
+
+EXAMPLES = (
+    "Example:  vpm diagnose model.toml train.csv --validate test.csv --out report/\n\n"
+    "Example:  vpm diagnose model.toml a.csv b.csv --effect coulomb_friction --effect backlash --cutoff 40\n\n"
+    "Example:  vpm diagnose model.toml train.csv --without sensor_delay --limit 2 --workers 1"
+)
+
+Words = list[str] | None
+Validate = Annotated[
+    list[Path] | None, typer.Option(help="Record that is never fitted; repeat. Default: 30 % of each log.")
+]
+Out = Annotated[Path, typer.Option(help="Folder for report.json, report.html and the repaired model.")]
+Effect = Annotated[Words, typer.Option(help="Try only these effects; repeat.")]
+Without = Annotated[Words, typer.Option(help="Try all effects but these; repeat.")]
+Limit = Annotated[int, typer.Option(min=0, help="Most effects to accept.")]
+Workers = Annotated[int, typer.Option(min=0, help="Candidates at a time; 0 for one per core. The result is the same.")]
+Substeps = Annotated[int, typer.Option(min=1, help="Integration steps per sample, in simulations of unseen records.")]
+Horizon = Annotated[float, typer.Option(help="Length of each restart, where unseen records are simulated so, s.")]
+
+Tell = Callable[[str], None]
+Each = Callable[[str, str, int, int], None]
+
+
+def diagnose(
+    model: ModelPath,
+    logs: Logs,
+    validate: Validate = None,
+    out: Out = Path("report"),
+    effect: Effect = None,
+    without: Without = None,
+    limit: Limit = 6,
+    channels: Channels = None,
+    interpolate: Interpolate = False,
+    cutoff: Cutoff = None,
+    integrator: Integrator = "auto",
+    substeps: Substeps = 1,
+    horizon: Horizon = 0.25,
+    workers: Workers = 0,
+) -> None:
+    """Name the physical effect that a model is missing, with evidence on unseen data.
+
+    Ctrl-C ends the search and reports what is known until then.
+    """
+    from vpm.discrepancy import diagnose as find_missing
+    from vpm.report import print_story, write_report
+    from vpm.simulate import Setup
+
+    names = _tried(effect, without)
+    machine, records = load_all(model, logs, channels, interpolate)
+    unseen = [load_record(path, machine, channels, interpolate) for path in validate or []]
+    with shown(errors) as (tell, each):
+        diagnosis = find_missing(
+            machine,
+            records,
+            unseen or None,
+            effects=names,
+            cutoff=cutoff,
+            setup=Setup(integrator, substeps, horizon),
+            limit=limit,
+            workers=workers or None,
+            tell=tell,
+            progress=each,
+        )
+    print_story(diagnosis, console)
+    for path in write_report(diagnosis, out):
+        console.print(f"wrote {path}", markup=False)
+
+
+@contextmanager
+def shown(console_of_errors: Console) -> Iterator[tuple[Tell, Each]]:
+    """A bar of the candidates of each round; a line each where the output goes to a file."""
+    if not console_of_errors.is_terminal:
+        yield (
+            lambda text: console_of_errors.print(text, markup=False),
+            lambda what, name, done, total: console_of_errors.print(f"{what} {done} of {total}: {name}", markup=False),
+        )
+        return
+    words = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[name]}"))
+    with Progress(*words, TimeElapsedColumn(), console=console_of_errors, transient=True) as bar:
+        task = bar.add_task("starting", total=None, name="")
+
+        def tell(text: str) -> None:
+            bar.update(task, description=text, completed=0, total=None, name="")
+
+        def each(what: str, name: str, done: int, total: int) -> None:
+            bar.update(task, description=what, completed=done, total=total, name=name)
+
+        yield tell, each
+
+
+def _tried(only: list[str] | None, without: list[str] | None) -> list[str] | None:
+    """Names of the effects to try; None for all.
+
+    Raises
+    ------
+    DiagnosisError
+        Nothing is left to try, or what is to be left out was never in.
+    """
+    from vpm.catalogue import EFFECTS
+    from vpm.errors import DiagnosisError, near_match
+
+    if not without:
+        return only or None
+    given = only or [effect.name for effect in EFFECTS.values() if effect.screened]
+    for name in without:
+        if name not in given:
+            raise DiagnosisError(f'--without: "{name}" is not among the effects to try; {near_match(name, given)}')
+    left = [name for name in given if name not in without]
+    if not left:
+        raise DiagnosisError("--without leaves no effect to try; leave fewer out")
+    return left
