@@ -85,7 +85,10 @@ def diagnose(
     limit : int
         Most effects to accept.
     tell : callable, optional
-        Called with a sentence at every step; an exception raised there ends the diagnosis.
+        Called with a sentence at every step and for every candidate that was refitted, from several threads; an
+        exception raised there ends the diagnosis.
+
+    Ctrl-C during the search ends it with what is known so far, see `Diagnosis.interrupted`.
 
     Returns
     -------
@@ -115,6 +118,8 @@ def diagnose(
     recalibrated = judge(model, (*free, *transitions), data, transitions)
     notes.extend(_moved_far(model, recalibrated))
     found = search(recalibrated, data, effects, limit, say)
+    if found.interrupted:
+        notes.append("interrupted: what was accepted until then stands, and more may be missing")
     say("measuring the noise floor")
     floor = noise_floor(found.final.model, data.unseen, found.final.unseen, mode, setup)
     left = structure(found.final.model, data.training, data.unseen, found.final.fit.residual, found.final.unseen)
@@ -137,6 +142,7 @@ def diagnose(
         fit_of(found.final.model, data.training, found.final.fit, nominal.fit.residual, [e.name for e in training]),
         _pictures(data, nominal, recalibrated, found.final),
         time.perf_counter() - began,
+        found.interrupted,
     )
 
 
@@ -264,8 +270,8 @@ def _verdict(
         return (
             "unexplained",
             f"The residual is structured and {above:.2g} times the noise floor. The effects of the catalogue that come "
-            f"closest, {names}, leave {100.0 * rest_of:.0f} % of its mean square: they are not the explanation. Error on "
-            f"unseen data: {numbers}, {_percent(worst.after, worst)} after.",
+            f"closest, {names}, leave {100.0 * rest_of:.0f} % of its mean square: they are not the explanation. Error "
+            f"on unseen data: {numbers}, {_percent(worst.after, worst)} after.",
         )
     if found.accepted:
         rest = " A structured residual above the noise remains." if remaining else ""
@@ -279,8 +285,9 @@ def _verdict(
             f"The residual is structured and {above:.2g} times the noise floor, and no effect of the catalogue "
             f"explains it. Error on unseen data: {numbers}.",
         )
+    agrees = max((g.before / g.noise_floor if g.noise_floor > 0.0 else np.inf) for g in main) <= FLOOR_FACTOR
     better = gain(nominal.unseen, recalibrated.unseen, segments(data.unseen))
-    if better.relative > LEAST_GAIN and better.score > float(ndtri(1.0 - FALSE_ALARM_LEVEL)):
+    if not agrees and better.relative > LEAST_GAIN and better.score > float(ndtri(1.0 - FALSE_ALARM_LEVEL)):
         return (
             "parameters_only",
             f"Nothing is missing: other values of the known parameters close the gap. Error on unseen data: {numbers}.",

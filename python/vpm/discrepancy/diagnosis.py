@@ -213,6 +213,8 @@ class Diagnosis(Result):
     pictures : tuple of Picture
     seconds : float
         Time it took.
+    interrupted : bool
+        Ctrl-C ended the search: the effects are those accepted until then, and there may be more.
     """
 
     verdict: str
@@ -231,6 +233,7 @@ class Diagnosis(Result):
     fit: Fit
     pictures: tuple[Picture, ...]
     seconds: float
+    interrupted: bool = False
 
     def to_dict(self) -> dict[str, object]:
         """Content of ``report.json``: plain numbers and text, SI; what is not known is null."""
@@ -266,6 +269,7 @@ class Diagnosis(Result):
             "steps": [_fields(step) for step in self.steps],
             "notes": list(self.notes),
             "seconds": self.seconds,
+            "interrupted": self.interrupted,
         }
         return document
 

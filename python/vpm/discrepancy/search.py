@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import TypeVar
@@ -19,6 +17,7 @@ from vpm.discrepancy.refusal import LEAST_GAIN, Thresholds, refuse_probe, refuse
 from vpm.discrepancy.screening import Probe, probe
 from vpm.errors import DivergedError
 from vpm.identify import gain, segments
+from vpm.identify.parallel import in_order, worker_count
 
 #: Candidates refitted in one round.
 SHORT_LIST = 7
@@ -66,6 +65,7 @@ class Search:
     accepted: tuple[Accepted, ...]
     refused: tuple[RefusedEffect, ...]
     ranking: tuple[RankedCandidate, ...]
+    interrupted: bool = False
 
     @property
     def final(self) -> Judged:
@@ -79,20 +79,31 @@ def search(start: Judged, data: Data, effects: Sequence[str] | None, limit: int,
     accepted: list[Accepted] = []
     ranking: list[RankedCandidate] = []
     dropped: dict[Key, str] = {}
-    for number in range(1, 2 * limit + 2):
+    refused: dict[Key, str] = {}
+    interrupted = start.fit.interrupted
+    for number in range(1, 0 if interrupted else 2 * limit + 2):
         outcome = _Round(stages[-1].judged, data, number, tell)
-        outcome.screen(effects, set(dropped))
-        outcome.confirm()
-        best = outcome.best() if len(accepted) < limit else None
+        best = None
+        try:
+            outcome.screen(effects, set(dropped))
+            outcome.confirm()
+            best = outcome.best() if len(accepted) < limit else None
+        except KeyboardInterrupt:
+            interrupted = True
         ranking += outcome.ranked()
+        refused = outcome.refused
         if best is None:
             break
         accepted.append(best)
         stages.append(Stage("added", *best.key, best.trial.judged))
         tell(f"round {number}: accepted {best.trial.probe.candidate.label}")
-        _drop_replaced(stages, accepted, data, dropped)
-    refused = {**dropped, **outcome.refused}
-    return Search(tuple(stages), tuple(accepted), _listed(refused), tuple(ranking))
+        try:
+            _drop_replaced(stages, accepted, data, dropped)
+        except KeyboardInterrupt:
+            interrupted = True
+            break
+    listed = _listed({**dropped, **refused})
+    return Search(tuple(stages), tuple(accepted), listed, tuple(ranking), interrupted)
 
 
 class _Round:
@@ -127,7 +138,7 @@ class _Round:
             self.tell(f"round {self.number}: refitting with {', '.join(p.candidate.label for p in short_list)}")
         tried = len(self._ranking) * self.number
         thresholds = Thresholds(tried, min(m.dt for m in self.data.training.motions))
-        for trial in _side_by_side(partial(confirm, self.current, self.data), short_list):
+        for trial in _side_by_side(self._confirm, short_list):
             key = trial.probe.candidate.key
             self._ranking[key] = replace(self._ranking[key], unseen=trial.unseen.relative)
             if reason := refuse_trial(trial, thresholds):
@@ -138,6 +149,12 @@ class _Round:
             self.refused[result.candidate.key] = (
                 f"{SHORT_LIST} candidates explain more of the training residual, and none of them was enough"
             )
+
+    def _confirm(self, result: Probe) -> Trial:
+        trial = confirm(self.current, self.data, result)
+        share = f"{100.0 * trial.unseen.relative:.3g} % of the unseen mean square"
+        self.tell(f"round {self.number}: {result.candidate.label} takes away {share}")
+        return trial
 
     def best(self) -> Accepted | None:
         """The candidate that leaves least for its numbers; of those that are as good, the best simulation.
@@ -156,8 +173,17 @@ class _Round:
         return Accepted(chosen, tuple(t.probe.candidate.label for t in equals if t is not chosen))
 
     def ranked(self) -> list[RankedCandidate]:
-        """Candidates of this round, the most promising first."""
-        return sorted(self._ranking.values(), key=lambda c: -c.screened)
+        """Candidates of this round: what was accepted, what helped on unseen data, then by what screening promises."""
+        return sorted(self._ranking.values(), key=_promise)
+
+
+def _promise(candidate: RankedCandidate) -> tuple[int, float]:
+    """Sorts a ranking."""
+    if candidate.accepted:
+        return 0, 0.0
+    if candidate.unseen > 0.0:
+        return 1, -candidate.unseen
+    return 2, -candidate.screened
 
 
 def _left(trial: Trial) -> float:
@@ -226,8 +252,8 @@ def _side_by_side(work: Callable[[Item], Outcome], items: Sequence[Item]) -> lis
 
     The linear algebra inside is small: with threads of its own it would only take the processors from the others.
     """
-    with threadpool_limits(1, user_api="blas"), ThreadPoolExecutor(os.cpu_count()) as pool:
-        return list(pool.map(work, items))
+    with threadpool_limits(1, user_api="blas"):
+        return in_order([partial(work, item) for item in items], worker_count(None))
 
 
 def _listed(refused: dict[Key, str]) -> tuple[RefusedEffect, ...]:

@@ -234,10 +234,11 @@ class InverseDynamicsProblem:
         if owner not in model.actuators:
             return settled
         joints = [self.joints.index(joint) for joint in model.joints_of_actuator(owner) if joint in self.joints]
-        return settled * np.prod(self._busy(record)[:, joints], axis=1)
+        counts: Array = settled * np.prod(self._busy(record)[:, joints], axis=1)
+        return counts
 
     def _busy(self, record: int) -> Array:
-        """(n, joints): 0 where a joint is slow in the mean over ``REST_TIME``, so that noise does not pass for motion."""
+        """(n, joints): 0 where a joint is slow in the mean over ``REST_TIME``: noise must not pass for motion."""
         speeds = [np.abs(each.velocity[each.kept][:, self._joints]) for each in self.motions]
         largest = np.max([np.quantile(speed, 0.999, axis=0) for speed in speeds], axis=0)
         m = self.motions[record]
