@@ -126,8 +126,10 @@ def _candidate(effect: EffectType, site: str, model: Model, data: InverseDynamic
     if effect.name == "spring":
         return Candidate(effect, site, ({"rest": seen.middle},), {"rest": _around(seen)})
     if effect.name == "hysteresis":
-        bounds = {"displacement": (1e-4 * seen.travel, 2.0 * seen.travel), "shape": (0.0, 20.0)}
-        return Candidate(effect, site, _grid("displacement", PRESLIDING_SHARES, seen.travel), bounds)
+        # A way that is passed between two samples cannot be told from dry friction.
+        least = min(seen.speed * seen.interval, 0.5 * seen.travel)
+        starts = tuple({"displacement": max(share * seen.travel, least)} for share in PRESLIDING_SHARES)
+        return Candidate(effect, site, starts, {"displacement": (least, 2.0 * seen.travel), "shape": (0.0, 20.0)})
     if effect.name == "payload":
         return Candidate(effect, site, _payload_places(model, site))
     if effect.name == "actuator_lag":
