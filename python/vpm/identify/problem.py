@@ -31,9 +31,9 @@ STANDSTILL_SHARE = 0.005
 REST_SHARE, REST_TIME = 0.03, 0.1
 #: A record with fewer samples after decimation says nothing about anything.
 FEWEST_SAMPLES = 12
-#: Retained samples at each end of a record in which the parallel filter settles: its ringing falls to a fifth or less
-#: from one retained sample to the next.
-SETTLING = 4
+#: Retained samples at each end of a record in which the parallel filter settles: what a record that ends in motion sets
+#: off near the new Nyquist frequency falls by about two fifths from one retained sample to the next.
+SETTLING = 8
 
 
 @dataclass(frozen=True)
@@ -288,7 +288,7 @@ def _settled(samples: int, decimation: int) -> Array:
 
     A short record keeps its ends: what little there is has to do.
     """
-    ends = SETTLING if decimation > 1 and samples >= 3 * FEWEST_SAMPLES else 0
+    ends = SETTLING if decimation > 1 and samples >= 5 * SETTLING else 0
     place = np.arange(samples)
     return ((place >= ends) & (place < samples - ends)).astype(np.float64)
 
