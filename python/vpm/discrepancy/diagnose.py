@@ -94,9 +94,12 @@ def diagnose(
     workers : int, optional
         Candidates that are worked on at a time; one per core if not given. The result does not depend on it.
     tell : callable, optional
-        Called with a sentence at every step; an exception raised there ends the diagnosis.
+        Called with a sentence at every step and for every candidate that was refitted, from several threads; an
+        exception raised there ends the diagnosis.
     progress : callable, optional
         Called after every candidate with what is being done, its name, how many are done, and how many there are.
+
+    Ctrl-C during the search ends it with what is known so far, see `Diagnosis.interrupted`.
 
     Returns
     -------
@@ -281,8 +284,8 @@ def _verdict(
         return (
             "unexplained",
             f"The residual is structured and {above:.2g} times the noise floor. The effects of the catalogue that come "
-            f"closest, {names}, leave {100.0 * rest_of:.0f} % of its mean square: they are not the explanation. Error on "
-            f"unseen data: {numbers}, {_percent(worst.after, worst)} after.",
+            f"closest, {names}, leave {100.0 * rest_of:.0f} % of its mean square: they are not the explanation. Error "
+            f"on unseen data: {numbers}, {_percent(worst.after, worst)} after.",
         )
     if found.accepted:
         rest = " A structured residual above the noise remains." if remaining else ""
@@ -296,8 +299,9 @@ def _verdict(
             f"The residual is structured and {above:.2g} times the noise floor, and no effect of the catalogue "
             f"explains it. Error on unseen data: {numbers}.",
         )
+    agrees = max((g.before / g.noise_floor if g.noise_floor > 0.0 else np.inf) for g in main) <= FLOOR_FACTOR
     better = gain(nominal.unseen, recalibrated.unseen, segments(data.unseen))
-    if better.relative > LEAST_GAIN and better.score > float(ndtri(1.0 - FALSE_ALARM_LEVEL)):
+    if not agrees and better.relative > LEAST_GAIN and better.score > float(ndtri(1.0 - FALSE_ALARM_LEVEL)):
         return (
             "parameters_only",
             f"Nothing is missing: other values of the known parameters close the gap. Error on unseen data: {numbers}.",

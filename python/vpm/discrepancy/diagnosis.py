@@ -215,7 +215,7 @@ class Diagnosis(Result):
     seconds : float
         Time it took.
     interrupted : bool
-        Ctrl-C ended the search before every candidate was tried.
+        Ctrl-C ended the search: the effects are those accepted until then, and there may be more.
     evidence : tuple of Evidence
         For each accepted effect the residual over the state that it lives in, without it and with it.
     """

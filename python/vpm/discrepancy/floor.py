@@ -1,4 +1,4 @@
-"""How small the gap could be at best: noise, and the error of the comparison itself, carried through the same balance."""
+"""How small the gap could be at best: noise, and the error of the comparison itself, in the same balance."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ def noise_floor(
     """Root mean square that would remain in the balance of the right model, by channel.
 
     The larger of two. The first is known beforehand: the model runs the records by itself, in closed loop where that is
-    possible, and its own log, with noise of the size estimated from the measured one, is balanced like the measured one;
-    what remains is noise and the error of filters and steps. Where the model cannot run them so, noise is added to the
+    possible, and its own log, with noise of the size estimated from the measured one, is balanced like that one; what
+    remains is noise and the error of filters and steps. Where the model cannot run them so, noise is added to the
     measured motion once more, and what that changes is taken. The second comes from the residual: what is white in it,
     such as the ripple of a drive that shows in no channel (see `white_level`).
 
@@ -68,8 +68,8 @@ def white_level(residual: Array, moving: Array) -> float:
     """Root mean square of what is white in one channel of a residual.
 
     Power of white noise is the same at every frequency of the retained band and is distributed exponentially from one
-    to the next, so its mean follows from any quantile of the periodogram. A low one is taken, which what follows the motion
-    or stands out as a line does not reach.
+    to the next, so its mean follows from any quantile of the periodogram. A low one is taken, which what follows the
+    motion or stands out as a line does not reach.
 
     Parameters
     ----------

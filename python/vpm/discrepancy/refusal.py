@@ -15,9 +15,11 @@ from vpm.model import Model
 FALSE_ALARM_LEVEL = 0.01
 #: Drop of the unseen mean square below which an effect is not worth its name.
 LEAST_GAIN = 0.02
-#: Below this drop nine tenths of the residual are something else, which the effect might merely imitate: the evidence
-#: then has to be this many times as strong.
-MODEST_GAIN, MODEST_FACTOR = 0.1, 3.0
+#: The same for an effect that is to be believed: what sticks and creeps leaves more than that to imitate.
+WORTH_A_NAME = 0.1
+#: Below this drop most of the residual is something else, which the effect might merely imitate: the evidence then has
+#: to be this many times as strong.
+MODEST_GAIN, MODEST_FACTOR = 0.3, 3.0
 #: From this drop on, the balance of effort decides alone on a machine of several joints: with two effects missing, the
 #: simulation of a machine that has one of them may well be worse, because errors of coupled joints had cancelled.
 CLEAR_GAIN = 0.5
@@ -69,6 +71,7 @@ def refuse_trial(trial: Trial, thresholds: Thresholds) -> str:
         _not_clear(trial),
         _worse_in_simulation(trial),
         _too_little(trial, thresholds),
+        _only_reversals(trial),
     )
     return next(filter(None, reasons), "")
 
@@ -132,7 +135,7 @@ def _not_clear(trial: Trial) -> str:
 
 def _too_little(trial: Trial, thresholds: Thresholds) -> str:
     unseen = trial.unseen
-    if unseen.relative < LEAST_GAIN:
+    if unseen.relative < WORTH_A_NAME:
         return (
             f"it lowers the unseen error by only {_percent(unseen.relative)} of its mean square "
             f"({_rms(unseen.before, unseen.after)})"
@@ -145,6 +148,15 @@ def _too_little(trial: Trial, thresholds: Thresholds) -> str:
             "are tried"
         )
     return ""
+
+
+def _only_reversals(trial: Trial) -> str:
+    if trial.away is None or trial.away.relative >= LEAST_GAIN:
+        return ""
+    return (
+        "it lowers the unseen error only where a joint with dry friction turns round and sticks for a while; elsewhere "
+        f"by {_percent(trial.away.relative)} of its mean square"
+    )
 
 
 def _worse_in_simulation(trial: Trial) -> str:

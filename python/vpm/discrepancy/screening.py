@@ -65,7 +65,7 @@ class Probe:
     @property
     def score(self) -> float:
         """Drop per root of the fitted numbers: richer effects have to earn the numbers they bring."""
-        return float(self.drop / max(1, len(self.free)) ** 0.5)
+        return self.drop / float(np.sqrt(max(1, len(self.free))))
 
 
 @dataclass(frozen=True)

@@ -77,18 +77,18 @@ def search(
     ranking: list[RankedCandidate] = []
     dropped: dict[Key, str] = {}
     refused: dict[Key, str] = {}
-    interrupted = False
-    for number in range(1, 2 * limit + 2):
+    interrupted = start.fit.interrupted
+    for number in range(1, 0 if interrupted else 2 * limit + 2):
         outcome = _Round(stages[-1].judged, data, number, tell, each)
+        best = None
         try:
             outcome.screen(effects, set(dropped))
             outcome.confirm()
-        except KeyboardInterrupt:  # what the rounds before have found still holds
+            best = outcome.best() if len(accepted) < limit else None
+        except KeyboardInterrupt:
             interrupted = True
-            break
-        best = outcome.best() if len(accepted) < limit else None
         ranking += outcome.ranked()
-        refused = {**dropped, **outcome.refused}
+        refused = outcome.refused
         if best is None:
             break
         accepted.append(best)
@@ -99,8 +99,8 @@ def search(
         except KeyboardInterrupt:
             interrupted = True
             break
-    refused = {**dropped, **refused}
-    return Search(tuple(stages), tuple(accepted), _listed(refused), tuple(ranking), interrupted)
+    listed = _listed({**dropped, **refused})
+    return Search(tuple(stages), tuple(accepted), listed, tuple(ranking), interrupted)
 
 
 class _Round:
@@ -175,8 +175,17 @@ class _Round:
         return Accepted(chosen, tuple(t.probe.candidate.label for t in equals if t is not chosen))
 
     def ranked(self) -> list[RankedCandidate]:
-        """Candidates of this round, the most promising first."""
-        return sorted(self._ranking.values(), key=lambda c: -c.screened)
+        """Candidates of this round: what was accepted, what helped on unseen data, then by what screening promises."""
+        return sorted(self._ranking.values(), key=_promise)
+
+
+def _promise(candidate: RankedCandidate) -> tuple[int, float]:
+    """Sorts a ranking."""
+    if candidate.accepted:
+        return 0, 0.0
+    if candidate.unseen > 0.0:
+        return 1, -candidate.unseen
+    return 2, -candidate.screened
 
 
 def _left(trial: Trial) -> float:

@@ -15,9 +15,13 @@ from vpm.model import Model
 
 #: Effects whose start values are read here.
 STRUCTURAL = frozenset({"joint_compliance", "backlash", "link_flexibility", "end_stop"})
+#: Effects that add coordinates that nobody measures.
+HIDING = frozenset({"joint_compliance", "backlash", "link_flexibility"})
 #: Frequencies at which a spring lets the link swing behind a motor that stands still, Hz, and damping ratios there.
 FREQUENCIES = (3.0, 8.0, 20.0, 50.0)
 LOOSE, CONTACT = 0.05, 0.1
+#: Slowest of these in a fit, Hz: a softer spring holds nothing.
+SLOWEST = 0.5
 #: Frequency of the contacts of play, Hz, and widths of it tried, as shares of the half travel.
 CONTACT_FREQUENCY = 50.0
 GAP_SHARES = (5e-4, 3e-3, 1.5e-2)
@@ -31,9 +35,15 @@ Bounds = Mapping[str, tuple[float, float]]
 def sites_worth_trying(effect: EffectType, model: Model) -> tuple[str, ...]:
     """Sites of an effect but those where it cannot show: links that bend already, damping of rigid beams.
 
-    Play is looked for where an actuator drives the joint; elsewhere it needs a joint of its own.
+    Play is looked for where an actuator drives the joint; elsewhere it needs a joint of its own. Along a measured
+    motion no memory is carried where something moves that nobody measures, so that hysteresis and what hides exclude
+    each other.
     """
     sites = model.sites(effect.site)
+    remembers = any(present.name == "hysteresis" for present in model.effects)
+    hidden = bool(model.added_joints) or model.core.n_elastic > 0
+    if (remembers and effect.name in HIDING) or (hidden and effect.name == "hysteresis"):
+        return ()
     if effect.name == "link_flexibility":
         return tuple(site for site in sites if model.levels.get(site, "rigid") == "rigid")
     if effect.name == "structural_damping":
@@ -60,17 +70,24 @@ def structural_starts(effect: str, site: str, model: Model, middle: float, trave
         reach = (middle - 1.2 * travel, middle + 1.2 * travel)
         return (*high, *low), {"low": reach, "high": reach, "width": (1e-6 * travel, 0.05 * travel)}
     inertia = _moved(model, site)
+    held = (inertia * (2.0 * math.pi * SLOWEST) ** 2, math.inf)
     if effect == "backlash":
         stiffness = inertia * (2.0 * math.pi * CONTACT_FREQUENCY) ** 2
         damping = 2.0 * CONTACT * math.sqrt(stiffness * inertia)
         common = {"stiffness": stiffness, "damping": damping}
         gaps = [share * travel for share in GAP_SHARES]
-        return tuple({**common, "gap": gap, "width": 0.05 * gap} for gap in gaps), {"gap": (0.0, 0.5 * travel)}
+        return tuple({**common, "gap": gap, "width": 0.05 * gap} for gap in gaps), {
+            "stiffness": held,
+            "gap": (0.0, 0.5 * travel),
+            "width": (1e-7 * travel, 0.1 * travel),
+        }
     stiffnesses = [inertia * (2.0 * math.pi * frequency) ** 2 for frequency in FREQUENCIES]
     if effect == "link_flexibility":
         times = [LOOSE / (math.pi * frequency) for frequency in FREQUENCIES]
-        return tuple({"stiffness": k, "time": t} for k, t in zip(stiffnesses, times, strict=True)), {}
-    return tuple({"stiffness": k, "damping": 2.0 * LOOSE * math.sqrt(k * inertia)} for k in stiffnesses), {}
+        return tuple({"stiffness": k, "time": t} for k, t in zip(stiffnesses, times, strict=True)), {"stiffness": held}
+    return tuple({"stiffness": k, "damping": 2.0 * LOOSE * math.sqrt(k * inertia)} for k in stiffnesses), {
+        "stiffness": held
+    }
 
 
 def _moved(model: Model, site: str) -> float:

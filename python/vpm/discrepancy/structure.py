@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.stats import spearmanr
 
 from vpm.discrepancy.floor import white_level
-from vpm.identify import InverseDynamicsProblem
+from vpm.identify import InverseDynamicsProblem, gaps
 from vpm.model import Model
 
 Array = NDArray[np.float64]
@@ -24,7 +24,9 @@ PREDICTED_SHARE = 0.1
 SLOW_SHARE = 0.5
 #: So many times what is white in it, it is coloured.
 COLOURED = 1.6
-#: So many standard deviations of the rank correlation of its size and that of the effort, it grows with the effort.
+#: So many times the relative gap of the training records, that of the unseen ones holds something they never showed.
+NEW = 4.0
+#: From so many standard deviations of the rank correlation between the two on, its size grows with that of the effort.
 GROWING = 4.0
 
 
@@ -44,18 +46,21 @@ class Structure:
     growing : float
         Rank correlation of its size with that of the effort, in standard deviations: noise of sensors and drives does
         not know how hard the drive works.
+    new : float
+        Relative gap on unseen records over that on training records.
     """
 
     predicted: float
     slow: float
     coloured: float
     growing: float
+    new: float
 
     @property
     def present(self) -> bool:
         """Whether the residual is more than noise."""
         follows = self.predicted > PREDICTED_SHARE or self.growing > GROWING
-        return follows or self.slow > SLOW_SHARE or self.coloured > COLOURED
+        return follows or self.slow > SLOW_SHARE or self.coloured > COLOURED or self.new > NEW
 
 
 def structure(
@@ -71,7 +76,9 @@ def structure(
     slow = float(np.mean([_slow_share(residual[block.samples]) for block in unseen.blocks]))
     coloured = min(_coloured(training, fitted), _coloured(unseen, residual))
     growing = min(_growing(model, training, fitted), _growing(model, unseen, residual))
-    return Structure(predicted, slow, coloured, growing)
+    seen, fresh = gaps(training, fitted), gaps(unseen, residual)
+    new = max(fresh[c][1] / seen[c][1] if seen[c][1] > 0.0 else 0.0 for c in fresh)
+    return Structure(predicted, slow, coloured, growing, new)
 
 
 def _coloured(problem: InverseDynamicsProblem, residual: Array) -> float:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from vpm.errors import DivergedError, SimulationError
+from vpm.errors import DivergedError, SimulationError, VpmError
 from vpm.experiment import Experiment, Motion
 from vpm.initial import measured_states, whole_motion
 from vpm.model import Model
@@ -140,6 +140,11 @@ def respond(
     except Diverged as error:
         time = float(m.time[m.kept][0]) + len(error.outputs) * m.dt
         raise DivergedError(f"{experiment.name}: {error}", time=time) from None
+    except ValueError as error:
+        if isinstance(error, VpmError) or not has_hidden(model, m.joints):
+            raise
+        # No place of rest, or no mass matrix: with these numbers the machine cannot follow the motion.
+        raise DivergedError(f"{experiment.name}: {error}", time=float(m.time[m.kept][0])) from None
     return _rigid(model, theta, m, columns)
 
 
