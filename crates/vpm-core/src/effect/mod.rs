@@ -8,6 +8,7 @@ mod backlash;
 mod bias_force;
 mod coulomb_friction;
 mod domain;
+mod empirical_force;
 mod hysteresis;
 mod payload;
 mod spring;
@@ -22,6 +23,7 @@ pub use backlash::Backlash;
 pub use bias_force::BiasForce;
 pub use coulomb_friction::CoulombFriction;
 pub use domain::Domain;
+pub use empirical_force::EmpiricalForce;
 pub use hysteresis::Hysteresis;
 pub use payload::Payload;
 pub use spring::Spring;
@@ -35,6 +37,8 @@ use crate::scalar::{Dual, Scalar};
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(tag = "type", rename_all = "snake_case")]
 pub enum JointEffect<P> {
+    /// A sum of terms that a fit chose.
+    EmpiricalForce(EmpiricalForce<P>),
     /// Resistance proportional to speed.
     ViscousFriction(ViscousFriction<P>),
     /// Constant resistance against the motion.
@@ -57,6 +61,7 @@ impl<P> JointEffect<P> {
     /// The same effect over another number type.
     pub fn map<T>(&self, f: &mut impl FnMut(&P) -> T) -> JointEffect<T> {
         match self {
+            Self::EmpiricalForce(law) => JointEffect::EmpiricalForce(law.map(f)),
             Self::ViscousFriction(law) => JointEffect::ViscousFriction(law.map(f)),
             Self::CoulombFriction(law) => JointEffect::CoulombFriction(law.map(f)),
             Self::AsymmetricFriction(law) => JointEffect::AsymmetricFriction(law.map(f)),
@@ -71,6 +76,7 @@ impl<P> JointEffect<P> {
     /// The parameters and where each is defined.
     pub fn domains(&self) -> Vec<(&P, Domain)> {
         match self {
+            Self::EmpiricalForce(law) => law.domains(),
             Self::ViscousFriction(law) => law.domains(),
             Self::CoulombFriction(law) => law.domains(),
             Self::AsymmetricFriction(law) => law.domains(),
@@ -88,6 +94,7 @@ impl<S: Scalar> JointEffect<S> {
     #[inline]
     pub fn effort(&self, q: S, v: S) -> S {
         match self {
+            Self::EmpiricalForce(law) => law.effort(q, v),
             Self::ViscousFriction(law) => law.effort(v),
             Self::CoulombFriction(law) => law.effort(v),
             Self::AsymmetricFriction(law) => law.effort(v),
@@ -99,11 +106,12 @@ impl<S: Scalar> JointEffect<S> {
         }
     }
 
-    /// Resistance r in N s/m or N m s/rad at velocity `v`: what depends on the velocity is `-r v`, so that
+    /// Resistance r in N s/m or N m s/rad at coordinate `q` and velocity `v`: what depends on the velocity is `-r v`, so that
     /// `effort(q, v) = effort(q, 0) - r v`. It is the slope of the chord from rest to `v`, not of the tangent.
     #[inline]
-    pub fn resistance(&self, v: S) -> S {
+    pub fn resistance(&self, q: S, v: S) -> S {
         match self {
+            Self::EmpiricalForce(law) => law.resistance(q, v),
             Self::ViscousFriction(law) => law.resistance(),
             Self::CoulombFriction(law) => law.resistance(v),
             Self::AsymmetricFriction(law) => law.resistance(v),
@@ -117,6 +125,7 @@ impl<S: Scalar> JointEffect<S> {
     #[inline]
     pub fn effort_at_rest(&self, q: S) -> S {
         match self {
+            Self::EmpiricalForce(law) => law.effort_at_rest(q),
             Self::BiasForce(law) => law.effort(),
             Self::Spring(law) => law.effort(q),
             Self::TorqueRipple(law) => law.effort(q),
@@ -128,13 +137,32 @@ impl<S: Scalar> JointEffect<S> {
         }
     }
 
+    /// Share k of the load |u| that is taken off besides, u the effort of the actuators on the joint; within -1 and 1.
+    #[inline]
+    pub fn share_of_load(&self, q: S, v: S) -> S {
+        match self {
+            Self::EmpiricalForce(law) => law.share_of_load(q, v),
+            _ => S::zero(),
+        }
+    }
+
+    /// Resistance per load |u| at velocity `v`, the chord from rest of that share.
+    #[inline]
+    pub fn resistance_per_load(&self, v: S) -> S {
+        match self {
+            Self::EmpiricalForce(law) => law.resistance_per_load(v),
+            _ => S::zero(),
+        }
+    }
+
     /// Slope of the effort at rest by the coordinate, N/m or N m/rad.
     #[inline]
     pub fn slope_at_rest(&self, q: S) -> S {
         self.map(&mut |&parameter| Dual::<S, 1>::constant(parameter)).effort_at_rest(Dual::variable(q, 0)).gradient[0]
     }
 
-    /// Potential energy in J at coordinate `q`: `effort = -d potential/dq` for effects of the coordinate alone, zero for friction.
+    /// Potential energy in J at coordinate `q`: `effort = -d potential/dq` for effects of the coordinate alone, zero for friction
+    /// and for what is read off data.
     #[inline]
     pub fn potential(&self, q: S) -> S {
         match self {
@@ -142,7 +170,8 @@ impl<S: Scalar> JointEffect<S> {
             Self::Spring(law) => law.potential(q),
             Self::TorqueRipple(law) => law.potential(q),
             Self::Backlash(law) => law.potential(q),
-            Self::ViscousFriction(_)
+            Self::EmpiricalForce(_)
+            | Self::ViscousFriction(_)
             | Self::CoulombFriction(_)
             | Self::AsymmetricFriction(_)
             | Self::StribeckFriction(_) => S::zero(),
