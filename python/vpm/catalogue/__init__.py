@@ -15,6 +15,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 from vpm.catalogue.elsewhere import ACTUATOR_EFFECTS, BODY_EFFECTS, SENSOR_EFFECTS
+from vpm.catalogue.empirical import EMPIRICAL_EFFECTS
 from vpm.catalogue.joint import JOINT_EFFECTS
 from vpm.catalogue.kinds import POSITIVE, SITE_KINDS, EffectParameter, EffectType, JointKind, Scale, SiteKind
 from vpm.errors import ModelError, near_match
@@ -34,7 +35,10 @@ __all__ = [
 
 #: Every effect by name, in the order in which a page should list them.
 EFFECTS: Mapping[str, EffectType] = MappingProxyType(
-    {effect.name: effect for effect in (*JOINT_EFFECTS, *BODY_EFFECTS, *ACTUATOR_EFFECTS, *SENSOR_EFFECTS)}
+    {
+        effect.name: effect
+        for effect in (*JOINT_EFFECTS, *BODY_EFFECTS, *ACTUATOR_EFFECTS, *SENSOR_EFFECTS, *EMPIRICAL_EFFECTS)
+    }
 )
 
 

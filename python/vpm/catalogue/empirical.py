@@ -62,8 +62,10 @@ EMPIRICAL_FORCE = EffectType(
         _shape("reach", "{C}", "half of that range", None),
         _shape("speed", "{C}/s", "largest speed that was seen", None),
         _shape("transition_velocity", "{C}/s", "speed below which dry terms bend from one sign to the other", None),
-        replace(_shape("period", "{C}", "way after which cosines and sines repeat; twice the reach if not given", None),
-                optional=True),
+        replace(
+            _shape("period", "{C}", "way after which cosines and sines repeat; twice the reach if not given", None),
+            optional=True,
+        ),
         *(_term(name, text) for name, text in TERMS.items()),
     ),
     law=(
@@ -72,7 +74,7 @@ EMPIRICAL_FORCE = EffectType(
         + "; x = (q - middle)/reach and y = v/speed, held at -1 and 1, s = tanh(v/transition_velocity), "
         "phi = 2 pi q/period, u the effort of the actuators on the joint"
     ),
-    sentence="{at} is loaded by a force that was fitted to data and that no law of physics stands behind: {formula}.",
+    sentence="{at} is loaded by a force that was fitted to data and that no law of physics stands behind.",
     impossible="either sign is possible: it is a fit",
     confused_with={},
     screened=False,

@@ -21,6 +21,7 @@ from vpm.discrepancy.diagnosis import (
     Picture,
     Step,
 )
+from vpm.discrepancy.empirical import describe
 from vpm.discrepancy.floor import noise_floor
 from vpm.discrepancy.refusal import FALSE_ALARM_LEVEL, LEAST_GAIN
 from vpm.discrepancy.search import Accepted, Search, Stage, ambiguities, search
@@ -42,6 +43,9 @@ FLOOR_FACTOR = 1.3
 NEGLIGIBLE = 0.01
 #: Parameters that move by more of their stated uncertainties than this are reported.
 FAR = 3.0
+
+#: Said of what stays after effects were found.
+_REST = " A structured residual above the noise remains."
 
 Tell = Callable[[str], None]
 
@@ -116,6 +120,12 @@ def diagnose(
     left = structure(data.training, data.unseen, found.final.fit.residual, found.final.unseen)
     gap = _gaps(data, nominal, recalibrated, found.final, floor)
     verdict, summary = _verdict(data, nominal, recalibrated, found, gap, left)
+    final, empirical = found.final, None
+    if verdict == "unexplained" or summary.endswith(_REST):
+        say("describing what is left")
+        empirical, final = describe(final, data)
+        gap = _gaps(data, nominal, recalibrated, final, floor)
+        summary = f"{summary} {empirical.sentence}"
     return Diagnosis(
         verdict,
         summary,
@@ -129,10 +139,11 @@ def diagnose(
         tuple(e.name for e in training),
         tuple(e.name for e in unseen),
         tuple(notes),
-        found.final.model,
-        fit_of(found.final.model, data.training, found.final.fit, nominal.fit.residual, [e.name for e in training]),
-        _pictures(data, nominal, recalibrated, found.final),
+        final.model,
+        fit_of(final.model, data.training, final.fit, nominal.fit.residual, [e.name for e in training]),
+        _pictures(data, nominal, recalibrated, final),
         time.perf_counter() - began,
+        empirical,
     )
 
 
@@ -241,7 +252,7 @@ def _verdict(
     numbers = f"{_percent(worst.before, worst)} before, {_percent(worst.recalibrated, worst)} recalibrated"
     if found.accepted:
         names = ", then ".join(e.trial.probe.candidate.label for e in found.accepted)
-        rest = " A structured residual above the noise remains." if remaining else ""
+        rest = _REST if remaining else ""
         return (
             "effect_found",
             f"Missing: {names}. Error on unseen data: {numbers}, {_percent(worst.after, worst)} after.{rest}",
