@@ -21,7 +21,7 @@ from vpm.discrepancy.diagnosis import (
     Picture,
     Step,
 )
-from vpm.discrepancy.empirical import describe
+from vpm.discrepancy.empirical import describe_best
 from vpm.discrepancy.floor import noise_floor
 from vpm.discrepancy.refusal import FALSE_ALARM_LEVEL, LEAST_GAIN
 from vpm.discrepancy.search import Accepted, Search, Stage, ambiguities, search
@@ -122,20 +122,22 @@ def diagnose(
     left = structure(found.final.model, data.training, data.unseen, found.final.fit.residual, found.final.unseen)
     gap = _gaps(data, nominal, recalibrated, found.final, floor)
     verdict, summary = _verdict(data, nominal, recalibrated, found, gap, left)
-    final, empirical = found.final, None
+    final, empirical, accepted = found.final, None, found.accepted
     if verdict == "unexplained" or summary.endswith(_REST):
         say("describing what is left")
-        empirical, final = describe(final, data)
+        bases = [recalibrated] if verdict == "unexplained" and accepted else []
+        empirical, final, place = describe_best([*bases, found.final], data)
+        accepted = () if place < len(bases) else accepted
         gap = _gaps(data, nominal, recalibrated, final, floor)
         summary = f"{summary} {empirical.sentence}"
     return Diagnosis(
         verdict,
         summary,
-        tuple(_accepted_effect(entry, found.final) for entry in found.accepted),
+        tuple(_accepted_effect(entry, found.final) for entry in accepted),
         gap,
         found.refused,
         found.ranking,
-        ambiguities(found.accepted),
+        ambiguities(accepted),
         _where(recalibrated.model, data.unseen),
         tuple(_step(data, stage) for stage in found.stages),
         tuple(e.name for e in training),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -21,8 +22,28 @@ LEAST_GAIN = 0.1
 TIME_AHEAD = 0.1
 #: Least share of the residual that a state has to predict to be named.
 NAMED = 0.1
+#: A later model has to leave less than this share of what an earlier one leaves.
+CLEARLY = 0.9
+#: Share of the weightiest term below which a term is left out.
+SMALL = 0.03
 #: A period may move by this factor when the formula is fitted.
 PERIOD_RANGE = 1.15
+
+
+def describe_best(bases: Sequence[Judged], data: Data) -> tuple[Empirical, Judged, int]:
+    """The description that leaves least on unseen data, of several models to begin with, and the place of its model.
+
+    Effects that come closest and explain little may stand in the way of a formula: it is sought without them too.
+    A later model has to leave clearly less than an earlier one.
+    """
+    best: tuple[Empirical, Judged, int] | None = None
+    for place, base in enumerate(bases):
+        told, final = describe(base, data)
+        if best is None or told.after < CLEARLY * best[0].after:
+            best = told, final, place
+    if best is None:
+        raise ValueError("there is no model to describe")
+    return best
 
 
 def describe(final: Judged, data: Data) -> tuple[Empirical, Judged]:
@@ -38,21 +59,22 @@ def describe(final: Judged, data: Data) -> tuple[Empirical, Judged]:
         With the formula in the model, or ``final`` as it was.
     """
     joint = busiest_joint(data, final)
-    states = shares(data, final, joint)
-    remark = _in_time(states, rhythm(data, final, joint))
     channel = data.unseen.efforts(0)[joint].channel
-    if not remark and (formula := select(final, data.training)) is not None:
+    states, beat = shares(data, final, joint), rhythm(data, final, joint)
+    formula = select(final, data)
+    fitted = None
+    if formula is not None:
         fitted = _fit(formula, final, data)
-        told = gain(final.unseen, fitted.unseen, segments(data.unseen))
-        if told.relative >= LEAST_GAIN:
-            terms = _terms(formula, fitted)
-            ratio = told.after / told.before
-            text = "; ".join(_text(formula, fitted.model, at) for at in formula.terms)
-            return Empirical(
-                channel, states, remark, text, terms, told.before, told.after, _say(states, text, ratio)
-            ), fitted
-    rms = float(np.sqrt(np.mean(final.unseen**2)))
-    return Empirical(channel, states, remark, "", (), rms, rms, _say_without(channel, states, remark)), final
+        if (shorter := _without_small(formula, fitted)) != formula:
+            formula, fitted = shorter, _fit(shorter, final, data)
+    told = gain(final.unseen, final.unseen if fitted is None else fitted.unseen, segments(data.unseen))
+    remark = _in_time(states, beat, told.relative)
+    if remark or formula is None or fitted is None or told.relative < LEAST_GAIN:
+        sentence = _say_without(channel, states, remark)
+        return Empirical(channel, states, remark, "", (), told.before, told.before, sentence), final
+    text = "; ".join(_text(formula, fitted.model, at) for at in formula.terms)
+    sentence = _say(channel, states, text, told.after / told.before)
+    return Empirical(channel, states, "", text, _terms(formula, fitted), told.before, told.after, sentence), fitted
 
 
 def _fit(formula: Formula, final: Judged, data: Data) -> Judged:
@@ -69,6 +91,26 @@ def _fit(formula: Formula, final: Judged, data: Data) -> Judged:
         value = model.parameters[name].value
         bounds[name] = (value / PERIOD_RANGE, value * PERIOD_RANGE)
     return _judge(sized.model, (*final.free, *own, *periods), data, bounds)
+
+
+def _without_small(formula: Formula, fitted: Judged) -> Formula:
+    """Drop what hardly moves the residual once periods are right; the sines of one wave go together."""
+    weight = {}
+    for joint, terms in formula.terms.items():
+        for term in terms:
+            place = fitted.free.index(f"{joint}.empirical.{term}")
+            weight[joint, term] = float(np.linalg.norm(fitted.fit.jacobian[:, place]) * abs(fitted.fit.values[place]))
+    least = SMALL * max(weight.values())
+    kept = {}
+    for joint, terms in formula.terms.items():
+        pairs = {term: term.replace("cosine", "sine") for term in terms}
+        heavy = {pairs[term] for term in terms if weight[joint, term] >= least}
+        kept[joint] = tuple(term for term in terms if pairs[term] in heavy)
+    shapes = {joint: dict(formula.shapes[joint]) for joint, terms in kept.items() if terms}
+    for joint, own in shapes.items():
+        if not any("sine" in term for term in kept[joint]):
+            own.pop("period", None)
+    return Formula({joint: terms for joint, terms in kept.items() if terms}, shapes)
 
 
 def _judge(model: Model, free: tuple[str, ...], data: Data, bounds: dict[str, tuple[float, float]]) -> Judged:
@@ -114,14 +156,14 @@ def _text(formula: Formula, model: Model, joint: str) -> str:
     return f"tau = -({body}) {unit}".rstrip() + f" at {joint}" + (f", with {with_what}" if with_what else "")
 
 
-def _in_time(states: dict[str, float], beat: Rhythm | None) -> str:
-    """What runs with the time and not with the machine, in words; empty if nothing does."""
+def _in_time(states: dict[str, float], beat: Rhythm | None, told: float) -> str:
+    """What runs with the time and not with the machine, in words; empty if the formula or a state says as much."""
     time = max((share for name, share in states.items() if name.startswith("time")), default=0.0)
-    machine = max((share for name, share in states.items() if not name.startswith("time")), default=0.0)
+    machine = max((told, *(share for name, share in states.items() if not name.startswith("time"))))
     if beat is not None and beat.share > max(machine, time) + TIME_AHEAD:
         return (
-            f"it repeats every {beat.period:.3g} s whatever the machine does ({100 * beat.share:.0f} % of it): something "
-            "outside of the machine, or in its controller, disturbs it"
+            f"it repeats every {beat.period:.3g} s whatever the machine does ({100 * beat.share:.0f} % of it), so that "
+            "something outside of the machine, or its controller, disturbs it"
         )
     if time > machine + TIME_AHEAD:
         return (
@@ -136,10 +178,10 @@ def _depends(states: dict[str, float]) -> str:
     return f"it follows {', '.join(named)}" if named else "no single state of the machine predicts it"
 
 
-def _say(states: dict[str, float], text: str, ratio: float) -> str:
+def _say(channel: str, states: dict[str, float], text: str, ratio: float) -> str:
     return (
-        f"Of the residual on unseen data: {_depends(states)}. A fit, not physics, brings it down to {100 * ratio:.0f} % "
-        f"and stands in the repaired model as empirical_force: {text}."
+        f"Of the residual of {channel}: {_depends(states)}. A fit, which is no physics, brings it down to "
+        f"{100 * ratio:.0f} % on unseen data and stands in the repaired model as empirical_force: {text}."
     )
 
 

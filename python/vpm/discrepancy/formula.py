@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.catalogue.empirical import TERMS
-from vpm.discrepancy.confirmation import Judged
+from vpm.discrepancy.confirmation import Data, Judged
 from vpm.discrepancy.periods import harmonic_periods
 from vpm.identify import InverseDynamicsProblem
 from vpm.model import Model
@@ -65,9 +65,13 @@ class Formula:
         return model
 
 
-def select(base: Judged, data: InverseDynamicsProblem) -> Formula | None:
-    """Choose terms for the training residual of ``base``; None if none predicts what was left out."""
-    ranges = {joint: _ranges(base, data, joint) for joint in data.joints}
+def select(base: Judged, records: Data) -> Formula | None:
+    """Choose terms for the training residual of ``base``; None if none predicts what was left out.
+
+    Of the unseen records only the range of the motion is used: within it, and no farther, the formula may be followed.
+    """
+    data = records.training
+    ranges = {joint: _ranges(base, data, records.unseen, joint) for joint in data.joints}
     atoms = [atom for joint in data.joints for atom in _atoms(base, data, joint, ranges[joint])]
     scorer = _Folds(data, base.fit.residual, base.fit.jacobian)
     chosen: list[Atom] = []
@@ -90,8 +94,10 @@ def select(base: Judged, data: InverseDynamicsProblem) -> Formula | None:
         mine = [atom for atom in chosen if atom.joint == joint]
         if mine:
             terms[joint] = tuple(name for name in TERMS if any(name in atom.terms for atom in mine))
-            periods = {"period": atom.period for atom in mine if atom.period is not None}
-            shapes[joint] = {**ranges[joint], **periods}
+            shapes[joint] = dict(ranges[joint])
+            for atom in mine:
+                if atom.period is not None:
+                    shapes[joint]["period"] = atom.period
     return Formula(terms, shapes)
 
 
@@ -153,14 +159,17 @@ class _Folds:
         return total
 
 
-def _ranges(base: Judged, data: InverseDynamicsProblem, joint: str) -> dict[str, float]:
+def _ranges(base: Judged, data: InverseDynamicsProblem, unseen: InverseDynamicsProblem, joint: str) -> dict[str, float]:
     """Middle and reach of the way, largest speed, and the transition velocity that suits the residual best."""
     column = data.joints.index(joint)
     states = [data.state(record) for record in range(len(data.motions))]
     position = np.concatenate([q[:, column] for q, _, _ in states])
     velocity = np.concatenate([v[:, column] for _, v, _ in states])
-    low, high = float(position.min()), float(position.max())
-    speed = max(float(np.quantile(np.abs(velocity), 0.999)), 1e-12)
+    met = [unseen.state(record) for record in range(len(unseen.motions))]
+    ways = np.concatenate([position, *(q[:, column] for q, _, _ in met)])
+    rates = np.concatenate([velocity, *(v[:, column] for _, v, _ in met)])
+    low, high = float(ways.min()), float(ways.max())
+    speed = max(float(np.quantile(np.abs(rates), 0.999)), 1e-12)
     known = f"{joint}.friction.transition_velocity"
     if known in base.model.parameters:
         transition = base.model.parameters[known].value

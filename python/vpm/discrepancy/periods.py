@@ -23,7 +23,7 @@ MOST_SAMPLES = 4000
 def harmonic_periods(
     base: Judged, data: InverseDynamicsProblem, joint: str, ranges: Mapping[str, float]
 ) -> tuple[float, ...]:
-    """Periods in position (m or rad) at which a residual, its product with the direction, or with the load is strongest.
+    """Periods in position (m or rad) at which a residual is strongest, itself or as a factor of direction or load.
 
     Least squares with a cosine and a sine at evenly spaced wave numbers, beside a constant and the direction (N. Lomb,
     *Astrophysics and Space Science* 39, 1976).
