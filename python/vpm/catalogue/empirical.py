@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import replace
 from types import MappingProxyType
 
-from vpm.catalogue.kinds import ABOVE_ZERO, ANY, EffectParameter, EffectType, shape, size
+from vpm.catalogue.kinds import ABOVE_ZERO, ANY, EffectParameter, EffectType, Scale, shape, size
 
 #: Terms by name as text, in x (position), y (velocity), s (direction), phi (phase along the way) and u (load).
 TERMS = MappingProxyType(
@@ -41,7 +41,7 @@ TERMS = MappingProxyType(
 def _shape(
     name: str, unit: str, meaning: str, start: float | None, bounds: tuple[float, float] = ABOVE_ZERO
 ) -> EffectParameter:
-    scale = "speed" if unit.endswith("/s") else "coordinate"
+    scale: Scale = "speed" if unit.endswith("/s") else "coordinate"
     return shape(name, f"empirical.{name}", unit, scale, meaning, start=start, bounds=bounds)
 
 

@@ -13,6 +13,9 @@ from vpm.identify import InverseDynamicsProblem
 
 Array = NDArray[np.float64]
 
+#: A state, the direction of the motion (0 or 1) and what is to be predicted.
+Cells = tuple[Array, NDArray[np.int64], Array]
+
 #: Bins of a state.
 BINS = 10
 #: Strength of the pull of a bin towards zero, in samples of a bin that all alike would fill.
@@ -118,14 +121,14 @@ def _states(problem: InverseDynamicsProblem, final: Judged, joint: int) -> Mappi
         for channel in experiment.channels:
             if ".pressure" in channel:
                 values = experiment[channel][m.kept][:: m.decimation]
-                found.setdefault(channel.replace(".", " of ")[::1], []).append(values)
+                found.setdefault(" of ".join(reversed(channel.split("."))), []).append(values)
         time = problem.efforts(record)[joint].time
         found.setdefault("time", []).append(time - time[0])
     count = len(problem.motions)
     return {name: np.concatenate(parts) for name, parts in found.items() if len(parts) == count}
 
 
-def _predicted(seen: tuple[Array, Array, Array], met: tuple[Array, Array, Array], edges: Array) -> float:
+def _predicted(seen: Cells, met: Cells, edges: Array) -> float:
     """Share of the second target that the means of the first in its bins predict."""
     cells = [np.digitize(state, edges) * 2 + direction for state, direction, _ in (seen, met)]
     count = np.bincount(cells[0], minlength=2 * BINS)

@@ -12,6 +12,7 @@ from scipy.special import ndtri
 
 from vpm.catalogue import EFFECTS
 from vpm.compare import compare
+from vpm.discrepancy.ambiguity import listed, rivals
 from vpm.discrepancy.confirmation import Data, Judged, is_clear, judge
 from vpm.discrepancy.diagnosis import (
     AcceptedEffect,
@@ -26,6 +27,7 @@ from vpm.discrepancy.floor import noise_floor
 from vpm.discrepancy.refusal import FALSE_ALARM_LEVEL, LEAST_GAIN
 from vpm.discrepancy.search import Accepted, Search, Stage, ambiguities, search
 from vpm.discrepancy.structure import Structure, structure
+from vpm.discrepancy.telling_apart import experiments as experiments_for
 from vpm.errors import DiagnosisError, DivergedError, near_match
 from vpm.experiment import Experiment
 from vpm.identify import InverseDynamicsProblem, OutputErrorProblem, gain, gaps, segments
@@ -130,6 +132,9 @@ def diagnose(
         accepted = () if place < len(bases) else accepted
         gap = _gaps(data, nominal, recalibrated, final, floor)
         summary = f"{summary} {empirical.sentence}"
+    say("looking for what else would do, and for the experiment that tells it apart")
+    ambiguous = rivals(found.final, data, accepted)
+    noise = {channel: g.noise_floor for channel, g in gap.items() if g.mode == "inverse_dynamics"}
     return Diagnosis(
         verdict,
         summary,
@@ -137,7 +142,7 @@ def diagnose(
         gap,
         found.refused,
         found.ranking,
-        ambiguities(accepted),
+        listed(ambiguities(accepted), ambiguous),
         _where(recalibrated.model, data.unseen),
         tuple(_step(data, stage) for stage in found.stages),
         tuple(e.name for e in training),
@@ -148,6 +153,7 @@ def diagnose(
         _pictures(data, nominal, recalibrated, final),
         time.perf_counter() - began,
         empirical,
+        experiments_for(found.final, ambiguous, data.training, noise),
     )
 
 
