@@ -49,16 +49,18 @@ def listed(known: Sequence[Ambiguity], found: Sequence[Rivals]) -> tuple[Ambigui
     return (*known, *more)
 
 
-def rivals(final: Judged, data: Data, accepted: Sequence[Accepted]) -> tuple[Rivals, ...]:
+def rivals(
+    final: Judged, data: Data, accepted: Sequence[Accepted], effects: Sequence[str] | None = None
+) -> tuple[Rivals, ...]:
     """Replace each accepted effect in turn by every other that could do its work, and keep those that do it as well.
 
     All rivals are screened on the model without the effect; the few that take nearly as much from the training
     residual are refitted, and have to predict the unseen records as the effect does.
     """
-    return tuple(_of_one(final, data, entry) for entry in accepted)
+    return tuple(_of_one(final, data, entry, effects) for entry in accepted)
 
 
-def _of_one(final: Judged, data: Data, entry: Accepted) -> Rivals:
+def _of_one(final: Judged, data: Data, entry: Accepted, effects: Sequence[str] | None) -> Rivals:
     name, site = entry.key
     try:
         model = final.model.without_effect(name, site)
@@ -67,7 +69,7 @@ def _of_one(final: Judged, data: Data, entry: Accepted) -> Rivals:
     except DivergedError:
         return Rivals(name, site, ())
     taken = _power(without) - _power(final)
-    others = [c for c in candidates(model, data.training, without.fit.residual) if _near(c, entry)]
+    others = [c for c in candidates(model, data.training, without.fit.residual, effects) if _near(c, entry)]
     probes = [probe(without.baseline, data.training, candidate) for candidate in others]
     good = [
         p for p in probes if p.free and not impossible_values(p) and p.drop * _power(without) >= LEAST_SHARE * taken

@@ -133,7 +133,7 @@ def diagnose(
         gap = _gaps(data, nominal, recalibrated, final, floor)
         summary = f"{summary} {empirical.sentence}"
     say("looking for what else would do, and for the experiment that tells it apart")
-    ambiguous = rivals(found.final, data, accepted)
+    ambiguous = rivals(found.final, data, accepted, effects)
     noise = {channel: g.noise_floor for channel, g in gap.items() if g.mode == "inverse_dynamics"}
     return Diagnosis(
         verdict,
