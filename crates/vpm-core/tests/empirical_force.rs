@@ -8,7 +8,6 @@ mod hydraulics;
 #[cfg(test)]
 #[path = "common/servo_machine.rs"]
 mod servo_machine;
-mod values;
 
 use common::{Machine, close};
 use hydraulics::nominal;

@@ -14,10 +14,11 @@ const LARGEST_SHARE: f64 = 0.95;
 ///
 /// Law: with `x = (q - middle)/reach` and `y = v/speed`, both held at -1 and 1 outside of the range that was seen, `s = tanh(v /
 /// transition_velocity)`, `phi = 2 pi q / period` and u the effort of the actuators on the joint,
-/// `tau = -(constant + position x + position_2 x^2 + position_3 x^3 + cosine cos(phi) + sine sin(phi)
-/// + viscous y + speed_2 y^2 + drag y|y| + speed_3 y^3 + viscous_position y x + viscous_position_2 y x^2
-/// + s (dry + dry_position x + dry_position_2 x^2 + dry_cosine cos(phi) + dry_sine sin(phi)))
-/// - |u| (load_dry s + load_cosine cos(phi) + load_sine sin(phi))`;
+/// `tau = -(at_rest + viscous_part + dry_part + load_part)` with
+/// `at_rest = constant + position x + position_2 x^2 + position_3 x^3 + cosine cos(phi) + sine sin(phi)`,
+/// `viscous_part = viscous y + speed_2 y^2 + drag y|y| + speed_3 y^3 + viscous_position y x + viscous_position_2 y x^2`,
+/// `dry_part = s (dry + dry_position x + dry_position_2 x^2 + dry_cosine cos(phi) + dry_sine sin(phi))` and
+/// `load_part = |u| (load_dry s + load_cosine cos(phi) + load_sine sin(phi))`;
 /// coefficients in N or N m at the edge of the range, those of the load without unit; `middle`, `reach`, `period` in m or rad,
 /// velocities in m/s or rad/s. Terms without a coefficient are not there.
 /// Source: none but data. Checked: reach, speed and transition velocity must be positive; the share of the load is held within 0.95.
