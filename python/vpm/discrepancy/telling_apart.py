@@ -136,7 +136,7 @@ def _balance(model: Model, free: Sequence[str], motion: Motion, inputs: Array) -
 
 
 def _commands(model: Model, motion: Motion, seen: Seen) -> Array:
-    """Commands that a controller would have to give: those whose effort the motion requires, at the drives' mean gain."""
+    """Commands that a controller would have to give: their effort is the required one, at the drives' mean gain."""
     count = len(model.inputs)
     rest = np.zeros((len(motion.position), count))
     required = model.core.inverse_dynamics(
