@@ -117,14 +117,14 @@ def test_a_file_holds_the_terms_that_are_used_and_no_others() -> None:
 def record(seed: int, force: Force, duration: float = 10.0) -> vpm.Experiment:
     """A multisine with ``2 a + 3 v`` and a force that no catalogue has, by closed forms and not by the simulator."""
     generator = np.random.default_rng(seed)
-    time = STEP * np.arange(round(duration / STEP))
-    position, velocity, acceleration = np.zeros((3, time.size))
+    time: Array = STEP * np.arange(round(duration / STEP), dtype=np.float64)
+    position, velocity, acceleration = (np.zeros(time.size, dtype=np.float64) for _ in range(3))
     for rate in 2.0 * np.pi * generator.uniform(0.15, 1.2, 7):
         size, phase = 0.35 / (1.0 + rate), generator.uniform(0.0, 2.0 * np.pi)
         position += size * np.sin(rate * time + phase)
         velocity += size * rate * np.cos(rate * time + phase)
         acceleration -= size * rate**2 * np.sin(rate * time + phase)
-    effort = 2.0 * acceleration + 3.0 * velocity + force(position, velocity, time)
+    effort: Array = 2.0 * acceleration + 3.0 * velocity + force(position, velocity, time)
     effort += NOISE * generator.standard_normal(time.size)
     values = {"axis.position": position, "axis.velocity": velocity, "drive.command": effort}
     units = {"axis.position": "m", "axis.velocity": "m/s", "drive.command": "N"}

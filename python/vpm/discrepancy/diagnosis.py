@@ -11,13 +11,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from vpm.excitation import Excitation
 from vpm.identify import Fit
 from vpm.model import Model
 from vpm.results import Result, Storable
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from vpm.excitation import Excitation
 
 Array = NDArray[np.float64]
 
