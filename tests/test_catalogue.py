@@ -30,7 +30,7 @@ BOOM = {
     "section": {"shape": "rectangle", "width": 0.02, "height": 0.03},
 }
 #: Effects that put a joint behind the one they sit at, or say nothing about an effort at a state.
-ELSEWHERE = {"hysteresis", "joint_compliance", "rotor_inertia", "end_stop"}
+ELSEWHERE = {"empirical_force", "hysteresis", "joint_compliance", "rotor_inertia", "end_stop"}
 
 
 def machine(kind: str, sensed: str = "position", site: str = "joint") -> Model:
@@ -96,7 +96,7 @@ SITES = {
 
 def given(effect: EffectType) -> dict[str, float]:
     """Values for what a file has to give."""
-    return {parameter.name: 0.5 for parameter in effect.parameters if parameter.start is None}
+    return {parameter.name: 0.5 for parameter in effect.parameters if parameter.start is None or parameter.optional}
 
 
 @pytest.mark.parametrize("effect", EFFECTS.values(), ids=name_of)
@@ -104,7 +104,7 @@ def test_texts_are_complete(effect: EffectType) -> None:
     texts = {parameter.name: f"<{parameter.name}>" for parameter in effect.parameters}
     sentence = effect.sentence.format(at="<at>", **texts)
     assert "<at>" in sentence
-    assert all(texts[p.name] in sentence for p in effect.parameters if not p.shape)
+    assert all(texts[p.name] in sentence for p in effect.parameters if not p.shape and not p.optional)
     assert sentence.endswith(".")
     assert effect.impossible
     assert all(p.name in effect.law for p in effect.parameters if effect.name != "payload" and p.scale != "inertia")

@@ -88,6 +88,8 @@ class EffectParameter:
         Shape that nobody knows beforehand, so that data decide unless a value is given: adjustable in an added effect.
     typical : float
         Order of magnitude (SI) of a value that matters, for numbers that are far from 1 by their unit.
+    optional : bool
+        Not there at all unless a value is given.
     """
 
     name: str
@@ -103,6 +105,7 @@ class EffectParameter:
     shape: bool
     learnt: bool = False
     typical: float = 1.0
+    optional: bool = False
 
     def default(self, kind: JointKind | None = None) -> float | None:
         """Value when none is given (SI), at a site on a joint of this kind; None if it has to be given.

@@ -11,7 +11,7 @@ use crate::effect::{Domain, Hysteresis, JointEffect, Payload};
 use crate::sensor::Channel;
 
 /// An effect and its site, written as one flat table with a `type`.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(try_from = "Map<String, Value>")]
 pub enum EffectEntry {
     /// An effect on a joint.
@@ -19,7 +19,7 @@ pub enum EffectEntry {
         /// Number of the joint.
         joint: usize,
         /// Its law.
-        law: JointEffect<usize>,
+        law: Box<JointEffect<usize>>,
     },
     /// An effect on a joint that remembers its path.
     Hysteresis {
