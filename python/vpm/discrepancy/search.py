@@ -16,7 +16,7 @@ from vpm.discrepancy.diagnosis import Ambiguity, RankedCandidate, RefusedEffect
 from vpm.discrepancy.refusal import LEAST_GAIN, Thresholds, refuse_probe, refuse_trial
 from vpm.discrepancy.screening import Probe, probe
 from vpm.discrepancy.structure import structure
-from vpm.errors import DivergedError
+from vpm.errors import DivergedError, ModelError
 from vpm.identify import gain, segments
 from vpm.identify.parallel import in_order, worker_count
 
@@ -160,8 +160,11 @@ class _Round:
             self.tell(f"round {self.number}: refitting with {', '.join(p.candidate.label for p in short_list)}")
         tried = len(self._ranking) * self.number
         thresholds = Thresholds(tried, min(m.dt for m in self.data.training.motions))
-        for trial in _side_by_side(self._confirm, short_list):
-            key = trial.probe.candidate.key
+        for result, trial in zip(short_list, _side_by_side(self._confirm, short_list), strict=True):
+            key = result.candidate.key
+            if isinstance(trial, str):
+                self.refused[key] = trial
+                continue
             self._ranking[key] = replace(self._ranking[key], unseen=trial.unseen.relative)
             if reason := refuse_trial(trial, thresholds):
                 self.refused[key] = reason
@@ -172,8 +175,12 @@ class _Round:
                 f"{SHORT_LIST} candidates explain more of the training residual, and none of them was enough"
             )
 
-    def _confirm(self, result: Probe) -> Trial:
-        trial = confirm(self.current, self.data, result)
+    def _confirm(self, result: Probe) -> Trial | str:
+        """The trial, or why its values make no machine."""
+        try:
+            trial = confirm(self.current, self.data, result)
+        except (ModelError, DivergedError) as error:
+            return f"the values that the data ask for make no machine: {error}"
         share = f"{100.0 * trial.unseen.relative:.3g} % of the unseen mean square"
         self.tell(f"round {self.number}: {result.candidate.label} takes away {share}")
         return trial
