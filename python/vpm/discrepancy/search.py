@@ -14,6 +14,7 @@ from vpm.discrepancy.diagnosis import Ambiguity, RankedCandidate, RefusedEffect
 from vpm.discrepancy.refusal import LEAST_GAIN, Thresholds, refuse_probe, refuse_trial
 from vpm.discrepancy.screening import Probe, probe
 from vpm.discrepancy.side_by_side import Failure, SideBySide
+from vpm.discrepancy.structure import structure
 from vpm.errors import DivergedError
 from vpm.identify import gain, segments
 
@@ -22,6 +23,10 @@ SHORT_LIST = 7
 #: An instrument is blamed for what the machine may have done only if it leaves less than this share of the gap.
 SENSOR_SHARE = 0.25
 
+#: Effects that add a motion nobody measures, which has to be simulated for every probe; and the ratio of a residual to
+#: what is white in it up to which they are not worth that.
+HEAVY = ("joint_compliance", "backlash", "link_flexibility", "structural_damping")
+NOISE_ONLY = 1.2
 #: A refinement leaves less than this share of the mean square that the plainer effect leaves.
 REFINED = 0.5
 
@@ -82,9 +87,8 @@ def search(
         outcome = _Round(stages[-1].judged, data, number, tell, each)
         best = None
         try:
-            outcome.screen(effects, set(dropped))
-            outcome.confirm()
-            best = outcome.best() if len(accepted) < limit else None
+            if len(accepted) < limit:
+                best = outcome.light(effects, set(dropped)) or outcome.heavy(effects, set(dropped))
         except KeyboardInterrupt:
             interrupted = True
         ranking += outcome.ranked()
@@ -113,11 +117,29 @@ class _Round:
         self._promising: list[Probe] = []
         self._believed: list[Trial] = []
 
-    def screen(self, effects: Sequence[str] | None, without: set[Key]) -> None:
+    def light(self, effects: Sequence[str] | None, without: set[Key]) -> Accepted | None:
+        """The best of the candidates whose regressor follows from the measured motion alone."""
+        self.screen(effects, without, heavy=False)
+        self.confirm()
+        return self.best()
+
+    def heavy(self, effects: Sequence[str] | None, without: set[Key]) -> Accepted | None:
+        """The best of those with a motion of their own, tried only where more than noise is left to explain."""
+        left = structure(
+            self.current.model, self.data.training, self.data.unseen, self.current.fit.residual, self.current.unseen
+        )
+        if not left.present and left.coloured <= NOISE_ONLY:
+            return None
+        self._promising = []
+        self.screen(effects, without, heavy=True)
+        self.confirm()
+        return self.best()
+
+    def screen(self, effects: Sequence[str] | None, without: set[Key], *, heavy: bool) -> None:
         """Probe every candidate and set aside those that cannot be."""
         current, data = self.current, self.data
         found = candidates(current.model, data.training, current.fit.residual, effects)
-        listed = [c for c in found if c.key not in without]
+        listed = [c for c in found if c.key not in without and (c.effect.name in HEAVY) == heavy]
         self.tell(f"round {self.number}: screening {len(listed)} candidates")
         screen = partial(probe, current.baseline, data.training)
         results = self.each(f"round {self.number}: screening", screen, listed, lambda c: c.label)

@@ -24,6 +24,8 @@ PREDICTED_SHARE = 0.1
 SLOW_SHARE = 0.5
 #: So many times what is white in it, it is coloured.
 COLOURED = 1.6
+#: Pressures, currents and strains sum up the noise of what feeds them, which colours them by itself about so much.
+DRIFTING = 1.5
 #: So many times the relative gap of the training records, that of the unseen ones holds something they never showed.
 NEW = 4.0
 #: From so many standard deviations of the rank correlation between the two on, its size grows with that of the effort.
@@ -88,7 +90,8 @@ def _coloured(problem: InverseDynamicsProblem, residual: Array) -> float:
         mine = [block for block in problem.blocks if block.channel == channel]
         white = sum(white_level(residual[b.samples], b.moving) ** 2 * float(b.moving.sum()) for b in mine)
         power = sum(float(residual[b.samples] @ residual[b.samples]) for b in mine)
-        ratios.append(np.sqrt(power / white) if white > 0.0 else 0.0)
+        allowed = 1.0 if channel.endswith(".effort") else DRIFTING
+        ratios.append(np.sqrt(power / white) / allowed if white > 0.0 else 0.0)
     return float(max(ratios))
 
 
