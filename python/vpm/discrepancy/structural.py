@@ -35,8 +35,9 @@ Bounds = Mapping[str, tuple[float, float]]
 def sites_worth_trying(effect: EffectType, model: Model) -> tuple[str, ...]:
     """Sites of an effect but those where it cannot show: links that bend already, damping of rigid beams.
 
-    Play is looked for where an actuator drives the joint; elsewhere it needs a joint of its own. Along a measured motion
-    no memory is carried where something moves that nobody measures, so that hysteresis and what hides exclude each other.
+    Play is looked for where an actuator drives the joint; elsewhere it needs a joint of its own. Along a measured
+    motion no memory is carried where something moves that nobody measures, so that hysteresis and what hides exclude
+    each other.
     """
     sites = model.sites(effect.site)
     remembers = any(present.name == "hysteresis" for present in model.effects)
