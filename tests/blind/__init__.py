@@ -37,7 +37,7 @@ vertical plane (positive angles as those of the joint), and in the flexible arm 
 =================  ===================================================================================================
 """
 
-from blind.case import Case, Hidden, Truth, hideable, make_case, make_cases, sites_of
+from blind.case import Case, Hidden, Truth, hideable, make_case, make_cases, sites_of, try_cases
 from blind.effects import EFFECTS
 from blind.machines import MACHINES
 from blind.oracle import Oracle
@@ -53,4 +53,5 @@ __all__ = [
     "make_case",
     "make_cases",
     "sites_of",
+    "try_cases",
 ]

@@ -48,7 +48,7 @@ class Chain:
         self.hubs = stack(columns, JOINTS, "hub_inertia")
         self.elbow = stack(columns, ["elbow"], "housing_inertia")[0]
         self.loads = JointLoads(JOINTS, columns, step)
-        self.down = -1j * GRAVITY * np.sin(stack(columns, ["base"], "gravity_tilt.angle")[0])
+        self.down = -1j * GRAVITY * np.sin(stack(columns, ["world"], "gravity_tilt.angle")[0])
         places = self.ds * np.arange(1, SEGMENTS + 1)[None, :, None]
         places[1] += self.length[0]
         self.z: Complex = places.astype(np.complex128)
