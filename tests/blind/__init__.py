@@ -37,7 +37,8 @@ vertical plane (positive angles as those of the joint), and in the flexible arm 
 =================  ===================================================================================================
 """
 
-from blind.case import Case, Hidden, Truth, hideable, make_case, make_cases, sites_of, try_cases
+from blind.batch import Hidden, Truth
+from blind.case import Case, hideable, make_case, make_cases, sites_of, try_cases
 from blind.effects import EFFECTS
 from blind.machines import MACHINES
 from blind.oracle import Oracle

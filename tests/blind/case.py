@@ -68,7 +68,7 @@ class Case:
         return Model.from_toml(self.model_text)
 
     def write(self, folder: Path) -> None:
-        """Write model.toml, train_1.csv, train_2.csv, validate.csv for ``vpm diagnose``, and the truth as truth.json."""
+        """Write model.toml, train_1.csv, train_2.csv, validate.csv for ``vpm diagnose``, and truth.json."""
         folder.mkdir(parents=True, exist_ok=True)
         (folder / "model.toml").write_text(self.model_text, encoding="utf-8")
         for k, record in enumerate(self.train, 1):
@@ -81,7 +81,7 @@ class Case:
 
 def write_table(record: Experiment, path: Path) -> None:
     """Write a record as a table whose header has channels and units."""
-    header = ["time [s]", *(f"{channel} [{record.units[channel]}]" for channel in record)]
+    header = ["time [s]", *(f"{channel} [{record.unit(channel)}]" for channel in record)]
     table = np.column_stack([record.time, *(record[channel] for channel in record)])
     np.savetxt(path, table, fmt="%.12g", delimiter=",", header=",".join(header), comments="")
 
