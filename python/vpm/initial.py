@@ -23,7 +23,8 @@ def measured_states(
     """States (len(rows), nx) at some samples of the measured motion.
 
     Sensor errors are undone; flexible links are deflected as in equilibrium; lags, spools and currents have settled on
-    the held command, and chambers are without net force, unless the log holds what is inside of a drive.
+    the held command, and chambers are without net force, unless the log holds what is inside of a drive. Hystereses
+    remember the way since the first sample.
     """
     m = motion(experiment, model, cutoff=cutoff)
     gain, offset = sensor_errors(model, theta)
@@ -37,6 +38,9 @@ def measured_states(
         internal = _internal(model, experiment, theta, state[:coordinates], int(row))
         follow(model, theta, internal, m.inputs[row], state[coordinates : coordinates + joints])
         state[2 * coordinates :] = _seen(model, experiment, theta, state[:coordinates], internal, int(row))
+    memories = sum(name.endswith(".memory") for name in model.internal_names)
+    if memories:  # what the joints remember of their way until then
+        states[:, -memories:] = model.core.memories(theta, (m.position - offset) / gain)[rows]
     return states
 
 

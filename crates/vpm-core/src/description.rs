@@ -138,10 +138,20 @@ impl Description {
         self.actuators.len() + self.supplies.iter().filter(|supply| supply.is_logged()).count()
     }
 
-    /// Length of the state: coordinates, rates, the states of each actuator (lag, then drive), pressures of supplies that sag.
+    /// Length of the state: coordinates, rates, the states of each actuator (lag, then drive), pressures of supplies that sag,
+    /// memories of hystereses.
     pub fn n_states(&self) -> usize {
         let sagging = self.supplies.iter().filter(|supply| supply.is_sagging()).count();
-        2 * self.n_coordinates() + self.actuators.iter().map(Actuator::n_states).sum::<usize>() + sagging
+        let drives = self.actuators.iter().map(Actuator::n_states).sum::<usize>();
+        2 * self.n_coordinates() + drives + sagging + self.remembering().count()
+    }
+
+    /// Numbers of the joints with hysteresis, one for each.
+    pub(crate) fn remembering(&self) -> impl Iterator<Item = usize> {
+        self.effects.iter().filter_map(|entry| match entry {
+            EffectEntry::Hysteresis { joint, .. } => Some(*joint),
+            EffectEntry::Joint { .. } | EffectEntry::Payload { .. } => None,
+        })
     }
 
     /// Number of output channels.
@@ -226,7 +236,8 @@ impl Build for &Description {
         let supplies = self.supplies.iter().map(|supply| supply.map(&mut |&index| theta[index])).collect();
         let model = self.model(theta)?;
         let connections = self.connections(theta, &model)?;
-        Ok(Dynamics::new(model, effects, actuators, supplies).connected(connections))
+        let memories = self.effects.iter().filter_map(|entry| entry.with_memory(theta)).collect();
+        Ok(Dynamics::new(model, effects, actuators, supplies).connected(connections).remembering(memories))
     }
 }
 
@@ -237,14 +248,21 @@ impl EffectEntry {
                 let payload = law.map(&mut |&index| theta[index]);
                 Some(PointMass { on: *on, mass: payload.mass, position: payload.position })
             }
-            Self::Joint { .. } => None,
+            Self::Joint { .. } | Self::Hysteresis { .. } => None,
         }
     }
 
     fn on_joint<S: Scalar>(&self, theta: &[S]) -> Option<(usize, crate::effect::JointEffect<S>)> {
         match self {
             Self::Joint { joint, law } => Some((*joint, law.map(&mut |&index| theta[index]))),
-            Self::Payload { .. } => None,
+            Self::Payload { .. } | Self::Hysteresis { .. } => None,
+        }
+    }
+
+    fn with_memory<S: Scalar>(&self, theta: &[S]) -> Option<(usize, crate::effect::Hysteresis<S>)> {
+        match self {
+            Self::Hysteresis { joint, law } => Some((*joint, law.map(&mut |&index| theta[index]))),
+            Self::Payload { .. } | Self::Joint { .. } => None,
         }
     }
 }

@@ -96,6 +96,15 @@ pub enum Error {
         /// Name of the first such beam.
         beam: String,
     },
+    /// A prescribed motion of a machine with hysteresis.
+    #[error(
+        "joint `{joint}` has hysteresis, whose memory a simulation with prescribed motion does not carry; balance the efforts of the joints \
+         (inverse dynamics) or simulate it on its commands"
+    )]
+    Memory {
+        /// Name of the first such joint.
+        joint: String,
+    },
     /// A payload sits on a body that does not exist.
     #[error(
         "payload number {payload} sits on body number {body}, but the model has {bodies} bodies; use a number below {bodies}"

@@ -46,6 +46,7 @@ pub struct Efforts {
 /// `q(t) = (y(t + delay) - offset) / gain`, velocities and accelerations likewise without the offset.
 /// `applied[k] = (m[k-1] + m[k]) / 2` with m the mean effort over a sample interval, which is what a central difference of the motion
 /// sees; the lag is solved exactly in each interval, from rest at its first input.
+/// Hystereses begin relaxed and move on exactly along the way from sample to sample.
 /// Source: inverse dynamic identification model, Khalil & Dombre 2002, "Modeling, Identification and Control of Robots", section 12.4.
 /// Checked: recovers the efforts of a simulated run.
 pub fn inverse_dynamics(
@@ -142,7 +143,7 @@ impl Inverse<'_> {
         let Motion { position, velocity, acceleration, time_step, .. } = self.motion;
         let (motion, joints) = (JointMotion { position, velocity, acceleration }, sensors.len());
         let mut moving = [0; 3].map(|_| vec![S::zero(); joints]);
-        let mut required = vec![S::zero(); position.numbers().len()];
+        let (mut required, mut before) = (vec![S::zero(); position.numbers().len()], vec![S::zero(); joints]);
         let (mut levers, mut row_levers) = (Vec::new(), vec![S::zero(); dynamics.layout().lines * joints]);
         for (k, row) in required.chunks_exact_mut(joints).enumerate() {
             if k.is_multiple_of(PATIENCE) && (self.interrupt)() {
@@ -155,6 +156,10 @@ impl Inverse<'_> {
                 }
             }
             let [q, v, a] = &moving;
+            if k > 0 {
+                dynamics.memories.travel(|joint| q[joint] - before[joint]);
+            }
+            before.copy_from_slice(q);
             dynamics.inverse_dynamics(q, v, a, row);
             if dynamics.pulls() {
                 dynamics.levers(q, &mut row_levers);

@@ -39,6 +39,10 @@ pub trait Ode<S> {
         false
     }
 
+    /// Puts into `rates`, for states that follow the path of coordinates, their mean rates over a `step` along which the coordinates
+    /// move at the rates in `x`. A semi-implicit step asks for it when it knows the new rates of the coordinates.
+    fn along_path(&mut self, _x: &[S], _step: f64, _rates: &mut [S]) {}
+
     /// Writes a natural size of every state, in its unit: what a change of the state is small beside. Step control takes it for absolute
     /// tolerances.
     fn scales(&self, scales: &mut [f64]) {

@@ -4,6 +4,7 @@ mod answers;
 mod connections;
 mod driven;
 mod drives;
+mod memory;
 mod observe;
 mod ode;
 mod places;
@@ -13,6 +14,7 @@ mod stiff;
 mod tangent;
 
 pub use connections::Connections;
+pub use memory::Memories;
 pub use ode::System;
 
 use crate::actuator::hydraulic::Supply;
@@ -20,7 +22,7 @@ use crate::actuator::{Actuator, Target};
 use crate::contact::ContactFriction;
 use crate::data::Data;
 use crate::dynamics::{aba, flexible, lines, motion, poses};
-use crate::effect::JointEffect;
+use crate::effect::{Hysteresis, JointEffect};
 use crate::model::Model;
 use crate::scalar::Scalar;
 use drives::Shown;
@@ -28,7 +30,7 @@ use drives::Shown;
 /// The right-hand side: everything that acts, in one number type, with its buffers.
 ///
 /// Law: with x = [q, v, s], `dq/dt = v`, `M(q) dv/dt + h(q, v) + K q + D v = sum of actuator and effect efforts`; s are the states of
-/// each actuator in order (lag, then drive), then the pressures of supplies that sag.
+/// each actuator in order (lag, then drive), then the pressures of supplies that sag, then the memories of hystereses.
 #[derive(Clone, Debug)]
 pub struct Dynamics<S> {
     /// The tree with its payloads.
@@ -60,6 +62,8 @@ pub struct Dynamics<S> {
     loads: Vec<S>,
     /// Contacts, bushings and load cells.
     pub(crate) connections: Connections<S>,
+    /// Effects that remember.
+    pub(crate) memories: Memories<S>,
 }
 
 impl<S: Scalar> Dynamics<S> {
@@ -87,6 +91,7 @@ impl<S: Scalar> Dynamics<S> {
             pulls: actuators.iter().any(|actuator| matches!(actuator.on, Target::Line(_))),
             loads: zeros(model.n_coordinates()),
             connections: Connections::default(),
+            memories: Memories::new(Vec::new()),
             model,
             effects,
             actuators,
@@ -98,6 +103,12 @@ impl<S: Scalar> Dynamics<S> {
     #[must_use]
     pub fn connected(self, connections: Connections<S>) -> Self {
         Self { connections, ..self }
+    }
+
+    /// With hystereses, each with the number of its joint, relaxed.
+    #[must_use]
+    pub fn remembering(self, laws: Vec<(usize, Hysteresis<S>)>) -> Self {
+        Self { memories: Memories::new(laws), ..self }
     }
 
     /// Number of joints.
@@ -112,9 +123,15 @@ impl<S: Scalar> Dynamics<S> {
         self.model.n_coordinates()
     }
 
-    /// Length of the state: coordinates, rates, states of drives and supplies.
+    /// Length of the state: coordinates, rates, states of drives and supplies, memories.
     #[inline]
     pub fn dim(&self) -> usize {
+        self.first_memory() + self.memories.len()
+    }
+
+    /// Place of the first memory in the state.
+    #[inline]
+    pub(crate) fn first_memory(&self) -> usize {
         2 * self.coordinates() + self.internal
     }
 
@@ -188,6 +205,8 @@ impl<S: Scalar> Dynamics<S> {
         let (q, v) = x[..2 * n].split_at(n);
         self.actuate(x, dxdt);
         dxdt[..n].copy_from_slice(v);
+        let first = self.first_memory();
+        self.memories.rates(&x[first..], v, &mut dxdt[first..]);
         self.accelerate(q, v, laws, &[]);
         dxdt[n..2 * n].copy_from_slice(&self.data.acceleration);
     }
@@ -226,6 +245,7 @@ impl<S: Scalar> Dynamics<S> {
         elastic.fill(S::zero());
         elastic[..on_beams.len()].copy_from_slice(on_beams);
         add(&self.effects, q, v, of_joints);
+        self.memories.add_efforts(of_joints);
         if self.pulls {
             flexible::add_line_forces(data, tensions, loads);
         }

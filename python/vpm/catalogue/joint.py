@@ -1,4 +1,4 @@
-"""Effects that sit at a joint: they act with an effort that depends on its position and velocity.
+"""Effects that sit at a joint: they act with an effort that depends on its position and velocity, or on its path.
 
 Smooth friction laws: the sign of the velocity is written tanh(v/vt), so that every law has derivatives; the transition
 velocity vt is far below the speeds of interest. Coulomb, viscous and Stribeck terms: B. Armstrong-Helouvry, P. Dupont
@@ -16,6 +16,8 @@ _TRANSITION = (1e-3, 1e-2)
 _STRIBECK = (1e-2, 1e-1)
 #: Way over which a contact closes where none is given: prismatic (m), revolute (rad).
 _CONTACT = (1e-5, 1e-4)
+#: Pre-sliding way where none is given: prismatic (m), revolute (rad).
+_PRESLIDING = (1e-3, 1e-2)
 
 
 def _transition(suffix: str) -> EffectParameter:
@@ -26,6 +28,7 @@ def _transition(suffix: str) -> EffectParameter:
         "speed",
         "speed below which the law bends from one sign to the other",
         start=_TRANSITION,
+        learnt=True,
     )
 
 
@@ -77,6 +80,7 @@ COULOMB_FRICTION = EffectType(
         "viscous_friction": "motion at one speed alone does not part them; records at several speeds do",
         "stribeck_friction": "they differ only at low speed; slow motion and starts from rest part them",
         "dead_zone": "they agree wherever command and velocity have the same sign; braking parts them",
+        "hysteresis": "they agree but for the way after a reversal; short strokes and slow reversals part them",
     },
 )
 
@@ -138,6 +142,7 @@ STRIBECK_FRICTION = EffectType(
             "speed",
             "speed at which the excess has fallen to 37 %",
             start=_STRIBECK,
+            learnt=True,
         ),
         _transition("stribeck_transition_velocity"),
     ),
@@ -150,6 +155,7 @@ STRIBECK_FRICTION = EffectType(
     confused_with={
         "coulomb_friction": "they differ only at low speed; slow motion and starts from rest part them",
         "dead_zone": "both hold the joint at rest under small commands; slow reversals under load part them",
+        "hysteresis": "both shape the start of a motion; starts at several accelerations part speed from way",
     },
     requires="coulomb_friction",
 )
@@ -205,6 +211,7 @@ SPRING = EffectType(
         "payload": "near the hanging position gravity acts like a spring; large angles or fast motion part them",
         "sensor_offset": "a shifted rest position and a shifted zero agree; a reference position parts them",
         "torque_ripple": "they agree over less than a quarter of a period; a longer way parts them",
+        "hysteresis": "they agree over ways that are too short to slide; a longer way parts them",
     },
 )
 
@@ -230,6 +237,55 @@ TORQUE_RIPPLE = EffectType(
     confused_with={
         "spring": "they agree over less than a quarter of a period; a longer way parts them",
         "payload": "gravity on a revolute joint repeats once per turn; a vertical axis or fast motion parts them",
+    },
+)
+
+HYSTERESIS = EffectType(
+    name="hysteresis",
+    site="joint",
+    group="hysteresis",
+    parameters=(
+        size(
+            "force",
+            "hysteresis.force",
+            "{E}",
+            "effort",
+            "resistance after a long way in one direction",
+            physical=NOT_NEGATIVE,
+        ),
+        shape(
+            "displacement",
+            "hysteresis.displacement",
+            "{C}",
+            "coordinate",
+            "way over which the resistance builds up; from a relaxed start 63 % of it are there after that way",
+            start=_PRESLIDING,
+            learnt=True,
+        ),
+        shape(
+            "shape",
+            "hysteresis.shape",
+            "1",
+            "one",
+            "stiffness on reversal over that about the relaxed state, less 1; 1 is Dahl's friction",
+            start=1.0,
+            bounds=NOT_NEGATIVE,
+            learnt=True,
+        ),
+    ),
+    law=(
+        "tau = -force z, dz/dt = (v/displacement) (1 - |z|) where v z >= 0,"
+        " (v/displacement) (1 + shape |z|) where v z < 0"
+    ),
+    sentence=(
+        "{at} resists with a memory of its path: against {force} after a long way, which build up and turn round over"
+        " ways of about {displacement}."
+    ),
+    impossible="a negative hysteresis would give out more energy in every loop than went in",
+    confused_with={
+        "coulomb_friction": "they agree but for the way after a reversal; short strokes and slow reversals part them",
+        "stribeck_friction": "both shape the start of a motion; starts at several accelerations part speed from way",
+        "spring": "they agree over ways that are too short to slide; a longer way parts them",
     },
 )
 
@@ -282,5 +338,6 @@ JOINT_EFFECTS = (
     BIAS_FORCE,
     SPRING,
     TORQUE_RIPPLE,
+    HYSTERESIS,
     BACKLASH,
 )

@@ -67,6 +67,8 @@ class EffectParameter:
         The effort that a motion needs is linear in this parameter, the shape parameters being fixed.
     shape : bool
         Shapes a law whose size another parameter gives; has no meaning where that size is zero.
+    learnt : bool
+        Shape that nobody knows beforehand, so that data decide unless a value is given: adjustable in an added effect.
     """
 
     name: str
@@ -80,6 +82,7 @@ class EffectParameter:
     evaluable: Range
     linear: bool
     shape: bool
+    learnt: bool = False
 
     def default(self, kind: JointKind | None = None) -> float | None:
         """Value when none is given (SI), at a site on a joint of this kind; None if it has to be given.
@@ -179,6 +182,7 @@ def shape(
     *,
     start: float | tuple[float, float] | None,
     bounds: Range = ABOVE_ZERO,
+    learnt: bool = False,
 ) -> EffectParameter:
     """Shape parameter; law and physics have the same range."""
     return EffectParameter(
@@ -193,6 +197,7 @@ def shape(
         evaluable=bounds,
         linear=False,
         shape=True,
+        learnt=learnt,
     )
 
 

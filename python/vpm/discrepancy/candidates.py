@@ -23,6 +23,8 @@ STRIBECK_SHARES = (0.08, 0.25, 0.6)
 #: Lags tried, in sampling intervals, and saturation limits, as shares of the largest command.
 LAG_INTERVALS = (1.0, 4.0, 16.0)
 LIMIT_SHARES = (0.95, 0.7, 0.4)
+#: Ways over which a hysteresis turns round that are tried, as shares of the travel.
+PRESLIDING_SHARES = (0.004, 0.02, 0.1)
 #: Number of ripple periods proposed by the periodogram.
 PERIODS = 3
 
@@ -121,6 +123,11 @@ def _candidate(effect: EffectType, site: str, model: Model, data: InverseDynamic
         return Candidate(effect, site, tuple({"period": p} for p in periods), bounds)
     if effect.name == "spring":
         return Candidate(effect, site, ({"rest": seen.middle},), {"rest": _around(seen)})
+    if effect.name == "hysteresis":
+        # A way that is passed between two samples cannot be told from dry friction.
+        least = min(seen.speed * seen.interval, 0.5 * seen.travel)
+        starts = tuple({"displacement": max(share * seen.travel, least)} for share in PRESLIDING_SHARES)
+        return Candidate(effect, site, starts, {"displacement": (least, 2.0 * seen.travel), "shape": (0.0, 20.0)})
     if effect.name == "payload":
         return Candidate(effect, site, _payload_places(model, site))
     if effect.name == "actuator_lag":

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,13 +39,14 @@ class Data:
 
 @dataclass(frozen=True)
 class Judged:
-    """A fitted model with its residuals on all the data."""
+    """A fitted model with its residuals on all the data, and the bounds of its shapes that the data gave."""
 
     model: Model
     free: tuple[str, ...]
     fit: Estimate
     unseen: Array
     simulated: Array | None
+    bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     @property
     def baseline(self) -> Baseline:
@@ -104,12 +106,12 @@ def judge(model: Model, free: tuple[str, ...], data: Data, bounds: dict[str, tup
     simulated = None
     if data.simulation is not None:
         simulated, _ = data.simulation.evaluate(fitted, fitted.theta)
-    return Judged(fitted, free, fit, unseen, simulated)
+    return Judged(fitted, free, fit, unseen, simulated, dict(bounds))
 
 
 def confirm(current: Judged, data: Data, probe: Probe) -> Trial:
     """Refit with the candidate, release what has become visible, and measure the gain on unseen data."""
-    bounds = _bounds(probe)
+    bounds = {**current.bounds, **_bounds(probe)}
     start = probe.model.with_parameters(_inside(probe, bounds))
     free = (*current.free, *probe.free)
     held: tuple[Alias, ...] = ()

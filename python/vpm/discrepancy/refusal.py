@@ -64,6 +64,7 @@ def refuse_trial(trial: Trial, thresholds: Thresholds) -> str:
     """Reason not to accept a refitted candidate, or ""."""
     reasons = (
         _too_short(trial, thresholds.interval),
+        _no_way(trial),
         _only_training(trial),
         _not_clear(trial),
         _worse_in_simulation(trial),
@@ -90,6 +91,22 @@ def _too_short(trial: Trial, interval: float) -> str:
                 f"{1e3 * interval:.3g} ms: it cannot be told from the sampling itself"
             )
     return ""
+
+
+def _no_way(trial: Trial) -> str:
+    """A hysteresis that turns round within the way of one sample is dry friction, as far as the data can see."""
+    candidate, bounds = trial.probe.candidate, trial.judged.bounds
+    if candidate.effect.name != "hysteresis":
+        return ""
+    name = f"{candidate.site}.hysteresis.displacement"
+    parameter = trial.judged.model.parameters[name]
+    least = bounds[name][0]
+    if parameter.value > 1.001 * least:
+        return ""
+    return (
+        f"{name} comes out at the {least:.3g} {parameter.unit} that the joint passes between two samples: it cannot be "
+        "told from dry friction"
+    )
 
 
 def _only_training(trial: Trial) -> str:

@@ -17,10 +17,11 @@ from vpm.discrepancy.confirmation import Data, Judged, Trial, confirm, judge
 from vpm.discrepancy.diagnosis import Ambiguity, RankedCandidate, RefusedEffect
 from vpm.discrepancy.refusal import LEAST_GAIN, Thresholds, refuse_probe, refuse_trial
 from vpm.discrepancy.screening import Probe, probe
+from vpm.errors import DivergedError
 from vpm.identify import gain, segments
 
 #: Candidates refitted in one round.
-SHORT_LIST = 6
+SHORT_LIST = 7
 #: An instrument is blamed for what the machine may have done only if it leaves less than this share of the gap.
 SENSOR_SHARE = 0.25
 
@@ -182,7 +183,10 @@ def _drop_replaced(stages: list[Stage], accepted: list[Accepted], data: Data, dr
             continue
         model = current.model.without_effect(*entry.key)
         free = tuple(name for name in current.free if name in model.parameters)
-        reduced = judge(model, free, data, {})
+        try:
+            reduced = judge(model, free, data, {name: pair for name, pair in current.bounds.items() if name in free})
+        except DivergedError:
+            continue  # without it the model cannot follow the unseen data at all
         loss = gain(reduced.unseen, current.unseen, segments(data.unseen))
         if loss.relative < LEAST_GAIN:
             accepted.remove(entry)

@@ -69,7 +69,8 @@ class Components(DriveComponents):
         """State of a simulation: position and velocity of every coordinate, then what drives and supplies hold.
 
         Per actuator its lag, then of a motor ``current``, of a Maxwell element ``stretch``, of a cylinder ``spool``,
-        ``spool_rate``, ``chamber_a`` and ``chamber_b``; then the pressure of supplies that sag.
+        ``spool_rate``, ``chamber_a`` and ``chamber_b``; then the pressure of supplies that sag,
+        then the ``memory`` of each joint with hysteresis.
         """
         positions = [f"{name}.position" for name in self.coordinates]
         velocities = [f"{name}.velocity" for name in self.coordinates]

@@ -106,10 +106,11 @@ class DriveComponents:
 
     @cached_property
     def internal_names(self) -> tuple[str, ...]:
-        """States beside coordinates and their rates: per actuator lag and drive, then supplies that sag."""
+        """States beside coordinates and rates: per actuator lag and drive, then supplies that sag, then memories."""
         supplies = self._checked.document.supplies
         sagging = (f"{name}.pressure" for name, supply in supplies.items() if supply.source == "sagging")
-        return (*(state for name in self.actuators for state in self._states_of(name)), *sagging)
+        memories = (f"{effect.at}.memory" for effect in self._checked.document.effects if effect.type == "hysteresis")
+        return (*(state for name in self.actuators for state in self._states_of(name)), *sagging, *memories)
 
     def _states_of(self, actuator: str) -> Iterator[str]:
         if self.has_lag(actuator):
@@ -120,7 +121,7 @@ class DriveComponents:
     def internal_unit(self, state: str) -> str:
         """SI unit of a state of `internal_names`."""
         owner, _, name = state.partition(".")
-        units = {"current": "A", "stretch": "m", "chamber_a": "Pa", "chamber_b": "Pa", "pressure": "Pa"}
+        units = {"current": "A", "stretch": "m", "chamber_a": "Pa", "chamber_b": "Pa", "pressure": "Pa", "memory": "1"}
         if name in units:
             return units[name]
         command = self._checked.structure.unit(f"{owner}.command")

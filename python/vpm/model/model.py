@@ -203,7 +203,7 @@ class Model(Evaluations, Storable):
             Component that it sits at.
         **values : float
             SI values by short name. Sizes that are not given start where the effect does nothing, shape parameters at
-            the start value of the catalogue. Sizes, and velocities of friction laws that are not given, become
+            the start value of the catalogue. Sizes, and velocities and ways of friction laws that are not given, become
             adjustable, with nothing known about them beforehand.
 
         Raises
@@ -223,7 +223,7 @@ class Model(Evaluations, Storable):
             if given is None:
                 continue  # the check below says what is missing
             # Nobody knows beforehand at which velocity a friction law bends; places and periods are told.
-            known = parameter.shape and (parameter.name in values or parameter.scale != "speed")
+            known = parameter.shape and (parameter.name in values or not parameter.learnt)
             entry[parameter.name] = float(given) if known else {"value": float(given), "uncertainty": math.inf}
         content = self.to_dict()
         content.setdefault("effects", []).append(entry)

@@ -107,7 +107,9 @@ fn sites(description: &Description) -> Result<()> {
     for (number, effect) in description.effects.iter().enumerate() {
         let what = format!("effect number {number}");
         match effect {
-            EffectEntry::Joint { joint, .. } => within(&what, "joint", *joint, joints)?,
+            EffectEntry::Joint { joint, .. } | EffectEntry::Hysteresis { joint, .. } => {
+                within(&what, "joint", *joint, joints)?
+            }
             EffectEntry::Payload { on: Site::Body(body), .. } => within(&what, "body", *body, joints)?,
             EffectEntry::Payload { on: Site::Weld(weld), .. } => within(&what, "weld", *weld, description.welds.len())?,
             EffectEntry::Payload { on: Site::Tip(beam), .. } => within(&what, "beam", *beam, description.n_beams())?,

@@ -6,7 +6,7 @@ use serde_json::{Map, Value};
 
 use crate::body::Site;
 use crate::controller::ControlLaw;
-use crate::effect::{Domain, JointEffect, Payload};
+use crate::effect::{Domain, Hysteresis, JointEffect, Payload};
 use crate::sensor::Channel;
 
 /// An effect and its site, written as one flat table with a `type`.
@@ -19,6 +19,13 @@ pub enum EffectEntry {
         joint: usize,
         /// Its law.
         law: JointEffect<usize>,
+    },
+    /// An effect on a joint that remembers its path.
+    Hysteresis {
+        /// Number of the joint.
+        joint: usize,
+        /// Its law.
+        law: Hysteresis<usize>,
     },
     /// A payload on a body or at the tip of a beam.
     Payload {
@@ -54,6 +61,7 @@ impl EffectEntry {
     pub fn domains(&self) -> Vec<(&usize, Domain)> {
         match self {
             Self::Joint { law, .. } => law.domains(),
+            Self::Hysteresis { law, .. } => law.domains(),
             Self::Payload { law, .. } => law.domains(),
         }
     }
@@ -92,6 +100,10 @@ impl TryFrom<Map<String, Value>> for EffectEntry {
                 return Ok(Self::Payload { on, law: serde_json::from_value(Value::Object(table))? });
             }
             let joint = take(&mut table, "joint")?;
+            if kind == "hysteresis" {
+                table.remove("type");
+                return Ok(Self::Hysteresis { joint, law: serde_json::from_value(Value::Object(table))? });
+            }
             Ok(Self::Joint { joint, law: serde_json::from_value(Value::Object(table))? })
         })
     }

@@ -6,7 +6,8 @@ use crate::scalar::Scalar;
 
 /// First order, one evaluation a step: rates first, coordinates with the new rates; constant stiffness and damping implicitly.
 ///
-/// Law: `v+ = v + h a(q, v)`, `q+ = q + h v+`, other states by the explicit Euler rule. Where [`Ode::elasticity`] tells of constant
+/// Law: `v+ = v + h a(q, v)`, `q+ = q + h v+`, other states by the explicit Euler rule, but for those that
+/// follow the path of coordinates, [`Ode::along_path`]. Where [`Ode::elasticity`] tells of constant
 /// stiffness K and damping D, `M a = f - K q - D v`, the rates follow from `(M + h D + h^2 K) v+ = M v + h (f - K q)` instead, so
 /// that the vibrations they cause limit no step: they are damped where the step does not resolve them.
 /// Source: Hairer, Lubich & Wanner 2006, "Geometric Numerical Integration", equation I.1.9; for the implicit stiffness Baraff &
@@ -35,10 +36,13 @@ impl<S: Scalar> SemiImplicit<S> {
         if ode.elasticity(x, &mut self.elastic[..2 * n * n]) {
             self.relax(&x[n..2 * n], step);
         }
+        let add = |states: &mut [S], rates: &[S]| {
+            states.iter_mut().zip(rates).for_each(|(state, &rate)| *state += rate * step);
+        };
+        add(&mut x[n..2 * n], &self.rate[n..2 * n]);
+        ode.along_path(x, step, &mut self.rate);
+        add(&mut x[2 * n..], &self.rate[2 * n..]);
         let (coordinates, others) = x.split_at_mut(n);
-        for (state, &rate) in others.iter_mut().zip(&self.rate[n..]) {
-            *state += rate * step;
-        }
         for (coordinate, &rate) in coordinates.iter_mut().zip(&*others) {
             *coordinate += rate * step;
         }

@@ -19,7 +19,10 @@ pub(crate) fn state_name(description: &Description, place: usize) -> String {
         of_drives.map(|(state, actuator)| format!("{} of actuator `{}`", state.replace('_', " "), actuator.name));
     let sagging = description.supplies.iter().filter(|supply| supply.is_sagging());
     let of_supplies = sagging.map(|supply| format!("pressure of supply `{}`", supply.name));
-    of_drives.chain(of_supplies).nth(place - 2 * n).unwrap_or_default()
+    let of_effects = description
+        .remembering()
+        .map(|joint| format!("hysteresis of joint `{}`", description.bodies[joint].joint.name));
+    of_drives.chain(of_supplies).chain(of_effects).nth(place - 2 * n).unwrap_or_default()
 }
 
 fn coordinate_name(description: &Description, quantity: &str, place: usize) -> String {

@@ -34,6 +34,9 @@ pub fn prescribed(setting: Setting<'_>, motion: JointMotion<'_>, passive: &[usiz
     {
         table.expect(name, rows, joints)?;
     }
+    if let Some(joint) = setting.description.remembering().next() {
+        return Err(Error::Memory { joint: setting.description.bodies[joint].joint.name.clone() });
+    }
     let mut passive = passive.to_vec();
     passive.sort_unstable();
     passive.dedup();

@@ -8,7 +8,7 @@ use crate::scalar::Scalar;
 use crate::spatial::{Pose, Twist};
 
 impl<S: Scalar> Dynamics<S> {
-    /// Accelerations of all coordinates at (q, v) under `efforts` on all coordinates, with all effects.
+    /// Accelerations of all coordinates at (q, v) under `efforts` on all coordinates, with all effects, memories as they are.
     pub fn forward_dynamics(&mut self, q: &[S], v: &[S], efforts: &[S]) -> &[S] {
         let joints = self.joints();
         self.tensions.fill(S::zero());
@@ -47,6 +47,7 @@ impl<S: Scalar> Dynamics<S> {
         }
         loads.fill(S::zero());
         add_effects(&self.effects, q, v, loads);
+        self.memories.add_efforts(loads);
         for (effort, &effect) in efforts.iter_mut().zip(&*loads) {
             *effort -= effect;
         }

@@ -73,6 +73,7 @@ impl<S: Scalar> Driven<S> {
         }
         self.differentiate_drives(machine, x);
         self.add_internal(machine, matrix, dim);
+        self.add_memories(machine, x, matrix);
         for (number, acceleration) in self.acceleration.iter_mut().zip(&machine.data.acceleration) {
             *number = Dual::constant(*acceleration);
         }
@@ -87,7 +88,7 @@ impl<S: Scalar> Driven<S> {
     fn differentiate_drives(&mut self, machine: &Dynamics<S>, x: &[S]) {
         let n = machine.coordinates();
         let Self { dynamics, state, rate, .. } = self;
-        let internal = &x[2 * n..];
+        let internal = &x[2 * n..machine.first_memory()];
         let mut lifted = state[2 * n..].iter_mut().zip(internal);
         for actuator in &machine.actuators {
             for (lane, (state, &value)) in lifted.by_ref().take(actuator.n_states()).enumerate() {
@@ -146,6 +147,31 @@ impl<S: Scalar> Driven<S> {
         }
     }
 
+    /// The columns and rows of the memories, which know the velocity of their joint alone.
+    fn add_memories(&mut self, machine: &Dynamics<S>, x: &[S], matrix: &mut [S]) {
+        let Self { dynamics, state, rate, column, .. } = self;
+        let (n, first, dim) = (machine.coordinates(), machine.first_memory(), x.len());
+        let memories = state[first..].iter_mut().zip(&x[first..]);
+        memories.for_each(|(state, &value)| *state = Dual::variable(value, 0));
+        state[n..2 * n].iter_mut().zip(&x[n..2 * n]).for_each(|(state, &value)| *state = Dual::variable(value, 1));
+        let (moving, held) = state.split_at(first);
+        dynamics.memories.rates(held, &moving[n..2 * n], &mut rate[first..]);
+        let memories = state[first..].iter_mut().zip(&x[first..]);
+        memories.for_each(|(state, &value)| *state = Dual::constant(value));
+        dynamics.memories.hold(&state[first..]);
+        for (place, (joint, law, _)) in (first..).zip(machine.memories.iter()) {
+            column.fill(S::zero());
+            column[joint] = law.effort(S::one());
+            machine.data.solve(column);
+            for (row, &entry) in matrix[n * dim..].chunks_exact_mut(dim).zip(&*column) {
+                row[place] = entry;
+            }
+            let [by_memory, by_velocity, ..] = rate[place].gradient;
+            matrix[place * dim + place] = by_memory;
+            matrix[place * dim + n + joint] = by_velocity;
+        }
+    }
+
     /// The residual of the equations of motion with its derivatives along the directions from `first`: coordinates, then rates.
     fn sweep(&mut self, x: &[S], first: usize, laws: &impl Laws<Number<S>>) {
         let Self { dynamics, state, acceleration, residual, extra, .. } = self;
@@ -155,7 +181,9 @@ impl<S: Scalar> Driven<S> {
             *state = Dual::variable(value, column.wrapping_sub(first));
         }
         let (q, v) = state[..2 * n].split_at(n);
-        let Dynamics { model, data, connections, tensions, efforts, actuators, forces, effects, loads, .. } = dynamics;
+        let Dynamics {
+            model, data, connections, tensions, efforts, actuators, forces, effects, memories, loads, ..
+        } = dynamics;
         reach(model, data, [q, v, acceleration], extra);
         efforts.fill(Dual::default());
         tensions.fill(Dual::default());
@@ -176,6 +204,7 @@ impl<S: Scalar> Driven<S> {
         loads.fill(Dual::default());
         loads[..efforts.len()].copy_from_slice(efforts);
         laws.add(effects, q, v, &mut loads[..efforts.len()]);
+        memories.add_efforts(&mut loads[..efforts.len()]);
         flexible::subtract_elastic(model, q, v, loads);
         project(model, data, residual);
         for (residual, &load) in residual.iter_mut().zip(&*loads) {

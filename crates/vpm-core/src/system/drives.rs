@@ -56,11 +56,13 @@ impl<S: Scalar> Dynamics<S> {
         }
     }
 
-    /// The rates of the states of drives and supplies at state `x`, written into their place in `dxdt`, with all that they push.
+    /// The rates of the states of drives, supplies and memories at state `x`, written into their place in `dxdt`, with all that they push.
     pub(crate) fn drive(&mut self, x: &[S], dxdt: &mut [S]) {
         let (q, v) = x[..2 * self.coordinates()].split_at(self.coordinates());
         self.locate(q, v);
         self.actuate(x, dxdt);
+        let first = self.first_memory();
+        self.memories.rates(&x[first..], v, &mut dxdt[first..]);
     }
 
     /// Holds what input `number` amounts to, see [`Dynamics::input`].

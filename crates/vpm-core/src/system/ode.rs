@@ -14,6 +14,7 @@ pub struct System<S> {
     tangent: Tangent<S>,
     resistances: Vec<S>,
     seals: Vec<Option<S>>,
+    fadings: Vec<Option<S>>,
     /// A column of an iteration matrix on its way.
     column: Vec<S>,
     /// Rates at a state whose matrix is asked for alone.
@@ -31,7 +32,8 @@ impl<S: Scalar> System<S> {
         let column = vec![S::zero(); dynamics.coordinates()];
         let seals = vec![None; dynamics.actuators.len()];
         let rates = vec![S::zero(); dynamics.dim()];
-        Ok(Self { dynamics, tangent, resistances, seals, column, rates, ready: false })
+        let fadings = vec![None; dynamics.memories.len()];
+        Ok(Self { dynamics, tangent, resistances, seals, fadings, column, rates, ready: false })
     }
 
     /// The right-hand side.
@@ -82,7 +84,8 @@ impl<S: Scalar> System<S> {
             self.dynamics.rhs_with(x, &mut self.rates, (at_rest, chord));
             self.dynamics.seals.fill(None);
         }
-        self.tangent.chords(&mut self.dynamics, x, matrix, (&self.resistances, &self.seals));
+        self.fadings.fill(Some(S::zero()));
+        self.tangent.chords(&mut self.dynamics, x, matrix, (&self.resistances, &self.seals, &self.fadings));
         self.seals.fill(None);
     }
 
@@ -93,13 +96,16 @@ impl<S: Scalar> System<S> {
         for (joint, effect) in &self.dynamics.effects {
             self.resistances[*joint] += effect.resistance(x[n + joint]);
         }
+        let (v, first) = (&x[n..2 * n], self.dynamics.first_memory());
+        self.dynamics.memories.fadings(&x[first..], v, &mut self.fadings);
         if self.is_stiff_alone() {
-            stiff::iteration_matrix(&mut self.dynamics, x, matrix, &self.resistances, &mut self.column);
+            let laws = (&*self.resistances, &*self.fadings);
+            stiff::iteration_matrix(&mut self.dynamics, x, matrix, laws, &mut self.column);
             return;
         }
         let (q, v) = x[..2 * n].split_at(n);
         self.dynamics.seal_chords(q, v, &mut self.seals);
-        self.tangent.chords(&mut self.dynamics, x, matrix, (&self.resistances, &self.seals));
+        self.tangent.chords(&mut self.dynamics, x, matrix, (&self.resistances, &self.seals, &self.fadings));
     }
 
     /// Whether beams are all that is stiff in it.
@@ -165,6 +171,12 @@ impl<S: Scalar> Ode<S> for System<S> {
         motion[..n].fill(1e-2);
         motion[n..].fill(1.0);
         self.dynamics.drive_scales(internal);
+    }
+
+    /// Memories move on exactly along the way of their joints.
+    fn along_path(&mut self, x: &[S], step: f64, rates: &mut [S]) {
+        let (n, first) = (self.coordinates(), self.dynamics.first_memory());
+        self.dynamics.memories.mean_rates(&x[first..], &x[n..2 * n], step, &mut rates[first..]);
     }
 
     /// Stiffness and damping of the beams.

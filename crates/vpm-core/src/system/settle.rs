@@ -8,7 +8,7 @@ use crate::scalar::Scalar;
 
 impl<S: Scalar> Dynamics<S> {
     /// Writes the states of drives and supplies of a machine that has stood at `q` without commands: lags, currents and spools 0,
-    /// visco-elastic elements settled, chambers without net force, supplies at their pressure.
+    /// visco-elastic elements settled, chambers without net force, supplies at their pressure; memories relaxed.
     pub fn settle_drives(&mut self, q: &[S], states: &mut [S]) {
         let zero = vec![S::zero(); q.len()];
         self.locate(q, &zero);
@@ -30,6 +30,7 @@ impl<S: Scalar> Dynamics<S> {
             }
         }
         self.supplies.iter().filter(|supply| supply.is_sagging()).for_each(|supply| next(supply.pressure));
+        at.for_each(|memory| *memory = S::zero());
     }
 
     /// Number of an actuator whose piston stands beyond its stroke at `q` by more than the stops give way (1 mm or 2 % of the stroke, and
@@ -92,5 +93,6 @@ impl<S: Scalar> Dynamics<S> {
             }
         }
         self.supplies.iter().filter(|supply| supply.is_sagging()).for_each(|_| next(PRESSURE));
+        scales.for_each(|memory| *memory = 1.0);
     }
 }

@@ -5,7 +5,7 @@ use crate::actuator::{Drive, Target};
 use crate::scalar::Scalar;
 
 /// `[0, 1; -M^-1 K, -M^-1 D]` with the slopes of the effects in K and their chords, `resistances`, in D, and the columns and rows of
-/// the lags of ideal drives, for the price of one mass matrix.
+/// the lags of ideal drives and of memories with their `fadings`, for the price of one mass matrix.
 ///
 /// What it leaves out, the change of gravity, of velocity terms and of levers with the state, is slow beside the vibrations. Checked:
 /// against the exact Jacobian of a beam at rest without gravity, where nothing is left out.
@@ -13,7 +13,7 @@ pub(super) fn iteration_matrix<S: Scalar>(
     dynamics: &mut Dynamics<S>,
     x: &[S],
     matrix: &mut [S],
-    resistances: &[S],
+    (resistances, fadings): (&[S], &[Option<S>]),
     column: &mut [S],
 ) {
     let (n, dim) = (dynamics.coordinates(), x.len());
@@ -51,6 +51,21 @@ pub(super) fn iteration_matrix<S: Scalar>(
         data.solve(column);
         add_column(lower, dim, place, column);
         lower[(place - n) * dim + place] = lag.rate(S::one(), S::zero());
+    }
+    remember(dynamics, lower, dim, fadings, column);
+}
+
+/// The columns and rows of the memories.
+fn remember<S: Scalar>(dynamics: &Dynamics<S>, rows: &mut [S], dim: usize, fadings: &[Option<S>], column: &mut [S]) {
+    let (n, first) = (dynamics.coordinates(), dynamics.first_memory());
+    for ((place, (joint, law, _)), fading) in (first..).zip(dynamics.memories.iter()).zip(fadings) {
+        column.fill(S::zero());
+        column[joint] = law.effort(S::one());
+        dynamics.data.solve(column);
+        add_column(rows, dim, place, column);
+        let row = &mut rows[(place - n) * dim..];
+        row[n + joint] = law.displacement.recip();
+        row[place] = -fading.unwrap_or_else(S::zero);
     }
 }
 

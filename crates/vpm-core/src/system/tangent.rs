@@ -104,22 +104,22 @@ impl<S: Scalar> Tangent<S> {
         }
     }
 
-    /// df/dx with the friction laws replaced by `resistances` on the joints and by those of the `seals`, likewise.
+    /// df/dx with the friction laws replaced by `resistances` on the joints and by those of the `seals`, likewise the `fadings` of memories.
     pub(super) fn chords(
         &mut self,
         machine: &mut Dynamics<S>,
         x: &[S],
         matrix: &mut [S],
-        (resistances, seals): (&[S], &[Option<S>]),
+        (resistances, seals, fadings): (&[S], &[Option<S>], &[Option<S>]),
     ) {
         let laws = Chords(resistances);
         match self {
-            Self::Narrow(lanes) => lanes.chords(x, matrix, laws, seals),
-            Self::Wide(lanes) => lanes.chords(x, matrix, laws, seals),
+            Self::Narrow(lanes) => lanes.chords(x, matrix, laws, (seals, fadings)),
+            Self::Wide(lanes) => lanes.chords(x, matrix, laws, (seals, fadings)),
             Self::Driven(driven) => {
-                put_seals(&mut driven.dynamics, seals);
+                put(&mut driven.dynamics, seals, fadings);
                 driven.jacobian(machine, x, matrix, &laws);
-                driven.dynamics.seals.fill(None);
+                take_back(&mut driven.dynamics);
             }
         }
     }
@@ -131,11 +131,18 @@ impl<S: Scalar> Tangent<S> {
     }
 }
 
-/// Replaces the friction of the seals.
-fn put_seals<S: Scalar, const N: usize>(dynamics: &mut Dynamics<Dual<S, N>>, seals: &[Option<S>]) {
+/// Replaces the friction of the seals and the fading of memories.
+fn put<S: Scalar, const N: usize>(dynamics: &mut Dynamics<Dual<S, N>>, seals: &[Option<S>], fadings: &[Option<S>]) {
     for (seal, chord) in dynamics.seals.iter_mut().zip(seals) {
         *seal = chord.map(Dual::constant);
     }
+    dynamics.memories.replace(fadings.iter().map(|fading| fading.map(Dual::constant)));
+}
+
+/// Takes the laws as they are again.
+fn take_back<S: Scalar>(dynamics: &mut Dynamics<S>) {
+    dynamics.seals.fill(None);
+    dynamics.memories.replace(std::iter::repeat(None));
 }
 
 impl<S: Scalar, const N: usize> Lanes<S, N> {
@@ -145,10 +152,16 @@ impl<S: Scalar, const N: usize> Lanes<S, N> {
         Ok(Self { dynamics: build.dynamics(&lifted)?, state: zero.clone(), rate: zero })
     }
 
-    fn chords(&mut self, x: &[S], matrix: &mut [S], laws: Chords<'_, S>, seals: &[Option<S>]) {
-        put_seals(&mut self.dynamics, seals);
+    fn chords(
+        &mut self,
+        x: &[S],
+        matrix: &mut [S],
+        laws: Chords<'_, S>,
+        (seals, fadings): (&[Option<S>], &[Option<S>]),
+    ) {
+        put(&mut self.dynamics, seals, fadings);
         self.columns(x, matrix, &laws);
-        self.dynamics.seals.fill(None);
+        take_back(&mut self.dynamics);
     }
 
     /// The derivative of the rates along each state, `N` at a time, as columns of a matrix stored row by row.

@@ -138,6 +138,15 @@ impl System {
         Ok(PyArray1::from_vec(py, self.checked(py, result)?))
     }
 
+    /// Memories (N, hystereses) at every sample of a path of the joints (N, n), relaxed at the first.
+    fn memories<'py>(&self, py: Python<'py>, theta: &Any<'py>, position: &Any<'py>) -> PyResult<Table<'py>> {
+        let (theta, position) = (Numbers::vector("theta", theta)?, Numbers::table("position", position)?);
+        let values =
+            self.compute(py, |_| evaluate::memories(self.description(), theta.values(), position.as_table()?))?;
+        let (rows, count) = (position.rows(), values.len() / position.rows().max(1));
+        matrix(py, values, [rows, count])
+    }
+
     /// All coordinates (n,) at rest under gravity with the joints held, and the efforts (n_joints,) that hold them.
     fn equilibrium<'py>(
         &self,
