@@ -72,18 +72,11 @@ class Case:
         folder.mkdir(parents=True, exist_ok=True)
         (folder / "model.toml").write_text(self.model_text, encoding="utf-8")
         for k, record in enumerate(self.train, 1):
-            write_table(record, folder / f"train_{k}.csv")
+            record.to_csv(folder / f"train_{k}.csv")
         for record in self.validate:
-            write_table(record, folder / "validate.csv")
+            record.to_csv(folder / "validate.csv")
         truth = {"machine": self.machine, "seed": self.seed, "strength": self.oracle.strength, **asdict(self.truth)}
         (folder / "truth.json").write_text(json.dumps(truth, indent=2) + "\n", encoding="utf-8")
-
-
-def write_table(record: Experiment, path: Path) -> None:
-    """Write a record as a table whose header has channels and units."""
-    header = ["time [s]", *(f"{channel} [{record.unit(channel)}]" for channel in record)]
-    table = np.column_stack([record.time, *(record[channel] for channel in record)])
-    np.savetxt(path, table, fmt="%.12g", delimiter=",", header=",".join(header), comments="")
 
 
 def sites_of(machine: str, effect: str) -> tuple[str, ...]:
