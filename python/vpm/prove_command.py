@@ -73,8 +73,8 @@ def numbers(text: str) -> tuple[int, ...]:
     """Numbers such as ``0-4,7``."""
     found: list[int] = []
     for part in text.split(","):
-        first, _, last = part.strip().partition("-")
-        if not first.isdigit() or (last and not last.isdigit()):
+        first, dash, last = part.strip().partition("-")
+        if not first.isdigit() or (dash and not last.isdigit()):
             raise DiagnosisError(f'"{text}" are no seeds; write them like 0-9 or 1,4,7')
         found += range(int(first), int(last or first) + 1)
     if not found:

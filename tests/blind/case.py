@@ -141,7 +141,7 @@ def try_cases(
     recalibrate: bool = True,
 ) -> list[Case | FloatingPointError]:
     """The same, but a case whose simulation does not stay finite gives its error in its place."""
-    plans = [_plan(MACHINES[machine], hidden, seed, noise_level, recalibrate) for hidden, seed in requests]
+    plans = [_plan(MACHINES[machine], hidden, seed, noise_level, recalibrate=recalibrate) for hidden, seed in requests]
     cases: dict[int, Case | FloatingPointError] = {}
     for batch in batches(plans):
         for k, pieces in simulated([plans[k] for k in batch]):
@@ -149,7 +149,7 @@ def try_cases(
     return [cases[k] for k in range(len(plans))]
 
 
-def _plan(machine: Machine, hidden: str | Sequence[str], seed: int, noise_level: float, recalibrate: bool) -> Plan:
+def _plan(machine: Machine, hidden: str | Sequence[str], seed: int, noise_level: float, *, recalibrate: bool) -> Plan:
     """Draw everything that a case needs."""
     names = (hidden,) if isinstance(hidden, str) else tuple(hidden)
     drawn = np.random.default_rng([seed, zlib.crc32(machine.name.encode())])

@@ -24,7 +24,7 @@ from blind.table import failed
 
 KINDS = ("single", "pairs", "none", "parameters", "outside")
 #: Cases that are made together.
-BATCH = 40
+BATCH = 30
 #: Cases without a missing effect for each case of an effect: a rate of a few per cent takes many of them.
 NOTHING, PAIRS = 4, 5
 
@@ -194,16 +194,22 @@ def _here(todo: Sequence[Job], limit: float) -> Iterator[Answer]:
 
 
 def _beside(todo: Sequence[Job], count: int, limit: float) -> Iterator[Answer]:
-    """The same on processes of one thread each: cases first, as they are asked for in batches, then the diagnoses."""
+    """The same on processes of one thread each."""
     threads = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "RAYON_NUM_THREADS")
     before = {name: os.environ.get(name) for name in threads}
     os.environ.update(dict.fromkeys(threads, "1"))
     pool = ProcessPoolExecutor(count, mp_context=multiprocessing.get_context("spawn"))
     try:
-        making: set[Future[list[Made]]] = {pool.submit(make, batch) for batch in _batches(todo)}
+        batches = _batches(todo)
+        making: set[Future[list[Made]]] = set()
         asking: set[Future[Answer]] = set()
-        while making or asking:
+        while True:
+            # Cases are made a little ahead of the diagnoses, not all of them first.
+            while len(making) < count and len(asking) < 2 * count and (batch := next(batches, None)):
+                making.add(pool.submit(make, batch))
             running: list[Future[Any]] = [*making, *asking]
+            if not running:
+                return
             wait(running, return_when=FIRST_COMPLETED)
             for future in [f for f in making if f.done()]:
                 making.discard(future)
