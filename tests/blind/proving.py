@@ -220,8 +220,9 @@ def _beside(todo: Sequence[Job], count: int, limit: float) -> Iterator[Answer]:
     except KeyboardInterrupt:
         return
     finally:
+        processes = list((pool._processes or {}).values())
         pool.shutdown(wait=False, cancel_futures=True)
-        for process in list((pool._processes or {}).values()):
+        for process in processes:
             process.terminate()
         for name, value in before.items():
             os.environ.pop(name) if value is None else os.environ.update({name: value})
