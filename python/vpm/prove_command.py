@@ -31,7 +31,7 @@ def prove(
         list[str] | None, typer.Option(help="single, pairs, none, parameters, outside; all by default.")
     ] = None,
     workers: Annotated[int, typer.Option(help="Processes; 0 takes one for each core.")] = 0,
-    limit: Annotated[float, typer.Option(help="Longest time of one diagnosis, s.")] = 120.0,
+    limit: Annotated[float, typer.Option(help="Longest time of one diagnosis on its core, s.")] = 120.0,
     folder: Annotated[Path, typer.Option(help="Folder of a checkout that holds blind/.")] = Path("tests"),
     out: Annotated[Path | None, typer.Option(help="Write the tables into this page, and every case beside it.")] = None,
 ) -> None:

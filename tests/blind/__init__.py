@@ -14,11 +14,11 @@ diagnosis finds, it finds in somebody else's data.
 
     make_cases("axis_linear", [(name, seed) for name in hideable("axis_linear") for seed in range(5)])
 
-A batch is simulated side by side and takes little longer than one case, so ask for many at once. All cases of a seed have
-one machine and one set of motions, and share what is simulated without their effects: ask for the cases of a seed
+A batch is simulated side by side and takes little longer than one case, so ask for many at once. All cases of a seed
+have one machine and one set of motions, and share what is simulated without their effects: ask for the cases of a seed
 together. Beside effects there are the cases ``"none"`` and ``"parameters"``, and several effects as a tuple.
 
-    case.write(Path("case"))          # model.toml, train_1.csv, train_2.csv, validate.csv and the truth, for vpm diagnose
+    case.write(Path("case"))          # model.toml, train_1.csv, train_2.csv, validate.csv, truth.json
 
 The sites are those of the model files. At ``"world"``, a tilt turns gravity about the axis of a joint in the vertical
 plane (positive angles as those of the joint), and in the flexible arm into the level plane, towards -y.

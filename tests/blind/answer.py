@@ -61,7 +61,7 @@ class Answer:
     oracle_note : str
         Why there is no oracle gap.
     seconds, making : float
-        Time of the diagnosis, and of making the case.
+        Time of the processor for the diagnosis, and for making the case.
     error : str
         Why it failed, or "".
     """
@@ -131,18 +131,18 @@ def answered(case: Case, kind: str, request: Sequence[str], strengths: Sequence[
     strengths : sequence of float
         Of each hidden effect alone.
     limit : float
-        Longest time for it [s].
+        Longest time of the processor for it [s].
     """
     known = all(h.known for h in case.truth.hidden)
     hidden = hidden_in(case)
     about = (case.machine, kind, tuple(request), case.seed, case.noise_level, known, hidden, tuple(strengths))
-    began = time.perf_counter()
+    began = time.process_time()
     try:
         with _within(limit):
             why = vpm.diagnose(case.model(), case.train, case.validate)
     except Exception as error:  # noqa: BLE001  whatever a diagnosis raises is a failure of it, and counts as one
-        return Answer(*about, seconds=time.perf_counter() - began, error=f"{type(error).__name__}: {error}")
-    seconds = time.perf_counter() - began
+        return Answer(*about, seconds=time.process_time() - began, error=f"{type(error).__name__}: {error}")
+    seconds = time.process_time() - began
     named = tuple(
         Named(e.name, e.site, {p.name: p.value for p in e.parameters}, {p.name: p.std for p in e.parameters})
         for e in why.effects
@@ -201,18 +201,18 @@ def informed(case: Case) -> tuple[Model, tuple[str, ...]]:
 
 @contextmanager
 def _within(limit: float) -> Iterator[None]:
-    """Raise TimeoutError after so many seconds, where the system can do that."""
+    """Raise TimeoutError after so many seconds of the processor, where the system can do that."""
     if not hasattr(signal, "setitimer") or threading.current_thread() is not threading.main_thread():
         yield
         return
 
     def late(_number: int, _frame: FrameType | None) -> None:
-        raise TimeoutError(f"not done within {limit:g} s")
+        raise TimeoutError(f"not done within {limit:g} s of the processor")
 
-    before = signal.signal(signal.SIGALRM, late)
-    signal.setitimer(signal.ITIMER_REAL, limit)
+    before = signal.signal(signal.SIGPROF, late)
+    signal.setitimer(signal.ITIMER_PROF, limit)
     try:
         yield
     finally:
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
-        signal.signal(signal.SIGALRM, before)
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
+        signal.signal(signal.SIGPROF, before)

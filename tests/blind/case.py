@@ -32,8 +32,8 @@ Array = NDArray[np.float64]
 RECORDS = ("train", "train", "validate")
 #: Largest error of a nominal parameter where an effect is hidden, and range of it where nothing but that is wrong.
 OFF, CLEARLY_OFF = 0.1, (0.1, 0.25)
-#: Longest record [s].
-LONGEST = 12.0
+#: Shortest and longest record [s].
+SHORTEST, LONGEST = 9.0, 12.0
 NOTHING, PARAMETERS = "none", "parameters"
 
 
@@ -181,7 +181,7 @@ def _paths(machine: Machine, draft: Draft, generator: Generator) -> tuple[Array,
     """References of the records: all cases of a seed have the same."""
     paths = []
     for kind in RECORDS:
-        time = np.arange(round(float(generator.uniform(9.0, LONGEST)) * draft.rate), dtype=np.float64) / draft.rate
+        time = np.arange(round(float(generator.uniform(SHORTEST, LONGEST)) * draft.rate), dtype=np.float64) / draft.rate
         paths.append(machine.reference(generator, draft, time, kind))
     return tuple(paths)
 

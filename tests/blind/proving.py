@@ -117,7 +117,7 @@ def answers(
     workers : int
         Processes; 0 takes one for each core, 1 works here.
     limit : float
-        Longest time of one diagnosis [s].
+        Longest time of one diagnosis on the processor [s].
     tell : callable, optional
         Called with a line for each case.
     """
@@ -152,14 +152,14 @@ Made = tuple[Job, Case | None, tuple[float, ...], float, str]
 
 def make(batch: Sequence[Job]) -> list[Made]:
     """Cases of a batch with the strength of each hidden effect alone, the time that each took, and errors."""
-    began = time.perf_counter()
+    began = time.process_time()
     machine, level = batch[0].machine, batch[0].noise_level
     wanted = [(job.request, job.seed) for job in batch]
     alone = [((name,), job.seed) for job in batch if len(job.request) > 1 for name in job.request]
     made = try_cases(machine, [*wanted, *alone], level)
     beside = zip(alone, made[len(wanted) :], strict=True)
     strengths = {pair: case.oracle.strength for pair, case in beside if isinstance(case, Case)}
-    each = (time.perf_counter() - began) / len(batch)
+    each = (time.process_time() - began) / len(batch)
     result: list[Made] = []
     for job, case in zip(batch, made, strict=False):
         if isinstance(case, FloatingPointError):

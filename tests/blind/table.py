@@ -78,7 +78,7 @@ def _summary(answers: Sequence[Answer]) -> str:
         ("outside the catalogue: gap after / before", _spread(shrunk)),
         ("gap after / gap of the oracle, one effect", _spread(score.gap_ratios(one))),
         ("gap after / gap of the oracle, pairs", _spread(score.gap_ratios(two))),
-        ("time of a diagnosis [s]", _spread([a.seconds for a in answers])),
+        ("time of a diagnosis on one core [s]", _spread([a.seconds for a in answers])),
         ("diagnoses that failed", score.rate(answers, lambda a: bool(a.error))),
     ]
     return markdown(("", ""), rows)
