@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
 
 import numpy as np
 import pytest
@@ -29,7 +30,7 @@ Array = NDArray[np.float64]
 EXACT = {
     "axis_linear": (0, {"position": 1e-7, "command": 1e-6}),
     "axis_rotary": (0, {"position": 1e-6, "command": 1e-5}),
-    "arm2r": (3, {"position": 1e-6, "command": 1e-5}),
+    "arm2r": (3, {"position": 1e-7, "command": 3e-6}),
     "flexible_arm": (3, {"position": 5e-4, "strain": 2.5e-2, "command": 1e-2}),
     "hydraulic_leg": (5, {"position": 1e-5, "pressure_a": 1e-3, "pressure_b": 1e-3, "command": 1e-4}),
     "servo_cylinder": (1, {"position": 1e-6, "pressure_a": 1e-4, "pressure_b": 1e-4, "command": 1e-6}),
@@ -37,8 +38,8 @@ EXACT = {
 STEP = 1e-4
 
 
-@pytest.fixture(scope="module")
-def short() -> Iterator[None]:
+@contextmanager
+def shorter() -> Iterator[None]:
     """Records of a third of the length, which say as much about a simulation."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(case_module, "SHORTEST", 3.5)
@@ -46,14 +47,24 @@ def short() -> Iterator[None]:
         yield
 
 
+@pytest.fixture
+def short() -> Iterator[None]:
+    """The same for a whole test."""
+    with shorter():
+        yield
+
+
 @pytest.fixture(scope="module")
-def made(short: None) -> dict[str, dict[str, Case]]:
-    """By machine: a case without a secret, one with a wrong parameter, and some effects; without noise, with counts."""
-    del short
+def made() -> dict[str, dict[str, Case]]:
+    """By machine: a case without a secret, one with a wrong parameter, and some effects; without noise, with counts.
+
+    Those of the flexible arm are as long as ever: what its eight segments lack is counted against the whole motion.
+    """
     result = {}
     for machine, (seed, _) in EXACT.items():
         names = ("none", "parameters", *hideable(machine)[::9])
-        cases = make_cases(machine, [(name, seed) for name in names], noise_level=0.0, recalibrate=False)
+        with nullcontext() if machine == "flexible_arm" else shorter():
+            cases = make_cases(machine, [(name, seed) for name in names], noise_level=0.0, recalibrate=False)
         result[machine] = dict(zip(names, cases, strict=True))
     return result
 
@@ -68,7 +79,8 @@ def test_a_machine_without_secrets_is_the_model(made: dict[str, dict[str, Case]]
     tolerances, case = EXACT[machine][1], made[machine]["none"]
     assert "coulomb" not in case.model_text
     for record, exact in zip((*case.train, *case.validate), case.oracle.with_effect, strict=True):
-        run = simulate(case.model(), record, "closed_loop")
+        # The steps of the model are those of its controllers, at 500 Hz the larger part of the difference.
+        run = simulate(case.model(), record, "closed_loop", substeps=4 if machine == "arm2r" else 1)
         for channel, values in exact.items():
             tolerance = tolerances[channel.partition(".")[2]]
             assert np.abs(run[channel] - values).max() < tolerance * np.abs(values).max(), channel
@@ -81,7 +93,7 @@ def test_every_case_is_a_model_with_records(made: dict[str, dict[str, Case]], ma
         assert [hidden.name for hidden in missing] == [name] * (name in EFFECTS)
         model = case.model()
         for record in (*case.train, *case.validate):
-            assert 3.0 < record.duration < 5.0
+            assert 3.0 < record.duration < 12.0
             assert set(record) >= {f"{joint}.position" for joint in model.joints}
         adjustable = {key for key, parameter in model.parameters.items() if parameter.adjustable}
         assert len(adjustable) == len(case.truth.nominal)
