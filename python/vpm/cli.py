@@ -11,7 +11,7 @@ from typing import Annotated
 import typer
 from typer.core import TyperGroup
 
-from vpm import __version__, diagnose_command, identify_command
+from vpm import __version__, diagnose_command, identify_command, prove_command
 from vpm.command import (
     BESIDE,
     FORMATS,
@@ -82,6 +82,7 @@ app = typer.Typer(
 app.add_typer(excite_app, name="excite")
 app.command(epilog=identify_command.EXAMPLES)(identify_command.identify)
 app.command(epilog=diagnose_command.EXAMPLES)(diagnose_command.diagnose)
+app.command(epilog=prove_command.EXAMPLES)(prove_command.prove)
 Out = Annotated[Path, typer.Option(help="Folder for report.json, report.html and the repaired model.")]
 
 

@@ -14,15 +14,20 @@ diagnosis finds, it finds in somebody else's data.
 
     make_cases("axis_linear", [(name, seed) for name in hideable("axis_linear") for seed in range(5)])
 
-A batch is simulated side by side and takes little longer than one case, so ask for many at once. The machines with many
-parameters are three times as quick with ``recalibrate=False``, which leaves their oracle without a recalibration.
-Beside effects there are the cases ``"none"`` and ``"parameters"``, and several effects as a tuple.
+A batch is simulated side by side and takes little longer than one case, so ask for many at once. All cases of a seed
+have one machine and one set of motions, and share what is simulated without their effects: ask for the cases of a seed
+together. Beside effects there are the cases ``"none"`` and ``"parameters"``, and several effects as a tuple.
 
-The sites are those of the model files, but for ``"base"``: a tilt turns gravity about the axis of a joint in the
-vertical plane (positive angles as those of the joint), and in the flexible arm into the level plane, towards -y.
+    case.write(Path("case"))          # model.toml, train_1.csv, train_2.csv, validate.csv, truth.json
+
+The sites are those of the model files. At ``"world"``, a tilt turns gravity about the axis of a joint in the vertical
+plane (positive angles as those of the joint), and in the flexible arm into the level plane, towards -y.
+
+``vpm prove`` diagnoses many cases and counts what was named: docs/proving_ground.md.
 
 =================  ===================================================================================================
-``case.py``        ``make_case``, ``make_cases``, the truth
+``case.py``        ``make_case``, ``make_cases``
+``batch.py``       the truth; records side by side
 ``oracle.py``      whether a case can be solved
 ``effects.py``     what can be hidden, and how large
 ``machine.py``     what a machine has to say of itself
@@ -34,10 +39,15 @@ vertical plane (positive angles as those of the joint), and in the flexible arm 
 ``loop.py``        sensors, controllers, drives
 ``motion.py``      references
 ``noise.py``       noise and counts
+``proving.py``     which cases, made and diagnosed on many cores
+``answer.py``      what a diagnosis answers to a case
+``score.py``       what counts as right
+``table.py``       the tables
 =================  ===================================================================================================
 """
 
-from blind.case import Case, Hidden, Truth, hideable, make_case, make_cases, sites_of
+from blind.batch import Hidden, Truth
+from blind.case import Case, hideable, make_case, make_cases, sites_of, try_cases
 from blind.effects import EFFECTS
 from blind.machines import MACHINES
 from blind.oracle import Oracle
@@ -53,4 +63,5 @@ __all__ = [
     "make_case",
     "make_cases",
     "sites_of",
+    "try_cases",
 ]

@@ -1,25 +1,27 @@
 """A case: a nominal model as text, records of a machine that is not quite like that, and the truth about it.
 
 Cases are made in batches, because many records side by side cost hardly more than one: every record is a column of the
-state arrays. Each case brings columns of its own for the oracle: the same motion without noise, without the hidden
-effect, and with each calibratable parameter a little different.
+state arrays. Each case brings columns for the oracle: the same motion without noise, without the hidden effect, and
+with each calibratable parameter a little different. All cases of a seed have one machine and one set of motions, so the
+columns without an effect, which are most of them, are simulated once for all (`blind.batch`).
 """
 
 from __future__ import annotations
 
+import json
 import zlib
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
+from blind.batch import NUDGE, Hidden, Plan, Truth, batches, simulated
 from blind.effects import EFFECTS
-from blind.loop import Actuators, Inputs, Sensors, closed_loop
 from blind.machine import Draft, Layout, Machine
 from blind.machines import MACHINES
-from blind.noise import normal
 from blind.oracle import Oracle, judge
 from vpm.experiment import Experiment
 from vpm.model import Model
@@ -30,43 +32,32 @@ Array = NDArray[np.float64]
 RECORDS = ("train", "train", "validate")
 #: Largest error of a nominal parameter where an effect is hidden, and range of it where nothing but that is wrong.
 OFF, CLEARLY_OFF = 0.1, (0.1, 0.25)
-#: Relative step of the oracle's sensitivities.
-NUDGE = 0.02
-#: Numbers that the outputs of one batch may have, for the sake of memory, and columns beyond which nothing is won.
-LARGEST_BATCH, MOST_COLUMNS = 4e7, 1200
-#: Longest record [s].
-LONGEST = 12.0
+#: Shortest and longest record [s].
+SHORTEST, LONGEST = 9.0, 12.0
 NOTHING, PARAMETERS = "none", "parameters"
 
 
 @dataclass(frozen=True)
-class Hidden:
-    """An effect that the nominal model lacks: name, site as in the model, parameters; known to the catalogue or not."""
-
-    name: str
-    site: str
-    parameters: Mapping[str, float]
-    known: bool
-
-
-@dataclass(frozen=True)
-class Truth:
-    """What is really there: hidden effects, and true and nominal values of what may be calibrated."""
-
-    hidden: tuple[Hidden, ...]
-    parameters: Mapping[str, float]
-    nominal: Mapping[str, float]
-    wrong: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
 class Case:
-    """One case of the proving ground."""
+    """One case of the proving ground.
+
+    Attributes
+    ----------
+    machine, seed, noise_level
+        As asked for.
+    model_text, true_text : str
+        The nominal model, and the same with the true values of its parameters: both lack the hidden effects.
+    train, validate : tuple of Experiment
+        Records to fit and to judge.
+    truth : Truth
+    oracle : Oracle
+    """
 
     machine: str
     seed: int
     noise_level: float
     model_text: str
+    true_text: str
     train: tuple[Experiment, ...]
     validate: tuple[Experiment, ...]
     truth: Truth
@@ -76,23 +67,16 @@ class Case:
         """The nominal model."""
         return Model.from_toml(self.model_text)
 
-
-@dataclass
-class _Plan:
-    """A case before it is simulated."""
-
-    machine: Machine
-    seed: int
-    noise_level: float
-    draft: Draft
-    base: tuple[tuple[str, str], ...]
-    truth: Truth
-    with_effect: dict[str, float]
-    without: dict[str, float]
-    generator: Generator
-    references: list[Array] = field(default_factory=list)
-    free: tuple[str, ...] = ()
-    """Parameters that the oracle recalibrates."""
+    def write(self, folder: Path) -> None:
+        """Write model.toml, train_1.csv, train_2.csv, validate.csv for ``vpm diagnose``, and truth.json."""
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / "model.toml").write_text(self.model_text, encoding="utf-8")
+        for k, record in enumerate(self.train, 1):
+            record.to_csv(folder / f"train_{k}.csv")
+        for record in self.validate:
+            record.to_csv(folder / "validate.csv")
+        truth = {"machine": self.machine, "seed": self.seed, "strength": self.oracle.strength, **asdict(self.truth)}
+        (folder / "truth.json").write_text(json.dumps(truth, indent=2) + "\n", encoding="utf-8")
 
 
 def sites_of(machine: str, effect: str) -> tuple[str, ...]:
@@ -142,33 +126,40 @@ def make_cases(
     ValueError
         An effect makes no sense on the machine.
     """
-    plans = [_plan(MACHINES[machine], hidden, seed, noise_level) for hidden, seed in requests]
-    for plan in plans:
-        plan.free = tuple(plan.truth.nominal) if recalibrate else ()
-    cases: dict[int, Case] = {}
-    for rate in sorted({plan.draft.rate for plan in plans}):
-        chosen = [k for k, plan in enumerate(plans) if plan.draft.rate == rate]
-        layout = MACHINES[machine].layout
-        width = len(RECORDS) * max(3 + len(plans[k].free) for k in chosen)
-        numbers = LONGEST * rate * (len(layout.sensors) + len(layout.commands))
-        size = max(1, int(min(MOST_COLUMNS, LARGEST_BATCH / numbers) / width))
-        for begin in range(0, len(chosen), size):
-            part = chosen[begin : begin + size]
-            cases.update(zip(part, _simulate([plans[k] for k in part]), strict=True))
+    made = try_cases(machine, requests, noise_level, recalibrate=recalibrate)
+    for case in made:
+        if isinstance(case, FloatingPointError):
+            raise case
+    return [case for case in made if isinstance(case, Case)]
+
+
+def try_cases(
+    machine: str,
+    requests: Iterable[tuple[str | Sequence[str], int]],
+    noise_level: float = 1.0,
+    *,
+    recalibrate: bool = True,
+) -> list[Case | FloatingPointError]:
+    """The same, but a case whose simulation does not stay finite gives its error in its place."""
+    plans = [_plan(MACHINES[machine], hidden, seed, noise_level, recalibrate=recalibrate) for hidden, seed in requests]
+    cases: dict[int, Case | FloatingPointError] = {}
+    for batch in batches(plans):
+        for k, pieces in simulated([plans[k] for k in batch]):
+            cases[batch[k]] = _case(plans[batch[k]], pieces)
     return [cases[k] for k in range(len(plans))]
 
 
-def _plan(machine: Machine, hidden: str | Sequence[str], seed: int, noise_level: float) -> _Plan:
+def _plan(machine: Machine, hidden: str | Sequence[str], seed: int, noise_level: float, *, recalibrate: bool) -> Plan:
     """Draw everything that a case needs."""
     names = (hidden,) if isinstance(hidden, str) else tuple(hidden)
-    generator = np.random.default_rng([seed, zlib.crc32(machine.name.encode())])
+    drawn = np.random.default_rng([seed, zlib.crc32(machine.name.encode())])
     effects = [_placed(machine, name, seed) for name in names if name not in {NOTHING, PARAMETERS}]
     needs = [f"{need}@{site}" for name, site in effects for need in EFFECTS[name].needs]
-    draft = machine.draft(generator, needs)
+    draft = machine.draft(drawn, needs)
     found = []
     for name, site in effects:
-        drawn = EFFECTS[name].draw(_own_generator(machine, name, seed), draft.scales[site])
-        found.append(Hidden(name, site, drawn, EFFECTS[name].known))
+        parameters = EFFECTS[name].draw(_own_generator(machine, name, seed), draft.scales[site])
+        found.append(Hidden(name, site, parameters, EFFECTS[name].known))
     absent = {f"{name}@{site}" for name, site in effects} - set(needs)
     base = tuple((name, site) for name, site in draft.base if f"{name}@{site}" not in absent)
     keys = {f"{h.site}.{h.name}.{p}": value for h in found for p, value in h.parameters.items()}
@@ -178,13 +169,25 @@ def _plan(machine: Machine, hidden: str | Sequence[str], seed: int, noise_level:
             without[f"{hidden_effect.site}.{hidden_effect.name}.{parameter}"] = value
     stiff = {f"{h.site}.bending" for h in found if h.name == "link_flexibility"}
     free = {k: v for k, v in without.items() if k in draft.calibratable and k not in stiff}
-    nominal, wrong = _nominal(generator, free, names)
+    own = _own_generator(machine, f"case of {' '.join(names)}", seed)
+    nominal, wrong = _nominal(own, free, names)
     truth = Truth(tuple(_as_catalogued(h, draft.values) for h in found), free, nominal, wrong)
-    return _Plan(machine, seed, noise_level, draft, base, truth, {**without, **keys}, without, generator)
+    paths = _paths(machine, draft, _own_generator(machine, "motion", seed))
+    varied = tuple(nominal) if recalibrate else ()
+    return Plan(machine, seed, noise_level, draft, base, truth, {**without, **keys}, without, varied, paths, own)
+
+
+def _paths(machine: Machine, draft: Draft, generator: Generator) -> tuple[Array, ...]:
+    """References of the records: all cases of a seed have the same."""
+    paths = []
+    for kind in RECORDS:
+        time = np.arange(round(float(generator.uniform(SHORTEST, LONGEST)) * draft.rate), dtype=np.float64) / draft.rate
+        paths.append(machine.reference(generator, draft, time, kind))
+    return tuple(paths)
 
 
 def _own_generator(machine: Machine, name: str, seed: int) -> Generator:
-    """Numbers for one effect: all effects of a seed act on one machine, but are not all large or all small."""
+    """Numbers of their own: all effects of a seed act on one machine, but are not all large or all small."""
     return np.random.default_rng([seed, zlib.crc32(f"{machine.name} {name}".encode())])
 
 
@@ -221,71 +224,14 @@ def _as_catalogued(hidden: Hidden, values: Mapping[str, float]) -> Hidden:
     return hidden
 
 
-def _simulate(plans: Sequence[_Plan]) -> list[Case]:
-    """Run all records of plans with one sampling rate side by side."""
-    machine, dt = plans[0].machine, 1.0 / plans[0].draft.rate
-    fine = max(5, round(dt / machine.step))
-    columns: list[dict[str, float]] = []
-    references: list[Array] = []
-    noise: list[Array] = []
-    owner: list[int] = []
-    loud: list[int] = []
-    noisy = [signal.name for signal in (*machine.layout.commands, *machine.layout.sensors)]
-    for plan in plans:
-        for kind in RECORDS:
-            time = np.arange(round(float(plan.generator.uniform(9.0, LONGEST)) / dt), dtype=np.float64) * dt
-            path = machine.reference(plan.generator, plan.draft, time, kind)
-            plan.references.append(path)
-            members = _columns(plan, noisy)
-            loud.append(len(columns))
-            owner += [len(references)] * len(members)
-            columns += members
-            references.append(path)
-            noise.append(normal(plan.generator, len(time), len(noisy)))
-    longest = max(len(n) for n in noise)
-    held = np.stack([np.pad(path, ((0, 0), (0, longest - path.shape[1])), mode="edge").T for path in references], -1)
-    padded = np.stack([np.pad(n, ((0, longest - len(n)), (0, 0))) for n in noise], -1)
-    drives = [signal.name for signal in machine.layout.commands]
-    sensors = [signal.name for signal in machine.layout.sensors]
-    with np.errstate(all="ignore"):
-        both = closed_loop(
-            machine.plant(columns, dt / fine),
-            machine.controller(columns, dt),
-            Actuators(drives, columns, dt, fine),
-            Sensors(sensors, columns, dt, fine),
-            Inputs(held, np.array(owner), padded, np.array(loud)),
-            dt,
-            fine,
-        )
-    cases, place = [], 0
-    for plan in plans:
-        width = 3 + len(plan.free)
-        pieces = []
-        for path in plan.references:
-            pieces.append(both[: path.shape[1], :, place : place + width])
-            place += width
-        cases.append(_case(plan, pieces, dt))
-    return cases
-
-
-def _columns(plan: _Plan, noisy: Sequence[str]) -> list[dict[str, float]]:
-    """As measured, without noise, without the effect, and that with each parameter a little different."""
-    loud = {f"{name}.noise": plan.with_effect[f"{name}.noise"] * plan.noise_level for name in noisy}
-    silent = {f"{name}.{what}": 0.0 for name in noisy for what in ("noise", "quantum")}
-    bare = {**plan.without, **silent}
-    nudged = [{**bare, key: bare[key] * (1.0 + NUDGE)} for key in plan.free]
-    return [{**plan.with_effect, **loud}, {**plan.with_effect, **silent}, bare, *nudged]
-
-
-def _case(plan: _Plan, pieces: list[Array], dt: float) -> Case:
-    layout = plan.machine.layout
+def _case(plan: Plan, pieces: Sequence[Array]) -> Case | FloatingPointError:
+    layout, dt = plan.machine.layout, 1.0 / plan.draft.rate
     if not all(np.isfinite(piece).all() for piece in pieces):
-        raise FloatingPointError(
-            f"{plan.machine.name} with {plan.truth.hidden} and seed {plan.seed} does not stay finite"
-        )
+        what = ", ".join(f"{hidden.name} at {hidden.site}" for hidden in plan.truth.hidden) or "nothing hidden"
+        return FloatingPointError(f"{plan.machine.name} with {what} and seed {plan.seed} does not stay finite")
     records = [
         _experiment(layout, piece[:, :, 0], path, dt, f"{kind} {k}")
-        for k, (kind, piece, path) in enumerate(zip(RECORDS, pieces, plan.references, strict=True))
+        for k, (kind, piece, path) in enumerate(zip(RECORDS, pieces, plan.paths, strict=True))
     ]
     channels = [signal.channel for signal in (*layout.sensors, *layout.commands)]
     quanta = np.array([plan.without[f"{signal.name}.quantum"] for signal in layout.sensors])
@@ -298,6 +244,7 @@ def _case(plan: _Plan, pieces: list[Array], dt: float) -> Case:
         seed=plan.seed,
         noise_level=plan.noise_level,
         model_text=plan.machine.text(nominal, plan.draft, plan.base),
+        true_text=plan.machine.text(plan.without, plan.draft, plan.base),
         train=tuple(r for r, kind in zip(records, RECORDS, strict=True) if kind == "train"),
         validate=tuple(r for r, kind in zip(records, RECORDS, strict=True) if kind == "validate"),
         truth=plan.truth,

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from blind.loads import Column, JointLoads, stack
+from blind.loads import Column, JointLoads, clip, stack
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -48,7 +48,7 @@ class Chain:
         self.hubs = stack(columns, JOINTS, "hub_inertia")
         self.elbow = stack(columns, ["elbow"], "housing_inertia")[0]
         self.loads = JointLoads(JOINTS, columns, step)
-        self.down = -1j * GRAVITY * np.sin(stack(columns, ["base"], "gravity_tilt.angle")[0])
+        self.down = -1j * GRAVITY * np.sin(stack(columns, ["world"], "gravity_tilt.angle")[0])
         places = self.ds * np.arange(1, SEGMENTS + 1)[None, :, None]
         places[1] += self.length[0]
         self.z: Complex = places.astype(np.complex128)
@@ -97,7 +97,7 @@ class Chain:
         """Impulses of dry friction: of the first joint against the ground, of the second against its housing."""
         moving = np.array([self.hubs[0], 1.0 / (1.0 / self.hubs[1] + 1.0 / self.elbow)])
         relative = np.array([rate[0], rate[1] - back])
-        impulse = np.clip(moving * relative, -limit, limit)
+        impulse = clip(moving * relative, -limit, limit)
         return rate - impulse / self.hubs, back + impulse[1] / self.elbow
 
     def _elastic(self, z: Complex, angle: Array, housing: Array) -> tuple[Complex, Array, Array]:

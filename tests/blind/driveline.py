@@ -13,7 +13,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from blind.loads import Column, JointLoads, stack
+from blind.loads import Column, JointLoads, clip, stack
 
 Array = NDArray[np.float64]
 #: Sweeps over the joints in which their impulses of dry friction settle; they start from those of the step before.
@@ -60,7 +60,7 @@ class Driveline:
         """Effort through a soft gear; within the play there is none, and a contact only pushes."""
         if not self.any_play:
             return self.stiffness * twist + self.damping * rate
-        beyond = twist - np.clip(twist, -self.half_gap, self.half_gap)
+        beyond = twist - clip(twist, -self.half_gap, self.half_gap)
         effort = self.stiffness * beyond + self.damping * rate
         pushing = (self.half_gap == 0.0) | (effort * beyond > 0.0)
         return np.where(pushing, effort, 0.0)
@@ -84,7 +84,7 @@ class Driveline:
             new_motor = self.motor_v + h * (push - through) / self.safe_rotor
             if dry is not None:
                 brake = h * dry / self.safe_rotor
-                new_motor = new_motor - np.clip(new_motor, -brake, brake)
+                new_motor = new_motor - clip(new_motor, -brake, brake)
         limit = None if dry is None else h * np.where(self.soft, 0.0, dry)
         new = self._velocities(q, h * (drive - self.links.load(q, v)), limit)
         self.a = (new - self.v) / h
@@ -105,19 +105,19 @@ class Driveline:
             if limit is None:
                 return np.asarray(free)
             brake = limit / mass
-            return np.asarray(free - np.clip(free, -brake, brake))
+            return np.asarray(free - clip(free, -brake, brake))
         m11, m12, m22 = inertia[0] + self.diagonal[0], inertia[1], inertia[2] + self.diagonal[1]
         determinant = m11 * m22 - m12 * m12
         w11, w12, w22 = m22 / determinant, -m12 / determinant, m11 / determinant
         first, second = self.v[0] + w11 * impulse[0] + w12 * impulse[1], self.v[1] + w12 * impulse[0] + w22 * impulse[1]
         if limit is None:
             return np.array([first, second])
-        one, two = np.clip(self.impulse, -limit, limit)
+        one, two = clip(self.impulse, -limit, limit)
         first, second = first + w11 * one + w12 * two, second + w12 * one + w22 * two
         for _ in range(SWEEPS):
-            change = np.clip(one - first / w11, -limit[0], limit[0]) - one
+            change = clip(one - first / w11, -limit[0], limit[0]) - one
             one, first, second = one + change, first + w11 * change, second + w12 * change
-            change = np.clip(two - second / w22, -limit[1], limit[1]) - two
+            change = clip(two - second / w22, -limit[1], limit[1]) - two
             two, first, second = two + change, first + w12 * change, second + w22 * change
         self.impulse = np.array([one, two])
         return np.array([first, second])

@@ -149,7 +149,7 @@ _ALL = (
         lambda g, _s: {"share": between(g, 0.4, 1.2)},
     ),
     Effect("structural_damping", "link", lambda g, _s: {"time": between(g, 1e-4, 2e-3)}),
-    Effect("gravity_tilt", "base", lambda g, _s: {"angle": _sign(g) * between(g, np.radians(0.3), np.radians(8.0))}),
+    Effect("gravity_tilt", "world", lambda g, _s: {"angle": _sign(g) * between(g, np.radians(0.3), np.radians(8.0))}),
     Effect("input_delay", "actuator", lambda g, _s: {"time": between(g, 5e-4, 8e-3)}),
     Effect("dead_zone", "actuator", lambda g, s: {"width": between(g, 0.003, 0.3) * s.command}),
     Effect("saturation", "actuator", lambda g, s: {"limit": float(g.uniform(0.9, 2.2)) * s.command}),

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from blind.loads import Column, stack
+from blind.loads import Column, clip, stack
 
 Array = NDArray[np.float64]
 #: Drop around which the flow through an edge turns from laminar to turbulent [Pa].
@@ -71,7 +71,7 @@ class Cylinders:
         away, rate = self.z - command, self.rate
         self.z = command + self._zz * away + self._zr * rate
         self.rate = self._rz * away + self._rr * rate
-        return np.clip(self.z, -self.limit, self.limit)
+        return clip(self.z, -self.limit, self.limit)
 
     def start(self, force: Array) -> None:
         """Chambers at rest with a net force, around the pressures of no net force."""
@@ -111,11 +111,11 @@ class Cylinders:
 
     def middle_force(self, command: Array, x: Array, v: Array) -> Array:
         """Force in the middle of the step that begins at x and v."""
-        z = np.clip(self.z, -self.limit, self.limit)
-        self._command = np.clip(command, -self.limit, self.limit)
+        z = clip(self.z, -self.limit, self.limit)
+        self._command = clip(command, -self.limit, self.limit)
         self._middle = self._gone_on(self._rates(z, x, v, (self.pa, self.pb, self.ps)), 0.5 * self.step)
         pa, pb, _ = self._middle
-        beyond = x - np.clip(x, -0.5 * self.stroke, 0.5 * self.stroke)
+        beyond = x - clip(x, -0.5 * self.stroke, 0.5 * self.stroke)
         stop = np.where(beyond != 0.0, STOP_STIFFNESS * beyond + STOP_DAMPING * v, 0.0)
         return np.asarray(self.area * (pa - self.ratio * pb) - np.where(stop * beyond > 0.0, stop, 0.0))
 

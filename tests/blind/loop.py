@@ -13,7 +13,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from blind.loads import Column, stack
+from blind.loads import Column, clip, stack
 
 Array = NDArray[np.float64]
 
@@ -68,14 +68,14 @@ class Actuators:
     def _cut(self, command: Array) -> Array:
         if not self.cut:
             return command
-        beyond = command - np.clip(command, -self.width, self.width)
-        return np.clip(beyond, -self.limit, self.limit)
+        beyond = command - clip(command, -self.width, self.width)
+        return clip(beyond, -self.limit, self.limit)
 
     def step(self, j: int) -> Array:
         """Mean command over fine step ``j`` of the sample."""
         given = self.new
         if self.delayed:
-            given = self.old + np.clip(j + 1 - self.switch, 0.0, 1.0) * (self.new - self.old)
+            given = self.old + clip(j + 1 - self.switch, 0.0, 1.0) * (self.new - self.old)
         if not self.lags or self.state is None:
             return given
         mean = given + (self.state - given) * self.mean_share
@@ -134,7 +134,7 @@ class Cascade:
         speed = (reading - second) / (2.0 * self.dt)
         self.before = (reading, last)
         wanted = self.velocity_gain * (self.position_gain * (reference - reading) - speed)
-        return np.clip(wanted, -self.limit, self.limit)
+        return clip(wanted, -self.limit, self.limit)
 
 
 @dataclass
@@ -145,7 +145,7 @@ class Proportional:
     limit: Array
 
     def __call__(self, reference: Array, reading: Array) -> Array:
-        return np.clip(self.proportional * (reference - reading), -self.limit, self.limit)
+        return clip(self.proportional * (reference - reading), -self.limit, self.limit)
 
 
 class Controller(Protocol):

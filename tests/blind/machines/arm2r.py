@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 GRAVITY = 9.81
 JOINTS, BODIES, DRIVES = ("shoulder", "elbow"), ("upper", "lower"), ("first", "second")
 ENCODERS, SERVOS = ("encoder_1", "encoder_2"), ("servo_1", "servo_2")
-_SITES = {"joint": JOINTS, "link": BODIES, "actuator": DRIVES, "sensor": ENCODERS, "base": ("base",)}
+_SITES = {"joint": JOINTS, "link": BODIES, "actuator": DRIVES, "sensor": ENCODERS, "world": ("world",)}
 
 
 class TwoLinks:
@@ -40,7 +40,7 @@ class TwoLinks:
         self.alone, self.outer = own[0] + beyond * length**2, own[1]
         self.coupling = first[1] * length
         self.weight_1, self.weight_2 = GRAVITY * (first[0] + beyond * length), GRAVITY * first[1]
-        self.tilt = stack(columns, ["base"], "gravity_tilt.angle")[0]
+        self.tilt = stack(columns, ["world"], "gravity_tilt.angle")[0]
 
     def inertia(self, q: Array) -> tuple[Array, ...]:
         """See `Links`."""
@@ -74,7 +74,7 @@ class Arm2R:
     """The arm."""
 
     name: str = "arm2r"
-    step: float = 1e-4
+    step: float = 1.6e-4
 
     @property
     def layout(self) -> Layout:
@@ -133,7 +133,7 @@ class Arm2R:
                 calibratable[f"{joint}.coulomb_friction.coulomb"] = 0.2
             lever = length if k == 0 else 0.3
             scale = Scale(effort, speed, way, own, effort / gain, masses[k], lever, coulomb, viscous)
-            scales |= dict.fromkeys((joint, body, drive, ENCODERS[k], "base"), scale)
+            scales |= dict.fromkeys((joint, body, drive, ENCODERS[k], "world"), scale)
         return Draft(values, calibratable, tuple(base), scales, float(g.choice((250.0, 500.0, 1000.0))))
 
     def text(self, values: Mapping[str, float], draft: Draft, base: Sequence[tuple[str, str]]) -> str:

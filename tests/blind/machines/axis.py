@@ -25,7 +25,7 @@ _SITES = {
     "link": ("body",),
     "actuator": ("drive",),
     "sensor": ("encoder",),
-    "base": ("base",),
+    "world": ("world",),
 }
 
 
@@ -41,7 +41,7 @@ class _Mass:
             self.unbalance = GRAVITY * (body * centre + mass * lever)
         else:
             self.total, self.unbalance = body + mass, np.zeros_like(body)
-        self.tilt = stack(columns, ["base"], "gravity_tilt.angle")
+        self.tilt = stack(columns, ["world"], "gravity_tilt.angle")
         self.swings = bool(self.unbalance.any())
 
     def inertia(self, q: Array) -> tuple[Array, ...]:
@@ -73,7 +73,7 @@ class Axis:
     """The axis, linear or rotary."""
 
     rotary: bool
-    step: float = 1e-4
+    step: float = 1.6e-4
 
     @property
     def name(self) -> str:

@@ -29,7 +29,7 @@ _SITES = {
     "link": LINKS,
     "actuator": DRIVES,
     "sensor": (*ENCODERS, *BRIDGES),
-    "base": ("base",),
+    "world": ("world",),
 }
 
 
@@ -123,7 +123,7 @@ class FlexibleArm:
                 values[f"{joint}.coulomb_friction.coulomb"] = coulomb
                 calibratable[f"{joint}.coulomb_friction.coulomb"] = 0.2
             scale = Scale(effort, speed, way, felt[k], effort / gain, tips[k], lengths[k], coulomb, viscous)
-            scales |= dict.fromkeys((joint, link, drive, ENCODERS[k], "base"), scale)
+            scales |= dict.fromkeys((joint, link, drive, ENCODERS[k], "world"), scale)
             scales |= {BRIDGES[k]: Scale(way=4e-4)}
         return Draft(values, calibratable, tuple(base), scales, float(g.choice((500.0, 1000.0))))
 

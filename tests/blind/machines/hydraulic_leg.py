@@ -33,7 +33,7 @@ GAUGES = tuple(f"{joint}_gauge_{side}" for joint in JOINTS for side in "ab")
 _SITES = {
     "joint": JOINTS,
     "link": BODIES,
-    "base": ("base",),
+    "world": ("world",),
     "actuator": DRIVES,
     "valve": DRIVES,
     "cylinder": DRIVES,
@@ -172,7 +172,7 @@ class HydraulicLeg:
                 values[f"{joint}.coulomb_friction.coulomb"] = coulomb
                 calibratable[f"{joint}.coulomb_friction.coulomb"] = 0.2
             scale = Scale(effort, speed, way, own[k], command, masses[k], LENGTH, coulomb, viscous, START[k])
-            scales |= dict.fromkeys((joint, body, drive, f"{joint}_encoder", "base"), scale)
+            scales |= dict.fromkeys((joint, body, drive, f"{joint}_encoder", "world"), scale)
             scales |= dict.fromkeys((f"{joint}_gauge_a", f"{joint}_gauge_b"), Scale(way=20.0 * BAR))
         return Draft(values, calibratable, tuple(base), scales, float(g.choice((500.0, 1000.0))))
 

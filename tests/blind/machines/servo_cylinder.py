@@ -78,7 +78,7 @@ class ServoCylinder:
     """The rig."""
 
     name: str = "servo_cylinder"
-    step: float = 5e-5
+    step: float = 1e-4
 
     @property
     def layout(self) -> Layout:

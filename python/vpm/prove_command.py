@@ -1,0 +1,95 @@
+"""Command line of the proving ground: ``vpm prove``."""
+
+from __future__ import annotations
+
+import sys
+from importlib import import_module
+from pathlib import Path
+from types import ModuleType
+from typing import Annotated
+
+import typer
+
+from vpm.command import console, errors
+from vpm.errors import DiagnosisError
+
+EXAMPLES = (
+    "Example:  vpm prove --machine axis_linear --effect coulomb_friction --seeds 0-4 --each 5\n\n"
+    "Example:  vpm prove --seeds 0-9 --out docs/proving_ground.md"
+)
+#: Lines between which a page holds the tables.
+BEGIN, END = "<!-- tables of vpm prove: begin -->", "<!-- tables of vpm prove: end -->"
+
+
+def prove(
+    machine: Annotated[list[str] | None, typer.Option(help="Machine; all by default.")] = None,
+    effect: Annotated[list[str] | None, typer.Option(help="Effect to hide; all by default.")] = None,
+    seeds: Annotated[str, typer.Option(help="Seeds, for example 0-9 or 1,4,7.")] = "0-4",
+    each: Annotated[int, typer.Option(help="Cases of each effect on each machine; seeds are dealt out in turn.")] = 1,
+    noise: Annotated[list[float] | None, typer.Option(help="Noise level; 1 by default.")] = None,
+    kind: Annotated[
+        list[str] | None, typer.Option(help="single, pairs, none, parameters, outside; all by default.")
+    ] = None,
+    workers: Annotated[int, typer.Option(help="Processes; 0 takes one for each core.")] = 0,
+    limit: Annotated[float, typer.Option(help="Longest time of one diagnosis on its core, s.")] = 120.0,
+    folder: Annotated[Path, typer.Option(help="Folder of a checkout that holds blind/.")] = Path("tests"),
+    out: Annotated[Path | None, typer.Option(help="Write the tables into this page, and every case beside it.")] = None,
+) -> None:
+    """Hide effects in machines that other code simulates, diagnose them blind, and count what was named."""
+    proving, table = _proving_ground(folder)
+    if out is not None:
+        page(out, "")
+    try:
+        todo = proving.jobs(machine or (), effect or (), numbers(seeds), noise or (1.0,), kind or proving.KINDS, each)
+    except ValueError as error:
+        raise DiagnosisError(str(error)) from None
+    console.print(f"{len(todo)} cases", markup=False)
+    found = []
+    for answer in proving.answers(todo, workers, limit, lambda line: errors.print(line, markup=False)):
+        found.append(answer)
+        if out is not None:
+            proving.save_json(found, out.with_suffix(".json"))
+    if len(found) < len(todo):
+        errors.print(f"interrupted: {len(found)} of {len(todo)} cases are done", markup=False)
+    found.sort(key=lambda a: (list(proving.KINDS).index(a.kind), a.machine, a.request, a.seed))
+    text = table.tables(found)
+    console.print(text, markup=False)
+    if out is not None:
+        proving.save_json(found, out.with_suffix(".json"))
+        out.write_text(page(out, text), encoding="utf-8")
+        console.print(f"wrote {out} and {out.with_suffix('.json')}", markup=False)
+
+
+def page(path: Path, text: str) -> str:
+    """The page with new tables between its two markers; a page that is not there begins with a title."""
+    old = path.read_text(encoding="utf-8") if path.exists() else f"# Proving ground\n\n{BEGIN}\n{END}\n"
+    if old.count(BEGIN) != 1 or old.count(END) != 1 or old.index(END) < old.index(BEGIN):
+        raise DiagnosisError(f"{path} does not say where the tables go; it needs the lines {BEGIN} and {END}")
+    head, _, rest = old.partition(BEGIN)
+    return f"{head}{BEGIN}\n\n{text}\n{END}{rest.partition(END)[2]}"
+
+
+def numbers(text: str) -> tuple[int, ...]:
+    """Numbers such as ``0-4,7``."""
+    found: list[int] = []
+    for part in text.split(","):
+        first, dash, last = part.strip().partition("-")
+        if not first.isdigit() or (dash and not last.isdigit()):
+            raise DiagnosisError(f'"{text}" are no seeds; write them like 0-9 or 1,4,7')
+        found += range(int(first), int(last or first) + 1)
+    if not found:
+        raise DiagnosisError(f'"{text}" holds no seed; write the smaller number first, like 0-9')
+    return tuple(dict.fromkeys(found))
+
+
+def _proving_ground(folder: Path) -> tuple[ModuleType, ModuleType]:
+    """Modules of the proving ground, which is no part of the installed package."""
+    if not (folder / "blind" / "proving.py").is_file():
+        raise DiagnosisError(
+            f"{folder} holds no proving ground, which is part of the source only: run vpm prove in a checkout of the "
+            "repository, or say where its tests are with --folder"
+        )
+    place = str(folder.resolve())
+    if place not in sys.path:
+        sys.path.insert(0, place)
+    return import_module("blind.proving"), import_module("blind.table")

@@ -1,0 +1,218 @@
+"""What a diagnosis answers to a case, beside what the best possible one could have reached, as plain data."""
+
+from __future__ import annotations
+
+import signal
+import threading
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, field, fields
+from types import FrameType
+from typing import Any
+
+import numpy as np
+
+import vpm
+from blind.case import Case
+from vpm.discrepancy import Diagnosis
+from vpm.identify import InverseDynamicsProblem, estimate
+from vpm.model import Model
+
+#: Numbers of the truth beyond this stand for "not there": the far end of a stop that has one end.
+NOWHERE = 1e8
+
+
+@dataclass(frozen=True)
+class Named:
+    """An effect at a site, with the values of its parameters and their stated standard deviations (SI)."""
+
+    name: str
+    site: str
+    values: dict[str, float] = field(default_factory=dict)
+    stds: dict[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Answer:
+    """One case with the answer to it.
+
+    Attributes
+    ----------
+    machine, kind, request, seed, noise_level
+        The case; ``request`` is what `blind.make_case` takes.
+    known : bool
+        Whether the catalogue is said to have all that is hidden.
+    hidden : tuple of Named
+    strengths : tuple of float
+        How far each hidden effect alone stands clear of the noise, see `blind.Oracle`; nothing has none.
+    verdict : str
+        Of the diagnosis; "" if it failed.
+    named : tuple of Named
+        Accepted effects in their order.
+    ranking : tuple of Named
+        Accepted effects, then the other candidates in the order of what they explain of the unseen data.
+    rivals : tuple of str
+        Names that the diagnosis says it cannot tell from an accepted one.
+    nominal_gap, recalibrated_gap, gap, oracle_gap : float
+        Root mean square of the unseen residual of `vpm.identify.InverseDynamicsProblem` in units of the signal: nominal
+        model, nominal effects with refitted parameters, repaired model, and model with the hidden effect that was
+        fitted from the truth. NaN where it is not known.
+    oracle_note : str
+        Why there is no oracle gap.
+    seconds, making : float
+        Time of the processor for the diagnosis, and for making the case.
+    error : str
+        Why it failed, or "".
+    """
+
+    machine: str
+    kind: str
+    request: tuple[str, ...]
+    seed: int
+    noise_level: float
+    known: bool
+    hidden: tuple[Named, ...] = ()
+    strengths: tuple[float, ...] = ()
+    verdict: str = ""
+    named: tuple[Named, ...] = ()
+    ranking: tuple[Named, ...] = ()
+    rivals: tuple[str, ...] = ()
+    nominal_gap: float = np.nan
+    recalibrated_gap: float = np.nan
+    gap: float = np.nan
+    oracle_gap: float = np.nan
+    oracle_note: str = ""
+    seconds: float = 0.0
+    making: float = 0.0
+    error: str = ""
+
+    @property
+    def solvable(self) -> bool:
+        """Whether each hidden effect alone stands clear of the noise."""
+        return bool(self.strengths) and min(self.strengths) > 1.0
+
+    def to_dict(self) -> dict[str, object]:
+        """Plain data for JSON; what is not known is null."""
+        stored: dict[str, Any] = {
+            k: None if isinstance(v, float) and not np.isfinite(v) else v for k, v in asdict(self).items()
+        }
+        for named in stored["named"]:
+            named["stds"] = {k: v for k, v in named["stds"].items() if np.isfinite(v)}
+        return stored
+
+    @classmethod
+    def from_dict(cls, stored: dict[str, object]) -> Answer:
+        """The same, read back."""
+        values: dict[str, object] = {}
+        for entry in fields(cls):
+            value = stored[entry.name]
+            if entry.name in {"hidden", "named", "ranking"}:
+                value = tuple(Named(**item) for item in value)  # type: ignore[attr-defined]
+            elif isinstance(value, list):
+                value = tuple(value)
+            values[entry.name] = np.nan if value is None else value
+        return cls(**values)  # type: ignore[arg-type]
+
+
+def hidden_in(case: Case) -> tuple[Named, ...]:
+    """The hidden effects of a case."""
+    return tuple(Named(h.name, h.site, dict(h.parameters)) for h in case.truth.hidden)
+
+
+def answered(case: Case, kind: str, request: Sequence[str], strengths: Sequence[float], limit: float) -> Answer:
+    """Diagnose a case; whatever goes wrong is part of the answer.
+
+    Parameters
+    ----------
+    case : Case
+    kind : str
+    request : sequence of str
+    strengths : sequence of float
+        Of each hidden effect alone.
+    limit : float
+        Longest time of the processor for it [s].
+    """
+    known = all(h.known for h in case.truth.hidden)
+    hidden = hidden_in(case)
+    about = (case.machine, kind, tuple(request), case.seed, case.noise_level, known, hidden, tuple(strengths))
+    began = time.process_time()
+    try:
+        with _within(limit):
+            why = vpm.diagnose(case.model(), case.train, case.validate)
+    except Exception as error:  # noqa: BLE001  whatever a diagnosis raises is a failure of it, and counts as one
+        return Answer(*about, seconds=time.process_time() - began, error=f"{type(error).__name__}: {error}")
+    seconds = time.process_time() - began
+    named = tuple(
+        Named(e.name, e.site, {p.name: p.value for p in e.parameters}, {p.name: p.std for p in e.parameters})
+        for e in why.effects
+    )
+    rivals = tuple(dict.fromkeys(other for a in why.ambiguous_with for other in a.others))
+    gaps, note = _gaps(case, why, limit)
+    return Answer(*about, why.verdict, named, ranking(why), rivals, *gaps, note, seconds=seconds)
+
+
+def ranking(why: Diagnosis) -> tuple[Named, ...]:
+    """Accepted effects in their order, then other candidates: refitted ones by unseen gain, the rest as screened."""
+    order = [(e.name, e.site) for e in why.effects]
+    others = [c for c in why.candidates if not c.accepted]
+    tried = sorted((c for c in others if np.isfinite(c.unseen)), key=lambda c: (c.round, -c.unseen))
+    screened = sorted((c for c in others if not np.isfinite(c.unseen)), key=lambda c: (c.round, -c.screened))
+    order += [(c.name, c.site) for c in (*tried, *screened)]
+    return tuple(Named(*pair) for pair in dict.fromkeys(order))
+
+
+def _gaps(case: Case, why: Diagnosis, limit: float) -> tuple[tuple[float, float, float, float], str]:
+    """Unseen gaps of the nominal, the recalibrated, the repaired model and that of the oracle, all by one measure."""
+    nominal = case.model()
+    try:
+        training = InverseDynamicsProblem(nominal, case.train)
+        unseen = InverseDynamicsProblem(nominal, case.validate, cutoff=min(m.cutoff for m in training.motions))
+
+        def size(model: Model) -> float:
+            return float(np.sqrt(np.mean(unseen.evaluate(model, model.theta)[0] ** 2)))
+
+        first = next((step.values for step in why.steps if step.change == "recalibrated"), {})
+        kept = {name: value for name, value in first.items() if name in nominal.parameters}
+        told = (size(nominal), size(nominal.with_parameters(kept)), size(why.model))
+    except Exception as error:  # noqa: BLE001  an answer without a figure is still an answer
+        return (np.nan, np.nan, np.nan, np.nan), f"{type(error).__name__}: {error}"
+    try:
+        with _within(limit):
+            model, free = informed(case)
+            fit = estimate(model, training, free)
+            fitted = model.with_parameters(dict(zip(free, map(float, fit.values), strict=True)))
+            return (*told, min(size(model), size(fitted))), ""
+    except Exception as error:  # noqa: BLE001  the package may not have the effect
+        return (*told, np.nan), f"{type(error).__name__}: {error}"
+
+
+def informed(case: Case) -> tuple[Model, tuple[str, ...]]:
+    """The model with the true parameters and the hidden effects, and what of it is to be fitted."""
+    model = Model.from_toml(case.true_text)
+    free = [p.name for p in model.parameters.values() if p.adjustable]
+    for h in case.truth.hidden:
+        values = {name: value for name, value in h.parameters.items() if abs(value) < NOWHERE}
+        model = model.with_effect(h.name, at=h.site, **values)
+        effect = next(e for e in model.effects if (e.name, e.at) == (h.name, h.site))
+        free += [effect.parameter_names[name] for name in values if name in effect.parameter_names]
+    return model, tuple(free)
+
+
+@contextmanager
+def _within(limit: float) -> Iterator[None]:
+    """Raise TimeoutError after so many seconds of the processor, where the system can do that."""
+    if not hasattr(signal, "setitimer") or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def late(_number: int, _frame: FrameType | None) -> None:
+        raise TimeoutError(f"not done within {limit:g} s of the processor")
+
+    before = signal.signal(signal.SIGPROF, late)
+    signal.setitimer(signal.ITIMER_PROF, limit)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
+        signal.signal(signal.SIGPROF, before)

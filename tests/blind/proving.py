@@ -1,0 +1,242 @@
+"""The proving ground at work: chooses cases, makes them, diagnoses them on all cores, and keeps what is done."""
+
+from __future__ import annotations
+
+import json
+import multiprocessing
+import os
+import time
+import warnings
+import zlib
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from blind.answer import Answer, answered
+from blind.case import Case, hideable, sites_of, try_cases
+from blind.effects import EFFECTS
+from blind.machines import MACHINES
+from blind.table import failed
+
+KINDS = ("single", "pairs", "none", "parameters", "outside")
+#: Cases that are made together.
+BATCH = 30
+#: Cases without a missing effect for each case of an effect: a rate of a few per cent takes many of them.
+NOTHING, PAIRS = 4, 5
+
+
+@dataclass(frozen=True)
+class Job:
+    """One case to be made and diagnosed."""
+
+    machine: str
+    kind: str
+    request: tuple[str, ...]
+    seed: int
+    noise_level: float
+
+
+def jobs(
+    machines: Sequence[str] = (),
+    effects: Sequence[str] = (),
+    seeds: Sequence[int] = (0,),
+    noise_levels: Sequence[float] = (1.0,),
+    kinds: Sequence[str] = KINDS,
+    each: int = 1,
+) -> list[Job]:
+    """Cases of a run: each effect of each machine ``each`` times, with seeds that are dealt out in turn.
+
+    Parameters
+    ----------
+    machines, effects : sequence of str
+        All if empty.
+    seeds : sequence of int
+    noise_levels : sequence of float
+    kinds : sequence of str
+    each : int
+        Cases of each effect and machine; of no effect four times as many, and five times as many pairs.
+
+    Raises
+    ------
+    ValueError
+        A name is unknown, or nothing is left.
+    """
+    _check("machine", machines, tuple(MACHINES))
+    _check("effect", effects, tuple(EFFECTS))
+    _check("kind", kinds, KINDS)
+    if not seeds or not 1 <= each <= len(seeds):
+        raise ValueError(f"each effect is to be hidden {each} times with {len(seeds)} seeds; give a seed for each time")
+    found = []
+    for level in noise_levels:
+        for machine in machines or MACHINES:
+            for dealt, (kind, request, times) in enumerate(_requests(machine, effects, kinds)):
+                count = min(times * each, len(seeds))
+                turns = [seeds[(dealt + k) % len(seeds)] for k in range(count)]
+                found += [Job(machine, kind, request, seed, level) for seed in turns]
+    if not found:
+        raise ValueError("no case is left; the effects make no sense on the machines")
+    return found
+
+
+def _check(what: str, names: Sequence[str], known: Sequence[str]) -> None:
+    for name in names:
+        if name not in known:
+            raise ValueError(f'the proving ground has no {what} "{name}"; it has {", ".join(known)}')
+
+
+def _requests(machine: str, effects: Sequence[str], kinds: Sequence[str]) -> Iterator[tuple[str, tuple[str, ...], int]]:
+    """Kind, what to hide, and how often relative to one effect."""
+    for kind, known in (("single", True), ("outside", False)):
+        if kind in kinds:
+            for name in hideable(machine, known=known):
+                if not effects or name in effects:
+                    yield kind, (name,), 1
+    for kind in ("none", "parameters"):
+        if kind in kinds and not effects:
+            yield kind, (kind,), NOTHING
+    names = [name for name in hideable(machine, known=True) if not effects or name in effects]
+    if "pairs" in kinds and len(names) > 1:
+        generator = np.random.default_rng(zlib.crc32(f"pairs of {machine}".encode()))
+        drawn = (tuple(sorted(map(str, generator.choice(names, 2, replace=False)))) for _ in range(PAIRS))
+        for pair in dict.fromkeys(drawn):
+            yield "pairs", pair, 1
+
+
+def answers(
+    todo: Sequence[Job], workers: int = 0, limit: float = 120.0, tell: Callable[[str], None] | None = None
+) -> Iterator[Answer]:
+    """Answers in the order in which they come; Ctrl-C ends what runs and the iteration.
+
+    Parameters
+    ----------
+    todo : sequence of Job
+    workers : int
+        Processes; 0 takes one for each core, 1 works here.
+    limit : float
+        Longest time of one diagnosis on the processor [s].
+    tell : callable, optional
+        Called with a line for each case.
+    """
+    count = workers or os.cpu_count() or 1
+    say = tell or (lambda _: None)
+    given = _here(todo, limit) if count == 1 else _beside(todo, count, limit)
+    for done, answer in enumerate(given, 1):
+        say(f"{done}/{len(todo)}  {line(answer)}")
+        yield answer
+
+
+def line(answer: Answer) -> str:
+    """An answer in a line."""
+    hidden = ", ".join(f"{h.name}@{h.site}" for h in answer.hidden) or answer.request[0]
+    told = ", ".join(f"{n.name}@{n.site}" for n in answer.named) or answer.verdict or answer.error[:80]
+    strength = f" strength {min(answer.strengths):.2g}" if answer.strengths else ""
+    mark = "wrong" if failed(answer) else "right" if answer.solvable or not answer.hidden else "too weak"
+    return f"{mark:8s} {answer.machine}, seed {answer.seed}: {hidden}{strength} -> {told}  ({answer.seconds:.1f} s)"
+
+
+def _batches(todo: Sequence[Job]) -> Iterator[list[Job]]:
+    """Jobs of one machine and noise level together, those of a seed next to each other."""
+    for key in dict.fromkeys((job.machine, job.noise_level) for job in todo):
+        mine = sorted((job for job in todo if (job.machine, job.noise_level) == key), key=lambda job: job.seed)
+        pieces = -(-len(mine) // BATCH)
+        for k in range(pieces):
+            yield mine[k * len(mine) // pieces : (k + 1) * len(mine) // pieces]
+
+
+Made = tuple[Job, Case | None, tuple[float, ...], float, str]
+
+
+def make(batch: Sequence[Job]) -> list[Made]:
+    """Cases of a batch with the strength of each hidden effect alone, the time that each took, and errors."""
+    began = time.process_time()
+    machine, level = batch[0].machine, batch[0].noise_level
+    wanted = [(job.request, job.seed) for job in batch]
+    alone = [((name,), job.seed) for job in batch if len(job.request) > 1 for name in job.request]
+    made = try_cases(machine, [*wanted, *alone], level)
+    beside = zip(alone, made[len(wanted) :], strict=True)
+    strengths = {pair: case.oracle.strength for pair, case in beside if isinstance(case, Case)}
+    each = (time.process_time() - began) / len(batch)
+    result: list[Made] = []
+    for job, case in zip(batch, made, strict=False):
+        if isinstance(case, FloatingPointError):
+            result.append((job, None, (), each, str(case)))
+        else:
+            own: tuple[float, ...] = (case.oracle.strength,) if case.truth.hidden else ()
+            if len(job.request) > 1:
+                own = tuple(strengths.get(((name,), job.seed), np.nan) for name in job.request)
+            slim = replace(case.oracle, with_effect=(), without_effect=())
+            result.append((job, replace(case, oracle=slim), own, each, ""))
+    return result
+
+
+def ask(made: Made, limit: float) -> Answer:
+    """The answer to a case."""
+    job, case, strengths, making, error = made
+    if case is None:
+        known = all(EFFECTS[name.partition("@")[0]].known for name in job.request if name not in {"none", "parameters"})
+        return Answer(job.machine, job.kind, job.request, job.seed, job.noise_level, known, making=making, error=error)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return replace(answered(case, job.kind, job.request, strengths, limit), making=making)
+
+
+def _here(todo: Sequence[Job], limit: float) -> Iterator[Answer]:
+    try:
+        for batch in _batches(todo):
+            for made in make(batch):
+                yield ask(made, limit)
+    except KeyboardInterrupt:
+        return
+
+
+def _beside(todo: Sequence[Job], count: int, limit: float) -> Iterator[Answer]:
+    """The same on processes of one thread each."""
+    threads = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "RAYON_NUM_THREADS")
+    before = {name: os.environ.get(name) for name in threads}
+    os.environ.update(dict.fromkeys(threads, "1"))
+    pool = ProcessPoolExecutor(count, mp_context=multiprocessing.get_context("spawn"))
+    try:
+        batches = _batches(todo)
+        making: set[Future[list[Made]]] = set()
+        asking: set[Future[Answer]] = set()
+        while True:
+            # Cases are made a little ahead of the diagnoses, not all of them first.
+            while len(making) < count and len(asking) < 2 * count and (batch := next(batches, None)):
+                making.add(pool.submit(make, batch))
+            running: list[Future[Any]] = [*making, *asking]
+            if not running:
+                return
+            wait(running, return_when=FIRST_COMPLETED)
+            for future in [f for f in making if f.done()]:
+                making.discard(future)
+                asking |= {pool.submit(ask, made, limit) for made in future.result()}
+            for answer in [f for f in asking if f.done()]:
+                asking.discard(answer)
+                yield answer.result()
+    except KeyboardInterrupt:
+        return
+    finally:
+        processes = list((pool._processes or {}).values())
+        pool.shutdown(wait=False, cancel_futures=True)
+        for process in processes:
+            process.terminate()
+        for name, value in before.items():
+            os.environ.pop(name) if value is None else os.environ.update({name: value})
+
+
+def save_json(found: Sequence[Answer], path: Path) -> None:
+    """Every answer, one to a line."""
+    lines = ",\n".join(json.dumps(answer.to_dict()) for answer in found)
+    path.write_text(f"[\n{lines}\n]\n", encoding="utf-8")
+
+
+def load_json(path: Path) -> list[Answer]:
+    """The answers of a file."""
+    return [Answer.from_dict(entry) for entry in json.loads(path.read_text(encoding="utf-8"))]
+
+
+__all__ = ["KINDS", "Job", "answers", "ask", "jobs", "line", "load_json", "make", "save_json", "sites_of"]
