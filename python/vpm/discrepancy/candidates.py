@@ -19,7 +19,9 @@ Key = tuple[str, str]
 
 #: Transition and Stribeck velocities tried, as shares of the largest speed in the data.
 TRANSITION_SHARES = (0.002, 0.01, 0.04)
-STRIBECK_SHARES = (0.08, 0.25, 0.6)
+STRIBECK_SHARES = (0.015, 0.05, 0.15)
+#: Beyond this share of the largest speed it is no excess close to rest any more.
+HIGHEST_STRIBECK = 0.3
 #: Lags tried, in sampling intervals, and saturation limits, as shares of the largest command.
 LAG_INTERVALS = (1.0, 4.0, 16.0)
 LIMIT_SHARES = (0.95, 0.7, 0.4)
@@ -115,7 +117,7 @@ def _candidate(effect: EffectType, site: str, model: Model, data: InverseDynamic
     if effect.name == "stribeck_friction":
         velocity = _known_transition(model, site, seen)
         starts = tuple({"stribeck_velocity": s * seen.speed, "transition_velocity": velocity} for s in STRIBECK_SHARES)
-        bounds = {"stribeck_velocity": (2.0 * velocity, seen.speed)}
+        bounds = {"stribeck_velocity": (2e-3 * seen.speed, HIGHEST_STRIBECK * seen.speed)}
         return Candidate(effect, site, starts, bounds, fixed=("transition_velocity",))
     if effect.name == "torque_ripple":
         periods = _ripple_periods(data, model, joint, residual)
@@ -151,8 +153,12 @@ def _grid(name: str, shares: Sequence[float], size: float) -> tuple[Mapping[str,
 
 
 def _slow(seen: Excitation) -> dict[str, tuple[float, float]]:
-    """A transition velocity is a detail of small speeds: between 1/5000 and 1/10 of the largest."""
-    return {"transition_velocity": (2e-4 * seen.speed, 0.1 * seen.speed)}
+    return {"transition_velocity": slow_speeds(seen.speed)}
+
+
+def slow_speeds(fastest: float) -> tuple[float, float]:
+    """Bounds of a transition velocity, a detail of small speeds: between 1/5000 and 1/10 of the largest."""
+    return 2e-4 * fastest, 0.1 * fastest
 
 
 def _around(seen: Excitation) -> tuple[float, float]:

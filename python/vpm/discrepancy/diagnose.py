@@ -12,6 +12,7 @@ from scipy.special import ndtri
 
 from vpm.catalogue import EFFECTS
 from vpm.compare import compare
+from vpm.discrepancy.candidates import slow_speeds
 from vpm.discrepancy.confirmation import Data, Judged, is_clear, judge
 from vpm.discrepancy.diagnosis import (
     AcceptedEffect,
@@ -39,7 +40,10 @@ HELD_OUT = 0.3
 #: A residual within this factor of the noise floor has nothing left to explain.
 FLOOR_FACTOR = 1.3
 #: Neither has one below this share of the measured effort.
-NEGLIGIBLE = 0.01
+NEGLIGIBLE = 0.005
+#: Where a structured residual clear of the noise remains and is more than this share of the recalibrated mean square,
+#: what was found is not the explanation.
+MOSTLY_OPEN = 0.15
 #: Parameters that move by more of their stated uncertainties than this are reported.
 FAR = 3.0
 
@@ -107,13 +111,13 @@ def diagnose(
     free = tuple(p.name for p in model.parameters.values() if p.adjustable)
     if not free:
         notes.append("the model file gives no parameter an uncertainty, so none was recalibrated")
-    recalibrated = judge(model, free, data, {})
+    transitions = _transitions(model, data.training)
+    recalibrated = judge(model, (*free, *transitions), data, transitions)
     notes.extend(_moved_far(model, recalibrated))
     found = search(recalibrated, data, effects, limit, say)
     say("measuring the noise floor")
-    cutoffs = tuple(m.cutoff for m in data.unseen.motions)
-    floor = noise_floor(found.final.model, unseen, cutoffs)
-    left = structure(data.training, data.unseen, found.final.fit.residual, found.final.unseen)
+    floor = noise_floor(found.final.model, data.unseen, found.final.unseen, mode, setup)
+    left = structure(found.final.model, data.training, data.unseen, found.final.fit.residual, found.final.unseen)
     gap = _gaps(data, nominal, recalibrated, found.final, floor)
     verdict, summary = _verdict(data, nominal, recalibrated, found, gap, left)
     return Diagnosis(
@@ -192,6 +196,21 @@ def _nominal(model: Model, data: Data, notes: list[str]) -> Judged:
         return judge(model, (), replace(data, simulation=None), {})
 
 
+def _transitions(model: Model, data: InverseDynamicsProblem) -> dict[str, tuple[float, float]]:
+    """Transition velocities of the dry friction that the model has, with bounds from the data.
+
+    Nobody knows them beforehand, and a wrong one leaves a gap at every reversal, where the finer effects live.
+    """
+    found = {}
+    for effect in model.effects:
+        name = effect.parameter_names.get("transition_velocity")
+        if effect.name == "coulomb_friction" and name is not None and effect.at in data.joints:
+            joint = data.joints.index(effect.at)
+            speeds = np.concatenate([np.abs(data.state(record)[1][:, joint]) for record in range(len(data.motions))])
+            found[name] = slow_speeds(float(np.quantile(speeds, 0.999)))
+    return found
+
+
 def _moved_far(model: Model, recalibrated: Judged) -> list[str]:
     notes = []
     for name in recalibrated.free:
@@ -239,8 +258,16 @@ def _verdict(
     remaining = left.present and above > FLOOR_FACTOR and share > NEGLIGIBLE
     worst = max(main, key=lambda g: g.recalibrated / g.signal if g.signal else 0.0)
     numbers = f"{_percent(worst.before, worst)} before, {_percent(worst.recalibrated, worst)} recalibrated"
+    names = ", then ".join(e.trial.probe.candidate.label for e in found.accepted)
+    rest_of = max(g.after / g.recalibrated if g.recalibrated > 0.0 else 0.0 for g in [worst]) ** 2
+    if found.accepted and remaining and rest_of > MOSTLY_OPEN:
+        return (
+            "unexplained",
+            f"The residual is structured and {above:.2g} times the noise floor. The effects of the catalogue that come "
+            f"closest, {names}, leave {100.0 * rest_of:.0f} % of its mean square: they are not the explanation. Error on "
+            f"unseen data: {numbers}, {_percent(worst.after, worst)} after.",
+        )
     if found.accepted:
-        names = ", then ".join(e.trial.probe.candidate.label for e in found.accepted)
         rest = " A structured residual above the noise remains." if remaining else ""
         return (
             "effect_found",

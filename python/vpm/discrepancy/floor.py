@@ -1,52 +1,144 @@
-"""How small the gap could be at best: measurement noise carried through the same comparison."""
+"""How small the gap could be at best: noise, and the error of the comparison itself, carried through the same balance."""
 
 from __future__ import annotations
+
+import warnings
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vpm.errors import VpmError
 from vpm.experiment import Experiment, noise_std
+from vpm.experiment.signal import RETAINED_BAND
 from vpm.identify import InverseDynamicsProblem, gaps
 from vpm.model import Model
+from vpm.simulate import Setup, simulate_arrays
 
 Array = NDArray[np.float64]
 
 #: Seed of the noise that is carried through; any would do.
 SEED = 20160331
+#: Share of the frequencies of a residual that hold no more than noise, for the estimate of what is white in it.
+QUIET_SHARE = 0.4
 
 
-def noise_floor(model: Model, experiments: tuple[Experiment, ...], cutoffs: tuple[float, ...]) -> dict[str, float]:
-    """Root mean square that sensor noise alone leaves in the balance of effort, by channel.
+def noise_floor(
+    model: Model, unseen: InverseDynamicsProblem, residual: Array, mode: str, setup: Setup | None = None
+) -> dict[str, float]:
+    """Root mean square that would remain in the balance of the right model, by channel.
 
-    Noise of the estimated size is added to the measured motion once more; what that changes in the residual is the
-    floor. Commands are taken as exact: the controller wrote them.
+    The larger of two. The first is known beforehand: the model runs the records by itself, in closed loop where that is
+    possible, and its own log, with noise of the size estimated from the measured one, is balanced like the measured one;
+    what remains is noise and the error of filters and steps. Where the model cannot run them so, noise is added to the
+    measured motion once more, and what that changes is taken. The second comes from the residual: what is white in it,
+    such as the ripple of a drive that shows in no channel (see `white_level`).
 
     Parameters
     ----------
     model : Model
-        The best model found; its masses turn noise of acceleration into effort.
-    experiments : tuple of Experiment
-    cutoffs : tuple of float
-        Cut-off frequency of each record's motion filter, Hz.
+        The best model found.
+    unseen : InverseDynamicsProblem
+        The records it is judged on.
+    residual : ndarray
+        Its residual there.
+    mode : str
+        In which the records can be simulated; only "closed_loop" gives whole logs.
+    setup : Setup, optional
     """
     generator = np.random.default_rng(SEED)
-    power: dict[str, list[tuple[float, int]]] = {}
-    for experiment, cutoff in zip(experiments, cutoffs, strict=True):
-        clean = InverseDynamicsProblem(model, [experiment], cutoff=cutoff)
-        noisy = InverseDynamicsProblem(model, [_with_noise(model, experiment, generator)], cutoff=cutoff)
-        change = noisy.evaluate(model, model.theta)[0] - clean.evaluate(model, model.theta)[0]
-        for channel, (rms, _, _) in gaps(clean, change).items():
-            power.setdefault(channel, []).append((rms**2, change.size))
-    return {c: float(np.sqrt(np.average([p for p, _ in v], weights=[n for _, n in v]))) for c, v in power.items()}
+    cutoffs = [m.cutoff for m in unseen.motions]
+    expected: dict[str, list[tuple[float, int]]] = {}
+    for experiment, cutoff in zip(unseen.experiments, cutoffs, strict=True):
+        own = _own_log(model, experiment, setup, generator) if mode == "closed_loop" else None
+        change = _balance(model, own, cutoff) if own is not None else None
+        if change is None:
+            clean = InverseDynamicsProblem(model, [experiment], cutoff=cutoff)
+            noisy = InverseDynamicsProblem(model, [_with_noise(model, experiment, generator)], cutoff=cutoff)
+            change = clean, noisy.evaluate(model, model.theta)[0] - clean.evaluate(model, model.theta)[0]
+        for channel, (rms, _, _) in gaps(*change).items():
+            expected.setdefault(channel, []).append((rms**2, change[1].size))
+    white = _white(unseen, residual)
+    return {
+        channel: max(float(np.sqrt(np.average([p for p, _ in v], weights=[n for _, n in v]))), white.get(channel, 0.0))
+        for channel, v in expected.items()
+    }
+
+
+def white_level(residual: Array, moving: Array) -> float:
+    """Root mean square of what is white in one channel of a residual.
+
+    Power of white noise is the same at every frequency of the retained band and is distributed exponentially from one to
+    the next, so its mean follows from any quantile of the periodogram. A low one is taken, which what follows the motion
+    or stands out as a line does not reach.
+
+    Parameters
+    ----------
+    residual : ndarray, shape (n,)
+        Zero where it does not count.
+    moving : ndarray, shape (n,)
+        1 where it counts.
+    """
+    n = residual.size
+    count = float(np.count_nonzero(moving))
+    if n < 16 or count == 0.0:
+        return 0.0
+    window = np.hanning(n)
+    power = np.abs(np.fft.rfft(residual * window)) ** 2 / float(window @ window)
+    band = power[1 : max(2, int(RETAINED_BAND * power.size))]
+    level = float(np.quantile(band, QUIET_SHARE)) / -np.log(1.0 - QUIET_SHARE)
+    return float(np.sqrt(RETAINED_BAND * level * n / count))
+
+
+def _white(problem: InverseDynamicsProblem, residual: Array) -> dict[str, float]:
+    powers: dict[str, list[tuple[float, float]]] = {}
+    for block in problem.blocks:
+        level = white_level(residual[block.samples], block.moving) / block.weight
+        powers.setdefault(block.channel, []).append((level**2, float(block.moving.sum())))
+    return {
+        channel: float(np.sqrt(np.average([p for p, _ in v], weights=[max(n, 1e-9) for _, n in v])))
+        for channel, v in powers.items()
+    }
+
+
+def _own_log(
+    model: Model, experiment: Experiment, setup: Setup | None, generator: np.random.Generator
+) -> Experiment | None:
+    """The log that the model itself would have left, with noise; None where it cannot follow the references."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            run = simulate_arrays(model, experiment, "closed_loop", setup=setup)
+    except (VpmError, Warning):
+        return None
+    if len(run.rows) != len(experiment):
+        return None
+    own = experiment
+    for column, channel in enumerate(model.output_channels):
+        if channel in experiment:
+            values = run.outputs[:, column]
+            if not channel.endswith(".command"):  # the controller wrote it: nothing comes on top
+                values = values + noise_std(experiment[channel]) * generator.standard_normal(values.size)
+            own = own.with_channel(channel, values, _unit(experiment, channel))
+    return own
+
+
+def _balance(model: Model, own: Experiment, cutoff: float) -> tuple[InverseDynamicsProblem, Array] | None:
+    try:
+        problem = InverseDynamicsProblem(model, [own], cutoff=cutoff)
+        return problem, problem.evaluate(model, model.theta)[0]
+    except VpmError:
+        return None
 
 
 def _with_noise(model: Model, experiment: Experiment, generator: np.random.Generator) -> Experiment:
-    for joint in model.joints:
-        for quantity in ("position", "velocity", "acceleration"):
-            channel = f"{joint}.{quantity}"
-            if channel in experiment:
-                values = experiment[channel]
-                noise = noise_std(values) * generator.standard_normal(values.size)
-                unit = experiment.units[experiment.channels.index(channel)]
-                experiment = experiment.with_channel(channel, values + noise, unit)
+    """The record with noise of every logged output once more; commands are exact, for the controller wrote them."""
+    for channel in model.output_channels:
+        if channel in experiment and not channel.endswith(".command"):
+            values = experiment[channel]
+            noise = noise_std(values) * generator.standard_normal(values.size)
+            experiment = experiment.with_channel(channel, values + noise, _unit(experiment, channel))
     return experiment
+
+
+def _unit(experiment: Experiment, channel: str) -> str:
+    return experiment.units[experiment.channels.index(channel)]

@@ -25,6 +25,9 @@ SHORT_LIST = 7
 #: An instrument is blamed for what the machine may have done only if it leaves less than this share of the gap.
 SENSOR_SHARE = 0.25
 
+#: A refinement leaves less than this share of the mean square that the plainer effect leaves.
+REFINED = 0.5
+
 Item = TypeVar("Item")
 Outcome = TypeVar("Outcome")
 
@@ -137,10 +140,15 @@ class _Round:
             )
 
     def best(self) -> Accepted | None:
-        """The candidate with the largest unseen gain per number; of those that are as good, the best simulation."""
+        """The candidate that leaves least for its numbers; of those that are as good, the best simulation.
+
+        One that refines another only takes its place if it leaves less than ``REFINED`` of what that leaves.
+        """
         if not self._believed:
             return None
-        first = max(self._believed, key=lambda t: t.score)
+        first = min(self._believed, key=_cost)
+        plain = [t for t in self._believed if _plainer(t, first)]
+        first = min(plain, key=_cost) if plain else first
         equals = [t for t in self._believed if _as_good(t, first)]
         chosen = min(equals, key=_evidence)
         key = chosen.probe.candidate.key
@@ -150,6 +158,25 @@ class _Round:
     def ranked(self) -> list[RankedCandidate]:
         """Candidates of this round, the most promising first."""
         return sorted(self._ranking.values(), key=lambda c: -c.screened)
+
+
+def _left(trial: Trial) -> float:
+    """Share of the unseen mean square that a trial leaves."""
+    return max(1.0 - trial.unseen.relative, 1e-12)
+
+
+def _cost(trial: Trial) -> float:
+    """Information criterion of G. Schwarz (*Annals of Statistics* 6, 1978) per independent piece of the unseen data."""
+    pieces = max(trial.unseen.pieces, 3)
+    return float(np.log(_left(trial)) + len(trial.parameters) * np.log(pieces) / pieces)
+
+
+def _plainer(trial: Trial, first: Trial) -> bool:
+    """Whether a trial says in fewer numbers nearly what ``first`` says, at the same site and confusable with it."""
+    mine, other = trial.probe.candidate, first.probe.candidate
+    alike = other.effect.name in mine.effect.confused_with or mine.effect.name in other.effect.confused_with
+    fewer = len(trial.parameters) < len(first.parameters)
+    return mine.site == other.site and alike and fewer and REFINED * _left(trial) <= _left(first)
 
 
 def _as_good(trial: Trial, first: Trial) -> bool:

@@ -7,16 +7,26 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from scipy.stats import spearmanr
+
+from vpm.discrepancy.floor import white_level
 from vpm.identify import InverseDynamicsProblem
+from vpm.model import Model
 
 Array = NDArray[np.float64]
 
 #: Bins of position and of velocity in the state map.
 BINS = 8
+#: One sample in so many is taken for independent of the others.
+THINNED = 2
 #: Share of the unseen residual that a state map must predict, and share of its power in the lowest tenth of the
 #: band (a tenth for white noise), before it counts as structured.
-PREDICTED_SHARE = 0.15
+PREDICTED_SHARE = 0.1
 SLOW_SHARE = 0.5
+#: So many times what is white in it, it is coloured.
+COLOURED = 1.6
+#: So many standard deviations of the rank correlation between its size and that of the effort, it grows with the effort.
+GROWING = 4.0
 
 
 @dataclass(frozen=True)
@@ -26,32 +36,75 @@ class Structure:
     Attributes
     ----------
     predicted : float
-        Share of the unseen residual's mean square that a map of position, velocity and acceleration, drawn from the
-        training residual, predicts.
+        Share of the unseen residual's mean square that a map of position, velocity, acceleration and effort, drawn from
+        the training residual, predicts.
     slow : float
         Share of its power in the lowest tenth of the retained band.
+    coloured : float
+        How many times the residual is larger than what is white in it, on the records where it is least so.
+    growing : float
+        Rank correlation of its size with that of the effort, in standard deviations: noise of sensors and drives does
+        not know how hard the drive works.
     """
 
     predicted: float
     slow: float
+    coloured: float
+    growing: float
 
     @property
     def present(self) -> bool:
         """Whether the residual is more than noise."""
-        return self.predicted > PREDICTED_SHARE or self.slow > SLOW_SHARE
+        follows = self.predicted > PREDICTED_SHARE or self.growing > GROWING
+        return follows or self.slow > SLOW_SHARE or self.coloured > COLOURED
 
 
 def structure(
-    training: InverseDynamicsProblem, unseen: InverseDynamicsProblem, fitted: Array, residual: Array
+    model: Model,
+    training: InverseDynamicsProblem,
+    unseen: InverseDynamicsProblem,
+    fitted: Array,
+    residual: Array,
 ) -> Structure:
     """Examine the residuals of a fitted model on training and unseen data."""
     joints = range(len(training.joints))
-    predicted = max(_predicted(training, unseen, fitted, residual, joint) for joint in joints)
+    predicted = max(_predicted(model, training, unseen, fitted, residual, joint) for joint in joints)
     slow = float(np.mean([_slow_share(residual[block.samples]) for block in unseen.blocks]))
-    return Structure(predicted, slow)
+    coloured = min(_coloured(training, fitted), _coloured(unseen, residual))
+    growing = min(_growing(model, training, fitted), _growing(model, unseen, residual))
+    return Structure(predicted, slow, coloured, growing)
+
+
+def _coloured(problem: InverseDynamicsProblem, residual: Array) -> float:
+    """Largest ratio of any channel between its residual and what is white in it."""
+    ratios = []
+    for channel in dict.fromkeys(block.channel for block in problem.blocks):
+        mine = [block for block in problem.blocks if block.channel == channel]
+        white = sum(white_level(residual[b.samples], b.moving) ** 2 * float(b.moving.sum()) for b in mine)
+        power = sum(float(residual[b.samples] @ residual[b.samples]) for b in mine)
+        ratios.append(np.sqrt(power / white) if white > 0.0 else 0.0)
+    return float(max(ratios))
+
+
+def _growing(model: Model, problem: InverseDynamicsProblem, residual: Array) -> float:
+    """Largest over the joints, as if every other sample were independent."""
+    scores = []
+    for joint in range(len(problem.joints)):
+        sizes, efforts = [], []
+        for record in range(len(problem.motions)):
+            block = problem.efforts(record)[joint]
+            _, applied, _ = problem.effort(model, model.theta, record)
+            counted = block.moving > 0.0
+            sizes.append(np.abs(residual[block.samples][counted]))
+            efforts.append(np.abs(applied[counted, joint]))
+        size, effort = np.concatenate(sizes), np.concatenate(efforts)
+        if size.size > 2 * THINNED and np.ptp(effort) > 0.0 and np.ptp(size) > 0.0:
+            scores.append(float(spearmanr(size, effort).statistic) * np.sqrt(size.size / THINNED))
+    return max(scores, default=0.0)
 
 
 def _predicted(
+    model: Model,
     training: InverseDynamicsProblem,
     unseen: InverseDynamicsProblem,
     fitted: Array,
@@ -59,7 +112,9 @@ def _predicted(
     j: int,
 ) -> float:
     """Cross-validated share of one joint's residual that bins of its state explain."""
-    states = [np.vstack([_state(problem, r, j) for r in range(len(problem.motions))]) for problem in (training, unseen)]
+    states = [
+        np.vstack([_state(model, problem, r, j) for r in range(len(problem.motions))]) for problem in (training, unseen)
+    ]
     targets = [
         np.concatenate([values[problem.efforts(r)[j].samples] for r in range(len(problem.motions))])
         for problem, values in ((training, fitted), (unseen, residual))
@@ -73,19 +128,22 @@ def _predicted(
     return max(0.0, 1.0 - float(left @ left) / power) if power > 0.0 else 0.0
 
 
-def _state(problem: InverseDynamicsProblem, record: int, joint: int) -> Array:
+def _state(model: Model, problem: InverseDynamicsProblem, record: int, joint: int) -> Array:
     position, velocity, acceleration = problem.state(record)
-    return np.column_stack([position[:, joint], velocity[:, joint], acceleration[:, joint]])
+    _, applied, _ = problem.effort(model, model.theta, record)
+    return np.column_stack([position[:, joint], velocity[:, joint], acceleration[:, joint], applied[:, joint]])
 
 
 def _features(state: Array, edges: list[Array], reference: Array) -> Array:
-    """Membership in bins of position and of velocity, and the acceleration."""
+    """Membership in bins of position and of velocity, acceleration, and effort with and against the motion."""
     columns = []
     for quantity in range(2):
         place = np.digitize(state[:, quantity], edges[quantity])
         columns.append(place[:, None] == np.arange(BINS)[None, :])
-    scale = float(np.std(reference[:, 2])) or 1.0
-    return np.column_stack([*columns, state[:, 2:] / scale]).astype(np.float64)
+    scale = np.std(reference[:, 2:], axis=0)
+    further = state[:, 2:] / np.where(scale > 0.0, scale, 1.0)
+    against = np.abs(further[:, 1]) * np.sign(state[:, 1])
+    return np.column_stack([*columns, further, against]).astype(np.float64)
 
 
 def _slow_share(residual: Array) -> float:

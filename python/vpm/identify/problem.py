@@ -32,6 +32,9 @@ STANDSTILL_SHARE = 0.005
 FEWEST_SAMPLES = 12
 #: Modes that simulate a record as a whole from its first sample.
 WHOLE = ("free_run", "closed_loop")
+#: Retained samples at each end of a record in which the parallel filter settles: its ringing falls to a fifth or less
+#: from one retained sample to the next.
+SETTLING = 4
 
 
 @dataclass(frozen=True)
@@ -219,11 +222,15 @@ class InverseDynamicsProblem:
             efforts = np.sqrt(np.average(applied**2, axis=0, weights=moving[record]))
             spread = np.std(parallel_filter(self._measured(experiment, m), m.decimation), axis=0)
             sizes.append(np.concatenate([efforts, spread]))
-            moving[record] = np.hstack([moving[record], np.ones((len(applied), len(self.shown)))])
+            settled = _settled(len(applied), m.decimation)[:, None]
+            moving[record] = np.hstack([moving[record], np.repeat(settled, len(self.shown), axis=1)])
         return sizes, moving
 
     def _moving(self) -> list[Array]:
-        """For each record (n, joints): 1 where a joint moves, 0 where it stands still; all 1 if it mostly stands."""
+        """For each record (n, joints): 1 where a joint moves, 0 where it stands still; all 1 if it mostly stands.
+
+        Zero too where the parallel filter settles.
+        """
         speeds = [np.abs(m.velocity[m.kept][:, self._joints]) for m in self.motions]
         largest = np.max([np.quantile(speed, 0.999, axis=0) for speed in speeds], axis=0)
         masks = [
@@ -231,13 +238,26 @@ class InverseDynamicsProblem:
             for m, speed in zip(self.motions, speeds, strict=True)
         ]
         mostly = np.mean(np.vstack(masks), axis=0) >= 0.5
-        return [np.where(mostly, mask, True).astype(np.float64) for mask in masks]
+        return [
+            np.where(mostly, mask, True) * _settled(len(mask), m.decimation)[:, None]
+            for mask, m in zip(masks, self.motions, strict=True)
+        ]
 
     def _stack(self, records: list[Array]) -> Array:
         """Concatenate (n, channels, ...) arrays block by block and apply the weights."""
         columns = [record[:, c] for record in records for c in range(record.shape[1])]
         scaled = zip(columns, self.blocks, strict=True)
         return np.concatenate([(x.T * (block.weight * block.moving)).T for x, block in scaled])
+
+
+def _settled(samples: int, decimation: int) -> Array:
+    """1 for retained samples behind and ahead of which the parallel filter has all that it needs, else 0.
+
+    A short record keeps its ends: what little there is has to do.
+    """
+    ends = SETTLING if decimation > 1 and samples >= 3 * FEWEST_SAMPLES else 0
+    place = np.arange(samples)
+    return ((place >= ends) & (place < samples - ends)).astype(np.float64)
 
 
 def _standing(speed: Array, limit: Array, samples: int) -> NDArray[np.bool_]:
