@@ -21,21 +21,45 @@ def name_of(value: EffectType | EffectParameter) -> str:
     return value.name
 
 
-def machine(kind: str, sensed: str = "position") -> Model:
-    """One body of mass 2 and inertia 2 on one joint without gravity, with an actuator and a sensor."""
+BOOM = {
+    "parent": "link",
+    "length": 1.0,
+    "level": "modal(1)",
+    "deforms": ["bending_x"],
+    "material": {"young": 7e10, "poisson": 0.3, "density": 2700.0},
+    "section": {"shape": "rectangle", "width": 0.02, "height": 0.03},
+}
+#: Effects that put a joint behind the one they sit at, or say nothing about an effort at a state.
+ELSEWHERE = {"hysteresis", "joint_compliance", "rotor_inertia", "end_stop"}
+
+
+def machine(kind: str, sensed: str = "position", site: str = "joint") -> Model:
+    """One body of mass 2 and inertia 2 on one joint without gravity, with an actuator and a sensor.
+
+    For effects of beams and of the world it has a beam, or gravity.
+    """
     return Model.from_dict(
         {
             "name": "rig",
-            "gravity": [0, 0, 0],
+            "gravity": [0, 0, -9.81 if site == "world" else 0],
             "bodies": {"link": {"mass": 2.0, "inertia": [2.0, 2.0, 2.0, 0, 0, 0]}},
             "joints": {"axis": {"type": kind, "parent": "world", "child": "link", "axis": [0, 0, 1]}},
+            "beams": {"boom": BOOM} if site == "beam" else {},
             "actuators": {"drive": {"joint": "axis", "gain": 1.0, "command_unit": "V"}},
             "sensors": {"encoder": {"measures": f"axis.{sensed}"}},
         }
     )
 
 
-SITES = {"joint": "axis", "body": "link", "actuator": "drive", "sensor": "encoder"}
+SITES = {
+    "joint": "axis",
+    "body": "link",
+    "link": "link",
+    "beam": "boom",
+    "actuator": "drive",
+    "sensor": "encoder",
+    "world": "world",
+}
 
 
 def given(effect: EffectType) -> dict[str, float]:
@@ -51,7 +75,7 @@ def test_texts_are_complete(effect: EffectType) -> None:
     assert all(texts[p.name] in sentence for p in effect.parameters if not p.shape)
     assert sentence.endswith(".")
     assert effect.impossible
-    assert all(p.name in effect.law for p in effect.parameters if effect.name != "payload")
+    assert all(p.name in effect.law for p in effect.parameters if effect.name != "payload" and p.scale != "inertia")
     assert effect.requires is None or effect_type(effect.requires).site == effect.site
 
 
@@ -80,7 +104,10 @@ def test_dotted_names_do_not_meet_at_a_site(site: str) -> None:
 @pytest.mark.parametrize("kind", ["prismatic", "revolute"])
 @pytest.mark.parametrize("effect", EFFECTS.values(), ids=name_of)
 def test_every_effect_can_be_added_and_its_units_fit_its_law(effect: EffectType, kind: str) -> None:
-    model = machine(kind).with_effect(effect.name, at=SITES[effect.site], **given(effect))
+    if (effect.site, kind) == ("link", "prismatic"):
+        pytest.skip("a link bends about the axis that turns it")
+    bare = machine(kind, site=effect.site)
+    model = bare.with_effect(effect.name, at=SITES[effect.site], **given(effect))
     added = model.effects[-1]
     for short, dotted in added.parameter_names.items():
         parameter = model.parameters[dotted]
@@ -100,7 +127,7 @@ def test_every_effect_can_be_added_and_its_units_fit_its_law(effect: EffectType,
             unit = model.parameters[added.parameter_names[size.name]].unit
             product = parse_unit(f"({unit})({states[size.scale]})")
             assert product.dimension == parse_unit(effort_unit).dimension
-    assert model.without_effect(effect.name, at=SITES[effect.site]) == machine(kind)
+    assert model.without_effect(effect.name, at=SITES[effect.site]) == bare
 
 
 def law_of(effect: EffectType) -> str:
@@ -111,16 +138,19 @@ def law_of(effect: EffectType) -> str:
 
 
 @pytest.mark.parametrize("kind", ["prismatic", "revolute"])
-@pytest.mark.parametrize("effect", [e for e in effects_for_site("joint") if "dz/dt" not in e.law], ids=name_of)
+@pytest.mark.parametrize("effect", [e for e in effects_for_site("joint") if e.name not in ELSEWHERE], ids=name_of)
 def test_the_core_computes_the_law_as_it_is_written(effect: EffectType, kind: str) -> None:
     values = {parameter.name: 0.9 - 0.2 * i for i, parameter in enumerate(effect.parameters)}
-    model = machine(kind).with_effect(effect.name, at="axis", **values)
+    content = machine(kind).to_dict()
+    free = {key: table for key, table in content.items() if key not in {"actuators", "sensors"}}
+    model = Model.from_dict(free).with_effect(effect.name, at="axis", **values)
+    inertia = model.mass_matrix(np.zeros(1))[0, 0]
     functions = {"tanh": math.tanh, "exp": math.exp, "cos": math.cos, "sin": math.sin, "sqrt": math.sqrt, "pi": math.pi}
     seen = []
     for q, v in [(0.4, -0.9), (-0.2, 0.05), (1.3, 0.7), (0.1, 0.0)]:
         expected = eval(law_of(effect), {"q": q, "v": v, **values, **functions})
         acceleration = model.core.forward_dynamics(model.theta, np.array([q]), np.array([v]), np.array([0.0]))
-        assert 2.0 * acceleration[0] == pytest.approx(expected, rel=1e-12, abs=1e-14)
+        assert inertia * acceleration[0] == pytest.approx(expected, rel=1e-12, abs=1e-14)
         seen.append(expected)
     assert max(map(abs, seen)) > 0.1
 
@@ -168,4 +198,4 @@ def test_descriptions_name_every_effect_of_joints_and_bodies() -> None:
         model = machine("prismatic").with_effect(effect.name, at=SITES[effect.site], **given(effect))
         entry = json.loads(model.description())["effects"][0]
         assert entry["type"] == effect.name
-        assert entry[effect.site] == 0
+        assert entry[effect.site] == (1 if model.added_joints else 0)

@@ -61,11 +61,21 @@ def effects(draw: st.DrawFn, sites: dict[str, list[str]], units: dict[tuple[str,
         values = {
             p.name: draw(quantities(p.unit.format_map(units[effect.site, at]), *p.physical))
             for p in effect.parameters
-            if not p.shape or p.start is None or draw(st.booleans())
+            if p.name != "low" and (not p.shape or p.start is None or draw(st.booleans()))
         }
+        if "inertia" in {p.name for p in effect.parameters}:
+            values["inertia"] = draw(st.floats(1e-3, 1e3))
         return {"type": effect.name, "at": at, **values}
 
-    return [entry(effect, at) for effect, at in chosen]
+    split: set[str] = set()
+    kept = []
+    for effect, at in chosen:  # a joint is split once
+        splits = effect.name in {"joint_compliance", "backlash", "link_flexibility"}
+        joint = f"j{at[1:]}" if effect.site == "link" else at
+        if not (splits and joint in split):
+            kept.append(entry(effect, at))
+        split |= {joint} if splits else set()
+    return kept
 
 
 @st.composite
@@ -113,15 +123,18 @@ def machines(draw: st.DrawFn) -> dict[str, Any]:
         if draw(st.booleans())
     }
     sites = {"joint": list(joints), "body": list(bodies), "actuator": list(actuators), "sensor": list(sensors)}
+    gravity = draw(st.lists(moderate, min_size=3, max_size=3))
+    sites |= {"link": [f"b{k}" for k, kind in enumerate(kinds) if kind == "revolute"], "beam": []}
+    sites["world"] = ["world"] if any(gravity) else []
     units: dict[tuple[str, str], dict[str, str]] = {
         ("joint", name): {"E": effort[name], "C": coordinate[name]} for name in joints
     }
-    units |= {("body", name): {} for name in bodies}
+    units |= {(kind, name): {} for kind in ("body", "link", "world") for name in (*bodies, "world")}
     units |= {("actuator", name): {"U": unit} for name, unit in zip(actuators, commands, strict=False)}
     units |= {("sensor", f"s{i}"): {"S": coordinate[joint]} for i, joint in enumerate(read)}
     content = {
         "name": draw(st.text(min_size=1, max_size=10)),
-        "gravity": draw(st.lists(moderate, min_size=3, max_size=3)),
+        "gravity": gravity,
         "bodies": bodies,
         "joints": dict(draw(st.permutations(list(joints.items())))),
         "actuators": actuators,
@@ -174,9 +187,16 @@ def test_every_parameter_stands_in_the_description_once(content: dict[str, Any])
     assert [model.index(name) for name in model.parameter_names] == list(range(len(model.theta)))
     for k, body in enumerate(described["bodies"]):
         assert body["on"] == "world" or body["on"]["body"] < k
-        entry = content["joints"][body["joint"]["name"]]
+        name = body["joint"]["name"]
+        if name in model.added_joints:  # on the joint that it was split off, at its place
+            assert described["bodies"][body["on"]["body"]]["joint"]["name"] in content["joints"]
+            assert body["joint"]["translation"] == [0.0, 0.0, 0.0]
+            continue
+        entry = content["joints"][name]
         parent = "world" if body["on"] == "world" else described["bodies"][body["on"]["body"]]["name"]
-        assert (entry["child"], entry["parent"]) == (body["name"], parent)
+        behind = next((other["name"] for other in described["bodies"] if other["on"] == {"body": k}), None)
+        split = {f"{name}_deflection", f"{entry['child']}_bending"} & set(model.added_joints)
+        assert (entry["child"], entry["parent"]) == (behind if split else body["name"], parent)
         expected = Rotation.from_euler("xyz", entry["rotation"]).as_matrix()  # extrinsic: about fixed axes
         assert np.reshape(body["joint"]["rotation"], (3, 3)) == pytest.approx(expected, abs=1e-12)
     for actuator in described["actuators"]:

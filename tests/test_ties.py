@@ -5,13 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from synthetic import Truth, nominal, simulate_axis
-from vpm.catalogue import EFFECTS
-from vpm.discrepancy import diagnose
-from vpm.discrepancy.candidates import candidates
-from vpm.errors import DiagnosisError, IdentificationError
+from vpm.errors import IdentificationError
 from vpm.experiment import Experiment
-from vpm.identify import InverseDynamicsProblem, identify, problem
+from vpm.identify import identify, problem
 from vpm.identify.ties import TiedProblem
 from vpm.model import Model
 from vpm.simulate import Setup, simulate
@@ -103,16 +99,3 @@ def test_samples_of_the_settling_do_not_count() -> None:
         assert residual[block.samples][50:].any()
     with pytest.raises(IdentificationError, match="settling"):
         problem(model, [record], "free_run", setup=Setup(settling=2.99))
-
-
-def test_what_needs_a_joint_of_its_own_is_not_screened() -> None:
-    train, test = simulate_axis(Truth(coulomb=9.0), 2, 8.0, first_seed=3)
-    data = InverseDynamicsProblem(nominal(), [train])
-    residual, _ = data.evaluate(nominal(), nominal().theta)
-    tried = {candidate.effect.name for candidate in candidates(nominal(), data, residual)}
-    unscreened = {effect.name for effect in EFFECTS.values() if not effect.screened}
-    assert unscreened == {"backlash"}
-    assert tried
-    assert not tried & unscreened
-    with pytest.raises(DiagnosisError, match="joint of its own"):
-        diagnose(nominal(), train, test, effects=["backlash"])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,9 +24,10 @@ def measured_states(
 
     Sensor errors are undone; flexible links are deflected as in equilibrium; lags, spools and currents have settled on
     the held command, and chambers are without net force, unless the log holds what is inside of a drive. Hystereses
-    remember the way since the first sample.
+    remember the way since the first sample. Joints that effects have split off are where the measured motion of the
+    others takes them.
     """
-    m = motion(experiment, model, cutoff=cutoff)
+    m = whole_motion(model, experiment, theta, cutoff)
     gain, offset = sensor_errors(model, theta)
     states = np.zeros((len(rows), model.core.n_states))
     joints, coordinates = len(model.joints), len(model.coordinates)
@@ -58,6 +59,8 @@ def initial_state(model: Model, experiment: Experiment, theta: Array) -> Array:
             position, velocity = _fit_start(experiment, f"{name}.position")
             state[joint] = (position - offset[joint]) / gain[joint]
             state[coordinates + joint] = velocity / gain[joint]
+    if model.added_joints:
+        state[:joints] = _settled(model, theta, state[:joints], experiment.dt)
     if coordinates > joints:
         state[:coordinates] = model.core.equilibrium(theta, state[:joints])[0]
     internal = _internal(model, experiment, theta, state[:coordinates], 0)
@@ -67,6 +70,54 @@ def initial_state(model: Model, experiment: Experiment, theta: Array) -> Array:
             internal[place] = experiment[command][0]
     state[2 * coordinates :] = _seen(model, experiment, theta, state[:coordinates], internal, 0)
     return state
+
+
+def whole_motion(model: Model, experiment: Experiment, theta: Array, cutoff: float | None) -> Motion:
+    """Measured motion of all joints; that of joints which effects have split off is worked out along the others'."""
+    if not model.added_joints:
+        return motion(experiment, model, cutoff=cutoff)
+    own = tuple(name for name in model.joints if name not in model.added_joints)
+    m = motion(experiment, _Joints(model.name, own, model.input_channels, tuple(model.optional_inputs)), cutoff=cutoff)
+    position, velocity, acceleration = _worked_out(model, theta, m)
+    return replace(m, joints=model.joints, position=position, velocity=velocity, acceleration=acceleration)
+
+
+def _worked_out(model: Model, theta: Array, m: Motion) -> tuple[Array, Array, Array]:
+    """Positions, velocities and accelerations (N, joints) of all joints along a motion that lacks those split off."""
+    quantities = ("position", "velocity", "acceleration")
+    outputs = np.asarray(_along(model, theta, (m.position, m.velocity, m.acceleration), m.joints, m.dt))
+    columns = [[model.output_channels.index(f"{name}.{what}") for name in model.joints] for what in quantities]
+    full = [outputs[:, places] for places in columns]
+    for place, name in enumerate(model.joints):
+        if name in m.joints:
+            for values, given in zip(full, (m.position, m.velocity, m.acceleration), strict=True):
+                values[:, place] = given[:, m.joints.index(name)]
+    return full[0], full[1], full[2]
+
+
+def _along(model: Model, theta: Array, given: tuple[Array, Array, Array], joints: tuple[str, ...], dt: float) -> Array:
+    """Outputs (N, channels) along a motion of some joints, the others passive."""
+    followed = [place for place, name in enumerate(model.joints) if name in joints]
+    passive = [place for place in range(len(model.joints)) if place not in followed]
+    whole = np.zeros((3, len(given[0]), len(model.joints)))
+    for order, values in enumerate(given):
+        whole[order][:, followed] = values
+    outputs, _, _ = model.core.simulate_prescribed(
+        theta, whole[0], whole[1], whole[2], dt, 1, "linearly_implicit", [], passive
+    )
+    return outputs
+
+
+def _settled(model: Model, theta: Array, positions: Array, dt: float) -> Array:
+    """Positions with those of joints that effects have split off as they rest under gravity."""
+    own = [place for place, name in enumerate(model.joints) if name not in model.added_joints]
+    held = np.tile(positions[own], (2, 1))
+    still = np.zeros_like(held)
+    outputs = _along(model, theta, (held, still, still), tuple(model.joints[place] for place in own), dt)
+    settled = positions.copy()
+    for name in model.added_joints:
+        settled[model.joints.index(name)] = outputs[0, model.output_channels.index(f"{name}.position")]
+    return settled
 
 
 def _internal(model: Model, experiment: Experiment, theta: Array, coordinates: Array, row: int) -> Array:

@@ -24,9 +24,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.errors import DivergedError, ExperimentError, SimulationError, ValidityWarning, VpmError
-from vpm.experiment import Experiment, Motion, motion, parallel_filter
+from vpm.experiment import Experiment, Motion, parallel_filter
 from vpm.initial import initial_state as start
-from vpm.initial import joint_motion, measured_states, passive_joints
+from vpm.initial import joint_motion, measured_states, passive_joints, whole_motion
 from vpm.model import Model
 from vpm.results import Result, Storable
 
@@ -444,7 +444,7 @@ def check_balance(model: Model) -> None:
 
 def _inverse_dynamics_run(model: Model, experiment: Experiment, cutoff: float | None) -> Run:
     check_balance(model)
-    m = motion(experiment, model, cutoff=cutoff)
+    m = whole_motion(model, experiment, model.theta, cutoff)
     required, applied, _ = model.core.inverse_dynamics(
         model.theta, m.position, m.velocity, m.acceleration, m.inputs, m.dt, []
     )

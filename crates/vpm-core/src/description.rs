@@ -8,6 +8,7 @@ mod controllers;
 mod drives;
 mod entry;
 mod sampled;
+mod tree_effects;
 
 use serde::Deserialize;
 
@@ -15,6 +16,7 @@ pub use connections::LoadCell;
 pub(crate) use drives::piston_outside;
 pub use entry::{ControllerEntry, EffectEntry};
 pub(crate) use sampled::{maxwell_of, narx_of};
+pub use tree_effects::TreeEffect;
 
 use crate::actuator::hydraulic::Supply;
 use crate::actuator::{Actuator, Drive, Target};
@@ -150,7 +152,7 @@ impl Description {
     pub(crate) fn remembering(&self) -> impl Iterator<Item = usize> {
         self.effects.iter().filter_map(|entry| match entry {
             EffectEntry::Hysteresis { joint, .. } => Some(*joint),
-            EffectEntry::Joint { .. } | EffectEntry::Payload { .. } => None,
+            EffectEntry::Joint { .. } | EffectEntry::Payload { .. } | EffectEntry::Tree(_) => None,
         })
     }
 
@@ -213,8 +215,8 @@ impl Description {
                 *rotor = Some(rotor.map_or(own, |rotor| rotor + own));
             }
         }
-        Model::assemble(Parts {
-            gravity: self.gravity,
+        let mut parts = Parts {
+            gravity: self.gravity.map(S::from_f64),
             bodies,
             welds: self.welds.iter().map(|weld| weld.map(number)).collect(),
             beams: self.beams.iter().map(|beam| beam.map(number)).collect(),
@@ -223,7 +225,13 @@ impl Description {
             markers: self.markers.clone(),
             gauges: self.gauges.clone(),
             attachments: self.attachments(),
-        })
+        };
+        for effect in &self.effects {
+            if let EffectEntry::Tree(law) = effect {
+                law.map(number).apply(&mut parts)?;
+            }
+        }
+        Model::assemble(parts)
     }
 }
 
@@ -248,21 +256,21 @@ impl EffectEntry {
                 let payload = law.map(&mut |&index| theta[index]);
                 Some(PointMass { on: *on, mass: payload.mass, position: payload.position })
             }
-            Self::Joint { .. } | Self::Hysteresis { .. } => None,
+            Self::Joint { .. } | Self::Hysteresis { .. } | Self::Tree(_) => None,
         }
     }
 
     fn on_joint<S: Scalar>(&self, theta: &[S]) -> Option<(usize, crate::effect::JointEffect<S>)> {
         match self {
             Self::Joint { joint, law } => Some((*joint, law.map(&mut |&index| theta[index]))),
-            Self::Payload { .. } | Self::Hysteresis { .. } => None,
+            Self::Payload { .. } | Self::Hysteresis { .. } | Self::Tree(_) => None,
         }
     }
 
     fn with_memory<S: Scalar>(&self, theta: &[S]) -> Option<(usize, crate::effect::Hysteresis<S>)> {
         match self {
             Self::Hysteresis { joint, law } => Some((*joint, law.map(&mut |&index| theta[index]))),
-            Self::Payload { .. } | Self::Joint { .. } => None,
+            Self::Payload { .. } | Self::Joint { .. } | Self::Tree(_) => None,
         }
     }
 }

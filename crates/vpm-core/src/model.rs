@@ -25,7 +25,7 @@ use crate::spatial::{Matrix3, Pose, SpatialInertia, Vector3};
 /// Frames that something can sit on are numbered: 0 is the world, k + 1 is body k, then come the stations of the beams.
 #[derive(Clone, Debug)]
 pub struct Model<S> {
-    gravity: [f64; 3],
+    gravity: Vector3<S>,
     links: Vec<Link<S>>,
     frames: Vec<BodyFrame<S>>,
     beams: Vec<Elastic<S>>,
@@ -112,6 +112,7 @@ impl<S: Scalar> Model<S> {
     /// Builds a tree of rigid bodies with point masses (payloads) on them, under `gravity` in m/s^2 in the world frame.
     pub fn new(gravity: [f64; 3], bodies: &[Body<S>], point_masses: &[PointMass<S>]) -> Result<Self> {
         let (bodies, point_masses) = (bodies.to_vec(), point_masses.to_vec());
+        let gravity = gravity.map(S::from_f64);
         Self::assemble(Parts { gravity, bodies, point_masses, ..Parts::default() })
     }
 
@@ -141,7 +142,7 @@ impl<S: Scalar> Model<S> {
 
     /// Gravity in m/s^2, in the world frame.
     #[inline]
-    pub fn gravity(&self) -> [f64; 3] {
+    pub fn gravity(&self) -> Vector3<S> {
         self.gravity
     }
 

@@ -6,8 +6,8 @@ mod common;
 use common::{Bench, Machine, close};
 use std::f64::consts::PI;
 use vpm_core::effect::{
-    AsymmetricFriction, Backlash, BiasForce, CoulombFriction, JointEffect, Spring, StribeckFriction, TorqueRipple,
-    ViscousFriction,
+    AsymmetricFriction, Backlash, BiasForce, CoulombFriction, EndStop, Formula, JointCompliance, JointEffect,
+    LinkFlexibility, Spring, StribeckFriction, TorqueRipple, ViscousFriction,
 };
 use vpm_core::evaluate;
 use vpm_core::integrator::Method;
@@ -135,6 +135,10 @@ fn potentials_are_what_the_efforts_integrate_to() {
         JointEffect::Spring(Spring { stiffness: 70.0, rest: 0.2 }),
         JointEffect::TorqueRipple(TorqueRipple { period: 0.3, cosine: 1.0, sine: 2.0 }),
         JointEffect::Backlash(Backlash { gap: 0.4, stiffness: 30.0, damping: 0.0, width: 0.05 }),
+        JointEffect::JointCompliance(JointCompliance { stiffness: 30.0, damping: 0.0 }),
+        JointEffect::LinkFlexibility(LinkFlexibility { stiffness: 30.0, time: 0.0 }),
+        JointEffect::EndStop(EndStop { stiffness: 30.0, damping: 0.0, low: -0.3, high: 0.2, width: 0.05 }),
+        JointEffect::EndStop(EndStop { stiffness: 30.0, damping: 0.0, low: -1e9, high: 0.2, width: 1e-4 }),
     ];
     for law in laws {
         let lifted = law.map(&mut |&number| Dual::<f64, 1>::constant(number));
@@ -165,12 +169,16 @@ fn every_law_splits_into_rest_and_resistance() {
         JointEffect::Spring(Spring { stiffness: 70.0, rest: 0.2 }),
         JointEffect::TorqueRipple(TorqueRipple { period: 0.3, cosine: 1.0, sine: 2.0 }),
         JointEffect::Backlash(Backlash { gap: 0.4, stiffness: 30.0, damping: 3.0, width: 0.05 }),
+        JointEffect::JointCompliance(JointCompliance { stiffness: 30.0, damping: 2.0 }),
+        JointEffect::LinkFlexibility(LinkFlexibility { stiffness: 30.0, time: 0.02 }),
+        JointEffect::EndStop(EndStop { stiffness: 30.0, damping: 0.7, low: -0.3, high: 0.2, width: 0.05 }),
+        JointEffect::Formula(formula()),
     ];
     for law in laws {
         for v in [0.0, 1e-9, -1e-7, 0.003, -0.02, random.symmetric(), 50.0] {
             let q = random.symmetric();
             close(
-                law.effort_at_rest(q) - law.resistance(v) * v,
+                law.effort_at_rest(q) - law.resistance(q, v) * v,
                 law.effort(q, v),
                 1e-13 * (1.0 + law.effort(q, v).abs()),
             );
@@ -178,8 +186,53 @@ fn every_law_splits_into_rest_and_resistance() {
         // At rest the chord is the tangent.
         let lifted = law.map(&mut |&number| Dual::<f64, 1>::constant(number));
         let slope = lifted.effort(Dual::constant(0.1), Dual::variable(0.0, 0)).gradient[0];
-        close(-law.resistance(0.0), slope, 1e-12);
+        close(-law.resistance(0.1, 0.0), slope, 1e-12);
     }
+}
+
+/// `-a tanh(v/b) cos(2 q)`, written in postfix order.
+fn formula() -> Formula<f64> {
+    let text = r#"{"program": ["velocity", {"parameter": 1}, "divide", "tanh", {"constant": 0}, "position", "multiply", "cos",
+        "multiply", {"parameter": 0}, "multiply", "negate"], "constants": [2.0], "parameters": [3.0, 0.04]}"#;
+    serde_json::from_str(text).unwrap()
+}
+
+#[test]
+fn a_formula_gives_what_its_expression_gives() {
+    let mut random = Random::new(5);
+    for _ in 0..20 {
+        let (q, v) = (random.symmetric(), random.symmetric());
+        close(formula().effort(q, v), -3.0 * (v / 0.04).tanh() * (2.0 * q).cos(), 1e-13);
+    }
+    for (program, words) in [
+        (r#"["add"]"#, "finds no number"),
+        (r#"["position", "velocity"]"#, "leaves 2 numbers"),
+        (r#"[{"parameter": 2}]"#, "finds no number"),
+        (r#"[]"#, "leaves 0 numbers"),
+    ] {
+        let text = format!(r#"{{"program": {program}, "constants": [], "parameters": [1.0]}}"#);
+        let error = serde_json::from_str::<Formula<f64>>(&text).unwrap_err().to_string();
+        assert!(error.contains(words), "{error}");
+    }
+}
+
+#[test]
+fn end_stops_push_back_only_and_take_energy_out() {
+    let law = EndStop { stiffness: 2e3, damping: 0.4, low: -0.3, high: 0.2, width: 1e-3 };
+    let mut random = Random::new(8);
+    for _ in 0..500 {
+        let (q, v) = (0.5 * random.symmetric(), 9.0 * random.symmetric());
+        let effort = law.effort(q, v);
+        if q > 0.2 {
+            assert!(effort < 0.0);
+        } else if q < -0.3 {
+            assert!(effort > 0.0);
+        }
+        assert!((effort - law.effort(q, 0.0)) * v <= 0.0);
+    }
+    close(law.effort(0.25, 0.0), -100.0, 1e-2);
+    close(law.effort(0.25, 1.0), -140.0, 0.5);
+    close(law.effort(0.0, 3.0), 0.0, 1e-2);
 }
 
 #[test]

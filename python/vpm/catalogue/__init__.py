@@ -11,12 +11,15 @@ sensor reads.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from types import MappingProxyType
 
 from vpm.catalogue.elsewhere import ACTUATOR_EFFECTS, BODY_EFFECTS, SENSOR_EFFECTS
 from vpm.catalogue.joint import JOINT_EFFECTS
 from vpm.catalogue.kinds import POSITIVE, SITE_KINDS, EffectParameter, EffectType, JointKind, Scale, SiteKind
+from vpm.catalogue.link import LINK_EFFECTS
+from vpm.catalogue.own import entry_of
+from vpm.catalogue.world import WORLD_EFFECTS
 from vpm.errors import ModelError, near_match
 
 __all__ = [
@@ -30,12 +33,14 @@ __all__ = [
     "SiteKind",
     "effect_type",
     "effects_for_site",
+    "register",
+    "unregister",
 ]
 
-#: Every effect by name, in the order in which a page should list them.
-EFFECTS: Mapping[str, EffectType] = MappingProxyType(
-    {effect.name: effect for effect in (*JOINT_EFFECTS, *BODY_EFFECTS, *ACTUATOR_EFFECTS, *SENSOR_EFFECTS)}
-)
+_BUILT_IN = (*JOINT_EFFECTS, *BODY_EFFECTS, *LINK_EFFECTS, *WORLD_EFFECTS, *ACTUATOR_EFFECTS, *SENSOR_EFFECTS)
+_ENTRIES = {effect.name: effect for effect in _BUILT_IN}
+#: Every effect by name, in the order in which a page should list them; `register` adds to it.
+EFFECTS: Mapping[str, EffectType] = MappingProxyType(_ENTRIES)
 
 
 def effect_type(name: str) -> EffectType:
@@ -63,7 +68,7 @@ def effects_for_site(kind: str) -> tuple[EffectType, ...]:
 
     Parameters
     ----------
-    kind : {"joint", "body", "actuator", "sensor"}
+    kind : {"joint", "body", "link", "beam", "actuator", "sensor", "world"}
 
     Raises
     ------
@@ -73,3 +78,85 @@ def effects_for_site(kind: str) -> tuple[EffectType, ...]:
     if kind not in SITE_KINDS:
         raise ModelError(f'effects do not sit at a "{kind}"; {near_match(kind, SITE_KINDS)}', where=kind)
     return tuple(effect for effect in EFFECTS.values() if effect.site == kind)
+
+
+def register(
+    name: str,
+    *,
+    law: str,
+    sizes: Mapping[str, str],
+    shapes: Mapping[str, tuple[str, float]] | None = None,
+    sentence: str,
+    impossible: str = "",
+    not_negative: Collection[str] = (),
+    confused_with: Mapping[str, str] | None = None,
+) -> EffectType:
+    """Add an effect of joints to the catalogue: from here on models, diagnoses and reports know it.
+
+    An entry lives as long as the process; a program that reads model files with it registers it first. An entry of a
+    user may be registered again, one of vpm stays as it is.
+
+    Parameters
+    ----------
+    name : str
+        Small letters, digits and _.
+    law : str
+        Effort on the joint as a Python expression of ``q`` and ``v``, coordinate and velocity of the joint (SI), ``pi``
+        and the parameters, with ``+ - * /``, whole powers, abs, sqrt, exp, tanh, sin and cos. The core runs it.
+    sizes : mapping of str to str
+        Parameters with which the law vanishes, and their units: templates with ``{C}`` for the unit of the coordinate
+        and ``{E}`` for that of the effort.
+    shapes : mapping of str to (str, float), optional
+        All others: unit, and value (SI) to begin with; a fit may move it.
+    sentence : str
+        For reports; knows ``{at}`` and the parameters, as text with unit.
+    impossible : str, optional
+        What a value outside of the range would mean.
+    not_negative : collection of str
+        Parameters that physics keeps at or above zero; of shapes, above.
+    confused_with : mapping of str to str, optional
+        Effects that records may not tell from this one, and what tells them apart.
+
+    Returns
+    -------
+    EffectType
+
+    Raises
+    ------
+    ModelError
+        The law cannot be compiled, does not vanish with its sizes, or a name, unit or sentence cannot be used.
+
+    Examples
+    --------
+    >>> effect = register(
+    ...     "cubic_spring",
+    ...     law="-hardening*q**3",
+    ...     sizes={"hardening": "{E}/{C}^3"},
+    ...     sentence="{at} is pulled back with the cube of its way, {hardening}.",
+    ... )
+    >>> effect.title
+    'cubic spring'
+    >>> unregister("cubic_spring")
+    """
+    if name in _ENTRIES and _ENTRIES[name].formula is None:
+        raise ModelError(f'the catalogue has an effect "{name}" already; choose another name', where=name)
+    for other in confused_with or {}:
+        effect_type(other)
+    effect = entry_of(
+        name, law, sizes, shapes or {}, sentence, impossible, frozenset(not_negative), confused_with or {}
+    )
+    _ENTRIES[name] = effect
+    return effect
+
+
+def unregister(name: str) -> None:
+    """Take an effect that `register` added out of the catalogue again.
+
+    Raises
+    ------
+    ModelError
+        There is none of this name, or it is one of vpm.
+    """
+    if effect_type(name).formula is None:
+        raise ModelError(f'"{name}" belongs to vpm and stays in the catalogue', where=name)
+    del _ENTRIES[name]

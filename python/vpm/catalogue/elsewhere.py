@@ -48,6 +48,8 @@ PAYLOAD = EffectType(
     sentence="{at} carries {mass} more than described, at ({x}, {y}, {z}) of its frame.",
     impossible="a negative payload would mean that the body is lighter than described: correct the mass of the body",
     confused_with={
+        "gravity_tilt": "both change the load of gravity; fast motion shows the payload's inertia",
+        "rotor_inertia": "both need effort to accelerate; a payload has weight and loads the joints before it too",
         "bias_force": "they agree where gravity's lever does not change; other poses or fast motion part them",
         "spring": "near the hanging position gravity acts like a spring; large angles or fast motion part them",
         "torque_ripple": "gravity on a revolute joint repeats once per turn; a vertical axis or fast motion parts them",
@@ -114,6 +116,7 @@ SATURATION = EffectType(
     sentence="{at} does not follow commands beyond {limit}.",
     impossible="a limit of zero or less would mean that the drive never acts",
     confused_with={
+        "end_stop": "both stop the motion at large commands; the same command in the middle of the way parts them",
         "viscous_friction": "both weaken large commands; large commands at low speed part them",
     },
 )
@@ -138,6 +141,7 @@ ACTUATOR_LAG = EffectType(
     sentence="{at} follows its command gradually, with a time constant of {time_constant}.",
     impossible="a negative time constant would mean a drive that runs away from its command",
     confused_with={
+        "joint_compliance": "both delay the motion of the link; free vibration after a stop shows the spring alone",
         "input_delay": "they agree for slow commands; steps and fast commands part them",
         "sensor_delay": "they agree for slow motion; steps and fast motion part them",
         "viscous_friction": "both weaken fast motion; steady motion at several speeds shows the friction alone",
@@ -164,6 +168,7 @@ SENSOR_OFFSET = EffectType(
     sentence="{at} reads {value} too much, always.",
     impossible="either sign is possible: it says in which direction the zero is shifted",
     confused_with={
+        "gravity_tilt": "a shifted zero of an angle turns gravity for all that hangs on it; other poses part them",
         "bias_force": "through gravity or a spring a shifted zero acts like a load; other poses part them",
         "spring": "a shifted zero and a shifted rest position agree; a reference position parts them",
     },
@@ -189,6 +194,7 @@ SENSOR_GAIN = EffectType(
     sentence="{at} reads {value} times the true value.",
     impossible="a gain of zero or less would mean a reading that does not follow the motion, or runs against it",
     confused_with={
+        "rotor_inertia": "both scale the effort that an acceleration needs; a record with a known load parts them",
         "payload": "both scale the effort that an acceleration needs; a record with a known load parts them",
         "viscous_friction": "both scale the effort that a speed needs; a reference length parts them",
     },

@@ -8,14 +8,13 @@ friction", Automatica 30 (1994).
 
 from __future__ import annotations
 
+from vpm.catalogue.drivetrain import DRIVETRAIN_EFFECTS
 from vpm.catalogue.kinds import ANY, NOT_NEGATIVE, EffectParameter, EffectType, shape, size
 
 #: Transition velocity where none is given: prismatic (m/s), revolute (rad/s).
 _TRANSITION = (1e-3, 1e-2)
 #: Stribeck velocity where none is given: prismatic (m/s), revolute (rad/s).
 _STRIBECK = (1e-2, 1e-1)
-#: Way over which a contact closes where none is given: prismatic (m), revolute (rad).
-_CONTACT = (1e-5, 1e-4)
 #: Pre-sliding way where none is given: prismatic (m), revolute (rad).
 _PRESLIDING = (1e-3, 1e-2)
 
@@ -50,6 +49,7 @@ VISCOUS_FRICTION = EffectType(
     sentence="{at} resists motion in proportion to its speed, with {viscous}.",
     impossible="a negative viscous friction would feed energy into the motion instead of taking it out",
     confused_with={
+        "structural_damping": "both calm vibrations; friction also brakes motion that does not bend the link",
         "coulomb_friction": "motion at one speed alone does not part them; records at several speeds do",
         "actuator_lag": "both weaken fast motion; steady motion at several speeds shows the friction alone",
         "saturation": "both weaken large commands; large commands at low speed part them",
@@ -169,6 +169,7 @@ BIAS_FORCE = EffectType(
     sentence="{at} carries a constant load of {force}, in either direction and at rest.",
     impossible="either sign is possible: it says in which direction the load pulls",
     confused_with={
+        "gravity_tilt": "they agree where gravity's lever does not change; other poses part them",
         "coulomb_friction": "motion in one direction alone does not part them; motion in both directions does",
         "asymmetric_friction": (
             "a constant load and a difference of Coulomb friction agree wherever the joint moves; only standstill and"
@@ -207,6 +208,7 @@ SPRING = EffectType(
     sentence="{at} is pulled back towards {rest} with {stiffness}.",
     impossible="a negative stiffness would push the joint away from its rest position",
     confused_with={
+        "end_stop": "they agree over a way beyond the end alone; motion on both sides of it parts them",
         "bias_force": "they agree over a short way; motion over a longer way parts them",
         "payload": "near the hanging position gravity acts like a spring; large angles or fast motion part them",
         "sensor_offset": "a shifted rest position and a shifted zero agree; a reference position parts them",
@@ -289,47 +291,6 @@ HYSTERESIS = EffectType(
     },
 )
 
-BACKLASH = EffectType(
-    name="backlash",
-    site="joint",
-    group="backlash",
-    parameters=(
-        shape(
-            "gap",
-            "backlash.gap",
-            "{C}",
-            "coordinate",
-            "free way from contact to contact",
-            start=None,
-            bounds=NOT_NEGATIVE,
-        ),
-        size(
-            "stiffness",
-            "backlash.stiffness",
-            "{E}/{C}",
-            "effort_per_coordinate",
-            "effort per way beyond the play",
-            physical=NOT_NEGATIVE,
-        ),
-        size(
-            "damping",
-            "backlash.damping",
-            "{E} s/{C}",
-            "effort_per_speed",
-            "resistance per speed, within the play and beyond",
-            physical=NOT_NEGATIVE,
-        ),
-        shape("width", "backlash.width", "{C}", "coordinate", "way over which a contact closes", start=_CONTACT),
-    ),
-    law=(
-        "tau = -stiffness (q + 1/2 sqrt((q - 1/2 gap)^2 + width^2) - 1/2 sqrt((q + 1/2 gap)^2 + width^2)) - damping v"
-    ),
-    sentence="{at} has a play of {gap} between contacts of {stiffness}, damped with {damping}.",
-    impossible="a negative stiffness would pull the contacts into each other, a negative damping would feed energy in",
-    confused_with={},
-    screened=False,
-)
-
 JOINT_EFFECTS = (
     VISCOUS_FRICTION,
     COULOMB_FRICTION,
@@ -339,5 +300,5 @@ JOINT_EFFECTS = (
     SPRING,
     TORQUE_RIPPLE,
     HYSTERESIS,
-    BACKLASH,
+    *DRIVETRAIN_EFFECTS,
 )

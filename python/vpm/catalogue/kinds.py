@@ -7,10 +7,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
+from vpm.catalogue.formula import Formula
 from vpm.errors import ModelError, near_match
 
-SiteKind = Literal["joint", "body", "actuator", "sensor"]
-SITE_KINDS: tuple[SiteKind, ...] = ("joint", "body", "actuator", "sensor")
+SiteKind = Literal["joint", "body", "link", "beam", "actuator", "sensor", "world"]
+SITE_KINDS: tuple[SiteKind, ...] = ("joint", "body", "link", "beam", "actuator", "sensor", "world")
 
 JointKind = Literal["prismatic", "revolute", "helical"]
 
@@ -22,6 +23,8 @@ Scale = Literal[
     "coordinate",
     "speed",
     "mass",
+    "inertia",
+    "one_per_speed",
     "time",
     "command",
     "channel",
@@ -103,8 +106,9 @@ class EffectType:
     Attributes
     ----------
     name : str
-    site : {"joint", "body", "actuator", "sensor"}
-        Kind of component that it sits at; what sits at a body may sit at a beam too, in the frame of its tip.
+    site : {"joint", "body", "link", "beam", "actuator", "sensor", "world"}
+        Kind of component that it sits at; what sits at a body may sit at a beam too, in the frame of its tip. A link is
+        a body that its joint turns, or a beam; the world is one site, where there is gravity.
     group : str
         First part of the suffix of its parameters.
     parameters : tuple of EffectParameter
@@ -119,7 +123,9 @@ class EffectType:
     requires : str or None
         Effect that has to be at the same site before this one is worth looking for: it is a correction of that one.
     screened : bool
-        Whether a diagnosis tries it; not one that asks for a joint of its own.
+        Whether a diagnosis tries it.
+    formula : Formula or None
+        Law of an entry that a user wrote, see `vpm.catalogue.register`.
     """
 
     name: str
@@ -132,6 +138,7 @@ class EffectType:
     confused_with: Mapping[str, str]
     requires: str | None = None
     screened: bool = True
+    formula: Formula | None = None
 
     @property
     def title(self) -> str:
@@ -155,9 +162,17 @@ class EffectType:
 
 
 def size(
-    name: str, suffix: str, unit: str, scale: Scale, meaning: str, *, physical: Range = ANY, neutral: float = 0.0
+    name: str,
+    suffix: str,
+    unit: str,
+    scale: Scale,
+    meaning: str,
+    *,
+    physical: Range = ANY,
+    neutral: float = 0.0,
+    linear: bool = True,
 ) -> EffectParameter:
-    """Size of a law that is linear in it and can be evaluated for every number."""
+    """Size of a law that can be evaluated for every number; the effort is linear in it unless said otherwise."""
     return EffectParameter(
         name=name,
         suffix=suffix,
@@ -168,7 +183,7 @@ def size(
         start=neutral,
         physical=physical,
         evaluable=ANY,
-        linear=True,
+        linear=linear,
         shape=False,
     )
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.catalogue import EFFECTS, EffectType
+from vpm.discrepancy.structural import STRUCTURAL, sites_worth_trying, structural_starts
 from vpm.identify import InverseDynamicsProblem
 from vpm.model import Model
 
@@ -99,7 +100,7 @@ def candidates(
     for effect in EFFECTS.values():
         if not effect.screened or (effects is not None and effect.name not in effects):
             continue
-        for site in model.sites(effect.site):
+        for site in sites_worth_trying(effect, model):
             needed = effect.requires is None or (effect.requires, site) in present
             if (effect.name, site) not in present and needed:
                 found.append(_candidate(effect, site, model, data, residual))
@@ -109,6 +110,9 @@ def candidates(
 def _candidate(effect: EffectType, site: str, model: Model, data: InverseDynamicsProblem, residual: Array) -> Candidate:
     joint = _joint_of(effect.site, site, model)
     seen = _excitation(data, model, joint, site if effect.site == "actuator" else None)
+    if effect.name in STRUCTURAL:
+        starts, bounds = structural_starts(effect.name, site, model, seen.middle, seen.travel)
+        return Candidate(effect, site, starts, bounds, neutral=effect.name == "end_stop")
     if effect.name == "coulomb_friction":
         return Candidate(effect, site, _grid("transition_velocity", TRANSITION_SHARES, seen.speed), _slow(seen))
     if effect.name == "asymmetric_friction":
@@ -143,6 +147,8 @@ def _candidate(effect: EffectType, site: str, model: Model, data: InverseDynamic
 
 def _payload_places(model: Model, body: str) -> tuple[Mapping[str, float], ...]:
     """At the origin of the body, at its centre of mass, and twice as far out."""
+    if body in model.beams:  # in the frame of its tip
+        return ({},)
     centre = {axis: model.parameters[f"{body}.center_of_mass.{axis}"].value for axis in "xyz"}
     factors = (0.0, 1.0, 2.0) if any(centre.values()) else (0.0,)
     return tuple({axis: factor * value for axis, value in centre.items()} for factor in factors)
@@ -181,8 +187,10 @@ def _joint_of(kind: str, site: str, model: Model) -> int:
 
 def _excitation(data: InverseDynamicsProblem, model: Model, joint: int, actuator: str | None) -> Excitation:
     """Largest speed (99.9 % quantile), middle and half range of the travel, interval and largest command."""
-    position = np.concatenate([m.position[:, joint] for m in data.motions])
-    velocity = np.concatenate([m.velocity[:, joint] for m in data.motions])
+    name = model.joints[joint]
+    column = data.motions[0].joints.index(name) if name in data.motions[0].joints else 0
+    position = np.concatenate([m.position[:, column] for m in data.motions])
+    velocity = np.concatenate([m.velocity[:, column] for m in data.motions])
     column = model.actuators.index(actuator) if actuator is not None else 0
     command = max((float(np.abs(m.inputs[:, column]).max()) for m in data.motions if m.inputs.size), default=1.0)
     low, high = float(position.min()), float(position.max())

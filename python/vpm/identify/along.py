@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from vpm.errors import DivergedError, SimulationError
 from vpm.experiment import Experiment, Motion
-from vpm.initial import measured_states
+from vpm.initial import measured_states, whole_motion
 from vpm.model import Model
 from vpm.simulate import Setup, copied_channels
 
@@ -131,6 +131,8 @@ def respond(
     from vpm._core import Diverged
 
     try:
+        if has_own_drives(model) and has_hidden(model, m.joints):
+            return _with_both(model, theta, m, experiment, columns, channels)
         if has_own_drives(model):
             return _with_drives(model, theta, m, experiment, columns, channels)
         if has_hidden(model, m.joints):
@@ -154,14 +156,8 @@ def _with_drives(
     model: Model, theta: Array, m: Motion, experiment: Experiment, columns: Sequence[int], channels: Sequence[str]
 ) -> Response:
     """Drives with states of their own, on the joints' motion."""
-    setup, rows = Setup(), m.kept
-    # From the beginning of the record: what nobody knows of the first state has the filter's settling to die away.
-    state = measured_states(model, experiment, theta, np.zeros(1, dtype=np.int64), m.cutoff)[0]
-    motion = (m.position, m.velocity, m.acceleration, m.inputs)
-    places, seen = _measured_states(model, experiment)
-    stepping = (m.dt, setup.substeps, setup.method(model), list(columns))
-    internal = state[2 * len(model.joints) :]
-    outputs, _, jacobian = model.core.simulate_drives(theta, *motion, internal, places, seen, *stepping)
+    outputs, jacobian = _driven(model, theta, m, experiment, columns)
+    rows = m.kept
     effort = [model.output_channels.index(f"{name}.effort") for name in model.joints]
     drives = range(len(model.output_channels), outputs.shape[1])
     shown = [model.output_channels.index(channel) for channel in channels]
@@ -172,6 +168,48 @@ def _with_drives(
         outputs[rows][:, shown],
         jacobian[rows][:, shown],
     )
+
+
+def _with_both(
+    model: Model, theta: Array, m: Motion, experiment: Experiment, columns: Sequence[int], channels: Sequence[str]
+) -> Response:
+    """Drives with states of their own on measured joints, behind which others hang that nobody measures.
+
+    Such drives feel the measured motion alone: what they deliver does not depend on the hidden one.
+    """
+    required, slopes = _hidden(model, theta, m, columns)
+    outputs, jacobian = _driven(model, theta, whole_motion(model, experiment, theta, m.cutoff), experiment, columns)
+    rows, joints = m.kept, [place for place, joint in enumerate(model.joints) if joint in m.joints]
+    effort = [model.output_channels.index(f"{model.joints[place]}.effort") for place in joints]
+    drives = [len(model.output_channels) + place for place in joints]
+    shown = [model.output_channels.index(channel) for channel in channels]
+    return Response(
+        required[rows][:, effort],
+        outputs[rows][:, drives],
+        (slopes[:, effort] - jacobian[:, drives])[rows],
+        outputs[rows][:, shown],
+        jacobian[rows][:, shown],
+    )
+
+
+def _driven(
+    model: Model, theta: Array, m: Motion, experiment: Experiment, columns: Sequence[int]
+) -> tuple[Array, Array]:
+    """Outputs with the efforts of the drives on the joints behind them, and their derivative."""
+    if model.core.n_elastic:
+        raise SimulationError(
+            f"no effort can be balanced along a motion of {model.name}, whose links bend while its drives have states "
+            "of their own; make the links rigid with model.at('rigid')"
+        )
+    setup = Setup()
+    # From the beginning of the record: what nobody knows of the first state has the filter's settling to die away.
+    state = measured_states(model, experiment, theta, np.zeros(1, dtype=np.int64), m.cutoff)[0]
+    motion = (m.position, m.velocity, m.acceleration, m.inputs)
+    places, seen = _measured_states(model, experiment)
+    stepping = (m.dt, setup.substeps, setup.method(model), list(columns))
+    internal = state[2 * len(model.joints) :]
+    outputs, _, jacobian = model.core.simulate_drives(theta, *motion, internal, places, seen, *stepping)
+    return outputs, jacobian
 
 
 def _measured_states(model: Model, experiment: Experiment) -> tuple[list[int], Array]:
@@ -190,14 +228,8 @@ def _measured_states(model: Model, experiment: Experiment) -> tuple[list[int], A
 
 def _with_hidden(model: Model, theta: Array, m: Motion, columns: Sequence[int], channels: Sequence[str]) -> Response:
     """Elastic links, and joints that nobody measures, on the motion of the others; ideal drives."""
-    setup, rows = Setup(), m.kept
-    measured = [place for place, joint in enumerate(model.joints) if joint in m.joints]
-    passive = [place for place in range(len(model.joints)) if place not in measured]
-    motion = np.zeros((3, len(m.time), len(model.joints)))
-    for order, values in enumerate((m.position, m.velocity, m.acceleration)):
-        motion[order][:, measured] = values
-    stepping = (m.dt, setup.substeps, setup.method(model), list(columns), passive)
-    outputs, _, jacobian = model.core.simulate_prescribed(theta, motion[0], motion[1], motion[2], *stepping)
+    outputs, jacobian = _hidden(model, theta, m, columns)
+    rows, measured = m.kept, [place for place, joint in enumerate(model.joints) if joint in m.joints]
     applied, slopes = model.core.delivered(theta, m.inputs, m.dt, list(columns))
     effort = [model.output_channels.index(f"{model.joints[place]}.effort") for place in measured]
     seen = [model.output_channels.index(channel) for channel in channels]
@@ -208,3 +240,17 @@ def _with_hidden(model: Model, theta: Array, m: Motion, columns: Sequence[int], 
         outputs[rows][:, seen],
         jacobian[rows][:, seen],
     )
+
+
+def _hidden(model: Model, theta: Array, m: Motion, columns: Sequence[int]) -> tuple[Array, Array]:
+    """Outputs along the motion of the measured joints, all else free, and their derivative."""
+    setup = Setup()
+    measured = [place for place, joint in enumerate(model.joints) if joint in m.joints]
+    passive = [place for place in range(len(model.joints)) if place not in measured]
+    motion = np.zeros((3, len(m.time), len(model.joints)))
+    for order, values in enumerate((m.position, m.velocity, m.acceleration)):
+        motion[order][:, measured] = values
+    method = "linearly_implicit" if has_own_drives(model) else setup.method(model)
+    stepping = (m.dt, setup.substeps, method, list(columns), passive)
+    outputs, _, jacobian = model.core.simulate_prescribed(theta, motion[0], motion[1], motion[2], *stepping)
+    return outputs, jacobian

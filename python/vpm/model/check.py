@@ -19,6 +19,7 @@ from vpm.model.parameters import Parameter, Slot, slots, table
 from vpm.model.references import gauge_problems, reference_problems
 from vpm.model.sampled_files import with_files
 from vpm.model.schema import Document
+from vpm.model.splitting import stop_problems
 from vpm.model.structure import Structure, build_structure
 from vpm.model.tree import joint_problems, name_problems, tree_problems
 from vpm.units import parse_unit, require_dimension
@@ -76,7 +77,8 @@ def check_document(content: Mapping[str, object], path: str | None = None) -> Ch
     parameters = table(list(found))
     inertias = [problem for body in structure.bodies for problem in _inertia_problems(body, parameters)]
     pairs = [*value_problems(document, parameters), *connection_value_problems(document, parameters)]
-    _stop_at([*inertias, *size_problems(document, parameters), *pairs], path)
+    stops = stop_problems(document, {name: parameter.value for name, parameter in parameters.items()})
+    _stop_at([*inertias, *size_problems(document, parameters), *pairs, *stops], path)
     return Checked(document, structure, found, parameters)
 
 

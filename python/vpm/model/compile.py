@@ -19,7 +19,8 @@ from vpm.model.connection_compile import (
 )
 from vpm.model.controller import ComputedTorque, Controller
 from vpm.model.drive_compile import drive_json, supply_json
-from vpm.model.effects import Effect, effects_of
+from vpm.model.effect_compile import EFFECT_SITES, effect_json
+from vpm.model.effects import effects_of
 from vpm.model.parameters import INERTIA_AXES
 from vpm.model.pose import Pose, pose
 from vpm.model.structure import HYDRAULIC_CHANNELS, SUPPLY_CHANNELS, Axis, Frame, Structure
@@ -50,7 +51,9 @@ def description(checked: Checked) -> str:
         "gauges": [_gauge(name, gauge, structure) for name, gauge in document.gauges.items()],
         "markers": [_marker(name, marker, structure) for name, marker in document.markers.items()],
         "lines": [_line(name, line, structure, index) for name, line in document.lines.items()],
-        "effects": [_effect(e, structure, index) for e in effects if EFFECTS[e.name].site in {"joint", "body"}],
+        "effects": [
+            part for e in effects if EFFECTS[e.name].site in EFFECT_SITES for part in effect_json(e, structure, index)
+        ],
         "supplies": [supply_json(name, supply, index) for name, supply in document.supplies.items()],
         "actuators": [_actuator(name, structure, index) for name in document.actuators],
         "sensors": [_sensor(name, structure, index) for name in document.sensors],
@@ -153,23 +156,6 @@ def _line(name: str, line: Line, structure: Structure, index: Mapping[str, int])
 def _end(end: End, structure: Structure) -> dict[str, Any]:
     frame = structure.mounted(end.parent, end.at, Pose(end.point))
     return {"on": mount_json(frame.mount), "point": list(frame.pose.translation)}
-
-
-def _effect(effect: Effect, structure: Structure, index: Mapping[str, int]) -> dict[str, Any]:
-    numbers = {short: index[dotted] for short, dotted in effect.parameter_names.items()}
-    if effect.type.site == "joint":
-        return {"type": effect.name, "joint": structure.joints.index(effect.at), **numbers}
-    position = [numbers.pop(axis) for axis in "xyz"]
-    return {"type": effect.name, **_carrier(effect.at, structure), **numbers, "position": position}
-
-
-def _carrier(site: str, structure: Structure) -> dict[str, int]:
-    """Where a payload sits: at a body of the core, at one that is fixed to something, or at the tip of a beam."""
-    if site in structure.beams:
-        return {"beam": structure.beams.index(site)}
-    if site in structure.welds:
-        return {"weld": structure.welds.index(site)}
-    return {"body": next(k for k, axis in enumerate(structure.axes) if axis.body == site)}
 
 
 def _actuator(name: str, structure: Structure, index: Mapping[str, int]) -> dict[str, Any]:

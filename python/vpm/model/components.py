@@ -35,6 +35,27 @@ class Components(DriveComponents):
         return self._checked.structure.joints
 
     @property
+    def added_joints(self) -> tuple[str, ...]:
+        """Joints that effects have split off others, ``axis_deflection``: nobody drives and nobody measures them."""
+        return self._checked.structure.added
+
+    def joint_before(self, site: str) -> str:
+        """Joint with one coordinate that moves a body or a beam, or a joint itself.
+
+        Raises
+        ------
+        ModelError
+            There is no such component, or nothing moves it.
+        """
+        structure = self._checked.structure
+        if site in structure.joints:
+            return site
+        joint = structure.joint_at("body", site) if site in structure.frames else None
+        if joint is None:
+            raise ModelError(f'{self.name} has no joint that moves "{site}"; name a joint, or what hangs on one')
+        return joint
+
+    @property
     def bodies(self) -> tuple[str, ...]:
         """Bodies, parents before children."""
         return self._checked.structure.bodies
@@ -78,8 +99,9 @@ class Components(DriveComponents):
 
     @cached_property
     def levels(self) -> Mapping[str, str]:
-        """Level of detail of each beam, as `at` takes it."""
-        return MappingProxyType({name: str(self._checked.document.beams[name].detail) for name in self.beams})
+        """Level of detail of each beam, as `at` takes it; a rigid one that an effect bends has a level that bends."""
+        beams = self._checked.structure.document.beams
+        return MappingProxyType({name: str(beams[name].detail) for name in self.beams})
 
     @property
     def sensors(self) -> tuple[str, ...]:

@@ -10,6 +10,7 @@ from vpm.errors import near_match
 from vpm.model.entry import Quantity
 from vpm.model.messages import Problem, place
 from vpm.model.schema import Document, EffectEntry
+from vpm.model.splitting import splitting_problems
 from vpm.model.structure import COORDINATE_UNIT, EFFORT_UNIT, Structure
 from vpm.units import si_unit
 
@@ -58,6 +59,7 @@ def effect_problems(document: Document, structure: Structure) -> Iterator[Proble
             rest = f'is a second {entry.type} at "{entry.at}", after effects[{earlier}]; remove one'
             yield Problem(place(*keys), rest)
         yield from _value_problems(effect, entry, keys)
+    yield from splitting_problems(document, structure.turned)
 
 
 def _value_problems(effect: EffectType, entry: EffectEntry, keys: tuple[str, int]) -> Iterator[Problem]:

@@ -28,6 +28,10 @@ if TYPE_CHECKING:
     from vpm._core import System
 
 
+#: Share of the inertia that a joint moves on the motor side of a spring or play, where nobody says better.
+MOTOR_SHARE = 0.1
+
+
 class Model(Evaluations, Storable):
     """A machine: bodies, joints, beams, actuators, sensors, controllers and effects, with one flat table of parameters.
 
@@ -200,7 +204,7 @@ class Model(Evaluations, Storable):
         name : str
             Effect of the catalogue.
         at : str
-            Component that it sits at.
+            Component that it sits at; ``"world"`` for a tilt of gravity.
         **values : float
             SI values by short name. Sizes that are not given start where the effect does nothing, shape parameters at
             the start value of the catalogue. Sizes, and velocities and ways of friction laws that are not given, become
@@ -222,12 +226,35 @@ class Model(Evaluations, Storable):
                 given = parameter.default(kind)
             if given is None:
                 continue  # the check below says what is missing
+            if parameter.scale == "inertia" and parameter.shape and parameter.name not in values:
+                given = self._motor_side(name, at)
             # Nobody knows beforehand at which velocity a friction law bends; places and periods are told.
             known = parameter.shape and (parameter.name in values or not parameter.learnt)
             entry[parameter.name] = float(given) if known else {"value": float(given), "uncertainty": math.inf}
         content = self.to_dict()
         content.setdefault("effects", []).append(entry)
         return type(self)(content)
+
+    def _motor_side(self, effect: str, at: str) -> float:
+        """Inertia to begin with before a spring or play: a share of what the joint moves, none where a rotor is known.
+
+        Of what the joint moves when all joints stand at zero.
+        """
+        joint = self._checked.structure.turned.get(at, at)
+        if joint not in self.joints or (effect == "backlash" and not self._is_driven(joint)):
+            return 0.0
+        known = [f"{joint}.rotor_inertia", f"{joint}.rotor.inertia"]
+        known += [f"{name}.rotor_inertia" for name in self.actuators if self._drives(name, joint)]
+        if any(name in self.parameters for name in known):
+            return 0.0
+        place = self.joints.index(joint)
+        return MOTOR_SHARE * float(self.mass_matrix(np.zeros(len(self.coordinates)))[place, place])
+
+    def _is_driven(self, joint: str) -> bool:
+        return any(self._drives(name, joint) for name in self.actuators)
+
+    def _drives(self, actuator: str, joint: str) -> bool:
+        return self._checked.document.actuators[actuator].joint == joint
 
     def without_effect(self, name: str, at: str) -> Self:
         """Model with one effect less.
@@ -250,7 +277,7 @@ class Model(Evaluations, Storable):
 
         Parameters
         ----------
-        kind : {"joint", "body", "actuator", "sensor"}
+        kind : {"joint", "body", "link", "beam", "actuator", "sensor", "world"}
         """
         for known in SITE_KINDS:
             if kind == known:

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from vpm.catalogue import JointKind, SiteKind
 from vpm.errors import ModelError, near_match
-from vpm.model.expand import Coordinate, coordinates
+from vpm.model.expand import Coordinate, Direction, coordinates, plane, unit
 from vpm.model.pose import Pose, denavit_hartenberg, pose
 from vpm.model.schema import Document, Joint
+from vpm.model.splitting import bendings, deflections, flexed
 from vpm.model.tree import WORLD
 from vpm.units import si_unit
 
@@ -78,12 +79,15 @@ class Axis:
         Joint of the file that it is a part of.
     body : str or None
         Body of the file that it carries; None for a massless carrier.
+    added : bool
+        Whether an effect has split it off the joint of the file.
     """
 
     coordinate: Coordinate
     frame: Frame
     joint: str
     body: str | None
+    added: bool = False
 
     @property
     def name(self) -> str:
@@ -125,6 +129,24 @@ class Structure:
         return tuple(axis.name for axis in self.axes)
 
     @property
+    def added(self) -> tuple[str, ...]:
+        """Joints that effects have split off; they have neither actuator nor sensor."""
+        return tuple(axis.name for axis in self.axes if axis.added)
+
+    @property
+    def turned(self) -> Mapping[str, str]:
+        """Bodies that the last coordinate of their joint turns, with the name of that."""
+        own = {axis.joint: axis for axis in self.axes if not axis.added}
+        joints = ((joint.child, own[name]) for name, joint in self.document.joints.items() if name in own)
+        return {body: axis.name for body, axis in joints if axis.coordinate.kind == "revolute"}
+
+    @property
+    def horizontal(self) -> tuple[Direction, Direction]:
+        """Axes of the world about which gravity can be tilted; it must not be zero."""
+        x, y, z = self.document.gravity
+        return plane(unit((-x, -y, -z)))
+
+    @property
     def welds(self) -> tuple[str, ...]:
         """Bodies whose inertia is fixed to something else, at a constant place."""
         carried = {axis.body for axis in self.axes}
@@ -144,8 +166,11 @@ class Structure:
     def sites(self, kind: SiteKind) -> tuple[str, ...]:
         """Names of the components at which an effect of this kind can sit."""
         sites: dict[SiteKind, tuple[str, ...]] = {
-            "joint": self.joints,
+            "joint": tuple(axis.name for axis in self.axes if not axis.added),
             "body": (*self.bodies, *self.beams),
+            "link": (*self.turned, *(name for name in self.beams if self._bends(name))),
+            "beam": self.beams,
+            "world": (WORLD,) if any(self.document.gravity) else (),
             "actuator": tuple(self.document.actuators),
             "sensor": tuple(self.document.sensors),
         }
@@ -161,10 +186,15 @@ class Structure:
             return site
         if kind == "body":
             return self._mover(site)
+        if kind in {"link", "beam", "world"}:
+            return None
         if kind == "actuator":
             return self.document.actuators[site].joint
         owner = self.document.sensors[site].measures.partition(".")[0]
         return owner if owner in self.joints else None
+
+    def _bends(self, beam: str) -> bool:
+        return any(component.startswith("bending") for component in self.document.beams[beam].deforms)
 
     def _mover(self, site: str) -> str | None:
         """Last joint on the way from the world to a body or a beam."""
@@ -245,6 +275,7 @@ class Structure:
 
 def build_structure(document: Document) -> Structure:
     """Order the tree, parents first, else in the order of the file; the tree has to be free of problems."""
+    document = flexed(document)
     axes: list[Axis] = []
     bodies: list[str] = []
     beams: list[str] = []
@@ -259,7 +290,8 @@ def build_structure(document: Document) -> Structure:
             joint = document.joints[name]
             before, after = _places(joint)
             start = _mounted(joint.parent, joint.at, before, frames, tuple(beams), document)
-            found = list(_chain(name, joint, start, len(axes), carries=after == Pose()))
+            parts = _parts(name, joint, document)
+            found = list(_chain(name, joint, parts, start, len(axes), carries=after == Pose()))
             end = Frame(Mount("body", len(axes) + len(found) - 1), Pose()) if found else start
             axes.extend(found)
             frames[joint.child] = Frame(end.mount, end.pose @ after)
@@ -283,12 +315,26 @@ def _places(joint: Joint) -> tuple[Pose, Pose]:
     return (pose(joint.translation, joint.rotation), Pose()) if joint.dh is None else denavit_hartenberg(joint.dh)
 
 
-def _chain(name: str, joint: Joint, start: Frame, first: int, *, carries: bool) -> Iterator[Axis]:
+def _parts(name: str, joint: Joint, document: Document) -> list[tuple[Coordinate, bool]]:
+    """Coordinates of a joint, with those that effects split off, and whether each is such a one."""
+    split, bent = deflections(document), bendings(document)
+    parts: list[tuple[Coordinate, bool]] = []
+    for part in coordinates(name, joint):
+        parts.append((part, False))
+        if part.name in split:
+            parts.append((replace(part, name=split[part.name]), True))
+    if parts and joint.child in bent:
+        parts.append((Coordinate(bent[joint.child], "revolute", parts[-1][0].direction), True))
+    return parts
+
+
+def _chain(
+    name: str, joint: Joint, parts: list[tuple[Coordinate, bool]], start: Frame, first: int, *, carries: bool
+) -> Iterator[Axis]:
     """Axes of a joint; the last one carries the child, unless that sits at a constant place away from it."""
-    parts = coordinates(name, joint)
-    for i, part in enumerate(parts):
+    for i, (part, added) in enumerate(parts):
         frame = start if i == 0 else Frame(Mount("body", first + i - 1), Pose())
-        yield Axis(part, frame, name, joint.child if carries and i == len(parts) - 1 else None)
+        yield Axis(part, frame, name, joint.child if carries and i == len(parts) - 1 else None, added)
 
 
 def _mounted(

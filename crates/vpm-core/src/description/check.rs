@@ -113,6 +113,12 @@ fn sites(description: &Description) -> Result<()> {
             EffectEntry::Payload { on: Site::Body(body), .. } => within(&what, "body", *body, joints)?,
             EffectEntry::Payload { on: Site::Weld(weld), .. } => within(&what, "weld", *weld, description.welds.len())?,
             EffectEntry::Payload { on: Site::Tip(beam), .. } => within(&what, "beam", *beam, description.n_beams())?,
+            EffectEntry::Tree(law) => {
+                if let Some((target, index)) = law.site() {
+                    let count = if target == "beam" { description.n_beams() } else { joints };
+                    within(&what, target, index, count)?;
+                }
+            }
         }
     }
     for actuator in &description.actuators {

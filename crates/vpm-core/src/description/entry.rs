@@ -4,6 +4,7 @@ use serde::Deserialize;
 use serde::de::Error as _;
 use serde_json::{Map, Value};
 
+use super::TreeEffect;
 use crate::body::Site;
 use crate::controller::ControlLaw;
 use crate::effect::{Domain, Hysteresis, JointEffect, Payload};
@@ -34,6 +35,8 @@ pub enum EffectEntry {
         /// Its mass and place.
         law: Payload<usize>,
     },
+    /// An effect on what the machine is made of.
+    Tree(TreeEffect<usize>),
 }
 
 /// A controller: its law, what it measures and what it commands, and when, written as one flat table with a `type`.
@@ -63,6 +66,7 @@ impl EffectEntry {
             Self::Joint { law, .. } => law.domains(),
             Self::Hysteresis { law, .. } => law.domains(),
             Self::Payload { law, .. } => law.domains(),
+            Self::Tree(law) => law.domains(),
         }
     }
 }
@@ -98,6 +102,9 @@ impl TryFrom<Map<String, Value>> for EffectEntry {
                     Site::Body(take(&mut table, "body")?)
                 };
                 return Ok(Self::Payload { on, law: serde_json::from_value(Value::Object(table))? });
+            }
+            if matches!(kind.as_str(), "rotor_inertia" | "gravity_tilt") || table.contains_key("beam") {
+                return Ok(Self::Tree(serde_json::from_value(Value::Object(table))?));
             }
             let joint = take(&mut table, "joint")?;
             if kind == "hysteresis" {

@@ -82,7 +82,7 @@ fn inertias<S: Scalar>(model: &Model<S>, data: &mut Data<S>, tau: &[S]) {
 
 fn accelerations<S: Scalar>(model: &Model<S>, data: &mut Data<S>) {
     let slots = &mut data.aba;
-    slots[0].acceleration = Twist::new(Vector3::zero(), -Vector3::from_f64(model.gravity()));
+    slots[0].acceleration = Twist::new(Vector3::zero(), -model.gravity());
     for (k, (link, result)) in model.links().iter().zip(&mut data.acceleration).enumerate() {
         let (before, rest) = slots.split_at_mut(k + 1);
         let (parent, slot) = (&before[link.parent], &mut rest[0]);

@@ -4,7 +4,6 @@ use super::kinematics;
 use crate::data::Data;
 use crate::model::Model;
 use crate::scalar::Scalar;
-use crate::spatial::Vector3;
 
 /// Mechanical energy of a state, in J.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -20,7 +19,7 @@ pub struct Energy<S> {
 /// Checked: Lagrange's equations of these energies give the efforts of `rnea`; free motion conserves their sum.
 pub fn energy<S: Scalar>(model: &Model<S>, data: &mut Data<S>, q: &[S], v: &[S]) -> Energy<S> {
     kinematics(model, data, q, v);
-    let gravity = Vector3::from_f64(model.gravity());
+    let gravity = model.gravity();
     let mut total = Energy { kinetic: of_rotors(model, v), potential: S::zero() };
     for (frame, slot) in model.frames().iter().zip(data.kinematics.iter().skip(1)) {
         let body = frame.inertia;

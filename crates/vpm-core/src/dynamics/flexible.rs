@@ -189,7 +189,7 @@ pub fn energy<S: Scalar>(model: &Model<S>, data: &mut Data<S>, q: &[S], v: &[S])
     frames(model, data, q, v);
     poses(model, data);
     lines(model, data);
-    let gravity = Vector3::from_f64(model.gravity());
+    let gravity = model.gravity();
     let mut total = Energy { kinetic: of_rotors(model, v), potential: S::zero() };
     for FrameSlot { pose, velocity, inertia, .. } in data.composite.frames.iter().skip(1) {
         total.kinetic += inertia.kinetic_energy(*velocity);

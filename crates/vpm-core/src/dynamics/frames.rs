@@ -14,7 +14,7 @@ use crate::spatial::{Pose, Twist, Vector3};
 pub fn frames<S: Scalar>(model: &Model<S>, data: &mut Data<S>, q: &[S], v: &[S]) {
     debug_assert!(q.len() == model.n_coordinates() && v.len() == model.n_coordinates());
     let Composite { frames, sections, .. } = &mut data.composite;
-    frames[0].acceleration = Twist::new(Vector3::zero(), -Vector3::from_f64(model.gravity()));
+    frames[0].acceleration = Twist::new(Vector3::zero(), -model.gravity());
     for node in model.order() {
         match node {
             Node::Body(number, _) => {

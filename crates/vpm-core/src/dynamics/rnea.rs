@@ -20,7 +20,7 @@ pub fn rnea<'d, S: Scalar>(model: &Model<S>, data: &'d mut Data<S>, q: &[S], v: 
 fn outward<S: Scalar>(model: &Model<S>, data: &mut Data<S>, q: &[S], v: &[S], a: &[S]) {
     let slots = &mut data.rnea;
     slots[0].velocity = Twist::zero();
-    slots[0].acceleration = Twist::new(Vector3::zero(), -Vector3::from_f64(model.gravity()));
+    slots[0].acceleration = Twist::new(Vector3::zero(), -model.gravity());
     for (k, (((link, &q), &v), &a)) in model.links().iter().zip(q).zip(v).zip(a).enumerate() {
         let (before, rest) = slots.split_at_mut(k + 1);
         let (parent, slot) = (&before[link.parent], &mut rest[0]);

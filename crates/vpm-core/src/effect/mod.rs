@@ -8,7 +8,11 @@ mod backlash;
 mod bias_force;
 mod coulomb_friction;
 mod domain;
+mod end_stop;
+mod formula;
 mod hysteresis;
+mod joint_compliance;
+mod link_flexibility;
 mod payload;
 mod spring;
 mod stribeck_friction;
@@ -22,7 +26,11 @@ pub use backlash::Backlash;
 pub use bias_force::BiasForce;
 pub use coulomb_friction::CoulombFriction;
 pub use domain::Domain;
+pub use end_stop::EndStop;
+pub use formula::{Formula, Instruction};
 pub use hysteresis::Hysteresis;
+pub use joint_compliance::JointCompliance;
+pub use link_flexibility::LinkFlexibility;
 pub use payload::Payload;
 pub use spring::Spring;
 pub use stribeck_friction::StribeckFriction;
@@ -51,6 +59,14 @@ pub enum JointEffect<P> {
     TorqueRipple(TorqueRipple<P>),
     /// Spring with a dead band.
     Backlash(Backlash<P>),
+    /// Wind-up of a drive.
+    JointCompliance(JointCompliance<P>),
+    /// Bending of a link, lumped at its root.
+    LinkFlexibility(LinkFlexibility<P>),
+    /// Ends of the way.
+    EndStop(EndStop<P>),
+    /// Law that a user wrote.
+    Formula(Formula<P>),
 }
 
 impl<P> JointEffect<P> {
@@ -65,6 +81,10 @@ impl<P> JointEffect<P> {
             Self::Spring(law) => JointEffect::Spring(law.map(f)),
             Self::TorqueRipple(law) => JointEffect::TorqueRipple(law.map(f)),
             Self::Backlash(law) => JointEffect::Backlash(law.map(f)),
+            Self::JointCompliance(law) => JointEffect::JointCompliance(law.map(f)),
+            Self::LinkFlexibility(law) => JointEffect::LinkFlexibility(law.map(f)),
+            Self::EndStop(law) => JointEffect::EndStop(law.map(f)),
+            Self::Formula(law) => JointEffect::Formula(law.map(f)),
         }
     }
 
@@ -79,6 +99,10 @@ impl<P> JointEffect<P> {
             Self::Spring(law) => law.domains(),
             Self::TorqueRipple(law) => law.domains(),
             Self::Backlash(law) => law.domains(),
+            Self::JointCompliance(law) => law.domains(),
+            Self::LinkFlexibility(law) => law.domains(),
+            Self::EndStop(law) => law.domains(),
+            Self::Formula(law) => law.domains(),
         }
     }
 }
@@ -96,19 +120,27 @@ impl<S: Scalar> JointEffect<S> {
             Self::Spring(law) => law.effort(q),
             Self::TorqueRipple(law) => law.effort(q),
             Self::Backlash(law) => law.effort(q, v),
+            Self::JointCompliance(law) => law.effort(q, v),
+            Self::LinkFlexibility(law) => law.effort(q, v),
+            Self::EndStop(law) => law.effort(q, v),
+            Self::Formula(law) => law.effort(q, v),
         }
     }
 
-    /// Resistance r in N s/m or N m s/rad at velocity `v`: what depends on the velocity is `-r v`, so that
+    /// Resistance r in N s/m or N m s/rad at coordinate `q` and velocity `v`: what depends on the velocity is `-r v`, so that
     /// `effort(q, v) = effort(q, 0) - r v`. It is the slope of the chord from rest to `v`, not of the tangent.
     #[inline]
-    pub fn resistance(&self, v: S) -> S {
+    pub fn resistance(&self, q: S, v: S) -> S {
         match self {
             Self::ViscousFriction(law) => law.resistance(),
             Self::CoulombFriction(law) => law.resistance(v),
             Self::AsymmetricFriction(law) => law.resistance(v),
             Self::StribeckFriction(law) => law.resistance(v),
             Self::Backlash(law) => law.resistance(),
+            Self::JointCompliance(law) => law.resistance(),
+            Self::LinkFlexibility(law) => law.resistance(),
+            Self::EndStop(law) => law.resistance(q, v),
+            Self::Formula(law) => law.resistance(q, v),
             Self::BiasForce(_) | Self::Spring(_) | Self::TorqueRipple(_) => S::zero(),
         }
     }
@@ -121,6 +153,10 @@ impl<S: Scalar> JointEffect<S> {
             Self::Spring(law) => law.effort(q),
             Self::TorqueRipple(law) => law.effort(q),
             Self::Backlash(law) => law.effort_at_rest(q),
+            Self::JointCompliance(law) => law.effort_at_rest(q),
+            Self::LinkFlexibility(law) => law.effort_at_rest(q),
+            Self::EndStop(law) => law.effort_at_rest(q),
+            Self::Formula(law) => law.effort_at_rest(q),
             Self::ViscousFriction(_)
             | Self::CoulombFriction(_)
             | Self::AsymmetricFriction(_)
@@ -134,7 +170,8 @@ impl<S: Scalar> JointEffect<S> {
         self.map(&mut |&parameter| Dual::<S, 1>::constant(parameter)).effort_at_rest(Dual::variable(q, 0)).gradient[0]
     }
 
-    /// Potential energy in J at coordinate `q`: `effort = -d potential/dq` for effects of the coordinate alone, zero for friction.
+    /// Potential energy in J at coordinate `q`: `effort = -d potential/dq` for effects of the coordinate alone, zero for friction
+    /// and for formulas.
     #[inline]
     pub fn potential(&self, q: S) -> S {
         match self {
@@ -142,10 +179,14 @@ impl<S: Scalar> JointEffect<S> {
             Self::Spring(law) => law.potential(q),
             Self::TorqueRipple(law) => law.potential(q),
             Self::Backlash(law) => law.potential(q),
+            Self::JointCompliance(law) => law.potential(q),
+            Self::LinkFlexibility(law) => law.potential(q),
+            Self::EndStop(law) => law.potential(q),
             Self::ViscousFriction(_)
             | Self::CoulombFriction(_)
             | Self::AsymmetricFriction(_)
-            | Self::StribeckFriction(_) => S::zero(),
+            | Self::StribeckFriction(_)
+            | Self::Formula(_) => S::zero(),
         }
     }
 }

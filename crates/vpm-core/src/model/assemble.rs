@@ -15,7 +15,7 @@ use crate::spatial::{Matrix3, Pose, SpatialInertia, Vector3};
 #[derive(Clone, Debug, Default)]
 pub struct Parts<S> {
     /// Gravity in the world frame, m/s^2.
-    pub gravity: [f64; 3],
+    pub gravity: [S; 3],
     /// Bodies with their joints.
     pub bodies: Vec<Body<S>>,
     /// Bodies without joints.
@@ -282,10 +282,10 @@ impl<'a, S: Scalar> Assembly<'a, S> {
     }
 }
 
-fn check_gravity(gravity: [f64; 3]) -> Result<()> {
+fn check_gravity<S: Scalar>(gravity: [S; 3]) -> Result<()> {
     for (axis, value) in ["x", "y", "z"].into_iter().zip(gravity) {
         if !value.is_finite() {
-            return Err(Error::NonFinite { path: format!("gravity.{axis}"), value });
+            return Err(Error::NonFinite { path: format!("gravity.{axis}"), value: value.re() });
         }
     }
     Ok(())

@@ -38,7 +38,7 @@ impl<S: Scalar> Assembly<'_, S> {
         let sorted = links.iter().enumerate().all(|(number, link)| link.parent <= number);
         let rigid = n_coordinates == n_joints && self.beams.iter().all(|elastic| elastic.frame.is_none());
         Ok(Model {
-            gravity: self.parts.gravity,
+            gravity: Vector3::from(self.parts.gravity),
             order: self.nodes(order, &links),
             n_frames: self.inertias.len(),
             recursive: sorted && rigid && !lines.iter().any(Wire::is_massive),

@@ -343,7 +343,7 @@ impl<S: Scalar> Buffers<S> {
         for (k, &joint) in free.iter().enumerate().take_while(|(_, place)| **place < joints) {
             let own = || dynamics.effects.iter().filter(|(place, _)| *place == joint).map(|(_, effect)| effect);
             let slope: S = own().map(|effect| effect.slope_at_rest(q[joint])).sum();
-            let resistance: S = own().map(|effect| effect.resistance(v[joint])).sum();
+            let resistance: S = own().map(|effect| effect.resistance(q[joint], v[joint])).sum();
             for (place, entry) in [(k, slope), (count + k, -resistance)] {
                 column.fill(S::zero());
                 column[k] = entry;

@@ -94,7 +94,7 @@ impl<S: Scalar> System<S> {
         let n = self.coordinates();
         self.resistances.fill(S::zero());
         for (joint, effect) in &self.dynamics.effects {
-            self.resistances[*joint] += effect.resistance(x[n + joint]);
+            self.resistances[*joint] += effect.resistance(x[*joint], x[n + joint]);
         }
         let (v, first) = (&x[n..2 * n], self.dynamics.first_memory());
         self.dynamics.memories.fadings(&x[first..], v, &mut self.fadings);

@@ -21,7 +21,7 @@ pub const UPRIGHT: [f64; 9] = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
 pub fn lift<S: Scalar>(parts: &Parts<f64>) -> Parts<S> {
     let number = &mut |&value: &f64| S::from_f64(value);
     Parts {
-        gravity: parts.gravity,
+        gravity: parts.gravity.map(S::from_f64),
         bodies: parts.bodies.iter().map(|body| body.map(number)).collect(),
         welds: parts.welds.iter().map(|weld| weld.map(number)).collect(),
         beams: parts.beams.iter().map(|beam| beam.map(number)).collect(),

@@ -1,0 +1,168 @@
+"""Laws that users write: expressions in q, v and parameters, compiled to a program that the core runs."""
+
+from __future__ import annotations
+
+import ast
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from vpm.errors import ModelError
+
+#: What the core has room for.
+MOST_INSTRUCTIONS, MOST_WAITING, MOST_NUMBERS = 32, 8, 6
+FUNCTIONS = ("abs", "sqrt", "exp", "tanh", "sin", "cos")
+_OPERATIONS: Mapping[type[ast.operator], str] = {
+    ast.Add: "add",
+    ast.Sub: "subtract",
+    ast.Mult: "multiply",
+    ast.Div: "divide",
+}
+
+Instruction = str | dict[str, int]
+
+
+@dataclass(frozen=True)
+class Formula:
+    """A law as text and as a program in postfix order.
+
+    Attributes
+    ----------
+    text : str
+    program : tuple
+        Instructions: ``"position"``, ``"velocity"``, ``{"parameter": k}``, ``{"constant": k}`` or an operation.
+    constants : tuple of float
+    """
+
+    text: str
+    program: tuple[Instruction, ...]
+    constants: tuple[float, ...]
+
+    def __call__(self, q: float, v: float, parameters: Sequence[float]) -> float:
+        """Effort, as the core computes it.
+
+        Parameters
+        ----------
+        q, v : float
+            Coordinate and velocity of the joint (SI).
+        parameters : sequence of float
+            In the order in which they were declared.
+        """
+        stack: list[float] = []
+        for instruction in self.program:
+            if isinstance(instruction, dict):
+                ((kind, place),) = instruction.items()
+                numbers = {"parameter": parameters, "constant": self.constants}
+                if kind == "power":
+                    stack.append(stack.pop() ** place)
+                else:
+                    stack.append(numbers[kind][place])
+            elif instruction in {"position", "velocity"}:
+                stack.append(q if instruction == "position" else v)
+            elif instruction in _OPERATIONS.values():
+                second, first = stack.pop(), stack.pop()
+                stack.append(_combined(instruction, first, second))
+            elif instruction == "negate":
+                stack.append(-stack.pop())
+            else:
+                stack.append(abs(stack.pop()) if instruction == "abs" else getattr(math, instruction)(stack.pop()))
+        return stack[0]
+
+
+def _combined(operation: str, first: float, second: float) -> float:
+    match operation:
+        case "add":
+            return first + second
+        case "subtract":
+            return first - second
+        case "multiply":
+            return first * second
+    return first / second
+
+
+def compile_formula(text: str, names: Sequence[str]) -> Formula:
+    """Compile a law.
+
+    Parameters
+    ----------
+    text : str
+        Python expression in ``q``, ``v``, ``pi``, numbers and parameters, with ``+ - * /``, whole powers, and the
+        functions abs, sqrt, exp, tanh, sin and cos.
+    names : sequence of str
+        Parameters, in the order of the core.
+
+    Raises
+    ------
+    ModelError
+        The text is no such expression, or is longer than the core has room for.
+    """
+    if len(names) > MOST_NUMBERS:
+        raise ModelError(f'the law "{text}" has {len(names)} parameters, but {MOST_NUMBERS} are the most; use fewer')
+    try:
+        tree = ast.parse(text, mode="eval").body
+    except SyntaxError as error:
+        raise ModelError(f'the law "{text}" is no expression ({error.msg}); write it as in Python') from None
+    compiler = _Compiler(text, tuple(names))
+    deepest = compiler.write(tree)
+    for what, count, most in (
+        ("operations and numbers", len(compiler.program), MOST_INSTRUCTIONS),
+        ("constants", len(compiler.constants), MOST_NUMBERS),
+        ("numbers that wait in brackets", deepest, MOST_WAITING),
+    ):
+        if count > most:
+            raise ModelError(f'the law "{text}" has {count} {what}, but {most} are the most; write it shorter')
+    return Formula(text, tuple(compiler.program), tuple(compiler.constants))
+
+
+class _Compiler:
+    """Writes the program of one expression."""
+
+    def __init__(self, text: str, names: tuple[str, ...]) -> None:
+        self.text, self.names = text, names
+        self.program: list[Instruction] = []
+        self.constants: list[float] = []
+
+    def write(self, node: ast.expr) -> int:
+        """Append the program of a node; gives how many numbers wait at the most."""
+        match node:
+            case ast.Constant(value=int() | float() as value) if not isinstance(value, bool):
+                return self._constant(float(value))
+            case ast.Name(id=name):
+                return self._named(name)
+            case ast.UnaryOp(op=ast.USub(), operand=operand):
+                return self._after(operand, "negate")
+            case ast.BinOp(left=base, op=ast.Pow(), right=ast.Constant(value=int() as power)) if abs(power) < 100:
+                return self._after(base, {"power": power})
+            case ast.BinOp(left=left, op=operation, right=right) if type(operation) in _OPERATIONS:
+                first, second = self.write(left), self.write(right)
+                self.program.append(_OPERATIONS[type(operation)])
+                return max(first, second + 1)
+            case ast.Call(func=ast.Name(id=name), args=[argument], keywords=[]) if name in FUNCTIONS:
+                return self._after(argument, name)
+        raise ModelError(
+            f'the law "{self.text}" has "{ast.unparse(node)}", which the core does not know; use + - * /, whole '
+            f"powers, {', '.join(FUNCTIONS)} of q, v, pi and {', '.join(self.names)}"
+        )
+
+    def _after(self, operand: ast.expr, instruction: Instruction) -> int:
+        deepest = self.write(operand)
+        self.program.append(instruction)
+        return deepest
+
+    def _named(self, name: str) -> int:
+        if name == "pi":
+            return self._constant(math.pi)
+        if name in {"q", "v"}:
+            self.program.append("position" if name == "q" else "velocity")
+        elif name in self.names:
+            self.program.append({"parameter": self.names.index(name)})
+        else:
+            known = ", ".join(self.names)
+            raise ModelError(f'the law "{self.text}" names {name}, which is no parameter; it has q, v, pi and {known}')
+        return 1
+
+    def _constant(self, value: float) -> int:
+        if value not in self.constants:
+            self.constants.append(value)
+        self.program.append({"constant": self.constants.index(value)})
+        return 1

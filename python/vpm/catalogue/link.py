@@ -1,0 +1,83 @@
+"""Effects of links as wholes: bending of what is described as rigid, damping of what is described as elastic.
+
+A rigid body that bends is a pseudo-rigid link: a torsion spring at its root carries its first mode (L. L. Howell,
+"Compliant Mechanisms", 2001, chapter 5). A rigid beam that bends becomes elastic itself, with two strain polynomials in
+each of its components, so that strain gauges on it show it too.
+"""
+
+from __future__ import annotations
+
+from vpm.catalogue.kinds import NOT_NEGATIVE, POSITIVE, EffectType, nonlinear, shape
+
+#: A stiffness that nothing bends, N m/rad.
+_RIGID = 1e9
+
+LINK_FLEXIBILITY = EffectType(
+    name="link_flexibility",
+    site="link",
+    group="flexibility",
+    parameters=(
+        nonlinear(
+            "stiffness",
+            "flexibility.stiffness",
+            "N m/rad",
+            "effort_per_coordinate",
+            "moment at the root per angle of the line from root to tip; of a uniform beam 3 E I/length",
+            neutral=_RIGID,
+            physical=(POSITIVE, float("inf")),
+            evaluable=(POSITIVE, float("inf")),
+        ),
+        nonlinear(
+            "time",
+            "flexibility.time",
+            "s",
+            "time",
+            "damping per stiffness",
+            neutral=0.0,
+            physical=NOT_NEGATIVE,
+            evaluable=NOT_NEGATIVE,
+        ),
+        shape(
+            "inertia",
+            "flexibility.inertia",
+            "kg m^2",
+            "inertia",
+            "inertia at the root of a rigid body that does not bend with it, as its joint feels it",
+            start=0.0,
+            bounds=NOT_NEGATIVE,
+            learnt=True,
+        ),
+    ),
+    law="moment = -stiffness (b + time db/dt) on the bending b of the link, with inertia before it",
+    sentence="{at} bends: its tip gives way like a hinge at its root with {stiffness}, damped over {time}.",
+    impossible="a negative stiffness would bend the link by itself, a negative damping would feed energy in",
+    confused_with={
+        "joint_compliance": "behind one motor both are a spring; a strain gauge or the motion of the tip parts them",
+    },
+)
+
+STRUCTURAL_DAMPING = EffectType(
+    name="structural_damping",
+    site="beam",
+    group="structural_damping",
+    parameters=(
+        nonlinear(
+            "time",
+            "structural_damping.time",
+            "s",
+            "time",
+            "damping per stiffness beside what is described",
+            neutral=0.0,
+            physical=NOT_NEGATIVE,
+            evaluable=NOT_NEGATIVE,
+        ),
+    ),
+    law="D = D_described + time K",
+    sentence="{at} damps its vibrations by {time} more than described, in proportion to its stiffness.",
+    impossible="a negative damping would feed energy into the vibrations",
+    confused_with={
+        "viscous_friction": "both calm vibrations; friction also brakes motion that does not bend the link",
+    },
+)
+
+LINK_EFFECTS = (LINK_FLEXIBILITY, STRUCTURAL_DAMPING)

@@ -1,0 +1,32 @@
+"""Effects of where the whole machine stands."""
+
+from __future__ import annotations
+
+import math
+
+from vpm.catalogue.kinds import ANY, EffectParameter, EffectType, nonlinear
+
+_UPRIGHT = (-0.5 * math.pi, 0.5 * math.pi)
+
+
+def _angle(name: str, which: str) -> EffectParameter:
+    meaning = f"angle by which gravity is turned about the {which} horizontal axis of the world"
+    return nonlinear(name, f"tilt.{name}", "rad", "one", meaning, neutral=0.0, physical=_UPRIGHT, evaluable=ANY)
+
+
+GRAVITY_TILT = EffectType(
+    name="gravity_tilt",
+    site="world",
+    group="tilt",
+    parameters=(_angle("first", "first"), _angle("second", "second")),
+    law="g = R_second(second) R_first(first) g_described",
+    sentence="The base is not level: gravity is turned by {first} and {second} about the horizontal axes of the {at}.",
+    impossible="beyond 90 degrees gravity would point upwards: correct its direction in the model",
+    confused_with={
+        "bias_force": "they agree where gravity's lever does not change; other poses part them",
+        "payload": "both change the load of gravity; fast motion shows the payload's inertia",
+        "sensor_offset": "a shifted zero of an angle turns gravity for all that hangs on it; other poses part them",
+    },
+)
+
+WORLD_EFFECTS = (GRAVITY_TILT,)

@@ -1,0 +1,54 @@
+"""Effects of joints, bodies, beams and the world as the core reads them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from vpm.model.effects import Effect
+from vpm.model.splitting import bendings, deflections
+from vpm.model.structure import Structure
+
+#: Sites whose effects are entries of their own; those of actuators and sensors are keys of them.
+EFFECT_SITES = frozenset({"joint", "body", "link", "beam", "world"})
+
+
+def effect_json(effect: Effect, structure: Structure, index: Mapping[str, int]) -> list[dict[str, Any]]:
+    """Entries of one effect; one that splits a joint has two, its law behind and the inertia before."""
+    numbers = {short: index[dotted] for short, dotted in effect.parameter_names.items()}
+    match effect.type.site:
+        case "world":
+            return [{"type": effect.name, "axes": [list(axis) for axis in structure.horizontal], **numbers}]
+        case "beam":
+            return [{"type": effect.name, "beam": structure.beams.index(effect.at), **numbers}]
+        case "body":
+            position = [numbers.pop(axis) for axis in "xyz"]
+            return [{"type": effect.name, **_carrier(effect.at, structure), **numbers, "position": position}]
+        case "link" if effect.at in structure.beams:
+            numbers.pop("inertia")  # of what carries the beam
+            return [{"type": effect.name, "beam": structure.beams.index(effect.at), **numbers}]
+    return _on_joint(effect, structure, numbers)
+
+
+def _on_joint(effect: Effect, structure: Structure, numbers: dict[str, int]) -> list[dict[str, Any]]:
+    places, formula = structure.joints, effect.type.formula
+    if formula is not None:
+        law = {"program": list(formula.program), "constants": list(formula.constants)}
+        joint = places.index(effect.at)
+        return [{"type": "formula", "joint": joint, **law, "parameters": list(numbers.values())}]
+    before, behind = effect.at, deflections(structure.document).get(effect.at)
+    if effect.type.site == "link":
+        before, behind = structure.turned[effect.at], bendings(structure.document)[effect.at]
+    if effect.name not in {"joint_compliance", "backlash", "link_flexibility"}:
+        return [{"type": effect.name, "joint": places.index(before), **numbers}]
+    inertia = {"type": "rotor_inertia", "joint": places.index(before), "inertia": numbers.pop("inertia")}
+    return [{"type": effect.name, "joint": places.index(behind or before), **numbers}, inertia]
+
+
+def _carrier(site: str, structure: Structure) -> dict[str, int]:
+    """Where a payload sits: at a body of the core, at one that is fixed to something, or at the tip of a beam."""
+    if site in structure.beams:
+        return {"beam": structure.beams.index(site)}
+    if site in structure.welds:
+        return {"weld": structure.welds.index(site)}
+    return {"body": next(k for k, axis in enumerate(structure.axes) if axis.body == site)}

@@ -1,0 +1,104 @@
+"""What effects divide: joints whose drive and link part ways, links that bend although they are described as rigid.
+
+A split joint keeps its name and coordinate on the motor side, with the actuator and all other effects on it. Behind it
+comes a joint of the same kind and axis without actuator, which carries the link: ``axis_deflection`` for play and
+wind-up, ``arm_bending`` for a body that bends at its root. A rigid beam that bends is not split; it gets a level of
+detail that bends.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+from vpm.model.drives import DcMotor
+from vpm.model.messages import Problem, place
+from vpm.model.schema import Document, EffectEntry
+
+#: Level of a rigid beam that bends: two strain polynomials carry its first mode within 0.1 % (docs/beams.md).
+FLEXED = "strain(2)"
+
+
+def splits_joint(entry: EffectEntry, document: Document) -> bool:
+    """Whether an effect parts motor and link: wind-up always, play at a joint that an actuator drives directly.
+
+    A joint without an actuator may be the play itself.
+    """
+    if entry.type == "backlash":
+        return any(actuator.joint == entry.at for actuator in document.actuators.values())
+    return entry.type == "joint_compliance"
+
+
+def deflections(document: Document) -> Mapping[str, str]:
+    """Coordinates that are split, each with the name of the joint behind it."""
+    return {entry.at: f"{entry.at}_deflection" for entry in document.effects if splits_joint(entry, document)}
+
+
+def bendings(document: Document) -> Mapping[str, str]:
+    """Bodies that bend, each with the name of the joint at its root."""
+    bent = (entry.at for entry in document.effects if entry.type == "link_flexibility" and entry.at in document.bodies)
+    return {at: f"{at}_bending" for at in bent}
+
+
+def flexed(document: Document) -> Document:
+    """The document with the levels of detail that its effects ask for."""
+    bent = {entry.at for entry in document.effects if entry.type == "link_flexibility"}
+    rigid = [name for name, beam in document.beams.items() if name in bent and beam.detail.name == "rigid"]
+    if not rigid:
+        return document
+    raised = {name: document.beams[name].model_copy(update={"level": FLEXED}) for name in rigid}
+    return document.model_copy(update={"beams": {**document.beams, **raised}})
+
+
+def splitting_problems(document: Document, names: Mapping[str, str]) -> Iterator[Problem]:
+    """Two effects that split the same joint, names that are taken, and a motor side without inertia.
+
+    Parameters
+    ----------
+    document : Document
+    names : mapping of str to str
+        Last coordinate of the joint of each body that its joint turns.
+    """
+    split: dict[str, int] = {}
+    for position, entry in enumerate(document.effects):
+        bends = entry.type == "link_flexibility" and entry.at in names
+        if not (bends or splits_joint(entry, document)):
+            continue
+        where, joint = place("effects", position), names[entry.at] if bends else entry.at
+        earlier = split.setdefault(joint, position)
+        if earlier != position:
+            other = document.effects[earlier].type
+            rest = f'splits joint "{joint}" again, after {other} in effects[{earlier}], and no inertia is between'
+            yield Problem(where, f"{rest}; keep one of them")
+        added = f"{entry.at}_bending" if bends else f"{entry.at}_deflection"
+        if added in {*document.joints, *document.bodies, *document.beams, *document.actuators, *document.sensors}:
+            yield Problem(where, f'adds a joint "{added}", but the model has a component of this name; rename that one')
+        if not _has_rotor(document, joint):
+            given = entry.values.get("inertia")
+            if given is None or given.value == 0.0:
+                rest = "is missing" if given is None else "is 0"
+                yield Problem(
+                    place("effects", position, "inertia"),
+                    f'{rest}, so nothing between the drive of "{joint}" and {"the bending" if bends else "the spring"} '
+                    "has inertia; give it, or a rotor_inertia of the joint",
+                )
+
+
+def stop_problems(document: Document, values: Mapping[str, float]) -> Iterator[Problem]:
+    """End stops that leave no way between them."""
+    for position, entry in enumerate(document.effects):
+        if entry.type == "end_stop":
+            low, high = (values[f"{entry.at}.end_stop.{end}"] for end in ("low", "high"))
+            if low >= high:
+                rest = f"is {low:g}, but the upper end is {high:g} (SI); the lower one has to be below"
+                yield Problem(place("effects", position, "low"), rest)
+
+
+def _has_rotor(document: Document, joint: str) -> bool:
+    """Whether the motor side of a joint has an inertia of its own."""
+    described = document.joints.get(joint)
+    if described is not None and described.rotor_inertia is not None and described.rotor_inertia.value > 0.0:
+        return True
+    if any(entry.type == "rotor_inertia" and entry.at == joint for entry in document.effects):
+        return True
+    motors = (actuator for actuator in document.actuators.values() if isinstance(actuator, DcMotor))
+    return any(motor.joint == joint and motor.rotor_inertia is not None for motor in motors)
