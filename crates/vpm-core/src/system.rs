@@ -173,7 +173,7 @@ impl<S: Scalar> Dynamics<S> {
         &mut self,
         x: &[S],
         dxdt: &mut [S],
-        laws: (impl FnOnce(&[(usize, JointEffect<S>)], &[S], &[S], &mut [S]), impl Fn(&ContactFriction<S>, S, S) -> S),
+        laws: (impl FnOnce(&[(usize, JointEffect<S>)], [&[S]; 3], &mut [S]), impl Fn(&ContactFriction<S>, S, S) -> S),
     ) {
         let n = self.coordinates();
         let (q, v) = x[..2 * n].split_at(n);
@@ -199,7 +199,7 @@ impl<S: Scalar> Dynamics<S> {
         &mut self,
         x: &[S],
         dxdt: &mut [S],
-        laws: (impl FnOnce(&[(usize, JointEffect<S>)], &[S], &[S], &mut [S]), impl Fn(&ContactFriction<S>, S, S) -> S),
+        laws: (impl FnOnce(&[(usize, JointEffect<S>)], [&[S]; 3], &mut [S]), impl Fn(&ContactFriction<S>, S, S) -> S),
     ) {
         let n = self.coordinates();
         let (q, v) = x[..2 * n].split_at(n);
@@ -234,7 +234,7 @@ impl<S: Scalar> Dynamics<S> {
         q: &[S],
         v: &[S],
         (add, resistance): (
-            impl FnOnce(&[(usize, JointEffect<S>)], &[S], &[S], &mut [S]),
+            impl FnOnce(&[(usize, JointEffect<S>)], [&[S]; 3], &mut [S]),
             impl Fn(&ContactFriction<S>, S, S) -> S,
         ),
         on_beams: &[S],
@@ -244,7 +244,7 @@ impl<S: Scalar> Dynamics<S> {
         of_joints.copy_from_slice(&self.efforts);
         elastic.fill(S::zero());
         elastic[..on_beams.len()].copy_from_slice(on_beams);
-        add(&self.effects, q, v, of_joints);
+        add(&self.effects, [q, v, &self.efforts], of_joints);
         self.memories.add_efforts(of_joints);
         if self.pulls {
             flexible::add_line_forces(data, tensions, loads);
@@ -260,11 +260,15 @@ impl<S: Scalar> Dynamics<S> {
     }
 }
 
-/// Adds to `total` the efforts of all effects on the joints at coordinates `q` and rates `v`.
+/// Adds to `total` the efforts of all effects on the joints at coordinates q and rates v, where the actuators push with u.
 #[inline]
-pub(crate) fn add_effects<S: Scalar>(effects: &[(usize, JointEffect<S>)], q: &[S], v: &[S], total: &mut [S]) {
+pub(crate) fn add_effects<S: Scalar>(effects: &[(usize, JointEffect<S>)], [q, v, u]: [&[S]; 3], total: &mut [S]) {
     for (joint, effect) in effects {
-        total[*joint] += effect.effort(q[*joint], v[*joint]);
+        let (q, v) = (q[*joint], v[*joint]);
+        total[*joint] += effect.effort(q, v);
+        if let JointEffect::EmpiricalForce(law) = effect {
+            total[*joint] -= law.share_of_load(q, v) * u[*joint].abs();
+        }
     }
 }
 

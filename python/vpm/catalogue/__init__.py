@@ -15,6 +15,7 @@ from collections.abc import Collection, Mapping
 from types import MappingProxyType
 
 from vpm.catalogue.elsewhere import ACTUATOR_EFFECTS, BODY_EFFECTS, SENSOR_EFFECTS
+from vpm.catalogue.empirical import EMPIRICAL_EFFECTS
 from vpm.catalogue.joint import JOINT_EFFECTS
 from vpm.catalogue.kinds import POSITIVE, SITE_KINDS, EffectParameter, EffectType, JointKind, Scale, SiteKind
 from vpm.catalogue.link import LINK_EFFECTS
@@ -37,7 +38,15 @@ __all__ = [
     "unregister",
 ]
 
-_BUILT_IN = (*JOINT_EFFECTS, *BODY_EFFECTS, *LINK_EFFECTS, *WORLD_EFFECTS, *ACTUATOR_EFFECTS, *SENSOR_EFFECTS)
+_BUILT_IN = (
+    *JOINT_EFFECTS,
+    *BODY_EFFECTS,
+    *LINK_EFFECTS,
+    *WORLD_EFFECTS,
+    *ACTUATOR_EFFECTS,
+    *SENSOR_EFFECTS,
+    *EMPIRICAL_EFFECTS,
+)
 _ENTRIES = {effect.name: effect for effect in _BUILT_IN}
 #: Every effect by name, in the order in which a page should list them; `register` adds to it.
 EFFECTS: Mapping[str, EffectType] = MappingProxyType(_ENTRIES)

@@ -72,6 +72,8 @@ class EffectParameter:
         Shapes a law whose size another parameter gives; has no meaning where that size is zero.
     learnt : bool
         Shape that nobody knows beforehand, so that data decide unless a value is given: adjustable in an added effect.
+    optional : bool
+        Not there at all unless a value is given.
     """
 
     name: str
@@ -86,6 +88,7 @@ class EffectParameter:
     linear: bool
     shape: bool
     learnt: bool = False
+    optional: bool = False
 
     def default(self, kind: JointKind | None = None) -> float | None:
         """Value when none is given (SI), at a site on a joint of this kind; None if it has to be given.

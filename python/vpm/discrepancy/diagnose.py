@@ -12,6 +12,7 @@ from scipy.special import ndtri
 
 from vpm.catalogue import EFFECTS
 from vpm.compare import compare
+from vpm.discrepancy.ambiguity import listed, rivals
 from vpm.discrepancy.candidates import slow_speeds
 from vpm.discrepancy.confirmation import Data, Judged, is_clear, judge
 from vpm.discrepancy.diagnosis import (
@@ -22,10 +23,12 @@ from vpm.discrepancy.diagnosis import (
     Picture,
     Step,
 )
+from vpm.discrepancy.empirical import describe_best
 from vpm.discrepancy.floor import noise_floor
 from vpm.discrepancy.refusal import FALSE_ALARM_LEVEL, LEAST_GAIN
 from vpm.discrepancy.search import Accepted, Search, Stage, ambiguities, search
 from vpm.discrepancy.structure import Structure, structure
+from vpm.discrepancy.telling_apart import experiments as experiments_for
 from vpm.errors import DiagnosisError, DivergedError, near_match
 from vpm.experiment import Experiment
 from vpm.identify import InverseDynamicsProblem, OutputErrorProblem, gain, gaps, segments
@@ -46,6 +49,9 @@ NEGLIGIBLE = 0.005
 MOSTLY_OPEN = 0.15
 #: Parameters that move by more of their stated uncertainties than this are reported.
 FAR = 3.0
+
+#: Said of what stays after effects were found.
+_REST = " A structured residual above the noise remains."
 
 Tell = Callable[[str], None]
 
@@ -120,23 +126,36 @@ def diagnose(
     left = structure(found.final.model, data.training, data.unseen, found.final.fit.residual, found.final.unseen)
     gap = _gaps(data, nominal, recalibrated, found.final, floor)
     verdict, summary = _verdict(data, nominal, recalibrated, found, gap, left)
+    final, empirical, accepted = found.final, None, found.accepted
+    if verdict == "unexplained" or summary.endswith(_REST):
+        say("describing what is left")
+        bases = [recalibrated] if verdict == "unexplained" and accepted else []
+        empirical, final, place = describe_best([*bases, found.final], data)
+        accepted = () if place < len(bases) else accepted
+        gap = _gaps(data, nominal, recalibrated, final, floor)
+        summary = f"{summary} {empirical.sentence}"
+    say("looking for what else would do, and for the experiment that tells it apart")
+    ambiguous = rivals(found.final, data, accepted)
+    noise = {channel: g.noise_floor for channel, g in gap.items() if g.mode == "inverse_dynamics"}
     return Diagnosis(
         verdict,
         summary,
-        tuple(_accepted_effect(entry, found.final) for entry in found.accepted),
+        tuple(_accepted_effect(entry, found.final) for entry in accepted),
         gap,
         found.refused,
         found.ranking,
-        ambiguities(found.accepted),
+        listed(ambiguities(accepted), ambiguous),
         _where(recalibrated.model, data.unseen),
         tuple(_step(data, stage) for stage in found.stages),
         tuple(e.name for e in training),
         tuple(e.name for e in unseen),
         tuple(notes),
-        found.final.model,
-        fit_of(found.final.model, data.training, found.final.fit, nominal.fit.residual, [e.name for e in training]),
-        _pictures(data, nominal, recalibrated, found.final),
+        final.model,
+        fit_of(final.model, data.training, final.fit, nominal.fit.residual, [e.name for e in training]),
+        _pictures(data, nominal, recalibrated, final),
         time.perf_counter() - began,
+        empirical,
+        experiments_for(found.final, ambiguous, data.training, noise),
     )
 
 
@@ -268,7 +287,7 @@ def _verdict(
             f"unseen data: {numbers}, {_percent(worst.after, worst)} after.",
         )
     if found.accepted:
-        rest = " A structured residual above the noise remains." if remaining else ""
+        rest = _REST if remaining else ""
         return (
             "effect_found",
             f"Missing: {names}. Error on unseen data: {numbers}, {_percent(worst.after, worst)} after.{rest}",

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from vpm.excitation import Excitation
 from vpm.identify import Fit
 from vpm.model import Model
 from vpm.results import Result, Storable
@@ -106,6 +107,48 @@ class Ambiguity(Storable):
 
 
 @dataclass(frozen=True, repr=False, eq=False)
+class EmpiricalTerm(Storable):
+    """One term of an empirical force: joint, term as text, dotted parameter, coefficient, deviation and unit."""
+
+    joint: str
+    term: str
+    dotted: str
+    coefficient: float
+    std: float
+    unit: str
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class Empirical(Storable):
+    """A residual that no effect explains: on what it depends, and a formula that is no more than a fit.
+
+    Attributes
+    ----------
+    channel : str
+        The effort whose residual was examined.
+    states : dict of str to float
+        Share of its mean square on unseen data that each state predicts, the largest first.
+    remark : str
+        What runs with the time and not with the machine, in words, or "".
+    formula : str
+        With numbers and units, or "".
+    terms : tuple of EmpiricalTerm
+    before, after : float
+        Root mean square of the weighted residual on unseen data without and with the formula.
+    sentence : str
+    """
+
+    channel: str
+    states: dict[str, float]
+    remark: str
+    formula: str
+    terms: tuple[EmpiricalTerm, ...]
+    before: float
+    after: float
+    sentence: str
+
+
+@dataclass(frozen=True, repr=False, eq=False)
 class ChannelGap(Storable):
     """Root mean square gap of one channel on unseen data, at each stage.
 
@@ -129,6 +172,48 @@ class ChannelGap(Storable):
     unit: str
     signal: float
     mode: str
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class ProposedExperiment(Storable):
+    """An experiment that would tell two effects apart.
+
+    Attributes
+    ----------
+    effect, rival : str
+        ``effect at site``.
+    excitation : Excitation
+        The motion to make; ``excitation.to_csv`` writes it for the machine.
+    parameters : dict of str to float or str
+        Of the signal, in SI units.
+    channel, unit : str
+        Where the difference shows.
+    difference : float
+        Root mean square that the rival could not imitate by other values of its parameters.
+    noise : float
+        Of the same channel.
+    sentence : str
+    """
+
+    effect: str
+    rival: str
+    excitation: Excitation
+    parameters: dict[str, float | str]
+    channel: str
+    unit: str
+    difference: float
+    noise: float
+    sentence: str
+
+    @property
+    def ratio(self) -> float:
+        """Difference in units of the noise."""
+        return self.difference / self.noise if self.noise > 0.0 else float("inf")
+
+    def to_dict(self) -> dict[str, object]:
+        """Plain numbers and text, without the samples."""
+        content = {name: value for name, value in _fields(self).items() if name != "excitation"}
+        return {**content, "signal": self.excitation.name, "ratio": self.ratio}
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -213,6 +298,10 @@ class Diagnosis(Result):
     pictures : tuple of Picture
     seconds : float
         Time it took.
+    empirical : Empirical or None
+        What is said of a residual that no effect explains.
+    experiments : tuple of ProposedExperiment
+        For each pair of effects that the data cannot tell apart, the experiment that would.
     """
 
     verdict: str
@@ -231,6 +320,8 @@ class Diagnosis(Result):
     fit: Fit
     pictures: tuple[Picture, ...]
     seconds: float
+    empirical: Empirical | None = None
+    experiments: tuple[ProposedExperiment, ...] = ()
 
     def to_dict(self) -> dict[str, object]:
         """Content of ``report.json``: plain numbers and text, SI; what is not known is null."""
@@ -265,6 +356,8 @@ class Diagnosis(Result):
             "where": {channel: list(sentences) for channel, sentences in self.where.items()},
             "steps": [_fields(step) for step in self.steps],
             "notes": list(self.notes),
+            "empirical": None if self.empirical is None else _stored(self.empirical),
+            "experiments": [e.to_dict() for e in self.experiments],
             "seconds": self.seconds,
         }
         return document
@@ -299,6 +392,10 @@ def _gap(gap: ChannelGap) -> dict[str, object]:
 
 def _fields(value: Storable) -> dict[str, object]:
     return dict(value.to_stored())
+
+
+def _stored(found: Empirical) -> dict[str, object]:
+    return {**_fields(found), "terms": [_fields(term) for term in found.terms]}
 
 
 def _finite(value: object) -> object:

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-
 from scipy.stats import spearmanr
 
 from vpm.discrepancy.floor import white_level

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from vpm.catalogue import EFFECTS, EffectType
+from vpm.catalogue import EFFECTS, EffectParameter, EffectType
 from vpm.errors import near_match
 from vpm.model.entry import Quantity
 from vpm.model.messages import Problem, place
@@ -69,7 +69,7 @@ def _value_problems(effect: EffectType, entry: EffectEntry, keys: tuple[str, int
             repair = near_match(key, ["type", "at", *names])
             yield Problem(place(*keys, key), f"is not a known key of {effect.name}; {repair}")
     for parameter in effect.parameters:
-        if parameter.start is None and parameter.name not in entry.values:
+        if parameter.start is None and not parameter.optional and parameter.name not in entry.values:
             yield Problem(place(*keys, parameter.name), f"is missing; add it: {parameter.meaning}")
     sizes = [parameter.name for parameter in effect.parameters if not parameter.shape]
     if not any(name in entry.values for name in sizes):
@@ -88,12 +88,19 @@ def complete_effects(document: Document, structure: Structure) -> Document:
         kind = None if joint is None else structure.joint_kind(joint)
         values = {}
         for parameter in effect.parameters:
+            if parameter.optional and parameter.name not in given:
+                continue
             start = parameter.default(kind)
             quantity = given[parameter.name] if start is None else given.get(parameter.name, Quantity(value=start))
             unit = quantity.unit or effect_unit(parameter.unit, entry, structure)
             values[parameter.name] = quantity.model_copy(update={"unit": unit})
         entries.append(EffectEntry.model_validate({"type": entry.type, "at": entry.at, **values}))
     return document.model_copy(update={"effects": tuple(entries)})
+
+
+def parameters_of(entry: EffectEntry) -> tuple[EffectParameter, ...]:
+    """Parameters that an effect of a complete document has: all but optional ones that are not given."""
+    return tuple(p for p in EFFECTS[entry.type].parameters if not p.optional or p.name in entry.values)
 
 
 def effect_unit(template: str, entry: EffectEntry, structure: Structure) -> str:
@@ -121,6 +128,6 @@ class _Parenthesised(dict[str, str]):
 def effects_of(document: Document) -> tuple[Effect, ...]:
     """The effects of a checked document, in the order of the file."""
     return tuple(
-        Effect(entry.type, entry.at, {p.name: f"{entry.at}.{p.suffix}" for p in EFFECTS[entry.type].parameters})
+        Effect(entry.type, entry.at, {p.name: f"{entry.at}.{p.suffix}" for p in parameters_of(entry)})
         for entry in document.effects
     )

@@ -221,6 +221,8 @@ class Model(Evaluations, Storable):
             effect.parameter(short)
         kind = self.joint_kind(at) if at in self.joints else None
         for parameter in effect.parameters:
+            if parameter.optional and parameter.name not in values:
+                continue
             given = values.get(parameter.name, parameter.neutral)
             if given is None:
                 given = parameter.default(kind)

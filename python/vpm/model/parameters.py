@@ -17,7 +17,7 @@ from vpm.model.beam import Beam, Line, Part, sections_of
 from vpm.model.connection_parameters import bushing_rows, contact_rows
 from vpm.model.controller import Controller
 from vpm.model.drive_parameters import Row, actuator_rows, supply_rows
-from vpm.model.effects import effect_unit
+from vpm.model.effects import effect_unit, parameters_of
 from vpm.model.entry import Quantity
 from vpm.model.gains import gains
 from vpm.model.messages import Problem, place
@@ -279,7 +279,7 @@ def _connection_slots(document: Document) -> Iterator[Slot]:
 
 def _effect_slots(position: int, entry: EffectEntry, structure: Structure) -> Iterator[Slot]:
     effect, given = EFFECTS[entry.type], entry.values
-    for parameter in effect.parameters:
+    for parameter in parameters_of(entry):
         yield Slot(
             f"{entry.at}.{parameter.suffix}",
             ("effects", position, parameter.name),

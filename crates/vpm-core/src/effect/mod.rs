@@ -8,6 +8,7 @@ mod backlash;
 mod bias_force;
 mod coulomb_friction;
 mod domain;
+mod empirical_force;
 mod end_stop;
 mod formula;
 mod hysteresis;
@@ -26,6 +27,7 @@ pub use backlash::Backlash;
 pub use bias_force::BiasForce;
 pub use coulomb_friction::CoulombFriction;
 pub use domain::Domain;
+pub use empirical_force::EmpiricalForce;
 pub use end_stop::EndStop;
 pub use formula::{Formula, Instruction};
 pub use hysteresis::Hysteresis;
@@ -43,6 +45,8 @@ use crate::scalar::{Dual, Scalar};
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(tag = "type", rename_all = "snake_case")]
 pub enum JointEffect<P> {
+    /// A sum of terms that a fit chose.
+    EmpiricalForce(EmpiricalForce<P>),
     /// Resistance proportional to speed.
     ViscousFriction(ViscousFriction<P>),
     /// Constant resistance against the motion.
@@ -73,6 +77,7 @@ impl<P> JointEffect<P> {
     /// The same effect over another number type.
     pub fn map<T>(&self, f: &mut impl FnMut(&P) -> T) -> JointEffect<T> {
         match self {
+            Self::EmpiricalForce(law) => JointEffect::EmpiricalForce(law.map(f)),
             Self::ViscousFriction(law) => JointEffect::ViscousFriction(law.map(f)),
             Self::CoulombFriction(law) => JointEffect::CoulombFriction(law.map(f)),
             Self::AsymmetricFriction(law) => JointEffect::AsymmetricFriction(law.map(f)),
@@ -91,6 +96,7 @@ impl<P> JointEffect<P> {
     /// The parameters and where each is defined.
     pub fn domains(&self) -> Vec<(&P, Domain)> {
         match self {
+            Self::EmpiricalForce(law) => law.domains(),
             Self::ViscousFriction(law) => law.domains(),
             Self::CoulombFriction(law) => law.domains(),
             Self::AsymmetricFriction(law) => law.domains(),
@@ -112,6 +118,7 @@ impl<S: Scalar> JointEffect<S> {
     #[inline]
     pub fn effort(&self, q: S, v: S) -> S {
         match self {
+            Self::EmpiricalForce(law) => law.effort(q, v),
             Self::ViscousFriction(law) => law.effort(v),
             Self::CoulombFriction(law) => law.effort(v),
             Self::AsymmetricFriction(law) => law.effort(v),
@@ -132,6 +139,7 @@ impl<S: Scalar> JointEffect<S> {
     #[inline]
     pub fn resistance(&self, q: S, v: S) -> S {
         match self {
+            Self::EmpiricalForce(law) => law.resistance(q, v),
             Self::ViscousFriction(law) => law.resistance(),
             Self::CoulombFriction(law) => law.resistance(v),
             Self::AsymmetricFriction(law) => law.resistance(v),
@@ -149,6 +157,7 @@ impl<S: Scalar> JointEffect<S> {
     #[inline]
     pub fn effort_at_rest(&self, q: S) -> S {
         match self {
+            Self::EmpiricalForce(law) => law.effort_at_rest(q),
             Self::BiasForce(law) => law.effort(),
             Self::Spring(law) => law.effort(q),
             Self::TorqueRipple(law) => law.effort(q),
@@ -164,14 +173,32 @@ impl<S: Scalar> JointEffect<S> {
         }
     }
 
+    /// Share k of the load |u| that is taken off besides, u the effort of the actuators on the joint; within -1 and 1.
+    #[inline]
+    pub fn share_of_load(&self, q: S, v: S) -> S {
+        match self {
+            Self::EmpiricalForce(law) => law.share_of_load(q, v),
+            _ => S::zero(),
+        }
+    }
+
+    /// Resistance per load |u| at velocity `v`, the chord from rest of that share.
+    #[inline]
+    pub fn resistance_per_load(&self, v: S) -> S {
+        match self {
+            Self::EmpiricalForce(law) => law.resistance_per_load(v),
+            _ => S::zero(),
+        }
+    }
+
     /// Slope of the effort at rest by the coordinate, N/m or N m/rad.
     #[inline]
     pub fn slope_at_rest(&self, q: S) -> S {
         self.map(&mut |&parameter| Dual::<S, 1>::constant(parameter)).effort_at_rest(Dual::variable(q, 0)).gradient[0]
     }
 
-    /// Potential energy in J at coordinate `q`: `effort = -d potential/dq` for effects of the coordinate alone, zero for friction
-    /// and for formulas.
+    /// Potential energy in J at coordinate `q`: `effort = -d potential/dq` for effects of the coordinate alone, zero for friction,
+    /// for formulas and for what is read off data.
     #[inline]
     pub fn potential(&self, q: S) -> S {
         match self {
@@ -182,7 +209,8 @@ impl<S: Scalar> JointEffect<S> {
             Self::JointCompliance(law) => law.potential(q),
             Self::LinkFlexibility(law) => law.potential(q),
             Self::EndStop(law) => law.potential(q),
-            Self::ViscousFriction(_)
+            Self::EmpiricalForce(_)
+            | Self::ViscousFriction(_)
             | Self::CoulombFriction(_)
             | Self::AsymmetricFriction(_)
             | Self::StribeckFriction(_)

@@ -4,6 +4,7 @@ use super::{Dynamics, add_effects};
 use crate::actuator::{Actuator, Drive, Target};
 use crate::contact::ContactFriction;
 use crate::dynamics::{Energy, crba, energy, flexible, for_each_column, frames, lines, poses, rnea};
+use crate::effect::JointEffect;
 use crate::scalar::Scalar;
 use crate::spatial::{Pose, Twist};
 
@@ -22,22 +23,47 @@ impl<S: Scalar> Dynamics<S> {
     /// Efforts on all coordinates that give accelerations `a` at (q, v), with the efforts of the effects taken off. On the elastic
     /// coordinates they vanish in free motion.
     pub fn inverse_dynamics(&mut self, q: &[S], v: &[S], a: &[S], efforts: &mut [S]) {
-        self.inverse_dynamics_of_tree(q, v, a, efforts);
-        if self.connections.is_free() {
-            return;
+        self.balance(q, v, a, efforts);
+        if !self.connections.is_free() {
+            let Self { model, data, loads, .. } = self;
+            loads.fill(S::zero());
+            frames(model, data, q, v);
+            poses(model, data);
+            self.connections.add_loads(model, data, ContactFriction::resistance, loads);
+            for (effort, &load) in efforts.iter_mut().zip(&*loads) {
+                *effort -= load;
+            }
         }
-        let Self { model, data, loads, .. } = self;
-        loads.fill(S::zero());
-        frames(model, data, q, v);
-        poses(model, data);
-        self.connections.add_loads(model, data, ContactFriction::resistance, loads);
-        for (effort, &load) in efforts.iter_mut().zip(&*loads) {
-            *effort -= load;
-        }
+        self.load(q, v, efforts);
     }
 
     /// As [`Dynamics::inverse_dynamics`], but without what contacts and bushings do.
     pub(crate) fn inverse_dynamics_of_tree(&mut self, q: &[S], v: &[S], a: &[S], efforts: &mut [S]) {
+        self.balance(q, v, a, efforts);
+        self.load(q, v, efforts);
+    }
+
+    /// From efforts r that arrive to efforts u of the actuators, of which effects take a share k of the load:
+    /// `u - k |u| = r`, so `u = r / (1 - k sign(r))`.
+    fn load(&self, q: &[S], v: &[S], efforts: &mut [S]) {
+        for (joint, effect) in &self.effects {
+            let JointEffect::EmpiricalForce(law) = effect else { continue };
+            let (share, arriving) = (law.share_of_load(q[*joint], v[*joint]), efforts[*joint]);
+            let taken = if arriving.re() < 0.0 { -share } else { share };
+            efforts[*joint] = arriving / (S::one() - taken);
+        }
+    }
+
+    /// What of a change of the actuators' effort on a joint arrives at state `x`: one, but for effects that follow the load.
+    pub(crate) fn push_through(&self, joint: usize, x: &[S]) -> S {
+        let (q, v, u) = (x[joint], x[self.coordinates() + joint], self.efforts[joint]);
+        let own = self.effects.iter().filter(|(place, _)| *place == joint);
+        let share: S = own.map(|(_, effect)| effect.share_of_load(q, v)).sum();
+        S::one() - if u.re() < 0.0 { -share } else { share }
+    }
+
+    /// Efforts that arrive: those of the tree less those of the effects, whatever follows the load left out.
+    fn balance(&mut self, q: &[S], v: &[S], a: &[S], efforts: &mut [S]) {
         let Self { model, data, loads, .. } = self;
         if model.is_recursive() {
             efforts.copy_from_slice(rnea(model, data, q, v, a));
@@ -46,7 +72,9 @@ impl<S: Scalar> Dynamics<S> {
             flexible::required(model, data, (q, v), a, efforts);
         }
         loads.fill(S::zero());
-        add_effects(&self.effects, q, v, loads);
+        for (joint, effect) in &self.effects {
+            loads[*joint] += effect.effort(q[*joint], v[*joint]);
+        }
         self.memories.add_efforts(loads);
         for (effort, &effect) in efforts.iter_mut().zip(&*loads) {
             *effort -= effect;

@@ -72,7 +72,7 @@ impl<S: Scalar> Driven<S> {
             matrix[k * dim + n + k] = S::one();
         }
         self.differentiate_drives(machine, x);
-        self.add_internal(machine, matrix, dim);
+        self.add_internal(machine, x, matrix);
         self.add_memories(machine, x, matrix);
         for (number, acceleration) in self.acceleration.iter_mut().zip(&machine.data.acceleration) {
             *number = Dual::constant(*acceleration);
@@ -107,9 +107,9 @@ impl<S: Scalar> Driven<S> {
     }
 
     /// The columns of the states of drives and supplies.
-    fn add_internal(&mut self, machine: &Dynamics<S>, matrix: &mut [S], dim: usize) {
+    fn add_internal(&mut self, machine: &Dynamics<S>, x: &[S], matrix: &mut [S]) {
         let Self { dynamics, rate, column, .. } = self;
-        let n = machine.coordinates();
+        let (n, dim) = (machine.coordinates(), x.len());
         let mut drawn = dynamics.shown.drawn.iter();
         for (place, (actuator, force)) in places(machine).zip(dynamics.actuators.iter().zip(&dynamics.forces)) {
             let drawn = if place.draws(actuator) { drawn.next() } else { None };
@@ -120,7 +120,7 @@ impl<S: Scalar> Driven<S> {
             }
             column.fill(S::zero());
             match actuator.on {
-                Target::Joint(joint) => column[joint] = S::one(),
+                Target::Joint(joint) => column[joint] = machine.push_through(joint, x),
                 Target::Line(line) => machine.data.line_load(line, S::one(), column),
             }
             machine.data.solve(column);
@@ -203,7 +203,7 @@ impl<S: Scalar> Driven<S> {
         });
         loads.fill(Dual::default());
         loads[..efforts.len()].copy_from_slice(efforts);
-        laws.add(effects, q, v, &mut loads[..efforts.len()]);
+        laws.add(effects, [q, v, efforts], &mut loads[..efforts.len()]);
         memories.add_efforts(&mut loads[..efforts.len()]);
         flexible::subtract_elastic(model, q, v, loads);
         project(model, data, residual);

@@ -77,7 +77,7 @@ impl<S: Scalar> System<S> {
         self.seals.fill(Some(S::zero()));
         if self.tangent.leans() {
             self.dynamics.seals.copy_from_slice(&self.seals);
-            let at_rest = |effects: &[(usize, JointEffect<S>)], q: &[S], _: &[S], total: &mut [S]| {
+            let at_rest = |effects: &[(usize, JointEffect<S>)], [q, _, _]: [&[S]; 3], total: &mut [S]| {
                 effects.iter().for_each(|(joint, effect)| total[*joint] += effect.effort_at_rest(q[*joint]));
             };
             let chord = |law: &ContactFriction<S>, square, normal| law.chord(square) * normal;
@@ -94,7 +94,8 @@ impl<S: Scalar> System<S> {
         let n = self.coordinates();
         self.resistances.fill(S::zero());
         for (joint, effect) in &self.dynamics.effects {
-            self.resistances[*joint] += effect.resistance(x[*joint], x[n + joint]);
+            let (q, v, load) = (x[*joint], x[n + joint], self.dynamics.efforts[*joint].abs());
+            self.resistances[*joint] += effect.resistance(q, v) + effect.resistance_per_load(v) * load;
         }
         let (v, first) = (&x[n..2 * n], self.dynamics.first_memory());
         self.dynamics.memories.fadings(&x[first..], v, &mut self.fadings);

@@ -30,8 +30,8 @@ pub(super) struct Lanes<S, const N: usize> {
 
 /// What effects and contacts do in a right-hand side.
 pub(super) trait Laws<S: Scalar> {
-    /// Adds the efforts of the effects on the joints at (q, v).
-    fn add(&self, effects: &[(usize, JointEffect<S>)], q: &[S], v: &[S], total: &mut [S]);
+    /// Adds the efforts of the effects on the joints at (q, v) where the actuators push with u.
+    fn add(&self, effects: &[(usize, JointEffect<S>)], state: [&[S]; 3], total: &mut [S]);
     /// Resistance of a contact's friction at the square of its velocity, under its normal force.
     fn resistance(&self, law: &ContactFriction<S>, square: S, normal: S) -> S;
 }
@@ -41,8 +41,8 @@ pub(super) trait Laws<S: Scalar> {
 struct Exact;
 
 impl<S: Scalar> Laws<S> for Exact {
-    fn add(&self, effects: &[(usize, JointEffect<S>)], q: &[S], v: &[S], total: &mut [S]) {
-        add_effects(effects, q, v, total);
+    fn add(&self, effects: &[(usize, JointEffect<S>)], state: [&[S]; 3], total: &mut [S]) {
+        add_effects(effects, state, total);
     }
     fn resistance(&self, law: &ContactFriction<S>, square: S, normal: S) -> S {
         law.resistance(square, normal)
@@ -57,8 +57,7 @@ impl<S: Scalar, const N: usize> Laws<Dual<S, N>> for Chords<'_, S> {
     fn add(
         &self,
         effects: &[(usize, JointEffect<Dual<S, N>>)],
-        q: &[Dual<S, N>],
-        v: &[Dual<S, N>],
+        [q, v, _]: [&[Dual<S, N>]; 3],
         total: &mut [Dual<S, N>],
     ) {
         for (joint, effect) in effects {
@@ -173,7 +172,7 @@ impl<S: Scalar, const N: usize> Lanes<S, N> {
                 // A column before `first` wraps around to a lane that does not exist, which gives a constant.
                 *state = Dual::variable(value, column.wrapping_sub(first));
             }
-            let add = |effects: &[_], q: &[_], v: &[_], total: &mut [_]| laws.add(effects, q, v, total);
+            let add = |effects: &[_], state: [&[_]; 3], total: &mut [_]| laws.add(effects, state, total);
             let resistance = |law: &_, square, normal| laws.resistance(law, square, normal);
             self.dynamics.rhs_with(&self.state, &mut self.rate, (add, resistance));
             for (row, rate) in matrix.chunks_exact_mut(dim).zip(&self.rate) {

@@ -1,0 +1,138 @@
+"""What a residual depends on: the share of it that each state predicts on records that were not looked at."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vpm.discrepancy.confirmation import Data, Judged
+from vpm.identify import InverseDynamicsProblem
+
+Array = NDArray[np.float64]
+
+#: A state, the direction of the motion (0 or 1) and what is to be predicted.
+Cells = tuple[Array, NDArray[np.int64], Array]
+
+#: Bins of a state.
+BINS = 10
+#: Strength of the pull of a bin towards zero, in samples of a bin that all alike would fill.
+PULL = 0.02
+#: The direction of the motion takes part in the name of a state if it adds this share.
+DIRECTION_ADDS = 0.05
+#: Frequencies of a disturbance that is looked for: at least this many periods in a record.
+FEWEST_PERIODS = 3.0
+#: Most samples of a record that take part in the search for a frequency.
+MOST_SAMPLES = 3000
+
+
+@dataclass(frozen=True)
+class Rhythm:
+    """A disturbance that repeats in time: its period in s, and the share of the unseen residual that it takes."""
+
+    period: float
+    share: float
+
+
+def busiest_joint(data: Data, final: Judged) -> int:
+    """The joint whose residual on unseen data is the largest part of its effort."""
+    sums = np.zeros(len(data.unseen.joints))
+    for record in range(len(data.unseen.motions)):
+        for column, block in enumerate(data.unseen.efforts(record)):
+            scale = max(block.scale * block.weight, 1e-300)
+            sums[column] += float(np.sum((final.unseen[block.samples] / scale) ** 2))
+    return int(np.argmax(sums))
+
+
+def shares(data: Data, final: Judged, joint: int) -> dict[str, float]:
+    """Share of one joint's unseen residual that a map of each state, drawn from the training residual, predicts.
+
+    A map is a table of means over bins of equal count, for both directions of the motion or for each on its own.
+    """
+    sides = []
+    for problem, residual in ((data.training, final.fit.residual), (data.unseen, final.unseen)):
+        sides.append((_states(problem, final, joint), _residual(problem, residual, joint)))
+    (seen, target), (met, left) = sides
+    found = {}
+    for name in seen:
+        edges = np.quantile(seen[name], np.linspace(0.0, 1.0, BINS + 1)[1:-1])
+        direction = [np.zeros(values.size, dtype=np.int64) for values in (target, left)]
+        plain = _predicted((seen[name], direction[0], target), (met[name], direction[1], left), edges)
+        if name.startswith("velocity of " + data.training.joints[joint]):
+            found[name] = plain
+            continue
+        own = f"velocity of {data.training.joints[joint]}"
+        signs = [(states[own] > 0.0).astype(np.int64) for states in (seen, met)]
+        both = _predicted((seen[name], signs[0], target), (met[name], signs[1], left), edges)
+        with_direction = both > plain + DIRECTION_ADDS
+        found[f"{name} and direction" if with_direction else name] = both if with_direction else plain
+    return dict(sorted(found.items(), key=lambda item: -item[1]))
+
+
+def rhythm(data: Data, final: Judged, joint: int) -> Rhythm | None:
+    """The frequency in time that stands out of the training residual, with its share of the unseen one.
+
+    The phase is free on the unseen records: nobody knows when they began in the beat of the disturbance.
+    """
+    series = [_series(data.training, final.fit.residual, joint), _series(data.unseen, final.unseen, joint)]
+    shortest = min(time[-1] - time[0] for time, _ in series[0])
+    step = max(float(np.median(np.diff(time))) for time, _ in series[0])
+    frequencies = np.arange(FEWEST_PERIODS / shortest, 0.25 / step, 0.2 / shortest)
+    if not frequencies.size:
+        return None
+    power = [sum(_line(time, values, f) for time, values in series[0]) for f in frequencies]
+    best = float(frequencies[int(np.argmax(power))])
+    fine = best + np.linspace(-0.2, 0.2, 41) / shortest
+    best = float(fine[int(np.argmax([sum(_line(t, x, f) for t, x in series[0]) for f in fine]))])
+    total = sum(float(values @ values) for _, values in series[1])
+    share = sum(_line(time, values, best) for time, values in series[1]) / total if total > 0.0 else 0.0
+    return Rhythm(1.0 / best, share)
+
+
+def _series(problem: InverseDynamicsProblem, residual: Array, joint: int) -> list[tuple[Array, Array]]:
+    blocks = [problem.efforts(record)[joint] for record in range(len(problem.motions))]
+    thin = [max(1, block.time.size // MOST_SAMPLES) for block in blocks]
+    return [(b.time[::t], residual[b.samples][::t]) for b, t in zip(blocks, thin, strict=True)]
+
+
+def _line(time: Array, values: Array, frequency: float) -> float:
+    phase = 2.0 * np.pi * frequency * time
+    columns = np.column_stack([np.cos(phase), np.sin(phase)])
+    right = columns.T @ values
+    return float(right @ np.linalg.lstsq(columns.T @ columns, right, rcond=None)[0])
+
+
+def _residual(problem: InverseDynamicsProblem, residual: Array, joint: int) -> Array:
+    return np.concatenate([residual[problem.efforts(r)[joint].samples] for r in range(len(problem.motions))])
+
+
+def _states(problem: InverseDynamicsProblem, final: Judged, joint: int) -> Mapping[str, Array]:
+    """Every state by name: of all joints, the load of this one, logged pressures, and the time in the record."""
+    found: dict[str, list[Array]] = {}
+    for record, m in enumerate(problem.motions):
+        for column, name in enumerate(problem.joints):
+            for quantity, values in zip(("position", "velocity", "acceleration"), problem.state(record), strict=True):
+                found.setdefault(f"{quantity} of {name}", []).append(values[:, column])
+        _, applied, _ = problem.effort(final.model, final.model.theta, record)
+        found.setdefault(f"size of the load of {problem.joints[joint]}", []).append(np.abs(applied[:, joint]))
+        experiment = problem.experiments[record]
+        for channel in experiment.channels:
+            if ".pressure" in channel:
+                values = experiment[channel][m.kept][:: m.decimation]
+                found.setdefault(" of ".join(reversed(channel.split("."))), []).append(values)
+        time = problem.efforts(record)[joint].time
+        found.setdefault("time", []).append(time - time[0])
+    count = len(problem.motions)
+    return {name: np.concatenate(parts) for name, parts in found.items() if len(parts) == count}
+
+
+def _predicted(seen: Cells, met: Cells, edges: Array) -> float:
+    """Share of the second target that the means of the first in its bins predict."""
+    cells = [np.digitize(state, edges) * 2 + direction for state, direction, _ in (seen, met)]
+    count = np.bincount(cells[0], minlength=2 * BINS)
+    means = np.bincount(cells[0], seen[2], minlength=2 * BINS) / (count + PULL * seen[2].size / BINS)
+    power = float(met[2] @ met[2])
+    left = met[2] - means[cells[1]]
+    return max(0.0, 1.0 - float(left @ left) / power) if power > 0.0 else 0.0

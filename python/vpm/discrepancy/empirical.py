@@ -1,0 +1,191 @@
+"""What is said where no effect explains a residual: on what it depends, and a formula that is no more than a fit."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from vpm.catalogue.empirical import TERMS
+from vpm.discrepancy.confirmation import Data, Judged, judge
+from vpm.discrepancy.dependence import Rhythm, busiest_joint, rhythm, shares
+from vpm.discrepancy.diagnosis import Empirical, EmpiricalTerm
+from vpm.discrepancy.formula import Formula, select
+from vpm.errors import DivergedError
+from vpm.identify import gain, segments
+from vpm.model import Model
+
+#: Share of the unseen mean square that a formula has to take away to be put into the model.
+LEAST_GAIN = 0.1
+#: Time has to predict this much more of the residual than any state of the machine before it is named in its place.
+TIME_AHEAD = 0.1
+#: Least share of the residual that a state has to predict to be named.
+NAMED = 0.1
+#: A later model has to leave less than this share of what an earlier one leaves.
+CLEARLY = 0.9
+#: Share of the weightiest term below which a term is left out.
+SMALL = 0.03
+#: A period may move by this factor when the formula is fitted.
+PERIOD_RANGE = 1.15
+
+
+def describe_best(bases: Sequence[Judged], data: Data) -> tuple[Empirical, Judged, int]:
+    """The description that leaves least on unseen data, of several models to begin with, and the place of its model.
+
+    Effects that come closest and explain little may stand in the way of a formula: it is sought without them too.
+    A later model has to leave clearly less than an earlier one.
+    """
+    best: tuple[Empirical, Judged, int] | None = None
+    for place, base in enumerate(bases):
+        told, final = describe(base, data)
+        if best is None or told.after < CLEARLY * best[0].after:
+            best = told, final, place
+    if best is None:
+        raise ValueError("there is no model to describe")
+    return best
+
+
+def describe(final: Judged, data: Data) -> tuple[Empirical, Judged]:
+    """Describe what a model leaves, and add a formula for it to the model where one predicts the unseen data.
+
+    What runs with the time of the record, a drift or a rhythm, is told in words: as a force of the machine's state it
+    would be wrong in the next record.
+
+    Returns
+    -------
+    Empirical
+    Judged
+        With the formula in the model, or ``final`` as it was.
+    """
+    joint = busiest_joint(data, final)
+    channel = data.unseen.efforts(0)[joint].channel
+    states, beat = shares(data, final, joint), rhythm(data, final, joint)
+    formula = select(final, data)
+    fitted = None
+    if formula is not None:
+        fitted = _fit(formula, final, data)
+        if (shorter := _without_small(formula, fitted)) != formula:
+            formula, fitted = shorter, _fit(shorter, final, data)
+    told = gain(final.unseen, final.unseen if fitted is None else fitted.unseen, segments(data.unseen))
+    remark = _in_time(states, beat, told.relative)
+    if remark or formula is None or fitted is None or told.relative < LEAST_GAIN:
+        sentence = _say_without(channel, states, remark)
+        return Empirical(channel, states, remark, "", (), told.before, told.before, sentence), final
+    text = "; ".join(_text(formula, fitted.model, at) for at in formula.terms)
+    sentence = _say(channel, states, text, told.after / told.before)
+    return Empirical(channel, states, "", text, _terms(formula, fitted), told.before, told.after, sentence), fitted
+
+
+def _fit(formula: Formula, final: Judged, data: Data) -> Judged:
+    """Fit the coefficients, and the periods of harmonic terms, together with all that is free."""
+    model = formula.add_to(final.model)
+    own = [f"{joint}.empirical.{term}" for joint, terms in formula.terms.items() for term in terms]
+    # In a first step the sizes alone: a period has no meaning while they are zero.
+    sized = _judge(model, (*final.free, *own), data, dict(final.bounds))
+    periods = [f"{joint}.empirical.period" for joint, shapes in formula.shapes.items() if "period" in shapes]
+    if not periods:
+        return sized
+    bounds = dict(final.bounds)
+    for name in periods:
+        value = model.parameters[name].value
+        bounds[name] = (value / PERIOD_RANGE, value * PERIOD_RANGE)
+    return _judge(sized.model, (*final.free, *own, *periods), data, bounds)
+
+
+def _without_small(formula: Formula, fitted: Judged) -> Formula:
+    """Drop what hardly moves the residual once periods are right; the sines of one wave go together."""
+    weight = {}
+    for joint, terms in formula.terms.items():
+        for term in terms:
+            place = fitted.free.index(f"{joint}.empirical.{term}")
+            weight[joint, term] = float(np.linalg.norm(fitted.fit.jacobian[:, place]) * abs(fitted.fit.values[place]))
+    least = SMALL * max(weight.values())
+    kept = {}
+    for joint, terms in formula.terms.items():
+        pairs = {term: term.replace("cosine", "sine") for term in terms}
+        heavy = {pairs[term] for term in terms if weight[joint, term] >= least}
+        kept[joint] = tuple(term for term in terms if pairs[term] in heavy)
+    shapes = {joint: dict(formula.shapes[joint]) for joint, terms in kept.items() if terms}
+    for joint, own in shapes.items():
+        if not any("sine" in term for term in kept[joint]):
+            own.pop("period", None)
+    return Formula({joint: terms for joint, terms in kept.items() if terms}, shapes)
+
+
+def _judge(model: Model, free: tuple[str, ...], data: Data, bounds: dict[str, tuple[float, float]]) -> Judged:
+    try:
+        return judge(model, free, data, bounds)
+    except DivergedError:
+        return judge(model, free, replace(data, simulation=None), bounds)
+
+
+def _terms(formula: Formula, fitted: Judged) -> tuple[EmpiricalTerm, ...]:
+    found = []
+    for joint, terms in formula.terms.items():
+        for term in terms:
+            name = f"{joint}.empirical.{term}"
+            parameter = fitted.model.parameters[name]
+            std = float(fitted.fit.std[fitted.free.index(name)])
+            found.append(EmpiricalTerm(joint, TERMS[term], name, parameter.value, std, parameter.unit))
+    return tuple(found)
+
+
+def _text(formula: Formula, model: Model, joint: str) -> str:
+    """``tau = -(0.31 s + 0.12 s x) N at axis, with x = (q - 0.2 m)/0.5 m, s = tanh(v/0.01 m/s)``."""
+    value = {name: model.parameters[f"{joint}.empirical.{name}"] for name in formula.shapes[joint]}
+    terms = formula.terms[joint]
+
+    def written(name: str) -> str:
+        return f"{value[name].value:.4g} {value[name].unit}"
+
+    sums = [f"{model.parameters[f'{joint}.empirical.{t}'].value:+.3g} {TERMS[t]}" for t in terms]
+    unit = next((model.parameters[f"{joint}.empirical.{t}"].unit for t in terms if not t.startswith("load")), "")
+    used = " ".join(TERMS[t] for t in terms)
+    meanings = {
+        "x": f"x = (q - {written('middle')})/({written('reach')})",
+        "y": f"y = v/({written('speed')})",
+        "s": f"s = tanh(v/({written('transition_velocity')}))",
+        "phi": f"phi = 2 pi q/({written('period')})" if "period" in value else "",
+        "|u|": "u the effort of the actuators",
+    }
+    words = set(used.replace("cos(phi)", "phi").replace("sin(phi)", "phi").replace("^2", "").replace("^3", "").split())
+    words |= {"y"} if "y|y|" in words else set()
+    with_what = ", ".join(text for word, text in meanings.items() if word in words and text)
+    body = " ".join(sums).removeprefix("+")
+    return f"tau = -({body}) {unit}".rstrip() + f" at {joint}" + (f", with {with_what}" if with_what else "")
+
+
+def _in_time(states: dict[str, float], beat: Rhythm | None, told: float) -> str:
+    """What runs with the time and not with the machine, in words; empty if the formula or a state says as much."""
+    time = max((share for name, share in states.items() if name.startswith("time")), default=0.0)
+    machine = max((told, *(share for name, share in states.items() if not name.startswith("time"))))
+    if beat is not None and beat.share > max(machine, time) + TIME_AHEAD:
+        return (
+            f"it repeats every {beat.period:.3g} s whatever the machine does ({100 * beat.share:.0f} % of it), so that "
+            "something outside of the machine, or its controller, disturbs it"
+        )
+    if time > machine + TIME_AHEAD:
+        return (
+            f"it changes with the time in the record ({100 * time:.0f} % of it), not with the state of the machine: "
+            "something drifts, as friction does while a machine warms up"
+        )
+    return ""
+
+
+def _depends(states: dict[str, float]) -> str:
+    named = [f"{name} ({100 * share:.0f} %)" for name, share in states.items() if share >= NAMED][:3]
+    return f"it follows {', '.join(named)}" if named else "no single state of the machine predicts it"
+
+
+def _say(channel: str, states: dict[str, float], text: str, ratio: float) -> str:
+    return (
+        f"Of the residual of {channel}: {_depends(states)}. A fit, which is no physics, brings it down to "
+        f"{100 * ratio:.0f} % on unseen data and stands in the repaired model as empirical_force: {text}."
+    )
+
+
+def _say_without(channel: str, states: dict[str, float], remark: str) -> str:
+    if remark:
+        return f"Of the residual of {channel}: {remark}; no force law was made of it."
+    return f"Of the residual of {channel}: {_depends(states)}, and no short formula predicts it on unseen data."

@@ -1,0 +1,125 @@
+"""Two effects that one record cannot tell apart, and the experiment that can."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import vpm
+from vpm.discrepancy import ProposedExperiment
+
+Array = NDArray[np.float64]
+
+AXIS = """
+name = "axis"
+gravity = [0, 0, 0]
+[bodies.carriage]
+mass = { value = 2.0, uncertainty = 0.2 }
+[joints.axis]
+type = "prismatic"
+parent = "world"
+child = "carriage"
+axis = [1, 0, 0]
+[actuators.drive]
+joint = "axis"
+gain = 1.0
+command_unit = "N"
+[[effects]]
+type = "viscous_friction"
+at = "axis"
+viscous = { value = 3.0, uncertainty = 1.0 }
+"""
+STEP, NOISE = 1e-3, 0.02
+
+
+def forward_only(seed: int, load: float) -> vpm.Experiment:
+    """A motion that never turns round, with a constant load, by closed forms and not by the simulator."""
+    generator = np.random.default_rng(seed)
+    time = STEP * np.arange(8000)
+    position, velocity, acceleration = 0.5 * time, np.full_like(time, 0.5), np.zeros_like(time)
+    for number in range(1, 7):
+        rate = 2.0 * np.pi * 0.25 * number
+        size, phase = 0.3 / (6 * rate), generator.uniform(0.0, 2.0 * np.pi)
+        position += size * np.sin(rate * time + phase)
+        velocity += size * rate * np.cos(rate * time + phase)
+        acceleration -= size * rate**2 * np.sin(rate * time + phase)
+    assert velocity.min() > 0.05
+    effort = 2.0 * acceleration + 3.0 * velocity + load + NOISE * generator.standard_normal(time.size)
+    return vpm.Experiment.from_arrays(
+        time,
+        {"axis.position": position, "drive.command": effort},
+        units={"axis.position": "m", "drive.command": "N"},
+        name=f"forward {seed}",
+    )
+
+
+@pytest.fixture(scope="module")
+def why() -> vpm.Diagnosis:
+    return vpm.diagnose(vpm.Model.from_toml(AXIS), [forward_only(1, 2.0), forward_only(2, 2.0)], forward_only(3, 2.0))
+
+
+def test_a_load_and_a_friction_are_the_same_in_one_direction(why: vpm.Diagnosis) -> None:
+    assert why.verdict == "effect_found"
+    named = {why.effects[0].name, *(other.split(" at ")[0] for a in why.ambiguous_with for other in a.others)}
+    assert {"bias_force", "coulomb_friction"} <= named
+
+
+def proposed(why: vpm.Diagnosis) -> ProposedExperiment:
+    return next(e for e in why.experiments if {"bias_force", "coulomb_friction"} == pair(e))
+
+
+def pair(experiment: ProposedExperiment) -> set[str]:
+    return {experiment.effect.split(" at ")[0], experiment.rival.split(" at ")[0]}
+
+
+def test_the_experiment_turns_round_and_shows_many_times_the_noise(why: vpm.Diagnosis) -> None:
+    best = proposed(why)
+    speed = np.gradient(best.excitation["axis.position"], best.excitation.time_step)
+    assert speed.min() < -0.01
+    assert speed.max() > 0.01
+    assert best.ratio > 20.0
+    # Of a force of 2 N that turns its sign, no constant can take more than the mean away.
+    assert 1.0 < best.difference < 4.5
+    assert "times the noise" in best.sentence
+    assert best.channel == "axis.effort"
+
+
+def test_it_stays_within_what_was_seen(why: vpm.Diagnosis) -> None:
+    position = np.concatenate([forward_only(seed, 2.0)["axis.position"] for seed in (1, 2)])
+    for experiment in why.experiments:
+        values = experiment.excitation["axis.position"]
+        assert position.min() <= values.min()
+        assert values.max() <= position.max()
+
+
+def test_the_experiment_when_made_names_the_true_effect(why: vpm.Diagnosis, tmp_path: Path) -> None:
+    """The proposed motion, run with the constant load that is really there, leaves one name."""
+    path = proposed(why).excitation.to_csv(tmp_path / "motion.csv")
+    motion = vpm.Experiment.load(path)
+    generator = np.random.default_rng(5)
+    time = motion.time
+    position = motion["axis.position"]
+    velocity = np.gradient(position, time)
+    effort = 2.0 * np.gradient(velocity, time) + 3.0 * velocity + 2.0 + NOISE * generator.standard_normal(time.size)
+    made = vpm.Experiment.from_arrays(
+        time,
+        {"axis.position": position, "drive.command": effort},
+        units={"axis.position": "m", "drive.command": "N"},
+        name="made",
+    )
+    model = vpm.Model.from_toml(AXIS)
+    names = ["bias_force", "coulomb_friction"]
+    again = vpm.diagnose(model, [forward_only(1, 2.0), made.split(0.5)[0]], made.split(0.5)[1], effects=names)
+    assert [e.name for e in again.effects] == ["bias_force"]
+    assert not again.ambiguous_with
+    assert not again.experiments
+
+
+def test_a_file_keeps_the_experiments(why: vpm.Diagnosis, tmp_path: Path) -> None:
+    assert vpm.Diagnosis.load(why.save(tmp_path / "why.npz")).experiments == why.experiments
+    told = why.to_dict()["experiments"]
+    assert isinstance(told, list)
+    assert len(told) == len(why.experiments)
