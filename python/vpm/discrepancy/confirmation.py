@@ -19,6 +19,10 @@ Array = NDArray[np.float64]
 #: A refit stops when the sum of squares changes by less than this share: far below what a verdict rests on.
 TOLERANCE = 1e-6
 
+#: Effects under which a joint can stick, and the share of its largest speed below which it may.
+DRY = ("coulomb_friction", "stribeck_friction", "hysteresis")
+CREEPING = 0.05
+
 
 @dataclass(frozen=True)
 class Data:
@@ -70,6 +74,8 @@ class Trial:
         Against the model without the effect.
     simulated : Gain or None
         The same by simulation of the unseen records; None where they were not simulated.
+    away : Gain or None
+        The unseen gain away from reversals, for an effect of a drive or an instrument on a machine with dry friction.
     diverged : str
         Why the simulation of the unseen records stopped, or "".
     clear : bool
@@ -83,6 +89,7 @@ class Trial:
     training: Gain
     unseen: Gain
     simulated: Gain | None
+    away: Gain | None
     diverged: str
     clear: bool
 
@@ -139,6 +146,7 @@ def confirm(current: Judged, data: Data, probe: Probe) -> Trial:
         ),
         gain(current.unseen, judged.unseen * _shrinkage(data.unseen, current, judged), segments(data.unseen)),
         _simulated_gain(current, judged, data),
+        _away_gain(current, judged, data.unseen, probe),
         diverged,
         is_clear(judged, own),
     )
@@ -159,6 +167,26 @@ def _simulated_gain(current: Judged, judged: Judged, data: Data) -> Gain | None:
     if data.simulation is None or current.simulated is None or judged.simulated is None:
         return None
     return gain(current.simulated, judged.simulated, segments(data.simulation))
+
+
+def _away_gain(current: Judged, judged: Judged, data: InverseDynamicsProblem, probe: Probe) -> Gain | None:
+    """Gain on samples at which every joint is clearly in motion.
+
+    Where a joint with dry friction turns round it sticks for a while, which no smooth law follows, and a late drive or
+    sensor imitates that; elsewhere it cannot.
+    """
+    dry = any(effect.name in DRY for effect in current.model.effects)
+    if not dry or probe.candidate.effect.site not in {"actuator", "sensor"}:
+        return None
+    counted = np.ones(current.unseen.size)
+    speeds = [np.abs(data.state(record)[1]) for record in range(len(data.motions))]
+    largest = np.max([np.quantile(speed, 0.999, axis=0) for speed in speeds], axis=0)
+    for record, speed in enumerate(speeds):
+        slow = (speed < CREEPING * largest).any(axis=1)
+        near = slow | np.append(slow[1:], False) | np.insert(slow[:-1], 0, False)
+        for block in data.efforts(record):
+            counted[block.samples] = ~near
+    return gain(current.unseen * counted, judged.unseen * counted, segments(data))
 
 
 def _bounds(probe: Probe) -> dict[str, tuple[float, float]]:
@@ -208,7 +236,17 @@ def _release(
 
 
 def is_clear(judged: Judged, own: tuple[str, ...]) -> bool:
-    """Whether an effect's linear parameters (its size) differ from zero together."""
+    """Whether an effect's linear parameters (its size) differ from zero together, for the shape that was found.
+
+    Size and shape of a law often make up for each other (a friction close to rest that is higher and fades sooner), and
+    where there is no size, there is no shape to be uncertain of.
+    """
     size = [n for n in own if judged.model.parameters[n].kind == "linear"] or list(own)
+    shape = [judged.free.index(name) for name in own if name not in size]
     index = [judged.free.index(name) for name in size]
-    return size_is_clear(size, judged.fit.values[index], judged.fit.covariance[np.ix_(index, index)])
+    full = judged.fit.covariance
+    covariance = full[np.ix_(index, index)]
+    if shape and np.all(np.isfinite(full[np.ix_(index + shape, index + shape)])):
+        across = full[np.ix_(index, shape)]
+        covariance = covariance - across @ np.linalg.pinv(full[np.ix_(shape, shape)], hermitian=True) @ across.T
+    return size_is_clear(size, judged.fit.values[index], covariance)

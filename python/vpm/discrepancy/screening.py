@@ -64,8 +64,8 @@ class Probe:
 
     @property
     def score(self) -> float:
-        """Drop per fitted number: richer effects have to earn every number they bring."""
-        return self.drop / max(1, len(self.free))
+        """Drop per root of the fitted numbers: richer effects have to earn the numbers they bring."""
+        return self.drop / max(1, len(self.free)) ** 0.5
 
 
 @dataclass(frozen=True)

@@ -7,13 +7,13 @@ the nominal model, the recalibrated one and every candidate effect on the same s
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import maximum_filter1d
+from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from vpm.errors import IdentificationError, near_match
 from vpm.experiment import Experiment, Motion, parallel_filter
@@ -28,6 +28,8 @@ Array = NDArray[np.float64]
 
 #: A joint stands still where it is slower than this share of its largest speed for two decimated samples on end.
 STANDSTILL_SHARE = 0.005
+#: A drive rests where its joint is slower than this share of its largest speed, in the mean over this time, s.
+REST_SHARE, REST_TIME = 0.03, 0.1
 #: A record with fewer samples after decimation says nothing about anything.
 FEWEST_SAMPLES = 12
 #: Modes that simulate a record as a whole from its first sample.
@@ -126,6 +128,8 @@ class InverseDynamicsProblem:
         self.motions: tuple[Motion, ...] = tuple(joint_motion(e, model, cutoff, commanded=True) for e in experiments)
         for m in self.motions:
             check_along(model, m.joints)
+        # The parallel filter passes over whole records: where one begins and ends at rest there is nothing to settle.
+        self._whole = tuple(replace(m, edge=0) for m in self.motions)
         measured = self.motions[0].joints
         moved = {joint for name in model.actuators for joint in model.joints_of_actuator(name)}
         self._joints = [place for place, joint in enumerate(measured) if joint in moved] or list(range(len(measured)))
@@ -137,23 +141,23 @@ class InverseDynamicsProblem:
     def evaluate(self, model: Model, theta: Array, columns: Sequence[int] = ()) -> tuple[Array, Array]:
         """Residual of the balance and its derivative; see :class:`Problem`."""
         residuals, jacobians = [], []
-        for m, experiment in zip(self.motions, self.experiments, strict=True):
-            answer = respond(model, theta, m, experiment, columns, self.shown)
-            measured = self._measured(experiment, m)
+        for m, whole, experiment in zip(self.motions, self._whole, self.experiments, strict=True):
+            answer = respond(model, theta, whole, experiment, columns, self.shown)
+            measured = self._measured(experiment)
             residual = np.hstack([(answer.applied - answer.required)[:, self._joints], measured - answer.seen])
-            residuals.append(parallel_filter(residual, m.decimation))
+            residuals.append(_filtered(residual, m))
             slopes = -np.concatenate([answer.balance[:, self._joints], answer.slopes], axis=1)
             flat = slopes.reshape(len(residual), -1)
-            kept = parallel_filter(flat, m.decimation) if columns else np.zeros((len(residuals[-1]), 0))
+            kept = _filtered(flat, m) if columns else np.zeros((len(residuals[-1]), 0))
             jacobians.append(kept.reshape(len(residuals[-1]), residual.shape[1], len(columns)))
         return self._stack(residuals), self._stack(jacobians)
 
     def effort(self, model: Model, theta: Array, record: int) -> tuple[Array, Array, Array]:
         """Time, applied and required effort (n, joints) of one record, filtered as in the residual."""
         m = self.motions[record]
-        answer = respond(model, theta, m, self.experiments[record], (), ())
-        pair = [parallel_filter(side[:, self._joints], m.decimation) for side in (answer.applied, answer.required)]
-        return self._retained_time(m), pair[0], pair[1]
+        answer = respond(model, theta, self._whole[record], self.experiments[record], (), ())
+        pair = [_filtered(side[:, self._joints], m) for side in (answer.applied, answer.required)]
+        return m.time[_retained(m)], pair[0], pair[1]
 
     def strength(self, model: Model) -> float:
         """Root mean square of the weighted applied effort over all records: what a relative error is relative to."""
@@ -173,7 +177,7 @@ class InverseDynamicsProblem:
         """Position, velocity and acceleration (n, joints) of one record at the retained samples."""
         m = self.motions[record]
         position, velocity, acceleration = (
-            x[m.kept][:: m.decimation][:, self._joints] for x in (m.position, m.velocity, m.acceleration)
+            x[_retained(m)][:, self._joints] for x in (m.position, m.velocity, m.acceleration)
         )
         return position, velocity, acceleration
 
@@ -182,13 +186,10 @@ class InverseDynamicsProblem:
         first = record * (len(self.joints) + len(self.shown))
         return self.blocks[first : first + len(self.joints)]
 
-    def _measured(self, experiment: Experiment, m: Motion) -> Array:
-        """Logged channels (n, shown) between the two ends."""
-        columns = [experiment[channel][m.kept] for channel in self.shown]
-        return np.column_stack(columns) if columns else np.zeros((len(m.time[m.kept]), 0))
-
-    def _retained_time(self, m: Motion) -> Array:
-        return m.time[m.kept][:: m.decimation]
+    def _measured(self, experiment: Experiment) -> Array:
+        """Logged channels (N, shown)."""
+        columns = [experiment[channel] for channel in self.shown]
+        return np.column_stack(columns) if columns else np.zeros((len(experiment), 0))
 
     def _lay_out(self, model: Model) -> tuple[Block, ...]:
         sizes, moving = self._sizes(model)
@@ -196,7 +197,7 @@ class InverseDynamicsProblem:
         channels = (*(f"{joint}.effort" for joint in self.joints), *self.shown)
         blocks, start = [], 0
         for record, m in enumerate(self.motions):
-            time = self._retained_time(m)
+            time = m.time[_retained(m)]
             for column, channel in enumerate(channels):
                 weight = 1.0 if len(channels) == 1 or typical[column] == 0.0 else 1.0 / float(typical[column])
                 scale, counts = float(sizes[record][column]), moving[record][:, column]
@@ -220,21 +221,45 @@ class InverseDynamicsProblem:
                     f"{m.cutoff:.3g} Hz; record longer or pass a higher cutoff"
                 )
             efforts = np.sqrt(np.average(applied**2, axis=0, weights=moving[record]))
-            spread = np.std(parallel_filter(self._measured(experiment, m), m.decimation), axis=0)
+            spread = np.std(_filtered(self._measured(experiment), m), axis=0)
             sizes.append(np.concatenate([efforts, spread]))
-            settled = _settled(len(applied), m.decimation)[:, None]
-            moving[record] = np.hstack([moving[record], np.repeat(settled, len(self.shown), axis=1)])
+            settled = _settled(len(applied), m.decimation)
+            columns = [self._counts(model, channel, record, settled) for channel in self.shown]
+            moving[record] = np.column_stack([moving[record], *columns])
         return sizes, moving
+
+    def _counts(self, model: Model, channel: str, record: int, settled: Array) -> Array:
+        """Which samples of a shown channel count: those of a drive not while its joint rests.
+
+        What a shut valve encloses drifts with the smallest leak, and whatever load dry friction takes up does not show.
+        """
+        owner = channel.rpartition(".")[0]
+        if owner not in model.actuators:
+            return settled
+        joints = [self.joints.index(joint) for joint in model.joints_of_actuator(owner) if joint in self.joints]
+        return settled * np.prod(self._busy(record)[:, joints], axis=1)
+
+    def _busy(self, record: int) -> Array:
+        """(n, joints): 0 where a joint is slow in the mean over ``REST_TIME``, so that noise does not pass for motion."""
+        speeds = [np.abs(each.velocity[each.kept][:, self._joints]) for each in self.motions]
+        largest = np.max([np.quantile(speed, 0.999, axis=0) for speed in speeds], axis=0)
+        m = self.motions[record]
+        width = max(1, round(REST_TIME / m.dt))
+        mean = np.abs(uniform_filter1d(m.velocity[:, self._joints], width, axis=0))
+        moving = maximum_filter1d(mean, width, axis=0) > REST_SHARE * largest
+        busy = moving[_retained(m)].astype(np.float64)
+        return busy if busy.mean() >= 0.5 else np.ones_like(busy)
 
     def _moving(self) -> list[Array]:
         """For each record (n, joints): 1 where a joint moves, 0 where it stands still; all 1 if it mostly stands.
 
         Zero too where the parallel filter settles.
         """
-        speeds = [np.abs(m.velocity[m.kept][:, self._joints]) for m in self.motions]
-        largest = np.max([np.quantile(speed, 0.999, axis=0) for speed in speeds], axis=0)
+        speeds = [np.abs(m.velocity[:, self._joints]) for m in self.motions]
+        kept = [speed[m.kept] for speed, m in zip(speeds, self.motions, strict=True)]
+        largest = np.max([np.quantile(speed, 0.999, axis=0) for speed in kept], axis=0)
         masks = [
-            ~_widened(_standing(speed, STANDSTILL_SHARE * largest, m.decimation), m)[:: m.decimation]
+            ~_widened(_standing(speed, STANDSTILL_SHARE * largest, m.decimation), m)[_retained(m)]
             for m, speed in zip(self.motions, speeds, strict=True)
         ]
         mostly = np.mean(np.vstack(masks), axis=0) >= 0.5
@@ -248,6 +273,16 @@ class InverseDynamicsProblem:
         columns = [record[:, c] for record in records for c in range(record.shape[1])]
         scaled = zip(columns, self.blocks, strict=True)
         return np.concatenate([(x.T * (block.weight * block.moving)).T for x, block in scaled])
+
+
+def _retained(m: Motion) -> NDArray[np.int64]:
+    """Samples that the decimation keeps between the two ends where the motion filter settles."""
+    return np.arange(-(-m.edge // m.decimation) * m.decimation, m.time.size - m.edge, m.decimation)
+
+
+def _filtered(values: Array, m: Motion) -> Array:
+    """The parallel filter over a whole record, and of it the samples of `_retained`."""
+    return np.ascontiguousarray(parallel_filter(values, m.decimation)[_retained(m) // m.decimation])
 
 
 def _settled(samples: int, decimation: int) -> Array:
