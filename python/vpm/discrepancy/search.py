@@ -12,7 +12,7 @@ from typing import TypeVar
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from vpm.discrepancy.candidates import Key, candidates
+from vpm.discrepancy.candidates import Key, candidates, left_out
 from vpm.discrepancy.confirmation import Data, Judged, Trial, confirm, judge
 from vpm.discrepancy.diagnosis import Ambiguity, RankedCandidate, RefusedEffect
 from vpm.discrepancy.refusal import LEAST_GAIN, Thresholds, refuse_probe, refuse_trial
@@ -109,6 +109,7 @@ class _Round:
         """Probe every candidate and set aside those that cannot be."""
         current, data = self.current, self.data
         found = candidates(current.model, data.training, current.fit.residual, effects)
+        self.refused.update(left_out(current.model, data.training, effects))
         listed = [c for c in found if c.key not in without]
         self.tell(f"round {self.number}: screening {len(listed)} candidates")
         for result in _side_by_side(partial(probe, current.baseline, data.training), listed):

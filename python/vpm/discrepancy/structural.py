@@ -6,11 +6,13 @@ A spring between two masses shows by its resonance, so that stiffnesses are trie
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from vpm.catalogue import EffectType
+from vpm.errors import ModelError
+from vpm.identify.along import has_hidden
 from vpm.model import Model
 
 #: Effects whose start values are read here.
@@ -23,6 +25,9 @@ CONTACT_FREQUENCY = 50.0
 GAP_SHARES = (5e-4, 3e-3, 1.5e-2)
 #: Places of a stop, as shares of the half travel from its middle.
 STOP_SHARES = (0.6, 0.8, 0.95)
+
+#: Effects that let something move that nobody measures.
+HIDING = frozenset({"joint_compliance", "backlash", "link_flexibility"})
 
 Starts = tuple[Mapping[str, float], ...]
 Bounds = Mapping[str, tuple[float, float]]
@@ -42,6 +47,25 @@ def sites_worth_trying(effect: EffectType, model: Model) -> tuple[str, ...]:
         driven = {joint for name in model.actuators for joint in model.joints_of_actuator(name)}
         return tuple(site for site in sites if site in driven and f"{site}_deflection" not in model.joints)
     return sites
+
+
+def beyond(effect: EffectType, site: str, model: Model, measured: Sequence[str]) -> str:
+    """Why a model with one effect more could not be built, or not be balanced along the ``measured`` joints, or "".
+
+    A motion with joints that nobody measures is integrated, and there no hysteresis carries its memory along.
+    """
+    remembering = [entry.at for entry in model.effects if entry.name == "hysteresis"]
+    if effect.name == "hysteresis" and has_hidden(model, measured):
+        return "its memory cannot be balanced beside what moves unseen in this model"
+    if effect.name not in HIDING:
+        return ""
+    if remembering:
+        return f"what moves unseen cannot be balanced beside the memory of the hysteresis at {remembering[0]}"
+    try:
+        model.with_effect(effect.name, at=site)
+    except ModelError as error:
+        return f"this model cannot have it: {error}"
+    return ""
 
 
 def structural_starts(effect: str, site: str, model: Model, middle: float, travel: float) -> tuple[Starts, Bounds]:
