@@ -104,7 +104,9 @@ def candidates(
 
 def left_out(model: Model, data: InverseDynamicsProblem, effects: Sequence[str] | None = None) -> dict[Key, str]:
     """Why effects are not among the `candidates` that ``model`` could have but for what it has already."""
-    reasons = {(effect.name, site): beyond(effect, site, model, data.joints) for effect, site in _absent(model, effects)}
+    reasons = {
+        (effect.name, site): beyond(effect, site, model, data.joints) for effect, site in _absent(model, effects)
+    }
     return {key: reason for key, reason in reasons.items() if reason}
 
 

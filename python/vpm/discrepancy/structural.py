@@ -11,7 +11,6 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from vpm.catalogue import EffectType
-from vpm.errors import ModelError
 from vpm.identify.along import has_hidden
 from vpm.model import Model
 
@@ -26,6 +25,8 @@ GAP_SHARES = (5e-4, 3e-3, 1.5e-2)
 #: Places of a stop, as shares of the half travel from its middle.
 STOP_SHARES = (0.6, 0.8, 0.95)
 
+#: Least inertia on the side of the drive, as a share of what the joint moves.
+LEAST_DRIVEN = 1e-4
 #: Effects that let something move that nobody measures.
 HIDING = frozenset({"joint_compliance", "backlash", "link_flexibility"})
 
@@ -50,7 +51,7 @@ def sites_worth_trying(effect: EffectType, model: Model) -> tuple[str, ...]:
 
 
 def beyond(effect: EffectType, site: str, model: Model, measured: Sequence[str]) -> str:
-    """Why a model with one effect more could not be built, or not be balanced along the ``measured`` joints, or "".
+    """Why a model with one effect more could not be built, or balanced along the ``measured`` joints, or "".
 
     A motion with joints that nobody measures is integrated, and there no hysteresis carries its memory along.
     """
@@ -61,11 +62,19 @@ def beyond(effect: EffectType, site: str, model: Model, measured: Sequence[str])
         return ""
     if remembering:
         return f"what moves unseen cannot be balanced beside the memory of the hysteresis at {remembering[0]}"
-    try:
-        model.with_effect(effect.name, at=site)
-    except ModelError as error:
-        return f"this model cannot have it: {error}"
+    split = [(entry.name, entry.at) for entry in model.effects if entry.name in HIDING]
+    whole = model
+    for key in split:
+        whole = whole.without_effect(*key)
+    for name, at in split:
+        if _joint(whole, at) == _joint(whole, site):
+            return f"the joint is split already by {name} at {at}, and no inertia is between"
     return ""
+
+
+def _joint(model: Model, site: str) -> str:
+    """A joint itself, or the one before a body or beam."""
+    return site if site in model.joints else model.joint_before(site)
 
 
 def structural_starts(effect: str, site: str, model: Model, middle: float, travel: float) -> tuple[Starts, Bounds]:
@@ -84,17 +93,20 @@ def structural_starts(effect: str, site: str, model: Model, middle: float, trave
         reach = (middle - 1.2 * travel, middle + 1.2 * travel)
         return (*high, *low), {"low": reach, "high": reach, "width": (1e-6 * travel, 0.05 * travel)}
     inertia = _moved(model, site)
+    share = (LEAST_DRIVEN * inertia, math.inf)  # without any inertia before it a spring has nothing to swing against
     if effect == "backlash":
         stiffness = inertia * (2.0 * math.pi * CONTACT_FREQUENCY) ** 2
         damping = 2.0 * CONTACT * math.sqrt(stiffness * inertia)
         common = {"stiffness": stiffness, "damping": damping}
         gaps = [share * travel for share in GAP_SHARES]
-        return tuple({**common, "gap": gap, "width": 0.05 * gap} for gap in gaps), {"gap": (0.0, 0.5 * travel)}
+        bounds = {"gap": (0.0, 0.5 * travel), "inertia": share}
+        return tuple({**common, "gap": gap, "width": 0.05 * gap} for gap in gaps), bounds
     stiffnesses = [inertia * (2.0 * math.pi * frequency) ** 2 for frequency in FREQUENCIES]
     if effect == "link_flexibility":
         times = [LOOSE / (math.pi * frequency) for frequency in FREQUENCIES]
-        return tuple({"stiffness": k, "time": t} for k, t in zip(stiffnesses, times, strict=True)), {}
-    return tuple({"stiffness": k, "damping": 2.0 * LOOSE * math.sqrt(k * inertia)} for k in stiffnesses), {}
+        return tuple({"stiffness": k, "time": t} for k, t in zip(stiffnesses, times, strict=True)), {"inertia": share}
+    starts = tuple({"stiffness": k, "damping": 2.0 * LOOSE * math.sqrt(k * inertia)} for k in stiffnesses)
+    return starts, {"inertia": share}
 
 
 def _moved(model: Model, site: str) -> float:
