@@ -17,6 +17,7 @@ from vpm.discrepancy.confirmation import Data, Judged, Trial, confirm, judge
 from vpm.discrepancy.diagnosis import Ambiguity, RankedCandidate, RefusedEffect
 from vpm.discrepancy.refusal import LEAST_GAIN, Thresholds, refuse_probe, refuse_trial
 from vpm.discrepancy.screening import Probe, probe
+from vpm.discrepancy.structural import coupled
 from vpm.errors import DivergedError
 from vpm.identify import gain, segments
 
@@ -191,8 +192,8 @@ def _evidence(trial: Trial) -> float:
     left = np.log(max(trial.unseen.after, 1e-300) / trial.unseen.before)
     if trial.probe.candidate.effect.site == "sensor":
         left -= np.log(SENSOR_SHARE)
-    coupled = len(trial.judged.model.joints) > 1  # errors of coupled joints cancel; see refusal.CLEAR_GAIN
-    if trial.simulated is not None and trial.simulated.before > 0.0 and not coupled:
+    # Errors of coupled joints cancel; see refusal.CLEAR_GAIN.
+    if trial.simulated is not None and trial.simulated.before > 0.0 and not coupled(trial.judged.model):
         left += np.log(max(trial.simulated.after, 1e-300) / trial.simulated.before)
     return float(left)
 

@@ -72,6 +72,12 @@ def beyond(effect: EffectType, site: str, model: Model, measured: Sequence[str])
     return ""
 
 
+def coupled(model: Model) -> bool:
+    """Whether it has several joints beside those that effects have split off, whose errors can cancel each other."""
+    added = {f"{entry.at}_{suffix}" for entry in model.effects for suffix in ("bending", "deflection")}
+    return len(set(model.joints) - added) > 1
+
+
 def _joint(model: Model, site: str) -> str:
     """A joint itself, or the one before a body or beam."""
     return site if site in model.joints else model.joint_before(site)
