@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.catalogue import EFFECTS, EffectType
-from vpm.discrepancy.structural import STRUCTURAL, sites_worth_trying, structural_starts
+from vpm.discrepancy.structural import STRUCTURAL, beyond, sites_worth_trying, structural_starts
 from vpm.identify import InverseDynamicsProblem
 from vpm.model import Model
 
@@ -97,6 +97,23 @@ def candidates(
     effects : sequence of str, optional
         Restrict the search to these.
     """
+    return tuple(
+        _candidate(effect, site, model, data, residual)
+        for effect, site in _absent(model, effects)
+        if not beyond(effect, site, model, data.joints)
+    )
+
+
+def left_out(model: Model, data: InverseDynamicsProblem, effects: Sequence[str] | None = None) -> dict[Key, str]:
+    """Why effects are not among the `candidates` that ``model`` could have but for what it has already."""
+    reasons = {
+        (effect.name, site): beyond(effect, site, model, data.joints) for effect, site in _absent(model, effects)
+    }
+    return {key: reason for key, reason in reasons.items() if reason}
+
+
+def _absent(model: Model, effects: Sequence[str] | None) -> list[tuple[EffectType, str]]:
+    """Effects of the catalogue that ``model`` does not have, with each of their sites."""
     present = {(effect.name, effect.at) for effect in model.effects}
     found = []
     for effect in EFFECTS.values():
@@ -105,8 +122,8 @@ def candidates(
         for site in sites_worth_trying(effect, model):
             needed = effect.requires is None or (effect.requires, site) in present
             if (effect.name, site) not in present and needed:
-                found.append(_candidate(effect, site, model, data, residual))
-    return tuple(found)
+                found.append((effect, site))
+    return found
 
 
 def _candidate(effect: EffectType, site: str, model: Model, data: InverseDynamicsProblem, residual: Array) -> Candidate:

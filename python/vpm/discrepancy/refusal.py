@@ -8,6 +8,7 @@ from scipy.special import stdtrit
 
 from vpm.discrepancy.confirmation import Trial
 from vpm.discrepancy.screening import Probe, impossible_values
+from vpm.discrepancy.structural import coupled
 from vpm.identify.statistics import NORMAL_95
 from vpm.model import Model
 
@@ -163,8 +164,8 @@ def _worse_in_simulation(trial: Trial) -> str:
     if trial.diverged:
         return f"with it the simulation of the unseen record fails: {trial.diverged}"
     simulated = trial.simulated
-    coupled = len(trial.judged.model.joints) > 1 and trial.unseen.relative >= CLEAR_GAIN
-    if simulated is not None and simulated.relative < -LEAST_GAIN and not coupled:
+    decided = coupled(trial.judged.model) and trial.unseen.relative >= CLEAR_GAIN
+    if simulated is not None and simulated.relative < -LEAST_GAIN and not decided:
         return (
             "it helps the balance of effort and makes the simulation of the unseen record worse by "
             f"{_percent(-simulated.relative)} of its mean square"

@@ -8,12 +8,13 @@ from functools import partial
 
 import numpy as np
 
-from vpm.discrepancy.candidates import Key, candidates
+from vpm.discrepancy.candidates import Key, candidates, left_out
 from vpm.discrepancy.confirmation import Data, Judged, Trial, confirm, judge
 from vpm.discrepancy.diagnosis import Ambiguity, RankedCandidate, RefusedEffect
 from vpm.discrepancy.refusal import LEAST_GAIN, Thresholds, refuse_probe, refuse_trial
 from vpm.discrepancy.screening import Probe, probe
 from vpm.discrepancy.side_by_side import Failure, SideBySide
+from vpm.discrepancy.structural import coupled
 from vpm.discrepancy.structure import structure
 from vpm.errors import DivergedError
 from vpm.identify import gain, segments
@@ -139,6 +140,7 @@ class _Round:
         """Probe every candidate and set aside those that cannot be."""
         current, data = self.current, self.data
         found = candidates(current.model, data.training, current.fit.residual, effects)
+        self.refused.update(left_out(current.model, data.training, effects))
         listed = [c for c in found if c.key not in without and (c.effect.name in HEAVY) == heavy]
         self.tell(f"round {self.number}: screening {len(listed)} candidates")
         screen = partial(probe, current.baseline, data.training)
@@ -240,8 +242,8 @@ def _evidence(trial: Trial) -> float:
     left = np.log(max(trial.unseen.after, 1e-300) / trial.unseen.before)
     if trial.probe.candidate.effect.site == "sensor":
         left -= np.log(SENSOR_SHARE)
-    coupled = len(trial.judged.model.joints) > 1  # errors of coupled joints cancel; see refusal.CLEAR_GAIN
-    if trial.simulated is not None and trial.simulated.before > 0.0 and not coupled:
+    # Errors of coupled joints cancel; see refusal.CLEAR_GAIN.
+    if trial.simulated is not None and trial.simulated.before > 0.0 and not coupled(trial.judged.model):
         left += np.log(max(trial.simulated.after, 1e-300) / trial.simulated.before)
     return float(left)
 

@@ -197,8 +197,8 @@ impl<S: Scalar> JointEffect<S> {
         self.map(&mut |&parameter| Dual::<S, 1>::constant(parameter)).effort_at_rest(Dual::variable(q, 0)).gradient[0]
     }
 
-    /// Potential energy in J at coordinate `q`: `effort = -d potential/dq` for effects of the coordinate alone, zero for friction
-    /// and for what is read off data.
+    /// Potential energy in J at coordinate `q`: `effort = -d potential/dq` for effects of the coordinate alone, zero for friction,
+    /// for formulas and for what is read off data.
     #[inline]
     pub fn potential(&self, q: S) -> S {
         match self {
