@@ -319,6 +319,7 @@ def _verdict(
             f"explains it. Error on unseen data: {numbers}.",
         )
     agrees = max((g.before / g.noise_floor if g.noise_floor > 0.0 else np.inf) for g in main) <= FLOOR_FACTOR
+    agrees = agrees or max(g.before / g.signal if g.signal > 0.0 else 0.0 for g in main) <= NEGLIGIBLE
     better = gain(nominal.unseen, recalibrated.unseen, segments(data.unseen))
     if not agrees and better.relative > LEAST_GAIN and better.score > float(ndtri(1.0 - FALSE_ALARM_LEVEL)):
         return (
