@@ -64,6 +64,8 @@ def experiments(
     found = []
     for rivals in ambiguous:
         for trial in rivals.trials:
+            if has_hidden(trial.judged.model, data.motions[0].joints):
+                continue  # its balance needs a motion that nobody measures
             rival = trial.probe.candidate.label
             joint = _joint_of(final.model, rivals.site, data.joints)
             best = propose(final, trial.judged, (rivals.label, rival), seen_range(data, joint), noise)

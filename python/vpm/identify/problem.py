@@ -32,7 +32,7 @@ STANDSTILL_SHARE = 0.005
 #: A drive rests where its joint is slower than this share of its largest speed, in the mean over this time, s.
 REST_SHARE, REST_TIME = 0.03, 0.1
 #: A joint that moves for less than this share of all records is judged at standstill too: nothing else is left of it.
-LEAST_MOVING = 0.1
+LEAST_MOVING = 0.5
 #: A record with fewer samples after decimation says nothing about anything.
 FEWEST_SAMPLES = 12
 #: Modes that simulate a record as a whole from its first sample.
@@ -255,7 +255,7 @@ class InverseDynamicsProblem:
         return busy if busy.mean() >= 0.5 else np.ones_like(busy)
 
     def _moving(self, model: Model) -> list[Array]:
-        """For each record (n, joints): 1 where a joint moves, 0 where it stands still; all 1 if it hardly ever moves.
+        """For each record (n, joints): 1 where a joint moves, 0 where it stands still; all 1 if it mostly stands.
 
         Zero too where the parallel filter settles, and where a piston that moves it touches an end of its stroke.
         """
