@@ -205,6 +205,11 @@ def test_a_pair_knows_how_strong_each_effect_is_alone() -> None:
     assert strengths == pytest.approx([one.oracle.strength for one in alone])
 
 
+def test_what_is_exactly_a_calibratable_parameter_is_not_solvable() -> None:
+    ((_, _, strengths, _, _),) = proving.make([Job("axis_linear", "single", ("payload",), 0, 1.0)])
+    assert strengths == (0.0,)
+
+
 def test_a_case_that_blows_up_loses_itself_only(monkeypatch: pytest.MonkeyPatch) -> None:
     spring = EFFECTS["spring"]
     wild = replace(spring, draw=lambda _g, _s: {"stiffness": -1e12, "rest": 1.0})
