@@ -120,7 +120,7 @@ def _states(problem: InverseDynamicsProblem, final: Judged, joint: int) -> Mappi
         experiment = problem.experiments[record]
         for channel in experiment.channels:
             if ".pressure" in channel:
-                values = experiment[channel][m.kept][:: m.decimation]
+                values = experiment[channel][m.retained]
                 found.setdefault(" of ".join(reversed(channel.split("."))), []).append(values)
         time = problem.efforts(record)[joint].time
         found.setdefault("time", []).append(time - time[0])

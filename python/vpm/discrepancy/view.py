@@ -9,9 +9,8 @@ from numpy.typing import NDArray
 
 from vpm.catalogue import EFFECTS
 from vpm.catalogue.signature import signature_of
-from vpm.experiment import parallel_filter
 from vpm.identify import InverseDynamicsProblem
-from vpm.identify.along import respond
+from vpm.identify.along import Response, respond
 from vpm.model import Model
 
 Array = NDArray[np.float64]
@@ -94,7 +93,7 @@ class View:
             return self._state(axis)
         if axis == "effort":
             joint, m = self._joint(), self.problem.motions[self.record]
-            answer = respond(self.model, self.model.theta, m, self.problem.experiments[self.record], (), ())
+            answer = self._response(())
             values = self._kept(answer.required[:, m.joints.index(joint)])
             return f"effort that {joint} needs", self.model.channel_unit(f"{joint}.effort"), values
         actuator = self._actuator()
@@ -102,22 +101,22 @@ class View:
 
     def _time(self) -> tuple[str, str, Array]:
         m = self.problem.motions[self.record]
-        time = m.time[m.kept]
-        return "time", "s", time if self.fine else time[:: m.decimation]
+        return "time", "s", m.time[m.kept if self.fine else m.retained]
 
     def _state(self, axis: str) -> tuple[str, str, Array]:
         m, joint = self.problem.motions[self.record], self._joint()
         place, per = _STATE[axis]
-        values = (m.position, m.velocity, m.acceleration)[place][m.kept, m.joints.index(joint)]
+        rows = m.kept if self.fine else m.retained
+        values = (m.position, m.velocity, m.acceleration)[place][rows, m.joints.index(joint)]
         unit = self.model.channel_unit(f"{joint}.position") + per
-        return f"{axis} of {joint}", unit, values if self.fine else values[:: m.decimation]
+        return f"{axis} of {joint}", unit, values
 
     def _driven(self, axis: str, actuator: str) -> tuple[str, str, Array] | None:
         m = self.problem.motions[self.record]
         channel = f"{actuator}.command"
         if axis in {"command", "command_rate"} and channel in m.drivers:
             unit = self.model.channel_unit(channel)
-            values = self._kept(m.inputs[m.kept, m.drivers.index(channel)])
+            values = self._kept(m.inputs[:, m.drivers.index(channel)])
             if axis == "command":
                 return f"command of {actuator}", unit, values
             return f"rate of the command of {actuator}", f"{unit}/s", np.gradient(values, self._time()[2])
@@ -134,16 +133,22 @@ class View:
 
     def _shown(self, channel: str) -> Array | None:
         """A channel as logged, else as the repaired model works it out along the motion; None if it cannot."""
-        m, experiment = self.problem.motions[self.record], self.problem.experiments[self.record]
+        experiment = self.problem.experiments[self.record]
         if channel in experiment:
-            return self._kept(experiment[channel][m.kept])
+            return self._kept(experiment[channel])
         if channel not in self.model.output_channels:
             return None
-        return self._kept(respond(self.model, self.model.theta, m, experiment, (), (channel,)).seen[:, 0])
+        return self._kept(self._response((channel,)).seen[:, 0])
+
+    def _response(self, shown: tuple[str, ...]) -> Response:
+        """What the repaired model answers at every sample of the record."""
+        whole = replace(self.problem.motions[self.record], edge=0)
+        return respond(self.model, self.model.theta, whole, self.problem.experiments[self.record], (), shown)
 
     def _kept(self, values: Array) -> Array:
-        decimation = self.problem.motions[self.record].decimation
-        return values if self.fine else np.asarray(parallel_filter(values, decimation))
+        """Of values at every sample of the record those of this view."""
+        m = self.problem.motions[self.record]
+        return values[m.kept] if self.fine else m.parallel(values)
 
     def _joint(self) -> str:
         actuator = self._actuator()

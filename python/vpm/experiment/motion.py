@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from vpm.errors import ExperimentError, near_match
 from vpm.experiment.cutoff import HIGHEST, CutoffChoice, choose_cutoff
 from vpm.experiment.record import Experiment
-from vpm.experiment.signal import decimation_for, differentiate, lowpass, settling_samples
+from vpm.experiment.signal import decimation_for, differentiate, lowpass, parallel_filter, settling_samples
 from vpm.results import Result
 
 Array = NDArray[np.float64]
@@ -87,6 +87,28 @@ class Motion(Result):
     def kept(self) -> slice:
         """Samples between the two ends."""
         return slice(self.edge, self.time.size - self.edge)
+
+    @property
+    def retained(self) -> NDArray[np.int64]:
+        """Samples, counted from the beginning of the record, that the decimation leaves between the two ends."""
+        first = -(-self.edge // self.decimation) * self.decimation
+        return np.arange(first, self.time.size - self.edge, self.decimation)
+
+    def parallel(self, values: Array) -> Array:
+        """The parallel filter over a whole record, of which the `retained` samples are given.
+
+        Where a record begins and ends at rest the filter has nothing to settle there; cut off before it, it would.
+
+        Parameters
+        ----------
+        values : ndarray, shape (N,) or (N, k)
+
+        Returns
+        -------
+        ndarray, shape (n,) or (n, k)
+            One row for each of `retained`.
+        """
+        return np.ascontiguousarray(parallel_filter(values, self.decimation)[self.retained // self.decimation])
 
     def _headline(self) -> Mapping[str, object]:
         return {

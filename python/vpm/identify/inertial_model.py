@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from vpm.errors import IdentificationError, near_match
 from vpm.experiment import Experiment
-from vpm.experiment.signal import parallel_filter
 from vpm.identify.inertial_regression import InertialRegression
 from vpm.identify.problem import InverseDynamicsProblem
 from vpm.model import Model
@@ -169,16 +168,15 @@ def inertial_regression(
     tables, efforts, count = [], [], len(model.joints)
     for at, m in enumerate(balance.motions):
         state = (m.position, m.velocity, m.acceleration)
-        some = slice(m.edge, len(m.time) - m.edge, m.decimation)
+        some = m.retained
         linear.check((m.position[some], m.velocity[some], m.acceleration[some]), m.inputs[some], m.dt)
         effort, table = linear.lacking(state, m.inputs, m.dt)
-        size = len(m.time[m.kept])
         blocks = balance.blocks[at * len(balance.blocks) // len(given) : (at + 1) * len(balance.blocks) // len(given)]
         driven = [model.joints.index(block.channel.rpartition(".")[0]) for block in blocks]
         counted = np.stack([block.moving for block in blocks], axis=1)
-        flat = parallel_filter(table[m.kept].reshape(size, -1), m.decimation)
+        flat = m.parallel(table.reshape(len(m.time), -1))
         tables.append(flat.reshape(len(flat), count, -1)[:, driven] * counted[:, :, None])
-        efforts.append(parallel_filter(effort[m.kept], m.decimation)[:, driven] * counted)
+        efforts.append(m.parallel(effort)[:, driven] * counted)
     masses = tuple(f"{body}.mass" for body in linear.bodies)
     moments = tuple(name for name in linear.names if ".first_moment." in name)
     turning = tuple(name for name in linear.names if ".origin_inertia." in name)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from vpm.errors import IdentificationError, near_match
-from vpm.experiment import Experiment, Motion, parallel_filter
+from vpm.experiment import Experiment, Motion
 from vpm.identify.along import check_along, respond, shown_channels
 from vpm.identify.first_state import add_first_state, first_state_slopes
 from vpm.identify.parallel import in_order
@@ -148,10 +148,10 @@ class InverseDynamicsProblem:
             answer = respond(model, theta, whole, experiment, columns, self.shown)
             measured = self._measured(experiment)
             residual = np.hstack([(answer.applied - answer.required)[:, self._joints], measured - answer.seen])
-            residuals.append(_filtered(residual, m))
+            residuals.append(m.parallel(residual))
             slopes = -np.concatenate([answer.balance[:, self._joints], answer.slopes], axis=1)
             flat = slopes.reshape(len(residual), -1)
-            kept = _filtered(flat, m) if columns else np.zeros((len(residuals[-1]), 0))
+            kept = m.parallel(flat) if columns else np.zeros((len(residuals[-1]), 0))
             jacobians.append(kept.reshape(len(residuals[-1]), residual.shape[1], len(columns)))
         return self._stack(residuals), self._stack(jacobians)
 
@@ -159,8 +159,8 @@ class InverseDynamicsProblem:
         """Time, applied and required effort (n, joints) of one record, filtered as in the residual."""
         m = self.motions[record]
         answer = respond(model, theta, self._whole[record], self.experiments[record], (), ())
-        pair = [_filtered(side[:, self._joints], m) for side in (answer.applied, answer.required)]
-        return m.time[_retained(m)], pair[0], pair[1]
+        pair = [m.parallel(side[:, self._joints]) for side in (answer.applied, answer.required)]
+        return m.time[m.retained], pair[0], pair[1]
 
     def strength(self, model: Model) -> float:
         """Root mean square of the weighted applied effort over all records: what a relative error is relative to."""
@@ -174,13 +174,15 @@ class InverseDynamicsProblem:
 
     def standstill(self, record: int) -> float:
         """Share of the samples of one record that do not count because a joint stands still."""
-        return 1.0 - float(np.mean([block.moving.mean() for block in self.efforts(record)]))
+        blocks = self.efforts(record)
+        settled = _settled(len(blocks[0].time), self.motions[record].decimation) > 0.0
+        return 1.0 - float(np.mean([block.moving[settled].mean() for block in blocks]))
 
     def state(self, record: int) -> tuple[Array, Array, Array]:
         """Position, velocity and acceleration (n, joints) of one record at the retained samples."""
         m = self.motions[record]
         position, velocity, acceleration = (
-            x[_retained(m)][:, self._joints] for x in (m.position, m.velocity, m.acceleration)
+            x[m.retained][:, self._joints] for x in (m.position, m.velocity, m.acceleration)
         )
         return position, velocity, acceleration
 
@@ -200,7 +202,7 @@ class InverseDynamicsProblem:
         channels = (*(f"{joint}.effort" for joint in self.joints), *self.shown)
         blocks, start = [], 0
         for record, m in enumerate(self.motions):
-            time = m.time[_retained(m)]
+            time = m.time[m.retained]
             for column, channel in enumerate(channels):
                 weight = 1.0 if len(channels) == 1 or typical[column] == 0.0 else 1.0 / float(typical[column])
                 scale, counts = float(sizes[record][column]), moving[record][:, column]
@@ -224,7 +226,7 @@ class InverseDynamicsProblem:
                     f"{m.cutoff:.3g} Hz; record longer or pass a higher cutoff"
                 )
             efforts = np.sqrt(np.average(applied**2, axis=0, weights=moving[record]))
-            spread = np.std(_filtered(self._measured(experiment), m), axis=0)
+            spread = np.std(m.parallel(self._measured(experiment)), axis=0)
             sizes.append(np.concatenate([efforts, spread]))
             settled = _settled(len(applied), m.decimation)
             columns = [self._counts(model, channel, record, settled) for channel in self.shown]
@@ -251,7 +253,7 @@ class InverseDynamicsProblem:
         width = max(1, round(REST_TIME / m.dt))
         mean = np.abs(uniform_filter1d(m.velocity[:, self._joints], width, axis=0))
         moving = maximum_filter1d(mean, width, axis=0) > REST_SHARE * largest
-        busy = moving[_retained(m)].astype(np.float64)
+        busy = moving[m.retained].astype(np.float64)
         return busy if busy.mean() >= 0.5 else np.ones_like(busy)
 
     def _moving(self, model: Model) -> list[Array]:
@@ -263,7 +265,7 @@ class InverseDynamicsProblem:
         kept = [speed[m.kept] for speed, m in zip(speeds, self.motions, strict=True)]
         largest = np.max([np.quantile(speed, 0.999, axis=0) for speed in kept], axis=0)
         masks = [
-            ~_widened(_standing(speed, STANDSTILL_SHARE * largest, m.decimation), m)[_retained(m)]
+            ~_widened(_standing(speed, STANDSTILL_SHARE * largest, m.decimation), m)[m.retained]
             for m, speed in zip(self.motions, speeds, strict=True)
         ]
         moves = np.mean(np.vstack(masks), axis=0) >= LEAST_MOVING
@@ -276,10 +278,10 @@ class InverseDynamicsProblem:
     def _free(self, model: Model, record: int) -> NDArray[np.bool_]:
         """Where (n, joints) no piston of one record touches an end, as far as the filters carry the touch."""
         m, experiment = self.motions[record], self.experiments[record]
-        away = np.ones((len(_retained(m)), len(self.joints)), dtype=np.bool_)
+        away = np.ones((len(m.retained), len(self.joints)), dtype=np.bool_)
         for name, touching in at_stops(model, experiment, m).items():
             # An impact rings, in the oil and in the filters: three times as long as the ends of the record settle.
-            near = maximum_filter1d(touching.view(np.uint8), 6 * m.edge + 1)[_retained(m)] > 0
+            near = maximum_filter1d(touching.view(np.uint8), 6 * m.edge + 1)[m.retained] > 0
             for column, joint in enumerate(self.joints):
                 if near.any() and joint in model.joints_of_actuator(name):
                     away[:, column] &= ~near
@@ -291,16 +293,6 @@ class InverseDynamicsProblem:
         columns = [record[:, c] for record in records for c in range(record.shape[1])]
         scaled = zip(columns, self.blocks, strict=True)
         return np.concatenate([(x.T * (block.weight * block.moving)).T for x, block in scaled])
-
-
-def _retained(m: Motion) -> NDArray[np.int64]:
-    """Samples that the decimation keeps between the two ends where the motion filter settles."""
-    return np.arange(-(-m.edge // m.decimation) * m.decimation, m.time.size - m.edge, m.decimation)
-
-
-def _filtered(values: Array, m: Motion) -> Array:
-    """The parallel filter over a whole record, and of it the samples of `_retained`."""
-    return np.ascontiguousarray(parallel_filter(values, m.decimation)[_retained(m) // m.decimation])
 
 
 def _settled(samples: int, decimation: int) -> Array:
