@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import spearmanr
 
 from vpm.discrepancy.floor import white_level
 from vpm.identify import InverseDynamicsProblem, gaps
@@ -97,6 +96,8 @@ def _coloured(problem: InverseDynamicsProblem, residual: Array) -> float:
 
 def _growing(model: Model, problem: InverseDynamicsProblem, residual: Array) -> float:
     """Largest over the joints, as if every other sample were independent."""
+    from scipy.stats import spearmanr
+
     scores = []
     for joint in range(len(problem.joints)):
         sizes, efforts = [], []
