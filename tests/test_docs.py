@@ -102,7 +102,7 @@ def test_the_front_page_shows_code() -> None:
 def test_the_physics_page_lists_the_catalogue() -> None:
     text = (ROOT / "docs" / "physics.md").read_text(encoding="utf-8")
     rows = [row.split("|")[1:3] for row in re.findall(r"^\| `[a-z_]+` \|.*$", text, re.MULTILINE)]
-    listed = {effect.strip(" `"): re.findall(r"`([a-z_.]+)`", parameters) for effect, parameters in rows}
+    listed = {effect.strip(" `"): re.findall(r"`([a-z0-9_.]+)`", parameters) for effect, parameters in rows}
     for effect in EFFECTS.values():
         # The page shortens `payload.x`, `payload.y`, `payload.z` to `payload.x`, `.y`, `.z`.
         full = [name if not name.startswith(".") else effect.group + name for name in listed[effect.name]]
