@@ -97,11 +97,10 @@ def test_interrupted_search_gives_what_is_known() -> None:
     assert not diagnose(nominal(), train, test, effects=["bias_force"]).interrupted
 
 
-def test_one_processor_finds_what_many_find(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_one_processor_finds_what_many_find() -> None:
     train, test = simulate_axis(Truth(bias=5.0), 2, 12.0, first_seed=9)
     effects = ["bias_force", "spring", "dead_zone"]
-    many = diagnose(nominal(), train, test, effects=effects)
-    monkeypatch.setattr("vpm.discrepancy.search.worker_count", lambda _: 1)
-    one = diagnose(nominal(), train, test, effects=effects)
+    many = diagnose(nominal(), train, test, effects=effects, workers=3)
+    one = diagnose(nominal(), train, test, effects=effects, workers=1)
     assert [(e.name, e.gain) for e in many.effects] == [(e.name, e.gain) for e in one.effects]
     assert many.model.theta.tolist() == one.model.theta.tolist()

@@ -147,7 +147,8 @@ def diagnose(
     final, empirical, accepted = found.final, None, found.accepted
     if verdict == "unexplained" or summary.endswith(_REST):
         say("describing what is left")
-        bases = [recalibrated] if verdict == "unexplained" and accepted else []
+        # What an interrupted search accepted stands: the rounds that would have judged it anew were not to be.
+        bases = [recalibrated] if verdict == "unexplained" and accepted and not found.interrupted else []
         empirical, final, place = describe_best([*bases, found.final], data)
         accepted = () if place < len(bases) else accepted
         gap = _gaps(data, nominal, recalibrated, final, floor)

@@ -174,9 +174,13 @@ def inertial_regression(
         blocks = balance.blocks[at * len(balance.blocks) // len(given) : (at + 1) * len(balance.blocks) // len(given)]
         driven = [model.joints.index(block.channel.rpartition(".")[0]) for block in blocks]
         counted = np.stack([block.moving for block in blocks], axis=1)
+        # No equation stands at the ends, in which the filter settles: as zeros they would make the noise look smaller.
+        equations = np.flatnonzero(counted.any(axis=1))
+        inner = slice(equations[0], equations[-1] + 1)
         flat = m.parallel(table.reshape(len(m.time), -1))
-        tables.append(flat.reshape(len(flat), count, -1)[:, driven] * counted[:, :, None])
-        efforts.append(m.parallel(effort)[:, driven] * counted)
+        lines = flat.reshape(len(flat), count, -1)[:, driven] * counted[:, :, None]
+        tables.append(lines[inner])
+        efforts.append((m.parallel(effort)[:, driven] * counted)[inner])
     masses = tuple(f"{body}.mass" for body in linear.bodies)
     moments = tuple(name for name in linear.names if ".first_moment." in name)
     turning = tuple(name for name in linear.names if ".origin_inertia." in name)
