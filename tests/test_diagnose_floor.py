@@ -93,7 +93,7 @@ def test_interrupted_search_gives_what_is_known() -> None:
     diagnosis = diagnose(nominal(), train, test, effects=effects, tell=tell)
     assert diagnosis.interrupted
     assert len(diagnosis.effects) == 1
-    assert any(note.startswith("interrupted") for note in diagnosis.notes)
+    assert any(note.startswith("stopped by Ctrl-C") for note in diagnosis.notes)
     assert not diagnose(nominal(), train, test, effects=["bias_force"]).interrupted
 
 

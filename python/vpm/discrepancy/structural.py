@@ -41,15 +41,9 @@ Bounds = Mapping[str, tuple[float, float]]
 def sites_worth_trying(effect: EffectType, model: Model) -> tuple[str, ...]:
     """Sites of an effect but those where it cannot show: links that bend already, damping of rigid beams.
 
-    Play is looked for where an actuator drives the joint; elsewhere it needs a joint of its own. Along a measured
-    motion no memory is carried where something moves that nobody measures, so that hysteresis and what hides exclude
-    each other.
+    Play is looked for where an actuator drives the joint; elsewhere it needs a joint of its own.
     """
     sites = model.sites(effect.site)
-    remembers = any(present.name == "hysteresis" for present in model.effects)
-    hidden = bool(model.added_joints) or model.core.n_elastic > 0
-    if (remembers and effect.name in HIDING) or (hidden and effect.name == "hysteresis"):
-        return ()
     if effect.name == "link_flexibility":
         return tuple(site for site in sites if model.levels.get(site, "rigid") == "rigid")
     if effect.name == "structural_damping":
