@@ -151,7 +151,10 @@ def _linear_step(counter: _Counter, start: Array, low: Array, high: Array) -> Ar
     residual, jacobian = counter(start)
     lengths = column_lengths(jacobian)
     orthogonal, square = np.linalg.qr(jacobian / lengths)
-    step = lsq_linear(square, -orthogonal.T @ residual, ((low - start) * lengths, (high - start) * lengths), tol=1e-14)
+    bounds = ((low - start) * lengths, (high - start) * lengths)
+    # By active sets, which end: where columns are multiples of each other, steps of 1e14 are all rounding, and the
+    # reflective method halves them for ever.
+    step = lsq_linear(square, -orthogonal.T @ residual, bounds, method="bvls", tol=1e-14)
     candidate = np.clip(start + step.x / lengths, low, high)
     better = np.sum(counter(candidate)[0] ** 2) <= np.sum(residual**2)
     return candidate if better else start
