@@ -39,8 +39,9 @@ test-rust: | $(VENV)/.tools-found
 reference: | $(VENV)/.tools-found ## integrators against an adaptive solver, which takes minutes to build
 	cargo test --features reference --test reference $(CARGO_ARGS)
 
+# Test files side by side on all cores; the linear algebra of each stays on one.
 test-python: $(VENV)/.installed
-	$(BIN)/python -m pytest $(PYTEST_ARGS)
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses auto --dist loadfile $(PYTEST_ARGS)
 
 lint: lint-rust lint-python ## formatting, static checks and types, all as errors
 

@@ -30,7 +30,7 @@ from vpm.experiment import Experiment
 from vpm.identify import InverseDynamicsProblem, OutputErrorProblem, gain, gaps, segments
 from vpm.identify.fit import fit_of
 from vpm.model import Model
-from vpm.simulate import Run, Setup, judging_mode
+from vpm.simulate import Run, Setup, check_balance, judging_mode
 
 Array = NDArray[np.float64]
 
@@ -97,6 +97,7 @@ def diagnose(
     began = time.perf_counter()
     say = tell or (lambda _: None)
     _check_effects(effects)
+    check_balance(model)
     training, unseen, notes = _records(experiments, validate)
     # A record cut off in the middle of a motion does not say what its controller remembers.
     mode = "restarts" if notes else judging_mode(model, unseen)
