@@ -17,6 +17,8 @@ from vpm.results import Result
 
 Array = NDArray[np.float64]
 
+#: A record begins or ends at rest where its joints are slower than this share of their largest speed.
+REST_SHARE = 0.01
 #: Samples that have to remain between the two ends where the filter settles.
 FEWEST_KEPT = 10
 
@@ -95,9 +97,10 @@ class Motion(Result):
         return np.arange(first, self.time.size - self.edge, self.decimation)
 
     def parallel(self, values: Array) -> Array:
-        """The parallel filter over a whole record, of which the `retained` samples are given.
+        """The parallel filter over a record, of which the `retained` samples are given.
 
-        Where a record begins and ends at rest the filter has nothing to settle there; cut off before it, it would.
+        An end at rest is filtered with the rest: there is nothing to settle. At an end in motion the derivatives within
+        `edge` are wrong, and what they make of a balance would ring on inside; it is cut off before.
 
         Parameters
         ----------
@@ -108,7 +111,16 @@ class Motion(Result):
         ndarray, shape (n,) or (n, k)
             One row for each of `retained`.
         """
-        return np.ascontiguousarray(parallel_filter(values, self.decimation)[self.retained // self.decimation])
+        retained = self.retained
+        begin = 0 if self._rests(slice(None, self.edge)) else int(retained[0])
+        end = self.time.size if self._rests(slice(self.time.size - self.edge, None)) else self.time.size - self.edge
+        filtered = parallel_filter(values[begin:end], self.decimation)
+        return np.ascontiguousarray(filtered[(retained - begin) // self.decimation])
+
+    def _rests(self, end: slice) -> bool:
+        """Whether no joint moves within one end of the record."""
+        speed = np.abs(self.velocity)
+        return bool(np.all(speed[end].max(axis=0, initial=0.0) <= REST_SHARE * speed[self.kept].max(axis=0)))
 
     def _headline(self) -> Mapping[str, object]:
         return {

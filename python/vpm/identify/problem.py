@@ -298,9 +298,9 @@ class InverseDynamicsProblem:
 def _settled(samples: int, decimation: int) -> Array:
     """1 for retained samples behind and ahead of which the parallel filter has all that it needs, else 0.
 
-    A short record keeps its ends: what little there is has to do.
+    A short record loses no more than a fifth at each end: what little there is has to do.
     """
-    ends = SETTLING if decimation > 1 and samples >= 5 * SETTLING else 0
+    ends = min(SETTLING, samples // 5) if decimation > 1 else 0
     place = np.arange(samples)
     return ((place >= ends) & (place < samples - ends)).astype(np.float64)
 
