@@ -172,6 +172,8 @@ def test_coefficients_are_those_that_were_planted() -> None:
     speed = why.model.parameters["axis.empirical.speed"].value
     assert term.coefficient == pytest.approx(2.5 * speed**2, rel=0.1)
     assert why.empirical.states["velocity of axis"] > 0.3
+    assert why.empirical.alike[0] == next(iter(why.empirical.states))
+    assert "position of axis" not in why.empirical.alike
 
 
 def test_a_rhythm_in_time_is_told_in_words_and_made_no_law() -> None:

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vpm.discrepancy.confirmation import Data, Judged
 from vpm.identify import InverseDynamicsProblem
+from vpm.identify.statistics import NORMAL_95, robust_covariance
 
 Array = NDArray[np.float64]
 
@@ -26,6 +28,22 @@ DIRECTION_ADDS = 0.05
 FEWEST_PERIODS = 3.0
 #: Most samples of a record that take part in the search for a frequency.
 MOST_SAMPLES = 3000
+
+
+@dataclass(frozen=True)
+class Shares:
+    """What each state predicts of a residual.
+
+    Attributes
+    ----------
+    of : dict of str to float
+        Share of the mean square on unseen data by state, the largest first.
+    alike : tuple of str
+        States whose share these data cannot tell from the largest, the largest itself among them.
+    """
+
+    of: dict[str, float]
+    alike: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -46,29 +64,49 @@ def busiest_joint(data: Data, final: Judged) -> int:
     return int(np.argmax(sums))
 
 
-def shares(data: Data, final: Judged, joint: int) -> dict[str, float]:
+def shares(data: Data, final: Judged, joint: int) -> Shares:
     """Share of one joint's unseen residual that a map of each state, drawn from the training residual, predicts.
 
-    A map is a table of means over bins of equal count, for both directions of the motion or for each on its own.
+    A map is a table of means over bins of equal count, for both directions of the motion or for each on its own. Two
+    states are alike where the mean difference of the squares that they leave is within its 95 % interval, which allows
+    for samples that resemble their neighbours (F. Diebold and R. Mariano, *J. Business & Econ. Statistics* 13, 1995).
     """
     sides = []
     for problem, residual in ((data.training, final.fit.residual), (data.unseen, final.unseen)):
         sides.append((_states(problem, final, joint), _residual(problem, residual, joint)))
     (seen, target), (met, left) = sides
-    found = {}
+    found: dict[str, Array] = {}
     for name in seen:
         edges = np.quantile(seen[name], np.linspace(0.0, 1.0, BINS + 1)[1:-1])
         direction = [np.zeros(values.size, dtype=np.int64) for values in (target, left)]
-        plain = _predicted((seen[name], direction[0], target), (met[name], direction[1], left), edges)
+        plain = _left((seen[name], direction[0], target), (met[name], direction[1], left), edges)
         if name.startswith("velocity of " + data.training.joints[joint]):
             found[name] = plain
             continue
         own = f"velocity of {data.training.joints[joint]}"
         signs = [(states[own] > 0.0).astype(np.int64) for states in (seen, met)]
-        both = _predicted((seen[name], signs[0], target), (met[name], signs[1], left), edges)
-        with_direction = both > plain + DIRECTION_ADDS
+        both = _left((seen[name], signs[0], target), (met[name], signs[1], left), edges)
+        with_direction = _share(both, left) > _share(plain, left) + DIRECTION_ADDS
         found[f"{name} and direction" if with_direction else name] = both if with_direction else plain
-    return dict(sorted(found.items(), key=lambda item: -item[1]))
+    best = min(found, key=lambda name: float(found[name] @ found[name]))
+    ends = np.cumsum([0, *(data.unseen.efforts(r)[joint].time.size for r in range(len(data.unseen.motions)))])
+    records = [slice(int(a), int(b)) for a, b in pairwise(ends)]
+    alike = {name for name in found if _as_good(found[best], found[name], records)}
+    ranked = dict(sorted(((name, _share(rest, left)) for name, rest in found.items()), key=lambda item: -item[1]))
+    return Shares(ranked, tuple(name for name in ranked if name in alike))
+
+
+def _as_good(best: Array, other: Array, records: Sequence[slice]) -> bool:
+    """Whether what ``other`` leaves is larger than what ``best`` leaves by no more than chance."""
+    difference = other**2 - best**2
+    mean = float(difference.mean())
+    variance = robust_covariance(np.ones((difference.size, 1)), difference - mean, records)[0, 0]
+    return mean <= NORMAL_95 * float(np.sqrt(max(variance, 0.0)))
+
+
+def _share(rest: Array, target: Array) -> float:
+    power = float(target @ target)
+    return max(0.0, 1.0 - float(rest @ rest) / power) if power > 0.0 else 0.0
 
 
 def rhythm(data: Data, final: Judged, joint: int) -> Rhythm | None:
@@ -128,11 +166,10 @@ def _states(problem: InverseDynamicsProblem, final: Judged, joint: int) -> Mappi
     return {name: np.concatenate(parts) for name, parts in found.items() if len(parts) == count}
 
 
-def _predicted(seen: Cells, met: Cells, edges: Array) -> float:
-    """Share of the second target that the means of the first in its bins predict."""
+def _left(seen: Cells, met: Cells, edges: Array) -> Array:
+    """What the means of the first target in its bins leave of the second."""
     cells = [np.digitize(state, edges) * 2 + direction for state, direction, _ in (seen, met)]
     count = np.bincount(cells[0], minlength=2 * BINS)
     means = np.bincount(cells[0], seen[2], minlength=2 * BINS) / (count + PULL * seen[2].size / BINS)
-    power = float(met[2] @ met[2])
-    left = met[2] - means[cells[1]]
-    return max(0.0, 1.0 - float(left @ left) / power) if power > 0.0 else 0.0
+    rest: Array = met[2] - means[cells[1]]
+    return rest

@@ -138,6 +138,8 @@ class Empirical(Storable):
     before, after : float
         Root mean square of the weighted residual on unseen data without and with the formula.
     sentence : str
+    alike : tuple of str
+        States whose share these data cannot tell from the largest, the largest itself among them.
     """
 
     channel: str
@@ -148,6 +150,7 @@ class Empirical(Storable):
     before: float
     after: float
     sentence: str
+    alike: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, repr=False, eq=False)

@@ -9,7 +9,7 @@ import numpy as np
 
 from vpm.catalogue.empirical import TERMS
 from vpm.discrepancy.confirmation import Data, Judged, judge
-from vpm.discrepancy.dependence import Rhythm, busiest_joint, rhythm, shares
+from vpm.discrepancy.dependence import Rhythm, Shares, busiest_joint, rhythm, shares
 from vpm.discrepancy.diagnosis import Empirical, EmpiricalTerm
 from vpm.discrepancy.formula import Formula, select
 from vpm.errors import DivergedError
@@ -20,8 +20,9 @@ from vpm.model import Model
 LEAST_GAIN = 0.1
 #: Time has to predict this much more of the residual than any state of the machine before it is named in its place.
 TIME_AHEAD = 0.1
-#: Least share of the residual that a state has to predict to be named.
+#: Least share of the residual that a state has to predict to be named, and most states that are.
 NAMED = 0.1
+MOST_NAMED = 4
 #: A later model has to leave less than this share of what an earlier one leaves.
 CLEARLY = 0.9
 #: Share of the weightiest term below which a term is left out.
@@ -68,13 +69,18 @@ def describe(final: Judged, data: Data) -> tuple[Empirical, Judged]:
         if (shorter := _without_small(formula, fitted)) != formula:
             formula, fitted = shorter, _fit(shorter, final, data)
     told = gain(final.unseen, final.unseen if fitted is None else fitted.unseen, segments(data.unseen))
-    remark = _in_time(states, beat, told.relative)
+    remark = _in_time(states.of, beat, told.relative)
     if remark or formula is None or fitted is None or told.relative < LEAST_GAIN:
         sentence = _say_without(channel, states, remark)
-        return Empirical(channel, states, remark, "", (), told.before, told.before, sentence), final
+        return Empirical(channel, states.of, remark, "", (), told.before, told.before, sentence, states.alike), final
     text = "; ".join(_text(formula, fitted.model, at) for at in formula.terms)
     sentence = _say(channel, states, text, told.after / told.before)
-    return Empirical(channel, states, "", text, _terms(formula, fitted), told.before, told.after, sentence), fitted
+    return (
+        Empirical(
+            channel, states.of, "", text, _terms(formula, fitted), told.before, told.after, sentence, states.alike
+        ),
+        fitted,
+    )
 
 
 def _fit(formula: Formula, final: Judged, data: Data) -> Judged:
@@ -173,19 +179,33 @@ def _in_time(states: dict[str, float], beat: Rhythm | None, told: float) -> str:
     return ""
 
 
-def _depends(states: dict[str, float]) -> str:
-    named = [f"{name} ({100 * share:.0f} %)" for name, share in states.items() if share >= NAMED][:3]
-    return f"it follows {', '.join(named)}" if named else "no single state of the machine predicts it"
+def _depends(states: Shares) -> str:
+    """The state that predicts most, what these data cannot tell from it, and what predicts clearly less."""
+    named = [name for name, share in states.of.items() if share >= NAMED][:MOST_NAMED]
+    if not named:
+        return "no single state of the machine predicts it"
+
+    def told(names: list[str]) -> str:
+        return ", ".join(f"{name} ({100 * states.of[name]:.0f} %)" for name in names)
+
+    alike = [name for name in named[1:] if name in states.alike]
+    less = [name for name in named[1:] if name not in states.alike]
+    sentence = f"it follows {told(named[:1])}"
+    if alike:
+        sentence += f", which these data cannot tell from {told(alike)}"
+    if less:
+        sentence += f"{';' if alike else ','} less {told(less)}"
+    return sentence
 
 
-def _say(channel: str, states: dict[str, float], text: str, ratio: float) -> str:
+def _say(channel: str, states: Shares, text: str, ratio: float) -> str:
     return (
         f"Of the residual of {channel}: {_depends(states)}. A fit, which is no physics, brings it down to "
         f"{100 * ratio:.0f} % on unseen data and stands in the repaired model as empirical_force: {text}."
     )
 
 
-def _say_without(channel: str, states: dict[str, float], remark: str) -> str:
+def _say_without(channel: str, states: Shares, remark: str) -> str:
     if remark:
         return f"Of the residual of {channel}: {remark}; no force law was made of it."
     return f"Of the residual of {channel}: {_depends(states)}, and no short formula predicts it on unseen data."
