@@ -105,6 +105,15 @@ class Arm:
         return np.asarray(both / determinant, dtype=np.float64)
 
 
+def midpoint(arm: Arm, q: Array, v: Array, effort: Array, step: float) -> tuple[Array, Array]:
+    """One step of second order: what a step of first order gets wrong is more than the noise lets parameters be known.
+
+    Efforts that lag by half a step pass for inertia and friction, 6e-4 N m s/rad and 3e-5 kg m² at a tenth of ``DT``.
+    """
+    slope = arm.acceleration(q + 0.5 * step * v, v + 0.5 * step * arm.acceleration(q, v, effort), effort)
+    return q + step * v + 0.5 * step**2 * slope, v + step * slope
+
+
 def record(arm: Arm, seconds: float, seed: int) -> Experiment:
     """One record of the arm following three sines on each joint."""
     generator = np.random.default_rng(seed)
@@ -127,8 +136,7 @@ def record(arm: Arm, seconds: float, seed: int) -> Experiment:
         positions[k], commands[k] = y, (feedback + arm.weight(y)) / GAINS
         queue.append(commands[k])
         for _ in range(FINE):
-            faster = v + DT / FINE * arm.acceleration(q, v, GAINS * queue[0])
-            q, v = q + 0.5 * DT / FINE * (v + faster), faster
+            q, v = midpoint(arm, q, v, GAINS * queue[0], DT / FINE)
     channels = {
         "shoulder.position": positions[:, 0],
         "elbow.position": positions[:, 1],
