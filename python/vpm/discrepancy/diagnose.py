@@ -8,7 +8,6 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtri
 
 from vpm.catalogue import EFFECTS
 from vpm.compare import compare
@@ -23,17 +22,18 @@ from vpm.discrepancy.diagnosis import (
     Picture,
     Step,
 )
-from vpm.discrepancy.empirical import describe_best
 from vpm.discrepancy.evidence import gather
 from vpm.discrepancy.floor import noise_floor
-from vpm.discrepancy.refusal import FALSE_ALARM_LEVEL, LEAST_GAIN
+from vpm.discrepancy.remainder import Remainder, remainder
 from vpm.discrepancy.search import Accepted, Search, Stage, ambiguities, search
 from vpm.discrepancy.side_by_side import Progress, SideBySide
-from vpm.discrepancy.structure import Structure, structure
+from vpm.discrepancy.structure import structure
 from vpm.discrepancy.telling_apart import experiments as experiments_for
+from vpm.discrepancy.timing import in_time
+from vpm.discrepancy.verdict import is_negligible, verdict
 from vpm.errors import DiagnosisError, DivergedError, near_match
 from vpm.experiment import Experiment
-from vpm.identify import InverseDynamicsProblem, OutputErrorProblem, gain, gaps, segments
+from vpm.identify import InverseDynamicsProblem, OutputErrorProblem, gaps
 from vpm.identify.fit import fit_of
 from vpm.identify.parallel import worker_count
 from vpm.model import Model
@@ -43,20 +43,10 @@ Array = NDArray[np.float64]
 
 #: Share of each record that is kept out of the fit when no validation record is given.
 HELD_OUT = 0.3
-#: A residual within this factor of the noise floor has nothing left to explain.
-FLOOR_FACTOR = 1.3
-#: Neither has one below this share of the measured effort.
-NEGLIGIBLE = 0.005
 #: What an interrupted diagnosis says of itself.
 STOPPED = "stopped by Ctrl-C before every candidate was tried: this is what was known until then"
-#: Where a structured residual clear of the noise remains and is more than this share of the recalibrated mean square,
-#: what was found is not the explanation.
-MOSTLY_OPEN = 0.15
 #: Parameters that move by more of their stated uncertainties than this are reported.
 FAR = 3.0
-
-#: Said of what stays after effects were found.
-_REST = " A structured residual above the noise remains."
 
 Tell = Callable[[str], None]
 
@@ -141,23 +131,24 @@ def diagnose(
         notes.append(STOPPED)
     say("measuring the noise floor")
     floor = noise_floor(found.final.model, data.unseen, found.final.unseen, mode, setup)
-    left = structure(found.final.model, data.training, data.unseen, found.final.fit.residual, found.final.unseen)
     gap = _gaps(data, nominal, recalibrated, found.final, floor)
-    verdict, summary = _verdict(data, nominal, recalibrated, found, gap, left)
+    say("examining what is left")
+    timed = in_time(found.final, data)
+    left = structure(found.final.model, data.training, data.unseen, timed.fitted, timed.unseen)
+    rest = _rest(recalibrated, found, data) if found.accepted or not is_negligible(gap) else None
+    word, summary, described = verdict(data, nominal, recalibrated, found, gap, left, rest)
     final, empirical, accepted = found.final, None, found.accepted
-    if verdict == "unexplained" or summary.endswith(_REST):
-        say("describing what is left")
-        # What an interrupted search accepted stands: the rounds that would have judged it anew were not to be.
-        bases = [recalibrated] if verdict == "unexplained" and accepted and not found.interrupted else []
-        empirical, final, place = describe_best([*bases, found.final], data)
-        accepted = () if place < len(bases) else accepted
+    if described and rest is not None:
+        told = rest.best if word == "unexplained" else rest.choices[-1]
+        final, empirical = told.judged, told.told
+        accepted = accepted if told.base is found.final else ()
         gap = _gaps(data, nominal, recalibrated, final, floor)
         summary = f"{summary} {empirical.sentence}"
     say("looking for what else would do, and for the experiment that tells it apart")
     ambiguous = rivals(found.final, data, accepted, effects)
     noise = {channel: g.noise_floor for channel, g in gap.items() if g.mode == "inverse_dynamics"}
     return Diagnosis(
-        verdict,
+        word,
         f"Stopped before every candidate was tried. {summary}" if found.interrupted else summary,
         tuple(_accepted_effect(entry, found.final) for entry in accepted),
         gap,
@@ -264,6 +255,12 @@ def _moved_far(model: Model, recalibrated: Judged) -> list[str]:
     return notes
 
 
+def _rest(recalibrated: Judged, found: Search, data: Data) -> Remainder:
+    """What is left; what an interrupted search accepted stands, for rounds that would have judged it were not to be."""
+    start = found.final if found.interrupted or not found.accepted else recalibrated
+    return remainder(start, found.final, data, min(m.dt for m in data.training.motions))
+
+
 def _gaps(
     data: Data, nominal: Judged, recalibrated: Judged, final: Judged, floor: dict[str, float]
 ) -> dict[str, ChannelGap]:
@@ -287,51 +284,6 @@ def _gaps(
 def _signal(problem: InverseDynamicsProblem | OutputErrorProblem, channel: str) -> float:
     mine = [block for block in problem.blocks if block.channel == channel]
     return float(np.sqrt(np.average([b.scale**2 for b in mine], weights=[b.moving.sum() for b in mine])))
-
-
-def _verdict(
-    data: Data, nominal: Judged, recalibrated: Judged, found: Search, gap: dict[str, ChannelGap], left: Structure
-) -> tuple[str, str]:
-    main = [g for g in gap.values() if g.mode == "inverse_dynamics"]
-    above = max((g.after / g.noise_floor if g.noise_floor > 0.0 else np.inf) for g in main)
-    share = max(g.after / g.signal if g.signal > 0.0 else 0.0 for g in main)
-    remaining = left.present and above > FLOOR_FACTOR and share > NEGLIGIBLE
-    worst = max(main, key=lambda g: g.recalibrated / g.signal if g.signal else 0.0)
-    numbers = f"{_percent(worst.before, worst)} before, {_percent(worst.recalibrated, worst)} recalibrated"
-    names = ", then ".join(e.trial.probe.candidate.label for e in found.accepted)
-    rest_of = max(g.after / g.recalibrated if g.recalibrated > 0.0 else 0.0 for g in [worst]) ** 2
-    if found.accepted and remaining and rest_of > MOSTLY_OPEN:
-        return (
-            "unexplained",
-            f"The residual is structured and {above:.2g} times the noise floor. The effects of the catalogue that come "
-            f"closest, {names}, leave {100.0 * rest_of:.0f} % of its mean square: they are not the explanation. Error "
-            f"on unseen data: {numbers}, {_percent(worst.after, worst)} after.",
-        )
-    if found.accepted:
-        rest = _REST if remaining else ""
-        return (
-            "effect_found",
-            f"Missing: {names}. Error on unseen data: {numbers}, {_percent(worst.after, worst)} after.{rest}",
-        )
-    if remaining:
-        return (
-            "unexplained",
-            f"The residual is structured and {above:.2g} times the noise floor, and no effect of the catalogue "
-            f"explains it. Error on unseen data: {numbers}.",
-        )
-    agrees = max((g.before / g.noise_floor if g.noise_floor > 0.0 else np.inf) for g in main) <= FLOOR_FACTOR
-    agrees = agrees or max(g.before / g.signal if g.signal > 0.0 else 0.0 for g in main) <= NEGLIGIBLE
-    better = gain(nominal.unseen, recalibrated.unseen, segments(data.unseen))
-    if not agrees and better.relative > LEAST_GAIN and better.score > float(ndtri(1.0 - FALSE_ALARM_LEVEL)):
-        return (
-            "parameters_only",
-            f"Nothing is missing: other values of the known parameters close the gap. Error on unseen data: {numbers}.",
-        )
-    return "no_disagreement", f"The nominal model agrees with the data. Error on unseen data: {numbers}."
-
-
-def _percent(value: float, gap: ChannelGap) -> str:
-    return f"{100.0 * value / gap.signal:.2f} %" if gap.signal > 0.0 else f"{value:.3g} {gap.unit}"
 
 
 def _accepted_effect(entry: Accepted, final: Judged) -> AcceptedEffect:

@@ -140,6 +140,8 @@ class Empirical(Storable):
     sentence : str
     alike : tuple of str
         States whose share these data cannot tell from the largest, the largest itself among them.
+    predicted : float
+        Share of the mean square on unseen data that the formula, or what the remark says, predicts.
     """
 
     channel: str
@@ -151,6 +153,7 @@ class Empirical(Storable):
     after: float
     sentence: str
     alike: tuple[str, ...] = ()
+    predicted: float = 0.0
 
 
 @dataclass(frozen=True, repr=False, eq=False)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -23,28 +22,10 @@ TIME_AHEAD = 0.1
 #: Least share of the residual that a state has to predict to be named, and most states that are.
 NAMED = 0.1
 MOST_NAMED = 4
-#: A later model has to leave less than this share of what an earlier one leaves.
-CLEARLY = 0.9
 #: Share of the weightiest term below which a term is left out.
 SMALL = 0.03
 #: A period may move by this factor when the formula is fitted.
 PERIOD_RANGE = 1.15
-
-
-def describe_best(bases: Sequence[Judged], data: Data) -> tuple[Empirical, Judged, int]:
-    """The description that leaves least on unseen data, of several models to begin with, and the place of its model.
-
-    Effects that come closest and explain little may stand in the way of a formula: it is sought without them too.
-    A later model has to leave clearly less than an earlier one.
-    """
-    best: tuple[Empirical, Judged, int] | None = None
-    for place, base in enumerate(bases):
-        told, final = describe(base, data)
-        if best is None or told.after < CLEARLY * best[0].after:
-            best = told, final, place
-    if best is None:
-        raise ValueError("there is no model to describe")
-    return best
 
 
 def describe(final: Judged, data: Data) -> tuple[Empirical, Judged]:
@@ -69,15 +50,25 @@ def describe(final: Judged, data: Data) -> tuple[Empirical, Judged]:
         if (shorter := _without_small(formula, fitted)) != formula:
             formula, fitted = shorter, _fit(shorter, final, data)
     told = gain(final.unseen, final.unseen if fitted is None else fitted.unseen, segments(data.unseen))
-    remark = _in_time(states.of, beat, told.relative)
+    remark, share = _in_time(states.of, beat, told.relative)
     if remark or formula is None or fitted is None or told.relative < LEAST_GAIN:
         sentence = _say_without(channel, states, remark)
-        return Empirical(channel, states.of, remark, "", (), told.before, told.before, sentence, states.alike), final
+        left = told.before
+        return Empirical(channel, states.of, remark, "", (), left, left, sentence, states.alike, share), final
     text = "; ".join(_text(formula, fitted.model, at) for at in formula.terms)
-    sentence = _say(channel, states, text, told.after / told.before)
+    sentence, terms = _say(channel, states, text, told.after / told.before), _terms(formula, fitted)
     return (
         Empirical(
-            channel, states.of, "", text, _terms(formula, fitted), told.before, told.after, sentence, states.alike
+            channel,
+            states.of,
+            "",
+            text,
+            terms,
+            told.before,
+            told.after,
+            sentence,
+            states.alike,
+            told.relative,
         ),
         fitted,
     )
@@ -162,21 +153,21 @@ def _text(formula: Formula, model: Model, joint: str) -> str:
     return f"tau = -({body}) {unit}".rstrip() + f" at {joint}" + (f", with {with_what}" if with_what else "")
 
 
-def _in_time(states: dict[str, float], beat: Rhythm | None, told: float) -> str:
-    """What runs with the time and not with the machine, in words; empty if the formula or a state says as much."""
+def _in_time(states: dict[str, float], beat: Rhythm | None, told: float) -> tuple[str, float]:
+    """What runs with the time and not with the machine, and its share; empty if the formula or a state says as much."""
     time = max((share for name, share in states.items() if name.startswith("time")), default=0.0)
     machine = max((told, *(share for name, share in states.items() if not name.startswith("time"))))
     if beat is not None and beat.share > max(machine, time) + TIME_AHEAD:
         return (
             f"it repeats every {beat.period:.3g} s whatever the machine does ({100 * beat.share:.0f} % of it), so that "
             "something outside of the machine, or its controller, disturbs it"
-        )
+        ), beat.share
     if time > machine + TIME_AHEAD:
         return (
             f"it changes with the time in the record ({100 * time:.0f} % of it), not with the state of the machine: "
             "something drifts, as friction does while a machine warms up"
-        )
-    return ""
+        ), time
+    return "", 0.0
 
 
 def _depends(states: Shares) -> str:

@@ -9,6 +9,7 @@ from scipy.special import stdtrit
 from vpm.discrepancy.confirmation import Trial
 from vpm.discrepancy.screening import Probe, impossible_values
 from vpm.discrepancy.structural import coupled
+from vpm.identify import Gain
 from vpm.identify.statistics import NORMAL_95
 from vpm.model import Model
 
@@ -47,6 +48,14 @@ class Thresholds:
         """Least standard deviations of unseen gain, by Student's t with one degree of freedom less than pieces."""
         return float(stdtrit(max(1, pieces - 1), 1.0 - FALSE_ALARM_LEVEL / max(1, self.candidates)))
 
+    def needed(self, unseen: Gain) -> float:
+        """Standard deviations that a gain has to have: more where most of the residual stays."""
+        return self.score(unseen.pieces) * (MODEST_FACTOR if unseen.relative < MODEST_GAIN else 1.0)
+
+    def met(self, unseen: Gain) -> bool:
+        """Whether a gain is worth a name, and sure."""
+        return unseen.relative >= WORTH_A_NAME and unseen.score >= self.needed(unseen)
+
 
 def refuse_probe(probe: Probe) -> str:
     """Reason to drop a candidate after screening, or ""."""
@@ -75,6 +84,16 @@ def refuse_trial(trial: Trial, thresholds: Thresholds) -> str:
         _only_reversals(trial),
     )
     return next(filter(None, reasons), "")
+
+
+def refuse_timing(timed: Gain, shift: float, thresholds: Thresholds) -> str:
+    """Reason not to accept a candidate that does no more than a shift of the commands within the sampling interval."""
+    if thresholds.met(timed):
+        return ""
+    return (
+        f"beside a shift of the commands by {1e3 * shift * thresholds.interval:.2g} ms, within the sampling interval, "
+        f"it lowers the unseen error by only {_percent(max(timed.relative, 0.0))} of its mean square"
+    )
 
 
 def _impossible(probe: Probe, name: str) -> str:
@@ -141,7 +160,7 @@ def _too_little(trial: Trial, thresholds: Thresholds) -> str:
             f"it lowers the unseen error by only {_percent(unseen.relative)} of its mean square "
             f"({_rms(unseen.before, unseen.after)})"
         )
-    needed = thresholds.score(unseen.pieces) * (MODEST_FACTOR if unseen.relative < MODEST_GAIN else 1.0)
+    needed = thresholds.needed(unseen)
     if unseen.score < needed:
         return (
             f"its gain of {_percent(unseen.relative)} on unseen data is {unseen.score:.1f} standard deviations over "

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 
 from vpm.discrepancy.candidates import Key, candidates, left_out
 from vpm.discrepancy.confirmation import Data, Judged, Trial, confirm, judge
 from vpm.discrepancy.diagnosis import Ambiguity, RankedCandidate, RefusedEffect
-from vpm.discrepancy.refusal import LEAST_GAIN, Thresholds, refuse_probe, refuse_trial
+from vpm.discrepancy.refusal import LEAST_GAIN, Thresholds, refuse_probe, refuse_timing, refuse_trial
 from vpm.discrepancy.screening import Probe, probe
 from vpm.discrepancy.side_by_side import Failure, SideBySide
 from vpm.discrepancy.structural import coupled
 from vpm.discrepancy.structure import structure
+from vpm.discrepancy.timing import InTime, in_time
 from vpm.errors import DivergedError
 from vpm.identify import gain, segments
 
@@ -126,9 +127,7 @@ class _Round:
 
     def heavy(self, effects: Sequence[str] | None, without: set[Key]) -> Accepted | None:
         """The best of those with a motion of their own, tried only where more than noise is left to explain."""
-        left = structure(
-            self.current.model, self.data.training, self.data.unseen, self.current.fit.residual, self.current.unseen
-        )
+        left = structure(self.current.model, self.data.training, self.data.unseen, self.timed.fitted, self.timed.unseen)
         if not left.present and left.coloured <= NOISE_ONLY:
             return None
         self._promising = []
@@ -173,7 +172,7 @@ class _Round:
                 self.refused[key] = trial.reason
                 continue
             self._ranking[key] = replace(self._ranking[key], unseen=trial.unseen.relative)
-            if reason := refuse_trial(trial, thresholds):
+            if reason := refuse_trial(trial, thresholds) or self._only_timing(trial, thresholds):
                 self.refused[key] = reason
             else:
                 self._believed.append(trial)
@@ -181,6 +180,19 @@ class _Round:
             self.refused[result.candidate.key] = (
                 f"{SHORT_LIST} candidates explain more of the training residual, and none of them was enough"
             )
+
+    @cached_property
+    def timed(self) -> InTime:
+        """Residuals of the model at hand with what the times of samples leave open."""
+        return in_time(self.current, self.data)
+
+    def _only_timing(self, trial: Trial, thresholds: Thresholds) -> str:
+        """Why a trial that would be believed does no more than a shift of the commands does, or ""."""
+        if self.timed.shift == 0.0:
+            return ""
+        unseen = in_time(trial.judged, self.data).unseen
+        timed = gain(self.timed.unseen, unseen, segments(self.data.unseen))
+        return refuse_timing(timed, self.timed.shift, thresholds)
 
     def best(self) -> Accepted | None:
         """The candidate that leaves least for its numbers; of those that are as good, the best simulation.

@@ -97,13 +97,14 @@ def structural_starts(effect: str, site: str, model: Model, middle: float, trave
     middle, travel : float
         Middle and half range of the joint's travel in the data.
     """
+    inertia = _moved(model, site)
+    held = (inertia * (2.0 * math.pi * SLOWEST) ** 2, math.inf)
     if effect == "end_stop":
         high = tuple({"high": middle + share * travel} for share in STOP_SHARES)
         low = tuple({"low": middle - share * travel} for share in STOP_SHARES)
-        reach = (middle - 1.2 * travel, middle + 1.2 * travel)
-        return (*high, *low), {"low": reach, "high": reach, "width": (1e-6 * travel, 0.05 * travel)}
-    inertia = _moved(model, site)
-    held = (inertia * (2.0 * math.pi * SLOWEST) ** 2, math.inf)
+        reach = (middle - travel, middle + travel)  # what is never touched does not show
+        bounds = {"low": reach, "high": reach, "width": (1e-6 * travel, 0.05 * travel), "stiffness": held}
+        return (*high, *low), bounds
     share = (LEAST_DRIVEN * inertia, math.inf)  # without any inertia before it a spring has nothing to swing against
     if effect == "backlash":
         stiffness = inertia * (2.0 * math.pi * CONTACT_FREQUENCY) ** 2

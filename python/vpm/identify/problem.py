@@ -7,6 +7,7 @@ the nominal model, the recalibrated one and every candidate effect on the same s
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Protocol
@@ -140,6 +141,13 @@ class InverseDynamicsProblem:
         #: Channels beside the balance that are compared too: what shows inside of drives, strains of links.
         self.shown = shown_channels(model, measured, experiments)
         self.blocks = self._lay_out(model)
+
+    def later(self) -> InverseDynamicsProblem:
+        """The same, but for commands, each of which holds from the sample after its own on."""
+        moved = tuple(replace(m, inputs=np.concatenate([m.inputs[:1], m.inputs[:-1]])) for m in self._whole)
+        same = copy(self)
+        vars(same)["_whole"] = moved
+        return same
 
     def evaluate(self, model: Model, theta: Array, columns: Sequence[int] = ()) -> tuple[Array, Array]:
         """Residual of the balance and its derivative; see :class:`Problem`."""

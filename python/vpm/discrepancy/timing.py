@@ -1,0 +1,75 @@
+"""What the times of samples leave open: commands may hold up to one sampling interval earlier or later than is said.
+
+Whether a logged command is the one that holds from its sample on, the mean over the interval, or the one that held
+until then, no log says. What a shift by no more than that explains is no physics that is missing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vpm.discrepancy.confirmation import Data, Judged
+from vpm.identify import gain, segments
+from vpm.identify.identifiability import column_lengths
+
+Array = NDArray[np.float64]
+
+#: A shift matters if it takes so much of the mean square of the residual, on training and on unseen records.
+MATTERS = 0.02
+
+
+@dataclass(frozen=True)
+class InTime:
+    """Residuals of a fitted model, with the shift of all commands within one interval that suits the training records.
+
+    Attributes
+    ----------
+    fitted, unseen : ndarray
+        Residuals on training and unseen records.
+    shift : float
+        How much later the commands hold, in sampling intervals; 0 where a shift does not matter.
+    """
+
+    fitted: Array
+    unseen: Array
+    shift: float
+
+
+def in_time(judged: Judged, data: Data) -> InTime:
+    """Residuals with the best shift of the commands, to first order; free parameters move with it."""
+    as_it_is = InTime(judged.fit.residual, judged.unseen, 0.0)
+    model = judged.model
+    later, _ = data.training.later().evaluate(model, model.theta)
+    own = judged.fit.residual
+    change, known = later - own, judged.fit.jacobian
+    rest = change - _projected(known, change)
+    power = float(rest @ rest)
+    if power <= 1e-20 * float(change @ change):
+        return as_it_is
+    shift = float(np.clip(-(rest @ own) / power, -1.0, 1.0))
+    fitted = own + shift * change
+    step = _step(known, fitted)
+    fitted = fitted + known @ step
+    if gain(own, fitted, segments(data.training)).relative < MATTERS:
+        return as_it_is
+    columns = [model.index(name) for name in judged.free]
+    own_unseen, slopes = data.unseen.evaluate(model, model.theta, columns)
+    later_unseen, _ = data.unseen.later().evaluate(model, model.theta)
+    unseen = own_unseen + shift * (later_unseen - own_unseen) + slopes @ step
+    if gain(own_unseen, unseen, segments(data.unseen)).relative < MATTERS:
+        return as_it_is
+    return InTime(fitted, unseen, shift)
+
+
+def _step(jacobian: Array, residual: Array) -> Array:
+    if not jacobian.shape[1]:
+        return np.zeros(0)
+    lengths = column_lengths(jacobian)
+    return np.asarray(np.linalg.lstsq(jacobian / lengths, -residual, rcond=1e-10)[0] / lengths)
+
+
+def _projected(jacobian: Array, values: Array) -> Array:
+    return np.asarray(-jacobian @ _step(jacobian, values))

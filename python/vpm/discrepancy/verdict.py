@@ -1,0 +1,112 @@
+"""The answer in one word and a few sentences, from what was found and what is left."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from scipy.special import ndtri
+
+from vpm.discrepancy.confirmation import Data, Judged
+from vpm.discrepancy.diagnosis import ChannelGap
+from vpm.discrepancy.refusal import FALSE_ALARM_LEVEL, LEAST_GAIN
+from vpm.discrepancy.remainder import Remainder
+from vpm.discrepancy.search import Search
+from vpm.discrepancy.structure import Structure
+from vpm.identify import gain, segments
+
+#: A residual within this factor of the noise floor has nothing left to explain, unless it repeats.
+FLOOR_FACTOR = 1.3
+#: Neither has one below this share of the measured effort.
+NEGLIGIBLE = 0.005
+#: Where so much of what could be explained remains, what was found is not the explanation.
+MOSTLY_OPEN = 0.15
+
+#: Said of what stays after effects were found.
+_REST = " A structured residual above the noise remains."
+
+
+def main_gaps(gap: Mapping[str, ChannelGap]) -> list[ChannelGap]:
+    """Those of the balance."""
+    return [g for g in gap.values() if g.mode == "inverse_dynamics"]
+
+
+def is_negligible(gap: Mapping[str, ChannelGap]) -> bool:
+    """Whether what is left is nothing beside the efforts; of a gap hardly larger, effects may still explain little."""
+    return all(g.after <= NEGLIGIBLE * g.signal or g.signal == 0.0 for g in main_gaps(gap))
+
+
+def verdict(
+    data: Data,
+    nominal: Judged,
+    recalibrated: Judged,
+    found: Search,
+    gap: dict[str, ChannelGap],
+    left: Structure,
+    rest: Remainder | None,
+) -> tuple[str, str, bool]:
+    """Verdict, summary, and whether something is left that should be described.
+
+    Parameters
+    ----------
+    data : Data
+    nominal, recalibrated : Judged
+    found : Search
+    gap : dict of str to ChannelGap
+    left : Structure
+        Of the residual with the accepted effects.
+    rest : Remainder or None
+        None where nothing was found and what is left is negligible.
+    """
+    main = main_gaps(gap)
+    above = max((g.after / g.noise_floor if g.noise_floor > 0.0 else np.inf) for g in main)
+    small = is_negligible(gap)
+    structured = left.present and above > FLOOR_FACTOR and not small
+    remaining = structured or (rest is not None and rest.repeats and not small)
+    worst = max(main, key=lambda g: g.recalibrated / g.signal if g.signal else 0.0)
+    numbers = f"{_percent(worst.before, worst)} before, {_percent(worst.recalibrated, worst)} recalibrated"
+    names = ", then ".join(e.trial.probe.candidate.label for e in found.accepted)
+    share_left = (worst.after / worst.recalibrated) ** 2 if worst.recalibrated > 0.0 else 0.0
+    mostly_open = structured and share_left > MOSTLY_OPEN
+    mostly_open = mostly_open or (rest is not None and rest.repeats and rest.open > MOSTLY_OPEN)
+    if found.accepted and mostly_open:
+        return (
+            "unexplained",
+            f"The residual is structured and {above:.2g} times the noise floor. The effects of the catalogue that come "
+            f"closest, {names}, leave {100.0 * share_left:.0f} % of its mean square: they are not the explanation. "
+            f"Error on unseen data: {numbers}, {_percent(worst.after, worst)} after.",
+            True,
+        )
+    if found.accepted:
+        return (
+            "effect_found",
+            f"Missing: {names}. Error on unseen data: {numbers}, {_percent(worst.after, worst)} after."
+            + (_REST if remaining else ""),
+            remaining,
+        )
+    if remaining:
+        return (
+            "unexplained",
+            f"The residual is structured and {above:.2g} times the noise floor, and no effect of the catalogue "
+            f"explains it. Error on unseen data: {numbers}.",
+            True,
+        )
+    return (*_nothing_missing(data, nominal, recalibrated, main, numbers), False)
+
+
+def _nothing_missing(
+    data: Data, nominal: Judged, recalibrated: Judged, main: list[ChannelGap], numbers: str
+) -> tuple[str, str]:
+    agrees = max((g.before / g.noise_floor if g.noise_floor > 0.0 else np.inf) for g in main) <= FLOOR_FACTOR
+    agrees = agrees or max(g.before / g.signal if g.signal > 0.0 else 0.0 for g in main) <= NEGLIGIBLE
+    better = gain(nominal.unseen, recalibrated.unseen, segments(data.unseen))
+    if not agrees and better.relative > LEAST_GAIN and better.score > float(ndtri(1.0 - FALSE_ALARM_LEVEL)):
+        return (
+            "parameters_only",
+            f"Nothing is missing: other values of the known parameters close the gap. Error on unseen data: {numbers}.",
+        )
+    return "no_disagreement", f"The nominal model agrees with the data. Error on unseen data: {numbers}."
+
+
+def _percent(value: float, gap: ChannelGap) -> str:
+    return f"{100.0 * value / gap.signal:.2f} %" if gap.signal > 0.0 else f"{value:.3g} {gap.unit}"
