@@ -39,6 +39,9 @@ class Oracle:
         Root mean square, on the validation records and below 25 Hz, of what the effect changes in each channel, and of
         what is left of it after a recalibration, both in units of ``noise``. Beside the channels there may be weighted
         sums of them that show an effect better, such as the force of a cylinder.
+    taught : mapping
+        What is left after the recalibration on the training records. An effect that shows on none of them, such as a
+        stop that only the validation record runs into, can be told by nobody who fits on the others.
     """
 
     with_effect: tuple[Mapping[str, Array], ...]
@@ -47,11 +50,12 @@ class Oracle:
     noise: Mapping[str, float]
     gap: Mapping[str, float]
     recalibrated: Mapping[str, float]
+    taught: Mapping[str, float]
 
     @property
     def strength(self) -> float:
-        """Largest recalibrated gap of all channels in units of the noise."""
-        return max(self.recalibrated.values())
+        """Largest recalibrated gap of all channels in units of the noise, on the records where it is less."""
+        return min(max(self.recalibrated.values()), max(self.taught.values()))
 
     @property
     def solvable(self) -> bool:
@@ -105,7 +109,7 @@ def judge(
         matrix = np.concatenate([slopes[k].reshape(-1, width) for k in learned])
         target = np.concatenate([gaps[k].ravel() for k in learned])
         change = np.linalg.lstsq(matrix, target, rcond=1e-9)[0]
-    left = [gaps[k] - slopes[k] @ change for k in unseen]
+    left = [gap - slope @ change for gap, slope in zip(gaps, slopes, strict=True)]
 
     def size(parts: Sequence[Array]) -> dict[str, float]:
         return dict(zip(judged, np.sqrt(np.mean(np.concatenate(parts) ** 2, 0)).tolist(), strict=True))
@@ -120,5 +124,6 @@ def judge(
         sensor_noise=dict(zip(channels, sensed.tolist(), strict=False)),
         noise=dict(zip(judged, noise.tolist(), strict=True)),
         gap=size([gaps[k] for k in unseen]),
-        recalibrated=size(left),
+        recalibrated=size([left[k] for k in unseen]),
+        taught=size([left[k] for k in learned]),
     )

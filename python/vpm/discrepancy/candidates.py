@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.catalogue import EFFECTS, EffectType
-from vpm.discrepancy.structural import STRUCTURAL, beyond, sites_worth_trying, structural_starts
+from vpm.discrepancy.structural import STRUCTURAL, beyond, sites_worth_trying, softest, stop_starts, structural_starts
 from vpm.identify import InverseDynamicsProblem
 from vpm.model import Model
 
@@ -130,8 +130,11 @@ def _candidate(effect: EffectType, site: str, model: Model, data: InverseDynamic
     joint = _joint_of(effect.site, site, model)
     seen = _excitation(data, model, joint, site if effect.site in {"actuator", "cylinder"} else None)
     if effect.name in STRUCTURAL:
-        starts, bounds = structural_starts(effect.name, site, model, seen.middle, seen.travel)
-        return Candidate(effect, site, starts, bounds, neutral=effect.name == "end_stop")
+        found = structural_starts(effect.name, site, model, seen.travel)
+        return Candidate(effect, site, *found, neutral=False)
+    if effect.name == "end_stop":
+        where = _over_way(data, model.joints[joint], residual)
+        return Candidate(effect, site, *stop_starts(*where, seen.middle, seen.travel, softest(model, site)))
     if effect.name == "coulomb_friction":
         return Candidate(effect, site, _grid("transition_velocity", TRANSITION_SHARES, seen.speed), _slow(seen))
     if effect.name == "asymmetric_friction":
@@ -155,18 +158,25 @@ def _candidate(effect: EffectType, site: str, model: Model, data: InverseDynamic
         return Candidate(effect, site, starts, {"displacement": (least, 2.0 * seen.travel), "shape": (0.0, 20.0)})
     if effect.name == "payload":
         return Candidate(effect, site, _payload_places(model, site))
-    if effect.name == "actuator_lag":
-        starts = tuple({"time_constant": n * seen.interval} for n in LAG_INTERVALS)
-        return Candidate(effect, site, starts, {"time_constant": (0.02 * seen.interval, np.inf)}, neutral=False)
-    if effect.name == "saturation":
-        starts = tuple({"limit": share * seen.command} for share in LIMIT_SHARES)
-        return Candidate(effect, site, starts, {"limit": (0.02 * seen.command, seen.command)}, neutral=False)
+    if effect.name in {"actuator_lag", "saturation"}:
+        return _in_drive(effect, site, seen)
     if effect.name == "supply_drop":
         return Candidate(effect, site, tuple({"time_constant": t} for t in DROP_TIMES), {"time_constant": (1e-3, 5.0)})
     if effect.name == "entrained_air":
         # Data hardly show in which way air is compressed.
         return Candidate(effect, site, ({},), fixed=("exponent", "reference_pressure"))
     return Candidate(effect, site, ({},))
+
+
+def _in_drive(effect: EffectType, site: str, seen: Excitation) -> Candidate:
+    """Lag and limit of a drive, which are never quite without effect."""
+    if effect.name == "actuator_lag":
+        name, bounds = "time_constant", (0.02 * seen.interval, np.inf)
+        values = [n * seen.interval for n in LAG_INTERVALS]
+    else:
+        name, bounds = "limit", (0.02 * seen.command, seen.command)
+        values = [share * seen.command for share in LIMIT_SHARES]
+    return Candidate(effect, site, tuple({name: value} for value in values), {name: bounds}, neutral=False)
 
 
 def _payload_places(model: Model, body: str) -> tuple[Mapping[str, float], ...]:
@@ -233,11 +243,7 @@ def _ripple_periods(data: InverseDynamicsProblem, model: Model, joint: int, resi
     Evenly spaced frequencies from two periods per travel up to what the decimated samples resolve; N. Lomb,
     *Astrophysics and Space Science* 39, 1976.
     """
-    name = model.joints[joint]
-    column = data.joints.index(name) if name in data.joints else 0
-    records = range(len(data.motions))
-    position = np.concatenate([data.state(r)[0][:, column] for r in records])
-    values = np.concatenate([residual[data.efforts(r)[column].samples] for r in records])
+    position, values = _over_way(data, model.joints[joint], residual)
     thin = max(1, len(values) // 4000)
     position, values = position[::thin], values[::thin]
     travel = max(float(np.ptp(position)), 1e-12)
@@ -250,3 +256,12 @@ def _ripple_periods(data: InverseDynamicsProblem, model: Model, joint: int, resi
     peaks = [i for i in range(1, len(power) - 1) if power[i] >= power[i - 1] and power[i] > power[i + 1]]
     best = sorted(peaks or [int(np.argmax(power))], key=lambda i: -power[i])[:PERIODS]
     return [float(1.0 / frequencies[i]) for i in best]
+
+
+def _over_way(data: InverseDynamicsProblem, joint: str, residual: Array) -> tuple[Array, Array]:
+    """Position and residual of one joint, or of the first one that is measured, at all samples."""
+    column = data.joints.index(joint) if joint in data.joints else 0
+    records = range(len(data.motions))
+    position = np.concatenate([data.state(r)[0][:, column] for r in records])
+    values = np.concatenate([residual[data.efforts(r)[column].samples] for r in records])
+    return position, values

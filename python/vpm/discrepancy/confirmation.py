@@ -19,6 +19,9 @@ Array = NDArray[np.float64]
 #: A refit stops when the sum of squares changes by less than this share: far below what a verdict rests on.
 TOLERANCE = 1e-6
 
+#: So many ranges of what the data reach, a place is nowhere.
+FAR_AWAY = 1e3
+
 #: Effects under which a joint can stick, and the share of its largest speed below which it may.
 DRY = ("coulomb_friction", "stribeck_friction", "hysteresis")
 CREEPING = 0.05
@@ -191,8 +194,19 @@ def _away_gain(current: Judged, judged: Judged, data: InverseDynamicsProblem, pr
 
 def _bounds(probe: Probe) -> dict[str, tuple[float, float]]:
     """Data-driven bounds of the candidate's shape by dotted name."""
-    short = _short_names(probe)
-    return {dotted: probe.candidate.bounds[s] for s, dotted in short.items() if s in probe.candidate.bounds}
+    given, short = probe.candidate.bounds, _short_names(probe)
+    away = _out_of_reach(probe)
+    return {dotted: given[s] for s, dotted in short.items() if s in given and dotted not in away}
+
+
+def _out_of_reach(probe: Probe) -> set[str]:
+    """Places that the start of the candidate leaves where no joint comes, such as the other end of a way.
+
+    Moved to the rim of what was seen they would stand where no sample of the training contradicts them.
+    """
+    given, values = probe.candidate.bounds, probe.model.parameters
+    bounded = {dotted: given[short] for short, dotted in _short_names(probe).items() if short in given}
+    return {dotted for dotted, (low, high) in bounded.items() if abs(values[dotted].value) >= FAR_AWAY * (high - low)}
 
 
 def _short_names(probe: Probe) -> dict[str, str]:
@@ -217,7 +231,7 @@ def _release(
 ) -> tuple[tuple[str, ...], tuple[Alias, ...]]:
     """Parameters without influence at zero size (a period, a transition velocity) that have one now."""
     fixed = {dotted for short, dotted in _short_names(probe).items() if short in probe.candidate.fixed}
-    asleep = [name for name in probe.invisible if name not in fixed]
+    asleep = [name for name in probe.invisible if name not in fixed | _out_of_reach(probe)]
     theta = model.theta.copy()
     theta[[model.index(name) for name in free]] = fit.values
     _, fresh = data.training.evaluate(model, theta, [model.index(name) for name in asleep])

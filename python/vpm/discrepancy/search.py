@@ -29,6 +29,8 @@ SENSOR_SHARE = 0.25
 #: what is white in it up to which they are not worth that.
 HEAVY = ("joint_compliance", "backlash", "link_flexibility", "structural_damping")
 NOISE_ONLY = 1.2
+#: What leaves up to so many times as much as the best explains the data as well, if it is also little of the whole gap.
+SAME = 1.5
 #: A refinement leaves less than this share of the mean square that the plainer effect leaves.
 REFINED = 0.5
 
@@ -245,7 +247,7 @@ def _plainer(trial: Trial, first: Trial) -> bool:
 
 def _as_good(trial: Trial, first: Trial) -> bool:
     """Whether a trial explains the unseen data as the first one does, with no more numbers."""
-    close = trial.unseen.relative >= first.unseen.relative - LEAST_GAIN
+    close = trial.unseen.relative >= first.unseen.relative - LEAST_GAIN and _left(trial) <= SAME * _left(first)
     return close and len(trial.parameters) <= len(first.parameters)
 
 

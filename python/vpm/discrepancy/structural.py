@@ -9,15 +9,18 @@ import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vpm.catalogue import EffectType
 from vpm.identify.along import has_hidden
 from vpm.model import Model
 
+Array = NDArray[np.float64]
+
 #: Effects whose start values are read here.
-STRUCTURAL = frozenset({"joint_compliance", "backlash", "link_flexibility", "end_stop"})
+STRUCTURAL = frozenset({"joint_compliance", "backlash", "link_flexibility"})
 #: Effects that add coordinates that nobody measures.
-HIDING = frozenset({"joint_compliance", "backlash", "link_flexibility"})
+HIDING = STRUCTURAL
 #: Frequencies at which a spring lets the link swing behind a motor that stands still, Hz, and damping ratios there.
 FREQUENCIES = (3.0, 8.0, 20.0, 50.0)
 LOOSE, CONTACT = 0.05, 0.1
@@ -28,11 +31,11 @@ CONTACT_FREQUENCY = 50.0
 GAP_SHARES = (5e-4, 3e-3, 1.5e-2)
 #: Places of a stop, as shares of the half travel from its middle.
 STOP_SHARES = (0.6, 0.8, 0.95)
+#: Places of a stop compared on either side, the largest share of the samples that may lie beyond one, and the fewest.
+STOP_PLACES, BEYOND_MOST, BEYOND_LEAST = 30, 0.3, 3
 
 #: Least inertia on the side of the drive, as a share of what the joint moves.
 LEAST_DRIVEN = 1e-4
-#: Effects that let something move that nobody measures.
-HIDING = frozenset({"joint_compliance", "backlash", "link_flexibility"})
 
 Starts = tuple[Mapping[str, float], ...]
 Bounds = Mapping[str, tuple[float, float]]
@@ -87,24 +90,18 @@ def _joint(model: Model, site: str) -> str:
     return site if site in model.joints else model.joint_before(site)
 
 
-def structural_starts(effect: str, site: str, model: Model, middle: float, travel: float) -> tuple[Starts, Bounds]:
+def structural_starts(effect: str, site: str, model: Model, travel: float) -> tuple[Starts, Bounds]:
     """Start values and bounds by short name.
 
     Parameters
     ----------
     effect, site : str
     model : Model
-    middle, travel : float
-        Middle and half range of the joint's travel in the data.
+    travel : float
+        Half range of the joint's travel in the data.
     """
     inertia = _moved(model, site)
-    held = (inertia * (2.0 * math.pi * SLOWEST) ** 2, math.inf)
-    if effect == "end_stop":
-        high = tuple({"high": middle + share * travel} for share in STOP_SHARES)
-        low = tuple({"low": middle - share * travel} for share in STOP_SHARES)
-        reach = (middle - travel, middle + travel)  # what is never touched does not show
-        bounds = {"low": reach, "high": reach, "width": (1e-6 * travel, 0.05 * travel), "stiffness": held}
-        return (*high, *low), bounds
+    held = (softest(model, site), math.inf)
     share = (LEAST_DRIVEN * inertia, math.inf)  # without any inertia before it a spring has nothing to swing against
     if effect == "backlash":
         stiffness = inertia * (2.0 * math.pi * CONTACT_FREQUENCY) ** 2
@@ -127,6 +124,57 @@ def structural_starts(effect: str, site: str, model: Model, middle: float, trave
         }
     starts = tuple({"stiffness": k, "damping": 2.0 * LOOSE * math.sqrt(k * inertia)} for k in stiffnesses)
     return starts, {"stiffness": held, "inertia": share}
+
+
+def softest(model: Model, site: str) -> float:
+    """Least stiffness that holds what a joint moves, N/m or N m/rad."""
+    return _moved(model, site) * (2.0 * math.pi * SLOWEST) ** 2
+
+
+def stop_starts(position: Array, residual: Array, middle: float, travel: float, least: float) -> tuple[Starts, Bounds]:
+    """The same for the ends of a way: one end, or both where either side looks like one.
+
+    A stop pushes back over the last bit of the way, so the residual (applied - required) there grows from its place on,
+    outwards; the places on either side are those at which such a ramp takes most of it.
+
+    Parameters
+    ----------
+    position, residual : ndarray, shape (n,)
+        Of the joint, at the same samples.
+    middle, travel : float
+        Middle and half range of the joint's travel in the data.
+    least : float
+        Stiffness of the softest stop.
+    """
+    ends: dict[str, list[float]] = {}
+    for name, side in (("high", 1.0), ("low", -1.0)):
+        found = _ramp(side * (position - middle), side * residual)
+        shares = [share * travel for share in STOP_SHARES]
+        ends[name] = [middle + side * place for place in (*found, *shares)]
+        if found:
+            ends[f"{name} seen"] = [middle + side * found[0]]
+    both = [{"low": low, "high": high} for low in ends.get("low seen", []) for high in ends.get("high seen", [])]
+    reach = (middle - 1.2 * travel, middle + 1.2 * travel)
+    one = [{name: place} for name in ("high", "low") for place in ends[name]]
+    width = (1e-6 * travel, 0.05 * travel)
+    return (*one, *both), {"low": reach, "high": reach, "width": width, "stiffness": (least, math.inf)}
+
+
+def _ramp(outwards: Array, push: Array) -> tuple[float, ...]:
+    """Place from which a ramp outwards takes most of the push; none where nothing pushes back."""
+    order = np.sort(outwards)
+    most = int(BEYOND_MOST * order.size)
+    if most <= BEYOND_LEAST:
+        return ()
+    counts = np.unique(np.geomspace(BEYOND_LEAST, most, STOP_PLACES).astype(np.int64))
+    best, place = 0.0, None
+    for start in order[-counts - 1]:
+        ramp = np.maximum(outwards - start, 0.0)
+        along = float(ramp @ push)
+        power = float(ramp @ ramp)
+        if along > 0.0 and power > 0.0 and along**2 / power > best:
+            best, place = along**2 / power, float(start)
+    return () if place is None else (place,)
 
 
 def _moved(model: Model, site: str) -> float:
