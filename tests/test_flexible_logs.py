@@ -101,9 +101,19 @@ def test_memory_of_the_gear_lowers_it_further() -> None:
 
 
 def test_a_diagnosis_of_the_rigid_hub_names_its_dry_friction() -> None:
-    # No effect of the catalogue stands for a flexible link; among frictions the diagnosis has to name dry friction.
+    # Without the gauge the torque alone does not show the link.
     train, test = halves(False)
     found = diagnose(hub(False), train, test, effects=["coulomb_friction", "bias_force", "spring", "stribeck_friction"])
     assert found.steps[1].effect == "coulomb_friction"
     # It leaves more than a quarter of the mean square, so that it is not called the explanation.
     assert found.verdict == "unexplained"
+
+
+def test_with_the_gauge_a_diagnosis_names_the_flexible_link_and_then_dry_friction() -> None:
+    train, test = (half.with_channel("arm_bending.position", half["link.command"], "rad") for half in halves(True))
+    found = diagnose(hub(False), train, test)
+    assert [step.effect for step in found.steps] == ["", "link_flexibility", "coulomb_friction"]
+    torque, angle = found.gap["hub.effort"], found.gap["arm_bending.position"]
+    assert torque.after / torque.signal < 0.24
+    assert angle.after / angle.signal < 0.42
+    assert angle.recalibrated / angle.signal > 1.0

@@ -244,3 +244,7 @@ def test_gain_of_a_smaller_residual_is_significant_and_of_noise_is_not() -> None
     other = gain(before, before + 0.3 * generator.standard_normal(5000), [slice(0, 5000)])
     assert abs(other.score) < 4.0
     assert other.relative < 0.0
+    assert other.harm > 5.0  # larger without doubt
+    assert better.harm < -5.0
+    shift = 0.02 * generator.standard_normal(5000)
+    assert abs(gain(before, before + shift, [slice(0, 5000)]).harm) < 2.0  # by chance

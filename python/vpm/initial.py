@@ -212,11 +212,14 @@ def passive_joints(experiment: Experiment, model: Model) -> tuple[str, ...]:
     """Joints that nobody drives and nobody measures: without an actuator and without a position in the log.
 
     In prescribed motion they move freely with their effects. A joint with an actuator is never one of them; that its
-    position is missing is a mistake of the log.
+    position is missing is a mistake of the log. One that an effect has split off is always one of them: where the log
+    holds its deflection, that is compared and not prescribed, or the log would show nothing of its stiffness.
     """
     on_joints = [name for name in model.actuators if model.line_of_actuator(name) is None]
     driven = {model.joint_of_actuator(name) for name in on_joints}
-    return tuple(name for name in model.joints if f"{name}.position" not in experiment and name not in driven)
+    added = set(model.added_joints)
+    unseen = (name for name in model.joints if name in added or f"{name}.position" not in experiment)
+    return tuple(name for name in unseen if name not in driven)
 
 
 def joint_motion(

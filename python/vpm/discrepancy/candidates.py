@@ -9,7 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.catalogue import EFFECTS, EffectType
-from vpm.discrepancy.structural import STRUCTURAL, beyond, sites_worth_trying, softest, stop_starts, structural_starts
+from vpm.discrepancy.structural import (
+    STRUCTURAL,
+    beyond,
+    logged_swing,
+    sites_worth_trying,
+    softest,
+    stop_starts,
+    structural_starts,
+)
 from vpm.identify import InverseDynamicsProblem
 from vpm.model import Model
 
@@ -130,7 +138,7 @@ def _candidate(effect: EffectType, site: str, model: Model, data: InverseDynamic
     joint = _joint_of(effect.site, site, model)
     seen = _excitation(data, model, joint, site if effect.site in {"actuator", "cylinder"} else None)
     if effect.name in STRUCTURAL:
-        found = structural_starts(effect.name, site, model, seen.travel)
+        found = structural_starts(effect.name, site, model, seen.travel, logged_swing(data, model, site))
         return Candidate(effect, site, *found, neutral=False)
     if effect.name == "end_stop":
         where = _over_way(data, model.joints[joint], residual)

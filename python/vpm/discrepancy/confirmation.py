@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from vpm.discrepancy.screening import Alias, Baseline, Probe, size_is_clear
 from vpm.errors import DivergedError
 from vpm.identify import Estimate, Gain, InverseDynamicsProblem, OutputErrorProblem, estimate, gain, segments
-from vpm.identify.identifiability import closest_column, is_alias
+from vpm.identify.identifiability import COPY_SHARE, closest_column, explained_share, is_alias
 from vpm.model import Model
 
 Array = NDArray[np.float64]
@@ -130,18 +130,17 @@ def confirm(current: Judged, data: Data, probe: Probe) -> Trial:
         released, held = _release(start, data, free, rough, probe)
         start = start.with_parameters(dict(zip(free, map(float, rough.values), strict=True)))
         free = (*free, *released)
-    diverged = ""
-    try:
-        judged = judge(start, free, data, bounds)
-    except DivergedError as error:
-        diverged = str(error)
-        judged = judge(start, free, Data(data.training, data.unseen, None), bounds)
+    judged, diverged = _judged(start, free, data, bounds)
+    doubtful = probe.held
+    if seen := _seen_by_now(judged, data, probe):
+        free, doubtful = (*free, *seen), tuple(alias for alias in doubtful if alias.parameter not in seen)
+        judged, diverged = _judged(judged.model, free, data, bounds)
     own = free[len(current.free) :]
     return Trial(
         probe,
         judged,
         own,
-        (*probe.held, *held),
+        (*doubtful, *held),
         gain(
             current.fit.residual,
             judged.fit.residual * _shrinkage(data.training, current, judged),
@@ -153,6 +152,39 @@ def confirm(current: Judged, data: Data, probe: Probe) -> Trial:
         diverged,
         is_clear(judged, own),
     )
+
+
+def _judged(
+    start: Model, free: tuple[str, ...], data: Data, bounds: dict[str, tuple[float, float]]
+) -> tuple[Judged, str]:
+    """A fit, judged by the balance alone where it cannot simulate the unseen records, with the reason."""
+    try:
+        return judge(start, free, data, bounds), ""
+    except DivergedError as error:
+        return judge(start, free, replace(data, simulation=None), bounds), str(error)
+
+
+def _seen_by_now(judged: Judged, data: Data, probe: Probe) -> tuple[str, ...]:
+    """Parameters that looked like others where the fit began and do not where it ended.
+
+    A stiffness looks like the inertia behind it as long as neither is near its value. Of an effect that does nothing at
+    its start a doubtful parameter may stay there; any other start is a guess, and is left if the data show it at all.
+    """
+    names = [alias.parameter for alias in probe.held]
+    if not names:
+        return ()
+    model = judged.model
+    _, columns = data.training.evaluate(model, model.theta, [model.index(name) for name in names])
+    known, seen = judged.fit.jacobian, []
+    for name, column in zip(names, columns.T, strict=True):
+        if probe.candidate.neutral:
+            alike = is_alias(column, known, judged.fit.residual)
+        else:
+            alike = explained_share(column, known) > COPY_SHARE
+        if np.any(column) and not alike:
+            seen.append(name)
+            known = np.column_stack([known, column])
+    return tuple(seen)
 
 
 def _shrinkage(problem: InverseDynamicsProblem, current: Judged, judged: Judged) -> float:

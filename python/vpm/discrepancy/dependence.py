@@ -39,7 +39,8 @@ class Shares:
     of : dict of str to float
         Share of the mean square on unseen data by state, the largest first.
     alike : tuple of str
-        States whose share these data cannot tell from the largest, the largest itself among them.
+        States whose share these data cannot tell from the largest, the largest itself among them; none if they cannot
+        tell the largest from zero.
     """
 
     of: dict[str, float]
@@ -91,7 +92,8 @@ def shares(data: Data, final: Judged, joint: int) -> Shares:
     best = min(found, key=lambda name: float(found[name] @ found[name]))
     ends = np.cumsum([0, *(data.unseen.efforts(r)[joint].time.size for r in range(len(data.unseen.motions)))])
     records = [slice(int(a), int(b)) for a, b in pairwise(ends)]
-    alike = {name for name in found if _as_good(found[best], found[name], records)}
+    told = not _as_good(found[best], left, records)
+    alike = {name for name in found if told and _as_good(found[best], found[name], records)}
     ranked = dict(sorted(((name, _share(rest, left)) for name, rest in found.items()), key=lambda item: -item[1]))
     return Shares(ranked, tuple(name for name in ranked if name in alike))
 

@@ -139,7 +139,8 @@ class Empirical(Storable):
         Root mean square of the weighted residual on unseen data without and with the formula.
     sentence : str
     alike : tuple of str
-        States whose share these data cannot tell from the largest, the largest itself among them.
+        States whose share these data cannot tell from the largest, the largest itself among them; none if they cannot
+        tell the largest from zero.
     predicted : float
         Share of the mean square on unseen data that the formula, or what the remark says, predicts.
     """

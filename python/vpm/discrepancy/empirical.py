@@ -173,7 +173,7 @@ def _in_time(states: dict[str, float], beat: Rhythm | None, told: float) -> tupl
 def _depends(states: Shares) -> str:
     """The state that predicts most, what these data cannot tell from it, and what predicts clearly less."""
     named = [name for name, share in states.of.items() if share >= NAMED][:MOST_NAMED]
-    if not named:
+    if not named or not states.alike:
         return "no single state of the machine predicts it"
 
     def told(names: list[str]) -> str:

@@ -25,6 +25,8 @@ MODEST_GAIN, MODEST_FACTOR = 0.3, 3.0
 #: From this drop on, the balance of effort decides alone on a machine of several joints: with two effects missing, the
 #: simulation of a machine that has one of them may well be worse, because errors of coupled joints had cancelled.
 CLEAR_GAIN = 0.5
+#: One-sided 95 % quantile of the normal distribution: a simulation that is worse by less is worse by chance.
+NORMAL_95_ONE_SIDED = 1.6448536269514722
 #: Drop of the training mean square below which a candidate is not refitted at all.
 LEAST_SCREENED = 0.005
 
@@ -184,10 +186,12 @@ def _worse_in_simulation(trial: Trial) -> str:
         return f"with it the simulation of the unseen record fails: {trial.diverged}"
     simulated = trial.simulated
     decided = coupled(trial.judged.model) and trial.unseen.relative >= CLEAR_GAIN
-    if simulated is not None and simulated.relative < -LEAST_GAIN and not decided:
+    if simulated is None or decided or simulated.harm <= NORMAL_95_ONE_SIDED:
+        return ""
+    if simulated.relative < -LEAST_GAIN:
         return (
             "it helps the balance of effort and makes the simulation of the unseen record worse by "
-            f"{_percent(-simulated.relative)} of its mean square"
+            f"{_percent(-simulated.relative)} of its mean square, {simulated.harm:.1f} standard deviations"
         )
     return ""
 

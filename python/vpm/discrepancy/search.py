@@ -8,7 +8,7 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from vpm.discrepancy.candidates import Key, candidates, left_out
+from vpm.discrepancy.candidates import Candidate, Key, candidates, left_out
 from vpm.discrepancy.confirmation import Data, Judged, Trial, confirm, judge
 from vpm.discrepancy.diagnosis import Ambiguity, RankedCandidate, RefusedEffect
 from vpm.discrepancy.refusal import LEAST_GAIN, Thresholds, refuse_probe, refuse_timing, refuse_trial
@@ -142,7 +142,7 @@ class _Round:
         current, data = self.current, self.data
         found = candidates(current.model, data.training, current.fit.residual, effects)
         self.refused.update(left_out(current.model, data.training, effects))
-        listed = [c for c in found if c.key not in without and (c.effect.name in HEAVY) == heavy]
+        listed = [c for c in found if c.key not in without and self._is_heavy(c) == heavy]
         self.tell(f"round {self.number}: screening {len(listed)} candidates")
         screen = partial(probe, current.baseline, data.training)
         results = self.each(f"round {self.number}: screening", screen, listed, lambda c: c.label)
@@ -158,6 +158,11 @@ class _Round:
             else:
                 self._promising.append(result)
         self._promising.sort(key=lambda p: -p.score)
+
+    def _is_heavy(self, candidate: Candidate) -> bool:
+        """Whether it adds a motion that nobody measures; where the log holds that motion, it is evidence like any."""
+        logged = {f"{candidate.site}_{suffix}.position" for suffix in ("bending", "deflection")}
+        return candidate.effect.name in HEAVY and not logged & set(self.data.training.shown)
 
     def confirm(self) -> None:
         """Refit with the most promising ones and judge them on unseen data."""

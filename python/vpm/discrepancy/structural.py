@@ -12,6 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.catalogue import EffectType
+from vpm.experiment.signal import differentiate
+from vpm.identify import InverseDynamicsProblem
 from vpm.identify.along import has_hidden
 from vpm.model import Model
 
@@ -90,7 +92,31 @@ def _joint(model: Model, site: str) -> str:
     return site if site in model.joints else model.joint_before(site)
 
 
-def structural_starts(effect: str, site: str, model: Model, travel: float) -> tuple[Starts, Bounds]:
+def logged_swing(data: InverseDynamicsProblem, model: Model, site: str) -> tuple[float, float] | None:
+    """Stiffness and damping per inertia, 1/s^2 and 1/s, of the deflection behind a joint, where the logs hold it.
+
+    What hangs on the spring obeys ``a + d'' = -(k/J) d - (c/J) d'``, ``a`` the acceleration of the joint before it.
+    Two numbers by linear least squares, without gravity and the motion of other joints, so good for a start only.
+    """
+    logged = [c for c in data.shown if c in {f"{site}_bending.position", f"{site}_deflection.position"}]
+    if not logged:
+        return None
+    column = data.motions[0].joints.index(_joint(model, site))
+    columns, wanted = [], []
+    for m, experiment in zip(data.motions, data.experiments, strict=True):
+        bent = experiment[logged[0]]
+        rate = differentiate(bent, m.dt)
+        whole = m.acceleration[:, column] + differentiate(rate, m.dt)
+        kept = m.parallel(np.column_stack([bent - bent.mean(), rate, whole]))
+        columns.append(kept[:, :2])
+        wanted.append(-kept[:, 2])
+    stiffness, damping = np.linalg.lstsq(np.vstack(columns), np.concatenate(wanted), rcond=None)[0]
+    return (float(stiffness), max(float(damping), 0.0)) if stiffness > (2.0 * math.pi * SLOWEST) ** 2 else None
+
+
+def structural_starts(
+    effect: str, site: str, model: Model, travel: float, swing: tuple[float, float] | None = None
+) -> tuple[Starts, Bounds]:
     """Start values and bounds by short name.
 
     Parameters
@@ -99,6 +125,8 @@ def structural_starts(effect: str, site: str, model: Model, travel: float) -> tu
     model : Model
     travel : float
         Half range of the joint's travel in the data.
+    swing : tuple of float, optional
+        What the logs say of the spring, see `logged_swing`; it is tried beside the grid of frequencies.
     """
     inertia = _moved(model, site)
     held = (softest(model, site), math.inf)
@@ -116,14 +144,16 @@ def structural_starts(effect: str, site: str, model: Model, travel: float) -> tu
         }
         return tuple({**common, "gap": gap, "width": 0.05 * gap} for gap in gaps), bounds
     stiffnesses = [inertia * (2.0 * math.pi * frequency) ** 2 for frequency in FREQUENCIES]
+    known = [(swing[0] * inertia, swing[1] * inertia)] if swing is not None else []
     if effect == "link_flexibility":
+        read = tuple({"stiffness": k, "time": c / k} for k, c in known)
         times = [LOOSE / (math.pi * frequency) for frequency in FREQUENCIES]
-        return tuple({"stiffness": k, "time": t} for k, t in zip(stiffnesses, times, strict=True)), {
+        return (*read, *({"stiffness": k, "time": t} for k, t in zip(stiffnesses, times, strict=True))), {
             "stiffness": held,
             "inertia": share,
         }
     starts = tuple({"stiffness": k, "damping": 2.0 * LOOSE * math.sqrt(k * inertia)} for k in stiffnesses)
-    return starts, {"stiffness": held, "inertia": share}
+    return (*({"stiffness": k, "damping": c} for k, c in known), *starts), {"stiffness": held, "inertia": share}
 
 
 def softest(model: Model, site: str) -> float:

@@ -87,7 +87,16 @@ def check_along(model: Model, joints: Sequence[str]) -> None:
 
 
 def shown_channels(model: Model, joints: Sequence[str], experiments: Sequence[Experiment]) -> tuple[str, ...]:
-    """Outputs beside the balance of effort that every log holds and that this machine works out along the motion."""
+    """What every log holds beside the balance of effort and this machine works out along the motion, or lacks.
+
+    It lacks the coordinates that effects would split off: where a log holds the deflection of a link or of a joint that
+    the machine takes for rigid, it says zero.
+    """
+    lacking = (channel for channel in model.deflections if all(channel in e for e in experiments))
+    return (*_shown(model, joints, experiments), *lacking)
+
+
+def _shown(model: Model, joints: Sequence[str], experiments: Sequence[Experiment]) -> tuple[str, ...]:
     if not has_own_drives(model) and not has_hidden(model, joints):
         return ()
     efforts = {f"{name}.effort" for name in model.joints}
@@ -145,16 +154,27 @@ def respond(
             raise
         # No place of rest, or no mass matrix: with these numbers the machine cannot follow the motion.
         raise DivergedError(f"{experiment.name}: {error}", time=float(m.time[m.kept][0])) from None
-    return _rigid(model, theta, m, columns)
+    return _rigid(model, theta, m, columns, channels)
 
 
-def _rigid(model: Model, theta: Array, m: Motion, columns: Sequence[int]) -> Response:
+def _picked(model: Model, outputs: Array, jacobian: Array, rows: slice, channels: Sequence[str]) -> tuple[Array, Array]:
+    """Some outputs with their derivative; of what a machine lacks, nothing shows."""
+    known = [column for column, channel in enumerate(channels) if channel in model.output_channels]
+    places = [model.output_channels.index(channels[column]) for column in known]
+    kept, slopes = outputs[rows], jacobian[rows]
+    seen, derivative = np.zeros((len(kept), len(channels))), np.zeros((len(kept), len(channels), slopes.shape[2]))
+    seen[:, known], derivative[:, known] = kept[:, places], slopes[:, places]
+    return seen, derivative
+
+
+def _rigid(model: Model, theta: Array, m: Motion, columns: Sequence[int], channels: Sequence[str]) -> Response:
     required, applied, jacobian = model.core.inverse_dynamics(
         theta, m.position, m.velocity, m.acceleration, m.inputs, m.dt, list(columns)
     )
     rows = m.kept
-    nothing = np.zeros((len(m.time[rows]), 0))
-    return Response(required[rows], applied[rows], jacobian[rows], nothing, np.zeros((len(nothing), 0, len(columns))))
+    nothing = np.zeros((len(m.time[rows]), len(channels)))
+    slopes = np.zeros((*nothing.shape, len(columns)))
+    return Response(required[rows], applied[rows], jacobian[rows], nothing, slopes)
 
 
 def _with_drives(
@@ -165,13 +185,11 @@ def _with_drives(
     rows = m.kept
     effort = [model.output_channels.index(f"{name}.effort") for name in model.joints]
     drives = range(len(model.output_channels), outputs.shape[1])
-    shown = [model.output_channels.index(channel) for channel in channels]
     return Response(
         outputs[rows][:, effort],
         outputs[rows][:, drives],
         (jacobian[:, effort] - jacobian[:, drives])[rows],
-        outputs[rows][:, shown],
-        jacobian[rows][:, shown],
+        *_picked(model, outputs, jacobian, rows, channels),
     )
 
 
@@ -187,13 +205,11 @@ def _with_both(
     rows, joints = m.kept, [place for place, joint in enumerate(model.joints) if joint in m.joints]
     effort = [model.output_channels.index(f"{model.joints[place]}.effort") for place in joints]
     drives = [len(model.output_channels) + place for place in joints]
-    shown = [model.output_channels.index(channel) for channel in channels]
     return Response(
         required[rows][:, effort],
         outputs[rows][:, drives],
         (slopes[:, effort] - jacobian[:, drives])[rows],
-        outputs[rows][:, shown],
-        jacobian[rows][:, shown],
+        *_picked(model, outputs, jacobian, rows, channels),
     )
 
 
@@ -237,13 +253,11 @@ def _with_hidden(model: Model, theta: Array, m: Motion, columns: Sequence[int], 
     rows, measured = m.kept, [place for place, joint in enumerate(model.joints) if joint in m.joints]
     applied, slopes = model.core.delivered(theta, m.inputs, m.dt, list(columns))
     effort = [model.output_channels.index(f"{model.joints[place]}.effort") for place in measured]
-    seen = [model.output_channels.index(channel) for channel in channels]
     return Response(
         outputs[rows][:, effort],
         applied[rows][:, measured],
         (jacobian[:, effort] - slopes[:, measured])[rows],
-        outputs[rows][:, seen],
-        jacobian[rows][:, seen],
+        *_picked(model, outputs, jacobian, rows, channels),
     )
 
 

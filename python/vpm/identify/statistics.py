@@ -116,6 +116,17 @@ class Gain:
         """Share of the residual's mean square that is gone (negative: it grew)."""
         return 1.0 - (self.after / self.before) ** 2 if self.before > 0.0 else 0.0
 
+    @property
+    def harm(self) -> float:
+        """By how many standard deviations the second residual is the larger one (negative: the smaller one).
+
+        Where half of the change is asked for, both are equally large: ``after^2 - before^2 = (1 - 2 weight) change^2``.
+        """
+        if self.score == 0.0:
+            return 0.0
+        std = abs(self.weight / self.score)
+        return (0.5 - self.weight) / std if std > 0.0 else float(np.copysign(np.inf, 0.5 - self.weight))
+
 
 def gain(before: Array, after: Array, segments: Sequence[slice]) -> Gain:
     """Compare two residuals of the same records.

@@ -113,7 +113,7 @@ def _command_problems(document: Document) -> Iterator[Problem]:
 def _channel_problems(document: Document, structure: Structure) -> Iterator[Problem]:
     known = ("time", *structure.channels)
     for name, entry in (document.channels or {}).items():
-        if name not in known:
+        if name not in known and name not in structure.deflections:
             repair = near_match(name, known, what="its channels are")
             yield Problem(place("channels", name), f"is no channel of the model; {repair}")
             continue

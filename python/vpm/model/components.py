@@ -39,6 +39,11 @@ class Components(DriveComponents):
         """Joints that effects have split off others, ``axis_deflection``: nobody drives and nobody measures them."""
         return self._checked.structure.added
 
+    @property
+    def deflections(self) -> tuple[str, ...]:
+        """Channels that a log may hold and this model takes for zero, such as ``arm_bending.position``."""
+        return tuple(self._checked.structure.deflections)
+
     def joint_before(self, site: str) -> str:
         """Joint with one coordinate that moves a body or a beam, or a joint itself.
 

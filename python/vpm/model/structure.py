@@ -141,6 +141,16 @@ class Structure:
         return {body: axis.name for body, axis in joints if axis.coordinate.kind == "revolute"}
 
     @property
+    def deflections(self) -> Mapping[str, str]:
+        """Positions of joints that effects would split off, each with the joint it is split from.
+
+        A log may hold one, from a strain gauge or a second encoder; the machine as it is takes it for zero.
+        """
+        bent = {f"{body}_bending": joint for body, joint in self.turned.items()}
+        wound = {f"{joint}_deflection": joint for joint in self.sites("joint")}
+        return {f"{name}.position": joint for name, joint in (bent | wound).items() if name not in self.joints}
+
+    @property
     def horizontal(self) -> tuple[Direction, Direction]:
         """Axes of the world about which gravity can be tilted; it must not be zero."""
         x, y, z = self.document.gravity
@@ -247,6 +257,8 @@ class Structure:
             The model has no such channel; the message names near ones.
         """
         owner, _, name = channel.partition(".")
+        if channel in self.deflections:
+            return COORDINATE_UNIT[self.joint_kind(self.deflections[channel])]
         if channel not in self.channels:
             repair = near_match(channel, self.channels, what="its channels are")
             raise ModelError(f'the model has no channel "{channel}"; {repair}', where=channel)
