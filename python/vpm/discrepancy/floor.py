@@ -49,7 +49,7 @@ def noise_floor(
     cutoffs = [m.cutoff for m in unseen.motions]
     expected: dict[str, list[tuple[float, int]]] = {}
     for experiment, cutoff in zip(unseen.experiments, cutoffs, strict=True):
-        own = _own_log(model, experiment, setup, generator) if mode == "closed_loop" else None
+        own = own_log(model, experiment, setup, generator) if mode == "closed_loop" else None
         change = _balance(model, own, cutoff) if own is not None else None
         if change is None:
             clean = InverseDynamicsProblem(model, [experiment], cutoff=cutoff)
@@ -100,10 +100,10 @@ def _white(problem: InverseDynamicsProblem, residual: Array) -> dict[str, float]
     }
 
 
-def _own_log(
-    model: Model, experiment: Experiment, setup: Setup | None, generator: np.random.Generator
+def own_log(
+    model: Model, experiment: Experiment, setup: Setup | None, generator: np.random.Generator | None = None
 ) -> Experiment | None:
-    """The log that the model itself would have left, with noise; None where it cannot follow the references."""
+    """The log that the model itself would have left, with noise from a generator; None where it cannot follow."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error")
@@ -116,7 +116,7 @@ def _own_log(
     for column, channel in enumerate(model.output_channels):
         if channel in experiment:
             values = run.outputs[:, column]
-            if not channel.endswith(".command"):  # the controller wrote it: nothing comes on top
+            if generator is not None and not channel.endswith(".command"):  # the controller wrote it: exact
                 values = values + noise_std(experiment[channel]) * generator.standard_normal(values.size)
             own = own.with_channel(channel, values, _unit(experiment, channel))
     return own

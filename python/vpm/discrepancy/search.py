@@ -11,6 +11,7 @@ import numpy as np
 from vpm.discrepancy.candidates import Candidate, Key, candidates, left_out
 from vpm.discrepancy.confirmation import Data, Judged, Trial, confirm, judge
 from vpm.discrepancy.diagnosis import Ambiguity, RankedCandidate, RefusedEffect
+from vpm.discrepancy.driven import compare_driven
 from vpm.discrepancy.refusal import LEAST_GAIN, Thresholds, refuse_probe, refuse_timing, refuse_trial
 from vpm.discrepancy.screening import Probe, probe
 from vpm.discrepancy.side_by_side import Failure, SideBySide
@@ -31,6 +32,8 @@ HEAVY = ("joint_compliance", "backlash", "link_flexibility", "structural_damping
 NOISE_ONLY = 1.2
 #: What leaves up to so many times as much as the best explains the data as well, if it is also little of the whole gap.
 SAME = 1.5
+#: A lag, and the delays that it may be taken for.
+LATE = ("actuator_lag", "input_delay", "sensor_delay")
 #: A refinement leaves less than this share of the mean square that the plainer effect leaves.
 REFINED = 0.5
 
@@ -212,10 +215,30 @@ class _Round:
         plain = [t for t in self._believed if _plainer(t, first)]
         first = min(plain, key=_cost) if plain else first
         equals = [t for t in self._believed if _as_good(t, first)]
-        chosen = min(equals, key=_evidence)
+        chosen = self._in_time(min(equals, key=_evidence))
         key = chosen.probe.candidate.key
         self._ranking[key] = replace(self._ranking[key], accepted=True)
         return Accepted(chosen, tuple(t.probe.candidate.label for t in equals if t is not chosen))
+
+    def _in_time(self, chosen: Trial) -> Trial:
+        """Of delay and lag, where both would do: what the reference tells from the other, else the delay.
+
+        A delay shifts in time; a lag does so too and weakens what is fast, which has to be seen.
+        """
+        if chosen.probe.candidate.effect.name not in LATE:
+            return chosen
+        alike = [
+            t for t in self._believed if t.probe.candidate.effect.name in LATE and _left(t) <= SAME * _left(chosen)
+        ]
+        lags = [t for t in alike if t.probe.candidate.effect.name == LATE[0]]
+        delays = [t for t in alike if t not in lags]
+        if not lags or not delays:
+            return chosen
+        lag, delay = min(lags, key=_evidence), min(delays, key=_evidence)
+        told = compare_driven(lag.judged, delay.judged, self.data)
+        if told is None:
+            return chosen
+        return lag if told.prefers_first else delay
 
     def ranked(self) -> list[RankedCandidate]:
         """Candidates of this round: what was accepted, what helped on unseen data, then by what screening promises."""

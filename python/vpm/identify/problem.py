@@ -163,6 +163,26 @@ class InverseDynamicsProblem:
             jacobians.append(kept.reshape(len(residuals[-1]), residual.shape[1], len(columns)))
         return self._stack(residuals), self._stack(jacobians)
 
+    def along_others(self, model: Model, logs: Sequence[Experiment]) -> InverseDynamicsProblem:
+        """The same samples and weights on other logs of these records, such as those of a simulation.
+
+        Parameters
+        ----------
+        model : Model
+        logs : sequence of Experiment
+            One for each record, sampled as it is.
+        """
+        others = copy(self)
+        moved = [joint_motion(log, model, m.cutoff, commanded=True) for log, m in zip(logs, self.motions, strict=True)]
+        quantities = ("position", "velocity", "acceleration", "inputs")
+        motions = tuple(
+            replace(m, **{name: getattr(other, name) for name in quantities})
+            for m, other in zip(self.motions, moved, strict=True)
+        )
+        whole = tuple(replace(m, edge=0) for m in motions)
+        vars(others).update(experiments=tuple(logs), motions=motions, _whole=whole)
+        return others
+
     def effort(self, model: Model, theta: Array, record: int) -> tuple[Array, Array, Array]:
         """Time, applied and required effort (n, joints) of one record, filtered as in the residual."""
         m = self.motions[record]
@@ -361,6 +381,11 @@ class OutputErrorProblem:
         self._followed = [joint_motion(e, model, cutoff) if follows else None for e in self.experiments]
         self._channels = compared_channels(model, experiments, mode, channels)
         self.blocks = self._lay_out(model)
+
+    @property
+    def setup(self) -> Setup:
+        """Integrator, substeps and horizon."""
+        return self._setup
 
     def evaluate(self, model: Model, theta: Array, columns: Sequence[int] = ()) -> tuple[Array, Array]:
         """Residual of the outputs and its derivative; see :class:`Problem`."""

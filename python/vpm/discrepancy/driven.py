@@ -1,0 +1,132 @@
+"""Is a drive late or slow? Asked of what the reference alone drives.
+
+A delay and a lag of one time part in the second order only. That is less than what feedback does to a balance of
+effort: the command answers to the disturbances that the balance leaves over, within the band of the filter, so that a fitted
+time comes out wrong by a share of a sample, with a residual that favours whatever is nearer to that. What the machine
+would do by itself, along the reference and without any noise, has nothing to do with the disturbances; it serves as
+instrument (A. Janot, P.-O. Vandanjon, M. Gautier, *IEEE Trans. Control Systems Technology* 22, 2014). Where a joint
+creeps, friction is late by itself, so that those samples do not count.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter1d
+
+from vpm.discrepancy.confirmation import CREEPING, Data, Judged
+from vpm.discrepancy.floor import own_log
+from vpm.identify import InverseDynamicsProblem
+from vpm.identify.identifiability import column_lengths
+
+Array = NDArray[np.float64]
+
+#: Standard deviations by which two models have to differ along the reference to be told apart.
+APART = 3.0
+#: Samples for each fitted number, at least.
+FEWEST = 10
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What the reference says of two models.
+
+    Attributes
+    ----------
+    apart : float
+        By how many standard deviations of the noise they differ along it, the smaller of both views; 0 where it cannot
+        be said.
+    first, second : float
+        By how many standard deviations the data ask each of them for what the other one does instead.
+    """
+
+    apart: float
+    first: float
+    second: float
+
+    @property
+    def prefers_first(self) -> bool:
+        """Whether they are told apart, and the first one is nearer to the data."""
+        return self.apart >= APART and abs(self.first) < abs(self.second)
+
+
+def compare_driven(first: Judged, second: Judged, data: Data) -> Verdict | None:
+    """Let two fitted models run the records by themselves, and ask the data which of them did what was measured.
+
+    In the balance of each, the rival's own run leaves a gap. Its part in the measured residual is estimated with the
+    gap as its own instrument and the slopes along the own run as those of the fitted parameters: 0 of a model that is
+    right, 1 of one whose rival is. None where one of them cannot follow its references.
+    """
+    problems = (data.training, data.unseen)
+    mine, its = _own_runs(first, data), _own_runs(second, data)
+    if mine is None or its is None:
+        return None
+    counted = np.concatenate([_moving(problem) for problem in problems])
+    one = _part(first, problems, mine, its, counted)
+    other = _part(second, problems, its, mine, counted)
+    return Verdict(min(one[0], other[0]), one[1], other[1])
+
+
+def _own_runs(judged: Judged, data: Data) -> list[InverseDynamicsProblem] | None:
+    """The problems on what a model does by itself; None where it cannot follow its references."""
+    if data.simulation is None or data.simulation.mode != "closed_loop":
+        return None
+    found = []
+    for problem in (data.training, data.unseen):
+        logs = [own_log(judged.model, record, data.simulation.setup) for record in problem.experiments]
+        whole = [log for log in logs if log is not None]
+        if len(whole) < len(logs):
+            return None
+        found.append(problem.along_others(judged.model, whole))
+    return found
+
+
+def _moving(problem: InverseDynamicsProblem) -> Array:
+    """1 for samples at which every joint is clearly in motion as far as the filters reach, else 0."""
+    speeds = [np.abs(m.velocity) for m in problem.motions]
+    largest = np.max([np.quantile(speed, 0.999, axis=0) for speed in speeds], axis=0)
+    counted = np.zeros(sum(block.time.size for block in problem.blocks))
+    for record, (m, speed) in enumerate(zip(problem.motions, speeds, strict=True)):
+        slow = (speed < CREEPING * largest).any(axis=1)
+        reach = m.decimation + round(1.0 / (m.cutoff * m.dt))
+        near = maximum_filter1d(slow.view(np.uint8), 2 * reach + 1)[m.retained] > 0
+        for block in problem.efforts(record):
+            counted[block.samples] = ~near
+    return counted
+
+
+def _part(
+    judged: Judged,
+    problems: tuple[InverseDynamicsProblem, ...],
+    own: list[InverseDynamicsProblem],
+    rival: list[InverseDynamicsProblem],
+    counted: Array,
+) -> tuple[float, float]:
+    """Size of the rival's gap beside the parameters, and of its part in the residual, in standard deviations."""
+    model, theta = judged.model, judged.model.theta
+    columns = [model.index(name) for name in judged.free]
+    measured = [problem.evaluate(model, theta, columns) for problem in problems]
+    alone = [problem.evaluate(model, theta, columns) for problem in own]
+    other = [problem.evaluate(model, theta)[0] for problem in rival]
+    residual = counted * np.concatenate([r for r, _ in measured])
+    gap = counted * np.concatenate([r - mine for r, (mine, _) in zip(other, alone, strict=True)])
+    slopes = counted[:, None] * np.vstack([j for _, j in measured])
+    instruments = counted[:, None] * np.vstack([j for _, j in alone])
+    samples = np.count_nonzero(residual)
+    if samples < FEWEST * (len(columns) + 1) or not np.any(gap):
+        return 0.0, 0.0
+    regressors, instruments = np.column_stack([slopes, -gap]), np.column_stack([instruments, gap])
+    lengths = column_lengths(instruments)
+    regressors, instruments = regressors / lengths, instruments / lengths
+    inverse = np.linalg.pinv(instruments.T @ regressors, rcond=1e-12)
+    step = -inverse @ (instruments.T @ residual)
+    left = residual + regressors @ step
+    deviation = float(np.sqrt(left @ left / samples))
+    spread = deviation * float(np.sqrt((inverse @ (instruments.T @ instruments) @ inverse.T)[-1, -1]))
+    known = instruments[:, :-1]
+    beside = gap - known @ np.linalg.lstsq(known, gap, rcond=1e-10)[0]
+    if deviation == 0.0 or spread == 0.0:
+        return 0.0, 0.0
+    return float(np.linalg.norm(beside)) / deviation, float(step[-1]) / spread

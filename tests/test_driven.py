@@ -1,0 +1,67 @@
+"""Late or slow: a delay and a lag, told apart by what the reference alone drives."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import vpm
+from blind import Case, make_case
+from vpm.discrepancy.confirmation import Data, judge
+from vpm.discrepancy.driven import APART, compare_driven
+from vpm.discrepancy.search import LATE
+from vpm.identify import InverseDynamicsProblem, OutputErrorProblem
+
+
+def fitted_late(case: Case) -> tuple[Data, list[vpm.discrepancy.confirmation.Judged]]:
+    """A lag and a delay, each fitted beside the parameters that may be calibrated."""
+    model = case.model()
+    training = InverseDynamicsProblem(model, case.train)
+    unseen = InverseDynamicsProblem(model, case.validate, cutoff=min(m.cutoff for m in training.motions))
+    data = Data(training, unseen, OutputErrorProblem(model, case.validate, "closed_loop"))
+    free = tuple(p.name for p in model.parameters.values() if p.adjustable)
+    found = []
+    for name, time in (("actuator_lag", "time_constant"), ("input_delay", "time")):
+        late = model.with_effect(name, at="drive", **{time: 2e-3})
+        own = next(effect for effect in late.effects if effect.name == name).parameter_names[time]
+        found.append(judge(late, (*free, own), data, {}))
+    return data, found
+
+
+def test_the_same_logs_give_the_same_residual() -> None:
+    case = make_case("axis_linear", "none", 2)
+    model = case.model()
+    problem = InverseDynamicsProblem(model, case.train)
+    same = problem.along_others(model, case.train)
+    np.testing.assert_allclose(
+        same.evaluate(model, model.theta)[0], problem.evaluate(model, model.theta)[0], rtol=0.0, atol=1e-9
+    )
+
+
+def test_a_long_lag_is_told_from_a_delay_and_a_short_delay_is_not_told_from_a_lag() -> None:
+    data, (lag, delay) = fitted_late(make_case("axis_linear", "actuator_lag", 5))
+    told = compare_driven(lag, delay, data)
+    assert told is not None
+    assert told.prefers_first
+    assert told.apart > 10.0 * APART
+    assert abs(told.first) < 3.0 < abs(told.second)
+    turned = compare_driven(delay, lag, data)
+    assert turned is not None
+    assert not turned.prefers_first
+    data, (lag, delay) = fitted_late(make_case("axis_linear", "input_delay", 5))
+    told = compare_driven(lag, delay, data)
+    assert told is not None
+    assert told.apart < APART
+    assert not told.prefers_first
+    assert compare_driven(lag, delay, replace(data, simulation=None)) is None
+
+
+@pytest.mark.parametrize(
+    ("hidden", "seed", "named"), [("actuator_lag", 5, "actuator_lag"), ("input_delay", 2, "input_delay")]
+)
+def test_a_lag_is_named_only_where_it_shows(hidden: str, seed: int, named: str) -> None:
+    case = make_case("axis_linear", hidden, seed)
+    why = vpm.diagnose(case.model(), case.train, case.validate, effects=LATE, workers=1)
+    assert [effect.name for effect in why.effects] == [named]
