@@ -1,11 +1,11 @@
 """Is a drive late or slow? Asked of what the reference alone drives.
 
 A delay and a lag of one time part in the second order only. That is less than what feedback does to a balance of
-effort: the command answers to the disturbances that the balance leaves over, within the band of the filter, so that a fitted
-time comes out wrong by a share of a sample, with a residual that favours whatever is nearer to that. What the machine
-would do by itself, along the reference and without any noise, has nothing to do with the disturbances; it serves as
-instrument (A. Janot, P.-O. Vandanjon, M. Gautier, *IEEE Trans. Control Systems Technology* 22, 2014). Where a joint
-creeps, friction is late by itself, so that those samples do not count.
+effort: the command answers to the disturbances that the balance leaves over, within the band of the filter, so that a
+fitted time comes out wrong by a share of a sample, with a residual that favours whatever is nearer to that. What the
+machine would do by itself, along the reference and without any noise, has nothing to do with the disturbances; it
+serves as instrument (A. Janot, P.-O. Vandanjon, M. Gautier, *IEEE Trans. Control Systems Technology* 22, 2014). Where a
+joint creeps, friction is late by itself, so that those samples do not count.
 """
 
 from __future__ import annotations
