@@ -12,7 +12,14 @@ from vpm.discrepancy.candidates import Candidate, Key, candidates, left_out
 from vpm.discrepancy.confirmation import Data, Judged, Trial, confirm, judge
 from vpm.discrepancy.diagnosis import Ambiguity, RankedCandidate, RefusedEffect
 from vpm.discrepancy.driven import compare_driven
-from vpm.discrepancy.refusal import LEAST_GAIN, Thresholds, refuse_probe, refuse_timing, refuse_trial
+from vpm.discrepancy.refusal import (
+    LEAST_GAIN,
+    NORMAL_95_ONE_SIDED,
+    Thresholds,
+    refuse_probe,
+    refuse_timing,
+    refuse_trial,
+)
 from vpm.discrepancy.screening import Probe, probe
 from vpm.discrepancy.side_by_side import Failure, SideBySide
 from vpm.discrepancy.structural import coupled
@@ -34,6 +41,8 @@ NOISE_ONLY = 1.2
 SAME = 1.5
 #: A lag, and the delays that it may be taken for.
 LATE = ("actuator_lag", "input_delay", "sensor_delay")
+#: Factor by which the last fit may exceed the bound of a transition velocity.
+MORE_ROOM = 3.0
 #: A refinement leaves less than this share of the mean square that the plainer effect leaves.
 REFINED = 0.5
 
@@ -110,6 +119,8 @@ def search(
         except KeyboardInterrupt:
             interrupted = True
             break
+    if not interrupted:
+        stages[-1] = replace(stages[-1], judged=_without_tight_bounds(stages[-1].judged, data))
     listed = _listed({**dropped, **refused})
     return Search(tuple(stages), tuple(accepted), listed, tuple(ranking), interrupted)
 
@@ -313,6 +324,28 @@ def _drop_replaced(stages: list[Stage], accepted: list[Accepted], data: Data, dr
             accepted.remove(entry)
             stages.append(Stage("removed", *entry.key, reduced))
             dropped[entry.key] = f"it is not needed any more beside {newest.trial.probe.candidate.label}"
+
+
+def _without_tight_bounds(final: Judged, data: Data) -> Judged:
+    """The same model fitted with more room where a transition velocity stands at its upper bound.
+
+    The bound keeps dry friction apart from viscous friction while candidates compete; once the names stand, it need not
+    cut the fit short. The training records decide, and the unseen ones may not be predicted worse for it.
+    """
+    bounds = dict(final.bounds)
+    for name, (low, high) in final.bounds.items():
+        shape = name.endswith("transition_velocity") and name in final.free
+        if shape and final.model.parameters[name].value > 0.999 * high:
+            bounds[name] = low, MORE_ROOM * high
+    if bounds == final.bounds:
+        return final
+    try:
+        refitted = judge(final.model, final.free, data, bounds)
+    except DivergedError:
+        return final
+    better = gain(final.fit.residual, refitted.fit.residual, segments(data.training)).relative > LEAST_GAIN
+    kept = gain(final.unseen, refitted.unseen, segments(data.unseen)).harm <= NORMAL_95_ONE_SIDED
+    return refitted if better and kept else final
 
 
 def _listed(refused: dict[Key, str]) -> tuple[RefusedEffect, ...]:
