@@ -176,6 +176,18 @@ def test_coefficients_are_those_that_were_planted() -> None:
     assert "position of axis" not in why.empirical.alike
 
 
+def test_a_formula_beside_a_named_effect_takes_nothing_from_it() -> None:
+    why = diagnosed(lambda q, v, _: (1.5 + 0.6 * np.cos(2.0 * np.pi * q / 0.35)) * np.tanh(v / 1e-3))
+    assert why.verdict == "effect_found"
+    assert [effect.name for effect in why.effects] == ["coulomb_friction"]
+    assert why.empirical is not None
+    assert why.empirical.formula in why.summary
+    assert why.empirical.after < 0.3 * why.empirical.before
+    for parameter in why.effects[0].parameters:
+        assert why.model.parameters[parameter.dotted].value == parameter.value
+    assert {term.dotted for term in why.empirical.terms} | {"axis.friction.coulomb"} <= set(why.fit.names)
+
+
 def test_a_rhythm_in_time_is_told_in_words_and_made_no_law() -> None:
     why = diagnosed(lambda _q, _v, t: 0.8 * np.sin(2.0 * np.pi * 3.3 * t + 0.4))
     assert why.verdict == "unexplained"

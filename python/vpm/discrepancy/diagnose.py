@@ -22,6 +22,7 @@ from vpm.discrepancy.diagnosis import (
     Picture,
     Step,
 )
+from vpm.discrepancy.empirical import beside
 from vpm.discrepancy.evidence import gather
 from vpm.discrepancy.floor import noise_floor
 from vpm.discrepancy.remainder import Remainder, remainder
@@ -142,6 +143,8 @@ def diagnose(
         told = rest.best if word == "unexplained" else rest.choices[-1]
         final, empirical = told.judged, told.told
         accepted = accepted if told.base is found.final else ()
+        if accepted:
+            empirical, final = beside(found.final, empirical, final, data)
         gap = _gaps(data, nominal, recalibrated, final, floor)
         summary = f"{summary} {empirical.sentence}"
     say("looking for what else would do, and for the experiment that tells it apart")

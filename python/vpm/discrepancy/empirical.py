@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from vpm.catalogue.empirical import TERMS
 from vpm.discrepancy.confirmation import Data, Judged, judge
@@ -72,6 +74,64 @@ def describe(final: Judged, data: Data) -> tuple[Empirical, Judged]:
         ),
         fitted,
     )
+
+
+def beside(base: Judged, told: Empirical, joint_fit: Judged, data: Data) -> tuple[Empirical, Judged]:
+    """The same formula beside effects that were found, which keep their numbers.
+
+    What is no physics takes nothing from what is.
+
+    Parameters
+    ----------
+    base : Judged
+        With the effects, without the formula.
+    told : Empirical
+    joint_fit : Judged
+        With the formula, all parameters fitted together.
+    data : Data
+    """
+    if not told.terms:
+        return told, base
+    own = tuple(term.dotted for term in told.terms)
+    start = joint_fit.model.with_parameters({name: base.model.parameters[name].value for name in base.free})
+    fitted = _judge(start, own, data, {})
+    better = gain(base.unseen, fitted.unseen, segments(data.unseen))
+    states = Shares(told.states, told.alike)
+    if better.relative < LEAST_GAIN:
+        sentence = _say_without(told.channel, states, "")
+        return replace(told, formula="", terms=(), after=told.before, sentence=sentence, predicted=0.0), base
+    fit = replace(
+        fitted.fit,
+        names=(*base.free, *own),
+        values=np.concatenate([base.fit.values, fitted.fit.values]),
+        jacobian=np.column_stack([base.fit.jacobian, fitted.fit.jacobian]),
+        covariance=block_diag(base.fit.covariance, fitted.fit.covariance),
+    )
+    judged = replace(fitted, free=fit.names, fit=fit, bounds=base.bounds)
+    formula = _formula_of(judged.model, own)
+    text = "; ".join(_text(formula, judged.model, at) for at in formula.terms)
+    sentence = _say(told.channel, states, text, better.after / better.before)
+    terms = _terms(formula, judged)
+    return replace(
+        told, formula=text, terms=terms, after=better.after, sentence=sentence, predicted=better.relative
+    ), judged
+
+
+def _formula_of(model: Model, own: Sequence[str]) -> Formula:
+    """Terms and shapes as they stand in a model."""
+    terms: dict[str, tuple[str, ...]] = {}
+    for dotted in own:
+        joint, _, term = dotted.partition(".empirical.")
+        terms[joint] = (*terms.get(joint, ()), term)
+    shapes = {
+        joint: {
+            name.removeprefix(f"{joint}.empirical."): model.parameters[name].value
+            for name in model.parameters
+            if name.startswith(f"{joint}.empirical.") and name not in own
+        }
+        for joint in terms
+    }
+    return Formula(terms, shapes)
 
 
 def _fit(formula: Formula, final: Judged, data: Data) -> Judged:
