@@ -8,6 +8,7 @@ from functools import cached_property, partial
 
 import numpy as np
 
+from vpm.catalogue import EFFECTS
 from vpm.discrepancy.candidates import Candidate, Key, candidates, left_out
 from vpm.discrepancy.confirmation import Data, Judged, Trial, confirm, judge
 from vpm.discrepancy.diagnosis import Ambiguity, RankedCandidate, RefusedEffect
@@ -41,6 +42,8 @@ NOISE_ONLY = 1.2
 SAME = 1.5
 #: A lag, and the delays that it may be taken for.
 LATE = ("actuator_lag", "input_delay", "sensor_delay")
+#: Difference of two logarithms of evidence that says nothing.
+TIE = 0.01
 #: Factor by which the last fit may exceed the bound of a transition velocity.
 MORE_ROOM = 3.0
 #: A refinement leaves less than this share of the mean square that the plainer effect leaves.
@@ -226,7 +229,7 @@ class _Round:
         plain = [t for t in self._believed if _plainer(t, first)]
         first = min(plain, key=_cost) if plain else first
         equals = [t for t in self._believed if _as_good(t, first)]
-        chosen = self._in_time(min(equals, key=_evidence))
+        chosen = self._in_time(_first_named(equals))
         key = chosen.probe.candidate.key
         self._ranking[key] = replace(self._ranking[key], accepted=True)
         return Accepted(chosen, tuple(t.probe.candidate.label for t in equals if t is not chosen))
@@ -324,6 +327,17 @@ def _drop_replaced(stages: list[Stage], accepted: list[Accepted], data: Data, dr
             accepted.remove(entry)
             stages.append(Stage("removed", *entry.key, reduced))
             dropped[entry.key] = f"it is not needed any more beside {newest.trial.probe.candidate.label}"
+
+
+def _first_named(equals: Sequence[Trial]) -> Trial:
+    """The trial with the best evidence; of several that no digit of the data parts, the first in the catalogue.
+
+    On a single link a drive that winds up and a link that bends at its root are one and the same model, and rounding
+    would decide.
+    """
+    best = min(map(_evidence, equals))
+    tied = [t for t in equals if _evidence(t) <= best + TIE]
+    return min(tied, key=lambda t: list(EFFECTS).index(t.probe.candidate.effect.name))
 
 
 def _without_tight_bounds(final: Judged, data: Data) -> Judged:
