@@ -254,6 +254,19 @@ class System:
         jacobian : ndarray, shape (N, n, k)
             Derivative of ``required - applied``.
         """
+    def required(
+        self,
+        theta: ArrayLike,
+        position: ArrayLike,
+        velocity: ArrayLike,
+        acceleration: ArrayLike,
+        time_step: float,
+        sensitivities: Sequence[int] = ...,
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Effort (N, n) that a measured motion needs, as in `inverse_dynamics`, and its derivatives (N, n, k).
+
+        The drives may be any: what they deliver does not enter.
+        """
     def delivered(
         self, theta: ArrayLike, inputs: ArrayLike, time_step: float, sensitivities: Sequence[int] = ...
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -19,16 +19,21 @@ _SIZES = ("bore", "rod", "area", "area_ratio")
 
 
 def measured_states(
-    model: Model, experiment: Experiment, theta: Array, rows: NDArray[np.int64], cutoff: float | None
+    model: Model,
+    experiment: Experiment,
+    theta: Array,
+    rows: NDArray[np.int64],
+    cutoff: float | None,
+    given: Motion | None = None,
 ) -> Array:
     """States (len(rows), nx) at some samples of the measured motion.
 
     Sensor errors are undone; flexible links are deflected as in equilibrium; lags and spools have followed the commands
     from the beginning of the log, currents have settled on the held one, and chambers are without net force, unless the
     log holds what is inside of a drive. Hystereses remember the way since the first sample. Joints that effects have
-    split off are where the measured motion of the others takes them.
+    split off are where the measured motion of the others takes them. The motion of all joints may be ``given``.
     """
-    m = whole_motion(model, experiment, theta, cutoff)
+    m = given or whole_motion(model, experiment, theta, cutoff)
     gain, offset = sensor_errors(model, theta)
     states = np.zeros((len(rows), model.core.n_states))
     followed = commanded_states(model, theta, m.inputs, m.dt)

@@ -100,6 +100,47 @@ pub fn delivered(
     Ok((pair.first, jacobian))
 }
 
+/// Efforts that a measured motion needs as in [`inverse_dynamics`], N x joints, and their derivatives; of a machine with any drives, for
+/// what these deliver does not enter.
+pub fn required(
+    description: &Description,
+    theta: &[f64],
+    (motion, time_step): (JointMotion<'_>, f64),
+    sensitivities: &[usize],
+    interrupt: Interrupt<'_>,
+) -> Result<(Vec<f64>, Vec<f64>)> {
+    if let Some((beam, _)) = description.beams.iter().zip(description.elastic()).find(|(_, len)| **len > 0) {
+        return Err(Error::Flexible { beam: beam.name.clone() });
+    }
+    let (rows, joints) = (motion.position.rows(), description.n_joints());
+    motion.position.expect("position", rows, joints)?;
+    motion.velocity.expect("velocity", rows, joints)?;
+    motion.acceleration.expect("acceleration", rows, joints)?;
+    check_time_step(time_step)?;
+    let job = Required { description, motion, time_step, interrupt };
+    let (pair, jacobian) = differentiate(&job, theta, sensitivities, |pass: &Pair<_>, place| pass.first[place])?;
+    Ok((pair.first, jacobian))
+}
+
+struct Required<'a> {
+    description: &'a Description,
+    motion: JointMotion<'a>,
+    time_step: f64,
+    interrupt: Interrupt<'a>,
+}
+
+impl Job for Required<'_> {
+    fn run<S: Scalar>(&self, theta: &[S]) -> Result<Pair<S>> {
+        let values: Vec<f64> = theta.iter().map(Scalar::re).collect();
+        self.description.check_values(&values)?;
+        let mut dynamics = Build::dynamics(&self.description, theta)?;
+        let sensors = position_sensors(self.description, theta);
+        let Self { motion, time_step, interrupt, .. } = *self;
+        let (first, _) = efforts_of_motion(&mut dynamics, &sensors, motion, time_step, interrupt)?;
+        Ok(Pair { first, second: Vec::new() })
+    }
+}
+
 struct Delivered<'a> {
     description: &'a Description,
     inputs: Table<'a>,
@@ -127,47 +168,48 @@ impl Job for Inverse<'_> {
         self.description.check_values(&values)?;
         let mut dynamics = Build::dynamics(&self.description, theta)?;
         let sensors = position_sensors(self.description, theta);
-        let (required, levers) = self.required(&mut dynamics, &sensors)?;
-        let applied = applied(&dynamics, self.motion.inputs, self.motion.time_step, &levers);
+        let Motion { position, velocity, acceleration, time_step, .. } = self.motion;
+        let motion = JointMotion { position, velocity, acceleration };
+        let (required, levers) = efforts_of_motion(&mut dynamics, &sensors, motion, time_step, self.interrupt)?;
+        let applied = applied(&dynamics, self.motion.inputs, time_step, &levers);
         Ok(Pair { first: required, second: applied })
     }
 }
 
-impl Inverse<'_> {
-    /// Efforts that the motion needs, and the lever arms of the lines if actuators act on any: by sample, line and joint.
-    fn required<S: Scalar>(
-        &self,
-        dynamics: &mut Dynamics<S>,
-        sensors: &[Option<Sensor<S>>],
-    ) -> Result<(Vec<S>, Vec<S>)> {
-        let Motion { position, velocity, acceleration, time_step, .. } = self.motion;
-        let (motion, joints) = (JointMotion { position, velocity, acceleration }, sensors.len());
-        let mut moving = [0; 3].map(|_| vec![S::zero(); joints]);
-        let (mut required, mut before) = (vec![S::zero(); position.numbers().len()], vec![S::zero(); joints]);
-        let (mut levers, mut row_levers) = (Vec::new(), vec![S::zero(); dynamics.layout().lines * joints]);
-        for (k, row) in required.chunks_exact_mut(joints).enumerate() {
-            if k.is_multiple_of(PATIENCE) && (self.interrupt)() {
-                return Err(Error::Interrupted);
-            }
-            for (joint, sensor) in sensors.iter().enumerate() {
-                let state = motion.behind(time_step, k, joint, sensor.as_ref());
-                for (numbers, number) in moving.iter_mut().zip(state) {
-                    numbers[joint] = number;
-                }
-            }
-            let [q, v, a] = &moving;
-            if k > 0 {
-                dynamics.memories.travel(|joint| q[joint] - before[joint]);
-            }
-            before.copy_from_slice(q);
-            dynamics.inverse_dynamics(q, v, a, row);
-            if dynamics.pulls() {
-                dynamics.levers(q, &mut row_levers);
-                levers.extend_from_slice(&row_levers);
+/// Efforts that a motion needs, and the lever arms of the lines if actuators act on any: by sample, line and joint.
+fn efforts_of_motion<S: Scalar>(
+    dynamics: &mut Dynamics<S>,
+    sensors: &[Option<Sensor<S>>],
+    motion: JointMotion<'_>,
+    time_step: f64,
+    interrupt: Interrupt<'_>,
+) -> Result<(Vec<S>, Vec<S>)> {
+    let joints = sensors.len();
+    let mut moving = [0; 3].map(|_| vec![S::zero(); joints]);
+    let (mut required, mut before) = (vec![S::zero(); motion.position.numbers().len()], vec![S::zero(); joints]);
+    let (mut levers, mut row_levers) = (Vec::new(), vec![S::zero(); dynamics.layout().lines * joints]);
+    for (k, row) in required.chunks_exact_mut(joints).enumerate() {
+        if k.is_multiple_of(PATIENCE) && interrupt() {
+            return Err(Error::Interrupted);
+        }
+        for (joint, sensor) in sensors.iter().enumerate() {
+            let state = motion.behind(time_step, k, joint, sensor.as_ref());
+            for (numbers, number) in moving.iter_mut().zip(state) {
+                numbers[joint] = number;
             }
         }
-        Ok((required, levers))
+        let [q, v, a] = &moving;
+        if k > 0 {
+            dynamics.memories.travel(|joint| q[joint] - before[joint]);
+        }
+        before.copy_from_slice(q);
+        dynamics.inverse_dynamics(q, v, a, row);
+        if dynamics.pulls() {
+            dynamics.levers(q, &mut row_levers);
+            levers.extend_from_slice(&row_levers);
+        }
     }
+    Ok((required, levers))
 }
 
 /// Efforts of ideal drives on the joints, sample by sample, with the `levers` of lines where any acts on one.

@@ -34,31 +34,41 @@ pub(crate) fn differentiate<J: Job>(
     variables: &[usize],
     quantity: impl Fn(&Pair<Dual<f64, LANES>>, usize) -> Dual<f64, LANES> + Sync,
 ) -> Result<(Pair<f64>, Vec<f64>)> {
+    differentiate_by(job, theta, variables, quantity)
+}
+
+/// As [`differentiate`], with `N` parameters per pass: where a pass is long, one that takes few parameters wants no more lanes.
+pub(crate) fn differentiate_by<J: Job, const N: usize>(
+    job: &J,
+    theta: &[f64],
+    variables: &[usize],
+    quantity: impl Fn(&Pair<Dual<f64, N>>, usize) -> Dual<f64, N> + Sync,
+) -> Result<(Pair<f64>, Vec<f64>)> {
     check_variables(theta, variables)?;
     if variables.is_empty() {
         return Ok((job.run(theta)?, Vec::new()));
     }
-    let pass = |chunk: &[usize]| job.run(&seed::<f64, LANES>(theta, chunk));
-    let passes: Vec<Pair<Dual<f64, LANES>>> = if variables.len() <= LANES {
+    let pass = |chunk: &[usize]| job.run(&seed::<f64, N>(theta, chunk));
+    let passes: Vec<Pair<Dual<f64, N>>> = if variables.len() <= N {
         vec![pass(variables)?]
     } else {
-        variables.par_chunks(LANES).map(pass).collect::<Result<_>>()?
+        variables.par_chunks(N).map(pass).collect::<Result<_>>()?
     };
     let jacobian = interleave(&passes, variables.len(), quantity);
-    let values = |numbers: &[Dual<f64, LANES>]| numbers.iter().map(|number| number.value).collect();
+    let values = |numbers: &[Dual<f64, N>]| numbers.iter().map(|number| number.value).collect();
     let pair = passes.first().map(|pass| Pair { first: values(&pass.first), second: values(&pass.second) });
     pair.map(|pair| (pair, jacobian)).ok_or(Error::Interrupted)
 }
 
-fn interleave(
-    passes: &[Pair<Dual<f64, LANES>>],
+fn interleave<const N: usize>(
+    passes: &[Pair<Dual<f64, N>>],
     variables: usize,
-    quantity: impl Fn(&Pair<Dual<f64, LANES>>, usize) -> Dual<f64, LANES>,
+    quantity: impl Fn(&Pair<Dual<f64, N>>, usize) -> Dual<f64, N>,
 ) -> Vec<f64> {
     let places = passes.first().map_or(0, |pass| pass.first.len());
     let mut jacobian = vec![0.0; places * variables];
     for (place, row) in jacobian.chunks_exact_mut(variables).enumerate() {
-        for (entries, pass) in row.chunks_mut(LANES).zip(passes) {
+        for (entries, pass) in row.chunks_mut(N).zip(passes) {
             let gradient = quantity(pass, place).gradient;
             entries.copy_from_slice(&gradient[..entries.len()]);
         }

@@ -7,6 +7,7 @@ import warnings
 import numpy as np
 from numpy.typing import NDArray
 
+from vpm.discrepancy.coloured import noise_shapes, noise_spectrum, with_noise
 from vpm.errors import VpmError
 from vpm.experiment import Experiment, noise_std
 from vpm.experiment.signal import RETAINED_BAND
@@ -31,7 +32,8 @@ def noise_floor(
     possible, and its own log, with noise of the size estimated from the measured one, is balanced like that one; what
     remains is noise and the error of filters and steps. Where the model cannot run them so, noise is added to the
     measured motion once more, and what that changes is taken. The second comes from the residual: what is white in it,
-    such as the ripple of a drive that shows in no channel (see `white_level`).
+    such as the ripple of a drive that shows in no channel (see `white_level`), or what was white before a drive with
+    states summed it up (see `noise_shapes`).
 
     Parameters
     ----------
@@ -53,18 +55,18 @@ def noise_floor(
         change = _balance(model, own, cutoff) if own is not None else None
         if change is None:
             clean = InverseDynamicsProblem(model, [experiment], cutoff=cutoff)
-            noisy = InverseDynamicsProblem(model, [_with_noise(model, experiment, generator)], cutoff=cutoff)
+            noisy = InverseDynamicsProblem(model, [with_noise(model, experiment, generator)], cutoff=cutoff)
             change = clean, noisy.evaluate(model, model.theta)[0] - clean.evaluate(model, model.theta)[0]
         for channel, (rms, _, _) in gaps(*change).items():
             expected.setdefault(channel, []).append((rms**2, change[1].size))
-    white = _white(unseen, residual)
+    white = _white(unseen, residual, noise_shapes(model, unseen))
     return {
         channel: max(float(np.sqrt(np.average([p for p, _ in v], weights=[n for _, n in v]))), white.get(channel, 0.0))
         for channel, v in expected.items()
     }
 
 
-def white_level(residual: Array, moving: Array) -> float:
+def white_level(residual: Array, moving: Array, shape: Array | None = None) -> float:
     """Root mean square of what is white in one channel of a residual.
 
     Power of white noise is the same at every frequency of the retained band and is distributed exponentially from one
@@ -77,11 +79,15 @@ def white_level(residual: Array, moving: Array) -> float:
         Zero where it does not count.
     moving : ndarray, shape (n,)
         1 where it counts.
+    shape : ndarray, optional
+        Of noise that is coloured on its way, see `noise_shapes`; then the size of that is meant.
     """
     n = residual.size
     count = float(np.count_nonzero(moving))
     if n < 16 or count == 0.0:
         return 0.0
+    if shape is not None:
+        return float(np.sqrt(2.0 * noise_spectrum(residual, shape, QUIET_SHARE).sum() / count))
     window = np.hanning(n)
     power = np.abs(np.fft.rfft(residual * window)) ** 2 / float(window @ window)
     band = power[1 : max(2, int(RETAINED_BAND * power.size))]
@@ -89,11 +95,11 @@ def white_level(residual: Array, moving: Array) -> float:
     return float(np.sqrt(RETAINED_BAND * level * n / count))
 
 
-def _white(problem: InverseDynamicsProblem, residual: Array) -> dict[str, float]:
+def _white(problem: InverseDynamicsProblem, residual: Array, shapes: tuple[Array | None, ...]) -> dict[str, float]:
     powers: dict[str, list[tuple[float, float]]] = {}
-    for block in problem.blocks:
-        level = white_level(residual[block.samples], block.moving) / block.weight
-        powers.setdefault(block.channel, []).append((level**2, float(block.moving.sum())))
+    for block, shape in zip(problem.blocks, shapes, strict=True):
+        size = white_level(residual[block.samples], block.moving, shape) / block.weight
+        powers.setdefault(block.channel, []).append((size**2, float(block.moving.sum())))
     return {
         channel: float(np.sqrt(np.average([p for p, _ in v], weights=[max(n, 1e-9) for _, n in v])))
         for channel, v in powers.items()
@@ -128,16 +134,6 @@ def _balance(model: Model, own: Experiment, cutoff: float) -> tuple[InverseDynam
         return problem, problem.evaluate(model, model.theta)[0]
     except VpmError:
         return None
-
-
-def _with_noise(model: Model, experiment: Experiment, generator: np.random.Generator) -> Experiment:
-    """The record with noise of every logged output once more; commands are exact, for the controller wrote them."""
-    for channel in model.output_channels:
-        if channel in experiment and not channel.endswith(".command"):
-            values = experiment[channel]
-            noise = noise_std(values) * generator.standard_normal(values.size)
-            experiment = experiment.with_channel(channel, values + noise, _unit(experiment, channel))
-    return experiment
 
 
 def _unit(experiment: Experiment, channel: str) -> str:

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from vpm.discrepancy.floor import white_level
+from vpm.discrepancy.coloured import noise_shapes, noise_spectrum
+from vpm.discrepancy.floor import QUIET_SHARE, white_level
 from vpm.identify import InverseDynamicsProblem, gaps
 from vpm.model import Model
 
@@ -23,7 +24,7 @@ PREDICTED_SHARE = 0.1
 SLOW_SHARE = 0.5
 #: So many times what is white in it, it is coloured.
 COLOURED = 1.6
-#: Pressures, currents and strains sum up the noise of what feeds them, which colours them by itself about so much.
+#: Strains and what else shows of hidden motion sum up the noise of what feeds them, which colours them about so much.
 DRIFTING = 1.5
 #: So many times the relative gap of the training records, that of the unseen ones holds something they never showed.
 NEW = 4.0
@@ -72,24 +73,26 @@ def structure(
     residual: Array,
 ) -> Structure:
     """Examine the residuals of a fitted model on training and unseen data."""
+    seen_shapes, unseen_shapes = noise_shapes(model, training), noise_shapes(model, unseen)
     joints = range(len(training.joints))
     predicted = max(_predicted(model, training, unseen, fitted, residual, joint) for joint in joints)
-    slow = float(np.mean([_slow_share(residual[block.samples]) for block in unseen.blocks]))
-    coloured = min(_coloured(training, fitted), _coloured(unseen, residual))
+    blocks = zip(unseen.blocks, unseen_shapes, strict=True)
+    slow = float(np.mean([_slow_share(residual[block.samples], shape) for block, shape in blocks]))
+    coloured = min(_coloured(training, fitted, seen_shapes), _coloured(unseen, residual, unseen_shapes))
     growing = min(_growing(model, training, fitted), _growing(model, unseen, residual))
     seen, fresh = gaps(training, fitted), gaps(unseen, residual)
     new = max(fresh[c][1] / seen[c][1] if seen[c][1] > 0.0 else 0.0 for c in fresh)
     return Structure(predicted, slow, coloured, growing, new)
 
 
-def _coloured(problem: InverseDynamicsProblem, residual: Array) -> float:
-    """Largest ratio of any channel between its residual and what is white in it."""
+def _coloured(problem: InverseDynamicsProblem, residual: Array, shapes: tuple[Array | None, ...]) -> float:
+    """Largest ratio of any channel between its residual and the noise in it."""
     ratios = []
     for channel in dict.fromkeys(block.channel for block in problem.blocks):
-        mine = [block for block in problem.blocks if block.channel == channel]
-        white = sum(white_level(residual[b.samples], b.moving) ** 2 * float(b.moving.sum()) for b in mine)
-        power = sum(float(residual[b.samples] @ residual[b.samples]) for b in mine)
-        allowed = 1.0 if channel.endswith(".effort") else DRIFTING
+        mine = [(b, s) for b, s in zip(problem.blocks, shapes, strict=True) if b.channel == channel]
+        white = sum(white_level(residual[b.samples], b.moving, s) ** 2 * float(b.moving.sum()) for b, s in mine)
+        power = sum(float(residual[b.samples] @ residual[b.samples]) for b, _ in mine)
+        allowed = 1.0 if channel.endswith(".effort") or mine[0][1] is not None else DRIFTING
         ratios.append(np.sqrt(power / white) / allowed if white > 0.0 else 0.0)
     return float(max(ratios))
 
@@ -156,7 +159,9 @@ def _features(state: Array, edges: list[Array], reference: Array) -> Array:
     return np.column_stack([*columns, further, against]).astype(np.float64)
 
 
-def _slow_share(residual: Array) -> float:
+def _slow_share(residual: Array, shape: Array | None) -> float:
     power = np.abs(np.fft.rfft(residual)) ** 2
+    if shape is not None:
+        power = power / noise_spectrum(residual, shape, QUIET_SHARE)
     total = float(power.sum())
     return float(power[: max(1, len(power) // 10)].sum()) / total if total > 0.0 else 0.0

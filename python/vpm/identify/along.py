@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from vpm.errors import DivergedError, SimulationError, VpmError
 from vpm.experiment import Experiment, Motion
+from vpm.identify.driven import DriveMemory, Filter, key_of, moves_drives
 from vpm.initial import measured_states, whole_motion
 from vpm.model import Model
 from vpm.simulate import Setup, copied_channels
@@ -27,7 +28,7 @@ SAMPLED_TYPES = ("narx", "maxwell_narx")
 
 @dataclass(frozen=True)
 class Response:
-    """What shows along one record, between the two ends where its filter settles.
+    """What shows along one record, between the two ends where its filter settles, or where it is compared.
 
     Attributes
     ----------
@@ -116,6 +117,7 @@ def respond(
     experiment: Experiment,
     columns: Sequence[int],
     channels: Sequence[str],
+    memory: DriveMemory | None = None,
 ) -> Response:
     """Let a machine answer to a measured motion and to its commands.
 
@@ -131,6 +133,9 @@ def respond(
         Parameters to differentiate by.
     channels : sequence of str
         Outputs to give, see `shown_channels`.
+    memory : DriveMemory, optional
+        Of what drives answered before to this motion. With it, all is given as it is compared: filtered, and only at
+        the samples that the filter retains.
 
     Raises
     ------
@@ -140,12 +145,16 @@ def respond(
     from vpm._core import Diverged
 
     try:
-        if has_own_drives(model) and has_hidden(model, m.joints):
-            return _with_both(model, theta, m, experiment, columns, channels)
+        if has_own_drives(model) and not has_hidden(model, m.joints):
+            remembered = memory or DriveMemory(lambda values: values[m.kept])
+            return _with_drives(model, theta, m, experiment, (columns, channels), remembered)
         if has_own_drives(model):
-            return _with_drives(model, theta, m, experiment, columns, channels)
-        if has_hidden(model, m.joints):
-            return _with_hidden(model, theta, m, columns, channels)
+            answer = _with_both(model, theta, m, experiment, columns, channels)
+        elif has_hidden(model, m.joints):
+            answer = _with_hidden(model, theta, m, columns, channels)
+        else:
+            answer = _rigid(model, theta, m, columns, channels)
+        return answer if memory is None else _filtered(answer, memory.keep)
     except Diverged as error:
         time = float(m.time[m.kept][0]) + len(error.outputs) * m.dt
         raise DivergedError(f"{experiment.name}: {error}", time=time) from None
@@ -154,7 +163,20 @@ def respond(
             raise
         # No place of rest, or no mass matrix: with these numbers the machine cannot follow the motion.
         raise DivergedError(f"{experiment.name}: {error}", time=float(m.time[m.kept][0])) from None
-    return _rigid(model, theta, m, columns, channels)
+
+
+def _filtered(answer: Response, keep: Filter) -> Response:
+    """The same at the samples that are compared."""
+    sides = [keep(side) for side in (answer.required, answer.applied, answer.seen)]
+    required, applied, seen = (side.reshape(len(sides[0]), -1) for side in sides)
+    columns = answer.balance.shape[2]
+    if not columns:
+        empty = np.zeros((*required.shape, 0)), np.zeros((*seen.shape, 0))
+        return Response(required, applied, empty[0], seen, empty[1])
+    slopes = np.concatenate([answer.balance, answer.slopes], axis=1)
+    flat = keep(slopes.reshape(len(slopes), -1)).reshape(len(required), -1, columns)
+    joints = required.shape[1]
+    return Response(required, applied, flat[:, :joints], seen, flat[:, joints:])
 
 
 def _picked(model: Model, outputs: Array, jacobian: Array, rows: slice, channels: Sequence[str]) -> tuple[Array, Array]:
@@ -178,19 +200,42 @@ def _rigid(model: Model, theta: Array, m: Motion, columns: Sequence[int], channe
 
 
 def _with_drives(
-    model: Model, theta: Array, m: Motion, experiment: Experiment, columns: Sequence[int], channels: Sequence[str]
+    model: Model,
+    theta: Array,
+    m: Motion,
+    experiment: Experiment,
+    wanted: tuple[Sequence[int], Sequence[str]],
+    memory: DriveMemory,
 ) -> Response:
-    """Drives with states of their own, on the joints' motion."""
-    outputs, jacobian = _driven(model, theta, m, experiment, columns)
-    rows = m.kept
-    effort = [model.output_channels.index(f"{name}.effort") for name in model.joints]
-    drives = range(len(model.output_channels), outputs.shape[1])
-    return Response(
-        outputs[rows][:, effort],
-        outputs[rows][:, drives],
-        (jacobian[:, effort] - jacobian[:, drives])[rows],
-        *_picked(model, outputs, jacobian, rows, channels),
-    )
+    """Drives with states of their own, on the joints' motion.
+
+    The effort that the motion needs and what the drives do along it do not depend on each other.
+    """
+    columns, channels = wanted
+    names = [model.parameter_names[column] for column in columns]
+    # A load cell, say, feels the machine as well.
+    alone = all(channel.rpartition(".")[0] in {*model.actuators, *model.supplies} for channel in channels)
+    felt = [place for place, name in enumerate(names) if not alone or moves_drives(model, name)]
+    internal = _first_drives(model, theta, m, experiment)
+
+    def work(missing: Sequence[str]) -> tuple[Array, Array]:
+        asked = [model.index(name) for name in missing]
+        outputs, slopes = _driven(model, theta, m, experiment, asked, internal)
+        seen, derivative = _picked(model, outputs, slopes, slice(None), channels)
+        first = len(model.output_channels)
+        return np.hstack([seen, outputs[:, first:]]), np.concatenate([derivative, slopes[:, first:]], axis=1)
+
+    key = (key_of(model, theta, internal), tuple(channels), alone or (theta.tobytes(), model.effects))
+    outputs, by_drives = memory.recall(key, [names[place] for place in felt], work)
+    motion = (m.position, m.velocity, m.acceleration)
+    required, slopes = model.core.required(theta, *motion, m.dt, list(columns))
+    needed = memory.keep(required)
+    balance = memory.keep(slopes.reshape(len(slopes), -1)) if columns else np.zeros((len(needed), 0))
+    balance = balance.reshape(*needed.shape, len(columns)).copy()
+    seen = np.zeros((len(outputs), len(channels), len(columns)))
+    seen[:, :, felt] = by_drives[:, : len(channels)]
+    balance[:, :, felt] -= by_drives[:, len(channels) :]
+    return Response(needed, outputs[:, len(channels) :], balance, outputs[:, : len(channels)], seen)
 
 
 def _with_both(
@@ -201,7 +246,9 @@ def _with_both(
     Such drives feel the measured motion alone: what they deliver does not depend on the hidden one.
     """
     required, slopes = _hidden(model, theta, m, columns)
-    outputs, jacobian = _driven(model, theta, whole_motion(model, experiment, theta, m.cutoff), experiment, columns)
+    whole = whole_motion(model, experiment, theta, m.cutoff)
+    internal = _first_drives(model, theta, m, experiment)
+    outputs, jacobian = _driven(model, theta, whole, experiment, columns, internal)
     rows, joints = m.kept, [place for place, joint in enumerate(model.joints) if joint in m.joints]
     effort = [model.output_channels.index(f"{model.joints[place]}.effort") for place in joints]
     drives = [len(model.output_channels) + place for place in joints]
@@ -213,22 +260,29 @@ def _with_both(
     )
 
 
-def _driven(
-    model: Model, theta: Array, m: Motion, experiment: Experiment, columns: Sequence[int]
-) -> tuple[Array, Array]:
-    """Outputs with the efforts of the drives on the joints behind them, and their derivative."""
+def _first_drives(model: Model, theta: Array, m: Motion, experiment: Experiment) -> Array:
+    """States of drives and supplies at the beginning of a record.
+
+    From there on: what nobody knows of the first state has the filter's settling to die away.
+    """
     if model.core.n_elastic:
         raise SimulationError(
             f"no effort can be balanced along a motion of {model.name}, whose links bend while its drives have states "
             "of their own; make the links rigid with model.at('rigid')"
         )
+    given = None if model.added_joints else m
+    state = measured_states(model, experiment, theta, np.zeros(1, dtype=np.int64), m.cutoff, given)[0]
+    return np.asarray(state[2 * len(model.joints) :])
+
+
+def _driven(
+    model: Model, theta: Array, m: Motion, experiment: Experiment, columns: Sequence[int], internal: Array
+) -> tuple[Array, Array]:
+    """Outputs with the efforts of the drives on the joints behind them, and their derivative."""
     setup = Setup()
-    # From the beginning of the record: what nobody knows of the first state has the filter's settling to die away.
-    state = measured_states(model, experiment, theta, np.zeros(1, dtype=np.int64), m.cutoff)[0]
     motion = (m.position, m.velocity, m.acceleration, m.inputs)
     places, seen = _measured_states(model, experiment)
     stepping = (m.dt, setup.substeps, setup.method(model), list(columns))
-    internal = state[2 * len(model.joints) :]
     outputs, _, jacobian = model.core.simulate_drives(theta, *motion, internal, places, seen, *stepping)
     return outputs, jacobian
 

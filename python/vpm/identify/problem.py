@@ -18,7 +18,8 @@ from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from vpm.errors import IdentificationError, near_match
 from vpm.experiment import Experiment, Motion
-from vpm.identify.along import check_along, respond, shown_channels
+from vpm.identify.along import Response, check_along, respond, shown_channels
+from vpm.identify.driven import DriveMemory
 from vpm.identify.first_state import add_first_state, first_state_slopes
 from vpm.identify.parallel import in_order
 from vpm.identify.stops import at_stops, check_left
@@ -140,6 +141,8 @@ class InverseDynamicsProblem:
         self.joints = tuple(measured[place] for place in self._joints)
         #: Channels beside the balance that are compared too: what shows inside of drives, strains of links.
         self.shown = shown_channels(model, measured, experiments)
+        self._memories = tuple(DriveMemory(m.parallel) for m in self.motions)
+        self._compared = tuple(self._measured(m, e) for m, e in zip(self.motions, self.experiments, strict=True))
         self.blocks = self._lay_out(model)
 
     def later(self) -> InverseDynamicsProblem:
@@ -152,15 +155,10 @@ class InverseDynamicsProblem:
     def evaluate(self, model: Model, theta: Array, columns: Sequence[int] = ()) -> tuple[Array, Array]:
         """Residual of the balance and its derivative; see :class:`Problem`."""
         residuals, jacobians = [], []
-        for m, whole, experiment in zip(self.motions, self._whole, self.experiments, strict=True):
-            answer = respond(model, theta, whole, experiment, columns, self.shown)
-            measured = self._measured(experiment)
-            residual = np.hstack([(answer.applied - answer.required)[:, self._joints], measured - answer.seen])
-            residuals.append(m.parallel(residual))
-            slopes = -np.concatenate([answer.balance[:, self._joints], answer.slopes], axis=1)
-            flat = slopes.reshape(len(residual), -1)
-            kept = m.parallel(flat) if columns else np.zeros((len(residuals[-1]), 0))
-            jacobians.append(kept.reshape(len(residuals[-1]), residual.shape[1], len(columns)))
+        for record, measured in enumerate(self._compared):
+            answer = self._answer(model, theta, record, columns)
+            residuals.append(np.hstack([(answer.applied - answer.required)[:, self._joints], measured - answer.seen]))
+            jacobians.append(-np.concatenate([answer.balance[:, self._joints], answer.slopes], axis=1))
         return self._stack(residuals), self._stack(jacobians)
 
     def along_others(self, model: Model, logs: Sequence[Experiment]) -> InverseDynamicsProblem:
@@ -186,9 +184,13 @@ class InverseDynamicsProblem:
     def effort(self, model: Model, theta: Array, record: int) -> tuple[Array, Array, Array]:
         """Time, applied and required effort (n, joints) of one record, filtered as in the residual."""
         m = self.motions[record]
-        answer = respond(model, theta, self._whole[record], self.experiments[record], (), ())
-        pair = [m.parallel(side[:, self._joints]) for side in (answer.applied, answer.required)]
-        return m.time[m.retained], pair[0], pair[1]
+        answer = self._answer(model, theta, record, ())
+        return m.time[m.retained], answer.applied[:, self._joints], answer.required[:, self._joints]
+
+    def _answer(self, model: Model, theta: Array, record: int, columns: Sequence[int]) -> Response:
+        """What shows along one record, filtered."""
+        whole, experiment, memory = self._whole[record], self.experiments[record], self._memories[record]
+        return respond(model, theta, whole, experiment, columns, self.shown, memory)
 
     def strength(self, model: Model) -> float:
         """Root mean square of the weighted applied effort over all records: what a relative error is relative to."""
@@ -219,10 +221,10 @@ class InverseDynamicsProblem:
         first = record * (len(self.joints) + len(self.shown))
         return self.blocks[first : first + len(self.joints)]
 
-    def _measured(self, experiment: Experiment) -> Array:
-        """Logged channels (N, shown)."""
+    def _measured(self, m: Motion, experiment: Experiment) -> Array:
+        """Logged channels (n, shown), filtered."""
         columns = [experiment[channel] for channel in self.shown]
-        return np.column_stack(columns) if columns else np.zeros((len(experiment), 0))
+        return m.parallel(np.column_stack(columns)) if columns else np.zeros((len(m.retained), 0))
 
     def _lay_out(self, model: Model) -> tuple[Block, ...]:
         sizes, moving = self._sizes(model)
@@ -254,7 +256,7 @@ class InverseDynamicsProblem:
                     f"{m.cutoff:.3g} Hz; record longer or pass a higher cutoff"
                 )
             efforts = np.sqrt(np.average(applied**2, axis=0, weights=moving[record]))
-            spread = np.std(m.parallel(self._measured(experiment)), axis=0)
+            spread = np.std(self._compared[record], axis=0)
             sizes.append(np.concatenate([efforts, spread]))
             settled = _settled(len(applied), m.decimation)
             columns = [self._counts(model, channel, record, settled) for channel in self.shown]

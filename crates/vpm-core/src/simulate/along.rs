@@ -8,13 +8,14 @@ use crate::integrator::{Halt, Integrator, Stuck};
 use crate::motion::{JointMotion, position_sensors, state_sensors};
 use crate::ode::Ode;
 use crate::scalar::{Dual, Scalar};
-use crate::sensitivity::{Interrupt, Job, Pair, differentiate};
+use crate::sensitivity::{Interrupt, Job, Pair, differentiate, differentiate_by};
 use crate::sensor::Sensor;
 use crate::system::{Build, Dynamics};
 use crate::table::Table;
 
-/// Derivatives taken in one sweep.
-const LANES: usize = 8;
+/// Derivatives by states taken in one sweep: those of one cylinder behind its valve and of time; those of two, and of time.
+const FEW: usize = 5;
+const LANES: usize = 9;
 
 /// What a sampled drive takes away.
 const NO_STATES: &str = "its effort cannot be worked out along a given motion";
@@ -73,8 +74,11 @@ pub fn drives_along(
         check_starts(setting, &first)?;
     }
     let job = Driven { setting, motion, inputs, internal, places, seen };
-    let output = |pass: &Pair<_>, place: usize| pass.first[place];
-    let (pair, jacobian) = differentiate(&job, theta, setting.sensitivities, output)?;
+    // Most questions are for one parameter: lanes that nobody needs would be most of the work.
+    let (pair, jacobian) = match setting.sensitivities {
+        [_] => differentiate_by::<_, 1>(&job, theta, setting.sensitivities, |pass, place| pass.first[place])?,
+        _ => differentiate(&job, theta, setting.sensitivities, |pass, place| pass.first[place])?,
+    };
     Ok(Along { outputs: pair.first, states: pair.second, jacobian })
 }
 
@@ -91,12 +95,16 @@ impl Job for Driven<'_> {
     fn run<S: Scalar>(&self, theta: &[S]) -> Result<Pair<S>> {
         let values: Vec<f64> = theta.iter().map(Scalar::re).collect();
         self.setting.description.check_values(&values)?;
-        Way::new(self, theta)?.run(self.setting.interrupt)
+        if self.internal.len() < FEW {
+            Way::<S, FEW>::new(self, theta)?.run(self.setting.interrupt)
+        } else {
+            Way::<S, LANES>::new(self, theta)?.run(self.setting.interrupt)
+        }
     }
 }
 
 /// Drives on their way along a motion.
-struct Way<'a, S> {
+struct Way<'a, S, const N: usize> {
     description: &'a Description,
     motion: JointMotion<'a>,
     inputs: Table<'a>,
@@ -107,7 +115,7 @@ struct Way<'a, S> {
     sensors: Vec<Sensor<S>>,
     of_joints: Vec<Option<Sensor<S>>>,
     of_states: Vec<Option<Sensor<S>>>,
-    ode: Answer<S>,
+    ode: Answer<S, N>,
     integrator: Integrator<S>,
     /// States of drives and supplies, time since the last sample.
     state: Vec<S>,
@@ -116,7 +124,7 @@ struct Way<'a, S> {
     states: Vec<S>,
 }
 
-impl<'a, S: Scalar> Way<'a, S> {
+impl<'a, S: Scalar, const N: usize> Way<'a, S, N> {
     fn new(job: &Driven<'a>, theta: &[S]) -> Result<Self> {
         let Driven { setting, motion, inputs, internal, places, seen } = *job;
         let description = setting.description;
@@ -278,14 +286,14 @@ impl<'a, S: Scalar> Way<'a, S> {
 }
 
 /// Drives and supplies of a machine whose joints follow a motion, with time as the last state.
-struct Answer<S> {
+struct Answer<S, const N: usize> {
     values: Buffers<S>,
-    duals: Buffers<Dual<S, LANES>>,
+    duals: Buffers<Dual<S, N>>,
     /// Motion of each joint at the sample before and after.
     ends: Vec<[State<S>; 2]>,
     /// The same, and a state, in dual numbers.
-    lifted: Vec<[State<Dual<S, LANES>>; 2]>,
-    seeds: Vec<Dual<S, LANES>>,
+    lifted: Vec<[State<Dual<S, N>>; 2]>,
+    seeds: Vec<Dual<S, N>>,
     /// Time between samples, s.
     interval: f64,
 }
@@ -316,7 +324,7 @@ impl<S: Scalar> Buffers<S> {
     }
 }
 
-impl<S: Scalar> Ode<S> for Answer<S> {
+impl<S: Scalar, const N: usize> Ode<S> for Answer<S, N> {
     fn dim(&self) -> usize {
         self.values.x.len() - 2 * self.ends.len() + 1
     }
@@ -339,7 +347,7 @@ impl<S: Scalar> Ode<S> for Answer<S> {
         for (lifted, ends) in self.lifted.iter_mut().zip(&self.ends) {
             *lifted = ends.map(|end| end.map(Dual::constant));
         }
-        for first in (0..dim).step_by(LANES) {
+        for first in (0..dim).step_by(N) {
             for (column, (state, &value)) in self.seeds.iter_mut().zip(s).enumerate() {
                 // A column before `first` wraps around to a lane that does not exist, which gives a constant.
                 *state = Dual::variable(value, column.wrapping_sub(first));

@@ -4,8 +4,9 @@ use numpy::{PyArray1, PyArray2, PyArray3};
 use pyo3::prelude::*;
 use vpm_core::beam::Beam;
 use vpm_core::evaluate;
-use vpm_core::inverse::{Motion, delivered, inverse_dynamics};
+use vpm_core::inverse::{Motion, delivered, inverse_dynamics, required};
 use vpm_core::linearize::linearize;
+use vpm_core::motion::JointMotion;
 
 use super::System;
 use crate::arrays::{Numbers, cube, matrix, place, places};
@@ -54,6 +55,36 @@ impl System {
             matrix(py, efforts.applied, [rows, joints])?,
             cube(py, efforts.jacobian, [rows, joints, variables.len()])?,
         ))
+    }
+
+    /// Effort that a motion needs (N, n) whatever the drives are, and its derivatives (N, n, k).
+    #[pyo3(signature = (theta, position, velocity, acceleration, time_step, sensitivities=vec![]))]
+    #[expect(clippy::too_many_arguments, reason = "the arguments of the Python function")]
+    fn required<'py>(
+        &self,
+        py: Python<'py>,
+        theta: &Any<'py>,
+        position: &Any<'py>,
+        velocity: &Any<'py>,
+        acceleration: &Any<'py>,
+        time_step: f64,
+        sensitivities: Vec<i64>,
+    ) -> PyResult<(Table<'py>, Cube<'py>)> {
+        let theta = Numbers::vector("theta", theta)?;
+        let position = Numbers::table("position", position)?;
+        let velocity = Numbers::table("velocity", velocity)?;
+        let acceleration = Numbers::table("acceleration", acceleration)?;
+        let variables = places("sensitivities", &sensitivities)?;
+        let (efforts, jacobian) = self.compute(py, |interrupt| {
+            let motion = JointMotion {
+                position: position.as_table()?,
+                velocity: velocity.as_table()?,
+                acceleration: acceleration.as_table()?,
+            };
+            required(&self.description, theta.values(), (motion, time_step), &variables, interrupt)
+        })?;
+        let (rows, joints) = (position.rows(), self.description.n_joints());
+        Ok((matrix(py, efforts, [rows, joints])?, cube(py, jacobian, [rows, joints, variables.len()])?))
     }
 
     /// Effort of ideal drives on the joints (N, n_joints) under `inputs`, and its derivatives (N, n_joints, k).

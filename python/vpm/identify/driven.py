@@ -1,0 +1,91 @@
+"""What drives with states of their own answer to a measured motion, remembered: most questions are asked again.
+
+Along a given motion no joint effect, mass or inertia changes what a drive does. A search that tries them one after the
+other would let the same drives run through the same record every time.
+"""
+
+from __future__ import annotations
+
+import json
+from collections import OrderedDict
+from collections.abc import Callable, Hashable, Sequence
+from dataclasses import dataclass
+from threading import Lock
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vpm.catalogue import EFFECTS
+from vpm.model import Model
+
+Array = NDArray[np.float64]
+
+#: Answers that are kept for each record: what one round of a search asks, the next one asks again.
+KEPT = 200
+#: Parts of a model file that say what drives are and what they act on, and kinds of sites at which effects change them.
+_PARTS = ("actuators", "supplies", "sensors", "lines", "markers")
+_DRIVE_SITES = frozenset({"actuator", "cylinder", "supply", "sensor"})
+
+
+Filter = Callable[[Array], Array]
+
+
+@dataclass(frozen=True)
+class Answer:
+    """Outputs (n, k) and the derivatives (n, k) of these by parameter name, both filtered."""
+
+    outputs: Array
+    slopes: dict[str, Array]
+
+
+class DriveMemory:
+    """Answers of drives to one record by what they depend on; safe to be used by several threads.
+
+    Parameters
+    ----------
+    keep : callable
+        Filter of a record, from (N, k) to the (n, k) that are compared.
+    """
+
+    def __init__(self, keep: Filter) -> None:
+        self.keep = keep
+        self._lock = Lock()
+        self._answers: OrderedDict[Hashable, Answer] = OrderedDict()
+
+    def recall(
+        self, key: Hashable, names: Sequence[str], work: Callable[[Sequence[str]], tuple[Array, Array]]
+    ) -> tuple[Array, Array]:
+        """Filtered outputs (n, k) and derivatives (n, k, names); ``work`` gives unfiltered ones that are not known."""
+        with self._lock:
+            known = self._answers.get(key)
+        missing = [name for name in names if known is None or name not in known.slopes]
+        if known is None or missing:
+            outputs, slopes = work(missing)
+            before = known.slopes if known else {}
+            new = {name: self.keep(slopes[:, :, place]) for place, name in enumerate(missing)}
+            known = Answer(known.outputs if known else self.keep(outputs), {**before, **new})
+        with self._lock:
+            # What is read elsewhere is never changed: an answer that learnt more takes its place.
+            self._answers[key] = known
+            self._answers.move_to_end(key)
+            while len(self._answers) > KEPT:
+                self._answers.popitem(last=False)
+        columns = [known.slopes[name] for name in names]
+        empty = np.zeros((*known.outputs.shape, 0))
+        return known.outputs, np.stack(columns, axis=-1) if columns else empty
+
+
+def moves_drives(model: Model, name: str) -> bool:
+    """Whether a parameter can change what drives do along a given motion; none of bodies, joints and gravity can."""
+    owner = name.partition(".")[0]
+    return owner not in model.joints and owner not in model.bodies and owner != "world"
+
+
+def key_of(model: Model, theta: Array, internal: Array) -> Hashable:
+    """What the answer of drives to one motion depends on, beside that motion: their parts, parameters, first states."""
+    document = model.to_dict()
+    parts = json.dumps([document.get(part) for part in _PARTS], sort_keys=True)
+    effects = tuple((effect.name, effect.at) for effect in model.effects if EFFECTS[effect.name].site in _DRIVE_SITES)
+    own = [place for place, name in enumerate(model.parameter_names) if moves_drives(model, name)]
+    states = [place for place, name in enumerate(model.internal_names) if not name.endswith(".memory")]
+    return parts, effects, theta[own].tobytes(), internal[states].tobytes()
