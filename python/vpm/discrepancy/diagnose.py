@@ -46,6 +46,8 @@ Array = NDArray[np.float64]
 HELD_OUT = 0.3
 #: What an interrupted diagnosis says of itself.
 STOPPED = "stopped by Ctrl-C before every candidate was tried: this is what was known until then"
+#: Stated uncertainties, on a logarithmic scale, that a recalibration may move what the model is not linear in.
+REACH = 4.0
 #: Parameters that move by more of their stated uncertainties than this are reported.
 FAR = 3.0
 
@@ -125,7 +127,7 @@ def diagnose(
     if not free:
         notes.append("the model file gives no parameter an uncertainty, so none was recalibrated")
     transitions = _transitions(model, data.training)
-    recalibrated = judge(model, (*free, *transitions), data, transitions)
+    recalibrated = judge(model, (*free, *transitions), data, {**_within_reach(model, free), **transitions})
     notes.extend(_moved_far(model, recalibrated))
     found = search(recalibrated, data, effects, limit, say, SideBySide(workers, progress))
     if found.interrupted:
@@ -242,6 +244,22 @@ def _transitions(model: Model, data: InverseDynamicsProblem) -> dict[str, tuple[
             joint = data.joints.index(effect.at)
             speeds = np.concatenate([np.abs(data.state(record)[1][:, joint]) for record in range(len(data.motions))])
             found[name] = slow_speeds(float(np.quantile(speeds, 0.999)))
+    return found
+
+
+def _within_reach(model: Model, free: Sequence[str]) -> dict[str, tuple[float, float]]:
+    """Bounds of positive parameters that the model is not linear in, from their stated uncertainties.
+
+    With something large missing, a fit may flee to where nothing shows any more, such as oil as soft as air, from where
+    no effect leads back. What is linear comes back by itself.
+    """
+    found = {}
+    for name in free:
+        parameter = model.parameters[name]
+        value, spread = parameter.value, parameter.uncertainty or np.inf
+        if parameter.kind != "linear" and value > 0.0 and np.isfinite(spread):
+            factor = float(np.exp(REACH * spread / value))
+            found[name] = max(parameter.minimum, value / factor), min(parameter.maximum, value * factor)
     return found
 
 

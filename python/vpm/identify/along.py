@@ -225,7 +225,8 @@ def _with_drives(
         first = len(model.output_channels)
         return np.hstack([seen, outputs[:, first:]]), np.concatenate([derivative, slopes[:, first:]], axis=1)
 
-    key = (key_of(model, theta, internal), tuple(channels), alone or (theta.tobytes(), model.effects))
+    whole = None if alone else (theta.tobytes(), tuple((effect.name, effect.at) for effect in model.effects))
+    key = (key_of(model, theta, internal), tuple(channels), whole)
     outputs, by_drives = memory.recall(key, [names[place] for place in felt], work)
     motion = (m.position, m.velocity, m.acceleration)
     required, slopes = model.core.required(theta, *motion, m.dt, list(columns))
