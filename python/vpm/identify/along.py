@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from vpm.errors import DivergedError, SimulationError, VpmError
 from vpm.experiment import Experiment, Motion
-from vpm.identify.driven import DriveMemory, Filter, key_of, moves_drives
+from vpm.identify.drive_memory import DriveMemory, Filter, key_of, moves_drives
 from vpm.initial import measured_states, whole_motion
 from vpm.model import Model
 from vpm.simulate import Setup, copied_channels

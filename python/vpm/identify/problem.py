@@ -19,7 +19,7 @@ from scipy.ndimage import maximum_filter1d, uniform_filter1d
 from vpm.errors import IdentificationError, near_match
 from vpm.experiment import Experiment, Motion
 from vpm.identify.along import Response, check_along, respond, shown_channels
-from vpm.identify.driven import DriveMemory
+from vpm.identify.drive_memory import DriveMemory
 from vpm.identify.first_state import add_first_state, first_state_slopes
 from vpm.identify.parallel import in_order
 from vpm.identify.stops import at_stops, check_left

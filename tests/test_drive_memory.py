@@ -1,0 +1,85 @@
+"""What drives answered before is what they answer again; and their noise has the colour that they give it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from blind import make_case
+from vpm.discrepancy.coloured import noise_shapes, noise_spectrum
+from vpm.discrepancy.floor import noise_floor
+from vpm.discrepancy.structure import structure
+from vpm.identify import InverseDynamicsProblem, gaps
+from vpm.model import Model
+
+Exact = tuple[Model, InverseDynamicsProblem, InverseDynamicsProblem]
+
+
+@pytest.fixture(scope="module")
+def exact() -> Exact:
+    """A servo-cylinder of the proving ground whose model lacks nothing, with its training and unseen records."""
+    case = make_case("servo_cylinder", "none", 1, recalibrate=False)
+    model = Model.from_toml(case.true_text)
+    training = InverseDynamicsProblem(model, case.train)
+    cutoff = min(m.cutoff for m in training.motions)
+    return model, training, InverseDynamicsProblem(model, case.validate, cutoff=cutoff)
+
+
+def test_remembered_answers_are_those_of_a_problem_that_remembers_nothing(exact: Exact) -> None:
+    model, training, _ = exact
+    more = model.with_effect("hysteresis", at="axis", force=5.0, displacement=1e-3)
+    more = more.with_effect("internal_leakage", at="servo", coefficient=1e-13)
+    names = (
+        "axis.hysteresis.force",
+        "slide.mass",
+        "servo.internal_leakage.coefficient",
+        "servo.valve.flow_gain",
+        "axis.friction.viscous",
+    )
+    columns = [more.index(name) for name in names]
+    first = training.evaluate(more, more.theta, columns[:3])
+    training.evaluate(model, model.theta, [model.index("servo.valve.flow_gain")])
+    residual, jacobian = training.evaluate(more, more.theta, columns)
+    fresh = InverseDynamicsProblem(model, training.experiments)
+    expected, slopes = fresh.evaluate(more, more.theta, columns)
+    np.testing.assert_array_equal(residual, expected)
+    np.testing.assert_array_equal(jacobian, slopes)
+    np.testing.assert_array_equal(first[1], slopes[:, :3])
+
+
+@pytest.mark.parametrize("name", ["slide.mass", "axis.friction.viscous", "servo.valve.flow_gain"])
+def test_the_derivative_by_parts_is_that_of_the_residual(exact: Exact, name: str) -> None:
+    model, training, _ = exact
+    place = model.index(name)
+    _, jacobian = training.evaluate(model, model.theta, [place])
+    sides = []
+    step = 1e-5 * model.theta[place]
+    for sign in (1.0, -1.0):
+        theta = model.theta.copy()
+        theta[place] += sign * step
+        sides.append(training.evaluate(model, theta)[0])
+    slope = (sides[0] - sides[1]) / (2.0 * step)
+    assert np.abs(jacobian[:, 0] - slope).max() < 1e-5 * np.abs(slope).max()
+
+
+def test_noise_of_a_valve_is_no_structure(exact: Exact) -> None:
+    model, training, unseen = exact
+    fitted, residual = (problem.evaluate(model, model.theta)[0] for problem in (training, unseen))
+    assert not structure(model, training, unseen, fitted, residual).present
+    floor = noise_floor(model, unseen, residual, "closed_loop")
+    for channel, (size, _, _) in gaps(unseen, residual).items():
+        assert 0.75 * size < floor[channel] < 1.5 * size
+
+
+def test_the_size_of_coloured_noise_is_read_off_its_quiet_part(exact: Exact) -> None:
+    model, training, _ = exact
+    shape = next(each for each in noise_shapes(model, training) if each is not None)
+    own, drive = shape
+    generator = np.random.default_rng(3)
+    n = 2 * (own.size - 1)
+    spectrum = own + 40.0 * own.mean() / drive.mean() * drive
+    waves = generator.standard_normal((2, own.size)) * np.sqrt(0.5 * spectrum * n)
+    residual = np.fft.irfft(waves[0] + 1j * waves[1], n)
+    line = 20.0 * residual.std() * np.cos(2.0 * np.pi * 5.0 * np.arange(n) / n)
+    found = noise_spectrum(residual + line, shape, 0.4)
+    assert found.sum() == pytest.approx(spectrum.sum(), rel=0.35)
