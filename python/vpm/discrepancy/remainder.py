@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from vpm.discrepancy.band import below, motion_band
 from vpm.discrepancy.confirmation import Data, Judged
 from vpm.discrepancy.diagnosis import Empirical
 from vpm.discrepancy.empirical import describe
@@ -23,6 +24,8 @@ Array = NDArray[np.float64]
 
 #: A later description has to leave less than this share of what an earlier one leaves to be taken in its place.
 CLEARLY = 0.9
+#: Share of what effects leave, below which a fit with no more numbers is not a matter of chance or of a rough law.
+HALF = 0.5
 #: Models that are described: that with the effects, and that without.
 DESCRIBED = 2
 
@@ -49,11 +52,14 @@ class Remainder:
     open : float
         Share that the effects leave of the mean square that a fit finds in the recalibrated residual; 0 where nothing
         repeats.
+    instead : bool
+        Whether a fit in the place of the effects, with no more numbers, leaves less than ``HALF`` of what they leave.
     """
 
     choices: tuple[Described, ...]
     repeats: bool
     open: float
+    instead: bool
 
     @property
     def best(self) -> Described:
@@ -75,23 +81,38 @@ def remainder(recalibrated: Judged, final: Judged, data: Data, interval: float) 
     """
     bases = [final] if recalibrated is final else [recalibrated, final]
     choices = tuple(Described(base, *describe(base, data)) for base in bases)
-    thresholds = Thresholds(DESCRIBED, interval)
-    left = in_time(final, data).unseen
+    view = _View(data, motion_band(data.training, final.model), Thresholds(DESCRIBED, interval))
+    left = view(final)
     power = float(left @ left)
-    least = min((_left(choice, left, data, thresholds) for choice in choices), default=power)
+    leave = [view.leaves(choice, left) for choice in choices]
+    least = min(leave)
     if least >= power:
-        return Remainder(choices, repeats=False, open=0.0)
-    start = in_time(recalibrated, data).unseen
+        return Remainder(choices, repeats=False, open=0.0, instead=False)
+    start = view(recalibrated)
     whole = max(float(start @ start), power)
-    return Remainder(choices, repeats=True, open=(power - least) / (whole - least))
+    plain = len(choices[0].judged.free) <= len(final.free)
+    instead = recalibrated is not final and plain and leave[0] < HALF * power
+    return Remainder(choices, repeats=True, open=(power - least) / (whole - least), instead=instead)
 
 
-def _left(choice: Described, left: Array, data: Data, thresholds: Thresholds) -> float:
-    """Sum of squares that a description leaves; that of ``left`` where it is not clearly better than the effects."""
-    power = float(left @ left)
-    if choice.told.remark:
-        own = in_time(choice.base, data).unseen
-        rest = (1.0 - choice.told.predicted) * float(own @ own)
-        return rest if rest < (1.0 - WORTH_A_NAME) * power else power
-    after = in_time(choice.judged, data).unseen
-    return float(after @ after) if thresholds.met(gain(left, after, segments(data.unseen))) else power
+@dataclass(frozen=True)
+class _View:
+    """Unseen residuals in the band of the motion, with what the times of samples leave open."""
+
+    data: Data
+    frequency: float
+    thresholds: Thresholds
+
+    def __call__(self, judged: Judged) -> Array:
+        """Residual of a model."""
+        return below(self.data.unseen, in_time(judged, self.data).unseen, self.frequency)
+
+    def leaves(self, choice: Described, left: Array) -> float:
+        """Sum of squares that a description leaves; that of ``left`` where it is not clearly better than that."""
+        power = float(left @ left)
+        if choice.told.remark:
+            own = self(choice.base)
+            rest = (1.0 - choice.told.predicted) * float(own @ own)
+            return rest if rest < (1.0 - WORTH_A_NAME) * power else power
+        after = self(choice.judged)
+        return float(after @ after) if self.thresholds.met(gain(left, after, segments(self.data.unseen))) else power

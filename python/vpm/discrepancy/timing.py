@@ -45,20 +45,20 @@ def in_time(judged: Judged, data: Data) -> InTime:
     later, _ = data.training.later().evaluate(model, model.theta)
     own = judged.fit.residual
     change, known = later - own, judged.fit.jacobian
-    rest = change - _projected(known, change)
+    # Free parameters give way to the shift and do nothing else: one that its bounds hold has to stay where it is.
+    step = _step(known, change)
+    rest = change + known @ step
     power = float(rest @ rest)
     if power <= 1e-20 * float(change @ change):
         return as_it_is
     shift = float(np.clip(-(rest @ own) / power, -1.0, 1.0))
-    fitted = own + shift * change
-    step = _step(known, fitted)
-    fitted = fitted + known @ step
+    fitted = own + shift * rest
     if gain(own, fitted, segments(data.training)).relative < MATTERS:
         return as_it_is
     columns = [model.index(name) for name in judged.free]
     own_unseen, slopes = data.unseen.evaluate(model, model.theta, columns)
     later_unseen, _ = data.unseen.later().evaluate(model, model.theta)
-    unseen = own_unseen + shift * (later_unseen - own_unseen) + slopes @ step
+    unseen = own_unseen + shift * (later_unseen - own_unseen + slopes @ step)
     if gain(own_unseen, unseen, segments(data.unseen)).relative < MATTERS:
         return as_it_is
     return InTime(fitted, unseen, shift)
@@ -69,7 +69,3 @@ def _step(jacobian: Array, residual: Array) -> Array:
         return np.zeros(0)
     lengths = column_lengths(jacobian)
     return np.asarray(np.linalg.lstsq(jacobian / lengths, -residual, rcond=1e-10)[0] / lengths)
-
-
-def _projected(jacobian: Array, values: Array) -> Array:
-    return np.asarray(-jacobian @ _step(jacobian, values))

@@ -68,7 +68,7 @@ def verdict(
     names = ", then ".join(e.trial.probe.candidate.label for e in found.accepted)
     share_left = (worst.after / worst.recalibrated) ** 2 if worst.recalibrated > 0.0 else 0.0
     mostly_open = structured and share_left > MOSTLY_OPEN
-    mostly_open = mostly_open or (rest is not None and rest.repeats and rest.open > MOSTLY_OPEN)
+    mostly_open = mostly_open or (rest is not None and (rest.open > MOSTLY_OPEN or rest.instead))
     if found.accepted and mostly_open:
         return (
             "unexplained",
