@@ -83,16 +83,20 @@ def remainder(recalibrated: Judged, final: Judged, data: Data, interval: float) 
     choices = tuple(Described(base, *describe(base, data)) for base in bases)
     view = _View(data, motion_band(data.training, final.model), Thresholds(DESCRIBED, interval))
     left = view(final)
-    power = float(left @ left)
-    leave = [view.leaves(choice, left) for choice in choices]
-    least = min(leave)
-    if least >= power:
+    clear = [view.clearly_better(choice, left) for choice in choices]
+    if not any(clear):
         return Remainder(choices, repeats=False, open=0.0, instead=False)
-    start = view(recalibrated)
-    whole = max(float(start @ start), power)
+    power, whole = (_power(in_time(judged, data).unseen) for judged in (final, recalibrated))
+    least = min(view.leaves(choice) for choice, better in zip(choices, clear, strict=True) if better)
+    share = np.clip((power - least) / max(whole - least, 1e-300), 0.0, 1.0)
     plain = len(choices[0].judged.free) <= len(final.free)
-    instead = recalibrated is not final and plain and leave[0] < HALF * power
-    return Remainder(choices, repeats=True, open=(power - least) / (whole - least), instead=instead)
+    instead = recalibrated is not final and clear[0] and plain and not choices[0].told.remark
+    instead = instead and _power(view(choices[0].judged)) < HALF * _power(left)
+    return Remainder(choices, repeats=True, open=float(share), instead=instead)
+
+
+def _power(values: Array) -> float:
+    return float(values @ values)
 
 
 @dataclass(frozen=True)
@@ -107,12 +111,13 @@ class _View:
         """Residual of a model."""
         return below(self.data.unseen, in_time(judged, self.data).unseen, self.frequency)
 
-    def leaves(self, choice: Described, left: Array) -> float:
-        """Sum of squares that a description leaves; that of ``left`` where it is not clearly better than that."""
-        power = float(left @ left)
+    def clearly_better(self, choice: Described, left: Array) -> bool:
+        """Whether a description predicts more than the effects do, as surely as an effect has to."""
         if choice.told.remark:
-            own = self(choice.base)
-            rest = (1.0 - choice.told.predicted) * float(own @ own)
-            return rest if rest < (1.0 - WORTH_A_NAME) * power else power
-        after = self(choice.judged)
-        return float(after @ after) if self.thresholds.met(gain(left, after, segments(self.data.unseen))) else power
+            return (1.0 - choice.told.predicted) * _power(self(choice.base)) < (1.0 - WORTH_A_NAME) * _power(left)
+        return self.thresholds.met(gain(left, self(choice.judged), segments(self.data.unseen)))
+
+    def leaves(self, choice: Described) -> float:
+        """Sum of squares over all frequencies that a description leaves."""
+        left = _power(in_time(choice.judged, self.data).unseen)
+        return (1.0 - choice.told.predicted) * left if choice.told.remark else left
