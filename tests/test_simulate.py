@@ -11,6 +11,7 @@ from synthetic import Truth, nominal, simulate_axis
 from vpm.compare import compare
 from vpm.errors import DivergedError, ExperimentError, SimulationError
 from vpm.experiment import Experiment
+from vpm.identify import InverseDynamicsProblem
 from vpm.model import Model
 from vpm.simulate import INTEGRATORS, MODES, Run, Setup, simulate
 
@@ -66,6 +67,11 @@ def test_inverse_dynamics_gives_back_the_effort(record: Experiment) -> None:
     assert run.channels == ("axis.effort",)
     residual = run.values - run.measured
     assert np.sqrt(np.mean(residual**2)) < 0.01 * np.sqrt(np.mean(run.measured**2))
+    # What a fit balances is the same, sample by sample.
+    model = nominal()
+    time, applied, required = InverseDynamicsProblem(model, [record]).effort(model, model.theta, 0)
+    for ours, theirs in ((run.time, time), (run.measured, applied), (run.values, required)):
+        np.testing.assert_array_equal(ours, theirs)
 
 
 def test_simulation_does_not_depend_on_the_number_of_substeps_in_the_limit(record: Experiment) -> None:

@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.errors import DivergedError, ExperimentError, SimulationError, ValidityWarning, VpmError
-from vpm.experiment import Experiment, Motion, parallel_filter
+from vpm.experiment import Experiment, Motion
 from vpm.initial import initial_state as start
 from vpm.initial import joint_motion, measured_states, passive_joints, whole_motion
 from vpm.model import Model
@@ -447,17 +447,16 @@ def _inverse_dynamics_run(model: Model, experiment: Experiment, cutoff: float | 
     required, applied, _ = model.core.inverse_dynamics(
         model.theta, m.position, m.velocity, m.acceleration, m.inputs, m.dt, []
     )
-    keep = slice(m.edge, len(m.time) - m.edge)
     channels = tuple(f"{joint}.effort" for joint in model.joints)
     return Run(
         model.name,
         experiment.name,
         "inverse_dynamics",
-        m.time[keep][:: m.decimation],
+        m.time[m.retained],
         channels,
         tuple(model.channel_unit(channel) for channel in channels),
-        parallel_filter(required[keep], m.decimation),
-        parallel_filter(applied[keep], m.decimation),
+        m.parallel(required),
+        m.parallel(applied),
         settings={"cutoff": m.cutoff, "decimation": m.decimation},
     )
 
