@@ -26,7 +26,7 @@ from vpm.discrepancy.side_by_side import Failure, SideBySide
 from vpm.discrepancy.structural import coupled
 from vpm.discrepancy.structure import structure
 from vpm.discrepancy.timing import InTime, in_time
-from vpm.errors import DivergedError
+from vpm.errors import DivergedError, ModelError
 from vpm.identify import gain, segments
 
 #: Candidates refitted in one round.
@@ -307,24 +307,27 @@ def _evidence(trial: Trial) -> float:
 def _drop_replaced(stages: list[Stage], accepted: list[Accepted], data: Data, dropped: dict[Key, str]) -> None:
     """Backward elimination: drop every earlier effect without which the model predicts the unseen data as well.
 
-    An effect stays if a parameter of another one was held because the data show the two only together: which of the
-    two is there is then a matter of names, and the first one named keeps its place.
+    Where a parameter of a later effect was held because the data show it only together with one of the earlier effect,
+    it is set free for the trial: a spring whose rest was held beside a constant force needs that force no more if it
+    may rest elsewhere. One name for what two would say is the shorter answer.
     """
     newest = accepted[-1]
     for entry in accepted[:-1]:
         current = stages[-1].judged
         own = set(entry.trial.parameters)
-        if any(alias.partner in own for other in accepted for alias in other.trial.held):
-            continue
-        model = current.model.without_effect(*entry.key)
-        free = tuple(name for name in current.free if name in model.parameters)
+        freed = {alias.parameter for other in accepted for alias in other.trial.held if alias.partner in own}
         try:
-            reduced = judge(model, free, data, {name: pair for name, pair in current.bounds.items() if name in free})
-        except DivergedError:
-            continue  # without it the model cannot follow the unseen data at all
+            model = current.model.without_effect(*entry.key)
+            known = tuple(name for name in current.free if name in model.parameters)
+            free = (*known, *sorted(name for name in freed - set(known) if name in model.parameters))
+            bounds = {name: pair for name, pair in current.bounds.items() if name in free}
+            reduced = judge(model, free, data, bounds)
+        except (DivergedError, ModelError):
+            continue  # without it the model cannot follow the unseen data at all, or another effect cannot stand
         loss = gain(reduced.unseen, current.unseen, segments(data.unseen))
         if loss.relative < LEAST_GAIN:
             accepted.remove(entry)
+            accepted[:] = [_released(other, freed) for other in accepted]
             stages.append(Stage("removed", *entry.key, reduced))
             dropped[entry.key] = f"it is not needed any more beside {newest.trial.probe.candidate.label}"
 
@@ -360,6 +363,16 @@ def _without_tight_bounds(final: Judged, data: Data) -> Judged:
     better = gain(final.fit.residual, refitted.fit.residual, segments(data.training)).relative > LEAST_GAIN
     kept = gain(final.unseen, refitted.unseen, segments(data.unseen)).harm <= NORMAL_95_ONE_SIDED
     return refitted if better and kept else final
+
+
+def _released(entry: Accepted, freed: set[str]) -> Accepted:
+    """An accepted effect of which parameters that were held are fitted now."""
+    trial = entry.trial
+    mine = tuple(alias.parameter for alias in trial.held if alias.parameter in freed)
+    if not mine:
+        return entry
+    held = tuple(alias for alias in trial.held if alias.parameter not in freed)
+    return replace(entry, trial=replace(trial, held=held, parameters=(*trial.parameters, *mine)))
 
 
 def _listed(refused: dict[Key, str]) -> tuple[RefusedEffect, ...]:
