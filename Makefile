@@ -8,7 +8,7 @@
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .SUFFIXES:
-.PHONY: help demo test test-rust test-python reference validation lint lint-rust lint-python bench peers chirp narx-peers bench-counts docs figures package clean
+.PHONY: help demo test test-rust test-python reference validation lint lint-rust lint-python bench peers chirp narx-peers bench-counts bench-diagnosis docs figures package clean
 
 PYTHON ?= python3
 DEMO_OUT ?= demo-report
@@ -26,7 +26,7 @@ RUST_SOURCES := Cargo.toml $(wildcard Cargo.lock) \
 
 help: ## this list
 	@echo 'vpm: the commands (each does all of its own set-up)'
-	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' Makefile
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-15s %s\n", $$1, $$2 }' Makefile
 
 demo: $(VENV)/.installed ## find the hidden effect in a recorded log; the report goes to demo-report/
 	$(BIN)/vpm demo --out "$(DEMO_OUT)"
@@ -74,6 +74,9 @@ chirp: $(VENV)/.installed ## time the servo-cylinder beside the solvers that are
 
 narx-peers: $(VENV)/.installed ## time a NARX model beside what is installed (C, Numba, sysidentpy)
 	$(BIN)/python benches/narx_peers.py
+
+bench-diagnosis: $(VENV)/.installed ## time whole diagnoses of an axis and of a flexible arm; writes into docs/performance.md
+	$(BIN)/python benches/diagnosis/diagnosis.py --write
 
 figures: $(VENV)/.installed ## draw the pictures of docs/ anew, from the package
 	$(BIN)/python docs/figures/validity.py

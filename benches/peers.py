@@ -12,6 +12,9 @@ from tempfile import TemporaryDirectory
 
 ROOT = Path(__file__).resolve().parent.parent
 
+#: Where the section begins that another benchmark writes.
+DIAGNOSIS = "<!-- begin of make bench-diagnosis -->"
+
 PAGE = """# Performance beside other engines
 
 Written by `make peers`; do not edit. Times depend on the machine and on what else runs on it, ratios less so.
@@ -93,8 +96,11 @@ def main() -> None:
     engines |= {"CasADi": "casadi", "SciPy": "scipy", "Numba": "numba"}
     versions = ", ".join(f"{name} {installed(package)}" for name, package in engines.items())
     system = f"{platform.system()}, Python {platform.python_version()}"
+    target = ROOT / "docs" / "performance.md"
+    # The section of `make bench-diagnosis` stays as it is.
+    diagnosis = target.read_text(encoding="utf-8").partition(DIAGNOSIS)
     page = PAGE.format(cpu=processor(), system=system, versions=versions, **sections)
-    (ROOT / "docs" / "performance.md").write_text(page, encoding="utf-8")
+    target.write_text("\n".join([page, diagnosis[1] + diagnosis[2]]) if diagnosis[1] else page, encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -1,0 +1,145 @@
+"""Time whole diagnoses, all effects of the catalogue: one axis, 25 s at 1 kHz, and a flexible arm of two links.
+
+The axis moves by closed forms; the flexible arm, about 20 s at 500 Hz, is one of the proving ground's, which other code
+simulates. The table goes into docs/performance.md between two marks; `make bench-diagnosis` runs this.
+"""
+
+from __future__ import annotations
+
+import os
+import platform
+import sys
+import time
+from argparse import ArgumentParser
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+ROOT = Path(__file__).resolve().parent.parent.parent
+sys.path[:0] = [str(ROOT / "benches"), str(ROOT / "tests")]
+
+import vpm  # noqa: E402
+from blind import make_cases  # noqa: E402
+from markdown import table  # noqa: E402
+from peers import processor  # noqa: E402
+
+PAGE = ROOT / "docs" / "performance.md"
+BEGIN, END = "<!-- begin of make bench-diagnosis -->\n", "<!-- end of make bench-diagnosis -->\n"
+SECTION = """## A diagnosis
+
+Written by `make bench-diagnosis` on {cpu}, {system}, {repeats} repeats. Wall time is the least of all repeats, then
+median and spread (largest less least); CPU time is that of the process over all its threads, the least of all repeats,
+so that wall time on an idle machine of four cores lies between a quarter of it and the whole. Processor load of others
+while it ran: {load:.0f} processes. `python benches/diagnosis/diagnosis.py --write --only axis` times one
+machine alone and leaves the other out of the table.
+
+{rows}
+"""
+
+AXIS = """
+name = "axis"
+gravity = [0, 0, 0]
+[bodies.carriage]
+mass = { value = 1.8, uncertainty = 0.4 }
+[joints.axis]
+type = "prismatic"
+parent = "world"
+child = "carriage"
+axis = [1, 0, 0]
+[actuators.drive]
+joint = "axis"
+gain = 1.0
+command_unit = "N"
+[[effects]]
+type = "viscous_friction"
+at = "axis"
+viscous = { value = 2.5, uncertainty = 1.0 }
+"""
+
+Array = NDArray[np.float64]
+Diagnose = Callable[[], vpm.Diagnosis]
+
+
+def axis() -> tuple[str, Diagnose]:
+    model = vpm.Model.from_toml(AXIS)
+    logs = [axis_record(1, 15.0), axis_record(2, 10.0)]
+    return _said("axis, coulomb_friction", logs), lambda: vpm.diagnose(model, logs[0], logs[1])
+
+
+def axis_record(seed: int, seconds: float) -> vpm.Experiment:
+    """Sines by closed forms, with friction, noise of an encoder and of a drive whose command holds for a sample."""
+    generator, step = np.random.default_rng(seed), 1e-3
+    time = step * np.arange(round(seconds / step), dtype=np.float64)
+    rates, phases = 2.0 * np.pi * generator.uniform(0.2, 2.5, 6), generator.uniform(0.0, 2.0 * np.pi, 6)
+
+    def wave(order: int, at: Array) -> Array:
+        turned = rates[:, None] * at + phases[:, None] + 0.5 * np.pi * order
+        return np.asarray(np.sum((0.3 / (1.0 + rates) * rates**order)[:, None] * np.sin(turned), axis=0))
+
+    middle = time + 0.5 * step
+    speed = wave(1, middle)
+    effort = 2.0 * wave(2, middle) + 3.0 * speed + 0.8 * np.tanh(speed / 2e-3)
+    values = {
+        "axis.position": wave(0, time) + 2e-6 * generator.standard_normal(time.size),
+        "drive.command": effort + 0.02 * generator.standard_normal(time.size),
+    }
+    return vpm.Experiment.from_arrays(time, values, units={"axis.position": "m", "drive.command": "N"}, name=f"{seed}")
+
+
+def flexible_arm() -> tuple[str, Diagnose]:
+    (case,) = make_cases("flexible_arm", [("coulomb_friction", 3)])
+    logs = [case.train[0], case.validate[0]]
+    model = case.model()
+    return _said("flexible arm, coulomb_friction", logs), lambda: vpm.diagnose(model, logs[0], logs[1])
+
+
+MACHINES = (axis, flexible_arm)
+
+
+def _said(name: str, logs: list[vpm.Experiment]) -> str:
+    spans = " + ".join(f"{log.time[-1] - log.time[0]:.0f}" for log in logs)
+    return f"{name}, {spans} s at {logs[0].rate:g} Hz"
+
+
+def timed(diagnose: Diagnose, repeats: int) -> tuple[list[float], float, vpm.Diagnosis]:
+    walls, cpus = [], []
+    for _ in range(repeats):
+        wall, cpu = time.perf_counter(), time.process_time()
+        why = diagnose()
+        walls.append(time.perf_counter() - wall)
+        cpus.append(time.process_time() - cpu)
+    return walls, min(cpus), why
+
+
+def main() -> None:
+    parser = ArgumentParser(description=__doc__)
+    parser.add_argument("--repeats", type=int, default=3)
+    parser.add_argument("--write", action="store_true", help="write the section of docs/performance.md")
+    parser.add_argument("--only", choices=[make.__name__ for make in MACHINES], help="one of the machines")
+    options = parser.parse_args()
+    rows = []
+    for make in MACHINES:
+        if options.only not in {None, make.__name__}:
+            continue
+        name, diagnose = make()
+        walls, cpu, why = timed(diagnose, options.repeats)
+        found = ", ".join(f"{effect.name} at {effect.site}" for effect in why.effects) or why.verdict
+        spread = f"{np.median(walls):.1f}, {max(walls) - min(walls):.1f}"
+        rows.append([name, found, f"{min(walls):.1f}", spread, f"{cpu:.1f}"])
+        print(*rows[-1], sep="; ", flush=True)
+    text = table(["records", "found", "wall, s", "median, spread", "CPU, s"], rows)
+    system = f"{platform.system()}, Python {platform.python_version()}"
+    section = SECTION.format(
+        cpu=processor(), system=system, repeats=options.repeats, rows=text, load=os.getloadavg()[0]
+    )
+    if options.write:
+        page = PAGE.read_text(encoding="utf-8")
+        before, _, rest = page.partition(BEGIN)
+        after = rest.partition(END)[2]
+        PAGE.write_text(f"{before.rstrip()}\n\n{BEGIN}{section}{END}{after}", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
