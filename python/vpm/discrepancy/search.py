@@ -309,13 +309,16 @@ def _drop_replaced(stages: list[Stage], accepted: list[Accepted], data: Data, dr
 
     Where a parameter of a later effect was held because the data show it only together with one of the earlier effect,
     it is set free for the trial: a spring whose rest was held beside a constant force needs that force no more if it
-    may rest elsewhere. One name for what two would say is the shorter answer.
+    may rest elsewhere. One name for what two would say is the shorter answer. A size that was held is another force
+    under another name, as a difference of dry friction is a constant one in motion: the first one named stays.
     """
     newest = accepted[-1]
     for entry in accepted[:-1]:
         current = stages[-1].judged
         own = set(entry.trial.parameters)
         freed = {alias.parameter for other in accepted for alias in other.trial.held if alias.partner in own}
+        if any(current.model.parameters[name].kind == "linear" for name in freed):
+            continue
         try:
             model = current.model.without_effect(*entry.key)
             known = tuple(name for name in current.free if name in model.parameters)
