@@ -10,8 +10,11 @@ from numpy.typing import NDArray
 
 from vpm.discrepancy.screening import Alias, Baseline, Probe, size_is_clear
 from vpm.errors import DivergedError
-from vpm.identify import Estimate, Gain, InverseDynamicsProblem, OutputErrorProblem, estimate, gain, segments
+from vpm.identify import Estimate, Gain, InverseDynamicsProblem, OutputErrorProblem, Problem, estimate, gain, segments
+from vpm.identify.along import bends
+from vpm.identify.estimation import MOST_EVALUATIONS
 from vpm.identify.identifiability import COPY_SHARE, closest_column, explained_share, is_alias
+from vpm.identify.tangent import Tangent, estimate_on_tangent, has_tangent
 from vpm.model import Model
 
 Array = NDArray[np.float64]
@@ -21,6 +24,9 @@ TOLERANCE = 1e-6
 
 #: So many ranges of what the data reach, a place is nowhere.
 FAR_AWAY = 1e3
+#: Evaluations for a spring more where links bend already: each is a simulation with a dozen derivatives, and one that
+#: is there gains most in the first.
+FEW_EVALUATIONS = 6
 
 #: Effects under which a joint can stick, and the share of its largest speed below which it may.
 DRY = ("coulomb_friction", "stribeck_friction", "hysteresis")
@@ -102,15 +108,25 @@ class Trial:
         return self.unseen.relative / max(1, len(self.parameters))
 
 
-def judge(model: Model, free: tuple[str, ...], data: Data, bounds: dict[str, tuple[float, float]]) -> Judged:
-    """Fit ``free`` on the training records and predict the unseen ones.
+def judge(
+    model: Model,
+    free: tuple[str, ...],
+    data: Data,
+    bounds: dict[str, tuple[float, float]],
+    origin: Array | None = None,
+) -> Judged:
+    """Fit ``free`` on the training records and predict the unseen ones; see `vpm.identify.tangent` for ``origin``.
 
     Raises
     ------
     DivergedError
         The fitted model cannot simulate the unseen records.
     """
-    fit = estimate(model, data.training, free, bounds=bounds, tolerance=TOLERANCE)
+    if origin is None:
+        most = FEW_EVALUATIONS if bends(model) and model.added_joints else MOST_EVALUATIONS
+        fit = estimate(model, data.training, free, bounds=bounds, tolerance=TOLERANCE, most_evaluations=most)
+    else:
+        fit = estimate_on_tangent(model, data.training, free, origin, bounds=bounds, tolerance=TOLERANCE)
     fitted = model.with_parameters(dict(zip(free, map(float, fit.values), strict=True)))
     unseen, _ = data.unseen.evaluate(fitted, fitted.theta)
     simulated = None
@@ -125,16 +141,21 @@ def confirm(current: Judged, data: Data, probe: Probe) -> Trial:
     start = probe.model.with_parameters(_inside(probe, bounds))
     free = (*current.free, *probe.free)
     held: tuple[Alias, ...] = ()
+    origin = _origin(data.training, probe)
     if probe.invisible:
-        rough = estimate(start, data.training, free, bounds=bounds, linear_only=True)
-        released, held = _release(start, data, free, rough, probe)
+        near: Problem = data.training if origin is None else Tangent(data.training, origin)
+        rough = estimate(start, near, free, bounds=bounds, linear_only=True)
+        moved = origin is not None and probe.candidate.effect.site not in {"joint", "actuator"}
+        released, held = _release(start, data.training if moved else near, free, rough, probe)
         start = start.with_parameters(dict(zip(free, map(float, rough.values), strict=True)))
         free = (*free, *released)
-    judged, diverged = _judged(start, free, data, bounds)
+        origin = start.theta if moved else origin
+    judged, diverged = _judged(start, free, data, bounds, origin)
     doubtful = probe.held
     if seen := _seen_by_now(judged, data, probe):
         free, doubtful = (*free, *seen), tuple(alias for alias in doubtful if alias.parameter not in seen)
-        judged, diverged = _judged(judged.model, free, data, bounds)
+        origin = None if origin is None else judged.model.theta
+        judged, diverged = _judged(judged.model, free, data, bounds, origin)
     own = free[len(current.free) :]
     return Trial(
         probe,
@@ -155,13 +176,17 @@ def confirm(current: Judged, data: Data, probe: Probe) -> Trial:
 
 
 def _judged(
-    start: Model, free: tuple[str, ...], data: Data, bounds: dict[str, tuple[float, float]]
+    start: Model,
+    free: tuple[str, ...],
+    data: Data,
+    bounds: dict[str, tuple[float, float]],
+    origin: Array | None = None,
 ) -> tuple[Judged, str]:
     """A fit, judged by the balance alone where it cannot simulate the unseen records, with the reason."""
     try:
-        return judge(start, free, data, bounds), ""
+        return judge(start, free, data, bounds, origin), ""
     except DivergedError as error:
-        return judge(start, free, replace(data, simulation=None), bounds), str(error)
+        return judge(start, free, replace(data, simulation=None), bounds, origin), str(error)
 
 
 def _seen_by_now(judged: Judged, data: Data, probe: Probe) -> tuple[str, ...]:
@@ -185,6 +210,14 @@ def _seen_by_now(judged: Judged, data: Data, probe: Probe) -> tuple[str, ...]:
             seen.append(name)
             known = np.column_stack([known, column])
     return tuple(seen)
+
+
+def _origin(data: InverseDynamicsProblem, probe: Probe) -> Array | None:
+    """Values at which links bend as in the model without the candidate, if it does nothing there or bends none."""
+    if not has_tangent(probe.model, data):
+        return None
+    alike = probe.candidate.effect.site in {"joint", "actuator"}
+    return probe.model.theta if alike or probe.candidate.neutral else None
 
 
 def _shrinkage(problem: InverseDynamicsProblem, current: Judged, judged: Judged) -> float:
@@ -259,14 +292,14 @@ def _inside(probe: Probe, bounds: dict[str, tuple[float, float]]) -> dict[str, f
 
 
 def _release(
-    model: Model, data: Data, free: tuple[str, ...], fit: Estimate, probe: Probe
+    model: Model, data: Problem, free: tuple[str, ...], fit: Estimate, probe: Probe
 ) -> tuple[tuple[str, ...], tuple[Alias, ...]]:
     """Parameters without influence at zero size (a period, a transition velocity) that have one now."""
     fixed = {dotted for short, dotted in _short_names(probe).items() if short in probe.candidate.fixed}
     asleep = [name for name in probe.invisible if name not in fixed | _out_of_reach(probe)]
     theta = model.theta.copy()
     theta[[model.index(name) for name in free]] = fit.values
-    _, fresh = data.training.evaluate(model, theta, [model.index(name) for name in asleep])
+    _, fresh = data.evaluate(model, theta, [model.index(name) for name in asleep])
     released: list[str] = []
     held: list[Alias] = []
     known, names = fit.jacobian, list(free)

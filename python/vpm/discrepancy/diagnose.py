@@ -127,7 +127,9 @@ def diagnose(
     if not free:
         notes.append("the model file gives no parameter an uncertainty, so none was recalibrated")
     transitions = _transitions(model, data.training)
+    data.training.workers = worker_count(workers)
     recalibrated = judge(model, (*free, *transitions), data, {**_within_reach(model, free), **transitions})
+    data.training.workers = 1  # candidates share the cores from here on
     notes.extend(_moved_far(model, recalibrated))
     found = search(recalibrated, data, effects, limit, say, SideBySide(workers, progress))
     if found.interrupted:

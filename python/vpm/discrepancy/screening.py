@@ -7,7 +7,7 @@ that a candidate is never credited with what a better value of a known parameter
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,9 @@ from scipy.special import chdtri
 
 from vpm.discrepancy.candidates import Candidate
 from vpm.identify import InverseDynamicsProblem, robust_covariance, segments
+from vpm.identify.along import bends
 from vpm.identify.identifiability import closest_column, column_lengths, is_alias
+from vpm.identify.tangent import has_tangent
 from vpm.model import Model
 
 Array = NDArray[np.float64]
@@ -78,6 +80,37 @@ class Baseline:
     jacobian: Array
 
 
+def prepare(base: Baseline, data: InverseDynamicsProblem, listed: Sequence[Candidate]) -> Baseline:
+    """Work out together what links do under all candidates that move them and do nothing at their start.
+
+    They all share one motion there, and its derivatives by many parameters take little longer than by one. Shapes of
+    what has no size have no influence. The baseline comes back with its regressor at its own values.
+    """
+    if not has_tangent(base.model, data):
+        return base
+    pool = [c for c in listed if c.neutral and len(c.starts) == 1 and c.effect.site not in {"joint", "actuator"}]
+    models = [base.model.with_effect(c.effect.name, at=c.site, **c.starts[0]) for c in pool]
+    whole = base.model
+    for c in pool:
+        whole = whole.with_effect(c.effect.name, at=c.site, **c.starts[0])
+    sizes = [
+        name
+        for c, model in zip(pool, models, strict=True)
+        for name in _added(model, c)
+        if not c.effect.parameter(_short(model, c, name)).shape
+    ]
+    residual, jacobian = data.evaluate(whole, whole.theta, [whole.index(name) for name in (*base.free, *sizes)])
+    own = [_added(model, c) for c, model in zip(pool, models, strict=True)]
+    data.share(whole, [(base.model, ()), *zip(models, own, strict=True)])
+    return replace(base, residual=residual, jacobian=jacobian[:, : len(base.free)])
+
+
+def _short(model: Model, candidate: Candidate, name: str) -> str:
+    """Short name of a parameter of a candidate."""
+    effect = next(e for e in model.effects if (e.name, e.at) == candidate.key)
+    return next(short for short, dotted in effect.parameter_names.items() if dotted == name)
+
+
 def probe(base: Baseline, data: InverseDynamicsProblem, candidate: Candidate) -> Probe:
     """Try all start values of a candidate and keep the best, a possible one before an impossible one."""
     probes = [_probe_start(base, data, candidate, start) for start in candidate.starts]
@@ -117,7 +150,8 @@ def _probe_start(
     model = base.model.with_effect(candidate.effect.name, at=candidate.site, **start)
     added = _added(model, candidate)
     columns = [model.index(name) for name in added]
-    if candidate.neutral:
+    if candidate.neutral or bends(base.model):
+        # Where links bend already, a spring more costs a simulation for each known column: they are taken as before it.
         residual, fresh = data.evaluate(model, model.theta, columns)
         known = base.jacobian
     else:

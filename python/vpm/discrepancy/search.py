@@ -21,13 +21,15 @@ from vpm.discrepancy.refusal import (
     refuse_timing,
     refuse_trial,
 )
-from vpm.discrepancy.screening import Probe, probe
+from vpm.discrepancy.screening import Probe, prepare, probe
 from vpm.discrepancy.side_by_side import Failure, SideBySide
 from vpm.discrepancy.structural import coupled
 from vpm.discrepancy.structure import structure
 from vpm.discrepancy.timing import InTime, in_time
 from vpm.errors import DivergedError, ModelError
 from vpm.identify import gain, segments
+from vpm.identify.along import bends
+from vpm.identify.tangent import has_tangent
 
 #: Candidates refitted in one round.
 SHORT_LIST = 7
@@ -46,6 +48,9 @@ LATE = ("actuator_lag", "input_delay", "sensor_delay")
 TIE = 0.01
 #: Factor by which the last fit may exceed the bound of a transition velocity.
 MORE_ROOM = 3.0
+#: Where links bend already, the noise of the measured motion rings in them: a spring more has to promise this share of
+#: the residual, and only the best is refitted.
+RINGING, FEW = 0.2, 1
 #: A refinement leaves less than this share of the mean square that the plainer effect leaves.
 REFINED = 0.5
 
@@ -114,6 +119,8 @@ def search(
         refused = outcome.refused
         if best is None:
             break
+        if has_tangent(best.trial.judged.model, data.training):
+            best = _settled(best, data)
         accepted.append(best)
         stages.append(Stage("added", *best.key, best.trial.judged))
         tell(f"round {number}: accepted {best.trial.probe.candidate.label}")
@@ -126,6 +133,16 @@ def search(
         stages[-1] = replace(stages[-1], judged=_without_tight_bounds(stages[-1].judged, data))
     listed = _listed({**dropped, **refused})
     return Search(tuple(stages), tuple(accepted), listed, tuple(ranking), interrupted)
+
+
+def _settled(best: Accepted, data: Data) -> Accepted:
+    """What was fitted on a tangent, fitted to the end: the next round starts from it."""
+    judged = best.trial.judged
+    try:
+        exact = judge(judged.model, judged.free, data, dict(judged.bounds), judged.model.theta)
+    except DivergedError:
+        return best
+    return replace(best, trial=replace(best.trial, judged=exact))
 
 
 class _Round:
@@ -161,7 +178,7 @@ class _Round:
         self.refused.update(left_out(current.model, data.training, effects))
         listed = [c for c in found if c.key not in without and self._is_heavy(c) == heavy]
         self.tell(f"round {self.number}: screening {len(listed)} candidates")
-        screen = partial(probe, current.baseline, data.training)
+        screen = partial(probe, prepare(current.baseline, data.training, listed), data.training)
         results = self.each(f"round {self.number}: screening", screen, listed, lambda c: c.label)
         for candidate, result in zip(listed, results, strict=True):
             key = candidate.key
@@ -175,6 +192,14 @@ class _Round:
             else:
                 self._promising.append(result)
         self._promising.sort(key=lambda p: -p.score)
+        if heavy and bends(current.model):
+            for one in self._promising:
+                if one.drop < RINGING:
+                    self.refused[one.candidate.key] = (
+                        f"it would lower the training error by {100.0 * one.drop:.2g} % of its mean square, which "
+                        "links that ring along a noisy motion leave as well"
+                    )
+            self._promising = [one for one in self._promising if one.drop >= RINGING][:FEW]
 
     def _is_heavy(self, candidate: Candidate) -> bool:
         """Whether it adds a motion that nobody measures; where the log holds that motion, it is evidence like any."""

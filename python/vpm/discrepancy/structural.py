@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from vpm.catalogue import EffectType
 from vpm.experiment.signal import differentiate
 from vpm.identify import InverseDynamicsProblem
-from vpm.identify.along import has_hidden
 from vpm.model import Model
 
 Array = NDArray[np.float64]
@@ -65,7 +64,7 @@ def beyond(effect: EffectType, site: str, model: Model, measured: Sequence[str])
     A motion with joints that nobody measures is integrated, and there no hysteresis carries its memory along.
     """
     remembering = [entry.at for entry in model.effects if entry.name == "hysteresis"]
-    if effect.name == "hysteresis" and has_hidden(model, measured):
+    if effect.name == "hysteresis" and tuple(model.joints) != tuple(measured):
         return "its memory cannot be balanced beside what moves unseen in this model"
     if effect.name not in HIDING:
         return ""

@@ -7,8 +7,9 @@ without a sensor, and the states inside of drives.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 from vpm.errors import DivergedError, SimulationError, VpmError
 from vpm.experiment import Experiment, Motion
 from vpm.identify.drive_memory import DriveMemory, Filter, key_of, moves_drives
+from vpm.identify.reuse import Kept, Parts, parts_of
 from vpm.initial import measured_states, whole_motion
 from vpm.model import Model
 from vpm.simulate import Setup, copied_channels
@@ -54,9 +56,14 @@ def has_own_drives(model: Model) -> bool:
     return any(model.actuator_type(name) != "ideal" for name in model.actuators)
 
 
+def bends(model: Model) -> bool:
+    """Whether any of its links is elastic."""
+    return bool(model.core.n_elastic)
+
+
 def has_hidden(model: Model, joints: Sequence[str]) -> bool:
     """Whether it moves in ways beside the measured ``joints``: elastic links, or joints that nobody measures."""
-    return bool(model.core.n_elastic) or tuple(model.joints) != tuple(joints)
+    return bends(model) or tuple(model.joints) != tuple(joints)
 
 
 def check_along(model: Model, joints: Sequence[str]) -> None:
@@ -118,6 +125,8 @@ def respond(
     columns: Sequence[int],
     channels: Sequence[str],
     memory: DriveMemory | None = None,
+    kept: Kept | None = None,
+    origin: Array | None = None,
 ) -> Response:
     """Let a machine answer to a measured motion and to its commands.
 
@@ -132,10 +141,14 @@ def respond(
     columns : sequence of int
         Parameters to differentiate by.
     channels : sequence of str
-        Outputs to give, see `shown_channels`.
+        Outputs to give, see `shown_channels`; the same in all calls with one ``kept``.
     memory : DriveMemory, optional
         Of what drives answered before to this motion. With it, all is given as it is compared: filtered, and only at
         the samples that the filter retains.
+    kept : Kept, optional
+        Remembers how links bend along this record.
+    origin : ndarray, shape (P,), optional
+        How links bend is taken from the tangent at these values, not worked out at ``theta``.
 
     Raises
     ------
@@ -151,7 +164,7 @@ def respond(
         if has_own_drives(model):
             answer = _with_both(model, theta, m, experiment, columns, channels)
         elif has_hidden(model, m.joints):
-            answer = _with_hidden(model, theta, m, columns, channels)
+            answer = _with_hidden(model, theta, m, columns, channels, kept or Kept(), origin)
         else:
             answer = _rigid(model, theta, m, columns, channels)
         return answer if memory is None else _filtered(answer, memory.keep)
@@ -302,18 +315,70 @@ def _measured_states(model: Model, experiment: Experiment) -> tuple[list[int], A
     return places, np.column_stack(columns) if columns else np.zeros((len(experiment), 0))
 
 
-def _with_hidden(model: Model, theta: Array, m: Motion, columns: Sequence[int], channels: Sequence[str]) -> Response:
+def _with_hidden(
+    model: Model,
+    theta: Array,
+    m: Motion,
+    columns: Sequence[int],
+    channels: Sequence[str],
+    kept: Kept,
+    origin: Array | None,
+) -> Response:
     """Elastic links, and joints that nobody measures, on the motion of the others; ideal drives."""
-    outputs, jacobian = _hidden(model, theta, m, columns)
-    rows, measured = m.kept, [place for place, joint in enumerate(model.joints) if joint in m.joints]
+    measured = [place for place, joint in enumerate(model.joints) if joint in m.joints]
+    read = [f"{model.joints[place]}.effort" for place in measured] + list(channels)
+
+    def bend(machine: Model, values: Array, wanted: Sequence[int]) -> tuple[Array, Array]:
+        return _picked(machine, *_hidden(machine, values, m, wanted), slice(None), read)
+
+    parts = parts_of(model, m.joints)
+    if parts is None:
+        outputs, jacobian = bend(model, theta, columns)
+    else:
+        outputs, jacobian = _bent(parts, theta, columns, partial(kept.near, work=bend), origin)
+        _add_laws(parts, theta, m, columns, outputs, jacobian)
+    rows, efforts = m.kept, len(measured)
     applied, slopes = model.core.delivered(theta, m.inputs, m.dt, list(columns))
-    effort = [model.output_channels.index(f"{model.joints[place]}.effort") for place in measured]
     return Response(
-        outputs[rows][:, effort],
+        outputs[rows][:, :efforts],
         applied[rows][:, measured],
-        (jacobian[:, effort] - slopes[:, measured])[rows],
-        *_picked(model, outputs, jacobian, rows, channels),
+        (jacobian[:, :efforts] - slopes[:, measured])[rows],
+        outputs[rows][:, efforts:],
+        jacobian[rows][:, efforts:],
     )
+
+
+def _bent(
+    parts: Parts, theta: Array, columns: Sequence[int], near: Callable[..., tuple[Array, Array]], origin: Array | None
+) -> tuple[Array, Array]:
+    """Channels of the bare machine and their derivative by ``columns`` of the whole one; copies."""
+    places = parts.places.tolist()
+    mine = {column: places.index(column) for column in columns if column in parts.moving}
+    values = theta[places]
+    start = values if origin is None else np.where(parts.still, values, origin[places])
+    channels, slopes = near(parts, start, values, list(mine.values()))
+    jacobian = np.zeros((*channels.shape, len(columns)))
+    for k, column in enumerate(mine):
+        jacobian[:, :, columns.index(column)] = slopes[:, :, k]
+    return channels.copy(), jacobian
+
+
+def _add_laws(parts: Parts, theta: Array, m: Motion, columns: Sequence[int], channels: Array, jacobian: Array) -> None:
+    """Add what the laws of joints take, the difference of two machines with rigid links, to the efforts."""
+    if parts.laws is None or parts.shell is None:
+        return
+    motion = (m.position, m.velocity, m.acceleration, m.inputs, m.dt)
+    with_laws = [column for column in columns if column in parts.felt]
+    places = parts.places.tolist()
+    without = [column for column in with_laws if column in places]
+    required, _, slopes = parts.laws.core.inverse_dynamics(theta, *motion, with_laws)
+    plain, _, less = parts.shell.core.inverse_dynamics(theta[places], *motion, [places.index(c) for c in without])
+    efforts = required.shape[1]
+    channels[:, :efforts] += required - plain
+    for k, column in enumerate(with_laws):
+        jacobian[:, :efforts, columns.index(column)] += slopes[:, :, k]
+    for k, column in enumerate(without):
+        jacobian[:, :efforts, columns.index(column)] -= less[:, :, k]
 
 
 def _hidden(model: Model, theta: Array, m: Motion, columns: Sequence[int]) -> tuple[Array, Array]:

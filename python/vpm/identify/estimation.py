@@ -11,7 +11,7 @@ from scipy.optimize import least_squares, lsq_linear
 
 from vpm.identify.identifiability import Combination, column_lengths, unseen_combinations
 from vpm.identify.objective import AnyProblem
-from vpm.identify.problem import segments
+from vpm.identify.problem import Problem, segments
 from vpm.identify.statistics import robust_covariance
 from vpm.model import Model
 
@@ -46,13 +46,14 @@ class Estimate:
 
 def estimate(
     model: Model,
-    data: AnyProblem,
+    data: AnyProblem | Problem,
     free: Sequence[str],
     *,
     bounds: Mapping[str, tuple[float, float]] | None = None,
     tolerance: float = 1e-8,
     linear_only: bool = False,
     progress: Progress | None = None,
+    most_evaluations: int = MOST_EVALUATIONS,
 ) -> Estimate:
     """Move ``free`` parameters of ``model`` until the residual of ``data`` is least.
 
@@ -73,6 +74,8 @@ def estimate(
     linear_only : bool
         Stop after the first step.
     progress : callable, optional
+    most_evaluations : int
+        Where to stop in any case.
 
     Raises
     ------
@@ -87,7 +90,7 @@ def estimate(
     try:
         if columns:
             start = _linear_step(counter, start, low, high)
-            start = start if linear_only else _refine(counter, start, low, high, tolerance)
+            start = start if linear_only else _refine(counter, start, low, high, tolerance, most_evaluations)
         residual, jacobian = counter(start)
     except KeyboardInterrupt:
         if counter.best is None:
@@ -107,7 +110,7 @@ def estimate(
 class _Counter:
     """Evaluates the problem at given values of the free parameters; remembers the last point and the best."""
 
-    def __init__(self, model: Model, data: AnyProblem, columns: list[int], progress: Progress | None) -> None:
+    def __init__(self, model: Model, data: AnyProblem | Problem, columns: list[int], progress: Progress | None) -> None:
         self.model, self.data, self.columns, self.progress = model, data, columns, progress
         self.theta = model.theta.copy()
         self.count = 0
@@ -160,7 +163,7 @@ def _linear_step(counter: _Counter, start: Array, low: Array, high: Array) -> Ar
     return candidate if better else start
 
 
-def _refine(counter: _Counter, start: Array, low: Array, high: Array, tolerance: float) -> Array:
+def _refine(counter: _Counter, start: Array, low: Array, high: Array, tolerance: float, most: int) -> Array:
     residual, jacobian = counter(start)
     lengths = column_lengths(jacobian)
     gradient = (jacobian / lengths).T @ residual
@@ -178,7 +181,7 @@ def _refine(counter: _Counter, start: Array, low: Array, high: Array, tolerance:
         bounds=(low, high),
         method="trf",
         x_scale=1.0 / lengths,
-        max_nfev=MOST_EVALUATIONS,
+        max_nfev=most,
         xtol=tolerance,
         ftol=tolerance,
         gtol=1e-12,
@@ -218,7 +221,7 @@ def _range(model: Model, name: str, free: Sequence[str]) -> tuple[float, float]:
 
 
 def _covariance(
-    data: AnyProblem, residual: Array, jacobian: Array, unseen: tuple[Combination, ...], free: Sequence[str]
+    data: AnyProblem | Problem, residual: Array, jacobian: Array, unseen: tuple[Combination, ...], free: Sequence[str]
 ) -> Array:
     """Robust covariance; infinite variance for every parameter that takes part in an unseen combination."""
     lengths = column_lengths(jacobian)

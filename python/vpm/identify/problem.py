@@ -22,6 +22,7 @@ from vpm.identify.along import Response, check_along, respond, shown_channels
 from vpm.identify.drive_memory import DriveMemory
 from vpm.identify.first_state import add_first_state, first_state_slopes
 from vpm.identify.parallel import in_order
+from vpm.identify.reuse import Kept, parts_of
 from vpm.identify.stops import at_stops, check_left
 from vpm.initial import initial_state, joint_motion
 from vpm.model import Model
@@ -143,6 +144,8 @@ class InverseDynamicsProblem:
         self.shown = shown_channels(model, measured, experiments)
         self._memories = tuple(DriveMemory(m.parallel) for m in self.motions)
         self._compared = tuple(self._measured(m, e) for m, e in zip(self.motions, self.experiments, strict=True))
+        self._kept = tuple(Kept() for _ in self.motions)
+        self.workers = 1
         self.blocks = self._lay_out(model)
 
     def later(self) -> InverseDynamicsProblem:
@@ -152,11 +155,16 @@ class InverseDynamicsProblem:
         vars(same)["_whole"] = moved
         return same
 
-    def evaluate(self, model: Model, theta: Array, columns: Sequence[int] = ()) -> tuple[Array, Array]:
-        """Residual of the balance and its derivative; see :class:`Problem`."""
+    def evaluate(
+        self, model: Model, theta: Array, columns: Sequence[int] = (), origin: Array | None = None
+    ) -> tuple[Array, Array]:
+        """Residual of the balance and its derivative; see :class:`Problem`.
+
+        With ``origin``, values of the parameters, links bend as on the tangent there.
+        """
         residuals, jacobians = [], []
-        for record, measured in enumerate(self._compared):
-            answer = self._answer(model, theta, record, columns)
+        jobs = [partial(self._answer, model, theta, record, columns, origin) for record in range(len(self.motions))]
+        for measured, answer in zip(self._compared, in_order(jobs, self.workers), strict=True):
             residuals.append(np.hstack([(answer.applied - answer.required)[:, self._joints], measured - answer.seen]))
             jacobians.append(-np.concatenate([answer.balance[:, self._joints], answer.slopes], axis=1))
         return self._stack(residuals), self._stack(jacobians)
@@ -178,19 +186,37 @@ class InverseDynamicsProblem:
             for m, other in zip(self.motions, moved, strict=True)
         )
         whole = tuple(replace(m, edge=0) for m in motions)
-        vars(others).update(experiments=tuple(logs), motions=motions, _whole=whole)
+        kept = tuple(Kept() for _ in motions)
+        vars(others).update(experiments=tuple(logs), motions=motions, _whole=whole, _kept=kept)
         return others
+
+    def share(self, whole: Model, others: Sequence[tuple[Model, Sequence[str]]]) -> None:
+        """Let ``others`` take how links bend from ``whole``, which moves as they do; see `vpm.identify.reuse.Kept`.
+
+        With each goes the list of its own parameters: those that ``whole`` was not differentiated by have no influence.
+        """
+        for m, kept in zip(self.motions, self._kept, strict=True):
+            source = parts_of(whole, m.joints)
+            for model, own in others:
+                target = parts_of(model, m.joints)
+                if source is not None and target is not None:
+                    pair = (source, whole.theta[source.places]), (target, model.theta[target.places])
+                    kept.share(*pair, own)
 
     def effort(self, model: Model, theta: Array, record: int) -> tuple[Array, Array, Array]:
         """Time, applied and required effort (n, joints) of one record, filtered as in the residual."""
         m = self.motions[record]
-        answer = self._answer(model, theta, record, ())
+        answer = self._answer(model, theta, record)
         return m.time[m.retained], answer.applied[:, self._joints], answer.required[:, self._joints]
 
-    def _answer(self, model: Model, theta: Array, record: int, columns: Sequence[int]) -> Response:
+    def _answer(
+        self, model: Model, theta: Array, record: int, columns: Sequence[int] = (), origin: Array | None = None
+    ) -> Response:
         """What shows along one record, filtered."""
         whole, experiment, memory = self._whole[record], self.experiments[record], self._memories[record]
-        return respond(model, theta, whole, experiment, columns, self.shown, memory)
+        return respond(
+            model, theta, whole, experiment, columns, self.shown, memory, kept=self._kept[record], origin=origin
+        )
 
     def strength(self, model: Model) -> float:
         """Root mean square of the weighted applied effort over all records: what a relative error is relative to."""

@@ -1,0 +1,156 @@
+"""What bends along a measured motion, worked out once for all models that do not differ in what moves it.
+
+Where every joint was measured, laws of effort at the joints and faults of the drives do not change how the links bend:
+their effort is added to the balance as it would be on rigid links, sample by sample, with nothing to integrate. Only
+what moves the links (masses, elasticities, gravity, instruments of the motion) asks for another simulation.
+"""
+
+from __future__ import annotations
+
+import json
+from collections import OrderedDict
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import lru_cache
+from threading import Lock
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vpm.model import Model
+
+Array = NDArray[np.float64]
+
+#: Effects of joints that add a motion of their own, and those that weigh the acceleration: the tree has them.
+SPLITTING = frozenset({"joint_compliance", "backlash"})
+#: Simulations that are kept for each record: those of one round of a search.
+KEPT = 48
+
+
+@dataclass(frozen=True)
+class Parts:
+    """A machine with elastic links as what moves them and what does not.
+
+    Attributes
+    ----------
+    bare : Model
+        Without the laws of its joints and the faults of its drives.
+    places : ndarray of int
+        Its parameters among those of the machine.
+    laws, shell : Model
+        Both machines with rigid links: their difference in effort is that of the laws. None of them without laws.
+    felt : frozenset of int
+        Parameters of the machine that change this difference.
+    moving : frozenset of int
+        Those that may change how the links bend.
+    still : ndarray of bool
+        Which parameters of ``bare`` do not: those of drives and controllers.
+    structure : str
+        Of ``bare``: its description without the values of its parameters.
+    """
+
+    bare: Model
+    places: NDArray[np.int64]
+    laws: Model | None
+    shell: Model | None
+    felt: frozenset[int]
+    moving: frozenset[int]
+    still: NDArray[np.bool_]
+    structure: str
+
+
+@lru_cache(maxsize=128)
+def parts_of(model: Model, joints: tuple[str, ...]) -> Parts | None:
+    """Split a machine whose measured ``joints`` are all that it has; None for any other, and where nothing bends."""
+    if not model.core.n_elastic or tuple(model.joints) != joints:
+        return None
+    aside = [e for e in model.effects if e.type.site in {"joint", "actuator"} and e.name not in SPLITTING]
+    if len(aside) < sum(e.type.site in {"joint", "actuator"} for e in model.effects):
+        return None
+    bare = model
+    for effect in aside:
+        bare = bare.without_effect(effect.name, effect.at)
+    places = np.array([model.index(name) for name in bare.parameter_names], dtype=np.int64)
+    owners = {*model.actuators, *model.controllers}
+    still = np.array([name.partition(".")[0] in owners for name in bare.parameter_names], dtype=np.bool_)
+    moving = frozenset(places[~still].tolist())
+    described = json.loads(bare.description())
+    del described["parameters"]
+    structure = json.dumps(described)
+    laws = [effect for effect in aside if effect.type.site == "joint"]
+    if not laws:
+        return Parts(bare, places, None, None, frozenset(), moving, still, structure)
+    felt = {model.index(name) for effect in laws for name in effect.parameter_names.values()}
+    read = [effect for effect in model.effects if effect.type.site == "sensor"]
+    felt |= {model.index(name) for effect in read for name in effect.parameter_names.values()}
+    return Parts(bare, places, model.at("rigid"), bare.at("rigid"), frozenset(felt), moving, still, structure)
+
+
+@dataclass
+class Answer:
+    """Channels (n, k) along a motion and, by parameter, their derivatives (n, k)."""
+
+    channels: Array
+    slopes: dict[str, Array] = field(default_factory=dict)
+
+
+#: Gives channels (n, k) and their derivative (n, k, columns).
+Work = Callable[[Model, Array, Sequence[int]], tuple[Array, Array]]
+
+
+class Kept:
+    """Answers of bare machines along one record, by structure and parameter values; safe on several threads."""
+
+    def __init__(self) -> None:
+        self._answers: OrderedDict[tuple[str, bytes], Answer] = OrderedDict()
+        self._lock = Lock()
+
+    def answer(self, parts: Parts, theta: Array, columns: Sequence[int], work: Work) -> tuple[Array, Array]:
+        """Channels (n, k) and derivative (n, k, columns) of the bare machine; what is not known is worked out."""
+        key, bare = (parts.structure, theta.tobytes()), parts.bare
+        names = [bare.parameter_names[column] for column in columns]
+        with self._lock:
+            known = self._answers.get(key)
+            slopes = dict(known.slopes) if known else {}
+        fresh = list(dict.fromkeys(c for c, name in zip(columns, names, strict=True) if name not in slopes))
+        if known is None or fresh:
+            channels, jacobian = work(bare, theta, fresh)
+            slopes |= {bare.parameter_names[c]: jacobian[:, :, k] for k, c in enumerate(fresh)}
+            known = Answer(channels, slopes)
+            self._keep(key, known)
+        stacked = [slopes[name] for name in names]
+        return known.channels, np.stack(stacked, axis=2) if stacked else np.zeros((*known.channels.shape, 0))
+
+    def near(
+        self, parts: Parts, origin: Array, theta: Array, columns: Sequence[int], work: Work
+    ) -> tuple[Array, Array]:
+        """The same on the tangent at ``origin``."""
+        moved = np.flatnonzero(theta != origin).tolist()
+        wanted = list(dict.fromkeys([*columns, *moved]))
+        channels, jacobian = self.answer(parts, origin, wanted, work)
+        steps = (theta - origin)[wanted]
+        return channels + jacobian @ steps, jacobian[:, :, : len(columns)]
+
+    def share(self, one: tuple[Parts, Array], other: tuple[Parts, Array], own: Sequence[str]) -> None:
+        """Let the machine ``other`` (its values with it) have the answer of ``one``, which moves in the same way there.
+
+        Of its ``own`` parameters those that ``one`` was not differentiated by have no influence.
+        """
+        (first, theta), (second, values) = one, other
+        with self._lock:
+            known = self._answers.get((first.structure, theta.tobytes()))
+        if known is None:
+            return
+        nothing = np.zeros_like(known.channels)
+        slopes = {name: known.slopes[name] for name in second.bare.parameter_names if name in known.slopes}
+        slopes |= {name: nothing for name in own if name not in slopes}
+        self._keep((second.structure, values.tobytes()), Answer(known.channels, slopes))
+
+    def _keep(self, key: tuple[str, bytes], answer: Answer) -> None:
+        with self._lock:
+            before = self._answers.pop(key, None)
+            if before is not None:
+                answer.slopes = {**before.slopes, **answer.slopes}
+            self._answers[key] = answer
+            while len(self._answers) > KEPT:
+                self._answers.popitem(last=False)

@@ -1,0 +1,90 @@
+"""Fits in which the bending of links is taken from its tangent, so that few of their steps ask for a simulation."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vpm.errors import DivergedError
+from vpm.identify.estimation import Estimate, estimate
+from vpm.identify.problem import InverseDynamicsProblem
+from vpm.identify.reuse import parts_of
+from vpm.model import Model
+
+Array = NDArray[np.float64]
+
+#: Tangents that are tried one after the other, and shares of the way to where the fit on one of them ends.
+TANGENTS, SHARES = 4, (1.0, 0.5, 0.25, 0.125)
+#: What the tangent may be off by where the fit ends, as a share of the residual: its sum of squares is then within the
+#: square of it of the least one.
+OFF = 0.03
+
+
+class Tangent:
+    """A balance of effort whose links bend as on the tangent at ``origin``, values of the parameters."""
+
+    mode = InverseDynamicsProblem.mode
+
+    def __init__(self, data: InverseDynamicsProblem, origin: Array) -> None:
+        self.data, self.origin, self.blocks = data, origin, data.blocks
+
+    def evaluate(self, model: Model, theta: Array, columns: Sequence[int] = ()) -> tuple[Array, Array]:
+        """See `vpm.identify.problem.Problem`."""
+        return self.data.evaluate(model, theta, columns, self.origin)
+
+
+def has_tangent(model: Model, data: InverseDynamicsProblem) -> bool:
+    """Whether links bend along the motion, and nothing else is worked out there."""
+    return all(parts_of(model, m.joints) is not None for m in data.motions)
+
+
+def estimate_on_tangent(
+    model: Model,
+    data: InverseDynamicsProblem,
+    free: tuple[str, ...],
+    origin: Array,
+    *,
+    bounds: Mapping[str, tuple[float, float]],
+    tolerance: float,
+) -> Estimate:
+    """A fit on one tangent after the other, until where it ends the tangent still holds.
+
+    Parameters
+    ----------
+    model : Model
+        With the start values.
+    data : InverseDynamicsProblem
+    free : tuple of str
+    origin : ndarray, shape (P,)
+        Where the tangent touches.
+    bounds : mapping
+    tolerance : float
+    """
+    residual, _ = data.evaluate(model, model.theta)
+    cost, at, columns = float(residual @ residual), model, [model.index(name) for name in free]
+    for _ in range(TANGENTS):
+        rough = estimate(at, Tangent(data, origin), free, bounds=bounds, tolerance=tolerance)
+        start, step = at.theta[columns], rough.values - at.theta[columns]
+        for share in SHARES:
+            reached = at.with_parameters(dict(zip(free, map(float, start + share * step), strict=True)))
+            residual = _residual(data, reached)
+            if residual @ residual <= cost * (1.0 + OFF**2):
+                break
+        else:
+            return estimate(at, data, free, bounds=bounds, tolerance=tolerance)
+        near = share == 1.0 and np.linalg.norm(residual - rough.residual) <= OFF * np.linalg.norm(residual)
+        if near or rough.interrupted:
+            break
+        cost, at, origin = float(residual @ residual), reached, reached.theta
+    return replace(rough, values=reached.theta[columns], residual=residual)
+
+
+def _residual(data: InverseDynamicsProblem, model: Model) -> Array:
+    """Infinite where the machine cannot follow the motion."""
+    try:
+        return data.evaluate(model, model.theta)[0]
+    except (DivergedError, ValueError):
+        return np.full(data.blocks[-1].samples.stop, np.inf)
