@@ -37,6 +37,7 @@ from vpm.experiment import Experiment
 from vpm.identify import InverseDynamicsProblem, OutputErrorProblem, gaps
 from vpm.identify.fit import fit_of
 from vpm.identify.parallel import worker_count
+from vpm.identify.tangent import has_tangent
 from vpm.model import Model
 from vpm.simulate import Run, Setup, judging_mode
 
@@ -128,7 +129,9 @@ def diagnose(
         notes.append("the model file gives no parameter an uncertainty, so none was recalibrated")
     transitions = _transitions(model, data.training)
     data.training.workers = worker_count(workers)
-    recalibrated = judge(model, (*free, *transitions), data, {**_within_reach(model, free), **transitions})
+    origin = model.theta if has_tangent(model, data.training) else None
+    bounds = {**_within_reach(model, free), **transitions}
+    recalibrated = judge(model, (*free, *transitions), data, bounds, origin)
     data.training.workers = 1  # candidates share the cores from here on
     notes.extend(_moved_far(model, recalibrated))
     found = search(recalibrated, data, effects, limit, say, SideBySide(workers, progress))

@@ -38,7 +38,7 @@ SENSOR_SHARE = 0.25
 
 #: Effects that add a motion nobody measures, which has to be simulated for every probe; and the ratio of a residual to
 #: what is white in it up to which they are not worth that.
-HEAVY = ("joint_compliance", "backlash", "link_flexibility", "structural_damping")
+HEAVY = ("joint_compliance", "backlash", "link_flexibility")
 NOISE_ONLY = 1.2
 #: What leaves up to so many times as much as the best explains the data as well, if it is also little of the whole gap.
 SAME = 1.5

@@ -17,7 +17,7 @@ from vpm.model import Model
 Array = NDArray[np.float64]
 
 #: Tangents that are tried one after the other, and shares of the way to where the fit on one of them ends.
-TANGENTS, SHARES = 4, (1.0, 0.5, 0.25, 0.125)
+TANGENTS, SHARES = 8, (1.0, 0.5, 0.25, 0.125)
 #: What the tangent may be off by where the fit ends, as a share of the residual: its sum of squares is then within the
 #: square of it of the least one.
 OFF = 0.03
