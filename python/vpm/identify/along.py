@@ -136,7 +136,7 @@ def respond(
         if has_hidden(model, m.joints):
             return _with_hidden(model, theta, m, columns, channels)
     except Diverged as error:
-        time = float(m.time[m.kept][0]) + len(error.outputs) * m.dt
+        time = float(m.time[0]) + len(error.outputs) * m.dt
         raise DivergedError(f"{experiment.name}: {error}", time=time) from None
     return _rigid(model, theta, m, columns)
 
