@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import vpm
-from vpm.errors import SimulationError
+from vpm.errors import DivergedError, SimulationError
 from vpm.identify import InverseDynamicsProblem, gaps
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -151,3 +151,14 @@ def test_what_cannot_be_balanced_is_refused() -> None:
     record = vpm.Experiment.from_arrays(time, data, units={"motor.command": "V", "shoulder.position": "rad"})
     with pytest.raises(SimulationError, match="leaves link free while the actuator motor has type dc_motor"):
         InverseDynamicsProblem(model, [record])
+
+
+def test_what_diverges_along_a_motion_says_when(cylinder: vpm.Model) -> None:
+    """The way begins with the record, not behind the settling of its filter."""
+    problem = InverseDynamicsProblem(cylinder, [cylinder_record(cylinder)])
+    assert problem.motions[0].edge > 10
+    theta = cylinder.theta.copy()
+    theta[cylinder.index("servo.valve.flow_gain")] = 1e200
+    with pytest.raises(DivergedError, match=r"sample 2\)") as raised:
+        problem.evaluate(cylinder, theta)
+    assert raised.value.time == pytest.approx(2 * DT)

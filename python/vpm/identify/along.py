@@ -169,7 +169,7 @@ def respond(
             answer = _rigid(model, theta, m, columns, channels)
         return answer if memory is None else _filtered(answer, memory.keep)
     except Diverged as error:
-        time = float(m.time[m.kept][0]) + len(error.outputs) * m.dt
+        time = float(m.time[0]) + len(error.outputs) * m.dt
         raise DivergedError(f"{experiment.name}: {error}", time=time) from None
     except ValueError as error:
         if isinstance(error, VpmError) or not has_hidden(model, m.joints):
