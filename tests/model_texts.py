@@ -43,3 +43,25 @@ def changed(text: str, *changes: tuple[str, str]) -> Model:
 def described(model: Model) -> Any:
     """Description that the core reads."""
     return json.loads(model.description())
+
+
+#: Carriage on a rail with an ideal drive, its mass and its viscous friction uncertain.
+DAMPED_AXIS = """
+name = "axis"
+gravity = [0, 0, 0]
+[bodies.carriage]
+mass = { value = 2.0, uncertainty = 0.2 }
+[joints.axis]
+type = "prismatic"
+parent = "world"
+child = "carriage"
+axis = [1, 0, 0]
+[actuators.drive]
+joint = "axis"
+gain = 1.0
+command_unit = "N"
+[[effects]]
+type = "viscous_friction"
+at = "axis"
+viscous = { value = 3.0, uncertainty = 1.0 }
+"""

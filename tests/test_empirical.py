@@ -9,6 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 import vpm
+from model_texts import DAMPED_AXIS
 from vpm.catalogue import effect_type
 from vpm.catalogue.empirical import TERMS
 from vpm.errors import ModelError
@@ -16,25 +17,6 @@ from vpm.errors import ModelError
 Array = NDArray[np.float64]
 Force = Callable[[Array, Array, Array], Array]
 
-AXIS = """
-name = "axis"
-gravity = [0, 0, 0]
-[bodies.carriage]
-mass = { value = 2.0, uncertainty = 0.2 }
-[joints.axis]
-type = "prismatic"
-parent = "world"
-child = "carriage"
-axis = [1, 0, 0]
-[actuators.drive]
-joint = "axis"
-gain = 1.0
-command_unit = "N"
-[[effects]]
-type = "viscous_friction"
-at = "axis"
-viscous = { value = 3.0, uncertainty = 1.0 }
-"""
 STEP, NOISE = 2e-3, 0.02
 SHAPES = {"middle": 0.1, "reach": 0.5, "speed": 2.0, "transition_velocity": 0.05, "period": 0.3}
 
@@ -43,7 +25,7 @@ def everything() -> vpm.Model:
     """All terms at once, with sizes that differ."""
     sizes = {name: 0.1 + 0.05 * k for k, name in enumerate(TERMS)}
     sizes |= {"load_dry": 0.1, "load_cosine": -0.05, "load_sine": 0.07}
-    return vpm.Model.from_toml(AXIS).with_effect("empirical_force", at="axis", **SHAPES, **sizes)
+    return vpm.Model.from_toml(DAMPED_AXIS).with_effect("empirical_force", at="axis", **SHAPES, **sizes)
 
 
 def balanced(model: vpm.Model, q: float, v: float, a: float) -> float:
@@ -103,7 +85,7 @@ def test_derivatives_are_exact() -> None:
 
 def test_a_file_holds_the_terms_that_are_used_and_no_others() -> None:
     shapes = {name: value for name, value in SHAPES.items() if name != "period"}
-    model = vpm.Model.from_toml(AXIS).with_effect("empirical_force", at="axis", **shapes, drag=0.5)
+    model = vpm.Model.from_toml(DAMPED_AXIS).with_effect("empirical_force", at="axis", **shapes, drag=0.5)
     again = vpm.Model.from_toml(model.to_toml())
     assert [name for name in again.parameters if "empirical" in name] == [
         f"axis.empirical.{name}" for name in ("middle", "reach", "speed", "transition_velocity", "drag")
@@ -111,7 +93,7 @@ def test_a_file_holds_the_terms_that_are_used_and_no_others() -> None:
     assert again.parameters["axis.empirical.drag"].unit == "N"
     assert "no law of physics" in effect_type("empirical_force").sentence
     with pytest.raises(ModelError, match="needs constant or position"):
-        vpm.Model.from_toml(AXIS).with_effect("empirical_force", at="axis", **shapes)
+        vpm.Model.from_toml(DAMPED_AXIS).with_effect("empirical_force", at="axis", **shapes)
 
 
 def record(seed: int, force: Force, duration: float = 10.0) -> vpm.Experiment:
@@ -132,7 +114,7 @@ def record(seed: int, force: Force, duration: float = 10.0) -> vpm.Experiment:
 
 
 def diagnosed(force: Force) -> vpm.Diagnosis:
-    model = vpm.Model.from_toml(AXIS)
+    model = vpm.Model.from_toml(DAMPED_AXIS)
     return vpm.diagnose(model, [record(1, force), record(2, force)], record(3, force))
 
 

@@ -9,29 +9,11 @@ import pytest
 from numpy.typing import NDArray
 
 import vpm
+from model_texts import DAMPED_AXIS
 from vpm.discrepancy import ProposedExperiment
 
 Array = NDArray[np.float64]
 
-AXIS = """
-name = "axis"
-gravity = [0, 0, 0]
-[bodies.carriage]
-mass = { value = 2.0, uncertainty = 0.2 }
-[joints.axis]
-type = "prismatic"
-parent = "world"
-child = "carriage"
-axis = [1, 0, 0]
-[actuators.drive]
-joint = "axis"
-gain = 1.0
-command_unit = "N"
-[[effects]]
-type = "viscous_friction"
-at = "axis"
-viscous = { value = 3.0, uncertainty = 1.0 }
-"""
 STEP, NOISE = 1e-3, 0.02
 
 
@@ -61,14 +43,14 @@ NAMES = ["bias_force", "coulomb_friction"]
 
 @pytest.fixture(scope="module")
 def why() -> vpm.Diagnosis:
-    model = vpm.Model.from_toml(AXIS)
+    model = vpm.Model.from_toml(DAMPED_AXIS)
     return vpm.diagnose(model, [forward_only(1, 2.0), forward_only(2, 2.0)], forward_only(3, 2.0), effects=NAMES)
 
 
 @pytest.fixture(scope="module")
 def any_effect() -> vpm.Diagnosis:
     """The whole catalogue on the same records."""
-    model = vpm.Model.from_toml(AXIS)
+    model = vpm.Model.from_toml(DAMPED_AXIS)
     return vpm.diagnose(model, [forward_only(1, 2.0), forward_only(2, 2.0)], forward_only(3, 2.0))
 
 
@@ -135,7 +117,7 @@ def test_the_experiment_when_made_names_the_true_effect(why: vpm.Diagnosis, tmp_
         units={"axis.position": "m", "drive.command": "N"},
         name="made",
     )
-    model = vpm.Model.from_toml(AXIS)
+    model = vpm.Model.from_toml(DAMPED_AXIS)
     again = vpm.diagnose(model, [forward_only(1, 2.0), made.split(0.5)[0]], made.split(0.5)[1], effects=NAMES)
     assert [e.name for e in again.effects] == ["bias_force"]
     assert not again.ambiguous_with

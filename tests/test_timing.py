@@ -9,31 +9,13 @@ import pytest
 from numpy.typing import NDArray
 
 import vpm
+from model_texts import DAMPED_AXIS
 from vpm.discrepancy.confirmation import Data, Judged, judge
 from vpm.discrepancy.timing import in_time
 from vpm.identify import InverseDynamicsProblem
 
 Array = NDArray[np.float64]
 
-AXIS = """
-name = "axis"
-gravity = [0, 0, 0]
-[bodies.carriage]
-mass = { value = 2.0, uncertainty = 0.2 }
-[joints.axis]
-type = "prismatic"
-parent = "world"
-child = "carriage"
-axis = [1, 0, 0]
-[actuators.drive]
-joint = "axis"
-gain = 1.0
-command_unit = "N"
-[[effects]]
-type = "viscous_friction"
-at = "axis"
-viscous = { value = 3.0, uncertainty = 1.0 }
-"""
 STEP, NOISE = 2e-3, 0.02
 
 
@@ -55,7 +37,7 @@ def record(seed: int, late: float) -> vpm.Experiment:
 
 
 def judged(late: float) -> tuple[Judged, Data]:
-    model = vpm.Model.from_toml(AXIS)
+    model = vpm.Model.from_toml(DAMPED_AXIS)
     data = Data(
         InverseDynamicsProblem(model, [record(1, late), record(2, late)]),
         InverseDynamicsProblem(model, [record(3, late)]),
@@ -90,7 +72,7 @@ def test_nothing_is_shifted_where_commands_hold_as_they_are_logged() -> None:
 
 
 def test_commands_of_a_later_problem_come_one_sample_later() -> None:
-    model = vpm.Model.from_toml(AXIS)
+    model = vpm.Model.from_toml(DAMPED_AXIS)
     there = record(1, 0.0)
     later = there["drive.command"].copy()
     later[1:] = there["drive.command"][:-1]
