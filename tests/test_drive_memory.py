@@ -10,6 +10,9 @@ from vpm.discrepancy.coloured import noise_shapes, noise_spectrum
 from vpm.discrepancy.floor import noise_floor
 from vpm.discrepancy.structure import structure
 from vpm.identify import InverseDynamicsProblem, gaps
+from vpm.identify.drive_answers import apart, together
+from vpm.identify.drive_memory import DriveMemory
+from vpm.identify.drives_apart import drives_of
 from vpm.model import Model
 
 Exact = tuple[Model, InverseDynamicsProblem, InverseDynamicsProblem]
@@ -83,3 +86,23 @@ def test_the_size_of_coloured_noise_is_read_off_its_quiet_part(exact: Exact) -> 
     line = 20.0 * residual.std() * np.cos(2.0 * np.pi * 5.0 * np.arange(n) / n)
     found = noise_spectrum(residual + line, shape, 0.4)
     assert found.sum() == pytest.approx(spectrum.sum(), rel=0.35)
+
+
+def test_cylinders_of_a_firm_supply_answer_one_by_one_as_they_do_together() -> None:
+    model = Model.from_toml(make_case("hydraulic_leg", "none", 1, recalibrate=False).true_text)
+    one_by_one = drives_of(model)
+    assert [drives.model.actuators for drives in one_by_one] == [("hip_drive",), ("knee_drive",)]
+    sagging = model.with_effect("supply_drop", at="pump", resistance=1e9, time_constant=0.01)
+    assert [drives.model.actuators for drives in drives_of(sagging)] == [("hip_drive", "knee_drive")]
+
+
+def test_the_answers_of_single_cylinders_make_up_that_of_the_machine() -> None:
+    case = make_case("hydraulic_leg", "none", 1, recalibrate=False)
+    model = Model.from_toml(case.true_text).with_effect("sensor_offset", at="knee_encoder", value=0.01)
+    training = InverseDynamicsProblem(model, case.train[:1])
+    m, record = training.motions[0], training.experiments[0]
+    memory, columns = DriveMemory(m.parallel), [model.index("pump.oil.bulk_modulus"), model.index("upper.mass")]
+    answers = [work(model, model.theta, m, record, (columns, training.shown), memory) for work in (apart, together)]
+    for one, other in zip(*answers, strict=True):
+        largest = np.abs(other).max(axis=0)
+        assert (np.abs(one - other).max(axis=0) <= 1e-4 * largest).all()

@@ -14,7 +14,7 @@ from vpm.identify import Estimate, Gain, InverseDynamicsProblem, OutputErrorProb
 from vpm.identify.along import bends
 from vpm.identify.estimation import MOST_EVALUATIONS
 from vpm.identify.identifiability import COPY_SHARE, closest_column, explained_share, is_alias
-from vpm.identify.tangent import Tangent, estimate_on_tangent, has_tangent
+from vpm.identify.tangent import Tangent, drives_on_tangent, estimate_on_tangent, has_tangent
 from vpm.model import Model
 
 Array = NDArray[np.float64]
@@ -141,11 +141,11 @@ def confirm(current: Judged, data: Data, probe: Probe) -> Trial:
     start = probe.model.with_parameters(_inside(probe, bounds))
     free = (*current.free, *probe.free)
     held: tuple[Alias, ...] = ()
-    origin = _origin(data.training, probe)
+    origin, still = _origin(data.training, probe, start), _still(data.training, probe)
     if probe.invisible:
         near: Problem = data.training if origin is None else Tangent(data.training, origin)
         rough = estimate(start, near, free, bounds=bounds, linear_only=True)
-        moved = origin is not None and probe.candidate.effect.site not in {"joint", "actuator"}
+        moved = origin is not None and probe.candidate.effect.site not in still
         released, held = _release(start, data.training if moved else near, free, rough, probe)
         start = start.with_parameters(dict(zip(free, map(float, rough.values), strict=True)))
         free = (*free, *released)
@@ -212,11 +212,21 @@ def _seen_by_now(judged: Judged, data: Data, probe: Probe) -> tuple[str, ...]:
     return tuple(seen)
 
 
-def _origin(data: InverseDynamicsProblem, probe: Probe) -> Array | None:
-    """Values at which links bend as in the model without the candidate, if it does nothing there or bends none."""
+def _still(data: InverseDynamicsProblem, probe: Probe) -> frozenset[str]:
+    """Kinds of sites at which an effect moves nothing that is taken from a tangent."""
+    return frozenset({"joint"} if drives_on_tangent(probe.model, data) else {"joint", "actuator"})
+
+
+def _origin(data: InverseDynamicsProblem, probe: Probe, start: Model) -> Array | None:
+    """Values at which links bend as in the model without the candidate, if it does nothing there or bends none.
+
+    Drives are taken as without it where it is none of theirs, and else as where the fit starts.
+    """
     if not has_tangent(probe.model, data):
         return None
-    alike = probe.candidate.effect.site in {"joint", "actuator"}
+    alike = probe.candidate.effect.site in _still(data, probe)
+    if drives_on_tangent(probe.model, data):
+        return probe.model.theta if alike else start.theta
     return probe.model.theta if alike or probe.candidate.neutral else None
 
 

@@ -86,7 +86,7 @@ def prepare(base: Baseline, data: InverseDynamicsProblem, listed: Sequence[Candi
     They all share one motion there, and its derivatives by many parameters take little longer than by one. Shapes of
     what has no size have no influence. The baseline comes back with its regressor at its own values.
     """
-    if not has_tangent(base.model, data):
+    if not bends(base.model) or not has_tangent(base.model, data):
         return base
     pool = [c for c in listed if c.neutral and len(c.starts) == 1 and c.effect.site not in {"joint", "actuator"}]
     models = [base.model.with_effect(c.effect.name, at=c.site, **c.starts[0]) for c in pool]
@@ -150,8 +150,8 @@ def _probe_start(
     model = base.model.with_effect(candidate.effect.name, at=candidate.site, **start)
     added = _added(model, candidate)
     columns = [model.index(name) for name in added]
-    if candidate.neutral or bends(base.model):
-        # Where links bend already, a spring more costs a simulation for each known column: they are taken as before it.
+    if candidate.neutral or has_tangent(base.model, data):
+        # Where links bend or drives answer, each known column costs a simulation: they are taken as before it.
         residual, fresh = data.evaluate(model, model.theta, columns)
         known = base.jacobian
     else:

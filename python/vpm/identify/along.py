@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 
 from vpm.errors import DivergedError, SimulationError, VpmError
 from vpm.experiment import Experiment, Motion
-from vpm.identify.drive_memory import DriveMemory, Filter, key_of, moves_drives
+from vpm.identify.drive_answers import apart, driven, first_drives, picked, together
+from vpm.identify.drive_memory import DriveMemory, Filter
 from vpm.identify.reuse import Kept, Parts, parts_of
-from vpm.initial import measured_states, whole_motion
+from vpm.initial import whole_motion
 from vpm.model import Model
 from vpm.simulate import Setup, copied_channels
 
@@ -148,7 +149,7 @@ def respond(
     kept : Kept, optional
         Remembers how links bend along this record.
     origin : ndarray, shape (P,), optional
-        How links bend is taken from the tangent at these values, not worked out at ``theta``.
+        How links bend and what drives do is taken from the tangent at these values, not worked out at ``theta``.
 
     Raises
     ------
@@ -160,7 +161,7 @@ def respond(
     try:
         if has_own_drives(model) and not has_hidden(model, m.joints):
             remembered = memory or DriveMemory(lambda values: values[m.kept])
-            return _with_drives(model, theta, m, experiment, (columns, channels), remembered)
+            return _with_drives(model, theta, m, experiment, (columns, channels), remembered, origin)
         if has_own_drives(model):
             answer = _with_both(model, theta, m, experiment, columns, channels)
         elif has_hidden(model, m.joints):
@@ -192,16 +193,6 @@ def _filtered(answer: Response, keep: Filter) -> Response:
     return Response(required, applied, flat[:, :joints], seen, flat[:, joints:])
 
 
-def _picked(model: Model, outputs: Array, jacobian: Array, rows: slice, channels: Sequence[str]) -> tuple[Array, Array]:
-    """Some outputs with their derivative; of what a machine lacks, nothing shows."""
-    known = [column for column, channel in enumerate(channels) if channel in model.output_channels]
-    places = [model.output_channels.index(channels[column]) for column in known]
-    kept, slopes = outputs[rows], jacobian[rows]
-    seen, derivative = np.zeros((len(kept), len(channels))), np.zeros((len(kept), len(channels), slopes.shape[2]))
-    seen[:, known], derivative[:, known] = kept[:, places], slopes[:, places]
-    return seen, derivative
-
-
 def _rigid(model: Model, theta: Array, m: Motion, columns: Sequence[int], channels: Sequence[str]) -> Response:
     required, applied, jacobian = model.core.inverse_dynamics(
         theta, m.position, m.velocity, m.acceleration, m.inputs, m.dt, list(columns)
@@ -212,6 +203,11 @@ def _rigid(model: Model, theta: Array, m: Motion, columns: Sequence[int], channe
     return Response(required[rows], applied[rows], jacobian[rows], nothing, slopes)
 
 
+def shows_drives_alone(model: Model, channels: Sequence[str]) -> bool:
+    """Whether none of the channels is of anything but drives: a load cell, say, feels the machine as well."""
+    return all(channel.rpartition(".")[0] in model.actuators for channel in channels)
+
+
 def _with_drives(
     model: Model,
     theta: Array,
@@ -219,36 +215,23 @@ def _with_drives(
     experiment: Experiment,
     wanted: tuple[Sequence[int], Sequence[str]],
     memory: DriveMemory,
+    origin: Array | None,
 ) -> Response:
     """Drives with states of their own, on the joints' motion.
 
     The effort that the motion needs and what the drives do along it do not depend on each other.
     """
     columns, channels = wanted
-    names = [model.parameter_names[column] for column in columns]
-    # A load cell, say, feels the machine as well.
-    alone = all(channel.rpartition(".")[0] in {*model.actuators, *model.supplies} for channel in channels)
-    felt = [place for place, name in enumerate(names) if not alone or moves_drives(model, name)]
-    internal = _first_drives(model, theta, m, experiment)
-
-    def work(missing: Sequence[str]) -> tuple[Array, Array]:
-        asked = [model.index(name) for name in missing]
-        outputs, slopes = _driven(model, theta, m, experiment, asked, internal)
-        seen, derivative = _picked(model, outputs, slopes, slice(None), channels)
-        first = len(model.output_channels)
-        return np.hstack([seen, outputs[:, first:]]), np.concatenate([derivative, slopes[:, first:]], axis=1)
-
-    whole = None if alone else (theta.tobytes(), tuple((effect.name, effect.at) for effect in model.effects))
-    key = (key_of(model, theta, internal), tuple(channels), whole)
-    outputs, by_drives = memory.recall(key, [names[place] for place in felt], work)
+    if shows_drives_alone(model, channels):
+        outputs, by_drives = apart(model, theta, m, experiment, wanted, memory, origin)
+    else:
+        outputs, by_drives = together(model, theta, m, experiment, wanted, memory)
     motion = (m.position, m.velocity, m.acceleration)
     required, slopes = model.core.required(theta, *motion, m.dt, list(columns))
     needed = memory.keep(required)
     balance = memory.keep(slopes.reshape(len(slopes), -1)) if columns else np.zeros((len(needed), 0))
-    balance = balance.reshape(*needed.shape, len(columns)).copy()
-    seen = np.zeros((len(outputs), len(channels), len(columns)))
-    seen[:, :, felt] = by_drives[:, : len(channels)]
-    balance[:, :, felt] -= by_drives[:, len(channels) :]
+    balance = balance.reshape(*needed.shape, len(columns)) - by_drives[:, len(channels) :]
+    seen = by_drives[:, : len(channels)]
     return Response(needed, outputs[:, len(channels) :], balance, outputs[:, : len(channels)], seen)
 
 
@@ -261,8 +244,8 @@ def _with_both(
     """
     required, slopes = _hidden(model, theta, m, columns)
     whole = whole_motion(model, experiment, theta, m.cutoff)
-    internal = _first_drives(model, theta, m, experiment)
-    outputs, jacobian = _driven(model, theta, whole, experiment, columns, internal)
+    internal = first_drives(model, theta, m, experiment)
+    outputs, jacobian = driven(model, theta, whole, experiment, columns, internal)
     rows, joints = m.kept, [place for place, joint in enumerate(model.joints) if joint in m.joints]
     effort = [model.output_channels.index(f"{model.joints[place]}.effort") for place in joints]
     drives = [len(model.output_channels) + place for place in joints]
@@ -270,49 +253,8 @@ def _with_both(
         required[rows][:, effort],
         outputs[rows][:, drives],
         (slopes[:, effort] - jacobian[:, drives])[rows],
-        *_picked(model, outputs, jacobian, rows, channels),
+        *picked(model, outputs, jacobian, rows, channels),
     )
-
-
-def _first_drives(model: Model, theta: Array, m: Motion, experiment: Experiment) -> Array:
-    """States of drives and supplies at the beginning of a record.
-
-    From there on: what nobody knows of the first state has the filter's settling to die away.
-    """
-    if model.core.n_elastic:
-        raise SimulationError(
-            f"no effort can be balanced along a motion of {model.name}, whose links bend while its drives have states "
-            "of their own; make the links rigid with model.at('rigid')"
-        )
-    given = None if model.added_joints else m
-    state = measured_states(model, experiment, theta, np.zeros(1, dtype=np.int64), m.cutoff, given)[0]
-    return np.asarray(state[2 * len(model.joints) :])
-
-
-def _driven(
-    model: Model, theta: Array, m: Motion, experiment: Experiment, columns: Sequence[int], internal: Array
-) -> tuple[Array, Array]:
-    """Outputs with the efforts of the drives on the joints behind them, and their derivative."""
-    setup = Setup()
-    motion = (m.position, m.velocity, m.acceleration, m.inputs)
-    places, seen = _measured_states(model, experiment)
-    stepping = (m.dt, setup.substeps, setup.method(model), list(columns))
-    outputs, _, jacobian = model.core.simulate_drives(theta, *motion, internal, places, seen, *stepping)
-    return outputs, jacobian
-
-
-def _measured_states(model: Model, experiment: Experiment) -> tuple[list[int], Array]:
-    """Which states of drives the log holds, and their values: currents, and both pressures of a cylinder or none."""
-    places: list[int] = []
-    columns: list[Array] = []
-    for place, name in enumerate(model.internal_names):
-        owner, _, quantity = name.partition(".")
-        pair = [f"{owner}.pressure_{side}" for side in "ab"]
-        if quantity == "current" and name in experiment:
-            places, columns = [*places, place], [*columns, experiment[name]]
-        elif quantity == "chamber_a" and all(channel in experiment for channel in pair):
-            places, columns = [*places, place, place + 1], [*columns, *(experiment[channel] for channel in pair)]
-    return places, np.column_stack(columns) if columns else np.zeros((len(experiment), 0))
 
 
 def _with_hidden(
@@ -329,7 +271,7 @@ def _with_hidden(
     read = [f"{model.joints[place]}.effort" for place in measured] + list(channels)
 
     def bend(machine: Model, values: Array, wanted: Sequence[int]) -> tuple[Array, Array]:
-        return _picked(machine, *_hidden(machine, values, m, wanted), slice(None), read)
+        return picked(machine, *_hidden(machine, values, m, wanted), slice(None), read)
 
     parts = parts_of(model, m.joints)
     if parts is None:

@@ -6,7 +6,6 @@ other would let the same drives run through the same record every time.
 
 from __future__ import annotations
 
-import json
 from collections import OrderedDict
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass
@@ -15,16 +14,10 @@ from threading import Lock
 import numpy as np
 from numpy.typing import NDArray
 
-from vpm.catalogue import EFFECTS
-from vpm.model import Model
-
 Array = NDArray[np.float64]
 
 #: Answers that are kept for each record: what one round of a search asks, the next one asks again.
 KEPT = 200
-#: Parts of a model file that say what drives are and what they act on, and kinds of sites at which effects change them.
-_PARTS = ("actuators", "supplies", "sensors", "lines", "markers")
-_DRIVE_SITES = frozenset({"actuator", "cylinder", "supply", "sensor"})
 
 
 Filter = Callable[[Array], Array]
@@ -73,19 +66,3 @@ class DriveMemory:
         columns = [known.slopes[name] for name in names]
         empty = np.zeros((*known.outputs.shape, 0))
         return known.outputs, np.stack(columns, axis=-1) if columns else empty
-
-
-def moves_drives(model: Model, name: str) -> bool:
-    """Whether a parameter can change what drives do along a given motion; none of bodies, joints and gravity can."""
-    owner = name.partition(".")[0]
-    return owner not in model.joints and owner not in model.bodies and owner != "world"
-
-
-def key_of(model: Model, theta: Array, internal: Array) -> Hashable:
-    """What the answer of drives to one motion depends on, beside that motion: their parts, parameters, first states."""
-    document = model.to_dict()
-    parts = json.dumps([document.get(part) for part in _PARTS], sort_keys=True)
-    effects = tuple((effect.name, effect.at) for effect in model.effects if EFFECTS[effect.name].site in _DRIVE_SITES)
-    own = [place for place, name in enumerate(model.parameter_names) if moves_drives(model, name)]
-    states = [place for place, name in enumerate(model.internal_names) if not name.endswith(".memory")]
-    return parts, effects, theta[own].tobytes(), internal[states].tobytes()

@@ -160,7 +160,7 @@ class InverseDynamicsProblem:
     ) -> tuple[Array, Array]:
         """Residual of the balance and its derivative; see :class:`Problem`.
 
-        With ``origin``, values of the parameters, links bend as on the tangent there.
+        With ``origin``, values of the parameters, links bend and drives answer as on the tangent there.
         """
         residuals, jacobians = [], []
         jobs = [partial(self._answer, model, theta, record, columns, origin) for record in range(len(self.motions))]

@@ -1,4 +1,4 @@
-"""Fits in which the bending of links is taken from its tangent, so that few of their steps ask for a simulation."""
+"""Fits in which what links and drives do is taken from its tangent, so that few of their steps ask for a simulation."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.errors import DivergedError
+from vpm.identify.along import has_hidden, has_own_drives, shows_drives_alone
 from vpm.identify.estimation import Estimate, estimate
 from vpm.identify.problem import InverseDynamicsProblem
 from vpm.identify.reuse import parts_of
@@ -24,7 +25,7 @@ OFF = 0.03
 
 
 class Tangent:
-    """A balance of effort whose links bend as on the tangent at ``origin``, values of the parameters."""
+    """A balance of effort whose links and drives answer as on the tangent at ``origin``, values of the parameters."""
 
     mode = InverseDynamicsProblem.mode
 
@@ -37,8 +38,15 @@ class Tangent:
 
 
 def has_tangent(model: Model, data: InverseDynamicsProblem) -> bool:
-    """Whether links bend along the motion, and nothing else is worked out there."""
-    return all(parts_of(model, m.joints) is not None for m in data.motions)
+    """Whether along the motion links bend, or several drives have states, and nothing else is worked out there."""
+    return drives_on_tangent(model, data) or all(parts_of(model, m.joints) is not None for m in data.motions)
+
+
+def drives_on_tangent(model: Model, data: InverseDynamicsProblem) -> bool:
+    """Whether several drives with states answer to the motion; a single one is as soon simulated."""
+    if not has_own_drives(model) or any(has_hidden(model, m.joints) for m in data.motions):
+        return False
+    return shows_drives_alone(model, data.shown) and len(model.actuators) > 1
 
 
 def estimate_on_tangent(

@@ -1,0 +1,142 @@
+"""What drives with states of their own answer along a measured motion: what shows of them, and the effort on joints."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vpm.errors import SimulationError
+from vpm.experiment import Experiment, Motion
+from vpm.identify.drive_memory import DriveMemory
+from vpm.identify.drives_apart import drives_of
+from vpm.initial import measured_states
+from vpm.model import Model
+from vpm.simulate import Setup
+
+Array = NDArray[np.float64]
+
+
+def picked(model: Model, outputs: Array, jacobian: Array, rows: slice, channels: Sequence[str]) -> tuple[Array, Array]:
+    """Some outputs with their derivative; of what a machine lacks, nothing shows."""
+    known = [column for column, channel in enumerate(channels) if channel in model.output_channels]
+    places = [model.output_channels.index(channels[column]) for column in known]
+    kept, slopes = outputs[rows], jacobian[rows]
+    seen, derivative = np.zeros((len(kept), len(channels))), np.zeros((len(kept), len(channels), slopes.shape[2]))
+    seen[:, known], derivative[:, known] = kept[:, places], slopes[:, places]
+    return seen, derivative
+
+
+def together(
+    model: Model,
+    theta: Array,
+    m: Motion,
+    experiment: Experiment,
+    wanted: tuple[Sequence[int], Sequence[str]],
+    memory: DriveMemory,
+) -> tuple[Array, Array]:
+    """Channels and efforts of drives on joints (n, k), filtered, and their derivative: of the machine as a whole."""
+    columns, channels = wanted
+    internal = first_drives(model, theta, m, experiment)
+    effects = tuple((effect.name, effect.at) for effect in model.effects)
+    key = (model.description(), effects, theta.tobytes(), internal.tobytes(), tuple(channels))
+    work = partial(_answered, model, theta, m, experiment, channels, internal)
+    return memory.recall(key, [model.parameter_names[column] for column in columns], work)
+
+
+def apart(
+    model: Model,
+    theta: Array,
+    m: Motion,
+    experiment: Experiment,
+    wanted: tuple[Sequence[int], Sequence[str]],
+    memory: DriveMemory,
+    origin: Array | None = None,
+) -> tuple[Array, Array]:
+    """The same of drives that do not feel each other, one after the other, or from their tangents at ``origin``."""
+    columns, channels = wanted
+    start = theta if origin is None else origin
+    internal = first_drives(model, start, m, experiment)
+    parts = []
+    for drives in drives_of(model):
+        alone, mine, first = drives.model, start[drives.places], internal[drives.states]
+        moving = {int(drives.places[place]) for place in drives.own}
+        felt = [place for place, column in enumerate(columns) if column in moving]
+        asked = [columns[place] for place in felt]
+        moved = [column for column in sorted(moving) if theta[column] != start[column]]
+        shown = [place for place, channel in enumerate(channels) if channel.rpartition(".")[0] in alone.actuators]
+        read, pushed = [channels[place] for place in shown], replace(m, inputs=m.inputs[:, drives.inputs])
+        key = (drives.structure, tuple(read), mine[drives.own].tobytes(), first.tobytes())
+        work = partial(_answered, alone, mine, pushed, experiment, read, first)
+        names = [model.parameter_names[column] for column in dict.fromkeys([*asked, *moved])]
+        outputs, slopes = memory.recall(key, names, work)
+        steps = (theta - start)[[model.index(name) for name in names]]
+        parts.append((outputs + slopes @ steps, slopes[:, :, : len(asked)], shown, felt))
+    total = np.zeros((len(parts[0][0]), len(channels) + len(model.joints)))
+    derivative = np.zeros((*total.shape, len(columns)))
+    for outputs, slopes, shown, felt in parts:
+        places = [*shown, *range(len(channels), total.shape[1])]
+        total[:, places] += outputs
+        derivative[np.ix_(range(len(total)), places, felt)] += slopes
+    return total, derivative
+
+
+def _answered(
+    model: Model,
+    theta: Array,
+    m: Motion,
+    experiment: Experiment,
+    channels: Sequence[str],
+    internal: Array,
+    names: Sequence[str],
+) -> tuple[Array, Array]:
+    """Channels, then efforts of drives on joints (N, k), and their derivative by the named parameters."""
+    columns = [model.index(name) for name in names]
+    outputs, slopes = driven(model, theta, m, experiment, columns, internal)
+    seen, derivative = picked(model, outputs, slopes, slice(None), channels)
+    first = len(model.output_channels)
+    return np.hstack([seen, outputs[:, first:]]), np.concatenate([derivative, slopes[:, first:]], axis=1)
+
+
+def first_drives(model: Model, theta: Array, m: Motion, experiment: Experiment) -> Array:
+    """States of drives and supplies at the beginning of a record.
+
+    From there on: what nobody knows of the first state has the filter's settling to die away.
+    """
+    if model.core.n_elastic:
+        raise SimulationError(
+            f"no effort can be balanced along a motion of {model.name}, whose links bend while its drives have states "
+            "of their own; make the links rigid with model.at('rigid')"
+        )
+    given = None if model.added_joints else m
+    state = measured_states(model, experiment, theta, np.zeros(1, dtype=np.int64), m.cutoff, given)[0]
+    return np.asarray(state[2 * len(model.joints) :])
+
+
+def driven(
+    model: Model, theta: Array, m: Motion, experiment: Experiment, columns: Sequence[int], internal: Array
+) -> tuple[Array, Array]:
+    """Outputs with the efforts of the drives on the joints behind them, and their derivative."""
+    setup = Setup()
+    motion = (m.position, m.velocity, m.acceleration, m.inputs)
+    places, seen = _measured_states(model, experiment)
+    stepping = (m.dt, setup.substeps, setup.method(model), list(columns))
+    outputs, _, jacobian = model.core.simulate_drives(theta, *motion, internal, places, seen, *stepping)
+    return outputs, jacobian
+
+
+def _measured_states(model: Model, experiment: Experiment) -> tuple[list[int], Array]:
+    """Which states of drives the log holds, and their values: currents, and both pressures of a cylinder or none."""
+    places: list[int] = []
+    columns: list[Array] = []
+    for place, name in enumerate(model.internal_names):
+        owner, _, quantity = name.partition(".")
+        pair = [f"{owner}.pressure_{side}" for side in "ab"]
+        if quantity == "current" and name in experiment:
+            places, columns = [*places, place], [*columns, experiment[name]]
+        elif quantity == "chamber_a" and all(channel in experiment for channel in pair):
+            places, columns = [*places, place, place + 1], [*columns, *(experiment[channel] for channel in pair)]
+    return places, np.column_stack(columns) if columns else np.zeros((len(experiment), 0))
