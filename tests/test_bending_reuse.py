@@ -66,3 +66,30 @@ def test_a_fit_on_tangents_ends_where_the_fit_does(record: vpm.Experiment) -> No
     assert float(fit.residual @ fit.residual) < 1.002 * float(exact.residual @ exact.residual)
     assert fit.values[1] == pytest.approx(exact.values[1], rel=0.01)
     assert fit.values[0] == pytest.approx(exact.values[0], rel=0.01)
+
+
+def test_derivatives_are_shared_again_only_near_where_they_were_taken(record: vpm.Experiment) -> None:
+    model = arm()
+    problem = InverseDynamicsProblem(model, [record], cutoff=40.0)
+
+    def lossy(base: vpm.Model) -> vpm.Model:
+        return base.with_effect("structural_damping", at="link", time=0.0)
+
+    own = ("link.structural_damping.time",)
+    assert not problem.share_again(model, [lossy(model)])
+    whole = lossy(model)
+    problem.evaluate(whole, whole.theta, [whole.index(own[0])])
+    problem.share(whole, [(lossy(model), own)])
+    for factor, near in ((1.004, True), (1.02, False)):
+        moved = model.with_parameters({YOUNG: factor * model.parameters[YOUNG].value})
+        assert problem.share_again(moved, [lossy(moved)]) == near
+    moved = model.with_parameters({YOUNG: 1.004 * model.parameters[YOUNG].value})
+    problem.share_again(moved, [lossy(moved)])
+    candidate = lossy(moved)
+    column = [candidate.index(own[0])]
+    residual, slopes = problem.evaluate(candidate, candidate.theta, column)
+    fresh = InverseDynamicsProblem(model, [record], cutoff=40.0).evaluate(candidate, candidate.theta, column)
+    assert np.allclose(residual, fresh[0], atol=1e-12 * np.abs(fresh[0]).max())
+    along = float(slopes[:, 0] @ fresh[1][:, 0])
+    assert along / (np.linalg.norm(slopes) * np.linalg.norm(fresh[1])) > 0.9
+    assert not np.array_equal(slopes, fresh[1])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import signal
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,7 +14,7 @@ from typer.testing import CliRunner
 import vpm
 from blind import EFFECTS, MACHINES, hideable, make_case, make_cases, proving, score, sites_of, table
 from blind import case as case_module
-from blind.answer import Answer, Named, informed
+from blind.answer import Answer, Named, _Alarm, informed
 from blind.batch import simulated
 from blind.case import _plan
 from blind.proving import Job
@@ -277,6 +278,34 @@ def test_what_is_done_is_kept_when_someone_interrupts(tmp_path: Path, monkeypatc
     assert run.exit_code == 0
     assert "interrupted: 1 of 2 cases are done" in run.stderr
     assert len(proving.load_json(tmp_path / "page.json")) == 1
+
+
+@pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="needs an alarm")
+def test_a_diagnosis_that_takes_too_long_is_asked_to_stop_and_then_made_to() -> None:
+    alarm, heard = _Alarm(0.05), []
+
+    def work() -> None:
+        with alarm.set():
+            for _ in range(2):
+                try:
+                    while True:
+                        np.sin(np.arange(1000.0))
+                except KeyboardInterrupt:
+                    heard.append(alarm.rung)
+
+    with pytest.raises(TimeoutError, match="not done within"):
+        work()
+    assert heard == [True]
+
+
+def test_a_late_answer_is_judged_and_listed() -> None:
+    late = answer("coulomb_friction", "coulomb_friction", late=True)
+    assert score.top(late, 1)
+    assert "ended by the limit" in proving.line(late)
+    assert Answer.from_dict(json.loads(json.dumps(late.to_dict()))).late
+    older = late.to_dict()
+    del older["late"]
+    assert not Answer.from_dict(older).late
 
 
 def test_outside_a_checkout_it_says_so(tmp_path: Path) -> None:

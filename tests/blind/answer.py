@@ -21,6 +21,8 @@ from vpm.model import Model
 
 #: Numbers of the truth beyond this stand for "not there": the far end of a stop that has one end.
 NOWHERE = 1e8
+#: Share of the limit of time that an interrupted diagnosis has to say what it knows.
+GRACE = 0.25
 
 
 @dataclass(frozen=True)
@@ -64,6 +66,8 @@ class Answer:
         Time of the processor for the diagnosis, and for making the case.
     error : str
         Why it failed, or "".
+    late : bool
+        Whether the diagnosis was ended by the limit of time and this is what it knew until then.
     """
 
     machine: str
@@ -86,6 +90,7 @@ class Answer:
     seconds: float = 0.0
     making: float = 0.0
     error: str = ""
+    late: bool = False
 
     @property
     def solvable(self) -> bool:
@@ -106,6 +111,8 @@ class Answer:
         """The same, read back."""
         values: dict[str, object] = {}
         for entry in fields(cls):
+            if entry.name == "late" and entry.name not in stored:
+                continue
             value = stored[entry.name]
             if entry.name in {"hidden", "named", "ranking"}:
                 value = tuple(Named(**item) for item in value)  # type: ignore[attr-defined]
@@ -123,6 +130,8 @@ def hidden_in(case: Case) -> tuple[Named, ...]:
 def answered(case: Case, kind: str, request: Sequence[str], strengths: Sequence[float], limit: float) -> Answer:
     """Diagnose a case; whatever goes wrong is part of the answer.
 
+    A diagnosis that takes too long is interrupted as by Ctrl-C, and counts with what it knows until then.
+
     Parameters
     ----------
     case : Case
@@ -136,10 +145,14 @@ def answered(case: Case, kind: str, request: Sequence[str], strengths: Sequence[
     known = all(h.known for h in case.truth.hidden)
     hidden = hidden_in(case)
     about = (case.machine, kind, tuple(request), case.seed, case.noise_level, known, hidden, tuple(strengths))
-    began = time.process_time()
+    began, alarm = time.process_time(), _Alarm(limit)
     try:
-        with _within(limit):
+        with alarm.set():
             why = vpm.diagnose(case.model(), case.train, case.validate)
+    except KeyboardInterrupt:
+        if not alarm.rung:
+            raise
+        return Answer(*about, seconds=time.process_time() - began, error=alarm.text)
     except Exception as error:  # noqa: BLE001  whatever a diagnosis raises is a failure of it, and counts as one
         return Answer(*about, seconds=time.process_time() - began, error=f"{type(error).__name__}: {error}")
     seconds = time.process_time() - began
@@ -149,7 +162,7 @@ def answered(case: Case, kind: str, request: Sequence[str], strengths: Sequence[
     )
     rivals = tuple(dict.fromkeys(other for a in why.ambiguous_with for other in a.others))
     gaps, note = _gaps(case, why, limit)
-    return Answer(*about, why.verdict, named, ranking(why), rivals, *gaps, note, seconds=seconds)
+    return Answer(*about, why.verdict, named, ranking(why), rivals, *gaps, note, seconds=seconds, late=alarm.rung)
 
 
 def ranking(why: Diagnosis) -> tuple[Named, ...]:
@@ -178,7 +191,7 @@ def _gaps(case: Case, why: Diagnosis, limit: float) -> tuple[tuple[float, float,
     except Exception as error:  # noqa: BLE001  an answer without a figure is still an answer
         return (np.nan, np.nan, np.nan, np.nan), f"{type(error).__name__}: {error}"
     try:
-        with _within(limit):
+        with _Alarm(limit).set(gently=False):
             model, free = informed(case)
             fit = estimate(model, training, free)
             fitted = model.with_parameters(dict(zip(free, map(float, fit.values), strict=True)))
@@ -199,20 +212,37 @@ def informed(case: Case) -> tuple[Model, tuple[str, ...]]:
     return model, tuple(free)
 
 
-@contextmanager
-def _within(limit: float) -> Iterator[None]:
-    """Raise TimeoutError after so many seconds of the processor, where the system can do that."""
-    if not hasattr(signal, "setitimer") or threading.current_thread() is not threading.main_thread():
-        yield
-        return
+class _Alarm:
+    """Ends what takes more than ``limit`` seconds of the processor, where the system can do that.
 
-    def late(_number: int, _frame: FrameType | None) -> None:
-        raise TimeoutError(f"not done within {limit:g} s of the processor")
+    First as Ctrl-C does, and with a TimeoutError if that is not heeded within ``GRACE`` of the limit.
+    """
 
-    before = signal.signal(signal.SIGPROF, late)
-    signal.setitimer(signal.ITIMER_PROF, limit)
-    try:
-        yield
-    finally:
-        signal.setitimer(signal.ITIMER_PROF, 0.0)
-        signal.signal(signal.SIGPROF, before)
+    def __init__(self, limit: float) -> None:
+        self.limit, self.rung = limit, False
+
+    @property
+    def text(self) -> str:
+        """What is said of a diagnosis that knew nothing yet."""
+        return f"TimeoutError: not done within {self.limit:g} s of the processor"
+
+    @contextmanager
+    def set(self, *, gently: bool = True) -> Iterator[None]:
+        """Watch what is done within; not ``gently``, the first ring ends it with TimeoutError."""
+        if not hasattr(signal, "setitimer") or threading.current_thread() is not threading.main_thread():
+            yield
+            return
+
+        def late(_number: int, _frame: FrameType | None) -> None:
+            first, self.rung = gently and not self.rung, True
+            if first:
+                raise KeyboardInterrupt
+            raise TimeoutError(self.text.partition(": ")[2])
+
+        before = signal.signal(signal.SIGPROF, late)
+        signal.setitimer(signal.ITIMER_PROF, self.limit, GRACE * self.limit)
+        try:
+            yield
+        finally:
+            signal.setitimer(signal.ITIMER_PROF, 0.0)
+            signal.signal(signal.SIGPROF, before)

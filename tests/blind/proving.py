@@ -137,8 +137,9 @@ def line(answer: Answer) -> str:
     hidden = ", ".join(f"{h.name}@{h.site}" for h in answer.hidden) or answer.request[0]
     told = ", ".join(f"{n.name}@{n.site}" for n in answer.named) or answer.verdict or answer.error[:80]
     strength = f" strength {min(answer.strengths):.2g}" if answer.strengths else ""
+    took = f"{answer.seconds:.1f} s" + (", ended by the limit" if answer.late else "")
     mark = "wrong" if failed(answer) else "right" if answer.solvable or not answer.hidden else "too weak"
-    return f"{mark:8s} {answer.machine}, seed {answer.seed}: {hidden}{strength} -> {told}  ({answer.seconds:.1f} s)"
+    return f"{mark:8s} {answer.machine}, seed {answer.seed}: {hidden}{strength} -> {told}  ({took})"
 
 
 def _batches(todo: Sequence[Job]) -> Iterator[list[Job]]:

@@ -80,6 +80,7 @@ def _summary(answers: Sequence[Answer]) -> str:
         ("gap after / gap of the oracle, pairs", _spread(score.gap_ratios(two))),
         ("time of a diagnosis on one core [s]", _spread([a.seconds for a in answers])),
         ("diagnoses that failed", score.rate(answers, lambda a: bool(a.error))),
+        ("ended by the limit of time, judged by what they knew", score.rate(answers, lambda a: a.late)),
     ]
     return markdown(("", ""), rows)
 

@@ -10,9 +10,10 @@ from vpm.discrepancy.confirmation import Data, Judged, Trial, confirm, judge
 from vpm.discrepancy.diagnosis import Ambiguity
 from vpm.discrepancy.refusal import LEAST_GAIN
 from vpm.discrepancy.screening import Probe, impossible_values, probe
-from vpm.discrepancy.search import Accepted
+from vpm.discrepancy.search import HEAVY, Accepted
 from vpm.errors import DivergedError
 from vpm.identify import gain, segments
+from vpm.identify.along import bends
 
 #: Rivals that are refitted in the place of an effect.
 SHORT_LIST = 3
@@ -70,6 +71,8 @@ def _of_one(final: Judged, data: Data, entry: Accepted, effects: Sequence[str] |
         return Rivals(name, site, ())
     taken = _power(without) - _power(final)
     others = [c for c in candidates(model, data.training, without.fit.residual, effects) if _near(c, entry)]
+    if bends(model) and name not in HEAVY:  # a spring more would not have been tried beside what is lighter and does
+        others = [c for c in others if c.effect.name not in HEAVY]
     probes = [probe(without.baseline, data.training, candidate) for candidate in others]
     good = [
         p for p in probes if p.free and not impossible_values(p) and p.drop * _power(without) >= LEAST_SHARE * taken

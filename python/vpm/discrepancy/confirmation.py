@@ -117,11 +117,15 @@ def judge(
 ) -> Judged:
     """Fit ``free`` on the training records and predict the unseen ones; see `vpm.identify.tangent` for ``origin``.
 
+    Where links bend and nothing else is worked out, the tangent at the start is taken if none is given.
+
     Raises
     ------
     DivergedError
         The fitted model cannot simulate the unseen records.
     """
+    if origin is None and has_tangent(model, data.training):
+        origin = model.theta
     if origin is None:
         most = FEW_EVALUATIONS if bends(model) and model.added_joints else MOST_EVALUATIONS
         fit = estimate(model, data.training, free, bounds=bounds, tolerance=TOLERANCE, most_evaluations=most)
@@ -182,11 +186,18 @@ def _judged(
     bounds: dict[str, tuple[float, float]],
     origin: Array | None = None,
 ) -> tuple[Judged, str]:
-    """A fit, judged by the balance alone where it cannot simulate the unseen records, with the reason."""
+    """A fit, judged by the balance alone where it cannot simulate the unseen records, with the reason.
+
+    One that Ctrl-C ended says nothing of a candidate.
+    """
+    reason = ""
     try:
-        return judge(start, free, data, bounds, origin), ""
+        judged = judge(start, free, data, bounds, origin)
     except DivergedError as error:
-        return judge(start, free, replace(data, simulation=None), bounds, origin), str(error)
+        judged, reason = judge(start, free, replace(data, simulation=None), bounds, origin), str(error)
+    if judged.fit.interrupted:
+        raise KeyboardInterrupt
+    return judged, reason
 
 
 def _seen_by_now(judged: Judged, data: Data, probe: Probe) -> tuple[str, ...]:

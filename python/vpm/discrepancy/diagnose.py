@@ -5,13 +5,14 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vpm.catalogue import EFFECTS
 from vpm.compare import compare
-from vpm.discrepancy.ambiguity import listed, rivals
+from vpm.discrepancy.ambiguity import Rivals, listed, rivals
 from vpm.discrepancy.candidates import slow_speeds
 from vpm.discrepancy.confirmation import Data, Judged, is_clear, judge
 from vpm.discrepancy.diagnosis import (
@@ -37,7 +38,6 @@ from vpm.experiment import Experiment
 from vpm.identify import InverseDynamicsProblem, OutputErrorProblem, gaps
 from vpm.identify.fit import fit_of
 from vpm.identify.parallel import worker_count
-from vpm.identify.tangent import has_tangent
 from vpm.model import Model
 from vpm.simulate import Run, Setup, judging_mode
 
@@ -47,12 +47,14 @@ Array = NDArray[np.float64]
 HELD_OUT = 0.3
 #: What an interrupted diagnosis says of itself.
 STOPPED = "stopped by Ctrl-C before every candidate was tried: this is what was known until then"
+STOPPED_LATE = "stopped by Ctrl-C before what is left, and what else would do, was examined"
 #: Stated uncertainties, on a logarithmic scale, that a recalibration may move what the model is not linear in.
 REACH = 4.0
 #: Parameters that move by more of their stated uncertainties than this are reported.
 FAR = 3.0
 
 Tell = Callable[[str], None]
+Found = TypeVar("Found")
 
 
 def diagnose(
@@ -129,9 +131,8 @@ def diagnose(
         notes.append("the model file gives no parameter an uncertainty, so none was recalibrated")
     transitions = _transitions(model, data.training)
     data.training.workers = worker_count(workers)
-    origin = model.theta if has_tangent(model, data.training) else None
     bounds = {**_within_reach(model, free), **transitions}
-    recalibrated = judge(model, (*free, *transitions), data, bounds, origin)
+    recalibrated = judge(model, (*free, *transitions), data, bounds)
     data.training.workers = 1  # candidates share the cores from here on
     notes.extend(_moved_far(model, recalibrated))
     found = search(recalibrated, data, effects, limit, say, SideBySide(workers, progress))
@@ -143,7 +144,9 @@ def diagnose(
     say("examining what is left")
     timed = in_time(found.final, data)
     left = structure(found.final.model, data.training, data.unseen, timed.fitted, timed.unseen)
-    rest = _rest(recalibrated, found, data) if found.accepted or not is_negligible(gap) else None
+    rest, stopped = _until_stopped(
+        lambda: _rest(recalibrated, found, data) if found.accepted or not is_negligible(gap) else None, None
+    )
     word, summary, described = verdict(data, nominal, recalibrated, found, gap, left, rest)
     final, empirical, accepted = found.final, None, found.accepted
     if described and rest is not None:
@@ -155,7 +158,10 @@ def diagnose(
         gap = _gaps(data, nominal, recalibrated, final, floor)
         summary = f"{summary} {empirical.sentence}"
     say("looking for what else would do, and for the experiment that tells it apart")
-    ambiguous = rivals(found.final, data, accepted, effects)
+    nothing: tuple[Rivals, ...] = ()
+    ambiguous, late = _until_stopped(lambda: rivals(found.final, data, accepted, effects), nothing)
+    if stopped or late:
+        notes.append(STOPPED_LATE)
     noise = {channel: g.noise_floor for channel, g in gap.items() if g.mode == "inverse_dynamics"}
     return Diagnosis(
         word,
@@ -174,11 +180,19 @@ def diagnose(
         fit_of(final.model, data.training, final.fit, nominal.fit.residual, [e.name for e in training]),
         _pictures(data, nominal, recalibrated, final),
         time.perf_counter() - began,
-        found.interrupted,
+        found.interrupted or stopped or late,
         gather(found.final.model, [entry.key for entry in accepted], data.unseen, floor),
         empirical,
         experiments_for(found.final, ambiguous, data.training, noise),
     )
+
+
+def _until_stopped(work: Callable[[], Found], nothing: Found) -> tuple[Found, bool]:
+    """What some work gives, or ``nothing`` if Ctrl-C ended it, and whether it did."""
+    try:
+        return work(), False
+    except KeyboardInterrupt:
+        return nothing, True
 
 
 def _check_effects(effects: Sequence[str] | None) -> None:

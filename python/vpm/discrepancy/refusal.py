@@ -88,6 +88,20 @@ def refuse_trial(trial: Trial, thresholds: Thresholds) -> str:
     return next(filter(None, reasons), "")
 
 
+def refuse_ringing(share: float, trial: Trial) -> str:
+    """Reason not to accept a candidate under which links ring less with the noise of the measured motion, or "".
+
+    ``share`` of the unseen mean square goes with that, by simulation.
+    """
+    rest = trial.unseen.relative - max(share, 0.0)
+    if rest >= WORTH_A_NAME:
+        return ""
+    return (
+        f"it lowers the unseen error by {_percent(trial.unseen.relative)} of its mean square, of which "
+        f"{_percent(share)} is noise of the measured motion that rings less in the links with it"
+    )
+
+
 def refuse_timing(timed: Gain, shift: float, thresholds: Thresholds) -> str:
     """Reason not to accept a candidate that does no more than a shift of the commands within the sampling interval."""
     if thresholds.met(timed):
@@ -106,8 +120,13 @@ def _impossible(probe: Probe, name: str) -> str:
 
 
 def _too_short(trial: Trial, interval: float) -> str:
-    """A delay or lag below one sampling interval cannot be told from the hold of the sampled command."""
+    """A delay or lag below one sampling interval cannot be told from the hold of the sampled command.
+
+    The time of a lossy link is no delay: it is a share of its stiffness.
+    """
     model = trial.judged.model
+    if trial.probe.candidate.effect.site in {"link", "body", "beam"}:
+        return ""
     for name in trial.parameters:
         parameter = model.parameters[name]
         if parameter.unit == "s" and parameter.value < interval:

@@ -21,6 +21,7 @@ from vpm.discrepancy.refusal import (
     refuse_timing,
     refuse_trial,
 )
+from vpm.discrepancy.ringing import NOISE_ONLY, noise_alone, only_ringing
 from vpm.discrepancy.screening import Probe, prepare, probe
 from vpm.discrepancy.side_by_side import Failure, SideBySide
 from vpm.discrepancy.structural import coupled
@@ -36,10 +37,8 @@ SHORT_LIST = 7
 #: An instrument is blamed for what the machine may have done only if it leaves less than this share of the gap.
 SENSOR_SHARE = 0.25
 
-#: Effects that add a motion nobody measures, which has to be simulated for every probe; and the ratio of a residual to
-#: what is white in it up to which they are not worth that.
+#: Effects that add a motion nobody measures, which has to be simulated for every probe.
 HEAVY = ("joint_compliance", "backlash", "link_flexibility")
-NOISE_ONLY = 1.2
 #: What leaves up to so many times as much as the best explains the data as well, if it is also little of the whole gap.
 SAME = 1.5
 #: A lag, and the delays that it may be taken for.
@@ -111,7 +110,7 @@ def search(
         outcome = _Round(stages[-1].judged, data, number, tell, each)
         best = None
         try:
-            if len(accepted) < limit:
+            if len(accepted) < limit and not (accepted and outcome.done()):
                 best = outcome.light(effects, set(dropped)) or outcome.heavy(effects, set(dropped))
         except KeyboardInterrupt:
             interrupted = True
@@ -124,6 +123,9 @@ def search(
         accepted.append(best)
         stages.append(Stage("added", *best.key, best.trial.judged))
         tell(f"round {number}: accepted {best.trial.probe.candidate.label}")
+        if best.trial.judged.fit.interrupted:
+            interrupted = True
+            break
         try:
             _drop_replaced(stages, accepted, data, dropped)
         except KeyboardInterrupt:
@@ -139,7 +141,7 @@ def _settled(best: Accepted, data: Data) -> Accepted:
     """What was fitted on a tangent, fitted to the end: the next round starts from it."""
     judged = best.trial.judged
     try:
-        exact = judge(judged.model, judged.free, data, dict(judged.bounds), judged.model.theta)
+        exact = judge(judged.model, judged.free, data, dict(judged.bounds))
     except DivergedError:
         return best
     return replace(best, trial=replace(best.trial, judged=exact))
@@ -155,6 +157,10 @@ class _Round:
         self._promising: list[Probe] = []
         self._believed: list[Trial] = []
 
+    def done(self) -> bool:
+        """Whether what is left is noise alone, as far as links that bend make it ring."""
+        return noise_alone(self.current.model, self.data, self.timed.unseen)
+
     def light(self, effects: Sequence[str] | None, without: set[Key]) -> Accepted | None:
         """The best of the candidates whose regressor follows from the measured motion alone."""
         self.screen(effects, without, heavy=False)
@@ -165,6 +171,8 @@ class _Round:
         """The best of those with a motion of their own, tried only where more than noise is left to explain."""
         left = structure(self.current.model, self.data.training, self.data.unseen, self.timed.fitted, self.timed.unseen)
         if not left.present and left.coloured <= NOISE_ONLY:
+            return None
+        if self.done():
             return None
         self._promising = []
         self.screen(effects, without, heavy=True)
@@ -221,7 +229,7 @@ class _Round:
                 self.refused[key] = trial.reason
                 continue
             self._ranking[key] = replace(self._ranking[key], unseen=trial.unseen.relative)
-            if reason := refuse_trial(trial, thresholds) or self._only_timing(trial, thresholds):
+            if reason := self._refused(trial, thresholds):
                 self.refused[key] = reason
             else:
                 self._believed.append(trial)
@@ -234,6 +242,11 @@ class _Round:
     def timed(self) -> InTime:
         """Residuals of the model at hand with what the times of samples leave open."""
         return in_time(self.current, self.data)
+
+    def _refused(self, trial: Trial, thresholds: Thresholds) -> str:
+        """Why a trial is not believed, or ""."""
+        reason = refuse_trial(trial, thresholds) or self._only_timing(trial, thresholds)
+        return reason or only_ringing(self.current, self.data, trial)
 
     def _only_timing(self, trial: Trial, thresholds: Thresholds) -> str:
         """Why a trial that would be believed does no more than a shift of the commands does, or ""."""

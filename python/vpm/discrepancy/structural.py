@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from vpm.catalogue import EffectType
+from vpm.catalogue import EFFECTS, EffectType
 from vpm.experiment.signal import differentiate
 from vpm.identify import InverseDynamicsProblem
 from vpm.model import Model
@@ -49,7 +49,12 @@ def sites_worth_trying(effect: EffectType, model: Model) -> tuple[str, ...]:
     """
     sites = model.sites(effect.site)
     if effect.name == "link_flexibility":
-        return tuple(site for site in sites if model.levels.get(site, "rigid") == "rigid")
+        stiff = tuple(site for site in sites if model.levels.get(site, "rigid") == "rigid")
+        if not model.core.n_elastic:
+            return stiff
+        # Beside links that bend, the spring at the root of a body is that of the joint before it, which is tried.
+        wound = set(sites_worth_trying(EFFECTS["joint_compliance"], model))
+        return tuple(site for site in stiff if site in model.beams or model.joint_before(site) not in wound)
     if effect.name == "structural_damping":
         return tuple(site for site in sites if model.levels[site] != "rigid")
     if effect.name in {"backlash", "joint_compliance"}:

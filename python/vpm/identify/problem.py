@@ -203,6 +203,22 @@ class InverseDynamicsProblem:
                     pair = (source, whole.theta[source.places]), (target, model.theta[target.places])
                     kept.share(*pair, own)
 
+    def share_again(self, base: Model, others: Sequence[Model]) -> bool:
+        """Let ``others``, which move as ``base`` does, have its motion and the derivatives that `share` gave before.
+
+        Returns
+        -------
+        bool
+            Whether all of them were shared before, at values not far from these.
+        """
+        self.evaluate(base, base.theta)
+        for m, kept in zip(self.motions, self._kept, strict=True):
+            parts = [(parts_of(model, m.joints), model.theta) for model in (base, *others)]
+            known = [(part, theta[part.places]) for part, theta in parts if part is not None]
+            if len(known) < len(parts) or not kept.share_again(known[0], known[1:]):
+                return False
+        return True
+
     def effort(self, model: Model, theta: Array, record: int) -> tuple[Array, Array, Array]:
         """Time, applied and required effort (n, joints) of one record, filtered as in the residual."""
         m = self.motions[record]

@@ -25,6 +25,9 @@ Array = NDArray[np.float64]
 SPLITTING = frozenset({"joint_compliance", "backlash"})
 #: Simulations that are kept for each record: those of one round of a search.
 KEPT = 48
+#: Values that have moved by no more than this share of themselves leave derivatives good enough for a first look: by more,
+#: links that hardly lose anything swing out of step with what was kept.
+NEAR = 0.005
 
 
 @dataclass(frozen=True)
@@ -103,6 +106,7 @@ class Kept:
 
     def __init__(self) -> None:
         self._answers: OrderedDict[tuple[str, bytes], Answer] = OrderedDict()
+        self._shared: dict[str, tuple[Array, dict[str, Array]]] = {}
         self._lock = Lock()
 
     def answer(self, parts: Parts, theta: Array, columns: Sequence[int], work: Work) -> tuple[Array, Array]:
@@ -144,7 +148,30 @@ class Kept:
         nothing = np.zeros_like(known.channels)
         slopes = {name: known.slopes[name] for name in second.bare.parameter_names if name in known.slopes}
         slopes |= {name: nothing for name in own if name not in slopes}
+        with self._lock:
+            self._shared[second.structure] = values, {name: slopes[name] for name in own}
         self._keep((second.structure, values.tobytes()), Answer(known.channels, slopes))
+
+    def share_again(self, one: tuple[Parts, Array], others: Sequence[tuple[Parts, Array]]) -> bool:
+        """Let the ``others`` have the answer of ``one`` with derivatives by their own parameters shared earlier.
+
+        False, and nothing done, where one of them was not shared or the values have moved far since.
+        """
+        first, theta = one
+        with self._lock:
+            known = self._answers.get((first.structure, theta.tobytes()))
+            earlier = [self._shared.get(parts.structure) for parts, _ in others]
+        found = []
+        for (parts, values), before in zip(others, earlier, strict=True):
+            if known is None or before is None:
+                return False
+            moved = ~parts.still & (np.abs(values - before[0]) > NEAR * np.abs(before[0]))
+            if np.any(moved):
+                return False
+            found.append(((parts.structure, values.tobytes()), Answer(known.channels, dict(before[1]))))
+        for key, answer in found:
+            self._keep(key, answer)
+        return True
 
     def _keep(self, key: tuple[str, bytes], answer: Answer) -> None:
         with self._lock:

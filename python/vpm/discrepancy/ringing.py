@@ -1,0 +1,53 @@
+"""Noise of a measured motion that rings in links that bend: it is not white in the balance, and no physics is missing.
+
+How much of it there is, the model's own simulation says, with noise like that of the records; see
+`vpm.discrepancy.floor`.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vpm.discrepancy.confirmation import Data, Judged, Trial
+from vpm.discrepancy.floor import noise_floor
+from vpm.discrepancy.refusal import refuse_ringing
+from vpm.identify import gaps
+from vpm.identify.along import bends
+from vpm.model import Model
+
+Array = NDArray[np.float64]
+
+#: Ratio of a residual to the noise in it up to which it is noise alone.
+NOISE_ONLY = 1.2
+#: Effects that only make links ring less.
+DAMPING = ("structural_damping",)
+
+
+def noise_alone(model: Model, data: Data, unseen: Array) -> bool:
+    """Whether links bend and the ``unseen`` residual is no more than the noise that rings in them."""
+    if not bends(model) or data.simulation is None:
+        return False
+    allowed = _ringing(model, data)
+    return all(gap <= NOISE_ONLY * allowed[name] for name, (gap, _, _) in gaps(data.unseen, unseen).items())
+
+
+def only_ringing(current: Judged, data: Data, trial: Trial) -> str:
+    """Why a trial that would be believed only damps what noise makes ring, or ""."""
+    name = trial.probe.candidate.effect.name
+    if data.simulation is None or not bends(current.model) or name not in DAMPING:
+        return ""
+    before, after = _ringing(current.model, data), _ringing(trial.judged.model, data)
+    weights = {block.channel: block.weight**2 for block in data.unseen.blocks}
+    left = gaps(data.unseen, current.unseen)
+    power = sum(weight * left[name][0] ** 2 for name, weight in weights.items())
+    damped = sum(weight * (before[name] ** 2 - after[name] ** 2) for name, weight in weights.items())
+    return refuse_ringing(damped / power, trial)
+
+
+def _ringing(model: Model, data: Data) -> dict[str, float]:
+    """Root mean square that noise of the records leaves of a model's own simulation, by channel."""
+    if data.simulation is None:
+        return {}
+    nothing = np.zeros(data.unseen.blocks[-1].samples.stop)
+    return noise_floor(model, data.unseen, nothing, data.simulation.mode, data.simulation.setup)
