@@ -210,9 +210,15 @@ class _Round:
             self._promising = [one for one in self._promising if one.drop >= RINGING][:FEW]
 
     def _is_heavy(self, candidate: Candidate) -> bool:
-        """Whether it adds a motion that nobody measures; where the log holds that motion, it is evidence like any."""
+        """Whether it adds a motion that nobody measures; where the log holds that motion, it is evidence like any.
+
+        So is the bending of a rigid beam beside others that bend: light effects would only imitate it.
+        """
+        model, name = self.current.model, candidate.effect.name
+        if bends(model) and name == "link_flexibility" and candidate.site in model.beams:
+            return False
         logged = {f"{candidate.site}_{suffix}.position" for suffix in ("bending", "deflection")}
-        return candidate.effect.name in HEAVY and not logged & set(self.data.training.shown)
+        return name in HEAVY and not logged & set(self.data.training.shown)
 
     def confirm(self) -> None:
         """Refit with the most promising ones and judge them on unseen data."""

@@ -25,8 +25,8 @@ Array = NDArray[np.float64]
 SPLITTING = frozenset({"joint_compliance", "backlash"})
 #: Simulations that are kept for each record: those of one round of a search.
 KEPT = 48
-#: Values that have moved by no more than this share of themselves leave derivatives good enough for a first look: by more,
-#: links that hardly lose anything swing out of step with what was kept.
+#: Values that have moved by no more than this share of themselves leave derivatives good enough for a first look: by
+#: more, links that hardly lose anything swing out of step with what was kept.
 NEAR = 0.005
 
 
