@@ -91,14 +91,14 @@ def refuse_trial(trial: Trial, thresholds: Thresholds) -> str:
 def refuse_ringing(share: float, trial: Trial) -> str:
     """Reason not to accept a candidate under which links ring less with the noise of the measured motion, or "".
 
-    ``share`` of the unseen mean square goes with that, by simulation.
+    ``share`` of the mean square of noise alone goes with that, by simulation.
     """
     rest = trial.unseen.relative - max(share, 0.0)
     if rest >= WORTH_A_NAME:
         return ""
     return (
-        f"it lowers the unseen error by {_percent(trial.unseen.relative)} of its mean square, of which "
-        f"{_percent(share)} is noise of the measured motion that rings less in the links with it"
+        f"it lowers the unseen error by {_percent(trial.unseen.relative)} of its mean square; noise of the "
+        f"measured motion alone, which rings less in the links with it, would be lowered by {_percent(share)}"
     )
 
 
