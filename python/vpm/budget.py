@@ -15,7 +15,7 @@ from vpm.errors import SimulationError
 from vpm.experiment import Experiment
 from vpm.model import Model
 from vpm.results import Result
-from vpm.simulate import AUTOMATIC, Setup
+from vpm.simulate import AUTOMATIC, Setup, simulate
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -128,23 +128,67 @@ def budget(
         raise SimulationError(f"{steps} steps are too few for a 99.9 % quantile; time at least 1000")
     setup = Setup(integrator, substeps)
     method = setup.method(model, bounded=True)
-    inputs = _commands(model, rate, experiment)
-    state = model.state()
-    seconds = model.core.time_steps(model.theta, state, inputs, 1.0 / rate, setup.substeps, method, steps)
+    seconds = step_times(model, rate, setup, steps, commands(model, rate, experiment))
     quantiles = {name: float(np.quantile(seconds, q)) for name, q in QUANTILES.items()}
     overruns = int(np.count_nonzero(seconds > 1.0 / rate))
     return BudgetReport(model.name, method, rate, steps, quantiles, share, overruns, _machine())
 
 
-def _commands(model: Model, rate: float, experiment: Experiment | None) -> Array:
+def step_times(model: Model, rate: float, setup: Setup, steps: int, inputs: Array) -> Array:
+    """Duration of each step, s.
+
+    Parameters
+    ----------
+    model : Model
+    rate : float
+        Hz.
+    setup : Setup
+    steps : int
+    inputs : ndarray, shape (N, inputs)
+        Repeated as often as needed.
+
+    Raises
+    ------
+    SimulationError
+        The commands do not lead through a simulation in these steps.
+    """
+    from vpm._core import Diverged
+
+    method = setup.method(model, bounded=True)
+    try:
+        return model.core.time_steps(model.theta, model.state(), inputs, 1.0 / rate, setup.substeps, method, steps)
+    except (Diverged, ValueError) as error:
+        raise SimulationError(f"{model.name}: {error}") from error
+
+
+def commands(model: Model, rate: float, experiment: Experiment | None = None) -> Array:
+    """Inputs (N, inputs) that drive a model while it is timed.
+
+    Parameters
+    ----------
+    model : Model
+    rate : float
+        Hz.
+    experiment : Experiment, optional
+        Its commands, or what the model's controllers make of its references; without it a sum of sines.
+    """
     if experiment is not None:
-        columns = [experiment[name] for name in model.input_channels]
+        columns = _driving(model, experiment)
     else:
         time = np.arange(SWEEP_SAMPLES) / rate
         wave = np.mean([np.sin(2.0 * np.pi * f * time) for f in SWEEP_FREQUENCIES], axis=0)
         columns = [wave for _ in model.actuators]
         columns += [np.full(time.size, model.parameters[name].value) for name in model.inputs[len(columns) :]]
     return np.ascontiguousarray(np.column_stack(columns)) if columns else np.zeros((1, 0))
+
+
+def _driving(model: Model, experiment: Experiment) -> list[Array]:
+    """Commands of a record; where controllers give them, what these say along its references."""
+    missing = [name for name in model.input_channels if name not in experiment]
+    if not missing or not model.controlled_actuators:
+        return [experiment[name] for name in model.input_channels]
+    run = simulate(model, experiment, "closed_loop")
+    return [run[name] if name in missing else experiment[name] for name in model.input_channels]
 
 
 def _machine() -> str:

@@ -176,8 +176,10 @@ def plot_candidates(candidates: Sequence[CandidateLike]) -> Figure:
 
 
 @styled
-def plot_ladder(seconds: Sequence[float], errors: Sequence[float], chosen: int) -> Figure:
-    """Draw error against step time of the rungs of a simplification, the chosen one marked.
+def plot_ladder(
+    seconds: Sequence[float], errors: Sequence[float], chosen: int, front: Sequence[int] = (), allowed: float = np.inf
+) -> Figure:
+    """Draw error against step time of the rungs of a simplification, the chosen one marked, both axes logarithmic.
 
     Parameters
     ----------
@@ -187,15 +189,25 @@ def plot_ladder(seconds: Sequence[float], errors: Sequence[float], chosen: int) 
         Shares of the signal.
     chosen : int
         Index of the rung to take.
+    front : sequence of int
+        Indices of those that no other one beats.
+    allowed : float
+        Share of the period that a step may take, s.
     """
     figure, axes = panels(1, height=3.0)
     axis = axes[0][0]
     times, gaps = 1e6 * np.asarray(seconds), 100.0 * np.asarray(errors)
     axis.plot(times, gaps, "o", color=SOFT, alpha=0.7, markersize=5, label="tried")
+    if len(front):
+        places = list(front)
+        axis.step(times[places], gaps[places], where="post", color=BLUE, linewidth=1.2, label="nothing beats these")
+    if np.isfinite(allowed):
+        axis.axvline(1e6 * allowed, color=SOFT, linestyle="--", linewidth=1.0, label="allowed share of the period")
+    axis.set_xscale("log")
+    axis.set_yscale("log")
     axis.plot(times[chosen], gaps[chosen], "D", color=BLUE, markersize=8, label="chosen")
     axis.set_xlabel("time of one step [µs]")
     axis.set_ylabel("error / measured signal [%]")
-    axis.set_ylim(bottom=0.0)
     axis.legend(loc="upper right")
     return figure
 

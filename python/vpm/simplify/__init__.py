@@ -1,0 +1,7 @@
+"""Walk a model back down: the cheapest one that still predicts the data within a tolerance."""
+
+from vpm.simplify.ladder import Ladder, Rung
+from vpm.simplify.reductions import Reduction, reduced, reductions
+from vpm.simplify.search import simplify
+
+__all__ = ["Ladder", "Reduction", "Rung", "reduced", "reductions", "simplify"]

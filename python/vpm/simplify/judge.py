@@ -1,0 +1,186 @@
+"""How far a reduced model is off: its parameters are fitted on some records, and it is judged on others."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from vpm.errors import SimulationError
+from vpm.experiment import Experiment
+from vpm.identify import InverseDynamicsProblem, OutputErrorProblem, Problem, estimate, gaps
+from vpm.model import Model
+from vpm.simulate import Setup, judging_mode, simulate
+
+#: Motions that a first state follows from, beside what is compared.
+MOTION = ("position", "velocity")
+#: How many steps finer the full model is simulated than the controller's period, where it is the reference.
+FINER = 2
+#: Integrator of fits: the one that is stable whatever the reduced model is like.
+FITTING = "linearly_implicit"
+
+
+class Judge:
+    """Errors of models on records, in steps of the controller.
+
+    Parameters
+    ----------
+    model : Model
+        The full one.
+    records, unseen : sequence of Experiment
+        To fit on, and to judge on.
+    rate : float
+        Steps per second, Hz.
+    mode : str
+        See `vpm.simulate.MODES`.
+    channels : sequence of str, optional
+        What is compared; by default all that can be.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        records: Sequence[Experiment],
+        unseen: Sequence[Experiment],
+        rate: float,
+        mode: str,
+        channels: Sequence[str] | None = None,
+    ) -> None:
+        self.records, self.unseen, self.mode, self.rate = tuple(records), tuple(unseen), mode, rate
+        self.channels = tuple(channels) if channels is not None else None
+        self.per_sample = steps_per_sample((*self.records, *self.unseen), rate)
+        self._balances = mode != "prescribed_motion" and not model.beams and _is_ideal(model)
+
+    @property
+    def driven(self) -> Experiment:
+        """Record whose commands drive a model that is timed."""
+        return self.unseen[0]
+
+    def fitted(self, model: Model) -> Model:
+        """Model with its adjustable parameters fitted to the records it learns from.
+
+        By the balance of effort where the machine has nothing that nobody measures, which is quick; by simulation in
+        the mode it is judged in where it has.
+
+        Parameters
+        ----------
+        model : Model
+        """
+        free = [p.name for p in model.parameters.values() if p.adjustable]
+        if not free:
+            return model
+        data: Problem
+        if self._balances:
+            data = InverseDynamicsProblem(model, self.records)
+        else:
+            data = self._outputs(model, self.records, Setup(FITTING, self.per_sample))
+        values = estimate(model, data, free).values
+        return model.with_parameters(dict(zip(free, map(float, values), strict=True)))
+
+    def errors(self, model: Model, setup: Setup) -> dict[str, float]:
+        """Relative error of each channel on the records to judge on.
+
+        Parameters
+        ----------
+        model : Model
+        setup : Setup
+            Its substeps are those of one step of the controller.
+
+        Raises
+        ------
+        SimulationError
+            The simulation fails in these steps.
+        """
+        stepped = Setup(setup.integrator, setup.substeps * self.per_sample, setup.horizon, setup.settling)
+        data = self._outputs(model, self.unseen, stepped)
+        residual, _ = data.evaluate(model, model.theta)
+        return {channel: share for channel, (_, share, _) in gaps(data, residual).items()}
+
+    def _outputs(self, model: Model, records: Sequence[Experiment], setup: Setup) -> OutputErrorProblem:
+        return OutputErrorProblem(model, records, self.mode, channels=self.channels, setup=setup)
+
+
+def steps_per_sample(records: Sequence[Experiment], rate: float) -> int:
+    """Steps of the controller between two samples of the records.
+
+    Parameters
+    ----------
+    records : sequence of Experiment
+    rate : float
+        Hz.
+
+    Raises
+    ------
+    SimulationError
+        The records are faster than the controller, differ, or their period is no whole number of its periods.
+    """
+    counts = {round(record.dt * rate, 6) for record in records}
+    for record in records:
+        steps = record.dt * rate
+        if steps < 1.0 - 1e-6 or abs(steps - round(steps)) > 1e-3 * steps or len(counts) > 1:
+            raise SimulationError(
+                f"{record.name}: a sample lasts {record.dt:g} s, which is {steps:g} steps at {rate:g} Hz, but has to "
+                "be the same whole number for all records; load them with `resample` at the rate or a whole part of it"
+            )
+    return round(records[0].dt * rate)
+
+
+def by_the_model(
+    model: Model, experiment: Experiment, mode: str, rate: float, channels: Sequence[str] | None
+) -> Experiment:
+    """The record with what the full model does in the place of what was measured.
+
+    Parameters
+    ----------
+    model : Model
+    experiment : Experiment
+        Its commands or references count.
+    mode : {"free_run", "closed_loop"}
+    rate : float
+        Hz; the full model takes twice as many steps, at least.
+    channels : sequence of str, optional
+        What is compared.
+
+    Raises
+    ------
+    SimulationError
+        The mode goes by the measured motion, or the full model cannot be simulated.
+    """
+    if mode not in ("free_run", "closed_loop"):
+        raise SimulationError(
+            f"the mode {mode} starts from the measured motion, so a model cannot be its own reference there; "
+            "choose free_run or closed_loop, or compare with the data"
+        )
+    run = simulate(model, experiment, mode, substeps=FINER * steps_per_sample([experiment], rate))
+    given = {name: experiment[name] for name in experiment.channels if not _is_answer(name, model)}
+    wanted = (*(channels or _shown(model)), *(f"{joint}.{what}" for joint in model.joints for what in MOTION))
+    answers = {name: run[name] for name in run.channels if name in wanted and name not in given}
+    return Experiment.from_arrays(run.time, {**given, **answers}, model=model, name=experiment.name)
+
+
+def reference_mode(model: Model, experiments: Sequence[Experiment], against: str, mode: str | None) -> str:
+    """Mode to judge in: what was asked for, or the one that says most.
+
+    Parameters
+    ----------
+    model : Model
+    experiments : sequence of Experiment
+    against : {"data", "model"}
+    mode : str or None
+    """
+    if mode is not None:
+        return mode
+    best = judging_mode(model, experiments)
+    return "free_run" if against == "model" and best == "restarts" else best
+
+
+def _is_ideal(model: Model) -> bool:
+    return all(model.actuator_type(name) == "ideal" for name in model.actuators)
+
+
+def _is_answer(channel: str, model: Model) -> bool:
+    return channel in model.output_channels and channel not in model.input_channels
+
+
+def _shown(model: Model) -> tuple[str, ...]:
+    """Positions of the joints, strains, places of markers and pressures: what a user looks at."""
+    ends = (".position", ".strain", ".x", ".y", ".z", ".pressure_a", ".pressure_b")
+    return tuple(name for name in model.output_channels if name.endswith(ends))

@@ -1,0 +1,158 @@
+"""What of a model can be made simpler: effects left out, links at a coarser level, deformations held rigid.
+
+Each place of a model where something can be simpler is a *site* with a list of *changes* that exclude each other; a
+reduced model takes one change, or none, at each site.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from vpm.errors import VpmError
+from vpm.model import Model
+from vpm.model.level import parse_level
+from vpm.results import Storable
+
+#: Levels that a flexible link is offered, where they have fewer coordinates than its own; docs/beams.md compares them.
+OFFERED = (
+    "elements(8)",
+    "strain(3)",
+    "strain(2)",
+    "bezier(4)",
+    "bezier(3)",
+    "bezier(2)",
+    "modal(2)",
+    "modal(1)",
+    "lumped(2)",
+    "lumped(1)",
+    "rigid",
+)
+#: Component that a link needs, because its joints or loads live in it, is never held rigid: bending.
+HELD_FIRST = ("extension", "shear_x", "shear_y", "torsion")
+
+
+@dataclass(frozen=True)
+class Reduction(Storable):
+    """One change that makes a model simpler.
+
+    Attributes
+    ----------
+    kind : {"effect", "level", "component"}
+        An effect that is left out, a coarser level of a flexible link, a deformation of a link that is held rigid.
+    name : str
+        Effect, level or component.
+    at : str
+        Site of the effect, or flexible link.
+    """
+
+    kind: str
+    name: str
+    at: str
+
+    def __str__(self) -> str:
+        match self.kind:
+            case "level":
+                return f"{self.at} as {self.name}"
+            case "component":
+                return f"{self.at} rigid in {self.name}"
+        return f"{self.name} at {self.at}"
+
+    @property
+    def site(self) -> tuple[str, str]:
+        """What it excludes: other reductions of the same site."""
+        return ("level", self.at) if self.kind == "level" else (f"{self.kind} {self.name}", self.at)
+
+    def applied(self, model: Model) -> Model:
+        """Model with this change.
+
+        Parameters
+        ----------
+        model : Model
+
+        Raises
+        ------
+        ModelError
+            The change contradicts something else in the model.
+        """
+        match self.kind:
+            case "effect":
+                return model.without_effect(self.name, self.at)
+            case "level":
+                return model.at({self.at: self.name})
+        content = model.to_dict()
+        beam = content["beams"][self.at]
+        beam["deforms"] = [component for component in _deforms(beam) if component != self.name]
+        return type(model)(content)
+
+
+def reductions(model: Model) -> dict[tuple[str, str], tuple[Reduction, ...]]:
+    """Changes that can be made to a model, by site.
+
+    Parameters
+    ----------
+    model : Model
+
+    Returns
+    -------
+    dict
+        Those of which the reduced model is a valid one. Levels of a link come finest first.
+    """
+    found: dict[tuple[str, str], tuple[Reduction, ...]] = {}
+    for reduction in _imaginable(model):
+        if _possible(model, reduction):
+            found[reduction.site] = (*found.get(reduction.site, ()), reduction)
+    return found
+
+
+def reduced(model: Model, changes: Sequence[Reduction]) -> Model:
+    """Model with several changes.
+
+    Parameters
+    ----------
+    model : Model
+    changes : sequence of Reduction
+        At most one of each site.
+
+    Raises
+    ------
+    ModelError
+        They contradict each other.
+    """
+    # A rigid link has no components: levels come last.
+    for change in sorted(changes, key=lambda each: each.kind == "level"):
+        model = change.applied(model)
+    return model
+
+
+def _imaginable(model: Model) -> Iterator[Reduction]:
+    for effect in model.effects:
+        yield Reduction("effect", effect.name, effect.at)
+    for name, beam in _beams(model).items():
+        deforms = _deforms(beam)
+        own = len(parse_level(beam["level"]).coordinates(deforms))
+        for level in OFFERED:
+            if len(parse_level(level).coordinates(deforms)) < own:
+                yield Reduction("level", level, name)
+        for component in HELD_FIRST:
+            if component in deforms and len(deforms) > 1:
+                yield Reduction("component", component, name)
+
+
+def _beams(model: Model) -> Mapping[str, Any]:
+    beams: Mapping[str, Any] = model.to_dict().get("beams", {})
+    return beams
+
+
+def _deforms(beam: Mapping[str, Any]) -> tuple[str, ...]:
+    return tuple(beam.get("deforms", ("bending_x", "bending_y", "torsion")))
+
+
+def _possible(model: Model, reduction: Reduction) -> bool:
+    """Whether the reduced model is one: a level may not know a component, or a gauge may lose its beam's bending."""
+    try:
+        _ = reduction.applied(model).core
+    except VpmError:
+        return False
+    return True

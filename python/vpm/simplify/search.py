@@ -1,0 +1,238 @@
+"""Walk a model back down: the cheapest one that still predicts the data within a tolerance.
+
+The search goes in four strides. All flexible links together are made coarser as long as that loses next to nothing:
+what comes next is tried on that model, which is cheap. Then each place by itself is made simpler by each of its
+changes. Losses and savings of single changes are added up to foresee those of all combinations, and the combinations
+that should be best are fitted, simulated and timed. From the best one each further change is tried while one pays.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from itertools import islice, product
+
+from vpm.errors import SimulationError
+from vpm.experiment import Experiment
+from vpm.model import Model
+from vpm.simplify.judge import Judge, by_the_model, reference_mode
+from vpm.simplify.ladder import Ladder, Rung, pareto
+from vpm.simplify.reductions import OFFERED, Reduction, reductions
+from vpm.simplify.trials import Changes, Trials
+from vpm.simulate import Setup
+
+#: Combinations that are foreseen, and of those the ones that are tried.
+FORESEEN, TRIED = 100_000, 16
+#: Share of the tolerance that the common start of the search may lose.
+NEGLIGIBLE = 0.2
+#: Steps timed of the chosen one.
+CHOSEN_STEPS = 200_000
+
+Sites = dict[tuple[str, str], tuple[Reduction, ...]]
+
+
+def simplify(
+    model: Model,
+    experiments: Experiment | Sequence[Experiment],
+    *,
+    rate: float = 1000.0,
+    tolerance: float = 0.02,
+    share: float = 0.2,
+    validate: Experiment | Sequence[Experiment] | None = None,
+    against: str = "data",
+    mode: str | None = None,
+    channels: Sequence[str] | None = None,
+    tell: Callable[[str], None] | None = None,
+) -> Ladder:
+    """Make a model simpler, place by place, as far as the tolerance allows, and find the cheapest way to step it.
+
+    Effects are left out, flexible links made coarser or rigid in single deformations, and every integrator of fixed
+    steps is tried with one, two and four steps in a period. The adjustable parameters of every reduced model are fitted
+    again before it is judged by simulation, so that what remains may take over what it can. Ctrl-C ends the search
+    with what is known.
+
+    Parameters
+    ----------
+    model : Model
+    experiments : Experiment or sequence of Experiment
+        Trajectories on which accuracy counts.
+    rate : float
+        Rate of the controller, Hz.
+    tolerance : float
+        Largest loss of relative error against the full model.
+    share : float
+        Share of the period that a step may take.
+    validate : Experiment or sequence of Experiment, optional
+        Trajectories to judge on; by default those of the fit.
+    against : {"data", "model"}
+        Reference: what was measured, or what the full model does on the commands of the records.
+    mode : str, optional
+        Mode of simulation to judge in; by default closed loop or restarts, see `vpm.simulate.judging_mode`, and
+        against the model free run instead of restarts.
+    channels : sequence of str, optional
+        What is compared; by default all measured outputs, and against the model the positions, strains, markers and
+        pressures.
+    tell : callable, optional
+        Called with a sentence at every step.
+
+    Returns
+    -------
+    Ladder
+
+    Raises
+    ------
+    SimulationError
+        A number is out of its range, the records do not suit the rate, or nothing can be simulated.
+    """
+    if not tolerance >= 0.0:
+        raise SimulationError(f"a tolerance of {tolerance:g} is not possible; give a share of zero or more")
+    if against not in ("data", "model"):
+        raise SimulationError(f'against is "{against}"; choose "data" or "model"')
+    if not rate > 0.0:
+        raise SimulationError(f"a rate of {rate:g} Hz is not possible; give a positive number")
+    say = tell or (lambda _: None)
+    records = _listed(experiments)
+    unseen = records if validate is None else _listed(validate)
+    mode = reference_mode(model, records, against, mode)
+    if against == "model":
+        say("the full model as the reference")
+        known = {id(each): by_the_model(model, each, mode, rate, channels) for each in (*records, *unseen)}
+        records, unseen = ([known[id(each)] for each in group] for group in (records, unseen))
+    judge = Judge(model, records, unseen, rate, mode, channels)
+    trials = Trials(model, judge, lambda changes: bool(changes) or against == "data", say)
+    sites = reductions(model)
+    try:
+        _descend(trials, sites, tolerance)
+    except KeyboardInterrupt:
+        if not trials.rungs:
+            raise
+        say("interrupted: the best of what was tried")
+    return _concluded(trials, tolerance, share, against)
+
+
+def _listed(experiments: Experiment | Sequence[Experiment]) -> list[Experiment]:
+    return [experiments] if isinstance(experiments, Experiment) else list(experiments)
+
+
+def _descend(trials: Trials, sites: Sites, tolerance: float) -> None:
+    full = trials.attempt(())
+    if not full:
+        raise SimulationError(
+            f"{trials.model.name}: no integrator of fixed steps can simulate the records at {trials.judge.rate:g} Hz: "
+            f"{trials.reason}"
+        )
+    limit = min(rung.error for rung in full) + tolerance
+    base = _together(trials, sites, limit, tolerance)
+    singles = {site: _alone(trials, base, changes) for site, changes in sites.items()}
+    for changes in _foreseen(trials, base, singles, limit):
+        trials.attempt(changes)
+    _polish(trials, sites, limit)
+
+
+def _together(trials: Trials, sites: Sites, limit: float, tolerance: float) -> Changes:
+    """All links at the same coarser level: the cheapest that loses next to nothing."""
+    best: Changes = ()
+    seconds = min(rung.seconds for rung in trials.attempt(()))
+    levels = [changes for (kind, _), changes in sites.items() if kind == "level"]
+    for level in OFFERED:
+        changes = tuple(c for each in levels for c in each if c.name == level)
+        if not changes:
+            continue
+        rung = trials.cheapest(changes, limit - (1.0 - NEGLIGIBLE) * tolerance)
+        if rung is not None and rung.seconds < seconds:
+            best, seconds = changes, rung.seconds
+    return best
+
+
+def _alone(trials: Trials, base: Changes, changes: Sequence[Reduction]) -> dict[Reduction, tuple[float, float]]:
+    """Seconds saved and error added by each change of one site on the common start; not what another beats."""
+    start = _best(trials.attempt(base))
+    found: dict[Reduction, tuple[float, float]] = {}
+    taken = [each for each in base if each.site == changes[0].site]
+    # Changes come finest first. What is finer than the common start would cost more and gain next to nothing.
+    coarser = changes[changes.index(taken[0]) + 1 :] if taken else changes
+    for change in coarser:
+        rungs = trials.attempt(_with(base, change))
+        if rungs:
+            best = _best(rungs)
+            found[change] = (start.seconds - best.seconds, best.error - start.error)
+    names = list(found)
+    return {names[k]: found[names[k]] for k in pareto([(-saved, added) for saved, added in found.values()])}
+
+
+def _best(rungs: Sequence[Rung]) -> Rung:
+    """The cheapest rung among those whose error is near the least."""
+    least = min(rung.error for rung in rungs)
+    return min((rung for rung in rungs if rung.error <= 1.1 * least), key=lambda rung: rung.seconds)
+
+
+def _with(base: Changes, change: Reduction) -> Changes:
+    """Changes with one more, in the place of that of the same site."""
+    return (*(each for each in base if each.site != change.site), change)
+
+
+def _foreseen(
+    trials: Trials, base: Changes, singles: dict[tuple[str, str], dict[Reduction, tuple[float, float]]], limit: float
+) -> list[Changes]:
+    """Combinations that should be best: the front of summed savings and losses, and the cheapest within the limit."""
+    start = _best(trials.attempt(base))
+    options = [[None, *found] for found in singles.values()]
+    numbers = {change: pair for found in singles.values() for change, pair in found.items()}
+    points, combinations = [], []
+    for choice in islice(product(*options), FORESEEN):
+        taken = [change for change in choice if change is not None]
+        error = start.error + sum(numbers[change][1] for change in taken)
+        points.append((start.seconds - sum(numbers[change][0] for change in taken), error))
+        combinations.append(taken)
+    order = sorted(pareto(points), key=lambda k: abs(points[k][1] - limit))
+    result = []
+    for place in order[:TRIED]:
+        changes = base
+        for change in combinations[place]:
+            changes = _with(changes, change)
+        result.append(changes)
+    return result
+
+
+def _polish(trials: Trials, sites: Sites, limit: float) -> None:
+    """From the cheapest within the limit, single changes as long as one pays."""
+    while True:
+        best = _within(trials.rungs, limit)
+        base = trials.changes_of(best)
+        for change in (change for changes in sites.values() for change in changes if change not in base):
+            trials.attempt(_with(base, change))
+        if not _within(trials.rungs, limit).seconds < 0.95 * best.seconds:
+            return
+
+
+def _within(rungs: Sequence[Rung], limit: float) -> Rung:
+    return min((rung for rung in rungs if rung.error <= limit), key=lambda rung: rung.seconds)
+
+
+def _concluded(trials: Trials, tolerance: float, share: float, against: str) -> Ladder:
+    """The choice, timed once more and longer."""
+    rungs, rate = trials.rungs, trials.judge.rate
+    chosen = next(rung for rung in rungs if rung.loss <= tolerance)
+    model = trials.fitted(trials.changes_of(chosen))
+    seconds, slowest = trials.timed(model, Setup(chosen.integrator, chosen.substeps), CHOSEN_STEPS)
+    place = rungs.index(chosen)
+    chosen = chosen.timed(seconds, slowest)
+    rungs[place] = chosen
+    return Ladder(
+        tuple(sorted(rungs, key=lambda rung: rung.seconds)),
+        chosen,
+        chosen.slowest * rate <= share,
+        rate,
+        tolerance,
+        share,
+        trials.judge.mode,
+        against,
+        _dearest(trials),
+        model,
+    )
+
+
+def _dearest(trials: Trials) -> tuple[tuple[str, float], ...]:
+    """What a step saves by each single change that was tried, the most first, one for each place."""
+    full = min((r for r in trials.rungs if not r.removed), key=lambda r: r.seconds)
+    saved = {r.removed[0]: full.seconds - r.seconds for r in reversed(trials.rungs) if len(r.removed) == 1}
+    return tuple(sorted(((name, gain) for name, gain in saved.items() if gain > 0.0), key=lambda pair: -pair[1]))
