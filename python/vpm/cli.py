@@ -83,6 +83,7 @@ app.add_typer(excite_app, name="excite")
 app.command(epilog=identify_command.EXAMPLES)(identify_command.identify)
 app.command(epilog=diagnose_command.EXAMPLES)(diagnose_command.diagnose)
 app.command(epilog=prove_command.EXAMPLES)(prove_command.prove)
+Share = Annotated[float, typer.Option(help="Share of the period that a step may take at its 99.9 % quantile.")]
 Out = Annotated[Path, typer.Option(help="Folder for report.json, report.html and the repaired model.")]
 
 
@@ -252,28 +253,47 @@ def simplify(
     logs: Logs,
     rate: Annotated[float, typer.Option(help="Rate of the controller, Hz.")] = 1000.0,
     tolerance: Annotated[float, typer.Option(help="Largest loss of accuracy, as a share of the signal.")] = 0.02,
+    share: Share = 0.2,
+    validate: Annotated[list[Path] | None, typer.Option(help="Log to judge on; those of the fit by default.")] = None,
+    against: Annotated[str, typer.Option(help="The reference: data, or the full model itself.")] = "data",
+    mode: Annotated[str | None, typer.Option(help="Mode of simulation to judge in.")] = None,
+    compare: Annotated[list[str] | None, typer.Option(help="Channel to judge; all by default.")] = None,
     channels: Channels = None,
     interpolate: Interpolate = False,
+    plot: Plot = None,
     out: Annotated[Path | None, typer.Option(help="Write the simplified model (TOML) here.")] = None,
 ) -> None:
-    """Find the cheapest model that still tells the truth within a tolerance."""
+    """Find the cheapest model that still tells the truth within a tolerance; exit code 1 if it misses the period."""
     from vpm.simplify import simplify as find_cheapest
 
     machine, records = load_all(model, logs, channels, interpolate)
+    unseen = load_all(model, validate, channels, interpolate)[1] if validate else None
     with progress() as tell:
-        ladder = find_cheapest(machine, records, rate=rate, tolerance=tolerance, tell=tell)
+        ladder = find_cheapest(
+            machine,
+            records,
+            rate=rate,
+            tolerance=tolerance,
+            share=share,
+            validate=unseen,
+            against=against,
+            mode=mode,
+            channels=compare,
+            tell=tell,
+        )
     console.print(str(ladder), markup=False)
+    save_plot(ladder.plot, plot)
     if out is not None:
         ladder.model.save(out)
+    if not ladder.holds:
+        raise typer.Exit(1)
 
 
 @app.command(epilog="Example:  vpm budget examples/emps/model.toml --rate 1000")
 def budget(
     model: ModelPath,
     rate: Annotated[float, typer.Option(help="Rate of the controller, Hz.")] = 1000.0,
-    share: Annotated[
-        float, typer.Option(help="Share of the period that a step may take at its 99.9 % quantile.")
-    ] = 0.2,
+    share: Share = 0.2,
     steps: Annotated[int, typer.Option(help="Number of steps to time.")] = 1_000_000,
     integrator: Integrator = "auto",
 ) -> None:
