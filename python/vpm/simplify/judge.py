@@ -10,8 +10,6 @@ from vpm.identify import InverseDynamicsProblem, OutputErrorProblem, Problem, es
 from vpm.model import Model
 from vpm.simulate import Setup, judging_mode, simulate
 
-#: Motions that a first state follows from, beside what is compared.
-MOTION = ("position", "velocity")
 #: How many steps finer the full model is simulated than the controller's period, where it is the reference.
 FINER = 2
 #: Integrator of fits: the one that is stable whatever the reduced model is like.
@@ -123,9 +121,7 @@ def steps_per_sample(records: Sequence[Experiment], rate: float) -> int:
     return round(records[0].dt * rate)
 
 
-def by_the_model(
-    model: Model, experiment: Experiment, mode: str, rate: float, channels: Sequence[str] | None
-) -> Experiment:
+def by_the_model(model: Model, experiment: Experiment, mode: str, rate: float, channels: Sequence[str]) -> Experiment:
     """The record with what the full model does in the place of what was measured.
 
     Parameters
@@ -136,7 +132,7 @@ def by_the_model(
     mode : {"free_run", "closed_loop"}
     rate : float
         Hz; the full model takes twice as many steps, at least.
-    channels : sequence of str, optional
+    channels : sequence of str
         What is compared.
 
     Raises
@@ -150,10 +146,18 @@ def by_the_model(
             "choose free_run or closed_loop, or compare with the data"
         )
     run = simulate(model, experiment, mode, substeps=FINER * steps_per_sample([experiment], rate))
-    given = {name: experiment[name] for name in experiment.channels if not _is_answer(name, model)}
-    wanted = (*(channels or _shown(model)), *(f"{joint}.{what}" for joint in model.joints for what in MOTION))
-    answers = {name: run[name] for name in run.channels if name in wanted and name not in given}
-    return Experiment.from_arrays(run.time, {**given, **answers}, model=model, name=experiment.name)
+    # What is not compared stays as it was measured: simulations start from it, the full model's and the others' alike.
+    kept = {name: experiment[name] for name in experiment.channels if name not in channels}
+    answers = {name: run[name] for name in channels}
+    return Experiment.from_arrays(run.time, {**kept, **answers}, model=model, name=experiment.name)
+
+
+def shown(model: Model) -> tuple[str, ...]:
+    """What a user looks at: strains, places of markers and pressures, or the positions of the joints without those."""
+    inner = tuple(
+        n for n in model.output_channels if n.endswith((".strain", ".x", ".y", ".z", ".pressure_a", ".pressure_b"))
+    )
+    return inner or tuple(f"{joint}.position" for joint in model.joints)
 
 
 def reference_mode(model: Model, experiments: Sequence[Experiment], against: str, mode: str | None) -> str:
@@ -174,13 +178,3 @@ def reference_mode(model: Model, experiments: Sequence[Experiment], against: str
 
 def _is_ideal(model: Model) -> bool:
     return all(model.actuator_type(name) == "ideal" for name in model.actuators)
-
-
-def _is_answer(channel: str, model: Model) -> bool:
-    return channel in model.output_channels and channel not in model.input_channels
-
-
-def _shown(model: Model) -> tuple[str, ...]:
-    """Positions of the joints, strains, places of markers and pressures: what a user looks at."""
-    ends = (".position", ".strain", ".x", ".y", ".z", ".pressure_a", ".pressure_b")
-    return tuple(name for name in model.output_channels if name.endswith(ends))

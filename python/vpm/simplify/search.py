@@ -14,7 +14,7 @@ from itertools import islice, product
 from vpm.errors import SimulationError
 from vpm.experiment import Experiment
 from vpm.model import Model
-from vpm.simplify.judge import Judge, by_the_model, reference_mode
+from vpm.simplify.judge import Judge, by_the_model, reference_mode, shown
 from vpm.simplify.ladder import Ladder, Rung, pareto
 from vpm.simplify.reductions import OFFERED, Reduction, reductions
 from vpm.simplify.trials import Changes, Trials
@@ -69,8 +69,8 @@ def simplify(
         Mode of simulation to judge in; by default closed loop or restarts, see `vpm.simulate.judging_mode`, and
         against the model free run instead of restarts.
     channels : sequence of str, optional
-        What is compared; by default all measured outputs, and against the model the positions, strains, markers and
-        pressures.
+        What is compared; by default all measured outputs, and against the model strains, places of markers and
+        pressures, or the positions of the joints where there are none.
     tell : callable, optional
         Called with a sentence at every step.
 
@@ -95,6 +95,7 @@ def simplify(
     mode = reference_mode(model, records, against, mode)
     if against == "model":
         say("the full model as the reference")
+        channels = shown(model) if channels is None else channels
         known = {id(each): by_the_model(model, each, mode, rate, channels) for each in (*records, *unseen)}
         records, unseen = ([known[id(each)] for each in group] for group in (records, unseen))
     judge = Judge(model, records, unseen, rate, mode, channels)
