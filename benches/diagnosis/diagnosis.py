@@ -23,6 +23,7 @@ sys.path[:0] = [str(ROOT / "benches"), str(ROOT / "tests")]
 import vpm  # noqa: E402
 from blind import make_cases  # noqa: E402
 from markdown import table  # noqa: E402
+from model_texts import DAMPED_AXIS, changed  # noqa: E402
 from peers import processor  # noqa: E402
 
 PAGE = ROOT / "docs" / "performance.md"
@@ -38,32 +39,17 @@ machine alone and leaves the other out of the table.
 {rows}
 """
 
-AXIS = """
-name = "axis"
-gravity = [0, 0, 0]
-[bodies.carriage]
-mass = { value = 1.8, uncertainty = 0.4 }
-[joints.axis]
-type = "prismatic"
-parent = "world"
-child = "carriage"
-axis = [1, 0, 0]
-[actuators.drive]
-joint = "axis"
-gain = 1.0
-command_unit = "N"
-[[effects]]
-type = "viscous_friction"
-at = "axis"
-viscous = { value = 2.5, uncertainty = 1.0 }
-"""
-
 Array = NDArray[np.float64]
 Diagnose = Callable[[], vpm.Diagnosis]
 
 
 def axis() -> tuple[str, Diagnose]:
-    model = vpm.Model.from_toml(AXIS)
+    # What the user believes: mass and friction are off.
+    nominal = (
+        ("value = 2.0, uncertainty = 0.2", "value = 1.8, uncertainty = 0.4"),
+        ("value = 3.0, uncertainty = 1.0", "value = 2.5, uncertainty = 1.0"),
+    )
+    model = changed(DAMPED_AXIS, *nominal)
     logs = [axis_record(1, 15.0), axis_record(2, 10.0)]
     return _said("axis, coulomb_friction", logs), lambda: vpm.diagnose(model, logs[0], logs[1])
 

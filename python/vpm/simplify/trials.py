@@ -48,7 +48,6 @@ class Trials:
         self.model, self.judge = model, judge
         self._refit, self._tell = refit, tell
         self._inputs = commands(model, judge.rate, judge.driven)
-        self._fastest = np.inf
         #: Why the last way that did not work did not.
         self.reason = ""
         self._rungs: dict[frozenset[Reduction], list[Rung]] = {}
@@ -60,11 +59,6 @@ class Trials:
         everything = [rung for rungs in self._rungs.values() for rung in rungs]
         least = min((rung.error for rung in everything if not rung.removed), default=0.0)
         return sorted((replace(r, loss=r.error - least) for r in everything), key=lambda rung: rung.seconds)
-
-    @property
-    def count(self) -> int:
-        """Number of combinations tried."""
-        return len(self._rungs)
 
     def fitted(self, changes: Changes) -> Model:
         """The model of a trial, its parameters fitted again."""
@@ -89,7 +83,7 @@ class Trials:
             self._tell(", ".join(map(str, changes)) or "the full model")
             try:
                 self._models[key] = self._made(changes)
-                self._rungs[key] = [rung for name in FIXED_STEP for rung in self._stepped(changes, name)]
+                self._rungs[key] = self._stepped(changes)
             except VpmError as error:
                 self.reason = str(error)
                 self._rungs[key] = []
@@ -99,13 +93,21 @@ class Trials:
         model = reduced(self.model, changes)
         return self.judge.fitted(model) if self._refit(changes) else model
 
-    def _stepped(self, changes: Changes, integrator: str) -> list[Rung]:
+    def _stepped(self, changes: Changes) -> list[Rung]:
+        """Rungs of every integrator."""
+        found: list[Rung] = []
+        for integrator in FIXED_STEP:
+            fastest = min((rung.seconds for rung in found), default=np.inf)
+            found += self._with_more_steps(changes, integrator, fastest)
+        return found
+
+    def _with_more_steps(self, changes: Changes, integrator: str, fastest: float) -> list[Rung]:
         """Rungs of one integrator with more and more steps in a period, as long as more steps pay."""
         model, found = self._models[frozenset(changes)], list[Rung]()
         for substeps in SUBSTEPS:
             setup = Setup(integrator, substeps)
             try:
-                if self._is_hopeless(model, setup):
+                if self._is_hopeless(model, setup, fastest):
                     break
                 errors = self.judge.errors(model, setup)
             except SimulationError as reason:
@@ -118,13 +120,12 @@ class Trials:
             times = self.timed(model, setup)
             labels, states = tuple(map(str, changes)), model.core.n_states
             found.append(Rung(labels, integrator, substeps, states, error, loudest, error, *times))
-        self._fastest = min((rung.seconds for rung in found), default=self._fastest)
         return found
 
-    def _is_hopeless(self, model: Model, setup: Setup) -> bool:
+    def _is_hopeless(self, model: Model, setup: Setup, fastest: float) -> bool:
         """Whether a step takes longer than the period, and so much longer than a way that works, that none takes it."""
         few = float(np.median(step_times(model, self.judge.rate, setup, GLANCE, self._inputs)))
-        return few * self.judge.rate > 1.0 and few > SLOWER * self._fastest
+        return few * self.judge.rate > 1.0 and few > SLOWER * fastest
 
     def timed(self, model: Model, setup: Setup, most: int = TIMED_STEPS[1]) -> tuple[float, float]:
         """Median and 99.9 % quantile of a period, s.
