@@ -10,7 +10,17 @@ from numpy.typing import NDArray
 
 from vpm.discrepancy.screening import Alias, Baseline, Probe, size_is_clear
 from vpm.errors import DivergedError
-from vpm.identify import Estimate, Gain, InverseDynamicsProblem, OutputErrorProblem, Problem, estimate, gain, segments
+from vpm.identify import (
+    Estimate,
+    Gain,
+    InverseDynamicsProblem,
+    OutputErrorProblem,
+    Problem,
+    Worth,
+    estimate,
+    gain,
+    segments,
+)
 from vpm.identify.along import bends
 from vpm.identify.estimation import MOST_EVALUATIONS
 from vpm.identify.identifiability import COPY_SHARE, closest_column, explained_share, is_alias
@@ -27,6 +37,9 @@ FAR_AWAY = 1e3
 #: Evaluations for a spring more where links bend already: each is a simulation with a dozen derivatives, and one that
 #: is there gains most in the first.
 FEW_EVALUATIONS = 6
+#: A refit that has lowered the training error by less than this share of its mean square in so many evaluations, and
+#: hardly goes on, is ended: ten times as much is asked of it on unseen data.
+SLOW_GAIN, SLOW_EVALUATIONS = 0.01, 10
 
 #: Effects under which a joint can stick, and the share of its largest speed below which it may.
 DRY = ("coulomb_friction", "stribeck_friction", "hysteresis")
@@ -114,10 +127,12 @@ def judge(
     data: Data,
     bounds: dict[str, tuple[float, float]],
     origin: Array | None = None,
+    worth: Worth | None = None,
 ) -> Judged:
     """Fit ``free`` on the training records and predict the unseen ones; see `vpm.identify.tangent` for ``origin``.
 
-    Where links bend and nothing else is worked out, the tangent at the start is taken if none is given.
+    Where links bend and nothing else is worked out, the tangent at the start is taken if none is given. A fit that is
+    not on a tangent ends early if it is not ``worth`` its time.
 
     Raises
     ------
@@ -128,7 +143,9 @@ def judge(
         origin = model.theta
     if origin is None:
         most = FEW_EVALUATIONS if bends(model) and model.added_joints else MOST_EVALUATIONS
-        fit = estimate(model, data.training, free, bounds=bounds, tolerance=TOLERANCE, most_evaluations=most)
+        fit = estimate(
+            model, data.training, free, bounds=bounds, tolerance=TOLERANCE, most_evaluations=most, worth=worth
+        )
     else:
         fit = estimate_on_tangent(model, data.training, free, origin, bounds=bounds, tolerance=TOLERANCE)
     fitted = model.with_parameters(dict(zip(free, map(float, fit.values), strict=True)))
@@ -154,12 +171,14 @@ def confirm(current: Judged, data: Data, probe: Probe) -> Trial:
         start = start.with_parameters(dict(zip(free, map(float, rough.values), strict=True)))
         free = (*free, *released)
         origin = start.theta if moved else origin
-    judged, diverged = _judged(start, free, data, bounds, origin)
+    cost = float(current.fit.residual @ current.fit.residual)
+    worth = Worth((1.0 - SLOW_GAIN) * cost, SLOW_EVALUATIONS)
+    judged, diverged = _judged(start, free, data, bounds, origin, worth)
     doubtful = probe.held
     if seen := _seen_by_now(judged, data, probe):
         free, doubtful = (*free, *seen), tuple(alias for alias in doubtful if alias.parameter not in seen)
         origin = None if origin is None else judged.model.theta
-        judged, diverged = _judged(judged.model, free, data, bounds, origin)
+        judged, diverged = _judged(judged.model, free, data, bounds, origin, worth)
     own = free[len(current.free) :]
     return Trial(
         probe,
@@ -185,6 +204,7 @@ def _judged(
     data: Data,
     bounds: dict[str, tuple[float, float]],
     origin: Array | None = None,
+    worth: Worth | None = None,
 ) -> tuple[Judged, str]:
     """A fit, judged by the balance alone where it cannot simulate the unseen records, with the reason.
 
@@ -192,9 +212,9 @@ def _judged(
     """
     reason = ""
     try:
-        judged = judge(start, free, data, bounds, origin)
+        judged = judge(start, free, data, bounds, origin, worth)
     except DivergedError as error:
-        judged, reason = judge(start, free, replace(data, simulation=None), bounds, origin), str(error)
+        judged, reason = judge(start, free, replace(data, simulation=None), bounds, origin, worth), str(error)
     if judged.fit.interrupted:
         raise KeyboardInterrupt
     return judged, reason

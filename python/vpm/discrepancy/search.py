@@ -45,6 +45,8 @@ SAME = 1.5
 LATE = ("actuator_lag", "input_delay", "sensor_delay")
 #: Difference of two logarithms of evidence that says nothing.
 TIE = 0.01
+#: Share by which what screening promises of two candidates may differ by rounding alone.
+TWIN = 1e-6
 #: Factor by which the last fit may exceed the bound of a transition velocity.
 MORE_ROOM = 3.0
 #: Where links bend already, the noise of the measured motion rings in them: a spring more has to promise this share of
@@ -225,6 +227,23 @@ class _Round:
         short_list = self._promising[:SHORT_LIST]
         if short_list:
             self.tell(f"round {self.number}: refitting with {', '.join(p.candidate.label for p in short_list)}")
+        twins = _twins(short_list)
+        self._refit([one for one in short_list if one.candidate.key not in twins])
+        believed = {trial.probe.candidate.key for trial in self._believed}
+        again = [one for one in short_list if twins.get(one.candidate.key) in believed]
+        self._refit(again)
+        for one in short_list:
+            key = one.candidate.key
+            if key in twins and one not in again:
+                effect, site = twins[key]
+                self.refused[key] = f"it is {effect} at {site} by another name here: {self.refused[twins[key]]}"
+        for result in self._promising[SHORT_LIST:]:
+            self.refused[result.candidate.key] = (
+                f"{SHORT_LIST} candidates explain more of the training residual, and none of them was enough"
+            )
+
+    def _refit(self, short_list: Sequence[Probe]) -> None:
+        """Refit with each of some candidates, and believe or refuse it."""
         tried = len(self._ranking) * self.number
         thresholds = Thresholds(tried, min(m.dt for m in self.data.training.motions))
         refit = partial(confirm, self.current, self.data)
@@ -239,10 +258,6 @@ class _Round:
                 self.refused[key] = reason
             else:
                 self._believed.append(trial)
-        for result in self._promising[SHORT_LIST:]:
-            self.refused[result.candidate.key] = (
-                f"{SHORT_LIST} candidates explain more of the training residual, and none of them was enough"
-            )
 
     @cached_property
     def timed(self) -> InTime:
@@ -301,6 +316,22 @@ class _Round:
     def ranked(self) -> list[RankedCandidate]:
         """Candidates of this round: what was accepted, what helped on unseen data, then by what screening promises."""
         return sorted(self._ranking.values(), key=_promise)
+
+
+def _twins(short_list: Sequence[Probe]) -> dict[Key, Key]:
+    """Candidates with a motion of their own that are an earlier one by another name, with that one.
+
+    A rigid link that bends at its root is a drive that winds up: no digit of what screening says parts the two. Refits
+    of such machines take long, so that one of each pair has to be enough where it is refused.
+    """
+    found: dict[Key, Key] = {}
+    for place, one in enumerate(short_list):
+        for other in short_list[:place]:
+            heavy = {one.candidate.effect.name, other.candidate.effect.name} == {"joint_compliance", "link_flexibility"}
+            same = len(one.free) == len(other.free) and abs(one.drop - other.drop) <= TWIN * abs(other.drop)
+            if heavy and same and other.candidate.key not in found:
+                found[one.candidate.key] = other.candidate.key
+    return found
 
 
 def _promise(candidate: RankedCandidate) -> tuple[int, float]:

@@ -1,7 +1,7 @@
 """Identification: parameters, their uncertainty, and what the data cannot see."""
 
 from vpm.identify.comparison import FIT_MODES, problem
-from vpm.identify.estimation import Estimate, estimate
+from vpm.identify.estimation import Estimate, Worth, estimate
 from vpm.identify.fit import Fit, identify
 from vpm.identify.identifiability import Combination, unseen_combinations
 from vpm.identify.inertial import identify_inertial
@@ -39,6 +39,7 @@ __all__ = [
     "Problem",
     "Profile",
     "ShootingProblem",
+    "Worth",
     "bootstrap",
     "estimate",
     "gain",

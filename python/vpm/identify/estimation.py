@@ -20,6 +20,10 @@ Array = NDArray[np.float64]
 #: Evaluations after which a fit is ended as it stands.
 MOST_EVALUATIONS = 40
 
+#: A fit that lowers the sum of squares by less than this share in half of the evaluations that it has to show its worth
+#: hardly comes nearer.
+PROGRESS = 0.05
+
 #: Called after every evaluation with (evaluations so far, root mean square of the weighted residual).
 Progress = Callable[[int, float], None]
 
@@ -54,6 +58,7 @@ def estimate(
     linear_only: bool = False,
     progress: Progress | None = None,
     most_evaluations: int = MOST_EVALUATIONS,
+    worth: Worth | None = None,
 ) -> Estimate:
     """Move ``free`` parameters of ``model`` until the residual of ``data`` is least.
 
@@ -76,6 +81,8 @@ def estimate(
     progress : callable, optional
     most_evaluations : int
         Where to stop in any case.
+    worth : Worth, optional
+        A fit that has not reached it in time ends with the best values until then.
 
     Raises
     ------
@@ -84,7 +91,7 @@ def estimate(
     """
     columns = [model.index(name) for name in free]
     low, high = limits(model, free, bounds or {})
-    counter = _Counter(model, data, columns, progress)
+    counter = _Counter(model, data, columns, progress, worth)
     start = np.clip(model.theta[columns], low, high)
     interrupted = False
     try:
@@ -92,11 +99,11 @@ def estimate(
             start = _linear_step(counter, start, low, high)
             start = start if linear_only else _refine(counter, start, low, high, tolerance, most_evaluations)
         residual, jacobian = counter(start)
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, _HopelessError) as reason:
         if counter.best is None:
             raise
         start, (residual, jacobian) = counter.best
-        interrupted = True
+        interrupted = isinstance(reason, KeyboardInterrupt)
     unseen = unseen_combinations(jacobian, free)
     covariance = _covariance(data, residual, jacobian, unseen, free)
     touching = tuple(
@@ -107,46 +114,107 @@ def estimate(
     return Estimate(tuple(free), start, residual, jacobian, covariance, unseen, touching, counter.count, interrupted)
 
 
-class _Counter:
-    """Evaluates the problem at given values of the free parameters; remembers the last point and the best."""
+@dataclass(frozen=True)
+class Worth:
+    """What a fit has to reach to be worth its time.
 
-    def __init__(self, model: Model, data: AnyProblem | Problem, columns: list[int], progress: Progress | None) -> None:
-        self.model, self.data, self.columns, self.progress = model, data, columns, progress
+    Attributes
+    ----------
+    cost : float
+        Sum of squares that it is to reach.
+    evaluations : int
+        Number of evaluations after which it ends if it has not, and hardly comes nearer.
+    """
+
+    cost: float
+    evaluations: int
+
+    def lost(self, reached: Sequence[float]) -> bool:
+        """Whether least sums of squares after each evaluation say that a fit is not, and will not be."""
+        if len(reached) < self.evaluations or reached[-1] <= self.cost:
+            return False
+        return reached[-1] > (1.0 - PROGRESS) * reached[-1 - self.evaluations // 2]
+
+
+class _HopelessError(Exception):
+    """A fit has not reached what makes it worth its time."""
+
+
+@dataclass(frozen=True)
+class _Point:
+    """Values of the free parameters, and the residual there with its derivative, if that was asked for."""
+
+    x: Array
+    residual: Array
+    slopes: Array | None
+
+
+class _Counter:
+    """Evaluates the problem at given values of the free parameters; remembers the last points and the best.
+
+    A step is tried by its residual alone: derivatives, which take many times as long, are for those that are taken.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        data: AnyProblem | Problem,
+        columns: list[int],
+        progress: Progress | None,
+        worth: Worth | None = None,
+    ) -> None:
+        self.model, self.data, self.columns, self.progress, self.worth = model, data, columns, progress, worth
         self.theta = model.theta.copy()
         self.count = 0
-        self._at: Array | None = None
-        self._value: tuple[Array, Array] | None = None
+        self._tried: _Point | None = None
+        self._whole: _Point | None = None
         self.best: tuple[Array, tuple[Array, Array]] | None = None
         self._least = np.inf
+        self._reached: list[float] = []
 
     def __call__(self, x: Array) -> tuple[Array, Array]:
-        if self._value is None or self._at is None or not np.array_equal(x, self._at):
-            theta = self.theta.copy()
-            theta[self.columns] = x
-            self._value = self._evaluate(theta)
-            self._at = x.copy()
-            self.count += 1
-            if (cost := float(self._value[0] @ self._value[0])) < self._least:
-                self._least, self.best = cost, (self._at, self._value)
-            if self.progress is not None:
-                self.progress(self.count, float(np.sqrt(np.mean(self._value[0] ** 2))))
-        return self._value
+        known = self._whole
+        if known is not None and known.slopes is not None and np.array_equal(x, known.x):
+            return known.residual, known.slopes
+        residual, slopes = self._evaluate(x, self.columns)
+        if self._tried is None or not np.array_equal(x, self._tried.x):
+            self._count(residual)
+        self._whole = _Point(x.copy(), residual, slopes)
+        if (cost := float(residual @ residual)) < self._least:
+            self._least, self.best = cost, (self._whole.x, (residual, slopes))
+        return residual, slopes
 
-    def _evaluate(self, theta: Array) -> tuple[Array, Array]:
+    def residual(self, x: Array) -> Array:
+        for known in (self._tried, self._whole):
+            if known is not None and np.array_equal(x, known.x):
+                return known.residual
+        residual, _ = self._evaluate(x, [])
+        self._count(residual)
+        self._tried = _Point(x.copy(), residual, None)
+        return residual
+
+    def jacobian(self, x: Array) -> Array:
+        return self(x)[1]
+
+    def _count(self, residual: Array) -> None:
+        self.count += 1
+        self._reached.append(min([float(residual @ residual), *self._reached[-1:]]))
+        if self.progress is not None:
+            self.progress(self.count, float(np.sqrt(np.mean(residual**2))))
+        if self.worth is not None and self.worth.lost(self._reached):
+            raise _HopelessError
+
+    def _evaluate(self, x: Array, columns: list[int]) -> tuple[Array, Array]:
         """Infinite where the values make no machine (an inertia that no body has): a step to there is not taken."""
+        theta = self.theta.copy()
+        theta[self.columns] = x
         try:
-            return self.data.evaluate(self.model, theta, self.columns)
+            return self.data.evaluate(self.model, theta, columns)
         except ValueError:
             if self.count == 0:  # the start itself: an error of the input, not of a step
                 raise
             rows = self.data.blocks[-1].samples.stop
-            return np.full(rows, np.inf), np.zeros((rows, len(self.columns)))
-
-    def residual(self, x: Array) -> Array:
-        return self(x)[0]
-
-    def jacobian(self, x: Array) -> Array:
-        return self(x)[1]
+            return np.full(rows, np.inf), np.zeros((rows, len(columns)))
 
 
 def _linear_step(counter: _Counter, start: Array, low: Array, high: Array) -> Array:
@@ -159,7 +227,7 @@ def _linear_step(counter: _Counter, start: Array, low: Array, high: Array) -> Ar
     # reflective method halves them for ever.
     step = lsq_linear(square, -orthogonal.T @ residual, bounds, method="bvls", tol=1e-14)
     candidate = np.clip(start + step.x / lengths, low, high)
-    better = np.sum(counter(candidate)[0] ** 2) <= np.sum(residual**2)
+    better = np.sum(counter.residual(candidate) ** 2) <= np.sum(residual**2)
     return candidate if better else start
 
 
@@ -172,7 +240,9 @@ def _refine(counter: _Counter, start: Array, low: Array, high: Array, tolerance:
     if np.all(np.abs(gradient[interior]) <= 1e-9 * np.sqrt(residual @ residual)):
         return start
     inside = _strictly_inside(start, low, high)
-    if not np.all(np.isfinite(counter(inside)[0])):  # a bound that the simulation does not bear, such as no friction
+    if not np.all(
+        np.isfinite(counter.residual(inside))
+    ):  # a bound that the simulation does not bear, such as no friction
         return start
     result = least_squares(
         counter.residual,
@@ -187,7 +257,7 @@ def _refine(counter: _Counter, start: Array, low: Array, high: Array, tolerance:
         gtol=1e-12,
     )
     solution: Array = result.x
-    return solution if np.sum(counter(solution)[0] ** 2) <= np.sum(residual**2) else start
+    return solution if np.sum(counter.residual(solution) ** 2) <= np.sum(residual**2) else start
 
 
 def _strictly_inside(x: Array, low: Array, high: Array) -> Array:
