@@ -11,7 +11,7 @@ import vpm
 from blind import Case, make_case
 from vpm.discrepancy.confirmation import Data, judge
 from vpm.discrepancy.driven import APART, compare_driven
-from vpm.discrepancy.search import LATE
+from vpm.discrepancy.motion_only import LATE
 from vpm.identify import InverseDynamicsProblem, OutputErrorProblem
 
 

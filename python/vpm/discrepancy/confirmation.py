@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from vpm.discrepancy.motion_only import CREEPING, LATE, Timed, is_dry, timed_in_motion
 from vpm.discrepancy.screening import Alias, Baseline, Probe, size_is_clear
 from vpm.errors import DivergedError
 from vpm.identify import (
@@ -40,10 +41,6 @@ FEW_EVALUATIONS = 6
 #: A refit that has lowered the training error by less than this share of its mean square in so many evaluations, and
 #: hardly goes on, is ended: ten times as much is asked of it on unseen data.
 SLOW_GAIN, SLOW_EVALUATIONS = 0.01, 10
-
-#: Effects under which a joint can stick, and the share of its largest speed below which it may.
-DRY = ("coulomb_friction", "stribeck_friction", "hysteresis")
-CREEPING = 0.05
 
 
 @dataclass(frozen=True)
@@ -180,6 +177,9 @@ def confirm(current: Judged, data: Data, probe: Probe) -> Trial:
         origin = None if origin is None else judged.model.theta
         judged, diverged = _judged(judged.model, free, data, bounds, origin, worth)
     own = free[len(current.free) :]
+    timed = _timed(current, judged, data, probe)
+    if timed is not None:
+        judged, diverged = _judged(judged.model, free, data, {**bounds, **timed.bounds}, origin)
     return Trial(
         probe,
         judged,
@@ -192,7 +192,7 @@ def confirm(current: Judged, data: Data, probe: Probe) -> Trial:
         ),
         gain(current.unseen, judged.unseen * _shrinkage(data.unseen, current, judged), segments(data.unseen)),
         _simulated_gain(current, judged, data),
-        _away_gain(current, judged, data.unseen, probe),
+        timed.unseen if timed is not None else _away_gain(current, judged, data.unseen, probe),
         diverged,
         is_clear(judged, own),
     )
@@ -278,14 +278,21 @@ def _simulated_gain(current: Judged, judged: Judged, data: Data) -> Gain | None:
     return gain(current.simulated, judged.simulated, segments(data.simulation))
 
 
+def _timed(current: Judged, judged: Judged, data: Data, probe: Probe) -> Timed | None:
+    """A late drive or instrument on a machine with dry friction, timed in motion; None for anything else."""
+    if probe.candidate.effect.name not in LATE or not is_dry(current.model) or has_tangent(probe.model, data.training):
+        return None
+    before, late = (current.model, current.free), (judged.model, judged.free)
+    return timed_in_motion(before, late, data.training, data.unseen, judged.bounds)
+
+
 def _away_gain(current: Judged, judged: Judged, data: InverseDynamicsProblem, probe: Probe) -> Gain | None:
     """Gain on samples at which every joint is clearly in motion.
 
     Where a joint with dry friction turns round it sticks for a while, which no smooth law follows, and a late drive or
     sensor imitates that; elsewhere it cannot.
     """
-    dry = any(effect.name in DRY for effect in current.model.effects)
-    if not dry or probe.candidate.effect.site not in {"actuator", "sensor"}:
+    if not is_dry(current.model) or probe.candidate.effect.site not in {"actuator", "sensor"}:
         return None
     counted = np.ones(current.unseen.size)
     speeds = [np.abs(data.state(record)[1]) for record in range(len(data.motions))]

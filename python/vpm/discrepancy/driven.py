@@ -14,10 +14,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import maximum_filter1d
 
-from vpm.discrepancy.confirmation import CREEPING, Data, Judged
+from vpm.discrepancy.confirmation import Data, Judged
 from vpm.discrepancy.floor import own_log
+from vpm.discrepancy.motion_only import in_motion
 from vpm.identify import InverseDynamicsProblem
 from vpm.identify.identifiability import column_lengths
 
@@ -63,7 +63,7 @@ def compare_driven(first: Judged, second: Judged, data: Data) -> Verdict | None:
     mine, its = _own_runs(first, data), _own_runs(second, data)
     if mine is None or its is None:
         return None
-    counted = np.concatenate([_moving(problem) for problem in problems])
+    counted = np.concatenate([in_motion(problem) for problem in problems])
     one = _part(first, problems, mine, its, counted)
     other = _part(second, problems, its, mine, counted)
     return Verdict(min(one[0], other[0]), one[1], other[1])
@@ -81,20 +81,6 @@ def _own_runs(judged: Judged, data: Data) -> list[InverseDynamicsProblem] | None
             return None
         found.append(problem.along_others(judged.model, whole))
     return found
-
-
-def _moving(problem: InverseDynamicsProblem) -> Array:
-    """1 for samples at which every joint is clearly in motion as far as the filters reach, else 0."""
-    speeds = [np.abs(m.velocity) for m in problem.motions]
-    largest = np.max([np.quantile(speed, 0.999, axis=0) for speed in speeds], axis=0)
-    counted = np.zeros(sum(block.time.size for block in problem.blocks))
-    for record, (m, speed) in enumerate(zip(problem.motions, speeds, strict=True)):
-        slow = (speed < CREEPING * largest).any(axis=1)
-        reach = m.decimation + round(1.0 / (m.cutoff * m.dt))
-        near = maximum_filter1d(slow.view(np.uint8), 2 * reach + 1)[m.retained] > 0
-        for block in problem.efforts(record):
-            counted[block.samples] = ~near
-    return counted
 
 
 def _part(

@@ -13,6 +13,7 @@ from vpm.discrepancy.candidates import Candidate, Key, candidates, left_out
 from vpm.discrepancy.confirmation import Data, Judged, Trial, confirm, judge
 from vpm.discrepancy.diagnosis import Ambiguity, RankedCandidate, RefusedEffect
 from vpm.discrepancy.driven import compare_driven
+from vpm.discrepancy.motion_only import LATE
 from vpm.discrepancy.refusal import (
     LEAST_GAIN,
     NORMAL_95_ONE_SIDED,
@@ -32,8 +33,10 @@ from vpm.identify import gain, segments
 from vpm.identify.along import bends
 from vpm.identify.tangent import has_tangent
 
-#: Candidates refitted in one round.
-SHORT_LIST = 7
+#: Candidates refitted in one round: those that promise most for their numbers, and those that promise most of all.
+#: Without the latter, several names of one regressor, as a constant force and a tilted world, crowd out a law of two
+#: numbers that takes more than any of them.
+SHORT_LIST, RICHEST = 7, 2
 #: An instrument is blamed for what the machine may have done only if it leaves less than this share of the gap.
 SENSOR_SHARE = 0.25
 
@@ -41,8 +44,6 @@ SENSOR_SHARE = 0.25
 HEAVY = ("joint_compliance", "backlash", "link_flexibility")
 #: What leaves up to so many times as much as the best explains the data as well, if it is also little of the whole gap.
 SAME = 1.5
-#: A lag, and the delays that it may be taken for.
-LATE = ("actuator_lag", "input_delay", "sensor_delay")
 #: Difference of two logarithms of evidence that says nothing.
 TIE = 0.01
 #: Share by which what screening promises of two candidates may differ by rounding alone.
@@ -224,7 +225,7 @@ class _Round:
 
     def confirm(self) -> None:
         """Refit with the most promising ones and judge them on unseen data."""
-        short_list = self._promising[:SHORT_LIST]
+        short_list = _short_list(self._promising)
         if short_list:
             self.tell(f"round {self.number}: refitting with {', '.join(p.candidate.label for p in short_list)}")
         twins = _twins(short_list)
@@ -237,8 +238,9 @@ class _Round:
             if key in twins and one not in again:
                 effect, site = twins[key]
                 self.refused[key] = f"it is {effect} at {site} by another name here: {self.refused[twins[key]]}"
-        for result in self._promising[SHORT_LIST:]:
-            self.refused[result.candidate.key] = (
+        tried = {one.candidate.key for one in short_list}
+        for key in (p.candidate.key for p in self._promising if p.candidate.key not in tried):
+            self.refused[key] = (
                 f"{SHORT_LIST} candidates explain more of the training residual, and none of them was enough"
             )
 
@@ -332,6 +334,12 @@ def _twins(short_list: Sequence[Probe]) -> dict[Key, Key]:
             if heavy and same and other.candidate.key not in found:
                 found[one.candidate.key] = other.candidate.key
     return found
+
+
+def _short_list(promising: Sequence[Probe]) -> list[Probe]:
+    """What is refitted, of probes by falling score."""
+    richest = {p.candidate.key for p in sorted(promising, key=lambda p: -p.drop)[:RICHEST]}
+    return [p for rank, p in enumerate(promising) if rank < SHORT_LIST or p.candidate.key in richest]
 
 
 def _promise(candidate: RankedCandidate) -> tuple[int, float]:

@@ -1,0 +1,137 @@
+"""Late drives and instruments, timed on samples at which every joint is clearly in motion.
+
+Where a joint with dry friction turns round it sticks for a while, and filtered samples do not say when it lets go: what
+is left of the balance there is several times what is left elsewhere, and it is late by itself. A time fitted to all
+samples comes out too long for it (twice the true delay of a stiff axis is usual), long enough to make its simulation
+worse. In clear motion friction is as smooth as the rest, so a time is fitted there, and kept within what that says when
+all the other parameters are fitted to all samples.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter1d
+
+from vpm.identify import Gain, InverseDynamicsProblem, estimate, gain, segments
+from vpm.identify.identifiability import column_lengths
+from vpm.model import Model
+
+Array = NDArray[np.float64]
+
+#: Effects under which a joint can stick, and the share of its largest speed below which it may.
+DRY = ("coulomb_friction", "stribeck_friction", "hysteresis")
+CREEPING = 0.05
+#: A lag, and the delays that it may be taken for.
+LATE = ("actuator_lag", "input_delay", "sensor_delay")
+#: Samples in clear motion that a fit needs, for each fitted number.
+FEWEST = 10
+#: A parameter that shows less of itself in motion than this share of its regressor's power stays as it is.
+SHOWN = 0.1
+#: Standard deviations around a time fitted in motion within which it stays when all samples are fitted.
+WITHIN = 2.0
+#: A fit stops when the sum of squares changes by less than this share.
+TOLERANCE = 1e-6
+
+
+class InMotion:
+    """A balance of effort of which only samples count at which every joint is clearly in motion."""
+
+    mode = InverseDynamicsProblem.mode
+
+    def __init__(self, data: InverseDynamicsProblem) -> None:
+        self.data, self.blocks, self.counted = data, data.blocks, in_motion(data)
+
+    def evaluate(self, model: Model, theta: Array, columns: Sequence[int] = ()) -> tuple[Array, Array]:
+        """See `vpm.identify.problem.Problem`."""
+        residual, jacobian = self.data.evaluate(model, theta, columns)
+        return self.counted * residual, self.counted[:, None] * jacobian
+
+
+@dataclass(frozen=True)
+class Timed:
+    """An effect that was timed in motion.
+
+    Attributes
+    ----------
+    bounds : dict
+        Of its own parameters, by dotted name.
+    unseen : Gain
+        On unseen samples in motion, against the model without it that was fitted to the same samples.
+    """
+
+    bounds: Mapping[str, tuple[float, float]]
+    unseen: Gain
+
+
+def is_dry(model: Model) -> bool:
+    """Whether a joint of a model can stick."""
+    return any(effect.name in DRY for effect in model.effects)
+
+
+def in_motion(problem: InverseDynamicsProblem) -> Array:
+    """1 for samples at which every joint is clearly in motion as far as the filters reach, else 0, shape (n,)."""
+    speeds = [np.abs(m.velocity) for m in problem.motions]
+    largest = np.max([np.quantile(speed, 0.999, axis=0) for speed in speeds], axis=0)
+    counted = np.zeros(sum(block.time.size for block in problem.blocks))
+    for record, (m, speed) in enumerate(zip(problem.motions, speeds, strict=True)):
+        slow = (speed < CREEPING * largest).any(axis=1)
+        reach = m.decimation + round(1.0 / (m.cutoff * m.dt))
+        near = maximum_filter1d(slow.view(np.uint8), 2 * reach + 1)[m.retained] > 0
+        for block in problem.efforts(record):
+            counted[block.samples] = ~near
+    return counted
+
+
+def timed_in_motion(
+    current: tuple[Model, Sequence[str]],
+    late: tuple[Model, Sequence[str]],
+    training: InverseDynamicsProblem,
+    unseen: InverseDynamicsProblem,
+    bounds: Mapping[str, tuple[float, float]],
+) -> Timed | None:
+    """Fit a model without a late effect and with it to the samples in motion; None where those are too few.
+
+    Parameters
+    ----------
+    current, late : (Model, sequence of str)
+        Without the effect and with it, each with its free parameters; those that only ``late`` has are the effect's.
+    training, unseen : InverseDynamicsProblem
+    bounds : mapping
+        Bounds of free parameters that replace those of the models.
+    """
+    fitted, predicted = InMotion(training), InMotion(unseen)
+    own = [name for name in late[1] if name not in current[1]]
+    if np.count_nonzero(fitted.counted) < FEWEST * (len(late[1]) + 1) or not np.any(predicted.counted):
+        return None
+    left, spread = [], {}
+    for model, free in (current, late):
+        shown = _shown(model, free, fitted, own)
+        fit = estimate(model, fitted, shown, bounds=bounds, tolerance=TOLERANCE)
+        values = dict(zip(shown, map(float, fit.values), strict=True))
+        moved = model.with_parameters(values)
+        left.append(predicted.evaluate(moved, moved.theta)[0])
+        spread = {name: (values[name], float(s)) for name, s in zip(shown, fit.std, strict=True) if name in own}
+    if not np.all(np.isfinite([s for _, s in spread.values()])):
+        return None
+    near = {name: _near(late[0], name, *spread[name], bounds) for name in own}
+    return Timed(near, gain(left[0], left[1], segments(unseen)))
+
+
+def _near(
+    model: Model, name: str, value: float, std: float, bounds: Mapping[str, tuple[float, float]]
+) -> tuple[float, float]:
+    parameter = model.parameters[name]
+    low, high = bounds.get(name, (parameter.minimum, parameter.maximum))
+    return max(low, value - WITHIN * std), min(high, value + WITHIN * std)
+
+
+def _shown(model: Model, free: Sequence[str], problem: InMotion, own: Sequence[str]) -> list[str]:
+    """Free parameters that show themselves in motion, and those of the late effect."""
+    columns = [model.index(name) for name in free]
+    _, whole = problem.data.evaluate(model, model.theta, columns)
+    shares = np.sum((problem.counted[:, None] * whole) ** 2, axis=0) / column_lengths(whole) ** 2
+    return [name for name, share in zip(free, shares, strict=True) if name in own or share >= SHOWN]
