@@ -9,7 +9,7 @@ from synthetic import Truth, nominal, simulate_axis
 from vpm.discrepancy import diagnose
 from vpm.discrepancy.diagnosis import RankedCandidate
 from vpm.discrepancy.floor import white_level
-from vpm.discrepancy.search import _promise
+from vpm.discrepancy.round import _promise
 from vpm.discrepancy.structure import structure
 from vpm.identify import InverseDynamicsProblem
 

@@ -6,11 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from vpm.discrepancy.candidates import Candidate, candidates
+from vpm.discrepancy.choice import Accepted
 from vpm.discrepancy.confirmation import Data, Judged, Trial, confirm, judge
 from vpm.discrepancy.diagnosis import Ambiguity
 from vpm.discrepancy.refusal import LEAST_GAIN
+from vpm.discrepancy.round import HEAVY
 from vpm.discrepancy.screening import Probe, impossible_values, probe
-from vpm.discrepancy.search import HEAVY, Accepted
 from vpm.errors import DivergedError
 from vpm.identify import gain, segments
 from vpm.identify.along import bends

@@ -14,6 +14,7 @@ from vpm.catalogue import EFFECTS
 from vpm.compare import compare
 from vpm.discrepancy.ambiguity import Rivals, listed, rivals
 from vpm.discrepancy.candidates import slow_speeds
+from vpm.discrepancy.choice import Accepted
 from vpm.discrepancy.confirmation import Data, Judged, is_clear, judge
 from vpm.discrepancy.diagnosis import (
     AcceptedEffect,
@@ -23,11 +24,12 @@ from vpm.discrepancy.diagnosis import (
     Picture,
     Step,
 )
+from vpm.discrepancy.elimination import Stage
 from vpm.discrepancy.empirical import beside
 from vpm.discrepancy.evidence import gather
 from vpm.discrepancy.floor import noise_floor
 from vpm.discrepancy.remainder import Remainder, remainder
-from vpm.discrepancy.search import Accepted, Search, Stage, ambiguities, search
+from vpm.discrepancy.search import Search, ambiguities, search
 from vpm.discrepancy.side_by_side import Progress, SideBySide
 from vpm.discrepancy.structure import structure
 from vpm.discrepancy.telling_apart import experiments as experiments_for

@@ -1,0 +1,117 @@
+"""Which of several believed candidates comes in: little left, few numbers, the machine before its instruments."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from vpm.catalogue import EFFECTS
+from vpm.discrepancy.candidates import Key
+from vpm.discrepancy.confirmation import Data, Trial
+from vpm.discrepancy.driven import compare_driven
+from vpm.discrepancy.motion_only import LATE
+from vpm.discrepancy.refusal import LEAST_GAIN
+from vpm.discrepancy.structural import coupled
+
+#: An instrument is blamed for what the machine may have done only if it leaves less than this share of the gap.
+SENSOR_SHARE = 0.25
+#: What leaves up to so many times as much as the best explains the data as well, if it is also little of the whole gap.
+SAME = 1.5
+#: Difference of two logarithms of evidence that says nothing.
+TIE = 0.01
+#: A refinement leaves less than this share of the mean square that the plainer effect leaves.
+REFINED = 0.5
+
+
+@dataclass(frozen=True)
+class Accepted:
+    """An effect that came in, the trial that let it in, and those that would have done as well."""
+
+    trial: Trial
+    rivals: tuple[str, ...]
+
+    @property
+    def key(self) -> Key:
+        """Effect and site."""
+        return self.trial.probe.candidate.key
+
+
+def choose(believed: Sequence[Trial], data: Data) -> Accepted:
+    """The candidate that leaves least for its numbers; of those that are as good, the best simulation.
+
+    One that refines another only takes its place if it leaves less than ``REFINED`` of what that leaves.
+    """
+    first = min(believed, key=_cost)
+    plain = [t for t in believed if _plainer(t, first)]
+    first = min(plain, key=_cost) if plain else first
+    equals = [t for t in believed if _as_good(t, first)]
+    chosen = _late_or_slow(_first_named(equals), believed, data)
+    return Accepted(chosen, tuple(t.probe.candidate.label for t in equals if t is not chosen))
+
+
+def _late_or_slow(chosen: Trial, believed: Sequence[Trial], data: Data) -> Trial:
+    """Of delay and lag, where both would do: what the reference tells from the other, else the delay.
+
+    A delay shifts in time; a lag does so too and weakens what is fast, which has to be seen.
+    """
+    if chosen.probe.candidate.effect.name not in LATE:
+        return chosen
+    alike = [t for t in believed if t.probe.candidate.effect.name in LATE and _left(t) <= SAME * _left(chosen)]
+    lags = [t for t in alike if t.probe.candidate.effect.name == LATE[0]]
+    delays = [t for t in alike if t not in lags]
+    if not lags or not delays:
+        return chosen
+    lag, delay = min(lags, key=_evidence), min(delays, key=_evidence)
+    told = compare_driven(lag.judged, delay.judged, data)
+    if told is None:
+        return chosen
+    return lag if told.prefers_first else delay
+
+
+def _first_named(equals: Sequence[Trial]) -> Trial:
+    """The trial with the best evidence; of several that no digit of the data parts, the first in the catalogue.
+
+    On a single link a drive that winds up and a link that bends at its root are one and the same model, and rounding
+    would decide.
+    """
+    best = min(map(_evidence, equals))
+    tied = [t for t in equals if _evidence(t) <= best + TIE]
+    return min(tied, key=lambda t: list(EFFECTS).index(t.probe.candidate.effect.name))
+
+
+def _left(trial: Trial) -> float:
+    """Share of the unseen mean square that a trial leaves."""
+    return max(1.0 - trial.unseen.relative, 1e-12)
+
+
+def _cost(trial: Trial) -> float:
+    """Information criterion of G. Schwarz (*Annals of Statistics* 6, 1978) per independent piece of the unseen data."""
+    pieces = max(trial.unseen.pieces, 3)
+    return float(np.log(_left(trial)) + len(trial.parameters) * np.log(pieces) / pieces)
+
+
+def _plainer(trial: Trial, first: Trial) -> bool:
+    """Whether a trial says in fewer numbers nearly what ``first`` says, at the same site and confusable with it."""
+    mine, other = trial.probe.candidate, first.probe.candidate
+    alike = other.effect.name in mine.effect.confused_with or mine.effect.name in other.effect.confused_with
+    fewer = len(trial.parameters) < len(first.parameters)
+    return mine.site == other.site and alike and fewer and REFINED * _left(trial) <= _left(first)
+
+
+def _as_good(trial: Trial, first: Trial) -> bool:
+    """Whether a trial explains the unseen data as the first one does, with no more numbers."""
+    close = trial.unseen.relative >= first.unseen.relative - LEAST_GAIN and _left(trial) <= SAME * _left(first)
+    return close and len(trial.parameters) <= len(first.parameters)
+
+
+def _evidence(trial: Trial) -> float:
+    """Logarithm of what is left of the gap in both views; the machine is blamed before its instruments."""
+    left = np.log(max(trial.unseen.after, 1e-300) / trial.unseen.before)
+    if trial.probe.candidate.effect.site == "sensor":
+        left -= np.log(SENSOR_SHARE)
+    # Errors of coupled joints cancel; see refusal.CLEAR_GAIN.
+    if trial.simulated is not None and trial.simulated.before > 0.0 and not coupled(trial.judged.model):
+        left += np.log(max(trial.simulated.after, 1e-300) / trial.simulated.before)
+    return float(left)

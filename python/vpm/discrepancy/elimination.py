@@ -1,0 +1,98 @@
+"""What later effects make superfluous is dropped, and what kept candidates apart is loosened once the names stand."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from vpm.discrepancy.candidates import Key
+from vpm.discrepancy.choice import Accepted
+from vpm.discrepancy.confirmation import Data, Judged, judge
+from vpm.discrepancy.refusal import LEAST_GAIN, NORMAL_95_ONE_SIDED
+from vpm.errors import DivergedError, ModelError
+from vpm.identify import gain, segments
+
+#: Factor by which the last fit may exceed the bound of a transition velocity.
+MORE_ROOM = 3.0
+
+
+@dataclass(frozen=True)
+class Stage:
+    """The model at one point of the search; ``change`` is "recalibrated", "added" or "removed"."""
+
+    change: str
+    effect: str
+    site: str
+    judged: Judged
+
+
+def drop_replaced(stages: list[Stage], accepted: list[Accepted], data: Data, dropped: dict[Key, str]) -> None:
+    """Backward elimination: drop every earlier effect without which the model predicts the unseen data as well.
+
+    Where a parameter of a later effect was held because the data show it only together with one of the earlier effect,
+    it is set free for the trial: a spring whose rest was held beside a constant force needs that force no more if it
+    may rest elsewhere. One name for what two would say is the shorter answer. A size that was held is another force
+    under another name, as a difference of dry friction is a constant one in motion: the first one named stays.
+    """
+    newest = accepted[-1]
+    for entry in accepted[:-1]:
+        current = stages[-1].judged
+        own = set(entry.trial.parameters)
+        freed = {alias.parameter for other in accepted for alias in other.trial.held if alias.partner in own}
+        if any(current.model.parameters[name].kind == "linear" for name in freed):
+            continue
+        try:
+            model = current.model.without_effect(*entry.key)
+            known = tuple(name for name in current.free if name in model.parameters)
+            free = (*known, *sorted(name for name in freed - set(known) if name in model.parameters))
+            bounds = {name: pair for name, pair in current.bounds.items() if name in free}
+            reduced = judge(model, free, data, bounds)
+        except (DivergedError, ModelError):
+            continue  # without it the model cannot follow the unseen data at all, or another effect cannot stand
+        loss = gain(reduced.unseen, current.unseen, segments(data.unseen))
+        if loss.relative < LEAST_GAIN:
+            accepted.remove(entry)
+            accepted[:] = [_released(other, freed) for other in accepted]
+            stages.append(Stage("removed", *entry.key, reduced))
+            dropped[entry.key] = f"it is not needed any more beside {newest.trial.probe.candidate.label}"
+
+
+def without_tight_bounds(final: Judged, data: Data) -> Judged:
+    """The same model fitted with more room where a transition velocity stands at its upper bound.
+
+    The bound keeps dry friction apart from viscous friction while candidates compete; once the names stand, it need not
+    cut the fit short. The training records decide, and the unseen ones may not be predicted worse for it.
+    """
+    bounds = dict(final.bounds)
+    for name, (low, high) in final.bounds.items():
+        shape = name.endswith("transition_velocity") and name in final.free
+        if shape and final.model.parameters[name].value > 0.999 * high:
+            bounds[name] = low, MORE_ROOM * high
+    if bounds == final.bounds:
+        return final
+    try:
+        refitted = judge(final.model, final.free, data, bounds)
+    except DivergedError:
+        return final
+    better = gain(final.fit.residual, refitted.fit.residual, segments(data.training)).relative > LEAST_GAIN
+    kept = gain(final.unseen, refitted.unseen, segments(data.unseen)).harm <= NORMAL_95_ONE_SIDED
+    return refitted if better and kept else final
+
+
+def _released(entry: Accepted, freed: set[str]) -> Accepted:
+    """An accepted effect of which parameters that were held are fitted now."""
+    trial = entry.trial
+    mine = tuple(alias.parameter for alias in trial.held if alias.parameter in freed)
+    if not mine:
+        return entry
+    held = tuple(alias for alias in trial.held if alias.parameter not in freed)
+    return replace(entry, trial=replace(trial, held=held, parameters=(*trial.parameters, *mine)))
+
+
+def settled(best: Accepted, data: Data) -> Accepted:
+    """What was fitted on a tangent, fitted to the end: the next round starts from it."""
+    judged = best.trial.judged
+    try:
+        exact = judge(judged.model, judged.free, data, dict(judged.bounds))
+    except DivergedError:
+        return best
+    return replace(best, trial=replace(best.trial, judged=exact))

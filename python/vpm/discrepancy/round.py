@@ -1,0 +1,208 @@
+"""One round of the search: screen every candidate, refit with the most promising, believe or refuse each."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import cached_property, partial
+
+from vpm.discrepancy.candidates import Candidate, Key, candidates, left_out
+from vpm.discrepancy.choice import Accepted, choose
+from vpm.discrepancy.confirmation import Data, Judged, Trial, confirm
+from vpm.discrepancy.diagnosis import RankedCandidate
+from vpm.discrepancy.refusal import Thresholds, refuse_probe, refuse_timing, refuse_trial
+from vpm.discrepancy.ringing import NOISE_ONLY, noise_alone, only_ringing
+from vpm.discrepancy.screening import Probe, prepare, probe
+from vpm.discrepancy.side_by_side import Failure, SideBySide
+from vpm.discrepancy.structure import structure
+from vpm.discrepancy.timing import InTime, in_time
+from vpm.identify import gain, segments
+from vpm.identify.along import bends
+
+#: Candidates refitted in one round: those that promise most for their numbers, and those that promise most of all.
+#: Without the latter, several names of one regressor, as a constant force and a tilted world, crowd out a law of two
+#: numbers that takes more than any of them.
+SHORT_LIST, RICHEST = 7, 2
+#: Effects that add a motion nobody measures, which has to be simulated for every probe.
+HEAVY = ("joint_compliance", "backlash", "link_flexibility")
+#: Share by which what screening promises of two candidates may differ by rounding alone.
+TWIN = 1e-6
+#: Where links bend already, the noise of the measured motion rings in them: a spring more has to promise this share of
+#: the residual, and only the best is refitted.
+RINGING, FEW = 0.2, 1
+
+#: Called with a sentence on what is being done.
+Tell = Callable[[str], None]
+
+
+class Round:
+    """One round of the search."""
+
+    def __init__(self, current: Judged, data: Data, number: int, tell: Tell, each: SideBySide) -> None:
+        self.current, self.data, self.number, self.tell, self.each = current, data, number, tell, each
+        self.refused: dict[Key, str] = {}
+        self._ranking: dict[Key, RankedCandidate] = {}
+        self._promising: list[Probe] = []
+        self._believed: list[Trial] = []
+
+    def done(self) -> bool:
+        """Whether what is left is noise alone, as far as links that bend make it ring."""
+        return noise_alone(self.current.model, self.data, self.timed.unseen)
+
+    def light(self, effects: Sequence[str] | None, without: set[Key]) -> Accepted | None:
+        """The best of the candidates whose regressor follows from the measured motion alone."""
+        self.screen(effects, without, heavy=False)
+        self.confirm()
+        return self.best()
+
+    def heavy(self, effects: Sequence[str] | None, without: set[Key]) -> Accepted | None:
+        """The best of those with a motion of their own, tried only where more than noise is left to explain."""
+        left = structure(self.current.model, self.data.training, self.data.unseen, self.timed.fitted, self.timed.unseen)
+        if not left.present and left.coloured <= NOISE_ONLY:
+            return None
+        if self.done():
+            return None
+        self._promising = []
+        self.screen(effects, without, heavy=True)
+        self.confirm()
+        return self.best()
+
+    def screen(self, effects: Sequence[str] | None, without: set[Key], *, heavy: bool) -> None:
+        """Probe every candidate and set aside those that cannot be."""
+        current, data = self.current, self.data
+        found = candidates(current.model, data.training, current.fit.residual, effects)
+        self.refused.update(left_out(current.model, data.training, effects))
+        listed = [c for c in found if c.key not in without and self._is_heavy(c) == heavy]
+        self.tell(f"round {self.number}: screening {len(listed)} candidates")
+        screen = partial(probe, prepare(current.baseline, data.training, listed), data.training)
+        results = self.each(f"round {self.number}: screening", screen, listed, lambda c: c.label)
+        for candidate, result in zip(listed, results, strict=True):
+            key = candidate.key
+            if isinstance(result, Failure):
+                self._ranking[key] = RankedCandidate(*key, self.number, 0.0, float("nan"), accepted=False)
+                self.refused[key] = result.reason
+                continue
+            self._ranking[key] = RankedCandidate(*key, self.number, result.drop, float("nan"), accepted=False)
+            if reason := refuse_probe(result):
+                self.refused[key] = reason
+            else:
+                self._promising.append(result)
+        self._promising.sort(key=lambda p: -p.score)
+        if heavy and bends(current.model):
+            for one in self._promising:
+                if one.drop < RINGING:
+                    self.refused[one.candidate.key] = (
+                        f"it would lower the training error by {100.0 * one.drop:.2g} % of its mean square, which "
+                        "links that ring along a noisy motion leave as well"
+                    )
+            self._promising = [one for one in self._promising if one.drop >= RINGING][:FEW]
+
+    def _is_heavy(self, candidate: Candidate) -> bool:
+        """Whether it adds a motion that nobody measures; where the log holds that motion, it is evidence like any.
+
+        So is the bending of a rigid beam beside others that bend: light effects would only imitate it.
+        """
+        model, name = self.current.model, candidate.effect.name
+        if bends(model) and name == "link_flexibility" and candidate.site in model.beams:
+            return False
+        logged = {f"{candidate.site}_{suffix}.position" for suffix in ("bending", "deflection")}
+        return name in HEAVY and not logged & set(self.data.training.shown)
+
+    def confirm(self) -> None:
+        """Refit with the most promising ones and judge them on unseen data."""
+        short_list = _short_list(self._promising)
+        if short_list:
+            self.tell(f"round {self.number}: refitting with {', '.join(p.candidate.label for p in short_list)}")
+        twins = _twins(short_list)
+        self._refit([one for one in short_list if one.candidate.key not in twins])
+        believed = {trial.probe.candidate.key for trial in self._believed}
+        again = [one for one in short_list if twins.get(one.candidate.key) in believed]
+        self._refit(again)
+        for one in short_list:
+            key = one.candidate.key
+            if key in twins and one not in again:
+                effect, site = twins[key]
+                self.refused[key] = f"it is {effect} at {site} by another name here: {self.refused[twins[key]]}"
+        tried = {one.candidate.key for one in short_list}
+        for key in (p.candidate.key for p in self._promising if p.candidate.key not in tried):
+            self.refused[key] = (
+                f"{SHORT_LIST} candidates explain more of the training residual, and none of them was enough"
+            )
+
+    def _refit(self, short_list: Sequence[Probe]) -> None:
+        """Refit with each of some candidates, and believe or refuse it."""
+        tried = len(self._ranking) * self.number
+        thresholds = Thresholds(tried, min(m.dt for m in self.data.training.motions))
+        refit = partial(confirm, self.current, self.data)
+        trials = self.each(f"round {self.number}: refitting", refit, short_list, lambda p: p.candidate.label)
+        for tried_one, trial in zip(short_list, trials, strict=True):
+            key = tried_one.candidate.key
+            if isinstance(trial, Failure):
+                self.refused[key] = trial.reason
+                continue
+            self._ranking[key] = replace(self._ranking[key], unseen=trial.unseen.relative)
+            if reason := self._refused(trial, thresholds):
+                self.refused[key] = reason
+            else:
+                self._believed.append(trial)
+
+    @cached_property
+    def timed(self) -> InTime:
+        """Residuals of the model at hand with what the times of samples leave open."""
+        return in_time(self.current, self.data)
+
+    def _refused(self, trial: Trial, thresholds: Thresholds) -> str:
+        """Why a trial is not believed, or ""."""
+        reason = refuse_trial(trial, thresholds) or self._only_timing(trial, thresholds)
+        return reason or only_ringing(self.current, self.data, trial)
+
+    def _only_timing(self, trial: Trial, thresholds: Thresholds) -> str:
+        """Why a trial that would be believed does no more than a shift of the commands does, or ""."""
+        if self.timed.shift == 0.0:
+            return ""
+        unseen = in_time(trial.judged, self.data).unseen
+        timed = gain(self.timed.unseen, unseen, segments(self.data.unseen))
+        return refuse_timing(timed, self.timed.shift, thresholds)
+
+    def best(self) -> Accepted | None:
+        """The one that comes in, if any is believed."""
+        if not self._believed:
+            return None
+        best = choose(self._believed, self.data)
+        self._ranking[best.key] = replace(self._ranking[best.key], accepted=True)
+        return best
+
+    def ranked(self) -> list[RankedCandidate]:
+        """Candidates of this round: what was accepted, what helped on unseen data, then by what screening promises."""
+        return sorted(self._ranking.values(), key=_promise)
+
+
+def _twins(short_list: Sequence[Probe]) -> dict[Key, Key]:
+    """Candidates with a motion of their own that are an earlier one by another name, with that one.
+
+    A rigid link that bends at its root is a drive that winds up: no digit of what screening says parts the two. Refits
+    of such machines take long, so that one of each pair has to be enough where it is refused.
+    """
+    found: dict[Key, Key] = {}
+    for place, one in enumerate(short_list):
+        for other in short_list[:place]:
+            heavy = {one.candidate.effect.name, other.candidate.effect.name} == {"joint_compliance", "link_flexibility"}
+            same = len(one.free) == len(other.free) and abs(one.drop - other.drop) <= TWIN * abs(other.drop)
+            if heavy and same and other.candidate.key not in found:
+                found[one.candidate.key] = other.candidate.key
+    return found
+
+
+def _short_list(promising: Sequence[Probe]) -> list[Probe]:
+    """What is refitted, of probes by falling score."""
+    richest = {p.candidate.key for p in sorted(promising, key=lambda p: -p.drop)[:RICHEST]}
+    return [p for rank, p in enumerate(promising) if rank < SHORT_LIST or p.candidate.key in richest]
+
+
+def _promise(candidate: RankedCandidate) -> tuple[int, float]:
+    """Sorts a ranking."""
+    if candidate.accepted:
+        return 0, 0.0
+    if candidate.unseen > 0.0:
+        return 1, -candidate.unseen
+    return 2, -candidate.screened
