@@ -228,7 +228,12 @@ def passive_joints(experiment: Experiment, model: Model) -> tuple[str, ...]:
 
 
 def joint_motion(
-    experiment: Experiment, model: Model, cutoff: float | None = None, *, commanded: bool = False
+    experiment: Experiment,
+    model: Model,
+    cutoff: float | None = None,
+    *,
+    commanded: bool = False,
+    band: float | None = None,
 ) -> Motion:
     """Filtered motion of the joints, as `vpm.experiment.motion` gives it.
 
@@ -238,7 +243,7 @@ def joint_motion(
     passive = passive_joints(experiment, model)
     followed = tuple(name for name in model.joints if name not in passive)
     inputs = (model.input_channels, tuple(model.optional_inputs)) if commanded else ((), ())
-    return motion(experiment, _Joints(model.name, followed or model.joints, *inputs), cutoff=cutoff)
+    return motion(experiment, _Joints(model.name, followed or model.joints, *inputs), cutoff=cutoff, band=band)
 
 
 def _fit_start(experiment: Experiment, channel: str, samples: int = 15) -> tuple[float, float]:

@@ -115,9 +115,9 @@ def _of_instruments(
 ) -> list[Array]:
     """Powers of what the noise of all instruments makes of each shown channel, by adding it once more."""
     one = [problem.experiments[record]]
-    cutoff = problem.motions[record].cutoff
-    clean = InverseDynamicsProblem(model, one, cutoff=cutoff)
-    noisy = InverseDynamicsProblem(model, [with_noise(model, one[0], generator)], cutoff=cutoff)
+    cutoff, band = problem.motions[record].cutoff, problem.motions[record].band
+    clean = InverseDynamicsProblem(model, one, cutoff=cutoff, band=band)
+    noisy = InverseDynamicsProblem(model, [with_noise(model, one[0], generator)], cutoff=cutoff, band=band)
     change = noisy.evaluate(model, model.theta)[0] / _weights(noisy) - clean.evaluate(model, model.theta)[0] / (
         _weights(clean)
     )

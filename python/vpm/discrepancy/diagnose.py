@@ -27,6 +27,7 @@ from vpm.discrepancy.diagnosis import (
 from vpm.discrepancy.elimination import Stage
 from vpm.discrepancy.empirical import beside
 from vpm.discrepancy.evidence import gather
+from vpm.discrepancy.filters import filters
 from vpm.discrepancy.floor import noise_floor
 from vpm.discrepancy.remainder import Remainder, remainder
 from vpm.discrepancy.search import Search, ambiguities, search
@@ -234,12 +235,15 @@ def _data(
 ) -> Data:
     fitted = InverseDynamicsProblem(model, training, cutoff=cutoff)
     # One filter for all records: a gap that is measured in another band is another gap.
-    predicted = InverseDynamicsProblem(model, unseen, cutoff=cutoff or min(m.cutoff for m in fitted.motions))
+    states, band = filters(model, fitted, cutoff)
+    if states > min(m.cutoff for m in fitted.motions):
+        fitted = InverseDynamicsProblem(model, training, cutoff=states, band=band)
+    predicted = InverseDynamicsProblem(model, unseen, cutoff=states, band=band)
     for problem in (fitted, predicted):
         for number, (record, m) in enumerate(zip(problem.experiments, problem.motions, strict=True)):
             still = problem.standstill(number)
             rest = f"; {100 * still:.0f} % at standstill left out of the balance" if still > 0.0 else ""
-            notes.append(f"{record.name}: motion filtered at {m.cutoff:.4g} Hz, decimated by {m.decimation}{rest}")
+            notes.append(f"{record.name}: motion filtered at {m.cutoff:.4g} Hz, compared up to {m.band:.3g} Hz{rest}")
     notes.append(f"unseen records simulated in mode {mode}")
     return Data(fitted, predicted, OutputErrorProblem(model, unseen, mode, setup=setup))
 

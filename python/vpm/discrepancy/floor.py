@@ -48,14 +48,15 @@ def noise_floor(
     setup : Setup, optional
     """
     generator = np.random.default_rng(SEED)
-    cutoffs = [m.cutoff for m in unseen.motions]
+    filters = [(m.cutoff, m.band) for m in unseen.motions]
     expected: dict[str, list[tuple[float, int]]] = {}
-    for experiment, cutoff in zip(unseen.experiments, cutoffs, strict=True):
+    for experiment, (cutoff, band) in zip(unseen.experiments, filters, strict=True):
         own = own_log(model, experiment, setup, generator) if mode == "closed_loop" else None
-        change = _balance(model, own, cutoff) if own is not None else None
+        change = _balance(model, own, cutoff, band) if own is not None else None
         if change is None:
-            clean = InverseDynamicsProblem(model, [experiment], cutoff=cutoff)
-            noisy = InverseDynamicsProblem(model, [with_noise(model, experiment, generator)], cutoff=cutoff)
+            clean = InverseDynamicsProblem(model, [experiment], cutoff=cutoff, band=band)
+            once_more = with_noise(model, experiment, generator)
+            noisy = InverseDynamicsProblem(model, [once_more], cutoff=cutoff, band=band)
             change = clean, noisy.evaluate(model, model.theta)[0] - clean.evaluate(model, model.theta)[0]
         for channel, (rms, _, _) in gaps(*change).items():
             expected.setdefault(channel, []).append((rms**2, change[1].size))
@@ -128,9 +129,9 @@ def own_log(
     return own
 
 
-def _balance(model: Model, own: Experiment, cutoff: float) -> tuple[InverseDynamicsProblem, Array] | None:
+def _balance(model: Model, own: Experiment, cutoff: float, band: float) -> tuple[InverseDynamicsProblem, Array] | None:
     try:
-        problem = InverseDynamicsProblem(model, [own], cutoff=cutoff)
+        problem = InverseDynamicsProblem(model, [own], cutoff=cutoff, band=band)
         return problem, problem.evaluate(model, model.theta)[0]
     except VpmError:
         return None

@@ -12,7 +12,15 @@ from numpy.typing import NDArray
 from vpm.errors import ExperimentError, near_match
 from vpm.experiment.cutoff import HIGHEST, CutoffChoice, choose_cutoff
 from vpm.experiment.record import Experiment
-from vpm.experiment.signal import decimation_for, differentiate, lowpass, parallel_filter, settling_samples
+from vpm.experiment.signal import (
+    RETAINED_BAND,
+    UNDISTORTED_BAND,
+    decimation_for,
+    differentiate,
+    lowpass,
+    parallel_filter,
+    settling_samples,
+)
 from vpm.results import Result
 
 Array = NDArray[np.float64]
@@ -91,6 +99,11 @@ class Motion(Result):
         return slice(self.edge, self.time.size - self.edge)
 
     @property
+    def band(self) -> float:
+        """Highest frequency that `parallel` keeps, Hz."""
+        return 0.5 * RETAINED_BAND / (self.decimation * self.dt)
+
+    @property
     def retained(self) -> NDArray[np.int64]:
         """Samples, counted from the beginning of the record, that the decimation leaves between the two ends."""
         first = -(-self.edge // self.decimation) * self.decimation
@@ -146,7 +159,12 @@ class Motion(Result):
 
 
 def motion(
-    experiment: Experiment, model: Machine, cutoff: float | None = None, *, measured: Collection[str] = ()
+    experiment: Experiment,
+    model: Machine,
+    cutoff: float | None = None,
+    *,
+    measured: Collection[str] = (),
+    band: float | None = None,
 ) -> Motion:
     """What inverse dynamics needs from a log.
 
@@ -162,6 +180,8 @@ def motion(
         Hz; without it `choose_cutoff` decides.
     measured : collection of {"velocity", "acceleration"}
         Derivatives to take from their own channels, through the same filter, instead of from the position.
+    band : float, optional
+        Highest frequency that `Motion.parallel` keeps, Hz; without it what the filter leaves alone.
 
     Returns
     -------
@@ -192,7 +212,8 @@ def motion(
             notes.append(f"The {quantity} is the measured one, through the same filter.")
         if order == 0:
             derivatives.append(differentiate(derivatives[0], experiment.dt))
-    decimation = min(decimation_for(rate, cutoff), (len(experiment) - 2 * edge) // 4)
+    wanted = decimation_for(rate, cutoff) if band is None else decimation_for(rate, band / UNDISTORTED_BAND)
+    decimation = min(wanted, (len(experiment) - 2 * edge) // 4)
     notes.append(f"{edge} samples at each end are left to the settling of the filter.")
     return Motion(
         joints,

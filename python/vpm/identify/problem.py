@@ -125,13 +125,24 @@ class InverseDynamicsProblem:
         Each with the position of every joint that moves by an actuator, and the command of every actuator.
     cutoff : float, optional
         Cut-off frequency of the motion filter, Hz; chosen from each record if not given.
+    band : float, optional
+        Highest frequency that is compared, Hz; without it what the motion filter leaves alone.
     """
 
     mode = "inverse_dynamics"
 
-    def __init__(self, model: Model, experiments: Sequence[Experiment], *, cutoff: float | None = None) -> None:
+    def __init__(
+        self,
+        model: Model,
+        experiments: Sequence[Experiment],
+        *,
+        cutoff: float | None = None,
+        band: float | None = None,
+    ) -> None:
         self.experiments = tuple(experiments)
-        self.motions: tuple[Motion, ...] = tuple(joint_motion(e, model, cutoff, commanded=True) for e in experiments)
+        self.motions: tuple[Motion, ...] = tuple(
+            joint_motion(e, model, cutoff, commanded=True, band=band) for e in experiments
+        )
         for m in self.motions:
             check_along(model, m.joints)
         # The parallel filter passes over whole records: where one begins and ends at rest there is nothing to settle.
@@ -337,7 +348,7 @@ class InverseDynamicsProblem:
         kept = [speed[m.kept] for speed, m in zip(speeds, self.motions, strict=True)]
         largest = np.max([np.quantile(speed, 0.999, axis=0) for speed in kept], axis=0)
         masks = [
-            ~_widened(_standing(speed, STANDSTILL_SHARE * largest, m.decimation), m)[m.retained]
+            ~_widened(_standing(speed, STANDSTILL_SHARE * largest, _period(m)), m)[m.retained]
             for m, speed in zip(self.motions, speeds, strict=True)
         ]
         moves = np.mean(np.vstack(masks), axis=0) >= LEAST_MOVING
@@ -377,6 +388,11 @@ def _settled(samples: int, decimation: int) -> Array:
     return ((place >= ends) & (place < samples - ends)).astype(np.float64)
 
 
+def _period(m: Motion) -> int:
+    """Samples in which the motion filter tells a stop from a reversal, no more than the parallel filter keeps apart."""
+    return min(m.decimation, max(1, round(1.0 / (m.cutoff * m.dt))))
+
+
 def _standing(speed: Array, limit: Array, samples: int) -> NDArray[np.bool_]:
     """Where all speeds within ``samples`` to both sides are below the limit."""
     return np.asarray(maximum_filter1d(speed, 2 * samples + 1, axis=0) < limit)
@@ -384,7 +400,7 @@ def _standing(speed: Array, limit: Array, samples: int) -> NDArray[np.bool_]:
 
 def _widened(standing: NDArray[np.bool_], m: Motion) -> NDArray[np.bool_]:
     """Standstill with its surroundings, into which the filters carry what happens in it."""
-    reach = m.decimation + round(1.0 / (m.cutoff * m.dt))
+    reach = m.decimation + max(m.decimation, round(1.0 / (m.cutoff * m.dt)))
     return np.asarray(maximum_filter1d(standing.view(np.uint8), 2 * reach + 1, axis=0).astype(np.bool_))
 
 
