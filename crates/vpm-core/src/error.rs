@@ -171,6 +171,18 @@ pub enum Error {
         /// What the reader says, with the place.
         message: String,
     },
+    /// Times of a loop cannot be recorded.
+    #[error("the times of the loop cannot be recorded: {message}; report it")]
+    Timer {
+        /// What the recorder says.
+        message: String,
+    },
+    /// A compiled model is not what it should be.
+    #[error("the compiled model cannot be read: {message}")]
+    Compiled {
+        /// What is wrong, and the repair.
+        message: String,
+    },
     /// Something in the description points at something that is not there.
     #[error("{what} refers to {target} number {index}, but there are {count}; use a number below {count}")]
     Reference {

@@ -80,6 +80,11 @@ impl Live {
             && self.theta == other.theta
     }
 
+    /// The parameters of the machine.
+    pub fn parameters(&self) -> &[f64] {
+        &self.theta
+    }
+
     /// The state now.
     pub fn state(&self) -> &[f64] {
         &self.state

@@ -2,6 +2,7 @@
 
 mod answers;
 mod connections;
+mod counted;
 mod driven;
 mod drives;
 mod memory;
@@ -10,10 +11,12 @@ mod ode;
 mod places;
 mod settle;
 mod slopes;
+mod stages;
 mod stiff;
 mod tangent;
 
 pub use connections::Connections;
+pub(crate) use counted::{Calls, Counted, Matrix};
 pub use memory::Memories;
 pub use ode::System;
 

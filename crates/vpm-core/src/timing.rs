@@ -1,34 +1,105 @@
-//! How long a step takes, one by one: the distribution matters to a real-time loop, not the mean.
+//! How long a step takes, one by one: the distribution matters to a real-time loop, not the mean; and what its time goes into.
 
 use std::time::Instant;
 
 use crate::error::{Error, Result};
 use crate::simulate::{Drive, Plan, Setting, Stepper, check_starts, check_state};
+use crate::system::Calls;
 use crate::table::Table;
 
-/// Duration in s of each of `count` steps on the way through `inputs`, which begins again from `initial_state` at its end.
+/// One part of a step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stage {
+    /// What it does.
+    pub name: &'static str,
+    /// Seconds of one call, the least of several at the same state, the mean over states.
+    pub seconds: f64,
+    /// Calls in a step.
+    pub calls: f64,
+}
+
+/// Steps on the way through inputs, which begin again from the initial state at their end. All buffers are there before the first.
 ///
 /// A step is what a real-time loop does between two samples: hold the command, evaluate and record the sample, integrate all substeps.
-pub fn time_steps(setting: Setting<'_>, initial_state: &[f64], inputs: Table<'_>, count: usize) -> Result<Vec<f64>> {
-    inputs.expect("inputs", inputs.rows(), setting.description.n_inputs())?;
-    check_state("initial_state", setting.description, initial_state)?;
-    if inputs.rows() == 0 {
-        let (what, each) = ("inputs".to_owned(), "sample, at least one".to_owned());
-        return Err(Error::Dimension { what, expected: 1, found: 0, each });
-    }
-    check_starts(setting, initial_state)?;
-    let plan = Plan { drive: Drive::Commands(inputs), initial: initial_state, starts: &[0], horizon: inputs.rows() };
-    let mut stepper = Stepper::new(&setting, &plan, setting.theta)?;
-    let mut durations = Vec::with_capacity(count);
-    for number in 0..count {
-        let row = number % inputs.rows();
-        if row == 0 {
-            stepper.restart(0);
+pub struct Course<'a> {
+    stepper: Stepper<'a, f64>,
+    setting: Setting<'a>,
+    rows: usize,
+    next: usize,
+}
+
+impl<'a> Course<'a> {
+    /// Checked inputs (N x inputs) from this state on.
+    pub fn new(setting: Setting<'a>, initial_state: &'a [f64], inputs: Table<'a>) -> Result<Self> {
+        let rows = inputs.rows();
+        inputs.expect("inputs", rows, setting.description.n_inputs())?;
+        check_state("initial_state", setting.description, initial_state)?;
+        if rows == 0 {
+            let (what, each) = ("inputs".to_owned(), "sample, at least one".to_owned());
+            return Err(Error::Dimension { what, expected: 1, found: 0, each });
         }
-        let begin = Instant::now();
-        stepper.sample(row, 0)?;
-        stepper.advance(row, 0, setting.interrupt)?;
-        durations.push(begin.elapsed().as_secs_f64());
+        check_starts(setting, initial_state)?;
+        let plan = Plan { drive: Drive::Commands(inputs), initial: initial_state, starts: &[0], horizon: rows };
+        Ok(Self { stepper: Stepper::new(&setting, &plan, setting.theta)?, setting, rows, next: 0 })
     }
+
+    /// Makes as many steps as there are places and writes the duration of each, s. Allocates nothing.
+    pub fn time(&mut self, durations: &mut [f64]) -> Result<()> {
+        for duration in durations {
+            let row = self.begin();
+            let begin = Instant::now();
+            self.stepper.sample(row, 0)?;
+            self.stepper.advance(row, 0, self.setting.interrupt)?;
+            *duration = begin.elapsed().as_secs_f64();
+        }
+        Ok(())
+    }
+
+    /// What the time of a step goes into, at `states` states along one way through the inputs.
+    pub fn stages(&mut self, states: usize) -> Result<Vec<Stage>> {
+        let stride = (self.rows / states.max(1)).max(1);
+        let (mut calls, mut steps, mut looks) = (Calls::default(), 0_usize, 0_usize);
+        let mut parts: Vec<Stage> = Vec::new();
+        self.next = 0;
+        for row in 0..self.rows {
+            self.begin();
+            self.stepper.sample(row, 0)?;
+            if row % stride == 0 {
+                looks += 1;
+                for (place, (name, seconds)) in self.stepper.parts().into_iter().enumerate() {
+                    if looks == 1 {
+                        parts.push(Stage { name, seconds: 0.0, calls: 0.0 });
+                    }
+                    parts[place].seconds += seconds;
+                }
+                self.stepper.sample(row, 0)?;
+            }
+            calls += self.stepper.advance_counted(row, 0, self.setting.interrupt)?;
+            steps += 1;
+        }
+        self.next = 0;
+        for stage in &mut parts {
+            stage.seconds /= looks as f64;
+            stage.calls = calls.of(stage.name) / steps as f64;
+        }
+        parts.retain(|stage| stage.calls > 0.0 && stage.seconds > 0.0);
+        Ok(parts)
+    }
+
+    /// The row of the next step; at the first the machine is where the way begins.
+    fn begin(&mut self) -> usize {
+        let row = self.next % self.rows;
+        if row == 0 {
+            self.stepper.restart(0);
+        }
+        self.next += 1;
+        row
+    }
+}
+
+/// Duration in s of each of `count` steps, see [`Course`].
+pub fn time_steps(setting: Setting<'_>, initial_state: &[f64], inputs: Table<'_>, count: usize) -> Result<Vec<f64>> {
+    let mut durations = vec![0.0; count];
+    Course::new(setting, initial_state, inputs)?.time(&mut durations)?;
     Ok(durations)
 }

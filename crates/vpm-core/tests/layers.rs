@@ -24,11 +24,12 @@ const TREE: [&str; 16] = [
     "linkage",
 ];
 /// Parts that stand alone, each a rig of its own, and all that they may import besides themselves.
-const ALONE: [(&str, &[&str]); 13] = [
+const ALONE: [(&str, &[&str]); 14] = [
     ("error", &[]),
     ("scalar", &[]),
     ("table", &["error"]),
     ("narx", &["error"]),
+    ("realtime", &["error"]),
     ("delay", &["error", "scalar"]),
     ("ode", &["error", "scalar"]),
     ("integrator", &["error", "scalar", "ode"]),
@@ -52,7 +53,7 @@ const ALONE: [(&str, &[&str]); 13] = [
     ("controller", &["error", "scalar", "effect::Domain", "actuator::Saturation"]),
 ];
 /// What puts the parts together, lowest first: each may import any part, any tree module and any before it.
-const WHOLE: [&str; 13] = [
+const WHOLE: [&str; 14] = [
     "sensitivity",
     "system",
     "description",
@@ -63,6 +64,7 @@ const WHOLE: [&str; 13] = [
     "evaluate",
     "linearize",
     "live",
+    "compiled",
     "prepared",
     "timing",
     "samples",

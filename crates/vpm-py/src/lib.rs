@@ -11,6 +11,7 @@ mod interrupt;
 mod linkage;
 mod narx;
 mod planar;
+mod realtime;
 mod stepping;
 mod system;
 
@@ -29,6 +30,8 @@ mod _core {
     use crate::narx::{MaxwellNarx, Narx, NarxStepper, narx_candidates, narx_fit, narx_select};
     #[pymodule_export]
     use crate::planar::PlanarArm;
+    #[pymodule_export]
+    use crate::realtime::Loop;
     #[pymodule_export]
     use crate::stepping::{Simulation, Snapshot, check_integrator};
     #[pymodule_export]

@@ -11,7 +11,7 @@ use crate::ode::Ode;
 use crate::scalar::Scalar;
 use crate::sensitivity::{Interrupt, Pair};
 use crate::sensor::Sensor;
-use crate::system::System;
+use crate::system::{Calls, Counted, Matrix, System};
 use crate::table::Table;
 
 /// Where the commands come from.
@@ -274,6 +274,31 @@ impl<'a, S: Scalar> Stepper<'a, S> {
     /// An output in words, of the row whose numbers begin at `row`.
     fn output_name(&self, column: usize, row: usize) -> String {
         of_what(&output_name(self.description, column), self.outputs[row + column])
+    }
+}
+
+impl Stepper<'_, f64> {
+    /// As [`Stepper::advance`], and tells what the integrator asked for.
+    pub(crate) fn advance_counted(&mut self, row: usize, start: usize, interrupt: Interrupt<'_>) -> Result<Calls> {
+        let (stepping, Self { integrator, system, state, .. }) = (self.stepping, &mut *self);
+        let pieces = (stepping.time_step, stepping.substeps);
+        let mut counted = Counted { system, calls: Calls { samples: 1, ..Calls::default() } };
+        let end = integrator.advance(&mut counted, state, pieces, interrupt);
+        let calls = counted.calls;
+        end.map_err(|halt| halted(self.description, stepping, start + row, halt, self.before(row + 1)))?;
+        Ok(calls)
+    }
+
+    /// Seconds of each part of a step at the state now, with its name.
+    pub(crate) fn parts(&mut self) -> Vec<(&'static str, f64)> {
+        let Self { system, state, description, .. } = self;
+        let mut seconds: Vec<_> = system.dynamics().parts(state).named().into();
+        for kind in Matrix::ALL {
+            seconds.push((kind.name(), system.matrix_seconds(kind, state)));
+        }
+        let mut seen = vec![0.0; description.n_outputs()];
+        seconds.push(("sensors", system.dynamics().observing(state, &mut seen)));
+        seconds
     }
 }
 

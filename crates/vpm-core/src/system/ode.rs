@@ -61,6 +61,11 @@ impl<S: Scalar> System<S> {
         self.ready = true;
     }
 
+    /// Whether the rates where the next step begins are at hand.
+    pub(crate) fn is_ready(&self) -> bool {
+        self.ready
+    }
+
     /// Rates at `x`: those at hand if a step begins there.
     fn begin(&mut self, x: &[S], rates: &mut [S]) {
         if std::mem::take(&mut self.ready) {

@@ -1,13 +1,11 @@
 //! Simulations of whole records.
 
 use numpy::{PyArray1, PyArray2, PyArray3, PyArray4, PyArrayMethods};
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use vpm_core::description::Description;
 use vpm_core::motion::JointMotion;
 use vpm_core::sensitivity::Interrupt;
 use vpm_core::simulate::{Run, Setting, Stepping, closed_loop, drives_along, free_run, prescribed, restarts};
-use vpm_core::timing::time_steps;
 
 use super::System;
 use crate::arrays::{self, Numbers, cube, matrix, places};
@@ -18,14 +16,19 @@ type Cube<'py> = Bound<'py, PyArray3<f64>>;
 type Any<'py> = Bound<'py, PyAny>;
 
 /// Arguments that every simulation shares, out of Python's hands.
-struct Request {
+pub(super) struct Request {
     theta: Numbers,
     stepping: Stepping,
     sensitivities: Vec<usize>,
 }
 
 impl Request {
-    fn new(system: &System, theta: &Any<'_>, timing: (f64, i64, &str), sensitivities: &[i64]) -> PyResult<Self> {
+    pub(super) fn new(
+        system: &System,
+        theta: &Any<'_>,
+        timing: (f64, i64, &str),
+        sensitivities: &[i64],
+    ) -> PyResult<Self> {
         Ok(Self {
             theta: Numbers::vector("theta", theta)?,
             stepping: system.checked(theta.py(), stepping(timing)?)?,
@@ -33,7 +36,7 @@ impl Request {
         })
     }
 
-    fn setting<'a>(&'a self, description: &'a Description, interrupt: Interrupt<'a>) -> Setting<'a> {
+    pub(super) fn setting<'a>(&'a self, description: &'a Description, interrupt: Interrupt<'a>) -> Setting<'a> {
         let (theta, sensitivities) = (self.theta.values(), &self.sensitivities);
         Setting { description, theta, stepping: self.stepping, sensitivities, interrupt }
     }
@@ -212,30 +215,5 @@ impl System {
             matrix(py, run.states, [rows, states])?,
             cube(py, run.jacobian, [rows, width, sensitivities.len()])?,
         ))
-    }
-
-    /// Duration in s of each of `count` steps, on the way through the inputs again and again.
-    #[expect(clippy::too_many_arguments, reason = "the arguments of the Python function")]
-    fn time_steps<'py>(
-        &self,
-        py: Python<'py>,
-        theta: &Any<'py>,
-        initial_state: &Any<'py>,
-        inputs: &Any<'py>,
-        time_step: f64,
-        substeps: i64,
-        integrator: &str,
-        count: i64,
-    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        let request = Request::new(self, theta, (time_step, substeps, integrator), &[])?;
-        let initial = Numbers::vector("initial_state", initial_state)?;
-        let inputs = Numbers::table("inputs", inputs)?;
-        let count = usize::try_from(count).map_err(|_| {
-            PyValueError::new_err(format!("count must not be negative, got {count}; ask for some steps"))
-        })?;
-        let durations = self.compute(py, |interrupt| {
-            time_steps(request.setting(&self.description, interrupt), initial.values(), inputs.as_table()?, count)
-        })?;
-        Ok(PyArray1::from_vec(py, durations))
     }
 }

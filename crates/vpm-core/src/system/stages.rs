@@ -1,0 +1,141 @@
+//! How long each part of one evaluation of the rates takes, part by part at the same state.
+
+use std::hint::black_box;
+use std::time::Instant;
+
+use super::{Dynamics, Matrix, System, add_effects};
+use crate::contact::ContactFriction;
+use crate::dynamics::{aba, flexible, frames, lines, motion, poses};
+use crate::ode::Ode;
+
+/// Calls in a row between two looks at the clock, which itself takes tens of ns.
+const REPEATS: u32 = 16;
+/// Rows of calls; the shortest counts, because nothing makes a computation faster than it is.
+const ROWS: usize = 5;
+
+/// Seconds of one call of each part.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Parts {
+    /// Frames and lines: where everything is and how it moves, without the beams.
+    pub(crate) kinematics: f64,
+    /// Sections of the beams along their centrelines.
+    pub(crate) beams: f64,
+    /// Mass matrix and bias; none in a rigid tree, whose articulated bodies are part of the solution.
+    pub(crate) mass_matrix: f64,
+    /// Drives and supplies.
+    pub(crate) actuators: f64,
+    /// Effects on the joints.
+    pub(crate) effects: f64,
+    /// Contacts and bushings.
+    pub(crate) contact: f64,
+    /// Accelerations from all loads.
+    pub(crate) solve: f64,
+}
+
+impl Parts {
+    /// Part by part, with its name.
+    pub(crate) fn named(&self) -> [(&'static str, f64); 7] {
+        [
+            ("kinematics", self.kinematics),
+            ("beams", self.beams),
+            ("mass matrix", self.mass_matrix),
+            ("actuators", self.actuators),
+            ("effects", self.effects),
+            ("contact", self.contact),
+            ("solve", self.solve),
+        ]
+    }
+}
+
+/// Seconds of one call, the least over some rows of calls.
+pub(crate) fn seconds(mut call: impl FnMut()) -> f64 {
+    call();
+    let mut row = || {
+        let begin = Instant::now();
+        for _ in 0..REPEATS {
+            call();
+        }
+        begin.elapsed().as_secs_f64() / f64::from(REPEATS)
+    };
+    (0..ROWS).map(|_| row()).fold(f64::INFINITY, f64::min)
+}
+
+impl Dynamics<f64> {
+    /// Seconds of each part of the rates at `x`.
+    pub(crate) fn parts(&mut self, x: &[f64]) -> Parts {
+        let n = self.coordinates();
+        let (q, v) = x[..2 * n].split_at(n);
+        let mut rates = vec![0.0; self.dim()];
+        self.rhs(x, &mut rates);
+        let mut parts = Parts { actuators: seconds(|| self.actuate(black_box(x), &mut rates)), ..Parts::default() };
+        self.rhs(x, &mut rates);
+        let (moves, touches) = (self.pulls, !self.connections.is_free());
+        let Self { model, data, effects, efforts, loads, connections, .. } = self;
+        if model.is_recursive() {
+            if moves || touches {
+                parts.kinematics = seconds(|| {
+                    motion(model, data, black_box(q), v);
+                    lines(model, data);
+                });
+            }
+        } else {
+            let outward = seconds(|| frames(model, data, black_box(q), v));
+            for (elastic, sections) in model.beams().iter().zip(&mut data.composite.sections) {
+                let own = elastic.coordinate..elastic.coordinate + elastic.beam.len();
+                parts.beams += seconds(|| elastic.beam.motion(black_box(&q[own.clone()]), &v[own.clone()], sections));
+            }
+            let terms = seconds(|| flexible::terms(model, data, black_box(q), v));
+            parts.mass_matrix = (terms - outward).max(0.0);
+            parts.kinematics = (outward - parts.beams).max(0.0);
+            if touches {
+                parts.kinematics += seconds(|| poses(model, data));
+            }
+        }
+        if !effects.is_empty() {
+            parts.effects = seconds(|| add_effects(effects, [black_box(q), v, efforts], loads));
+        }
+        if touches {
+            parts.contact =
+                seconds(|| connections.add_loads(model, data, ContactFriction::resistance, black_box(loads)));
+        }
+        loads.fill(0.0);
+        parts.solve = if model.is_recursive() {
+            seconds(|| {
+                aba(model, data, black_box(q), v, loads);
+            })
+        } else {
+            seconds(|| {
+                flexible::solve(model, data, black_box(q), v, loads);
+            })
+        };
+        parts
+    }
+
+    /// Seconds of reading all outputs at `x`.
+    pub(crate) fn observing(&mut self, x: &[f64], outputs: &mut [f64]) -> f64 {
+        let mut rates = vec![0.0; self.dim()];
+        self.rhs(x, &mut rates);
+        seconds(|| self.observe(black_box(x), &rates, outputs))
+    }
+}
+
+impl System<f64> {
+    /// Seconds of one matrix of this kind at `x`, the rates there not counted.
+    pub(crate) fn matrix_seconds(&mut self, kind: Matrix, x: &[f64]) -> f64 {
+        let (dim, n) = (self.dim(), self.coordinates());
+        let mut rates = vec![0.0; dim];
+        let mut matrix = vec![0.0; dim * dim];
+        let rhs = seconds(|| self.rhs(black_box(x), &mut rates));
+        let both = match kind {
+            Matrix::Jacobian => seconds(|| self.linearise(black_box(x), &mut matrix, &mut rates)),
+            Matrix::Iteration => seconds(|| self.prepare(black_box(x), &mut matrix, &mut rates)),
+            Matrix::Elasticity => {
+                let block = &mut matrix[..2 * n * n];
+                return seconds(|| {
+                    self.elasticity(black_box(x), block);
+                });
+            }
+        };
+        (both - rhs).max(0.0)
+    }
+}
