@@ -9,7 +9,7 @@ Each arrow is a function of this module, each result one frozen object.
 
 from importlib.metadata import version
 
-from vpm import impedance, linkages, narx
+from vpm import impedance, linkages, narx, realtime
 from vpm.batch import Trial, simulate_batch
 from vpm.budget import BudgetReport, budget
 from vpm.catalogue import EFFECTS
@@ -75,6 +75,7 @@ __all__ = [
     "impedance",
     "linkages",
     "narx",
+    "realtime",
     "report",
     "simplify",
     "simulate",

@@ -81,6 +81,38 @@ class Dynamics:
         """Jacobian (6, n) of a marker by number: angular velocity, then velocity of its origin, in world axes."""
 
 @final
+class Loop:
+    """A loop at a fixed rate with absolute deadlines; it belongs to the thread that made it.
+
+    Parameters
+    ----------
+    period : float
+        Time between two deadlines, s.
+    lock_memory : bool
+    priority : int, optional
+        Of ``SCHED_FIFO``.
+    """
+
+    def __new__(cls, period: float, lock_memory: bool, priority: int | None) -> Loop: ...
+    def wait(self) -> tuple[int, float, int]:
+        """Sleep until the next deadline: its number, how late it was (s), deadlines missed since the last."""
+    def close(self) -> None:
+        """Give memory and priority back."""
+    @property
+    def rights(self) -> tuple[str | None, str | None]:
+        """Memory and priority: None (not asked), an empty text (given) or a sentence (refused)."""
+    @property
+    def wakes(self) -> int:
+        """Wake-ups recorded."""
+    @property
+    def missed(self) -> int:
+        """Deadlines missed."""
+    def latencies(self, quantiles: Sequence[float]) -> list[float]:
+        """Time from a deadline to its wake-up, s, at these quantiles."""
+    def work(self, quantiles: Sequence[float]) -> list[float]:
+        """Time from a wake-up to the next wait, s, at these quantiles."""
+
+@final
 class Simulation:
     """A simulation that goes on one sample at a time.
 
@@ -379,8 +411,13 @@ class System:
         substeps: int,
         integrator: str,
         count: int,
-    ) -> NDArray[np.float64]:
-        """Duration (count,) in s of single steps, on the way through ``inputs`` again and again."""
+        states: int,
+    ) -> tuple[NDArray[np.float64], int, int, list[tuple[str, float, float]]]:
+        """Single steps on the way through ``inputs`` again and again.
+
+        Duration (count,) of each in s; how often they asked for memory; bytes that a simulation holds; at so many
+        ``states`` the stages of a step: name, seconds of a call, calls in a step.
+        """
 
 _Array = NDArray[np.float64]
 _Pair = Sequence[float]

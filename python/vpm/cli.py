@@ -296,14 +296,55 @@ def budget(
     share: Share = 0.2,
     steps: Annotated[int, typer.Option(help="Number of steps to time.")] = 1_000_000,
     integrator: Integrator = "auto",
+    substeps: Annotated[int, typer.Option(help="Integration steps in a period.")] = 1,
+    log: Annotated[
+        Path | None, typer.Option(help="Record whose commands drive the model; by default a sum of sines.")
+    ] = None,
+    latency: Annotated[
+        float, typer.Option(help="Time to watch how late an idle loop at this rate wakes up, s; 0 for not at all.")
+    ] = 2.0,
+    instructions: Annotated[
+        bool, typer.Option("--instructions", help="Count them with valgrind: a minute more.")
+    ] = False,
+    plot: Plot = None,
 ) -> None:
     """Time one step of the model against a controller's period; exit code 1 if it does not fit."""
     from vpm.budget import budget as time_steps
 
-    report = time_steps(load_model(model), rate=rate, share=share, steps=steps, integrator=integrator)
+    machine, record = (load_model(model), None) if log is None else load_pair(model, log, None, False)
+    with progress() as tell:
+        report = time_steps(
+            machine,
+            rate=rate,
+            share=share,
+            steps=steps,
+            integrator=integrator,
+            substeps=substeps,
+            experiment=record,
+            latency=latency,
+            instructions=instructions,
+            tell=tell,
+        )
     console.print(str(report), markup=False)
+    save_plot(report.plot, plot)
     if not report.holds:
         raise typer.Exit(1)
+
+
+@app.command("compile", epilog="Example:  vpm compile examples/emps/model.toml --rate 1000 --out axis.json")
+def compile_(
+    model: ModelPath,
+    rate: Annotated[float, typer.Option(help="Samples per second, Hz.")] = 1000.0,
+    out: Annotated[Path, typer.Option(help="Write the compiled model to this file.")] = Path("compiled.json"),
+    integrator: Integrator = "auto",
+    substeps: Annotated[int, typer.Option(help="Integration steps in a period.")] = 1,
+) -> None:
+    """Compile a model into one file with all that a step needs, for controllers in C and C++."""
+    from vpm.realtime import compile_model
+
+    compiled = compile_model(load_model(model), rate, integrator=integrator, substeps=substeps)
+    compiled.save(out)
+    console.print(f"wrote {out}: takes {', '.join(compiled.inputs)}; shows {', '.join(compiled.outputs)}", markup=False)
 
 
 @app.command(epilog="Example:  vpm linkage examples/karl/karl.toml --plot karl.png")

@@ -17,10 +17,14 @@ fn deadlines_do_not_drift() {
     let mut clock = Loop::new(period).unwrap();
     let begin = now();
     let mut last = None;
-    assert!(clock.run(count, || false, |tick| {
-        last = Some(tick);
-        true
-    }));
+    assert!(clock.run(
+        count,
+        || false,
+        |tick| {
+            last = Some(tick);
+            true
+        }
+    ));
     // Deadline k lies at k periods after the first wait: never earlier, and late by no more than the last wake-up was.
     let tick = last.unwrap();
     let (passed, due) = (now() - begin, tick.number * 2_000_000);
@@ -76,10 +80,14 @@ fn a_period_without_meaning_is_refused() {
 #[test]
 fn work_can_end_the_loop() {
     let (mut clock, done) = (Loop::new(1e-4).unwrap(), Cell::new(0));
-    assert!(clock.run(100, || false, |_| {
-        done.set(done.get() + 1);
-        done.get() < 3
-    }));
+    assert!(clock.run(
+        100,
+        || false,
+        |_| {
+            done.set(done.get() + 1);
+            done.get() < 3
+        }
+    ));
     assert_eq!(done.get(), 3);
 }
 

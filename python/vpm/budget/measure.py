@@ -1,0 +1,109 @@
+"""Times single steps of a model along a command, and says what they are made of."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from vpm.budget.instructions import count_instructions
+from vpm.budget.machine import describe
+from vpm.budget.report import QUANTILES, REST, BudgetReport, Stage
+from vpm.budget.steps import Timed, commands, time_steps
+from vpm.errors import SimulationError
+from vpm.experiment import Experiment
+from vpm.model import Model
+from vpm.realtime import Loop
+from vpm.simulate import AUTOMATIC, Setup
+
+#: States along the way at which the stages are timed.
+STATES = 32
+
+
+def budget(
+    model: Model,
+    *,
+    rate: float = 1000.0,
+    share: float = 0.2,
+    steps: int = 1_000_000,
+    integrator: str = AUTOMATIC,
+    substeps: int = 1,
+    experiment: Experiment | None = None,
+    latency: float = 0.0,
+    instructions: bool = False,
+    tell: Callable[[str], None] | None = None,
+) -> BudgetReport:
+    """Time single steps of a model along a command.
+
+    Parameters
+    ----------
+    model : Model
+    rate : float
+        Steps per second that the controller asks for, Hz.
+    share : float
+        Share of the period that a step may take at its 99.9 % quantile.
+    steps : int
+        How many steps to time.
+    integrator, substeps
+        See :class:`vpm.simulate.Setup`; ``auto`` takes steps whose time has a bound.
+    experiment : Experiment, optional
+        Its commands drive the model, over and over; without it a sum of sines at one unit of command does.
+    latency : float
+        Time, s, to watch how late an idle loop at this rate wakes up; never part of the step times. 0 for not at all.
+    instructions : bool
+        Count the machine instructions of a step with valgrind, which takes a minute.
+    tell : callable, optional
+        Told now and then how far it is.
+
+    Returns
+    -------
+    BudgetReport
+
+    Raises
+    ------
+    SimulationError
+        A setting has no meaning, the commands do not lead through a simulation, or valgrind is asked for and not there.
+    """
+    if not rate > 0.0:
+        raise SimulationError(f"a rate of {rate:g} Hz is not possible; give a positive number")
+    if steps < 1000:
+        raise SimulationError(f"{steps} steps are too few for a 99.9 % quantile; time at least 1000")
+    if not latency >= 0.0:
+        raise SimulationError(f"latency is {latency:g} s; give a time that is not negative")
+    setup = Setup(integrator, substeps)
+    inputs = commands(model, rate, experiment)
+    timed = time_steps(model, rate, setup, steps, inputs, states=STATES, tell=tell)
+    median = float(np.median(timed.seconds))
+    counted = count_instructions(model, rate, setup, inputs, median, tell) if instructions else None
+    return BudgetReport(
+        model_name=model.name,
+        integrator=setup.method(model, bounded=True),
+        rate=rate,
+        steps=steps,
+        quantiles={name: float(np.quantile(timed.seconds, q)) for name, q in QUANTILES.items()},
+        share=share,
+        overruns=int(np.count_nonzero(timed.seconds > 1.0 / rate)),
+        stages=_stages(timed),
+        allocations=timed.allocations,
+        memory=timed.memory,
+        instructions=counted,
+        latency=_latency(rate, latency, tell) if latency > 0.0 else {},
+        machine=describe(),
+    )
+
+
+def _stages(timed: Timed) -> tuple[Stage, ...]:
+    """Stages of a step, and what the median step takes beside them."""
+    parts = [Stage(name, seconds * calls, calls) for name, seconds, calls in timed.stages]
+    rest = float(np.median(timed.seconds)) - sum(part.seconds for part in parts)
+    return (*parts, Stage(REST, max(rest, 0.0), 1.0))
+
+
+def _latency(rate: float, seconds: float, tell: Callable[[str], None] | None) -> dict[str, float]:
+    """How late a loop without work wakes up."""
+    if tell:
+        tell(f"watching an idle loop for {seconds:g} s")
+    with Loop(rate) as loop:
+        for _ in loop.ticks(seconds):
+            pass
+        return loop.report().latency

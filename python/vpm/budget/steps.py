@@ -1,0 +1,136 @@
+"""Steps of a model, timed one by one along commands."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vpm.errors import SimulationError
+from vpm.experiment import Experiment
+from vpm.model import Model
+from vpm.simulate import Setup, simulate
+
+Array = NDArray[np.float64]
+
+#: The command that is repeated when no record is given: samples, and frequencies in Hz.
+SWEEP_SAMPLES = 10_000
+SWEEP_FREQUENCIES = (0.3, 0.7, 1.9, 4.3)
+#: Steps between two words to whoever waits; whole ways through the sweep.
+CHUNK = 100_000
+
+
+@dataclass(frozen=True)
+class Timed:
+    """Steps that were timed.
+
+    Attributes
+    ----------
+    seconds : ndarray, shape (steps,)
+        Duration of each, s.
+    allocations : int
+        How often they asked for memory.
+    memory : int
+        Bytes that a simulation holds.
+    stages : list of tuple of str, float, float
+        Name, seconds of one call, calls in a step.
+    """
+
+    seconds: Array
+    allocations: int
+    memory: int
+    stages: list[tuple[str, float, float]]
+
+
+def step_times(model: Model, rate: float, setup: Setup, steps: int, inputs: Array) -> Array:
+    """Duration of each step, s.
+
+    Parameters
+    ----------
+    model : Model
+    rate : float
+        Hz.
+    setup : Setup
+    steps : int
+    inputs : ndarray, shape (N, inputs)
+        Repeated as often as needed.
+
+    Raises
+    ------
+    SimulationError
+        The commands do not lead through a simulation in these steps.
+    """
+    return time_steps(model, rate, setup, steps, inputs).seconds
+
+
+def time_steps(
+    model: Model,
+    rate: float,
+    setup: Setup,
+    steps: int,
+    inputs: Array,
+    *,
+    states: int = 0,
+    tell: Callable[[str], None] | None = None,
+) -> Timed:
+    """Time steps, and at so many ``states`` along the way their stages.
+
+    Raises
+    ------
+    SimulationError
+        The commands do not lead through a simulation in these steps.
+    """
+    from vpm._core import Diverged
+
+    method = setup.method(model, bounded=True)
+    durations: list[Array] = []
+    allocations = memory = done = 0
+    stages: list[tuple[str, float, float]] = []
+    chunk = CHUNK if tell else steps
+    while done < steps:
+        count = min(chunk, steps - done)
+        try:
+            seconds, asked, memory, found = model.core.time_steps(
+                model.theta, model.state(), inputs, 1.0 / rate, setup.substeps, method, count, 0 if done else states
+            )
+        except (Diverged, ValueError) as error:
+            raise SimulationError(f"{model.name}: {error}") from error
+        durations.append(seconds)
+        stages = stages or found
+        allocations += asked
+        done += count
+        if tell:
+            tell(f"timed {done} of {steps} steps, {1e6 * float(np.median(seconds)):.3g} us each")
+    return Timed(np.concatenate(durations) if durations else np.empty(0), allocations, memory, stages)
+
+
+def commands(model: Model, rate: float, experiment: Experiment | None = None) -> Array:
+    """Inputs (N, inputs) that drive a model while it is timed.
+
+    Parameters
+    ----------
+    model : Model
+    rate : float
+        Hz.
+    experiment : Experiment, optional
+        Its commands, or what the model's controllers make of its references; without it a sum of sines.
+    """
+    if experiment is not None:
+        columns = _driving(model, experiment)
+    else:
+        time = np.arange(SWEEP_SAMPLES) / rate
+        wave = np.mean([np.sin(2.0 * np.pi * f * time) for f in SWEEP_FREQUENCIES], axis=0)
+        columns = [wave for _ in model.actuators]
+        columns += [np.full(time.size, model.parameters[name].value) for name in model.inputs[len(columns) :]]
+    return np.ascontiguousarray(np.column_stack(columns)) if columns else np.zeros((1, 0))
+
+
+def _driving(model: Model, experiment: Experiment) -> list[Array]:
+    """Commands of a record; where controllers give them, what these say along its references."""
+    missing = [name for name in model.input_channels if name not in experiment]
+    if not missing or not model.controlled_actuators:
+        return [experiment[name] for name in model.input_channels]
+    run = simulate(model, experiment, "closed_loop")
+    return [run[name] if name in missing else experiment[name] for name in model.input_channels]
