@@ -8,7 +8,7 @@
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .SUFFIXES:
-.PHONY: help demo test test-rust test-python reference validation lint lint-rust lint-python bench peers chirp narx-peers bench-counts bench-diagnosis docs figures package clean
+.PHONY: help demo test test-rust test-python reference validation lint lint-rust lint-python bench peers chirp narx-peers bench-counts c-library bench-diagnosis docs figures package clean
 
 PYTHON ?= python3
 DEMO_OUT ?= demo-report
@@ -77,6 +77,13 @@ narx-peers: $(VENV)/.installed ## time a NARX model beside what is installed (C,
 
 bench-diagnosis: $(VENV)/.installed ## time whole diagnoses of an axis and of a flexible arm; writes into docs/performance.md
 	$(BIN)/python benches/diagnosis/diagnosis.py --write
+
+c-library: | $(VENV)/.tools-found ## build the C library: header, static and shared library in dist/c
+	cargo build --release --package vpm-c $(CARGO_ARGS)
+	mkdir -p dist/c
+	cp crates/vpm-c/include/vpm.h target/release/libvpm.* dist/c
+	rm -f dist/c/*.d dist/c/*.rlib
+	@ls -l dist/c
 
 figures: $(VENV)/.installed ## draw the pictures of docs/ anew, from the package
 	$(BIN)/python docs/figures/validity.py

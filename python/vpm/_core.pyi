@@ -11,6 +11,7 @@ __all__ = [
     "Dynamics",
     "Karl",
     "Leg",
+    "Loop",
     "MaxwellNarx",
     "Narx",
     "NarxStepper",

@@ -1,4 +1,4 @@
-/* Compiled models of vpm (see docs/c_library.md). Written by `cargo test -p vpm-c`; do not edit. */
+/* Compiled models of vpm (see docs/realtime.md). Written by `cargo test -p vpm-c`; do not edit. */
 
 #ifndef VPM_H
 #define VPM_H

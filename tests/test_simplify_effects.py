@@ -1,14 +1,12 @@
-"""Walking down: what may be left out, and whether a step fits the period."""
+"""Walking down: what may be left out."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from synthetic import Truth, nominal, simulate_axis
-from vpm.budget import BudgetReport, budget
 from vpm.errors import SimulationError
 from vpm.experiment import Experiment
 from vpm.simplify import Ladder, simplify
@@ -50,34 +48,3 @@ def test_ladder_saves_and_loads(ladder: Ladder, tmp_path: Path) -> None:
 def test_negative_tolerance_is_refused(record: Experiment) -> None:
     with pytest.raises(SimulationError, match="tolerance of -1"):
         simplify(nominal(), record, tolerance=-1.0)
-
-
-def test_budget_reports_ordered_quantiles(record: Experiment) -> None:
-    report = budget(nominal(), steps=20_000, experiment=record)
-    values = list(report.quantiles.values())
-    assert values == sorted(values)
-    assert values[0] > 0.0
-    assert report.taken == pytest.approx(report.quantiles["p99.9"] * 1000.0)
-
-
-def test_a_rate_that_no_machine_has_does_not_hold() -> None:
-    report = budget(nominal(), rate=1e9, steps=2000)
-    assert not report.holds
-    assert report.overruns > 1900
-    assert "does not hold" in str(report)
-
-
-def test_budget_report_saves_and_loads(tmp_path: Path) -> None:
-    report = budget(nominal(), steps=2000)
-    assert BudgetReport.load(report.save(tmp_path / "budget.npz")) == report
-
-
-@pytest.mark.parametrize("steps", [0, 999])
-def test_too_few_steps_are_refused(steps: int) -> None:
-    with pytest.raises(SimulationError, match="too few"):
-        budget(nominal(), steps=steps)
-
-
-def test_more_substeps_take_longer() -> None:
-    one, many = (np.median(budget(nominal(), steps=5000, substeps=n).quantiles["p50"]) for n in (1, 40))
-    assert many > 5.0 * one
