@@ -10,7 +10,7 @@ import pytest
 import vpm
 from blind import Case, make_case
 from vpm.discrepancy.confirmation import Data, judge
-from vpm.discrepancy.driven import APART, compare_driven
+from vpm.discrepancy.driven import Verdict, compare_driven
 from vpm.discrepancy.motion_only import LATE
 from vpm.identify import InverseDynamicsProblem, OutputErrorProblem
 
@@ -45,7 +45,7 @@ def test_a_long_lag_is_told_from_a_delay_and_a_short_delay_is_not_told_from_a_la
     told = compare_driven(lag, delay, data)
     assert told is not None
     assert told.prefers_first
-    assert told.apart > 10.0 * APART
+    assert told.apart > 30.0
     assert abs(told.first) < 3.0 < abs(told.second)
     turned = compare_driven(delay, lag, data)
     assert turned is not None
@@ -53,9 +53,19 @@ def test_a_long_lag_is_told_from_a_delay_and_a_short_delay_is_not_told_from_a_la
     data, (lag, delay) = fitted_late(make_case("axis_linear", "input_delay", 5))
     told = compare_driven(lag, delay, data)
     assert told is not None
-    assert told.apart < APART
+    assert told.apart < 1.0
     assert not told.prefers_first
     assert compare_driven(lag, delay, replace(data, simulation=None)) is None
+
+
+def test_a_small_difference_counts_as_much_as_it_says() -> None:
+    # The likelihood ratio of normal means 0 and d at z is exp(d z - d^2 / 2).
+    d, z = 1.5, 1.8
+    seen = Verdict(d, first=d - z, second=z)
+    assert seen.evidence == pytest.approx(d * z - 0.5 * d**2)
+    assert seen.prefers_first
+    assert not Verdict(0.2, first=-1.0, second=1.2).prefers_first
+    assert not Verdict(1.5, first=-6.0, second=7.5).prefers_first
 
 
 @pytest.mark.parametrize(

@@ -23,8 +23,10 @@ from vpm.identify.identifiability import column_lengths
 
 Array = NDArray[np.float64]
 
-#: Standard deviations by which two models have to differ along the reference to be told apart.
-APART = 3.0
+#: What is late is twice as often late by a delay, which a drive or an instrument may have, as by a lag of the drive.
+ODDS = 2.0
+#: A model that the data contradict by more standard deviations than this is not preferred to anything.
+CONTRADICTED = 3.0
 #: Samples for each fitted number, at least.
 FEWEST = 10
 
@@ -47,9 +49,18 @@ class Verdict:
     second: float
 
     @property
+    def evidence(self) -> float:
+        """Logarithm of how many times as likely the data are with the first model as with the second.
+
+        Of a model that is right the data ask nothing, and of one that is wrong as much as both differ, with an error of
+        one standard deviation: the likelihood ratio of two normal means, of which both views give one.
+        """
+        return 0.5 * self.apart * (self.second - self.first)
+
+    @property
     def prefers_first(self) -> bool:
-        """Whether they are told apart, and the first one is nearer to the data."""
-        return self.apart >= APART and abs(self.first) < abs(self.second)
+        """Whether the data, which do not contradict it, make the first more likely by more than ``ODDS``."""
+        return abs(self.first) <= CONTRADICTED and self.evidence > float(np.log(ODDS))
 
 
 def compare_driven(first: Judged, second: Judged, data: Data) -> Verdict | None:
