@@ -234,11 +234,11 @@ def _data(
     notes: list[str],
 ) -> Data:
     fitted = InverseDynamicsProblem(model, training, cutoff=cutoff)
-    # One filter for all records: a gap that is measured in another band is another gap.
-    states, band = filters(model, fitted, cutoff)
-    if states > min(m.cutoff for m in fitted.motions):
-        fitted = InverseDynamicsProblem(model, training, cutoff=states, band=band)
-    predicted = InverseDynamicsProblem(model, unseen, cutoff=states, band=band)
+    states, bands = filters(model, fitted, cutoff)
+    if states != tuple(m.cutoff for m in fitted.motions):
+        fitted = InverseDynamicsProblem(model, training, cutoff=states, band=bands)
+    # One filter for all unseen records: a gap that is measured in another band is another gap.
+    predicted = InverseDynamicsProblem(model, unseen, cutoff=min(states), band=min(bands))
     for problem in (fitted, predicted):
         for number, (record, m) in enumerate(zip(problem.experiments, problem.motions, strict=True)):
             still = problem.standstill(number)

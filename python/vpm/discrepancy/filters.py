@@ -24,8 +24,10 @@ from vpm.model import Model
 QUICKER = 4.0
 
 
-def filters(model: Model, training: InverseDynamicsProblem, cutoff: float | None) -> tuple[float, float]:
-    """Cut-off frequency of the motion filter and highest frequency that is compared, common to all records, Hz.
+def filters(
+    model: Model, training: InverseDynamicsProblem, cutoff: float | None
+) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Cut-off frequency of the motion filter and highest frequency that is compared, of each record, Hz.
 
     Parameters
     ----------
@@ -36,13 +38,13 @@ def filters(model: Model, training: InverseDynamicsProblem, cutoff: float | None
         With the cut-off frequencies that suit each record.
     cutoff : float or None
     """
-    common = min(m.cutoff for m in training.motions)
-    band = UNDISTORTED_BAND * common
+    own = tuple(m.cutoff for m in training.motions)
+    bands = tuple(UNDISTORTED_BAND * one for one in own)
     if cutoff is not None or bends(model) or has_own_drives(model):
-        return common, band
+        return own, bands
     pairs = zip(training.experiments, training.motions, strict=True)
-    highest = min(quickest(record, m, training.joints) for record, m in pairs)
-    return max(common, min(QUICKER * common, highest)), band
+    highest = (quickest(record, m, training.joints) for record, m in pairs)
+    return tuple(max(one, min(QUICKER * one, most)) for one, most in zip(own, highest, strict=True)), bands
 
 
 def quickest(record: Experiment, m: Motion, joints: Sequence[str]) -> float:

@@ -123,9 +123,9 @@ class InverseDynamicsProblem:
         Names the joints and actuators; its parameters do not enter.
     experiments : sequence of Experiment
         Each with the position of every joint that moves by an actuator, and the command of every actuator.
-    cutoff : float, optional
-        Cut-off frequency of the motion filter, Hz; chosen from each record if not given.
-    band : float, optional
+    cutoff : float or sequence of float, optional
+        Cut-off frequency of the motion filter, for all or for each record, Hz; chosen from each record if not given.
+    band : float or sequence of float, optional
         Highest frequency that is compared, Hz; without it what the motion filter leaves alone.
     """
 
@@ -136,12 +136,13 @@ class InverseDynamicsProblem:
         model: Model,
         experiments: Sequence[Experiment],
         *,
-        cutoff: float | None = None,
-        band: float | None = None,
+        cutoff: float | Sequence[float] | None = None,
+        band: float | Sequence[float] | None = None,
     ) -> None:
         self.experiments = tuple(experiments)
         self.motions: tuple[Motion, ...] = tuple(
-            joint_motion(e, model, cutoff, commanded=True, band=band) for e in experiments
+            joint_motion(e, model, one, commanded=True, band=other)
+            for e, one, other in zip(experiments, _each(cutoff, experiments), _each(band, experiments), strict=True)
         )
         for m in self.motions:
             check_along(model, m.joints)
@@ -376,6 +377,11 @@ class InverseDynamicsProblem:
         columns = [record[:, c] for record in records for c in range(record.shape[1])]
         scaled = zip(columns, self.blocks, strict=True)
         return np.concatenate([(x.T * (block.weight * block.moving)).T for x, block in scaled])
+
+
+def _each(value: float | Sequence[float] | None, records: Sequence[Experiment]) -> Sequence[float | None]:
+    """One value for each record."""
+    return [value] * len(records) if value is None or isinstance(value, int | float) else value
 
 
 def _settled(samples: int, decimation: int) -> Array:
