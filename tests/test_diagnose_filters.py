@@ -28,7 +28,7 @@ def test_the_band_is_kept_apart_from_the_filter() -> None:
 
 
 def test_dry_friction_closes_the_balance_along_quicker_states() -> None:
-    """The exact model leaves little more than half, in the same band; a smooth motion passes through rest too slowly."""
+    """The exact model leaves little more than half in the same band: a smooth motion passes through rest too slowly."""
     records = simulate_axis(DRY, 2, 16.0, first_seed=3)
     model = exact()
     slow = InverseDynamicsProblem(model, records, cutoff=[8.0, 8.0])
