@@ -15,7 +15,10 @@ import pytest
 from vpm.demo import MODEL, TRAIN, VALIDATION
 
 STEP = Path(__file__).resolve().parent.parent / "examples" / "emps" / "step.toml"
-COMMANDS = ("info", "simulate", "compare", "identify", "diagnose", "report", "simplify", "budget", "compile", "demo")
+COMMANDS = (
+    *("info", "simulate", "compare", "identify", "diagnose", "report"),
+    *("climb", "simplify", "budget", "compile", "demo"),
+)
 
 
 def vpm(*words: str | Path, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:

@@ -13,6 +13,7 @@ from vpm import impedance, linkages, narx, realtime
 from vpm.batch import Trial, simulate_batch
 from vpm.budget import BudgetReport, budget
 from vpm.catalogue import EFFECTS
+from vpm.climb import Climb, climb
 from vpm.compare import Comparison, compare
 from vpm.discrepancy import Diagnosis, diagnose
 from vpm.errors import VpmError
@@ -43,6 +44,7 @@ __all__ = [
     "EFFECTS",
     "BudgetReport",
     "Campaign",
+    "Climb",
     "Comparison",
     "CylinderGeometry",
     "Diagnosis",
@@ -67,6 +69,7 @@ __all__ = [
     "VpmError",
     "__version__",
     "budget",
+    "climb",
     "compare",
     "diagnose",
     "identify",

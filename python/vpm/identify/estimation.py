@@ -99,6 +99,9 @@ def estimate(
             start = _linear_step(counter, start, low, high)
             start = start if linear_only else _refine(counter, start, low, high, tolerance, most_evaluations)
         residual, jacobian = counter(start)
+        # Derivatives may leave all bounds where the motion itself does not; the best with derivatives stands then.
+        if counter.best is not None and not np.all(np.isfinite(residual)):
+            start, (residual, jacobian) = counter.best
     except (KeyboardInterrupt, _HopelessError) as reason:
         if counter.best is None:
             raise

@@ -1,6 +1,6 @@
 """Pictures of results. Needs the extra ``plot``; each function returns a matplotlib figure and opens no window."""
 
-from vpm.plot.bars import plot_candidates, plot_gap, plot_ladder, plot_parameters, plot_step_cost
+from vpm.plot.bars import plot_candidates, plot_climb, plot_gap, plot_ladder, plot_parameters, plot_step_cost
 from vpm.plot.evidence import plot_evidence
 from vpm.plot.impedance import plot_impedances, plot_loops
 from vpm.plot.inertial import plot_inertial
@@ -23,6 +23,7 @@ __all__ = [
     "plot_bode",
     "plot_candidates",
     "plot_channels",
+    "plot_climb",
     "plot_comparison",
     "plot_correlation",
     "plot_evidence",

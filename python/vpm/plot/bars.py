@@ -250,3 +250,63 @@ def _name_rows(axis: Axes, names: Sequence[str]) -> None:
     axis.set_ylim(len(names) - 0.4, -0.6)
     axis.grid(visible=False, axis="y")
     axis.tick_params(axis="y", length=0, labelcolor=INK)
+
+
+class Climbed(Protocol):
+    """A level of a climb, as far as its picture needs it."""
+
+    @property
+    def name(self) -> str:
+        """Of the level."""
+
+    @property
+    def error(self) -> float:
+        """Share of the signal that is left on unseen data."""
+
+    @property
+    def pays(self) -> bool:
+        """Whether unseen data say that it is better."""
+
+    @property
+    def values(self) -> Mapping[str, float]:
+        """Fitted parameters."""
+
+    @property
+    def std(self) -> Mapping[str, float]:
+        """Their standard deviations."""
+
+
+@styled
+def plot_climb(levels: Sequence[Climbed], top: str) -> Figure:
+    """Draw the error on unseen data against the level of detail, and below it how each parameter moved.
+
+    Parameters
+    ----------
+    levels : sequence of Level
+        Simplest first.
+    top : str
+        Name of the level at which detail stops to pay.
+    """
+    figure, axes = panels(2, height=2.4, share_x=True)
+    above, below = axes[0][0], axes[1][0]
+    places, errors = np.arange(len(levels)), np.array([100.0 * level.error for level in levels])
+    above.plot(places, errors, color=SOFT, linewidth=1.2)
+    for place, (error, level) in enumerate(zip(errors, levels, strict=True)):
+        marker, size = ("D", 8) if level.name == top else ("o", 6)
+        above.plot(place, error, marker, color=BLUE if level.pays else SOFT, markersize=size)
+    above.set_yscale("log")
+    above.set_ylabel("error on unseen\ndata [%]")
+    last = next(level for level in levels if level.name == top)
+    for name, value in last.values.items():
+        held = [k for k, level in enumerate(levels) if name in level.values]
+        scale = abs(value) or 1.0
+        std = [levels[k].std[name] / scale for k in held]
+        bars = [each if np.isfinite(each) else 0.0 for each in std]
+        below.errorbar(
+            held, [levels[k].values[name] / scale for k in held], 1.96 * np.array(bars), fmt="o-", capsize=3, label=name
+        )
+    below.set_ylabel("parameter / its value\nat the chosen level")
+    below.set_xticks(places, [level.name for level in levels], rotation=20, ha="right")
+    if last.values:
+        below.legend(loc="best", fontsize=7.5)
+    return figure

@@ -148,16 +148,19 @@ def _alone(trials: Trials, base: Changes, changes: Sequence[Reduction]) -> dict[
     """Seconds saved and error added by each change of one site on the common start; not what another beats."""
     start = _best(trials.attempt(base))
     found: dict[Reduction, tuple[float, float]] = {}
-    taken = [each for each in base if each.site == changes[0].site]
-    # Changes come finest first. What is finer than the common start would cost more and gain next to nothing.
-    coarser = changes[changes.index(taken[0]) + 1 :] if taken else changes
-    for change in coarser:
+    for change in _coarser(changes, base):
         rungs = trials.attempt(_with(base, change))
         if rungs:
             best = _best(rungs)
             found[change] = (start.seconds - best.seconds, best.error - start.error)
     names = list(found)
     return {names[k]: found[names[k]] for k in pareto([(-saved, added) for saved, added in found.values()])}
+
+
+def _coarser(changes: Sequence[Reduction], base: Changes) -> Sequence[Reduction]:
+    """Changes of one site beyond that in the base: they come finest first, and what is finer costs more."""
+    taken = next((each for each in base if each in changes), None)
+    return changes if taken is None else changes[changes.index(taken) + 1 :]
 
 
 def _best(rungs: Sequence[Rung]) -> Rung:
@@ -199,8 +202,9 @@ def _polish(trials: Trials, sites: Sites, limit: float) -> None:
     while True:
         best = _within(trials.rungs, limit)
         base = trials.changes_of(best)
-        for change in (change for changes in sites.values() for change in changes if change not in base):
-            trials.attempt(_with(base, change))
+        for changes in sites.values():
+            for change in _coarser(changes, base):
+                trials.attempt(_with(base, change))
         if not _within(trials.rungs, limit).seconds < 0.95 * best.seconds:
             return
 

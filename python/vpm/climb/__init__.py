@@ -1,0 +1,6 @@
+"""Climb in complexity while identifying, as far as unseen data say that more detail pays."""
+
+from vpm.climb.climbing import climb
+from vpm.climb.result import Climb, Level
+
+__all__ = ["Climb", "Level", "climb"]

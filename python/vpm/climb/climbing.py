@@ -1,0 +1,213 @@
+"""The way up: at each level the new parameters first, then all; unseen data decide whether it paid."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vpm.climb.levels import Family, families
+from vpm.climb.result import Climb, Level
+from vpm.errors import IdentificationError, VpmError
+from vpm.experiment import Experiment
+from vpm.identify import Estimate, OutputErrorProblem, estimate, gain, gaps, segments
+from vpm.model import Model
+from vpm.simulate import Setup, judging_mode
+
+Array = NDArray[np.float64]
+
+#: A level pays where it predicts unseen data better by so many standard deviations, and by more than this share.
+SURE, WORTH = 2.0, 0.02
+#: A parameter is seen at a level where the residual moves by more than this share when it changes by its own size.
+SEEN = 1e-6
+
+
+@dataclass(frozen=True)
+class _Data:
+    """What a level is fitted to, and judged on."""
+
+    train: OutputErrorProblem
+    unseen: OutputErrorProblem
+
+
+@dataclass(frozen=True)
+class _Reached:
+    """A level with its residual on unseen data."""
+
+    level: Level
+    model: Model
+    residual: Array
+    #: Parameters that the data know here: where the level above begins. What rests on a bound is not among them.
+    known: dict[str, float]
+
+
+def climb(
+    model: Model,
+    experiments: Experiment | Sequence[Experiment],
+    *,
+    validate: Experiment | Sequence[Experiment],
+    mode: str | None = None,
+    channels: Sequence[str] | None = None,
+    setup: Setup | None = None,
+    patience: int = 2,
+    tell: Callable[[str], None] | None = None,
+) -> Climb:
+    """Identify a model at each level of detail, as far up as unseen data say that detail pays.
+
+    The levels are: rigid with ideal actuators, rigid with what the actuators do, then the flexible links from springs
+    between rigid segments over modes, Bezier curves and elements to the model's own; of each kind finer ones while the
+    error falls. At each the parameters that the data see
+    for the first time are fitted alone, then all adjustable ones, from where the level below left them. Ctrl-C ends
+    the climb with what is known.
+
+    Parameters
+    ----------
+    model : Model
+        The most detailed one; its adjustable parameters are fitted.
+    experiments : Experiment or sequence of Experiment
+        To fit on.
+    validate : Experiment or sequence of Experiment
+        To judge on; the fit does not see them.
+    mode : str, optional
+        Mode of simulation; by default closed loop or restarts, see `vpm.simulate.judging_mode`.
+    channels : sequence of str, optional
+        What is compared; by default all measured outputs.
+    setup : Setup, optional
+        How it steps.
+    patience : int
+        Kinds of levels in a row of which none pays before it ends.
+    tell : callable, optional
+        Called with a sentence at every level.
+
+    Returns
+    -------
+    Climb
+
+    Raises
+    ------
+    IdentificationError
+        Nothing is adjustable, or not even the lowest level can be simulated.
+
+    Notes
+    -----
+    A level pays if its residual on unseen data is smaller than that of the best level below by `SURE` standard
+    deviations, which count how long residuals resemble themselves (`vpm.identify.gain`), and by a share of `WORTH` of
+    the mean square.
+    """
+    if patience < 1:
+        raise IdentificationError(f"a patience of {patience} kinds of levels ends before the first; give at least 1")
+    if not any(parameter.adjustable for parameter in model.parameters.values()):
+        raise IdentificationError(
+            f"{model.name}: no parameter is adjustable; give some an uncertainty in the model file"
+        )
+    say = tell or (lambda _: None)
+    records, unseen = _listed(experiments), _listed(validate)
+    mode = mode or judging_mode(model, records)
+    data = _Data(*(OutputErrorProblem(model, each, mode, channels=channels, setup=setup) for each in (records, unseen)))
+    offered = families(model)
+    reached: list[_Reached] = []
+    vain = 0
+    try:
+        for family in offered:
+            paid = _through(family, data, reached, say)
+            vain = 0 if paid else vain + 1
+            if vain >= patience:
+                break
+    except KeyboardInterrupt:
+        if not reached:
+            raise
+        say("interrupted: the levels until here")
+    best = _best(reached)
+    if best is None:
+        raise IdentificationError(
+            f"{model.name}: no level can be simulated on these records; look at `vpm compare` first"
+        )
+    tried = {step.level.name for step in reached}
+    left = tuple(name for family in offered for name, _ in family if name not in tried)
+    return Climb(tuple(step.level for step in reached), best.level.name, left, mode, best.model)
+
+
+def _listed(experiments: Experiment | Sequence[Experiment]) -> list[Experiment]:
+    return [experiments] if isinstance(experiments, Experiment) else list(experiments)
+
+
+def _through(family: Family, data: _Data, reached: list[_Reached], say: Callable[[str], None]) -> bool:
+    """Levels of one kind, finer and finer as long as that lowers the error; whether one of them paid."""
+    paid, error = False, np.inf
+    for name, machine in family:
+        say(name)
+        step = _climbed(name, machine, data, reached[-1] if reached else None, _best(reached))
+        if step is None:
+            continue
+        reached.append(step)
+        paid = paid or step.level.pays
+        if not step.level.error < error:
+            break
+        error = step.level.error
+    return paid
+
+
+def _best(reached: Sequence[_Reached]) -> _Reached | None:
+    """The last level that paid."""
+    return next((step for step in reversed(reached) if step.level.pays), None)
+
+
+def _climbed(name: str, machine: Model, data: _Data, below: _Reached | None, best: _Reached | None) -> _Reached | None:
+    """A level, fitted and judged; None where it cannot be simulated."""
+    known = {} if below is None else below.known
+    try:
+        start = _start(machine, known, data.train)
+        seen = _seen(start, data.train)
+        unknown = tuple(key for key in seen if key not in known)
+        fitted = start
+        # What is new would otherwise begin where it was guessed, and pull what is known away from where it belongs.
+        if known and unknown:
+            fitted = _fitted(start, data.train, unknown)[0]
+        fitted, found = _fitted(fitted, data.train, seen) if seen else (fitted, None)
+        residual, _ = data.unseen.evaluate(fitted, fitted.theta)
+    except VpmError:
+        return None
+    touching = () if found is None else found.at_bounds
+    score, pays = np.inf, True
+    if best is not None:
+        change = gain(best.residual, residual, segments(data.unseen))
+        score, pays = -change.harm, -change.harm > SURE and change.relative > WORTH
+    level = Level(
+        name=name,
+        states=machine.core.n_states,
+        freed=tuple(key for key in seen if below is None or key not in below.level.values),
+        values={} if found is None else dict(zip(found.names, map(float, found.values), strict=True)),
+        std={} if found is None else dict(zip(found.names, map(float, found.std), strict=True)),
+        errors={channel: share for channel, (_, share, _) in gaps(data.unseen, residual).items()},
+        score=float(score),
+        pays=bool(pays),
+    )
+    known = {key: value for key, value in level.values.items() if level.std[key] < abs(value) and key not in touching}
+    return _Reached(level, fitted, residual, known)
+
+
+def _start(machine: Model, known: dict[str, float], problem: OutputErrorProblem) -> Model:
+    """Where the level below left its parameters, or where the model has them if that is nearer to the data."""
+    learnt = machine.with_parameters({key: value for key, value in known.items() if key in machine.parameters})
+    costs = []
+    for each in (learnt, machine):
+        residual, _ = problem.evaluate(each, each.theta)
+        costs.append(float(residual @ residual))
+    return learnt if costs[0] <= costs[1] else machine
+
+
+def _seen(machine: Model, problem: OutputErrorProblem) -> tuple[str, ...]:
+    """Adjustable parameters that the data see at this level."""
+    free = [parameter for parameter in machine.parameters.values() if parameter.adjustable]
+    residual, jacobian = problem.evaluate(machine, machine.theta, [machine.index(each.name) for each in free])
+    size = np.linalg.norm(residual)
+    scales = [abs(each.value) or 1.0 for each in free]
+    moves = np.linalg.norm(jacobian, axis=0) * scales
+    return tuple(each.name for each, move in zip(free, moves, strict=True) if move > SEEN * size)
+
+
+def _fitted(machine: Model, problem: OutputErrorProblem, free: Sequence[str]) -> tuple[Model, Estimate]:
+    found = estimate(machine, problem, free)
+    return machine.with_parameters(dict(zip(found.names, map(float, found.values), strict=True))), found

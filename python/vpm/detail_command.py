@@ -1,0 +1,167 @@
+"""Command line of detail and its cost: ``vpm climb``, ``simplify``, ``budget`` and ``compile``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from vpm.command import (
+    Channels,
+    Integrator,
+    Interpolate,
+    Logs,
+    ModelPath,
+    Plot,
+    console,
+    load_all,
+    load_model,
+    load_pair,
+    progress,
+    save_plot,
+)
+
+Share = Annotated[float, typer.Option(help="Share of the period that a step may take at its 99.9 % quantile.")]
+
+
+def add_to(app: typer.Typer) -> None:
+    """Add the commands."""
+    app.command(epilog="Example:  vpm climb model.toml log.csv --validate other.csv --plot climb.png")(climb)
+    app.command(epilog="Example:  vpm simplify model.toml log.csv --rate 1000 --tolerance 0.05")(simplify)
+    app.command(epilog="Example:  vpm budget examples/emps/model.toml --rate 1000")(budget)
+    app.command("compile", epilog="Example:  vpm compile examples/emps/model.toml --rate 1000 --out axis.json")(
+        compile_
+    )
+
+
+def climb(
+    model: ModelPath,
+    log: Logs,
+    validate: Annotated[list[Path], typer.Option(help="Record to judge on, which the fit does not see; repeatable.")],
+    channels: Channels = None,
+    interpolate: Interpolate = False,
+    mode: Annotated[str | None, typer.Option(help="Mode of simulation; by default closed loop or restarts.")] = None,
+    compare: Annotated[list[str] | None, typer.Option(help="Channel that counts; all measured by default.")] = None,
+    integrator: Integrator = "auto",
+    settling: Annotated[float, typer.Option(help="Time at the beginning of each record that does not count, s.")] = 0.0,
+    out: Annotated[Path | None, typer.Option(help="Write the model of the chosen level to this file.")] = None,
+    plot: Plot = None,
+) -> None:
+    """Identify a model level by level, as far up in detail as unseen records say that it pays."""
+    from vpm.climb import climb as find_level
+    from vpm.simulate import Setup
+
+    machine, records = load_all(model, log, channels, interpolate)
+    unseen = load_all(model, validate, channels, interpolate)[1]
+    with progress() as tell:
+        found = find_level(
+            machine,
+            records,
+            validate=unseen,
+            mode=mode,
+            channels=compare,
+            setup=Setup(integrator, settling=settling),
+            tell=tell,
+        )
+    console.print(str(found), markup=False)
+    save_plot(found.plot, plot)
+    if out is not None:
+        found.model.save(out)
+
+
+def simplify(
+    model: ModelPath,
+    logs: Logs,
+    rate: Annotated[float, typer.Option(help="Rate of the controller, Hz.")] = 1000.0,
+    tolerance: Annotated[float, typer.Option(help="Largest loss of accuracy, as a share of the signal.")] = 0.02,
+    share: Share = 0.2,
+    validate: Annotated[list[Path] | None, typer.Option(help="Log to judge on; those of the fit by default.")] = None,
+    against: Annotated[str, typer.Option(help="The reference: data, or the full model itself.")] = "data",
+    mode: Annotated[str | None, typer.Option(help="Mode of simulation to judge in.")] = None,
+    compare: Annotated[list[str] | None, typer.Option(help="Channel to judge; all by default.")] = None,
+    channels: Channels = None,
+    interpolate: Interpolate = False,
+    plot: Plot = None,
+    out: Annotated[Path | None, typer.Option(help="Write the simplified model (TOML) here.")] = None,
+) -> None:
+    """Find the cheapest model that still tells the truth within a tolerance; exit code 1 if it misses the period."""
+    from vpm.simplify import simplify as find_cheapest
+
+    machine, records = load_all(model, logs, channels, interpolate)
+    unseen = load_all(model, validate, channels, interpolate)[1] if validate else None
+    with progress() as tell:
+        ladder = find_cheapest(
+            machine,
+            records,
+            rate=rate,
+            tolerance=tolerance,
+            share=share,
+            validate=unseen,
+            against=against,
+            mode=mode,
+            channels=compare,
+            tell=tell,
+        )
+    console.print(str(ladder), markup=False)
+    save_plot(ladder.plot, plot)
+    if out is not None:
+        ladder.model.save(out)
+    if not ladder.holds:
+        raise typer.Exit(1)
+
+
+def budget(
+    model: ModelPath,
+    rate: Annotated[float, typer.Option(help="Rate of the controller, Hz.")] = 1000.0,
+    share: Share = 0.2,
+    steps: Annotated[int, typer.Option(help="Number of steps to time.")] = 1_000_000,
+    integrator: Integrator = "auto",
+    substeps: Annotated[int, typer.Option(help="Integration steps in a period.")] = 1,
+    log: Annotated[
+        Path | None, typer.Option(help="Record whose commands drive the model; by default a sum of sines.")
+    ] = None,
+    latency: Annotated[
+        float, typer.Option(help="Time to watch how late an idle loop at this rate wakes up, s; 0 for not at all.")
+    ] = 2.0,
+    instructions: Annotated[
+        bool, typer.Option("--instructions", help="Count them with valgrind: a minute more.")
+    ] = False,
+    plot: Plot = None,
+) -> None:
+    """Time one step of the model against a controller's period; exit code 1 if it does not fit."""
+    from vpm.budget import budget as time_steps
+
+    machine, record = (load_model(model), None) if log is None else load_pair(model, log, None, False)
+    with progress() as tell:
+        report = time_steps(
+            machine,
+            rate=rate,
+            share=share,
+            steps=steps,
+            integrator=integrator,
+            substeps=substeps,
+            experiment=record,
+            latency=latency,
+            instructions=instructions,
+            tell=tell,
+        )
+    console.print(str(report), markup=False)
+    save_plot(report.plot, plot)
+    if not report.holds:
+        raise typer.Exit(1)
+
+
+def compile_(
+    model: ModelPath,
+    rate: Annotated[float, typer.Option(help="Samples per second, Hz.")] = 1000.0,
+    out: Annotated[Path, typer.Option(help="Write the compiled model to this file.")] = Path("compiled.json"),
+    integrator: Integrator = "auto",
+    substeps: Annotated[int, typer.Option(help="Integration steps in a period.")] = 1,
+) -> None:
+    """Compile a model into one file with all that a step needs, for controllers in C and C++."""
+    from vpm.realtime import compile_model
+
+    compiled = compile_model(load_model(model), rate, integrator=integrator, substeps=substeps)
+    compiled.save(out)
+    console.print(f"wrote {out}: takes {', '.join(compiled.inputs)}; shows {', '.join(compiled.outputs)}", markup=False)
