@@ -63,17 +63,17 @@ bench: | $(VENV)/.tools-found ## time the core: one result per line, with its sp
 	cargo bench --bench '*' $(CARGO_ARGS)
 
 bench-counts: $(VENV)/.installed ## count the instructions of one call of the recursions (needs valgrind)
-	$(BIN)/python benches/instruction_counts.py
+	$(BIN)/python benches/peers/instruction_counts.py
 
 peers: $(VENV)/.installed ## time vpm beside other engines, which this installs; writes docs/performance.md
 	$(BIN)/python -m pip install --quiet 'exudyn>=1.10' 'mujoco>=3.3' 'pin>=3.0' 'casadi>=3.6' 'numba>=0.60'
-	$(BIN)/python benches/peers.py
+	$(BIN)/python benches/peers/run.py
 
 chirp: $(VENV)/.installed ## time the servo-cylinder beside the solvers that are installed (C, CasADi, SciPy with Numba)
-	$(BIN)/python benches/servo_chirp.py
+	$(BIN)/python benches/peers/servo_chirp.py
 
 narx-peers: $(VENV)/.installed ## time a NARX model beside what is installed (C, Numba, sysidentpy)
-	$(BIN)/python benches/narx_peers.py
+	$(BIN)/python benches/peers/narx.py
 
 bench-diagnosis: $(VENV)/.installed ## time whole diagnoses of an axis and of a flexible arm; writes into docs/performance.md
 	$(BIN)/python benches/diagnosis/diagnosis.py --write

@@ -7,6 +7,7 @@ does meets all of them.
 
 from __future__ import annotations
 
+import argparse
 import ctypes
 import shutil
 import subprocess
@@ -22,7 +23,10 @@ from numpy.typing import NDArray
 
 from vpm.narx import Narx
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
+ROOT = Path(__file__).resolve().parent.parent.parent
+sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "benches" / "peers")]
+
+import markdown  # noqa: E402
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -160,6 +164,9 @@ def sysidentpy_candidate(model: Narx, u: Array) -> dict[str, Callable[[], Array]
 
 def main() -> None:
     """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("--markdown", type=Path, help="write the section of the performance page here")
+    options = parser.parse_args()
     model, u = twenty(), np.random.default_rng(1).uniform(-1.0, 1.0, SAMPLES)
     start = np.zeros(SAMPLES)
     core, table = model._compiled, u[:, None]  # noqa: SLF001  # the crossing alone, without the result object
@@ -174,18 +181,25 @@ def main() -> None:
         compiled_ones = c_candidates(model, u, Path(folder)) | numba_candidate(model, u)
         candidates |= {name: (SAMPLES, run) for name, run in compiled_ones.items()}
         candidates |= {name: (short, run) for name, run in sysidentpy_candidate(model, u[:short]).items()}
-        measure(candidates)
+        rows = measure(candidates)
+    header = ("engine", "ns a step", "quartiles", "ratio", "largest difference")
+    text = markdown.table(header, rows) + "\n"
+    print(text)
+    if options.markdown:
+        options.markdown.write_text(text, encoding="utf-8")
 
 
-def measure(candidates: dict[str, tuple[int, Callable[[], Array]]]) -> None:
+def measure(candidates: dict[str, tuple[int, Callable[[], Array]]]) -> list[tuple[str, ...]]:
+    """Rows of the table."""
     expected = candidates["vpm, one call"][1]()
     times: dict[str, list[float]] = {}
+    differences: dict[str, float] = {}
     for name, (samples, run) in candidates.items():
         difference = float(np.abs(run()[:samples] - expected[:samples]).max())
         if difference > 1e-12:
             print(f"{name}: differs by {difference:.1e}, not timed")
         else:
-            times[name] = []
+            times[name], differences[name] = [], difference
     for _ in range(ROUNDS):
         for name, taken in times.items():
             samples, run = candidates[name]
@@ -193,10 +207,12 @@ def measure(candidates: dict[str, tuple[int, Callable[[], Array]]]) -> None:
             run()
             taken.append((time.perf_counter() - began) / samples * 1e9)
     base = float(np.median(times["vpm, one call"]))
-    print(f"{'20 terms, free run':26s} {'ns/step':>10s} {'quartiles':>20s} {'ratio':>8s}")
+    rows = []
     for name, taken in times.items():
         low, middle, high = np.percentile(taken, [25, 50, 75])
-        print(f"{name:26s} {middle:10.1f} {low:9.1f} ...{high:8.1f} {middle / base:8.2f}")
+        spread = f"{low:.1f} to {high:.1f}"
+        rows.append((name, f"{middle:.1f}", spread, f"{middle / base:.3g}", f"{differences[name]:.0e}"))
+    return rows
 
 
 if __name__ == "__main__":

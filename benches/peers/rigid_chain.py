@@ -1,6 +1,6 @@
 """Time of one call from Python on a rigid arm of seven joints, beside Pinocchio's bindings, with a check of values.
 
-    python benches/rigid_chain.py [--calls 30000] [--markdown FILE]
+    python benches/peers/rigid_chain.py [--calls 30000] [--markdown FILE]
 
 Inverse dynamics (rnea), mass matrix (crba) and forward dynamics (aba), each on prepared buffers and ready arrays, as a
 controller written in Python calls them. Pinocchio takes part where it is installed: pip install "vpm-dynamics[peers]".
@@ -19,8 +19,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-ROOT = Path(__file__).resolve().parent.parent
-sys.path[:0] = [str(ROOT / "benches")]
+ROOT = Path(__file__).resolve().parent.parent.parent
+sys.path[:0] = [str(ROOT / "benches" / "peers")]
 
 import markdown  # noqa: E402
 from vpm.model import Dynamics, Model  # noqa: E402

@@ -1,6 +1,6 @@
 """Error and time of a flexible two-link arm, side by side with other engines.
 
-    python benches/flexible_arm.py [--repeats 5] [--quick] [--markdown FILE]
+    python benches/peers/flexible_arm.py [--repeats 5] [--quick] [--markdown FILE]
 
 24 s of two motions; the error is that against converged motions, at 10 Hz. Other engines take part where they are
 installed: pip install "vpm-dynamics[peers]".
@@ -20,8 +20,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-ROOT = Path(__file__).resolve().parent.parent
-sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "benches")]
+ROOT = Path(__file__).resolve().parent.parent.parent
+sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "benches" / "peers")]
 
 import markdown  # noqa: E402
 from reference_arm import DURATION, MOTIONS, errors, planar_arm  # noqa: E402

@@ -1,6 +1,6 @@
 """One second of a servo-cylinder under a chirp from 2 to 50 Hz: vpm beside a loop in C, CVODES and LSODA.
 
-python benches/servo_chirp.py [--rounds N] [--markdown FILE]
+python benches/peers/servo_chirp.py [--rounds N] [--markdown FILE]
 
 Every round runs every engine. Errors are the largest of place and both pressures over rows of 10 ms, relative to the
 range of each, against the loop in C in long double at 1e-15 (without a C compiler: against SciPy's DOP853 at 1e-13).
@@ -27,8 +27,8 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from numpy.typing import NDArray
 
-ROOT = Path(__file__).resolve().parent.parent
-sys.path[:0] = [str(ROOT / "benches")]
+ROOT = Path(__file__).resolve().parent.parent.parent
+sys.path[:0] = [str(ROOT / "benches" / "peers")]
 
 import instruction_counts  # noqa: E402
 import markdown  # noqa: E402
@@ -115,7 +115,7 @@ def compiled(folder: Path, *, long: bool = False) -> Callable[[float], Array] | 
         return None
     target = folder / ("long.so" if long else "plain.so")
     flags = ["-O3", "-march=native", "-shared", "-fPIC", *(["-DLONG"] if long else [])]
-    source = str(ROOT / "benches" / "servo_chirp.c")
+    source = str(ROOT / "benches" / "peers" / "servo_chirp.c")
     subprocess.run([compiler, *flags, "-o", str(target), source, "-lm"], check=True)  # noqa: S603
     loop = ctypes.CDLL(str(target)).run
     loop.restype = ctypes.c_long

@@ -1,6 +1,6 @@
 """Instructions of one call of rnea, crba and aba on an arm of seven joints, counted by valgrind: free of machine noise.
 
-python benches/instruction_counts.py [--markdown FILE]
+python benches/peers/instruction_counts.py [--markdown FILE]
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ import subprocess
 import sys
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parent.parent
-sys.path[:0] = [str(ROOT / "benches")]
+ROOT = Path(__file__).resolve().parent.parent.parent
+sys.path[:0] = [str(ROOT / "benches" / "peers")]
 
 import markdown  # noqa: E402
 
