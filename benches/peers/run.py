@@ -58,8 +58,8 @@ repeats this table alone.
 
 ## A NARX model
 
-A free run of a model of 20 terms, time of one step. All engines take turns in one run, each on its own ready arrays; the
-difference is the largest to vpm, on values of about one. sysidentpy's `predict` and the loop in Python run 1000
+A free run of a model of 20 terms, time of one step. All engines take turns in one run, on ready arrays of their own.
+The difference is the largest to vpm, on values of about one. sysidentpy's `predict` and the loop in Python run 1000
 samples, the others 20 000.
 
 {narx}
