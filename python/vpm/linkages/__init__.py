@@ -10,6 +10,7 @@ Both are described by a TOML file or by numbers, and answer with frozen results 
 The laws are those of the core, see ``docs/linkages.md``. Angles in rad, lengths in m, all numbers SI.
 """
 
+from vpm.linkages.dropping import DropLimit, drop_limit
 from vpm.linkages.karl import Karl, KarlGeometry
 from vpm.linkages.karl_results import KarlPoses, KarlSingularities, KarlWorkspace
 from vpm.linkages.leg import Leg
@@ -22,6 +23,7 @@ __all__ = [
     "INERTIAL_NAMES",
     "Attachment",
     "Cylinder",
+    "DropLimit",
     "Karl",
     "KarlGeometry",
     "KarlPoses",
@@ -35,6 +37,7 @@ __all__ = [
     "LegTerms",
     "Segment",
     "ShareMap",
+    "drop_limit",
     "inertial_values",
     "load",
     "with_inertial_values",
