@@ -9,14 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import lru_cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vpm.errors import DivergedError, SimulationError, VpmError
 from vpm.experiment import Experiment, Motion
-from vpm.identify.drive_answers import apart, driven, first_drives, picked, together
+from vpm.identify.drive_answers import apart, driven, first_drives, needed, picked, together
 from vpm.identify.drive_memory import DriveMemory, Filter
 from vpm.identify.reuse import Kept, Parts, parts_of
 from vpm.initial import whole_motion
@@ -163,6 +163,10 @@ def respond(
             remembered = memory or DriveMemory(lambda values: values[m.kept])
             return _with_drives(model, theta, m, experiment, (columns, channels), remembered, origin)
         if has_own_drives(model):
+            bare = _unsplit(model, m.joints)
+            if bare is not None and shows_drives_alone(model, channels):
+                remembered = memory or DriveMemory(lambda values: values[m.kept])
+                return _with_known_drives(model, bare, theta, m, experiment, (columns, channels), remembered)
             answer = _with_both(model, theta, m, experiment, columns, channels)
         elif has_hidden(model, m.joints):
             answer = _with_hidden(model, theta, m, columns, channels, kept or Kept(), origin)
@@ -226,13 +230,52 @@ def _with_drives(
         outputs, by_drives = apart(model, theta, m, experiment, wanted, memory, origin)
     else:
         outputs, by_drives = together(model, theta, m, experiment, wanted, memory)
-    motion = (m.position, m.velocity, m.acceleration)
-    required, slopes = model.core.required(theta, *motion, m.dt, list(columns))
-    needed = memory.keep(required)
-    balance = memory.keep(slopes.reshape(len(slopes), -1)) if columns else np.zeros((len(needed), 0))
-    balance = balance.reshape(*needed.shape, len(columns)) - by_drives[:, len(channels) :]
+    required, slopes = needed(model, theta, m, columns, memory)
+    balance = slopes - by_drives[:, len(channels) :]
     seen = by_drives[:, : len(channels)]
-    return Response(needed, outputs[:, len(channels) :], balance, outputs[:, : len(channels)], seen)
+    return Response(required, outputs[:, len(channels) :], balance, outputs[:, : len(channels)], seen)
+
+
+@lru_cache(maxsize=128)
+def _unsplit(model: Model, joints: tuple[str, ...]) -> tuple[Model, NDArray[np.int64]] | None:
+    """A machine without the effects that split its joints, if it has the measured ``joints`` then, and its parameters.
+
+    The motor side of a split joint keeps the measured motion and the drives: these answer as in the machine as it was.
+    """
+    bare = model
+    for effect in model.effects:
+        candidate = bare.without_effect(effect.name, effect.at)
+        bare = candidate if len(candidate.joints) < len(bare.joints) else bare
+    if bends(model) or tuple(bare.joints) != joints:
+        return None
+    return bare, np.array([model.index(name) for name in bare.parameter_names], dtype=np.int64)
+
+
+def _with_known_drives(
+    model: Model,
+    unsplit: tuple[Model, NDArray[np.int64]],
+    theta: Array,
+    m: Motion,
+    experiment: Experiment,
+    wanted: tuple[Sequence[int], Sequence[str]],
+    memory: DriveMemory,
+) -> Response:
+    """Drives with states of their own on measured joints, behind which hang others that effects have split off."""
+    (bare, places), (columns, channels) = unsplit, wanted
+    own = {int(place): number for number, place in enumerate(places)}
+    felt = [number for number, column in enumerate(columns) if column in own]
+    asked = [own[columns[number]] for number in felt]
+    outputs, by_drives = apart(bare, theta[places], m, experiment, (asked, channels), memory)
+    effort = [model.output_channels.index(f"{joint}.effort") for joint in m.joints]
+    values, slopes = _hidden(model, theta, m, columns)
+    required = memory.keep(values[:, effort])
+    balance = np.zeros((*required.shape, len(columns)))
+    if columns:
+        balance += memory.keep(slopes[:, effort].reshape(len(slopes), -1)).reshape(balance.shape)
+    balance[:, :, felt] -= by_drives[:, len(channels) :]
+    seen = np.zeros((len(required), len(channels), len(columns)))
+    seen[:, :, felt] = by_drives[:, : len(channels)]
+    return Response(required, outputs[:, len(channels) :], balance, outputs[:, : len(channels)], seen)
 
 
 def _with_both(

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
+from functools import lru_cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -82,6 +83,37 @@ def apart(
         total[:, places] += outputs
         derivative[np.ix_(range(len(total)), places, felt)] += slopes
     return total, derivative
+
+
+def needed(model: Model, theta: Array, m: Motion, columns: Sequence[int], memory: DriveMemory) -> tuple[Array, Array]:
+    """Effort that a motion needs at the joints (n, joints), filtered, and its derivative by ``columns``."""
+    structure, places = _carried(model)
+    moving = frozenset(places.tolist())
+    felt = [place for place, column in enumerate(columns) if column in moving]
+
+    def work(missing: Sequence[str]) -> tuple[Array, Array]:
+        asked = [model.index(name) for name in missing]
+        required, slopes = model.core.required(theta, m.position, m.velocity, m.acceleration, m.dt, asked)
+        return required, slopes
+
+    names = [model.parameter_names[columns[place]] for place in felt]
+    efforts, slopes = memory.recall((structure, theta[places].tobytes()), names, work)
+    derivative = np.zeros((*efforts.shape, len(columns)))
+    derivative[:, :, felt] = slopes
+    return efforts, derivative
+
+
+@lru_cache(maxsize=256)
+def _carried(model: Model) -> tuple[str, NDArray[np.int64]]:
+    """All that the effort of a motion may depend on: a text, and parameters. Nothing of cylinders and supplies does."""
+    silent = {name for name in model.actuators if model.actuator_type(name) == "hydraulic"}
+    silent |= {*model.supplies, *model.controllers}
+    document = model.to_dict()
+    document["actuators"] = {name: entry for name, entry in document["actuators"].items() if name not in silent}
+    document["effects"] = [entry for entry in document.get("effects", ()) if entry["at"] not in silent]
+    text = json.dumps({key: entry for key, entry in document.items() if key not in {"supplies", "controllers"}})
+    owners = [name.partition(".")[0] for name in model.parameter_names]
+    return text, np.array([place for place, owner in enumerate(owners) if owner not in silent], dtype=np.int64)
 
 
 def _answered(

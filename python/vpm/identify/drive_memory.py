@@ -1,7 +1,8 @@
 """What drives with states of their own answer to a measured motion, remembered: most questions are asked again.
 
-Along a given motion no joint effect, mass or inertia changes what a drive does. A search that tries them one after the
-other would let the same drives run through the same record every time.
+Along a given motion no joint effect, mass or inertia changes what a drive does, and no cylinder the effort that the
+motion needs. A search that tries them one after the other would let the same drives run through the same record, and
+work out the same efforts, every time.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 #: Answers that are kept for each record: what one round of a search asks, the next one asks again.
-KEPT = 200
+KEPT = 400
 
 
 Filter = Callable[[Array], Array]
