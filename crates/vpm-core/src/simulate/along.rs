@@ -74,9 +74,10 @@ pub fn drives_along(
         check_starts(setting, &first)?;
     }
     let job = Driven { setting, motion, inputs, internal, places, seen };
-    // Most questions are for one parameter: lanes that nobody needs would be most of the work.
-    let (pair, jacobian) = match setting.sensitivities {
-        [_] => differentiate_by::<_, 1>(&job, theta, setting.sensitivities, |pass, place| pass.first[place])?,
+    // Most questions are for a few parameters: lanes that nobody needs would be most of the work.
+    let (pair, jacobian) = match setting.sensitivities.len() {
+        1 => differentiate_by::<_, 1>(&job, theta, setting.sensitivities, |pass, place| pass.first[place])?,
+        2 => differentiate_by::<_, 2>(&job, theta, setting.sensitivities, |pass, place| pass.first[place])?,
         _ => differentiate(&job, theta, setting.sensitivities, |pass, place| pass.first[place])?,
     };
     Ok(Along { outputs: pair.first, states: pair.second, jacobian })
@@ -360,6 +361,19 @@ impl<S: Scalar, const N: usize> Ode<S> for Answer<S, N> {
                 }
             }
         }
+    }
+
+    /// The dual numbers of the Jacobian carry the rates along.
+    fn linearise(&mut self, s: &[S], jacobian: &mut [S], rates: &mut [S]) {
+        self.jacobian(s, jacobian);
+        for (rate, dual) in rates.iter_mut().zip(&self.duals.rate[2 * self.ends.len()..]) {
+            *rate = dual.value;
+        }
+        rates[s.len() - 1] = S::one();
+    }
+
+    fn prepare(&mut self, s: &[S], matrix: &mut [S], rates: &mut [S]) {
+        self.linearise(s, matrix, rates);
     }
 
     fn scales(&self, scales: &mut [f64]) {

@@ -98,6 +98,7 @@ impl<'a, S: Scalar> Guide<'a, S> {
             duals: Buffers::new(Build::dynamics(&description, &lifted)?, job.passive),
             ends: vec![[[S::zero(); 3]; 2]; joints],
             interval: job.setting.stepping.time_step,
+            ready: false,
         };
         let dim = ode.dim();
         let mut guide = Self {
@@ -144,11 +145,13 @@ impl<'a, S: Scalar> Guide<'a, S> {
 
     fn run(mut self, interrupt: Interrupt<'_>) -> Result<Pair<S>> {
         let (rows, layout) = (self.motion.position.rows(), self.description.layout());
+        let mut now = if rows > 0 { self.at(0) } else { Vec::new() };
         for row in 0..rows {
-            let (now, next) = (self.at(row), self.at((row + 1).min(rows - 1)));
-            for ((ends, now), next) in self.ode.ends.iter_mut().zip(now).zip(next) {
+            let next = self.at((row + 1).min(rows - 1));
+            for ((ends, &now), &next) in self.ode.ends.iter_mut().zip(&now).zip(&next) {
                 *ends = [now, next];
             }
+            now = next;
             self.sample(row)?;
             if row + 1 < rows {
                 self.advance(row, interrupt)?;
@@ -190,15 +193,15 @@ impl<'a, S: Scalar> Guide<'a, S> {
             *time = S::zero();
         }
         let (width, dim) = (self.description.n_outputs(), self.description.n_states());
+        self.ode.depart(&self.state);
         let buffers = &mut self.ode.values;
-        buffers.evaluate(&self.state, &self.ode.ends, self.ode.interval);
         let n = buffers.q.len();
         let state = &mut self.states[row * dim..(row + 1) * dim];
         state[..n].copy_from_slice(&buffers.q);
         state[n..2 * n].copy_from_slice(&buffers.v);
         let outputs = &mut self.truth[row * width..(row + 1) * width];
+        buffers.require();
         let Buffers { dynamics, q, v, a, load, .. } = buffers;
-        dynamics.inverse_dynamics(q, v, a, load);
         dynamics.observe_motion(state, outputs);
         for ((channels, &a), &effort) in outputs.chunks_exact_mut(4).zip(&*a).zip(&*load).take(self.of_joints.len()) {
             channels[2] = a;
@@ -235,9 +238,42 @@ struct Free<S> {
     ends: Vec<[State<S>; 2]>,
     /// Time between samples, s.
     interval: f64,
+    /// Whether `values` are those of the state in which the next step begins.
+    ready: bool,
 }
 
 impl<S: Scalar> Free<S> {
+    /// Evaluates at `x`, where the next step begins.
+    fn depart(&mut self, x: &[S]) {
+        self.evaluate(x);
+        self.ready = true;
+    }
+
+    /// Evaluates at `x`.
+    fn evaluate(&mut self, x: &[S]) {
+        self.ready = false;
+        self.values.evaluate(x, &self.ends, self.interval);
+    }
+
+    /// Evaluates at `x` unless that is where the step begins and was done.
+    fn begin(&mut self, x: &[S]) {
+        if !std::mem::take(&mut self.ready) {
+            self.evaluate(x);
+        }
+    }
+
+    /// Writes the iteration matrix of a machine without contacts and bushings, from the last evaluation.
+    fn leading(&mut self, matrix: &mut [S]) {
+        let (dim, n) = (self.dim(), self.coordinates());
+        matrix.fill(S::zero());
+        for k in 0..n {
+            matrix[k * dim + n + k] = S::one();
+        }
+        let lower = &mut matrix[n * dim..2 * n * dim];
+        self.values.elasticity(lower, dim);
+        self.values.joint_effects(lower, dim);
+    }
+
     /// Where a state of the free coordinates stands among those of the machine.
     fn place(&self, state: usize) -> usize {
         let (free, n) = (&self.values.free, self.values.q.len());
@@ -315,6 +351,17 @@ impl<S: Scalar> Buffers<S> {
         rates[2 * count] = S::one();
     }
 
+    /// Turns the load that is left without the free accelerations into the efforts that the motion needs with them, by the mass matrix of
+    /// the last evaluation.
+    fn require(&mut self) {
+        let Self { dynamics, free, q, v, a, load, .. } = self;
+        let matrix = dynamics.data.mass_matrix();
+        for (effort, row) in load.iter_mut().zip(matrix.chunks_exact(q.len().max(1))) {
+            *effort += free.iter().map(|&place| row[place] * a[place]).sum();
+        }
+        dynamics.follow_load(q, v, load);
+    }
+
     /// Writes `[-M_ff^-1 K, -M_ff^-1 D]` of the beams into rows of `width` entries, with the factors of the last evaluation.
     fn elasticity(&mut self, rows: &mut [S], width: usize) {
         let Self { dynamics, factors, driven, free, column, .. } = self;
@@ -370,7 +417,7 @@ impl<S: Scalar> Ode<S> for Free<S> {
     }
 
     fn rhs(&mut self, x: &[S], dxdt: &mut [S]) {
-        self.values.evaluate(x, &self.ends, self.interval);
+        self.evaluate(x);
         dxdt.copy_from_slice(&self.values.rates);
     }
 
@@ -396,26 +443,35 @@ impl<S: Scalar> Ode<S> for Free<S> {
         (self.duals.ends, self.duals.state) = (lifted, state);
     }
 
+    fn linearise(&mut self, x: &[S], jacobian: &mut [S], rates: &mut [S]) {
+        self.begin(x);
+        rates.copy_from_slice(&self.values.rates);
+        self.jacobian(x, jacobian);
+    }
+
     /// `[0, 1; -M^-1 K, -M^-1 D]`: all that is stiff, for the price of one mass matrix; with contacts and bushings the exact Jacobian.
     fn iteration_matrix(&mut self, x: &[S], matrix: &mut [S]) {
         if !self.values.dynamics.connections.is_free() {
             return self.jacobian(x, matrix);
         }
-        let (dim, n) = (x.len(), self.coordinates());
-        matrix.fill(S::zero());
-        for k in 0..n {
-            matrix[k * dim + n + k] = S::one();
+        self.evaluate(x);
+        self.leading(matrix);
+    }
+
+    fn prepare(&mut self, x: &[S], matrix: &mut [S], rates: &mut [S]) {
+        self.begin(x);
+        rates.copy_from_slice(&self.values.rates);
+        if self.values.dynamics.connections.is_free() {
+            self.leading(matrix);
+        } else {
+            self.jacobian(x, matrix);
         }
-        self.values.evaluate(x, &self.ends, self.interval);
-        let lower = &mut matrix[n * dim..2 * n * dim];
-        self.values.elasticity(lower, dim);
-        self.values.joint_effects(lower, dim);
     }
 
     fn elasticity(&mut self, x: &[S], block: &mut [S]) -> bool {
         let n = self.coordinates();
         block.fill(S::zero());
-        self.values.evaluate(x, &self.ends, self.interval);
+        self.evaluate(x);
         self.values.elasticity(block, 2 * n);
         n > 0
     }

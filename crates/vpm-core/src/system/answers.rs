@@ -34,18 +34,18 @@ impl<S: Scalar> Dynamics<S> {
                 *effort -= load;
             }
         }
-        self.load(q, v, efforts);
+        self.follow_load(q, v, efforts);
     }
 
     /// As [`Dynamics::inverse_dynamics`], but without what contacts and bushings do.
     pub(crate) fn inverse_dynamics_of_tree(&mut self, q: &[S], v: &[S], a: &[S], efforts: &mut [S]) {
         self.balance(q, v, a, efforts);
-        self.load(q, v, efforts);
+        self.follow_load(q, v, efforts);
     }
 
     /// From efforts r that arrive to efforts u of the actuators, of which effects take a share k of the load:
     /// `u - k |u| = r`, so `u = r / (1 - k sign(r))`.
-    fn load(&self, q: &[S], v: &[S], efforts: &mut [S]) {
+    pub(crate) fn follow_load(&self, q: &[S], v: &[S], efforts: &mut [S]) {
         for (joint, effect) in &self.effects {
             let JointEffect::EmpiricalForce(law) = effect else { continue };
             let (share, arriving) = (law.share_of_load(q[*joint], v[*joint]), efforts[*joint]);
