@@ -17,7 +17,7 @@ from vpm.discrepancy.side_by_side import Failure, SideBySide
 from vpm.discrepancy.structure import structure
 from vpm.discrepancy.timing import InTime, in_time
 from vpm.identify import gain, segments
-from vpm.identify.along import bends
+from vpm.identify.along import bends, has_own_drives
 
 #: Candidates refitted in one round: those that promise most for their numbers, and those that promise most of all.
 #: Without the latter, several names of one regressor, as a constant force and a tilted world, crowd out a law of two
@@ -56,14 +56,20 @@ class Round:
         return self.best()
 
     def heavy(self, effects: Sequence[str] | None, without: set[Key]) -> Accepted | None:
-        """The best of those with a motion of their own, tried only where more than noise is left to explain."""
-        left = structure(self.current.model, self.data.training, self.data.unseen, self.timed.fitted, self.timed.unseen)
-        if not left.present and left.coloured <= NOISE_ONLY:
-            return None
-        if self.done():
+        """The best of those with a motion of their own, tried where more than noise is left to explain.
+
+        A spring that swings within the whole band leaves what is as white as noise: of rigid machines in which nothing
+        was found before it, one that promises much of the residual is refitted all the same.
+        """
+        model = self.current.model
+        left = structure(model, self.data.training, self.data.unseen, self.timed.fitted, self.timed.unseen)
+        quiet = not left.present and left.coloured <= NOISE_ONLY
+        if (quiet and (self.number > 1 or bends(model) or has_own_drives(model))) or self.done():
             return None
         self._promising = []
         self.screen(effects, without, heavy=True)
+        if quiet:
+            self._promising = [one for one in self._promising if one.drop >= RINGING]
         self.confirm()
         return self.best()
 
