@@ -85,6 +85,16 @@ pub(crate) struct Strip {
     pub(crate) point: [f64; 2],
 }
 
+impl Strip {
+    /// Strain per unit of each coordinate of its beam.
+    pub(crate) fn row(&self) -> Vec<f64> {
+        let mut row = vec![0.0; self.len];
+        let [x, y] = self.point;
+        self.section.add_weighted([y, -x, 0.0, 0.0, 0.0, 1.0], &mut row);
+        row
+    }
+}
+
 /// A beam in its place.
 #[derive(Clone, Debug)]
 pub(crate) struct Elastic<S> {

@@ -17,6 +17,22 @@ pub struct JointMotion<'a> {
     pub acceleration: Table<'a>,
 }
 
+/// Rates of strain that gauges showed along a motion, to which beams are held.
+#[derive(Clone, Copy)]
+pub struct StrainRates<'a> {
+    /// Readings, N x gauges, 1/s.
+    pub rate: Table<'a>,
+    /// How firmly each gauge holds its beam, J s; 0 for one that does not.
+    pub gain: &'a [f64],
+}
+
+/// The sensor on each gauge, if there is one.
+pub(crate) fn strain_sensors<S: Scalar>(description: &Description, theta: &[S]) -> Vec<Option<Sensor<S>>> {
+    let sensors = description.sensors(theta);
+    let on = |gauge| sensors.iter().find(|sensor| sensor.channel == Channel::Strain { gauge }).cloned();
+    (0..description.gauges.len()).map(on).collect()
+}
+
 /// The sensor on the position of each joint, if there is one.
 pub(crate) fn position_sensors<S: Scalar>(description: &Description, theta: &[S]) -> Vec<Option<Sensor<S>>> {
     let sensors = description.sensors(theta);

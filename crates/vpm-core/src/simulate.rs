@@ -1,8 +1,10 @@
 //! Simulation of a whole record: free run on commands, closed loop on references, restarts from many samples.
 
 mod along;
+mod buffers;
 mod control;
 mod names;
+mod observer;
 mod prescribed;
 mod quintic;
 mod sampled;
@@ -12,7 +14,7 @@ mod stepper;
 
 pub use along::{Along, drives_along};
 pub(crate) use names::state_name;
-pub use prescribed::prescribed;
+pub use prescribed::{observed, prescribed};
 pub(crate) use sampled::SampledDrives;
 pub(crate) use stability::{check_step, check_structure};
 pub(crate) use start::check_pistons;

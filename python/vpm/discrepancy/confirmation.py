@@ -41,6 +41,8 @@ FEW_EVALUATIONS = 6
 #: A refit that has lowered the training error by less than this share of its mean square in so many evaluations, and
 #: hardly goes on, is ended: ten times as much is asked of it on unseen data.
 SLOW_GAIN, SLOW_EVALUATIONS = 0.01, 10
+#: A joint that winds up before it moves on looks like one that sticks.
+WOUND_UP = "joint_compliance"
 
 
 @dataclass(frozen=True)
@@ -94,7 +96,8 @@ class Trial:
     simulated : Gain or None
         The same by simulation of the unseen records; None where they were not simulated.
     away : Gain or None
-        The unseen gain away from reversals, for an effect of a drive or an instrument on a machine with dry friction.
+        The unseen gain away from reversals, for an effect of a drive or an instrument, or a joint that winds up, on a
+        machine with dry friction.
     diverged : str
         Why the simulation of the unseen records stopped, or "".
     clear : bool
@@ -290,9 +293,10 @@ def _away_gain(current: Judged, judged: Judged, data: InverseDynamicsProblem, pr
     """Gain on samples at which every joint is clearly in motion.
 
     Where a joint with dry friction turns round it sticks for a while, which no smooth law follows, and a late drive or
-    sensor imitates that; elsewhere it cannot.
+    sensor imitates that, or a spring in the joint that winds up meanwhile; elsewhere they cannot.
     """
-    if not is_dry(current.model) or probe.candidate.effect.site not in {"actuator", "sensor"}:
+    imitates = probe.candidate.effect.site in {"actuator", "sensor"} or probe.candidate.effect.name == WOUND_UP
+    if not is_dry(current.model) or not imitates:
         return None
     counted = np.ones(current.unseen.size)
     speeds = [np.abs(data.state(record)[1]) for record in range(len(data.motions))]

@@ -8,7 +8,7 @@ without a sensor, and the states inside of drives.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 
 import numpy as np
@@ -18,6 +18,7 @@ from vpm.errors import DivergedError, SimulationError, VpmError
 from vpm.experiment import Experiment, Motion
 from vpm.identify.drive_answers import apart, driven, first_drives, needed, picked, together
 from vpm.identify.drive_memory import DriveMemory, Filter
+from vpm.identify.gauges import Hold
 from vpm.identify.reuse import Kept, Parts, parts_of
 from vpm.initial import whole_motion
 from vpm.model import Model
@@ -27,6 +28,9 @@ Array = NDArray[np.float64]
 
 #: Drives that go by samples of their own and remember the last ones.
 SAMPLED_TYPES = ("narx", "maxwell_narx")
+#: Samples per period of the highest frequency of the motion on which derivatives of what bends are taken: they are then
+#: within about one percent.
+SLOPE_SAMPLES = 8.0
 
 
 @dataclass(frozen=True)
@@ -314,7 +318,7 @@ def _with_hidden(
     read = [f"{model.joints[place]}.effort" for place in measured] + list(channels)
 
     def bend(machine: Model, values: Array, wanted: Sequence[int]) -> tuple[Array, Array]:
-        return picked(machine, *_hidden(machine, values, m, wanted), slice(None), read)
+        return picked(machine, *_swung(machine, values, m, wanted, kept.hold), slice(None), read)
 
     parts = parts_of(model, m.joints)
     if parts is None:
@@ -366,8 +370,28 @@ def _add_laws(parts: Parts, theta: Array, m: Motion, columns: Sequence[int], cha
         jacobian[:, :efforts, columns.index(column)] -= less[:, :, k]
 
 
-def _hidden(model: Model, theta: Array, m: Motion, columns: Sequence[int]) -> tuple[Array, Array]:
-    """Outputs along the motion of the measured joints, all else free, and their derivative."""
+def _swung(model: Model, theta: Array, m: Motion, columns: Sequence[int], hold: Hold | None) -> tuple[Array, Array]:
+    """As `_hidden`, with derivatives on fewer samples where gauges hold links: each costs as much as the outputs.
+
+    What rings freely would lose its phase by that.
+    """
+    every = int(1.0 / (SLOPE_SAMPLES * m.cutoff * m.dt))
+    if not columns or hold is None or every < 2:
+        return _hidden(model, theta, m, columns, hold)
+    from scipy.interpolate import CubicSpline
+
+    outputs, _ = _hidden(model, theta, m, (), hold)
+    quantities = ("position", "velocity", "acceleration", "time")
+    few = replace(m, **{name: getattr(m, name)[::every] for name in quantities}, dt=every * m.dt)
+    _, slopes = _hidden(model, theta, few, columns, replace(hold, rate=hold.rate[::every]))
+    grid, places = every * np.arange(len(few.time)), np.arange(len(m.time))
+    return outputs, np.asarray(CubicSpline(grid, slopes)(np.minimum(places, grid[-1])))
+
+
+def _hidden(
+    model: Model, theta: Array, m: Motion, columns: Sequence[int], hold: Hold | None = None
+) -> tuple[Array, Array]:
+    """Outputs along the motion of the measured joints, all else free or held by gauges, and their derivative."""
     setup = Setup()
     measured = [place for place, joint in enumerate(model.joints) if joint in m.joints]
     passive = [place for place in range(len(model.joints)) if place not in measured]
@@ -375,6 +399,6 @@ def _hidden(model: Model, theta: Array, m: Motion, columns: Sequence[int]) -> tu
     for order, values in enumerate((m.position, m.velocity, m.acceleration)):
         motion[order][:, measured] = values
     method = "linearly_implicit" if has_own_drives(model) else setup.method(model)
-    stepping = (m.dt, setup.substeps, method, list(columns), passive)
+    stepping = (m.dt, setup.substeps, method, list(columns), passive, *(hold.arguments(model) if hold else ()))
     outputs, _, jacobian = model.core.simulate_prescribed(theta, motion[0], motion[1], motion[2], *stepping)
     return outputs, jacobian

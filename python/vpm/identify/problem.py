@@ -18,9 +18,10 @@ from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from vpm.errors import IdentificationError, near_match
 from vpm.experiment import Experiment, Motion
-from vpm.identify.along import Response, check_along, respond, shown_channels
+from vpm.identify.along import Response, bends, check_along, respond, shown_channels
 from vpm.identify.drive_memory import DriveMemory
 from vpm.identify.first_state import add_first_state, first_state_slopes
+from vpm.identify.gauges import gauge_gains, hold_of
 from vpm.identify.parallel import in_order
 from vpm.identify.reuse import Kept, parts_of
 from vpm.identify.stops import at_stops, check_left
@@ -30,7 +31,8 @@ from vpm.simulate import Setup, SimulatedArrays, copied_channels, simulate_array
 
 Array = NDArray[np.float64]
 
-#: A joint stands still where it is slower than this share of its largest speed for two decimated samples on end.
+#: A joint stands still where it is slower than this share of its largest speed for one decimated sample on end: the
+#: filter of the motion shows no shorter rest.
 STANDSTILL_SHARE = 0.005
 #: A drive rests where its joint is slower than this share of its largest speed, in the mean over this time, s.
 REST_SHARE, REST_TIME = 0.03, 0.1
@@ -156,7 +158,8 @@ class InverseDynamicsProblem:
         self.shown = shown_channels(model, measured, experiments)
         self._memories = tuple(DriveMemory(m.parallel) for m in self.motions)
         self._compared = tuple(self._measured(m, e) for m, e in zip(self.motions, self.experiments, strict=True))
-        self._kept = tuple(Kept() for _ in self.motions)
+        self._gains = self._hold_gains(model)
+        self._kept = self._held(self.experiments, self.motions)
         self.workers = 1
         self.blocks = self._lay_out(model)
 
@@ -198,9 +201,20 @@ class InverseDynamicsProblem:
             for m, other in zip(self.motions, moved, strict=True)
         )
         whole = tuple(replace(m, edge=0) for m in motions)
-        kept = tuple(Kept() for _ in motions)
+        kept = self._held(logs, motions)
         vars(others).update(experiments=tuple(logs), motions=motions, _whole=whole, _kept=kept)
         return others
+
+    def _hold_gains(self, model: Model) -> dict[str, float]:
+        """How firmly gauges hold links, the same for all records and for all models that are compared."""
+        if not bends(model):
+            return {}
+        names, m = self.motions[0].joints, self.motions[0]
+        middle = np.array([m.position[:, names.index(j)].mean() if j in names else 0.0 for j in model.joints])
+        return gauge_gains(model, self.experiments, middle)
+
+    def _held(self, experiments: Sequence[Experiment], motions: Sequence[Motion]) -> tuple[Kept, ...]:
+        return tuple(Kept(hold_of(self._gains, e, m)) for e, m in zip(experiments, motions, strict=True))
 
     def share(self, whole: Model, others: Sequence[tuple[Model, Sequence[str]]]) -> None:
         """Let ``others`` take how links bend from ``whole``, which moves as they do; see `vpm.identify.reuse.Kept`.
@@ -349,7 +363,9 @@ class InverseDynamicsProblem:
         kept = [speed[m.kept] for speed, m in zip(speeds, self.motions, strict=True)]
         largest = np.max([np.quantile(speed, 0.999, axis=0) for speed in kept], axis=0)
         masks = [
-            ~_widened(_standing(speed, STANDSTILL_SHARE * largest, _period(m)), m)[m.retained]
+            ~_widened(_standing(speed, STANDSTILL_SHARE * largest, _period(m) // (2 if bends(model) else 1)), m)[
+                m.retained
+            ]
             for m, speed in zip(self.motions, speeds, strict=True)
         ]
         moves = np.mean(np.vstack(masks), axis=0) >= LEAST_MOVING

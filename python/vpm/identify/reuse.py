@@ -17,6 +17,7 @@ from threading import Lock
 import numpy as np
 from numpy.typing import NDArray
 
+from vpm.identify.gauges import Hold
 from vpm.model import Model
 
 Array = NDArray[np.float64]
@@ -104,7 +105,9 @@ Work = Callable[[Model, Array, Sequence[int]], tuple[Array, Array]]
 class Kept:
     """Answers of bare machines along one record, by structure and parameter values; safe on several threads."""
 
-    def __init__(self) -> None:
+    def __init__(self, hold: Hold | None = None) -> None:
+        #: Gauges that hold the links along the record.
+        self.hold = hold
         self._answers: OrderedDict[tuple[str, bytes], Answer] = OrderedDict()
         self._shared: dict[str, tuple[Array, dict[str, Array]]] = {}
         self._lock = Lock()

@@ -18,4 +18,11 @@ impl Gauge {
         }
         strain
     }
+
+    /// Adds to `row` what each coordinate contributes to the sum of the components of the strain screw, each times its weight.
+    pub fn add_weighted(&self, weights: [f64; 6], row: &mut [f64]) {
+        for &(coordinate, component, entry) in &self.entries {
+            row[coordinate] += weights[component] * entry;
+        }
+    }
 }

@@ -1,19 +1,20 @@
 //! Joints that follow a given motion, and what answers to it: beams, and joints that nobody drives.
 
-use super::quintic::{State, between};
+use super::buffers::Buffers;
+use super::observer::Held;
+use super::quintic::State;
 use super::{Run, Setting, Stepping, check_structure, halted, names};
-use crate::algebra::Cholesky;
 use crate::description::Description;
-use crate::dynamics::flexible;
 use crate::error::{Diverged, Error, Result};
 use crate::integrator::{Halt, Integrator, Stuck};
-use crate::motion::{JointMotion, position_sensors};
+use crate::motion::{JointMotion, StrainRates, position_sensors};
 use crate::ode::Ode;
 use crate::scalar::{Dual, Scalar};
 use crate::sensitivity::{Interrupt, Job, Pair, differentiate};
 use crate::sensor::Sensor;
-use crate::statics::{free_coordinates, settled};
-use crate::system::{Build, Dynamics};
+use crate::statics::settled;
+use crate::system::Build;
+use crate::table::Table;
 
 /// Size of a coordinate, rad or m, that a step control counts as small; rates have 1.
 const COORDINATE_SCALE: f64 = 1e-2;
@@ -28,11 +29,30 @@ const LANES: usize = 8;
 /// gravity. The outputs `effort` of the joints are the efforts that the motion needs, with those of the effects taken off; the actuators
 /// do nothing. Checked: a motion simulated from efforts gives those efforts back, with all joints or some of them following.
 pub fn prescribed(setting: Setting<'_>, motion: JointMotion<'_>, passive: &[usize]) -> Result<Run> {
+    observed(setting, motion, passive, None)
+}
+
+/// As [`prescribed`], with beams held to what their gauges showed.
+///
+/// Law: a force `c C^T (e' - C v)` more on the elastic coordinates, `C v` being the rate of strain at a gauge, `e'` the measured one and
+/// `c` its gain: a damper between the beam and the measured one, which takes the energy out of whatever they differ by and nothing where
+/// they agree (a natural observer: M. Demetriou, *Systems & Control Letters* 51, 2004). A damped error no longer rings with the noise
+/// of the motion. Checked: a free motion gives its own efforts back, with gauges that hold; a wrong begin is forgotten.
+pub fn observed(
+    setting: Setting<'_>,
+    motion: JointMotion<'_>,
+    passive: &[usize],
+    strains: Option<StrainRates<'_>>,
+) -> Result<Run> {
     let (rows, joints) = (motion.position.rows(), setting.description.n_joints());
     for (name, table) in
         [("position", motion.position), ("velocity", motion.velocity), ("acceleration", motion.acceleration)]
     {
         table.expect(name, rows, joints)?;
+    }
+    if let Some(StrainRates { rate, gain }) = strains {
+        rate.expect("strain_rate", rows, setting.description.gauges.len())?;
+        Table::new("strain_gain", gain, 1, gain.len())?.expect("strain_gain", 1, setting.description.gauges.len())?;
     }
     if let Some(joint) = setting.description.remembering().next() {
         return Err(Error::Memory { joint: setting.description.bodies[joint].joint.name.clone() });
@@ -50,7 +70,7 @@ pub fn prescribed(setting: Setting<'_>, motion: JointMotion<'_>, passive: &[usiz
         let driven: Vec<usize> = (0..joints).filter(|joint| !passive.contains(joint)).collect();
         check_structure(setting.description, setting.theta, setting.stepping, &state, &driven)?;
     }
-    let job = Guided { setting, motion, passive: &passive };
+    let job = Guided { setting, motion, passive: &passive, strains };
     let output = |pass: &Pair<_>, place: usize| pass.first[place];
     let (pair, jacobian) = differentiate(&job, setting.theta, setting.sensitivities, output)?;
     Ok(Run { outputs: pair.first, states: pair.second, jacobian })
@@ -60,6 +80,7 @@ struct Guided<'a> {
     setting: Setting<'a>,
     motion: JointMotion<'a>,
     passive: &'a [usize],
+    strains: Option<StrainRates<'a>>,
 }
 
 impl Job for Guided<'_> {
@@ -75,6 +96,7 @@ struct Guide<'a, S> {
     description: &'a Description,
     motion: JointMotion<'a>,
     passive: &'a [usize],
+    strains: Option<StrainRates<'a>>,
     stepping: Stepping,
     sensors: Vec<Sensor<S>>,
     of_joints: Vec<Option<Sensor<S>>>,
@@ -93,9 +115,11 @@ impl<'a, S: Scalar> Guide<'a, S> {
         let of_joints = position_sensors(description, theta);
         let lifted: Vec<_> = theta.iter().map(|&value| Dual::constant(value)).collect();
         let joints = dynamics.joints();
+        let held = Held::all(description, &dynamics.model, job.strains, theta);
+        let duals = held.iter().map(Held::lifted).collect();
         let ode = Free {
-            values: Buffers::new(dynamics, job.passive),
-            duals: Buffers::new(Build::dynamics(&description, &lifted)?, job.passive),
+            values: Buffers::new(dynamics, job.passive, held),
+            duals: Buffers::new(Build::dynamics(&description, &lifted)?, job.passive, duals),
             ends: vec![[[S::zero(); 3]; 2]; joints],
             interval: job.setting.stepping.time_step,
             ready: false,
@@ -105,6 +129,7 @@ impl<'a, S: Scalar> Guide<'a, S> {
             description,
             motion,
             passive: job.passive,
+            strains: job.strains,
             stepping: job.setting.stepping,
             sensors: description.sensors(theta),
             of_joints,
@@ -152,6 +177,11 @@ impl<'a, S: Scalar> Guide<'a, S> {
                 *ends = [now, next];
             }
             now = next;
+            if let Some(strains) = self.strains {
+                for held in &mut self.ode.values.held {
+                    held.move_on(strains, [row, (row + 1).min(rows - 1)], self.stepping.time_step);
+                }
+            }
             self.sample(row)?;
             if row + 1 < rows {
                 self.advance(row, interrupt)?;
@@ -262,18 +292,6 @@ impl<S: Scalar> Free<S> {
         }
     }
 
-    /// Writes the iteration matrix of a machine without contacts and bushings, from the last evaluation.
-    fn leading(&mut self, matrix: &mut [S]) {
-        let (dim, n) = (self.dim(), self.coordinates());
-        matrix.fill(S::zero());
-        for k in 0..n {
-            matrix[k * dim + n + k] = S::one();
-        }
-        let lower = &mut matrix[n * dim..2 * n * dim];
-        self.values.elasticity(lower, dim);
-        self.values.joint_effects(lower, dim);
-    }
-
     /// Where a state of the free coordinates stands among those of the machine.
     fn place(&self, state: usize) -> usize {
         let (free, n) = (&self.values.free, self.values.q.len());
@@ -282,128 +300,18 @@ impl<S: Scalar> Free<S> {
             None => n + free.get(state.wrapping_sub(free.len())).copied().unwrap_or_default(),
         }
     }
-}
 
-struct Buffers<S> {
-    dynamics: Dynamics<S>,
-    /// The joints that follow.
-    driven: Vec<usize>,
-    /// Passive joints, then elastic coordinates.
-    free: Vec<usize>,
-    q: Vec<S>,
-    v: Vec<S>,
-    a: Vec<S>,
-    load: Vec<S>,
-    rates: Vec<S>,
-    state: Vec<S>,
-    ends: Vec<[State<S>; 2]>,
-    /// A load on the free coordinates on its way.
-    column: Vec<S>,
-    /// The block of the mass matrix of the free coordinates, and its factors.
-    mass: Vec<S>,
-    factors: Cholesky<S>,
-}
-
-impl<S: Scalar> Buffers<S> {
-    fn new(dynamics: Dynamics<S>, passive: &[usize]) -> Self {
-        let (n, joints, zero) = (dynamics.coordinates(), dynamics.joints(), S::zero());
-        let free = free_coordinates(&dynamics, passive);
-        let driven = (0..joints).filter(|joint| !passive.contains(joint)).collect();
-        let count = free.len();
-        let [q, v, a, load] = [0; 4].map(|_| vec![zero; n]);
-        let [rates, state] = [0; 2].map(|_| vec![zero; 2 * count + 1]);
-        let (column, mass, factors) = (vec![zero; count], vec![zero; count * count], Cholesky::new(count));
-        let ends = vec![[[zero; 3]; 2]; joints];
-        Self { dynamics, driven, free, q, v, a, load, rates, state, ends, column, mass, factors }
-    }
-
-    /// Motion of all coordinates and rates of the state, at state `x` on the way between `ends`.
-    fn evaluate(&mut self, x: &[S], ends: &[[State<S>; 2]], interval: f64) {
-        let Self { dynamics, driven, free, q, v, a, load, column, mass, factors, rates, .. } = self;
-        let (n, count) = (q.len(), free.len());
-        for &joint in &*driven {
-            [q[joint], v[joint], a[joint]] = between(&ends[joint], x[2 * count], interval);
+    /// Writes the iteration matrix from the last evaluation.
+    fn stiff(&mut self, matrix: &mut [S]) {
+        let (n, dim) = (self.values.free.len(), self.values.rates.len());
+        matrix.fill(S::zero());
+        for k in 0..n {
+            matrix[k * dim + n + k] = S::one();
         }
-        for (k, &place) in free.iter().enumerate() {
-            (q[place], v[place], a[place]) = (x[k], x[count + k], S::zero());
-        }
-        dynamics.terms(q, v);
-        flexible::required(&dynamics.model, &dynamics.data, (q, v), a, load);
-        for (joint, effect) in &dynamics.effects {
-            load[*joint] -= effect.effort(q[*joint], v[*joint]);
-        }
-        dynamics.subtract_connections(load);
-        let matrix = dynamics.data.mass_matrix();
-        for (own, &row) in mass.chunks_exact_mut(count.max(1)).zip(&*free) {
-            for (entry, &place) in own.iter_mut().zip(&*free) {
-                *entry = matrix[row * n + place];
-            }
-        }
-        factors.factorise(mass);
-        for (entry, &place) in column.iter_mut().zip(&*free) {
-            *entry = -load[place];
-        }
-        factors.solve(column);
-        for (k, &place) in free.iter().enumerate() {
-            a[place] = column[k];
-            (rates[k], rates[count + k]) = (v[place], column[k]);
-        }
-        rates[2 * count] = S::one();
-    }
-
-    /// Turns the load that is left without the free accelerations into the efforts that the motion needs with them, by the mass matrix of
-    /// the last evaluation.
-    fn require(&mut self) {
-        let Self { dynamics, free, q, v, a, load, .. } = self;
-        let matrix = dynamics.data.mass_matrix();
-        for (effort, row) in load.iter_mut().zip(matrix.chunks_exact(q.len().max(1))) {
-            *effort += free.iter().map(|&place| row[place] * a[place]).sum();
-        }
-        dynamics.follow_load(q, v, load);
-    }
-
-    /// Writes `[-M_ff^-1 K, -M_ff^-1 D]` of the beams into rows of `width` entries, with the factors of the last evaluation.
-    fn elasticity(&mut self, rows: &mut [S], width: usize) {
-        let Self { dynamics, factors, driven, free, column, .. } = self;
-        let count = free.len();
-        for number in 0..dynamics.model.n_beams() {
-            let Some((beam, first)) = dynamics.model.beam(number) else { continue };
-            // The elastic coordinates are the last of all and of the free ones.
-            let (first, len) = (first - driven.len(), beam.len());
-            for (block, stiff) in [(0, beam.stiffness()), (count, beam.damping())] {
-                for k in 0..len {
-                    column.fill(S::zero());
-                    for (entry, row) in column[first..first + len].iter_mut().zip(stiff.chunks_exact(len)) {
-                        *entry = -row[k];
-                    }
-                    factors.solve(column);
-                    set_column(rows, width, block + first + k, column);
-                }
-            }
-        }
-    }
-
-    /// Writes the columns of the passive joints: slopes of their effects, and chords from rest in the place of the tangents of friction.
-    fn joint_effects(&mut self, rows: &mut [S], width: usize) {
-        let Self { dynamics, factors, free, q, v, column, .. } = self;
-        let (count, joints) = (free.len(), dynamics.joints());
-        for (k, &joint) in free.iter().enumerate().take_while(|(_, place)| **place < joints) {
-            let own = || dynamics.effects.iter().filter(|(place, _)| *place == joint).map(|(_, effect)| effect);
-            let slope: S = own().map(|effect| effect.slope_at_rest(q[joint])).sum();
-            let resistance: S = own().map(|effect| effect.resistance(q[joint], v[joint])).sum();
-            for (place, entry) in [(k, slope), (count + k, -resistance)] {
-                column.fill(S::zero());
-                column[k] = entry;
-                factors.solve(column);
-                set_column(rows, width, place, column);
-            }
-        }
-    }
-}
-
-fn set_column<S: Scalar>(rows: &mut [S], width: usize, place: usize, column: &[S]) {
-    for (row, &entry) in rows.chunks_exact_mut(width).zip(column) {
-        row[place] = entry;
+        let lower = &mut matrix[n * dim..2 * n * dim];
+        self.values.elasticity(lower, dim);
+        self.values.joint_effects(lower, dim);
+        self.values.drift(lower, dim, &self.ends, self.interval);
     }
 }
 
@@ -428,6 +336,7 @@ impl<S: Scalar> Ode<S> for Free<S> {
         for (lifted, ends) in ends.iter_mut().zip(&self.ends) {
             *lifted = ends.map(|end| end.map(Dual::constant));
         }
+        Held::follow(&mut self.duals.held, &self.values.held);
         let (lifted, mut state) = (std::mem::take(&mut self.duals.ends), std::mem::take(&mut self.duals.state));
         for first in (0..dim).step_by(LANES) {
             for (column, (state, &value)) in state.iter_mut().zip(x).enumerate() {
@@ -449,20 +358,21 @@ impl<S: Scalar> Ode<S> for Free<S> {
         self.jacobian(x, jacobian);
     }
 
-    /// `[0, 1; -M^-1 K, -M^-1 D]`: all that is stiff, for the price of one mass matrix; with contacts and bushings the exact Jacobian.
+    /// `[0, 1, 0; -M^-1 K, -M^-1 D, t]`: all that is stiff, for the price of one mass matrix, with the change in time of what drives it;
+    /// with contacts and bushings the exact Jacobian.
     fn iteration_matrix(&mut self, x: &[S], matrix: &mut [S]) {
         if !self.values.dynamics.connections.is_free() {
             return self.jacobian(x, matrix);
         }
         self.evaluate(x);
-        self.leading(matrix);
+        self.stiff(matrix);
     }
 
     fn prepare(&mut self, x: &[S], matrix: &mut [S], rates: &mut [S]) {
         self.begin(x);
         rates.copy_from_slice(&self.values.rates);
         if self.values.dynamics.connections.is_free() {
-            self.leading(matrix);
+            self.stiff(matrix);
         } else {
             self.jacobian(x, matrix);
         }

@@ -3,9 +3,9 @@
 use numpy::{PyArray1, PyArray2, PyArray3, PyArray4, PyArrayMethods};
 use pyo3::prelude::*;
 use vpm_core::description::Description;
-use vpm_core::motion::JointMotion;
+use vpm_core::motion::{JointMotion, StrainRates};
 use vpm_core::sensitivity::Interrupt;
-use vpm_core::simulate::{Run, Setting, Stepping, closed_loop, drives_along, free_run, prescribed, restarts};
+use vpm_core::simulate::{Run, Setting, Stepping, closed_loop, drives_along, free_run, observed, restarts};
 
 use super::System;
 use crate::arrays::{self, Numbers, cube, matrix, places};
@@ -139,8 +139,8 @@ impl System {
     }
 
     /// Joints but for `passive` ones follow a motion (N, n_joints), these and beams respond from rest: outputs, states and derivatives
-    /// as in `simulate`.
-    #[pyo3(signature = (theta, position, velocity, acceleration, time_step, substeps, integrator, sensitivities=vec![], passive=vec![]))]
+    /// as in `simulate`. Beams are held to the rates of strain (N, gauges) that gauges of some gain showed.
+    #[pyo3(signature = (theta, position, velocity, acceleration, time_step, substeps, integrator, sensitivities=vec![], passive=vec![], strain_rate=None, strain_gain=None))]
     #[expect(clippy::too_many_arguments, reason = "the arguments of the Python function")]
     fn simulate_prescribed<'py>(
         &self,
@@ -154,19 +154,27 @@ impl System {
         integrator: &str,
         sensitivities: Vec<i64>,
         passive: Vec<i64>,
+        strain_rate: Option<&Any<'py>>,
+        strain_gain: Option<&Any<'py>>,
     ) -> PyResult<(Table<'py>, Table<'py>, Cube<'py>)> {
         let request = Request::new(self, theta, (time_step, substeps, integrator), &sensitivities)?;
         let position = Numbers::table("position", position)?;
         let velocity = Numbers::table("velocity", velocity)?;
         let acceleration = Numbers::table("acceleration", acceleration)?;
         let passive = places("passive", &passive)?;
+        let rate = strain_rate.map(|array| Numbers::table("strain_rate", array)).transpose()?;
+        let gain = strain_gain.map(|array| Numbers::vector("strain_gain", array)).transpose()?;
         let run = self.compute(py, |interrupt| {
             let motion = JointMotion {
                 position: position.as_table()?,
                 velocity: velocity.as_table()?,
                 acceleration: acceleration.as_table()?,
             };
-            prescribed(request.setting(&self.description, interrupt), motion, &passive)
+            let strains = match (&rate, &gain) {
+                (Some(rate), Some(gain)) => Some(StrainRates { rate: rate.as_table()?, gain: gain.values() }),
+                _ => None,
+            };
+            observed(request.setting(&self.description, interrupt), motion, &passive, strains)
         })?;
         self.run(py, run, sensitivities.len())
     }
