@@ -109,17 +109,20 @@ fn torque_ripple_repeats_and_stores_what_it_takes() {
 
 #[test]
 fn backlash_lets_go_within_its_play_and_holds_beyond() {
-    let law = Backlash { gap: 0.01, stiffness: 2e4, damping: 1.5, width: 1e-6 };
+    let law = Backlash { gap: 0.01, stiffness: 2e4, damping: 1.5, contact_damping: 40.0, width: 1e-6 };
     // Nearly nothing in the play but the damping, a spring from the contact on, the same on both sides.
-    close(law.effort(0.0, 0.2), -0.3, 1e-12);
+    close(law.effort(0.0, 0.2), -0.3, 1e-6);
     close(law.effort(0.004, 0.0), 0.0, 1e-5);
+    // A closed contact resists as well.
+    close(law.effort(0.006, 0.2) - law.effort(0.006, 0.0), -41.5 * 0.2, 1e-5);
     for side in [1.0, -1.0] {
         close(law.effort(side * 0.006, 0.0), -side * 20.0, 1e-5);
         close(law.potential(side * 0.006), 0.5 * 2e4 * 1e-6, 1e-7);
     }
     close(law.potential(0.0), 0.0, 0.0);
     // The slope is nowhere negative and nowhere beyond the spring's, and no derivative breaks at the corners.
-    let soft = JointEffect::Backlash(Backlash { gap: 0.01, stiffness: 2e4, damping: 0.0, width: 1e-3 });
+    let soft =
+        JointEffect::Backlash(Backlash { gap: 0.01, stiffness: 2e4, damping: 0.0, contact_damping: 0.0, width: 1e-3 });
     let slopes: Vec<f64> = (-400..=400).map(|k| -soft.slope_at_rest(f64::from(k) * 5e-5)).collect();
     assert!(slopes.iter().all(|slope| (0.0..2e4).contains(slope)));
     assert!(slopes.windows(2).all(|pair| (pair[1] - pair[0]).abs() < 2e4 * 0.03));
@@ -134,7 +137,7 @@ fn potentials_are_what_the_efforts_integrate_to() {
         JointEffect::BiasForce(BiasForce { force: 2.0 }),
         JointEffect::Spring(Spring { stiffness: 70.0, rest: 0.2 }),
         JointEffect::TorqueRipple(TorqueRipple { period: 0.3, cosine: 1.0, sine: 2.0 }),
-        JointEffect::Backlash(Backlash { gap: 0.4, stiffness: 30.0, damping: 0.0, width: 0.05 }),
+        JointEffect::Backlash(Backlash { gap: 0.4, stiffness: 30.0, damping: 0.0, contact_damping: 0.0, width: 0.05 }),
         JointEffect::JointCompliance(JointCompliance { stiffness: 30.0, damping: 0.0 }),
         JointEffect::LinkFlexibility(LinkFlexibility { stiffness: 30.0, time: 0.0 }),
         JointEffect::EndStop(EndStop { stiffness: 30.0, damping: 0.0, low: -0.3, high: 0.2, width: 0.05 }),
@@ -168,7 +171,7 @@ fn every_law_splits_into_rest_and_resistance() {
         JointEffect::BiasForce(BiasForce { force: 2.0 }),
         JointEffect::Spring(Spring { stiffness: 70.0, rest: 0.2 }),
         JointEffect::TorqueRipple(TorqueRipple { period: 0.3, cosine: 1.0, sine: 2.0 }),
-        JointEffect::Backlash(Backlash { gap: 0.4, stiffness: 30.0, damping: 3.0, width: 0.05 }),
+        JointEffect::Backlash(Backlash { gap: 0.4, stiffness: 30.0, damping: 3.0, contact_damping: 2.0, width: 0.05 }),
         JointEffect::JointCompliance(JointCompliance { stiffness: 30.0, damping: 2.0 }),
         JointEffect::LinkFlexibility(LinkFlexibility { stiffness: 30.0, time: 0.02 }),
         JointEffect::EndStop(EndStop { stiffness: 30.0, damping: 0.7, low: -0.3, high: 0.2, width: 0.05 }),

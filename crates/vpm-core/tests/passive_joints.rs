@@ -38,9 +38,11 @@ fn geared(gap: f64) -> Description {
     parts.bodies.push(body(random, "hand", tip, JointKind::Revolute));
     parts.gauges.push(Gauge { name: "strip".into(), beam: 0, at: 0.1, x: 0.003, y: 0.005 });
     description(&parts, |content| {
-        let [gap, stiffness, damping, width] = [("gap", gap), ("contact", 3e4), ("grease", 0.5), ("width", 1e-3)]
-            .map(|(name, value)| parameter(content, name, value));
-        let entry = json!({"type": "backlash", "joint": PLAY, "gap": gap, "stiffness": stiffness, "damping": damping, "width": width});
+        let [gap, stiffness, damping, impact, width] =
+            [("gap", gap), ("contact", 3e4), ("grease", 0.5), ("impact", 1.0), ("width", 1e-3)]
+                .map(|(name, value)| parameter(content, name, value));
+        let entry = json!({"type": "backlash", "joint": PLAY, "gap": gap, "stiffness": stiffness, "damping": damping,
+            "contact_damping": impact, "width": width});
         push(content, "effects", entry);
         let [stiffness, rest] = [("spring", 30.0), ("rest", 0.1)].map(|(name, value)| parameter(content, name, value));
         push(content, "effects", json!({"type": "spring", "joint": 2, "stiffness": stiffness, "rest": rest}));

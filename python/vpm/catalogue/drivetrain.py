@@ -98,13 +98,22 @@ BACKLASH = EffectType(
             "resistance per speed, within the play and beyond",
             physical=NOT_NEGATIVE,
         ),
+        size(
+            "contact_damping",
+            "backlash.contact_damping",
+            "{E} s/{C}",
+            "effort_per_speed",
+            "resistance per speed of a closed contact alone",
+            physical=NOT_NEGATIVE,
+        ),
         shape("width", "backlash.width", "{C}", "coordinate", "way over which a contact closes", start=_CONTACT),
         _inertia("backlash.inertia"),
     ),
     law=(
-        "tau = -stiffness (q + 1/2 sqrt((q - 1/2 gap)^2 + width^2) - 1/2 sqrt((q + 1/2 gap)^2 + width^2)) - damping v"
+        "tau = -stiffness f(q) - (damping + contact_damping df/dq) v, "
+        "f(q) = q + 1/2 sqrt((q - 1/2 gap)^2 + width^2) - 1/2 sqrt((q + 1/2 gap)^2 + width^2)"
     ),
-    sentence="{at} has a play of {gap} between contacts of {stiffness}, damped with {damping}.",
+    sentence="{at} has a play of {gap} between contacts of {stiffness}, damped with {contact_damping}.",
     impossible="a negative stiffness would pull the contacts into each other, a negative damping would feed energy in",
     confused_with={
         "joint_compliance": "they agree where the load never changes its sign; reversals and small motion part them",

@@ -139,7 +139,8 @@ def _candidate(effect: EffectType, site: str, model: Model, data: InverseDynamic
     seen = _excitation(data, model, joint, site if effect.site in {"actuator", "cylinder"} else None)
     if effect.name in STRUCTURAL:
         found = structural_starts(effect.name, site, model, seen.travel, logged_swing(data, model, site))
-        return Candidate(effect, site, *found, neutral=False)
+        fixed = ("damping", "width") if effect.name == "backlash" else ()
+        return Candidate(effect, site, *found, fixed, neutral=False)
     if effect.name == "end_stop":
         where = _over_way(data, model.joints[joint], residual)
         return Candidate(effect, site, *stop_starts(*where, seen.middle, seen.travel, softest(model, site)))

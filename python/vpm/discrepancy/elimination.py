@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from vpm.discrepancy.candidates import Key
 from vpm.discrepancy.choice import Accepted
 from vpm.discrepancy.confirmation import Data, Judged, judge
+from vpm.discrepancy.play import is_read_off, only_winds_up
 from vpm.discrepancy.refusal import LEAST_GAIN, NORMAL_95_ONE_SIDED
 from vpm.errors import DivergedError, ModelError
 from vpm.identify import gain, segments
@@ -104,3 +105,19 @@ def settled(best: Accepted, data: Data) -> Accepted:
     except DivergedError:
         return best
     return replace(best, trial=replace(best.trial, judged=exact))
+
+
+def drop_springs(stages: list[Stage], accepted: list[Accepted], data: Data, dropped: dict[Key, str]) -> None:
+    """Drop plays of which a later effect has left no more than a spring."""
+    for entry in accepted[:]:
+        current = stages[-1].judged
+        name, site = entry.key
+        if not is_read_off(current.model, data.training, entry.trial.probe.candidate):
+            continue
+        if reason := only_winds_up(current.model, site, data.training):
+            model = current.model.without_effect(name, site)
+            free = tuple(each for each in current.free if each in model.parameters)
+            bounds = {each: pair for each, pair in current.bounds.items() if each in free}
+            stages.append(Stage("removed", name, site, judge(model, free, data, bounds)))
+            accepted.remove(entry)
+            dropped[entry.key] = reason

@@ -10,6 +10,7 @@ from vpm.discrepancy.candidates import Candidate, Key, candidates, left_out
 from vpm.discrepancy.choice import Accepted, choose
 from vpm.discrepancy.confirmation import Data, Judged, Trial, confirm
 from vpm.discrepancy.diagnosis import RankedCandidate
+from vpm.discrepancy.play import is_read_off, only_winds_up
 from vpm.discrepancy.refusal import Thresholds, refuse_probe, refuse_timing, refuse_trial
 from vpm.discrepancy.ringing import NOISE_ONLY, noise_alone, only_ringing
 from vpm.discrepancy.screening import Probe, prepare, probe
@@ -52,6 +53,11 @@ class Round:
     def light(self, effects: Sequence[str] | None, without: set[Key]) -> Accepted | None:
         """The best of the candidates whose regressor follows from the measured motion alone."""
         self.screen(effects, without, heavy=False)
+        if self._promising and self._promising[0].candidate.effect.name == "backlash":
+            # What winds up passes for play, and has to compete with it.
+            light = self._promising
+            self.screen(effects, without, heavy=True)
+            self._promising = sorted((*light, *self._promising), key=lambda p: -p.score)
         self.confirm()
         return self.best()
 
@@ -66,7 +72,6 @@ class Round:
         quiet = not left.present and left.coloured <= NOISE_ONLY
         if (quiet and (self.number > 1 or bends(model) or has_own_drives(model))) or self.done():
             return None
-        self._promising = []
         self.screen(effects, without, heavy=True)
         if quiet:
             self._promising = [one for one in self._promising if one.drop >= RINGING]
@@ -76,6 +81,7 @@ class Round:
     def screen(self, effects: Sequence[str] | None, without: set[Key], *, heavy: bool) -> None:
         """Probe every candidate and set aside those that cannot be."""
         current, data = self.current, self.data
+        self._promising = []
         found = candidates(current.model, data.training, current.fit.residual, effects)
         self.refused.update(left_out(current.model, data.training, effects))
         listed = [c for c in found if c.key not in without and self._is_heavy(c) == heavy]
@@ -106,10 +112,13 @@ class Round:
     def _is_heavy(self, candidate: Candidate) -> bool:
         """Whether it adds a motion that nobody measures; where the log holds that motion, it is evidence like any.
 
-        So is the bending of a rigid beam beside others that bend: light effects would only imitate it.
+        So is the bending of a rigid beam beside others that bend, and a play between links that do not, which its
+        flights tell at once: light effects would only imitate them.
         """
         model, name = self.current.model, candidate.effect.name
         if bends(model) and name == "link_flexibility" and candidate.site in model.beams:
+            return False
+        if is_read_off(model, self.data.training, candidate):
             return False
         logged = {f"{candidate.site}_{suffix}.position" for suffix in ("bending", "deflection")}
         return name in HEAVY and not logged & set(self.data.training.shown)
@@ -159,7 +168,10 @@ class Round:
 
     def _refused(self, trial: Trial, thresholds: Thresholds) -> str:
         """Why a trial is not believed, or ""."""
+        candidate = trial.probe.candidate
         reason = refuse_trial(trial, thresholds) or self._only_timing(trial, thresholds)
+        if not reason and is_read_off(self.current.model, self.data.training, candidate):
+            reason = only_winds_up(trial.judged.model, candidate.site, self.data.training)
         return reason or only_ringing(self.current, self.data, trial)
 
     def _only_timing(self, trial: Trial, thresholds: Thresholds) -> str:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.special import chdtri
 
 from vpm.discrepancy.candidates import Candidate
+from vpm.discrepancy.play import believed, is_read_off, read_off
 from vpm.identify import InverseDynamicsProblem, robust_covariance, segments
 from vpm.identify.along import bends
 from vpm.identify.identifiability import closest_column, column_lengths, is_alias
@@ -116,6 +117,9 @@ def _short(model: Model, candidate: Candidate, name: str) -> str:
 
 def probe(base: Baseline, data: InverseDynamicsProblem, candidate: Candidate) -> Probe:
     """Try all start values of a candidate and keep the best, a possible one before an impossible one."""
+    if is_read_off(base.model, data, candidate):
+        base = replace(base, model=believed(base.model, data.nominal, base.free))
+        return _probe_start(base, data, read_off(base.model, base.free, data, candidate), still=True)
     probes = [_probe_start(base, data, candidate, start) for start in candidate.starts]
     best = max(probes, key=lambda p: p.drop)
     possible = [p for p in probes if not impossible_values(p)]
@@ -148,10 +152,19 @@ def size_is_clear(names: Sequence[str], values: Array, covariance: Array) -> boo
 
 
 def _probe_start(
-    base: Baseline, data: InverseDynamicsProblem, candidate: Candidate, start: Mapping[str, float]
+    base: Baseline,
+    data: InverseDynamicsProblem,
+    candidate: Candidate,
+    start: Mapping[str, float] | None = None,
+    *,
+    still: bool = False,
 ) -> Probe:
+    """One start; where it is ``still``, the effect stays there, as its only one, and what is known moves alone."""
+    start = candidate.starts[0] if start is None else start
     model = base.model.with_effect(candidate.effect.name, at=candidate.site, **start)
     added = _added(model, candidate)
+    if not candidate.neutral:
+        added = tuple(name for name in added if _short(model, candidate, name) not in candidate.fixed)
     columns = [model.index(name) for name in added]
     if candidate.neutral or has_tangent(base.model, data):
         # Where links bend or drives answer, each known column costs a simulation: they are taken as before it.
@@ -161,11 +174,15 @@ def _probe_start(
         all_columns = [model.index(name) for name in base.free] + columns
         residual, jacobian = data.evaluate(model, model.theta, all_columns)
         known, fresh = jacobian[:, : len(base.free)], jacobian[:, len(base.free) :]
-    keep, held, invisible = _sort_columns(added, fresh, known, base.free, residual, _sizes(model, candidate, base.free))
+    keep, held, invisible = _sort_columns(
+        added, fresh, known, base.free, residual, _sizes(model, candidate, base.free, added)
+    )
     chosen = np.column_stack([known, fresh[:, keep]])
     names = (*base.free, *(added[i] for i in keep))
     start_values = np.concatenate([np.zeros(len(base.free)), model.theta[[columns[i] for i in keep]]])
     values, std, left = _linear_step(data, chosen, residual)
+    if still:
+        values, (_, _, left) = np.zeros_like(values), _linear_step(data, known, residual)
     power = float(base.residual @ base.residual)
     free = names[len(base.free) :]
     return Probe(
@@ -180,10 +197,11 @@ def _probe_start(
     )
 
 
-def _sizes(model: Model, candidate: Candidate, known: Sequence[str]) -> tuple[Array, Array]:
-    """Orders of magnitude of the known parameters and of those of the candidate."""
+def _sizes(model: Model, candidate: Candidate, known: Sequence[str], added: Sequence[str]) -> tuple[Array, Array]:
+    """Orders of magnitude of the known parameters and of those that the candidate adds."""
     values = np.array([abs(model.parameters[name].value) or 1.0 for name in known])
-    return values, np.array([parameter.typical for parameter in candidate.effect.parameters])
+    own = [candidate.effect.parameter(_short(model, candidate, name)) for name in added]
+    return values, np.array([parameter.typical for parameter in own])
 
 
 def _added(model: Model, candidate: Candidate) -> tuple[str, ...]:

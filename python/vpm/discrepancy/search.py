@@ -9,7 +9,7 @@ from vpm.discrepancy.candidates import Key
 from vpm.discrepancy.choice import Accepted
 from vpm.discrepancy.confirmation import Data, Judged
 from vpm.discrepancy.diagnosis import Ambiguity, RankedCandidate, RefusedEffect
-from vpm.discrepancy.elimination import Stage, drop_replaced, settled, without_tight_bounds
+from vpm.discrepancy.elimination import Stage, drop_replaced, drop_springs, settled, without_tight_bounds
 from vpm.discrepancy.round import Round, Tell
 from vpm.discrepancy.side_by_side import SideBySide
 from vpm.identify.tangent import has_tangent
@@ -63,6 +63,7 @@ def search(
             break
         try:
             drop_replaced(stages, accepted, data, dropped)
+            drop_springs(stages, accepted, data, dropped)
         except KeyboardInterrupt:
             interrupted = True
             break

@@ -132,7 +132,7 @@ def structural_starts(
     swing : tuple of float, optional
         What the logs say of the spring, see `logged_swing`; it is tried beside the grid of frequencies.
     """
-    inertia = _moved(model, site)
+    inertia = moved(model, site)
     held = (softest(model, site), math.inf)
     share = (LEAST_DRIVEN * inertia, math.inf)  # without any inertia before it a spring has nothing to swing against
     if effect == "backlash":
@@ -162,7 +162,7 @@ def structural_starts(
 
 def softest(model: Model, site: str) -> float:
     """Least stiffness that holds what a joint moves, N/m or N m/rad."""
-    return _moved(model, site) * (2.0 * math.pi * SLOWEST) ** 2
+    return moved(model, site) * (2.0 * math.pi * SLOWEST) ** 2
 
 
 def stop_starts(position: Array, residual: Array, middle: float, travel: float, least: float) -> tuple[Starts, Bounds]:
@@ -211,7 +211,7 @@ def _ramp(outwards: Array, push: Array) -> tuple[float, ...]:
     return () if place is None else (place,)
 
 
-def _moved(model: Model, site: str) -> float:
+def moved(model: Model, site: str) -> float:
     """Inertia that hangs on a joint, a body or a beam when all joints stand at zero."""
     joint = model.joint_before(site)
     place = model.joints.index(joint)

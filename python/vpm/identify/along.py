@@ -7,6 +7,7 @@ without a sensor, and the states inside of drives.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
@@ -31,6 +32,8 @@ SAMPLED_TYPES = ("narx", "maxwell_narx")
 #: Samples per period of the highest frequency of the motion on which derivatives of what bends are taken: they are then
 #: within about one percent.
 SLOPE_SAMPLES = 8.0
+#: Longest step where a link flies from contact to contact, s: these close within milliseconds.
+IN_PLAY = 5e-4
 
 
 @dataclass(frozen=True)
@@ -357,11 +360,11 @@ def _add_laws(parts: Parts, theta: Array, m: Motion, columns: Sequence[int], cha
     if parts.laws is None or parts.shell is None:
         return
     motion = (m.position, m.velocity, m.acceleration, m.inputs, m.dt)
-    with_laws = [column for column in columns if column in parts.felt]
-    places = parts.places.tolist()
-    without = [column for column in with_laws if column in places]
-    required, _, slopes = parts.laws.core.inverse_dynamics(theta, *motion, with_laws)
-    plain, _, less = parts.shell.core.inverse_dynamics(theta[places], *motion, [places.index(c) for c in without])
+    mine, bare = parts.of_laws.tolist(), parts.of_shell.tolist()
+    with_laws = [column for column in columns if column in parts.felt and column in mine]
+    without = [column for column in with_laws if column in bare]
+    required, _, slopes = parts.laws.core.inverse_dynamics(theta[mine], *motion, [mine.index(c) for c in with_laws])
+    plain, _, less = parts.shell.core.inverse_dynamics(theta[bare], *motion, [bare.index(c) for c in without])
     efforts = required.shape[1]
     channels[:, :efforts] += required - plain
     for k, column in enumerate(with_laws):
@@ -399,6 +402,8 @@ def _hidden(
     for order, values in enumerate((m.position, m.velocity, m.acceleration)):
         motion[order][:, measured] = values
     method = "linearly_implicit" if has_own_drives(model) else setup.method(model)
-    stepping = (m.dt, setup.substeps, method, list(columns), passive, *(hold.arguments(model) if hold else ()))
+    plays = any(effect.name == "backlash" for effect in model.effects)
+    substeps = max(setup.substeps, math.ceil(m.dt / IN_PLAY - 1e-6)) if plays else setup.substeps
+    stepping = (m.dt, substeps, method, list(columns), passive, *(hold.arguments(model) if hold else ()))
     outputs, _, jacobian = model.core.simulate_prescribed(theta, motion[0], motion[1], motion[2], *stepping)
     return outputs, jacobian

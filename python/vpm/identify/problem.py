@@ -122,7 +122,7 @@ class InverseDynamicsProblem:
     Parameters
     ----------
     model : Model
-        Names the joints and actuators; its parameters do not enter.
+        Names the joints and actuators; its parameters do not enter the balance.
     experiments : sequence of Experiment
         Each with the position of every joint that moves by an actuator, and the command of every actuator.
     cutoff : float or sequence of float, optional
@@ -142,6 +142,8 @@ class InverseDynamicsProblem:
         band: float | Sequence[float] | None = None,
     ) -> None:
         self.experiments = tuple(experiments)
+        #: What was given: the model before any fit.
+        self.nominal = model
         self.motions: tuple[Motion, ...] = tuple(
             joint_motion(e, model, one, commanded=True, band=other)
             for e, one, other in zip(experiments, _each(cutoff, experiments), _each(band, experiments), strict=True)
@@ -244,6 +246,22 @@ class InverseDynamicsProblem:
             if len(known) < len(parts) or not kept.share_again(known[0], known[1:]):
                 return False
         return True
+
+    def added(self, efforts: Sequence[Array]) -> Array:
+        """What efforts add to the residual, filtered and weighed as it is, shape (n, k).
+
+        Parameters
+        ----------
+        efforts : sequence of ndarray, shape (N, joints, k)
+            At the measured joints along each record, applied minus required; k of them side by side.
+        """
+        records = []
+        for m, values in zip(self.motions, efforts, strict=True):
+            flat = m.parallel(values.reshape(len(values), -1))
+            mine = flat.reshape(len(flat), *values.shape[1:])[:, self._joints]
+            others = np.zeros((len(flat), len(self.shown), values.shape[2]))
+            records.append(np.concatenate([mine, others], axis=1))
+        return self._stack(records)
 
     def effort(self, model: Model, theta: Array, record: int) -> tuple[Array, Array, Array]:
         """Time, applied and required effort (n, joints) of one record, filtered as in the residual."""

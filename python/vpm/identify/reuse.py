@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from vpm.identify.gauges import Hold
 from vpm.model import Model
+from vpm.model.effects import Effect
 
 Array = NDArray[np.float64]
 
@@ -42,7 +43,10 @@ class Parts:
     places : ndarray of int
         Its parameters among those of the machine.
     laws, shell : Model
-        Both machines with rigid links: their difference in effort is that of the laws. None of them without laws.
+        Both machines with rigid links and no play: their difference in effort is that of the laws. None of them without
+        laws.
+    of_laws, of_shell : ndarray of int
+        Their parameters among those of the machine.
     felt : frozenset of int
         Parameters of the machine that change this difference.
     moving : frozenset of int
@@ -57,6 +61,8 @@ class Parts:
     places: NDArray[np.int64]
     laws: Model | None
     shell: Model | None
+    of_laws: NDArray[np.int64]
+    of_shell: NDArray[np.int64]
     felt: frozenset[int]
     moving: frozenset[int]
     still: NDArray[np.bool_]
@@ -65,11 +71,15 @@ class Parts:
 
 @lru_cache(maxsize=128)
 def parts_of(model: Model, joints: tuple[str, ...]) -> Parts | None:
-    """Split a machine whose measured ``joints`` are all that it has; None for any other, and where nothing bends."""
-    if not model.core.n_elastic or tuple(model.joints) != joints:
+    """Split a machine whose measured ``joints`` are all that it has beside plays; None where nothing bends or flies."""
+    plays = [e for e in model.effects if e.name == "backlash" and f"{e.at}_deflection" in model.joints]
+    flying = {f"{e.at}_deflection" for e in plays}
+    if tuple(joint for joint in model.joints if joint not in flying) != joints:
         return None
+    if not model.core.n_elastic and (not plays or any(e.name == "rotor_inertia" for e in model.effects)):
+        return None  # a rotor is what flies against
     aside = [e for e in model.effects if e.type.site in {"joint", "actuator"} and e.name not in SPLITTING]
-    if len(aside) < sum(e.type.site in {"joint", "actuator"} for e in model.effects):
+    if len(aside) + len(plays) < sum(e.type.site in {"joint", "actuator"} for e in model.effects):
         return None
     bare = model
     for effect in aside:
@@ -83,11 +93,20 @@ def parts_of(model: Model, joints: tuple[str, ...]) -> Parts | None:
     structure = json.dumps(described)
     laws = [effect for effect in aside if effect.type.site == "joint"]
     if not laws:
-        return Parts(bare, places, None, None, frozenset(), moving, still, structure)
+        return Parts(bare, places, None, None, places, places, frozenset(), moving, still, structure)
     felt = {model.index(name) for effect in laws for name in effect.parameter_names.values()}
     read = [effect for effect in model.effects if effect.type.site == "sensor"]
     felt |= {model.index(name) for effect in read for name in effect.parameter_names.values()}
-    return Parts(bare, places, model.at("rigid"), bare.at("rigid"), frozenset(felt), moving, still, structure)
+    whole, shell = _held(model, plays), _held(bare, plays)
+    of_laws, of_shell = (np.array([model.index(n) for n in m.parameter_names], dtype=np.int64) for m in (whole, shell))
+    return Parts(bare, places, whole, shell, of_laws, of_shell, frozenset(felt), moving, still, structure)
+
+
+def _held(model: Model, plays: Sequence[Effect]) -> Model:
+    """The machine with rigid links and without its plays."""
+    for play in plays:
+        model = model.without_effect(play.name, play.at)
+    return model.at("rigid") if model.core.n_elastic else model
 
 
 @dataclass

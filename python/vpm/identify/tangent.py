@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.errors import DivergedError
-from vpm.identify.along import has_hidden, has_own_drives, shows_drives_alone
+from vpm.identify.along import bends, has_hidden, has_own_drives, shows_drives_alone
 from vpm.identify.estimation import Estimate, estimate
 from vpm.identify.problem import InverseDynamicsProblem
 from vpm.identify.reuse import parts_of
@@ -19,6 +19,9 @@ Array = NDArray[np.float64]
 
 #: Tangents that are tried one after the other, and shares of the way to where the fit on one of them ends.
 TANGENTS, SHARES = 8, (1.0, 0.5, 0.25, 0.125)
+#: The same where a link flies through a play: impacts shift in time, of which a tangent knows little, and the start was
+#: read off the flights.
+FLYING = 2
 #: What the tangent may be off by where the fit ends, as a share of the residual: its sum of squares is then within the
 #: square of it of the least one.
 OFF = 0.03
@@ -73,7 +76,8 @@ def estimate_on_tangent(
     """
     residual, _ = data.evaluate(model, model.theta)
     cost, at, columns = float(residual @ residual), model, [model.index(name) for name in free]
-    for _ in range(TANGENTS):
+    flying = not bends(model) and has_hidden(model, data.motions[0].joints)
+    for _ in range(FLYING if flying else TANGENTS):
         rough = estimate(at, Tangent(data, origin), free, bounds=bounds, tolerance=tolerance)
         start, step = at.theta[columns], rough.values - at.theta[columns]
         for share in SHARES:
@@ -82,7 +86,10 @@ def estimate_on_tangent(
             if residual @ residual <= cost * (1.0 + OFF**2):
                 break
         else:
-            return estimate(at, data, free, bounds=bounds, tolerance=tolerance)
+            if not flying:
+                return estimate(at, data, free, bounds=bounds, tolerance=tolerance)
+            reached, residual = at, _residual(data, at)
+            break
         near = share == 1.0 and np.linalg.norm(residual - rough.residual) <= OFF * np.linalg.norm(residual)
         if near or rough.interrupted:
             break

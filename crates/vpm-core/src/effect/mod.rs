@@ -144,7 +144,7 @@ impl<S: Scalar> JointEffect<S> {
             Self::CoulombFriction(law) => law.resistance(v),
             Self::AsymmetricFriction(law) => law.resistance(v),
             Self::StribeckFriction(law) => law.resistance(v),
-            Self::Backlash(law) => law.resistance(),
+            Self::Backlash(law) => law.resistance(q),
             Self::JointCompliance(law) => law.resistance(),
             Self::LinkFlexibility(law) => law.resistance(),
             Self::EndStop(law) => law.resistance(q, v),

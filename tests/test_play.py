@@ -1,0 +1,109 @@
+"""Play between motor and load, found along the motion of the motor alone; the machine is written out here."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from vpm import Experiment, Model, diagnose
+from vpm.catalogue import EFFECTS
+from vpm.discrepancy.candidates import Candidate
+from vpm.discrepancy.flights import flights
+from vpm.discrepancy.play import only_winds_up, read_off
+from vpm.identify import InverseDynamicsProblem
+
+GAP, MASS, ROTOR, VISCOUS = 4e-4, 12.0, 3.0, 30.0
+STIFFNESS, DAMPING = 1.5e6, 900.0
+TEXT = f"""name = "axis"
+gravity = [0.0, 0.0, -9.81]
+
+[bodies.body]
+mass = {{ value = {MASS * 1.05}, uncertainty = {MASS * 0.1}, unit = "kg" }}
+
+[joints.axis]
+type = "prismatic"
+parent = "world"
+child = "body"
+axis = [1.0, 0.0, 0.0]
+rotor_inertia = {ROTOR}
+
+[actuators.drive]
+joint = "axis"
+gain = {{ value = 1.0, unit = "N/N" }}
+command_unit = "N"
+
+[[effects]]
+type = "viscous_friction"
+at = "axis"
+viscous = {{ value = {VISCOUS * 0.95}, uncertainty = {VISCOUS * 0.1}, unit = "N s/m" }}
+"""
+
+
+def record(gap: float, seed: int, seconds: float = 6.0) -> Experiment:
+    """A motor of which the link behind hangs in two contacts, pushed about by a position loop, at 1 kHz."""
+    random = np.random.default_rng(seed)
+    fine, step = 20, 5e-5
+    time = 1e-3 * np.arange(round(seconds / 1e-3))
+    phases = random.uniform(0.0, 6.28, 3)
+    rates = 2.0 * np.pi * np.array([0.5, 1.1, 2.3])
+    path = (np.array([[0.08], [0.03], [0.01]]) * np.sin(rates[:, None] * time + phases[:, None])).sum(0)
+    path = (path - path[0]) * np.clip(time, 0.0, 1.0) ** 2
+    q = v = link = rate = 0.0
+    readings, commands, last = np.zeros(time.size), np.zeros(time.size), 0.0
+    for k in range(time.size):
+        readings[k] = 1e-6 * round((q + 3e-7 * random.standard_normal()) / 1e-6)
+        speed, last = (readings[k] - last) / 1e-3, readings[k]
+        effort = commands[k] = 800.0 * (10.0 * (path[k] - readings[k]) - speed)
+        for _ in range(fine):
+            twist = q - link
+            beyond = twist - min(max(twist, -0.5 * gap), 0.5 * gap)
+            push = STIFFNESS * beyond + DAMPING * (v - rate) if beyond else 0.0
+            push = push if push * beyond > 0.0 else 0.0
+            v += step * (effort - VISCOUS * v - push) / ROTOR
+            rate += step * push / MASS
+            q, link = q + step * v, link + step * rate
+    data = {"axis.position": readings, "drive.command": commands}
+    return Experiment.from_arrays(time, data, units={"axis.position": "m", "drive.command": "N"}, name=f"log {seed}")
+
+
+@pytest.fixture(scope="module")
+def loose() -> tuple[Experiment, ...]:
+    """Two records of a machine with play."""
+    return record(GAP, 1), record(GAP, 2)
+
+
+def test_flights_show_the_gap_best_where_it_is(loose: tuple[Experiment, ...]) -> None:
+    model = Model.from_toml(TEXT)
+    data = InverseDynamicsProblem(model, loose[:1])
+    residual, _ = data.evaluate(model, model.theta)
+    gaps = GAP * np.array([0.25, 0.5, 0.8, 1.0, 1.25, 2.0, 4.0])
+    added = flights(model.with_effect("backlash", at="axis", gap=GAP, stiffness=1.0), "axis", data, gaps.tolist())
+    left = np.sum((residual[:, None] + added) ** 2, axis=0)
+    assert int(np.argmin(left)) in {2, 3, 4}
+    assert left.min() < 0.6 * np.sum(residual**2)
+
+
+def test_the_gap_is_read_off_from_the_motor_alone(loose: tuple[Experiment, ...]) -> None:
+    model = Model.from_toml(TEXT)
+    data = InverseDynamicsProblem(model, loose[:1])
+    found = read_off(model, ("body.mass",), data, Candidate(EFFECTS["backlash"], "axis", ({},))).starts[0]
+    assert found["gap"] == pytest.approx(GAP, rel=0.15)
+
+
+def test_contacts_that_wind_up_further_than_the_gap_are_a_spring(loose: tuple[Experiment, ...]) -> None:
+    model = Model.from_toml(TEXT)
+    data = InverseDynamicsProblem(model, loose[:1])
+    stiff, soft = (model.with_effect("backlash", at="axis", gap=GAP, stiffness=k) for k in (1e6, 1e4))
+    assert not only_winds_up(stiff, "axis", data)
+    assert "that is a spring" in only_winds_up(soft, "axis", data)
+
+
+def test_play_is_named_and_none_is_seen_where_there_is_none(loose: tuple[Experiment, ...]) -> None:
+    model = Model.from_toml(TEXT)
+    effects = ["backlash", "joint_compliance", "input_delay", "coulomb_friction"]
+    why = diagnose(model, loose[:1], loose[1:], effects=effects)
+    assert [(effect.name, effect.site) for effect in why.effects][:1] == [("backlash", "axis")]
+    gap = next(p for p in why.effects[0].parameters if p.name == "gap")
+    assert gap.value == pytest.approx(GAP, rel=0.15)
+    tight = record(1e-9, 1), record(1e-9, 2)
+    assert "backlash" not in {effect.name for effect in diagnose(model, tight[:1], tight[1:], effects=effects).effects}
