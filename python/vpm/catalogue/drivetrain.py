@@ -113,7 +113,7 @@ BACKLASH = EffectType(
         "tau = -stiffness f(q) - (damping + contact_damping df/dq) v, "
         "f(q) = q + 1/2 sqrt((q - 1/2 gap)^2 + width^2) - 1/2 sqrt((q + 1/2 gap)^2 + width^2)"
     ),
-    sentence="{at} has a play of {gap} between contacts of {stiffness}, damped with {contact_damping}.",
+    sentence="{at} has a play of {gap} between contacts of {stiffness}, damped with {contact_damping}, and with {damping} within it as well.",
     impossible="a negative stiffness would pull the contacts into each other, a negative damping would feed energy in",
     confused_with={
         "joint_compliance": "they agree where the load never changes its sign; reversals and small motion part them",
