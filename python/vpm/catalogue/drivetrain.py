@@ -110,10 +110,14 @@ BACKLASH = EffectType(
         _inertia("backlash.inertia"),
     ),
     law=(
-        "tau = -stiffness f(q) - (damping + contact_damping df/dq) v, "
-        "f(q) = q + 1/2 sqrt((q - 1/2 gap)^2 + width^2) - 1/2 sqrt((q + 1/2 gap)^2 + width^2)"
+        "tau = -stiffness (q + 1/2 sqrt((q - 1/2 gap)^2 + width^2) - 1/2 sqrt((q + 1/2 gap)^2 + width^2))"
+        " - damping v - contact_damping (1 + 1/2 (q - 1/2 gap) / sqrt((q - 1/2 gap)^2 + width^2)"
+        " - 1/2 (q + 1/2 gap) / sqrt((q + 1/2 gap)^2 + width^2)) v"
     ),
-    sentence="{at} has a play of {gap} between contacts of {stiffness}, damped with {contact_damping}, and with {damping} within it as well.",
+    sentence=(
+        "{at} has a play of {gap} between contacts of {stiffness}, damped with {contact_damping}, and with {damping}"
+        " within it as well."
+    ),
     impossible="a negative stiffness would pull the contacts into each other, a negative damping would feed energy in",
     confused_with={
         "joint_compliance": "they agree where the load never changes its sign; reversals and small motion part them",
