@@ -172,7 +172,7 @@ def law_of(effect: EffectType) -> str:
 @pytest.mark.parametrize("kind", ["prismatic", "revolute"])
 @pytest.mark.parametrize("effect", [e for e in effects_for_site("joint") if e.name not in ELSEWHERE], ids=name_of)
 def test_the_core_computes_the_law_as_it_is_written(effect: EffectType, kind: str) -> None:
-    values = {parameter.name: 0.9 - 0.2 * i for i, parameter in enumerate(effect.parameters)}
+    values = {parameter.name: 0.9 * 0.8**i for i, parameter in enumerate(effect.parameters)}
     content = machine(kind).to_dict()
     free = {key: table for key, table in content.items() if key not in {"actuators", "sensors"}}
     model = Model.from_dict(free).with_effect(effect.name, at="axis", **values)
