@@ -144,7 +144,7 @@ import importlib, vpm
 for part in {parts}:
     importlib.import_module("vpm." + part)
 for name in vpm.__all__:
-    if name.islower() and name not in {{"__version__", "impedance", "linkages", "narx"}}:
+    if name.islower() and name not in {{"__version__", "impedance", "linkages", "narx", "realtime"}}:
         assert callable(getattr(vpm, name)), name
 """
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)

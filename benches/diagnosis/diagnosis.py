@@ -24,7 +24,7 @@ import vpm  # noqa: E402
 from blind import make_cases  # noqa: E402
 from markdown import table  # noqa: E402
 from model_texts import DAMPED_AXIS, changed  # noqa: E402
-from peers import processor  # noqa: E402
+from run import processor  # noqa: E402
 
 PAGE = ROOT / "docs" / "performance.md"
 BEGIN, END = "<!-- begin of make bench-diagnosis -->\n", "<!-- end of make bench-diagnosis -->\n"

@@ -32,15 +32,14 @@ def drop_replaced(stages: list[Stage], accepted: list[Accepted], data: Data, dro
     Where a parameter of a later effect was held because the data show it only together with one of the earlier effect,
     it is set free for the trial: a spring whose rest was held beside a constant force needs that force no more if it
     may rest elsewhere. One name for what two would say is the shorter answer. A size that was held is another force
-    under another name, as a difference of dry friction is a constant one in motion: it is set free where the same
-    effect has a size that the data ask for beside it, as a difference of viscous friction; else the first name stays.
+    under another name, as a difference of dry friction is a constant one in motion: the first one named stays.
     """
     newest = accepted[-1]
     for entry in accepted[:-1]:
         current = stages[-1].judged
         own = set(entry.trial.parameters)
         freed = {alias.parameter for other in accepted for alias in other.trial.held if alias.partner in own}
-        if any(_only_another_name(other, own, current) for other in accepted):
+        if any(current.model.parameters[name].kind == "linear" for name in freed):
             continue
         try:
             model = current.model.without_effect(*entry.key)
@@ -56,13 +55,6 @@ def drop_replaced(stages: list[Stage], accepted: list[Accepted], data: Data, dro
             accepted[:] = [_released(other, freed) for other in accepted]
             stages.append(Stage("removed", *entry.key, reduced))
             dropped[entry.key] = f"it is not needed any more beside {newest.trial.probe.candidate.label}"
-
-
-def _only_another_name(entry: Accepted, own: set[str], current: Judged) -> bool:
-    """Whether an effect holds a size for the sake of ``own``, parameters of an earlier one, and has no other size."""
-    values = current.model.parameters
-    held = any(values[alias.parameter].kind == "linear" for alias in entry.trial.held if alias.partner in own)
-    return held and not any(values[name].kind == "linear" for name in entry.trial.parameters)
 
 
 def without_tight_bounds(final: Judged, data: Data) -> Judged:

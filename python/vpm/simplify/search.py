@@ -24,6 +24,8 @@ from vpm.simulate import Setup
 FORESEEN, TRIED = 100_000, 16
 #: Share of the tolerance that the common start of the search may lose.
 NEGLIGIBLE = 0.2
+#: Times of steps of less than a microsecond differ by so much for no reason on a machine that does other things too.
+ALIKE = 1.3
 #: Steps timed of the chosen one.
 CHOSEN_STEPS = 200_000
 
@@ -216,7 +218,7 @@ def _within(rungs: Sequence[Rung], limit: float) -> Rung:
 def _concluded(trials: Trials, tolerance: float, share: float, against: str) -> Ladder:
     """The choice, timed once more and longer."""
     rungs, rate = trials.rungs, trials.judge.rate
-    chosen = next(rung for rung in rungs if rung.loss <= tolerance)
+    chosen = _simplest([rung for rung in rungs if rung.loss <= tolerance])
     model = trials.fitted(trials.changes_of(chosen))
     seconds, slowest = trials.timed(model, Setup(chosen.integrator, chosen.substeps), CHOSEN_STEPS)
     place = rungs.index(chosen)
@@ -234,6 +236,19 @@ def _concluded(trials: Trials, tolerance: float, share: float, against: str) -> 
         _dearest(trials),
         model,
     )
+
+
+def _simplest(rungs: Sequence[Rung]) -> Rung:
+    """The cheapest, or it with more left out if that seems dearer by no more than times are uncertain by."""
+    best = rungs[0]
+    alike = [
+        rung
+        for rung in rungs
+        if rung.stepping == best.stepping
+        and set(rung.removed) >= set(best.removed)
+        and rung.seconds <= ALIKE * best.seconds
+    ]
+    return max(alike, key=lambda rung: len(rung.removed))
 
 
 def _dearest(trials: Trials) -> tuple[tuple[str, float], ...]:
