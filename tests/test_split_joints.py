@@ -288,8 +288,9 @@ def test_a_logged_deflection_shows_what_a_rigid_model_lacks() -> None:
     assert np.std(problem.evaluate(slide(), slide().theta)[0][problem.blocks[1].samples]) == pytest.approx(1.0, rel=0.1)
     found = diagnose(slide(), record, wound_up(2), effects=["viscous_friction", "spring", "joint_compliance"])
     assert [(e.name, e.site) for e in found.effects] == [("joint_compliance", "axis")]
+    values = {p.name: p.value for p in found.effects[0].parameters}
     stiffness = next(p for p in found.effects[0].parameters if p.name == "stiffness")
-    # These waves end below the resonance: they know the stiffness within a twentieth, and it comes out within its interval.
+    # These waves end below the resonance: they know the stiffness within a twentieth, and it comes out within that.
     assert stiffness.std < 0.05 * K
     assert abs(stiffness.value - K) < 2.0 * stiffness.std
     # The record begins in motion: where the spring stood then is not fitted, and its decay goes into the damping.
