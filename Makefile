@@ -8,7 +8,7 @@
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .SUFFIXES:
-.PHONY: help demo test test-rust test-python reference validation lint lint-rust lint-python bench peers chirp narx-peers bench-counts c-library bench-diagnosis docs figures package clean
+.PHONY: help demo test test-rust test-python reference validation lint lint-rust lint-python bench peers chirp narx-peers bench-counts c-library bench-diagnosis docs docs-rust figures package clean
 
 PYTHON ?= python3
 DEMO_OUT ?= demo-report
@@ -91,8 +91,10 @@ figures: $(VENV)/.installed ## draw the pictures of docs/ anew, from the package
 	$(BIN)/python docs/figures/oil.py
 	$(BIN)/python docs/figures/effects.py
 
-docs: $(VENV)/.installed ## run every snippet of the documents; build the Rust documentation
+docs: $(VENV)/.installed docs-rust ## run every snippet of the documents; build the Rust documentation
 	$(BIN)/python -m pytest tests/test_docs.py $(PYTEST_ARGS)
+
+docs-rust: $(VENV)/.installed ## build the Rust documentation
 	RUSTDOCFLAGS='-D warnings' cargo doc --workspace --no-deps $(CARGO_ARGS)
 
 package: $(VENV)/.installed ## build the wheel and the source distribution into dist/

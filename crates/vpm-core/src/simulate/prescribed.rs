@@ -37,7 +37,7 @@ pub fn prescribed(setting: Setting<'_>, motion: JointMotion<'_>, passive: &[usiz
 /// Law: a force `c C^T (e' - C v)` more on the elastic coordinates, `C v` being the rate of strain at a gauge, `e'` the measured one and
 /// `c` its gain: a damper between the beam and the measured one, which takes the energy out of whatever they differ by and nothing where
 /// they agree (a natural observer: M. Demetriou, *Systems & Control Letters* 51, 2004). A damped error no longer rings with the noise
-/// of the motion. Checked: a free motion gives its own efforts back, with gauges that hold; a wrong begin is forgotten.
+/// of the motion. Checked: a free motion gives its own efforts back, with gauges that hold.
 pub fn observed(
     setting: Setting<'_>,
     motion: JointMotion<'_>,
