@@ -8,12 +8,12 @@ import numpy as np
 
 from vpm.budget.instructions import count_instructions
 from vpm.budget.machine import describe
-from vpm.budget.report import QUANTILES, REST, BudgetReport, Stage
+from vpm.budget.report import REST, BudgetReport, Stage
 from vpm.budget.steps import Timed, commands, time_steps
 from vpm.errors import SimulationError
 from vpm.experiment import Experiment
 from vpm.model import Model
-from vpm.realtime import Loop
+from vpm.realtime import QUANTILES, Loop
 from vpm.simulate import AUTOMATIC, Setup
 
 #: States along the way at which the stages are timed.

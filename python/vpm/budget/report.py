@@ -11,8 +11,6 @@ from vpm.results import Result, Storable
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-#: Quantiles of the step time and of the wake-up latency.
-QUANTILES = {"p50": 0.5, "p99": 0.99, "p99.9": 0.999, "p99.99": 0.9999, "max": 1.0}
 #: What is no stage of its own: the integrator's algebra, recording, and memory that is no longer warm.
 REST = "integrator and rest"
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from vpm.climb.levels import Family, families
 from vpm.climb.result import Climb, Level
 from vpm.errors import IdentificationError, VpmError
-from vpm.experiment import Experiment
+from vpm.experiment import Experiment, as_records
 from vpm.identify import Estimate, OutputErrorProblem, estimate, gain, gaps, segments
 from vpm.model import Model
 from vpm.simulate import Setup, judging_mode
@@ -103,7 +103,7 @@ def climb(
             f"{model.name}: no parameter is adjustable; give some an uncertainty in the model file"
         )
     say = tell or (lambda _: None)
-    records, unseen = _listed(experiments), _listed(validate)
+    records, unseen = as_records(experiments), as_records(validate)
     mode = mode or judging_mode(model, records)
     data = _Data(*(OutputErrorProblem(model, each, mode, channels=channels, setup=setup) for each in (records, unseen)))
     offered = families(model)
@@ -127,10 +127,6 @@ def climb(
     tried = {step.level.name for step in reached}
     left = tuple(name for family in offered for name, _ in family if name not in tried)
     return Climb(tuple(step.level for step in reached), best.level.name, left, mode, best.model)
-
-
-def _listed(experiments: Experiment | Sequence[Experiment]) -> list[Experiment]:
-    return [experiments] if isinstance(experiments, Experiment) else list(experiments)
 
 
 def _through(family: Family, data: _Data, reached: list[_Reached], say: Callable[[str], None]) -> bool:

@@ -7,7 +7,7 @@ from typing import Any
 
 from vpm.errors import VpmError
 from vpm.model import Model
-from vpm.model.level import parse_level
+from vpm.model.level import size_of
 
 #: What the lowest level is called, and the one with what the actuators do besides following their commands.
 RIGID, ACTUATORS = "rigid", "rigid with its actuators"
@@ -43,7 +43,7 @@ def families(model: Model) -> list[Family]:
     found = [[(RIGID, ideal)]]
     if len(ideal.effects) < len(stiff.effects):
         found.append([(ACTUATORS, stiff)])
-    if not any(_size(beam["level"], beam) for beam in beams.values()):
+    if not any(size_of(beam["level"], beam) for beam in beams.values()):
         return found
     for family in LINKS:
         made = [(level, each) for level in family if (each := _made(model, beams, level)) is not None]
@@ -53,7 +53,7 @@ def families(model: Model) -> list[Family]:
 
 def _made(model: Model, beams: Mapping[str, Any], level: str) -> Model | None:
     """Model with its links at a level, each at most as fine as its own; None where nothing changes or it is invalid."""
-    finer = {name: level for name, beam in beams.items() if 0 < _size(level, beam) < _size(beam["level"], beam)}
+    finer = {name: level for name, beam in beams.items() if 0 < size_of(level, beam) < size_of(beam["level"], beam)}
     if not finer:
         return None
     try:
@@ -62,11 +62,6 @@ def _made(model: Model, beams: Mapping[str, Any], level: str) -> Model | None:
     except VpmError:
         return None
     return made
-
-
-def _size(level: str, beam: Mapping[str, Any]) -> int:
-    """Coordinates of a link at a level."""
-    return len(parse_level(level).coordinates(tuple(beam.get("deforms", ("bending_x", "bending_y", "torsion")))))
 
 
 def _own(beams: Mapping[str, Any]) -> str:

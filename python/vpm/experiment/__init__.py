@@ -1,6 +1,6 @@
 """Measured records: reading and checking logs, filtering them, and the motion and the noise in them."""
 
-from vpm.experiment.campaign import Campaign
+from vpm.experiment.campaign import Campaign, as_records
 from vpm.experiment.cutoff import CutoffChoice, choose_cutoff
 from vpm.experiment.motion import Motion, common_cutoff, motion
 from vpm.experiment.noise import noise_std, quantisation_step
@@ -12,6 +12,7 @@ __all__ = [
     "CutoffChoice",
     "Experiment",
     "Motion",
+    "as_records",
     "choose_cutoff",
     "common_cutoff",
     "decimation_for",

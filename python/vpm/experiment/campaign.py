@@ -17,6 +17,16 @@ if TYPE_CHECKING:
     from vpm.model import ChannelEntry, Model
 
 
+def as_records(experiments: Experiment | Sequence[Experiment]) -> list[Experiment]:
+    """Records in a list, where one alone may be given.
+
+    Parameters
+    ----------
+    experiments : Experiment or sequence of Experiment
+    """
+    return [experiments] if isinstance(experiments, Experiment) else list(experiments)
+
+
 @dataclass(frozen=True, repr=False, eq=False)
 class Campaign(Result, Sequence[Experiment]):
     """Records of one machine in their order: a sequence of experiments that also knows them by name.

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.errors import IdentificationError
-from vpm.experiment import Experiment
+from vpm.experiment import Experiment, as_records
 from vpm.identify.comparison import comparison
 from vpm.identify.engine import Found, fit_problem
 from vpm.identify.estimation import Estimate, Progress, estimate, limits
@@ -186,7 +186,7 @@ def identify(
     IdentificationError
         Nothing is free, a name is unknown, a channel that the mode needs is missing, or a tie has no single meaning.
     """
-    records = [experiments] if isinstance(experiments, Experiment) else list(experiments)
+    records = as_records(experiments)
     names = tuple(free) if free is not None else tuple(p.name for p in model.parameters.values() if p.adjustable)
     if not names:
         raise IdentificationError(

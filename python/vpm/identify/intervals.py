@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.errors import IdentificationError
-from vpm.experiment import Experiment
+from vpm.experiment import Experiment, as_records
 from vpm.identify.engine import onward
 from vpm.identify.estimation import limits
 from vpm.identify.objective import Objective
@@ -285,7 +285,7 @@ def _again(fit: Fit, experiments: Experiment | Sequence[Experiment], cutoff: flo
     """The objective of a fit and the point where it ended."""
     from vpm.identify.comparison import comparison
 
-    records = [experiments] if isinstance(experiments, Experiment) else list(experiments)
+    records = as_records(experiments)
     if tuple(e.name for e in records) != fit.experiments:
         raise IdentificationError(
             f"the fit is of {', '.join(fit.experiments)}, not of {', '.join(e.name for e in records)}; pass its records"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from vpm.experiment import Experiment
+from vpm.experiment import Experiment, as_records
 from vpm.identify.comparison import comparison
 from vpm.identify.fit import Fit
 from vpm.identify.problem import gaps
@@ -41,7 +41,7 @@ def judged_on(
     DivergedError
         The simulation leaves the finite numbers.
     """
-    records = [experiments] if isinstance(experiments, Experiment) else list(experiments)
+    records = as_records(experiments)
     fitting = fit.fitting and replace(fit.fitting, states=())
     result = []
     for machine in (model, fit.model):

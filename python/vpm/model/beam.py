@@ -8,7 +8,7 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import AfterValidator, Field
 
 from vpm.model.entry import ORIGIN, ZERO, Entry, Number, ParameterValue, Quantity, Text, Vector
-from vpm.model.level import Component, Level, parse_level
+from vpm.model.level import USUAL, Component, Level, parse_level
 
 
 class Material(Entry):
@@ -120,11 +120,7 @@ class Beam(Entry):
     rotation: Vector = ORIGIN
     length: Number
     level: Annotated[Text, AfterValidator(_readable)]
-    deforms: Annotated[tuple[Component, ...], Field(min_length=1), AfterValidator(_different)] = (
-        "bending_x",
-        "bending_y",
-        "torsion",
-    )
+    deforms: Annotated[tuple[Component, ...], Field(min_length=1), AfterValidator(_different)] = USUAL
     material: Material
     section: Section | None = None
     sections: Annotated[tuple[Section, ...], Field(min_length=1)] | None = None

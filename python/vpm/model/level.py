@@ -8,12 +8,14 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 from vpm.errors import near_match
 
 Component = Literal["bending_x", "bending_y", "torsion", "shear_x", "shear_y", "extension"]
 COMPONENTS: tuple[Component, ...] = get_args(Component)
+#: What a link deforms in unless its model says otherwise.
+USUAL: tuple[Component, ...] = ("bending_x", "bending_y", "torsion")
 
 LevelName = Literal["rigid", "lumped", "modal", "bezier", "hermite", "strain", "elements"]
 
@@ -134,3 +136,26 @@ def parse_level(text: str) -> Level:
 
 def _example(name: str) -> str:
     return "rigid" if name == "rigid" else f"{name}(3)"
+
+
+def deforms_of(beam: Mapping[str, Any]) -> tuple[str, ...]:
+    """Components in which a beam of a model file deforms.
+
+    Parameters
+    ----------
+    beam : mapping
+        Its table.
+    """
+    return tuple(beam.get("deforms", USUAL))
+
+
+def size_of(level: str, beam: Mapping[str, Any]) -> int:
+    """Coordinates that a beam of a model file has at a level.
+
+    Parameters
+    ----------
+    level : str
+    beam : mapping
+        Its table.
+    """
+    return len(parse_level(level).coordinates(deforms_of(beam)))

@@ -1,6 +1,6 @@
 """Models in the loop: a runner at a fixed rate, and compiled models for controllers in C and C++."""
 
 from vpm.realtime.compiled import CompiledModel, compile_model
-from vpm.realtime.loop import Loop, LoopReport, Tick
+from vpm.realtime.loop import QUANTILES, Loop, LoopReport, Tick
 
-__all__ = ["CompiledModel", "Loop", "LoopReport", "Tick", "compile_model"]
+__all__ = ["QUANTILES", "CompiledModel", "Loop", "LoopReport", "Tick", "compile_model"]

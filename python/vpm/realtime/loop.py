@@ -10,7 +10,7 @@ from typing import NamedTuple, Self
 from vpm.errors import SimulationError
 from vpm.results import Result
 
-#: Quantiles of what a loop reports.
+#: Quantiles of times that are told: of steps, wake-ups and work.
 QUANTILES = {"p50": 0.5, "p99": 0.99, "p99.9": 0.999, "p99.99": 0.9999, "max": 1.0}
 
 

@@ -12,7 +12,7 @@ from typing import Any
 
 from vpm.errors import VpmError
 from vpm.model import Model
-from vpm.model.level import parse_level
+from vpm.model.level import deforms_of, size_of
 from vpm.results import Storable
 
 #: Levels that a flexible link is offered, where they have fewer coordinates than its own; docs/beams.md compares them.
@@ -83,7 +83,7 @@ class Reduction(Storable):
                 return model.at({self.at: self.name})
         content = model.to_dict()
         beam = content["beams"][self.at]
-        beam["deforms"] = [component for component in _deforms(beam) if component != self.name]
+        beam["deforms"] = [component for component in deforms_of(beam) if component != self.name]
         return type(model)(content)
 
 
@@ -130,10 +130,10 @@ def _imaginable(model: Model) -> Iterator[Reduction]:
     for effect in model.effects:
         yield Reduction("effect", effect.name, effect.at)
     for name, beam in _beams(model).items():
-        deforms = _deforms(beam)
-        own = len(parse_level(beam["level"]).coordinates(deforms))
+        deforms = deforms_of(beam)
+        own = size_of(beam["level"], beam)
         for level in OFFERED:
-            if len(parse_level(level).coordinates(deforms)) < own:
+            if size_of(level, beam) < own:
                 yield Reduction("level", level, name)
         for component in HELD_FIRST:
             if component in deforms and len(deforms) > 1:
@@ -143,10 +143,6 @@ def _imaginable(model: Model) -> Iterator[Reduction]:
 def _beams(model: Model) -> Mapping[str, Any]:
     beams: Mapping[str, Any] = model.to_dict().get("beams", {})
     return beams
-
-
-def _deforms(beam: Mapping[str, Any]) -> tuple[str, ...]:
-    return tuple(beam.get("deforms", ("bending_x", "bending_y", "torsion")))
 
 
 def _possible(model: Model, reduction: Reduction) -> bool:

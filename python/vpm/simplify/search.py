@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 from itertools import islice, product
 
 from vpm.errors import SimulationError
-from vpm.experiment import Experiment
+from vpm.experiment import Experiment, as_records
 from vpm.model import Model
 from vpm.simplify.judge import Judge, by_the_model, reference_mode, shown
 from vpm.simplify.ladder import Ladder, Rung, pareto
@@ -92,8 +92,8 @@ def simplify(
     if not rate > 0.0:
         raise SimulationError(f"a rate of {rate:g} Hz is not possible; give a positive number")
     say = tell or (lambda _: None)
-    records = _listed(experiments)
-    unseen = records if validate is None else _listed(validate)
+    records = as_records(experiments)
+    unseen = records if validate is None else as_records(validate)
     mode = reference_mode(model, records, against, mode)
     if against == "model":
         say("the full model as the reference")
@@ -110,10 +110,6 @@ def simplify(
             raise
         say("interrupted: the best of what was tried")
     return _concluded(trials, tolerance, share, against)
-
-
-def _listed(experiments: Experiment | Sequence[Experiment]) -> list[Experiment]:
-    return [experiments] if isinstance(experiments, Experiment) else list(experiments)
 
 
 def _descend(trials: Trials, sites: Sites, tolerance: float) -> None:
