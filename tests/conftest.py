@@ -1,5 +1,6 @@
 """What several test files share."""
 
+import os
 from pathlib import Path
 
 import pytest
@@ -7,8 +8,10 @@ from hypothesis import settings
 
 from vpm.model import Model
 
-# Generous time for slow machines; failing examples are printed in a form that can be pasted.
-settings.register_profile("vpm", deadline=None, print_blob=True)
+# Generous time for slow machines; failing examples are printed in a form that can be pasted. Where the variable CI is
+# set, the same code is always tried on the same examples, so that a change is judged by what it does and not by luck;
+# everywhere else every run draws new ones.
+settings.register_profile("vpm", deadline=None, print_blob=True, derandomize="CI" in os.environ)
 settings.load_profile("vpm")
 
 ROOT = Path(__file__).resolve().parent.parent

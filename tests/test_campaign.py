@@ -13,6 +13,7 @@ import vpm
 from vpm.demo import MODEL, TRAIN, VALIDATION
 from vpm.errors import ExperimentError
 from vpm.experiment import Campaign, Experiment
+from vpm.experiment.grid import FEWEST_SAMPLES
 
 
 def record(name: str, samples: int = 200, rate: float = 100.0, *, start: float = 0.0, unit: str = "m") -> Experiment:
@@ -113,8 +114,8 @@ def test_a_split_by_time_shares_no_sample_and_keeps_the_gap(
     share: float, gap: float, start: float, rate: float
 ) -> None:
     campaign = Campaign((record("a", 300, rate, start=start), record("b", 200, rate)))
-    # Of the shorter record something has to be left behind the gap.
-    assume(share * campaign[1].duration + gap + campaign[1].dt < campaign[1].duration)
+    # Of the shorter record enough for a record has to be left behind the gap.
+    assume(share * campaign[1].duration + gap + (FEWEST_SAMPLES + 1) * campaign[1].dt < campaign[1].duration)
     train, validation = campaign.split(share, gap=gap)
     for whole, first, last in zip(campaign, train, validation, strict=True):
         assert first.time[0] == whole.time[0]
