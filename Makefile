@@ -66,7 +66,7 @@ bench-counts: $(VENV)/.installed ## count the instructions of one call of the re
 	$(BIN)/python benches/peers/instruction_counts.py
 
 peers: $(VENV)/.installed ## time vpm beside other engines, which this installs; writes docs/performance.md
-	$(BIN)/python -m pip install --quiet 'exudyn>=1.10' 'mujoco>=3.3' 'pin>=3.0' 'casadi>=3.6' 'numba>=0.60'
+	$(BIN)/python -m pip install --quiet 'exudyn>=1.10' 'mujoco>=3.3' 'pin>=3.0' 'casadi>=3.6' 'numba>=0.60' 'sysidentpy>=0.9'
 	$(BIN)/python benches/peers/run.py
 
 chirp: $(VENV)/.installed ## time the servo-cylinder beside the solvers that are installed (C, CasADi, SciPy with Numba)
@@ -99,7 +99,13 @@ docs-rust: $(VENV)/.installed ## build the Rust documentation
 
 package: $(VENV)/.installed ## build the wheel and the source distribution into dist/
 	rm -rf dist
-	$(BIN)/python -m maturin build --release --sdist --out dist
+	$(BIN)/python -m maturin sdist --out dist
+	$(BIN)/python -m maturin build --release --out dist
+	@# The core is checked from the source distribution alone, so that nothing it is compiled from is left out.
+	mkdir dist/unpacked
+	tar -xzf dist/*.tar.gz -C dist/unpacked --strip-components 1
+	CARGO_TARGET_DIR='$(CURDIR)/target' cargo check --manifest-path dist/unpacked/Cargo.toml --package vpm-py --quiet
+	rm -rf dist/unpacked
 	@ls -l dist
 
 clean: ## remove everything that the commands made
