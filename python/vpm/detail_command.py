@@ -80,6 +80,9 @@ def simplify(
     against: Annotated[str, typer.Option(help="The reference: data, or the full model itself.")] = "data",
     mode: Annotated[str | None, typer.Option(help="Mode of simulation to judge in.")] = None,
     compare: Annotated[list[str] | None, typer.Option(help="Channel to judge; all by default.")] = None,
+    level: Annotated[
+        str | None, typer.Option(help='Level of the flexible links to begin at, "elements(20)"; that of the file.')
+    ] = None,
     channels: Channels = None,
     interpolate: Interpolate = False,
     plot: Plot = None,
@@ -90,6 +93,7 @@ def simplify(
 
     machine, records = load_all(model, logs, channels, interpolate)
     unseen = load_all(model, validate, channels, interpolate)[1] if validate else None
+    machine = machine if level is None else machine.at(level)
     with progress() as tell:
         ladder = find_cheapest(
             machine,
@@ -104,6 +108,7 @@ def simplify(
             tell=tell,
         )
     console.print(str(ladder), markup=False)
+    console.print(str(ladder.budget), markup=False)
     save_plot(ladder.plot, plot)
     if out is not None:
         ladder.model.save(out)
@@ -127,6 +132,9 @@ def budget(
     instructions: Annotated[
         bool, typer.Option("--instructions", help="Count them with valgrind: a minute more.")
     ] = False,
+    priority: Annotated[
+        int | None, typer.Option(help="Time before all ordinary threads, at this priority of SCHED_FIFO, if permitted.")
+    ] = None,
     plot: Plot = None,
 ) -> None:
     """Time one step of the model against a controller's period; exit code 1 if it does not fit."""
@@ -144,6 +152,7 @@ def budget(
             experiment=record,
             latency=latency,
             instructions=instructions,
+            priority=priority,
             tell=tell,
         )
     console.print(str(report), markup=False)

@@ -31,6 +31,7 @@ def budget(
     experiment: Experiment | None = None,
     latency: float = 0.0,
     instructions: bool = False,
+    priority: int | None = None,
     tell: Callable[[str], None] | None = None,
 ) -> BudgetReport:
     """Time single steps of a model along a command.
@@ -52,6 +53,9 @@ def budget(
         Time, s, to watch how late an idle loop at this rate wakes up; never part of the step times. 0 for not at all.
     instructions : bool
         Count the machine instructions of a step with valgrind, which takes a minute.
+    priority : int, optional
+        Time the steps as a controller runs: before all ordinary threads, with this priority of ``SCHED_FIFO`` (1 to
+        99), if permitted; ``machine`` says whether it was.
     tell : callable, optional
         Told now and then how far it is.
 
@@ -72,7 +76,7 @@ def budget(
         raise SimulationError(f"latency is {latency:g} s; give a time that is not negative")
     setup = Setup(integrator, substeps)
     inputs = commands(model, rate, experiment)
-    timed = time_steps(model, rate, setup, steps, inputs, states=STATES, tell=tell)
+    timed = time_steps(model, rate, setup, steps, inputs, states=STATES, tell=tell, priority=priority)
     median = float(np.median(timed.seconds))
     counted = count_instructions(model, rate, setup, inputs, median, tell) if instructions else None
     return BudgetReport(
@@ -88,8 +92,17 @@ def budget(
         memory=timed.memory,
         instructions=counted,
         latency=_latency(rate, latency, tell) if latency > 0.0 else {},
-        machine=describe(),
+        machine=describe() + _rank(rate, priority),
     )
+
+
+def _rank(rate: float, priority: int | None) -> str:
+    """Words on the priority that was asked for."""
+    if priority is None:
+        return ""
+    with Loop(rate, priority=priority) as loop:
+        answer = loop.report().priority_raised
+    return f", at priority {priority}" if answer == "yes" else f", at ordinary priority ({answer})"
 
 
 def _stages(timed: Timed) -> tuple[Stage, ...]:

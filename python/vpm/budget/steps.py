@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 from vpm.errors import SimulationError
 from vpm.experiment import Experiment
 from vpm.model import Model
+from vpm.realtime import Loop
 from vpm.simulate import Setup, simulate
 
 Array = NDArray[np.float64]
@@ -44,7 +46,9 @@ class Timed:
     stages: list[tuple[str, float, float]]
 
 
-def step_times(model: Model, rate: float, setup: Setup, steps: int, inputs: Array) -> Array:
+def step_times(
+    model: Model, rate: float, setup: Setup, steps: int, inputs: Array, priority: int | None = None
+) -> Array:
     """Duration of each step, s.
 
     Parameters
@@ -56,13 +60,15 @@ def step_times(model: Model, rate: float, setup: Setup, steps: int, inputs: Arra
     steps : int
     inputs : ndarray, shape (N, inputs)
         Repeated as often as needed.
+    priority : int, optional
+        Time them before all ordinary threads, see `vpm.realtime.Loop`, if permitted.
 
     Raises
     ------
     SimulationError
         The commands do not lead through a simulation in these steps.
     """
-    return time_steps(model, rate, setup, steps, inputs).seconds
+    return time_steps(model, rate, setup, steps, inputs, priority=priority).seconds
 
 
 def time_steps(
@@ -74,8 +80,9 @@ def time_steps(
     *,
     states: int = 0,
     tell: Callable[[str], None] | None = None,
+    priority: int | None = None,
 ) -> Timed:
-    """Time steps, and at so many ``states`` along the way their stages.
+    """Time steps, and at so many ``states`` along the way their stages; with a ``priority`` before ordinary threads.
 
     Raises
     ------
@@ -92,9 +99,10 @@ def time_steps(
     while done < steps:
         count = min(chunk, steps - done)
         try:
-            seconds, asked, memory, found = model.core.time_steps(
-                model.theta, model.state(), inputs, 1.0 / rate, setup.substeps, method, count, 0 if done else states
-            )
+            with _ahead(rate, priority):
+                seconds, asked, memory, found = model.core.time_steps(
+                    model.theta, model.state(), inputs, 1.0 / rate, setup.substeps, method, count, 0 if done else states
+                )
         except (Diverged, ValueError) as error:
             raise SimulationError(f"{model.name}: {error}") from error
         durations.append(seconds)
@@ -104,6 +112,11 @@ def time_steps(
         if tell:
             tell(f"timed {done} of {steps} steps, {1e6 * float(np.median(seconds)):.3g} us each")
     return Timed(np.concatenate(durations) if durations else np.empty(0), allocations, memory, stages)
+
+
+def _ahead(rate: float, priority: int | None) -> AbstractContextManager[object]:
+    """Before all ordinary threads, as a controller runs; nothing without a priority."""
+    return nullcontext() if priority is None else Loop(rate, priority=priority)
 
 
 def commands(model: Model, rate: float, experiment: Experiment | None = None) -> Array:

@@ -14,6 +14,9 @@ from vpm.simulate import Setup, judging_mode, simulate
 FINER = 2
 #: Integrator of fits: the one that is stable whatever the reduced model is like.
 FITTING = "linearly_implicit"
+#: Fits end where parameters or sum of squares move by less than this share, and after so many evaluations in any case:
+#: what is left of both is far less than a tolerance asks about.
+FIT_TOLERANCE, FIT_EVALUATIONS = 1e-3, 20
 
 
 class Judge:
@@ -70,8 +73,11 @@ class Judge:
             data = InverseDynamicsProblem(model, self.records)
         else:
             data = self._outputs(model, self.records, Setup(FITTING, self.per_sample))
-        values = estimate(model, data, free).values
-        return model.with_parameters(dict(zip(free, map(float, values), strict=True)))
+        found = estimate(model, data, free, tolerance=FIT_TOLERANCE, most_evaluations=FIT_EVALUATIONS)
+        if found.interrupted:
+            # Ctrl-C is meant for the whole search, not for this one fit.
+            raise KeyboardInterrupt
+        return model.with_parameters(dict(zip(free, map(float, found.values), strict=True)))
 
     def errors(self, model: Model, setup: Setup) -> dict[str, float]:
         """Relative error of each channel on the records to judge on.

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+from vpm.budget import BudgetReport
 from vpm.model import Model
 from vpm.results import Result, Storable
 
@@ -90,6 +91,10 @@ class Ladder(Result):
         What the step of the full model would lose without each place, s, the largest first.
     model : Model
         The chosen model, its parameters fitted again.
+    budget : BudgetReport
+        Of the chosen model: what its times are taken from.
+    cut : int
+        Reduced models that were not fitted, because a glance showed that something quicker loses next to nothing.
     """
 
     rungs: tuple[Rung, ...]
@@ -102,6 +107,8 @@ class Ladder(Result):
     against: str
     dearest: tuple[tuple[str, float], ...]
     model: Model
+    budget: BudgetReport
+    cut: int
 
     @property
     def front(self) -> tuple[Rung, ...]:
@@ -138,12 +145,13 @@ class Ladder(Result):
     def __str__(self) -> str:
         """The choice, the verdict, and the rungs that nothing beats."""
         chosen = self.chosen
+        cut = f" ({self.cut} models were cut after a glance)" if self.cut else ""
         lines = [
             f"cheapest within {100 * self.tolerance:g} %: {', '.join(chosen.removed) or 'the full model'}; "
             f"{chosen.stepping}; error {100 * chosen.error:.2f} % of {chosen.worst} (loss {100 * chosen.loss:.2f} %), "
             f"{1e6 * chosen.seconds:.3g} us a step",
             self.verdict,
-            f"{len(self.rungs)} ways were tried in {self.mode} against the {self.against}; nothing beats these:",
+            f"{len(self.rungs)} ways were tried in {self.mode} against the {self.against}{cut}; nothing beats these:",
         ]
         return "\n".join(lines + [f"  {rung}" for rung in self.front[:PRINTED]])
 

@@ -1,9 +1,10 @@
 """Walk a model back down: the cheapest one that still predicts the data within a tolerance.
 
-The search goes in four strides. All flexible links together are made coarser as long as that loses next to nothing:
-what comes next is tried on that model, which is cheap. Then each place by itself is made simpler by each of its
-changes. Losses and savings of single changes are added up to foresee those of all combinations, and the combinations
-that should be best are fitted, simulated and timed. From the best one each further change is tried while one pays.
+The search goes in four strides. All flexible links together are made finer, from the coarsest, until that loses next to
+nothing: what comes next is tried on that model, which is cheap, and what a glance shows to be dearer is not fitted.
+Then each place by itself is made simpler by each of its changes. Losses and savings of single changes are added up to
+foresee those of all combinations, and the combinations that should be best are fitted, simulated and timed. From the
+best one each further change is tried while one pays.
 """
 
 from __future__ import annotations
@@ -11,23 +12,22 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from itertools import islice, product
 
+from vpm.budget import budget
 from vpm.errors import SimulationError
 from vpm.experiment import Experiment, as_records
 from vpm.model import Model
 from vpm.simplify.judge import Judge, by_the_model, reference_mode, shown
 from vpm.simplify.ladder import Ladder, Rung, pareto
-from vpm.simplify.reductions import OFFERED, Reduction, reductions
-from vpm.simplify.trials import Changes, Trials
+from vpm.simplify.reductions import OFFERED, Reduction, reduced, reductions
+from vpm.simplify.trials import NEGLIGIBLE, PRIORITY, Changes, Trials
 from vpm.simulate import Setup
 
 #: Combinations that are foreseen, and of those the ones that are tried.
-FORESEEN, TRIED = 100_000, 16
-#: Share of the tolerance that the common start of the search may lose.
-NEGLIGIBLE = 0.2
+FORESEEN, TRIED = 100_000, 8
 #: Times of steps of less than a microsecond differ by so much for no reason on a machine that does other things too.
 ALIKE = 1.3
 #: Steps timed of the chosen one.
-CHOSEN_STEPS = 200_000
+CHOSEN_STEPS = 100_000
 
 Sites = dict[tuple[str, str], tuple[Reduction, ...]]
 
@@ -101,42 +101,44 @@ def simplify(
         known = {id(each): by_the_model(model, each, mode, rate, channels) for each in (*records, *unseen)}
         records, unseen = ([known[id(each)] for each in group] for group in (records, unseen))
     judge = Judge(model, records, unseen, rate, mode, channels)
-    trials = Trials(model, judge, lambda changes: bool(changes) or against == "data", say)
+    trials = Trials(model, judge, lambda changes: bool(changes) or against == "data", say, tolerance)
     sites = reductions(model)
     try:
-        _descend(trials, sites, tolerance)
+        _descend(trials, sites)
     except KeyboardInterrupt:
         if not trials.rungs:
             raise
         say("interrupted: the best of what was tried")
-    return _concluded(trials, tolerance, share, against)
+    return _concluded(trials, sites, share, against)
 
 
-def _descend(trials: Trials, sites: Sites, tolerance: float) -> None:
+def _descend(trials: Trials, sites: Sites) -> None:
     full = trials.attempt(())
     if not full:
         raise SimulationError(
             f"{trials.model.name}: no integrator of fixed steps can simulate the records at {trials.judge.rate:g} Hz: "
             f"{trials.reason}"
         )
-    limit = min(rung.error for rung in full) + tolerance
-    base = _together(trials, sites, limit, tolerance)
+    limit = min(rung.error for rung in full) + trials.tolerance
+    base = _together(trials, sites, limit)
     singles = {site: _alone(trials, base, changes) for site, changes in sites.items()}
     for changes in _foreseen(trials, base, singles, limit):
-        trials.attempt(changes)
+        trials.attempt(changes, _within(trials.rungs, limit).seconds)
     _polish(trials, sites, limit)
 
 
-def _together(trials: Trials, sites: Sites, limit: float, tolerance: float) -> Changes:
-    """All links at the same coarser level: the cheapest that loses next to nothing."""
+def _together(trials: Trials, sites: Sites, limit: float) -> Changes:
+    """All links at the same coarser level: the cheapest that loses next to nothing.
+
+    The coarsest come first, by the number of coordinates: they are quick to fit, and once one of them loses next to
+    nothing, a glance at the finer ones shows that they need no look.
+    """
     best: Changes = ()
     seconds = min(rung.seconds for rung in trials.attempt(()))
     levels = [changes for (kind, _), changes in sites.items() if kind == "level"]
-    for level in OFFERED:
-        changes = tuple(c for each in levels for c in each if c.name == level)
-        if not changes:
-            continue
-        rung = trials.cheapest(changes, limit - (1.0 - NEGLIGIBLE) * tolerance)
+    together = [tuple(c for each in levels for c in each if c.name == level) for level in OFFERED]
+    for changes in sorted(filter(None, together), key=lambda changes: reduced(trials.model, changes).core.n_states):
+        rung = trials.cheapest(changes, limit - (1.0 - NEGLIGIBLE) * trials.tolerance)
         if rung is not None and rung.seconds < seconds:
             best, seconds = changes, rung.seconds
     return best
@@ -147,7 +149,8 @@ def _alone(trials: Trials, base: Changes, changes: Sequence[Reduction]) -> dict[
     start = _best(trials.attempt(base))
     found: dict[Reduction, tuple[float, float]] = {}
     for change in _coarser(changes, base):
-        rungs = trials.attempt(_with(base, change))
+        # Something that saves little by itself may save more with others, so it is tried if it is hardly dearer.
+        rungs = trials.attempt(_with(base, change), ALIKE * start.seconds)
         if rungs:
             best = _best(rungs)
             found[change] = (start.seconds - best.seconds, best.error - start.error)
@@ -202,7 +205,7 @@ def _polish(trials: Trials, sites: Sites, limit: float) -> None:
         base = trials.changes_of(best)
         for changes in sites.values():
             for change in _coarser(changes, base):
-                trials.attempt(_with(base, change))
+                trials.attempt(_with(base, change), best.seconds)
         if not _within(trials.rungs, limit).seconds < 0.95 * best.seconds:
             return
 
@@ -211,44 +214,50 @@ def _within(rungs: Sequence[Rung], limit: float) -> Rung:
     return min((rung for rung in rungs if rung.error <= limit), key=lambda rung: rung.seconds)
 
 
-def _concluded(trials: Trials, tolerance: float, share: float, against: str) -> Ladder:
-    """The choice, timed once more and longer."""
-    rungs, rate = trials.rungs, trials.judge.rate
-    chosen = _simplest([rung for rung in rungs if rung.loss <= tolerance])
+def _concluded(trials: Trials, sites: Sites, share: float, against: str) -> Ladder:
+    """The choice, its steps timed once more as `vpm.budget` does."""
+    rungs, judge = trials.rungs, trials.judge
+    chosen = _simplest([rung for rung in rungs if rung.loss <= trials.tolerance])
     model = trials.fitted(trials.changes_of(chosen))
-    seconds, slowest = trials.timed(model, Setup(chosen.integrator, chosen.substeps), CHOSEN_STEPS)
+    report = budget(
+        model,
+        rate=judge.rate,
+        share=share,
+        steps=CHOSEN_STEPS,
+        integrator=chosen.integrator,
+        substeps=chosen.substeps,
+        experiment=judge.driven,
+        priority=PRIORITY,
+    )
     place = rungs.index(chosen)
-    chosen = chosen.timed(seconds, slowest)
+    chosen = chosen.timed(report.quantiles["p50"], report.quantiles["p99.9"])
     rungs[place] = chosen
     return Ladder(
         tuple(sorted(rungs, key=lambda rung: rung.seconds)),
         chosen,
-        chosen.slowest * rate <= share,
-        rate,
-        tolerance,
+        report.holds,
+        judge.rate,
+        trials.tolerance,
         share,
-        trials.judge.mode,
+        judge.mode,
         against,
-        _dearest(trials),
+        _dearest(trials, sites),
         model,
+        report,
+        trials.cut,
     )
 
 
 def _simplest(rungs: Sequence[Rung]) -> Rung:
-    """The cheapest, or it with more left out if that seems dearer by no more than times are uncertain by."""
+    """The cheapest, or what seems dearer by no more than times are uncertain by and has more left out or errs less."""
     best = rungs[0]
-    alike = [
-        rung
-        for rung in rungs
-        if rung.stepping == best.stepping
-        and set(rung.removed) >= set(best.removed)
-        and rung.seconds <= ALIKE * best.seconds
-    ]
-    return max(alike, key=lambda rung: len(rung.removed))
+    alike = [rung for rung in rungs if set(rung.removed) >= set(best.removed) and rung.seconds <= ALIKE * best.seconds]
+    return max(alike, key=lambda rung: (len(rung.removed), -rung.error))
 
 
-def _dearest(trials: Trials) -> tuple[tuple[str, float], ...]:
-    """What a step saves by each single change that was tried, the most first, one for each place."""
+def _dearest(trials: Trials, sites: Sites) -> tuple[tuple[str, float], ...]:
+    """What a glance says that a step of the full model saves by the last change of each place alone, the most first."""
     full = min((r for r in trials.rungs if not r.removed), key=lambda r: r.seconds)
-    saved = {r.removed[0]: full.seconds - r.seconds for r in reversed(trials.rungs) if len(r.removed) == 1}
-    return tuple(sorted(((name, gain) for name, gain in saved.items() if gain > 0.0), key=lambda pair: -pair[1]))
+    setup = Setup(full.integrator, full.substeps)
+    saved = ((str(changes[-1]), trials.saved(changes[-1], setup)) for changes in sites.values())
+    return tuple(sorted(((name, gain) for name, gain in saved if gain > 0.0), key=lambda pair: -pair[1]))

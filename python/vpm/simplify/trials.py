@@ -1,8 +1,8 @@
-"""Reduced models that were tried: fitted, simulated in every way to step them, and timed."""
+"""Reduced models that were tried: glanced at, fitted, simulated in every way to step them that may pay, and timed."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -16,7 +16,7 @@ from vpm.simplify.reductions import Reduction, reduced
 from vpm.simulate import FIXED_STEP, Setup
 
 #: Steps timed for each rung: as many as these seconds allow, within these numbers. A 99.9 % quantile needs the least.
-TIMED_SECONDS = 0.25
+TIMED_SECONDS = 0.1
 TIMED_STEPS = (1_000, 20_000)
 #: Every integrator of fixed steps is tried with these numbers of steps in a period.
 SUBSTEPS = (1, 2, 4)
@@ -24,12 +24,19 @@ SUBSTEPS = (1, 2, 4)
 PAYS = 0.7
 #: Steps of a first glance, and how much slower than another way that works one may be if it does not fit the period.
 GLANCE, SLOWER = 20, 5.0
+#: Share of the tolerance that is next to nothing, and how much slower than what loses no more than that a way may be.
+NEGLIGIBLE, SPARE = 0.2, 2.0
+#: Steps are timed before all ordinary threads where that is permitted, as a controller runs.
+PRIORITY = 50
 
 Changes = tuple[Reduction, ...]
 
 
 class Trials:
     """Reduced models by their changes, each tried once.
+
+    What a glance shows to be much slower than something that loses next to nothing is not fitted: it can neither be
+    chosen nor be a choice that anybody would take instead.
 
     Parameters
     ----------
@@ -40,24 +47,36 @@ class Trials:
         Says of changes whether the parameters are fitted again.
     tell : callable
         Called with a sentence for each trial.
+    tolerance : float
+        Largest loss that is allowed.
     """
 
     def __init__(
-        self, model: Model, judge: Judge, refit: Callable[[Changes], bool], tell: Callable[[str], None]
+        self,
+        model: Model,
+        judge: Judge,
+        refit: Callable[[Changes], bool],
+        tell: Callable[[str], None],
+        tolerance: float,
     ) -> None:
-        self.model, self.judge = model, judge
+        self.model, self.judge, self.tolerance = model, judge, tolerance
         self._refit, self._tell = refit, tell
         self._inputs = commands(model, judge.rate, judge.driven)
         #: Why the last way that did not work did not.
         self.reason = ""
         self._rungs: dict[frozenset[Reduction], list[Rung]] = {}
         self._models: dict[frozenset[Reduction], Model] = {}
+        self._cut: set[frozenset[Reduction]] = set()
+
+    @property
+    def cut(self) -> int:
+        """How many reduced models were not fitted because of what a glance showed."""
+        return len(self._cut - set(self._rungs))
 
     @property
     def rungs(self) -> list[Rung]:
         """All rungs, cheapest first, with what they lose against the best way to step the full model."""
-        everything = [rung for rungs in self._rungs.values() for rung in rungs]
-        least = min((rung.error for rung in everything if not rung.removed), default=0.0)
+        everything, least = self._everything(), self._least()
         return sorted((replace(r, loss=r.error - least) for r in everything), key=lambda rung: rung.seconds)
 
     def fitted(self, changes: Changes) -> Model:
@@ -73,73 +92,144 @@ class Trials:
         good = [rung for rung in self.attempt(changes) if rung.error <= limit]
         return min(good, key=lambda rung: rung.seconds, default=None)
 
-    def attempt(self, changes: Changes) -> Sequence[Rung]:
+    def attempt(self, changes: Changes, below: float = np.inf) -> Sequence[Rung]:
         """Rungs of the model with these changes: one for each way to step it that works.
 
-        None where the changes contradict each other, or where no fit can simulate the model.
+        None where the changes contradict each other, where no fit can simulate the model, or where no way is quick
+        enough to matter.
+
+        Parameters
+        ----------
+        changes : tuple of Reduction
+        below : float
+            Time of a period (s) from which on nobody asks for the model.
         """
         key = frozenset(changes)
         if key not in self._rungs:
-            self._tell(", ".join(map(str, changes)) or "the full model")
             try:
-                self._models[key] = self._made(changes)
-                self._rungs[key] = self._stepped(changes)
+                model = reduced(self.model, changes)
+                glances = self._glances(model)
+                if changes and min(glances.values(), default=0.0) > min(below, self._dear()):
+                    self._cut.add(key)
+                    return []
+                self._tell(", ".join(map(str, changes)) or "the full model")
+                self._models[key] = self.judge.fitted(model) if self._refit(changes) else model
+                self._rungs[key] = []
+                self._step(changes, glances)
             except VpmError as error:
                 self.reason = str(error)
-                self._rungs[key] = []
+                self._rungs.setdefault(key, [])
         return self._rungs[key]
 
-    def _made(self, changes: Changes) -> Model:
-        model = reduced(self.model, changes)
-        return self.judge.fitted(model) if self._refit(changes) else model
+    def saved(self, change: Reduction, setup: Setup) -> float:
+        """Seconds that a period of the full model takes less with one change, at a glance; none where it does not work.
 
-    def _stepped(self, changes: Changes) -> list[Rung]:
-        """Rungs of every integrator."""
-        found: list[Rung] = []
+        Parameters
+        ----------
+        change : Reduction
+        setup : Setup
+        """
+        try:
+            return self._glance(self.model, setup) - self._glance(reduced(self.model, (change,)), setup)
+        except VpmError:
+            return 0.0
+
+    def _everything(self) -> list[Rung]:
+        return [rung for rungs in self._rungs.values() for rung in rungs]
+
+    def _least(self) -> float:
+        """Error of the full model stepped as well as it was."""
+        return min((rung.error for rung in self._everything() if not rung.removed), default=0.0)
+
+    def _enough(self) -> float:
+        """Error that is next to nothing: nothing more exact is looked for."""
+        return self._least() + NEGLIGIBLE * self.tolerance
+
+    def _dear(self) -> float:
+        """Time of a period from which on a way is not worth a look."""
+        enough = self._enough()
+        return SPARE * min((rung.seconds for rung in self._everything() if rung.error <= enough), default=np.inf)
+
+    def _glances(self, model: Model) -> Mapping[str, float]:
+        """Seconds of a period in one step of each integrator, where a glance can tell."""
+        found = {}
         for integrator in FIXED_STEP:
-            fastest = min((rung.seconds for rung in found), default=np.inf)
-            found += self._with_more_steps(changes, integrator, fastest)
-        return found
-
-    def _with_more_steps(self, changes: Changes, integrator: str, fastest: float) -> list[Rung]:
-        """Rungs of one integrator with more and more steps in a period, as long as more steps pay."""
-        model, found = self._models[frozenset(changes)], list[Rung]()
-        for substeps in SUBSTEPS:
-            setup = Setup(integrator, substeps)
             try:
-                if self._is_hopeless(model, setup, fastest):
-                    break
-                errors = self.judge.errors(model, setup)
-            except SimulationError as reason:
-                # Too long a step for this integrator: perhaps a shorter one.
-                self.reason = str(reason)
-                continue
-            error, loudest = max((share, channel) for channel, share in errors.items())
-            if found and not error < PAYS * found[-1].error:
-                break
-            times = self.timed(model, setup)
-            labels, states = tuple(map(str, changes)), model.core.n_states
-            found.append(Rung(labels, integrator, substeps, states, error, loudest, error, *times))
+                found[integrator] = self._glance(model, Setup(integrator))
+            except SimulationError as error:
+                self.reason = str(error)
         return found
 
-    def _is_hopeless(self, model: Model, setup: Setup, fastest: float) -> bool:
-        """Whether a step takes longer than the period, and so much longer than a way that works, that none takes it."""
-        few = float(np.median(step_times(model, self.judge.rate, setup, GLANCE, self._inputs)))
-        return few * self.judge.rate > 1.0 and few > SLOWER * fastest
+    def _glance(self, model: Model, setup: Setup) -> float:
+        return float(np.min(step_times(model, self.judge.rate, setup, GLANCE, self._inputs)))
 
-    def timed(self, model: Model, setup: Setup, most: int = TIMED_STEPS[1]) -> tuple[float, float]:
+    def _step(self, changes: Changes, glances: Mapping[str, float]) -> None:
+        """Every integrator with one step in a period, the quickest first; then more steps where they could pay."""
+        for integrator in sorted(FIXED_STEP, key=lambda name: glances.get(name, np.inf)):
+            for substeps in SUBSTEPS:
+                if self._is_hopeless(changes, integrator, substeps, glances.get(integrator)):
+                    break
+                # Too long a step for this integrator: perhaps a shorter one.
+                if self._add(changes, Setup(integrator, substeps)) is not None:
+                    break
+        found = self._rungs[frozenset(changes)]
+        # No steps lower the error of the model itself, which the best way shows.
+        least = min((rung.error for rung in found), default=0.0)
+        for first in [rung for rung in found if rung.error == least or PAYS * rung.error > least]:
+            self._refine(changes, first)
+
+    def _refine(self, changes: Changes, rung: Rung) -> None:
+        """More and more steps in a period, as long as they pay."""
+        for substeps in SUBSTEPS[SUBSTEPS.index(rung.substeps) + 1 :]:
+            predicted = rung.seconds * substeps / rung.substeps
+            if rung.error <= self._enough() or predicted > self._dear() or predicted * self.judge.rate > 1.0:
+                return
+            finer = self._add(changes, Setup(rung.integrator, substeps), PAYS * rung.error)
+            if finer is None:
+                return
+            rung = finer
+
+    def _is_hopeless(self, changes: Changes, integrator: str, substeps: int, glance: float | None) -> bool:
+        """Whether a way takes so much longer than one that works, or that loses next to nothing, that none takes it."""
+        fastest = min((rung.seconds for rung in self._rungs[frozenset(changes)]), default=np.inf)
+        if glance is None:
+            try:
+                glance = self._glance(self._models[frozenset(changes)], Setup(integrator, substeps)) / substeps
+            except SimulationError as error:
+                self.reason = str(error)
+                return False
+        few = glance * substeps
+        return few > self._dear() or (few * self.judge.rate > 1.0 and few > SLOWER * fastest)
+
+    def _add(self, changes: Changes, setup: Setup, demanded: float = np.inf) -> Rung | None:
+        """The rung of one way, if it works and its error is less than what is demanded."""
+        key = frozenset(changes)
+        model = self._models[key]
+        try:
+            errors = self.judge.errors(model, setup)
+            error, loudest = max((share, channel) for channel, share in errors.items())
+            if not error < demanded:
+                return None
+            seconds, slowest = self.timed(model, setup)
+        except SimulationError as reason:
+            self.reason = str(reason)
+            return None
+        labels, states = tuple(map(str, changes)), model.core.n_states
+        rung = Rung(labels, setup.integrator, setup.substeps, states, error, loudest, error, seconds, slowest)
+        self._rungs[key].append(rung)
+        return rung
+
+    def timed(self, model: Model, setup: Setup) -> tuple[float, float]:
         """Median and 99.9 % quantile of a period, s.
 
         Parameters
         ----------
         model : Model
         setup : Setup
-        most : int
-            Steps at most.
         """
         rate = self.judge.rate
-        times = step_times(model, rate, setup, TIMED_STEPS[0], self._inputs)
-        steps = int(np.clip(TIMED_SECONDS / np.median(times), TIMED_STEPS[0], most))
+        times = step_times(model, rate, setup, TIMED_STEPS[0], self._inputs, PRIORITY)
+        steps = int(np.clip(TIMED_SECONDS / np.median(times), *TIMED_STEPS))
         if steps > TIMED_STEPS[0]:
-            times = step_times(model, rate, setup, steps, self._inputs)
+            times = step_times(model, rate, setup, steps, self._inputs, PRIORITY)
         return float(np.median(times)), float(np.quantile(times, 0.999))
