@@ -14,6 +14,8 @@ from vpm.identify import InverseDynamicsProblem
 
 GAP, MASS, ROTOR, VISCOUS = 4e-4, 12.0, 3.0, 30.0
 STIFFNESS, DAMPING = 1.5e6, 900.0
+#: Contacts in which the link sways at 14 Hz, a fifth of critically damped, and the gap between these.
+SOFT, SOFT_DAMPING, WIDE = 9.3e4, 420.0, 2e-3
 TEXT = f"""name = "axis"
 gravity = [0.0, 0.0, -9.81]
 
@@ -39,7 +41,9 @@ viscous = {{ value = {VISCOUS * 0.95}, uncertainty = {VISCOUS * 0.1}, unit = "N 
 """
 
 
-def record(gap: float, seed: int, seconds: float = 6.0) -> Experiment:
+def record(
+    gap: float, seed: int, seconds: float = 6.0, stiffness: float = STIFFNESS, damping: float = DAMPING
+) -> Experiment:
     """A motor of which the link behind hangs in two contacts, pushed about by a position loop, at 1 kHz."""
     random = np.random.default_rng(seed)
     fine, step = 20, 5e-5
@@ -57,7 +61,7 @@ def record(gap: float, seed: int, seconds: float = 6.0) -> Experiment:
         for _ in range(fine):
             twist = q - link
             beyond = twist - min(max(twist, -0.5 * gap), 0.5 * gap)
-            push = STIFFNESS * beyond + DAMPING * (v - rate) if beyond else 0.0
+            push = stiffness * beyond + damping * (v - rate) if beyond else 0.0
             push = push if push * beyond > 0.0 else 0.0
             v += step * (effort - VISCOUS * v - push) / ROTOR
             rate += step * push / MASS
@@ -88,6 +92,17 @@ def test_the_gap_is_read_off_from_the_motor_alone(loose: tuple[Experiment, ...])
     data = InverseDynamicsProblem(model, loose[:1])
     found = read_off(model, ("body.mass",), data, Candidate(EFFECTS["backlash"], "axis", ({},))).starts[0]
     assert found["gap"] == pytest.approx(GAP, rel=0.15)
+
+
+def test_soft_contacts_are_read_off_as_soft_and_the_gap_between_them_is_not_widened() -> None:
+    model = Model.from_toml(TEXT)
+    data = InverseDynamicsProblem(model, [record(WIDE, 1, 4.0, SOFT, SOFT_DAMPING)])
+    candidate = Candidate(EFFECTS["backlash"], "axis", ({},))
+    hard, soft = (read_off(model, ("body.mass",), data, candidate, soft=each).starts[0] for each in (False, True))
+    assert soft["gap"] == pytest.approx(WIDE, rel=0.03)
+    assert soft["gap"] < hard["gap"]
+    assert 0.5 * SOFT < soft["stiffness"] < 2.0 * SOFT
+    assert hard["stiffness"] > 4.0 * SOFT
 
 
 def test_contacts_that_wind_up_further_than_the_gap_are_a_spring(loose: tuple[Experiment, ...]) -> None:

@@ -107,6 +107,7 @@ LISTED = (
     "spring",
     "torque_ripple",
     "hysteresis",
+    "backlash",
     "joint_compliance",
     "end_stop",
     "gravity_tilt",
@@ -123,7 +124,6 @@ _TURNED = "on a single link a load beside its axis, a tilted base and a shifted 
 
 REFUSED: Mapping[str, str] = MappingProxyType(
     {
-        "backlash": "on these records the diagnosis does not name a play yet",
         "viscous_friction": "the model has it already, with another value",
         "payload": _TURNED,
         "sensor_offset": _TURNED,

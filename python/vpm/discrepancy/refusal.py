@@ -81,7 +81,7 @@ def refuse_trial(trial: Trial, thresholds: Thresholds) -> str:
         _no_way(trial),
         _only_training(trial),
         _not_clear(trial),
-        _worse_in_simulation(trial),
+        worse_in_simulation(trial),
         _too_little(trial, thresholds),
         _only_reversals(trial),
     )
@@ -200,7 +200,8 @@ def _only_reversals(trial: Trial) -> str:
     )
 
 
-def _worse_in_simulation(trial: Trial) -> str:
+def worse_in_simulation(trial: Trial) -> str:
+    """Why the second witness speaks against a trial, or ""."""
     if trial.diverged:
         return f"with it the simulation of the unseen record fails: {trial.diverged}"
     simulated = trial.simulated

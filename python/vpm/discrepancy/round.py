@@ -11,7 +11,7 @@ from vpm.discrepancy.choice import Accepted, choose
 from vpm.discrepancy.confirmation import Data, Judged, Trial, confirm
 from vpm.discrepancy.diagnosis import RankedCandidate
 from vpm.discrepancy.play import is_read_off, only_winds_up
-from vpm.discrepancy.refusal import Thresholds, refuse_probe, refuse_timing, refuse_trial
+from vpm.discrepancy.refusal import Thresholds, refuse_probe, refuse_timing, refuse_trial, worse_in_simulation
 from vpm.discrepancy.ringing import NOISE_ONLY, noise_alone, only_ringing
 from vpm.discrepancy.screening import Probe, prepare, probe
 from vpm.discrepancy.side_by_side import Failure, SideBySide
@@ -148,8 +148,7 @@ class Round:
         """Refit with each of some candidates, and believe or refuse it."""
         tried = len(self._ranking) * self.number
         thresholds = Thresholds(tried, min(m.dt for m in self.data.training.motions))
-        refit = partial(confirm, self.current, self.data)
-        trials = self.each(f"round {self.number}: refitting", refit, short_list, lambda p: p.candidate.label)
+        trials = self.each(f"round {self.number}: refitting", self._confirmed, short_list, lambda p: p.candidate.label)
         for tried_one, trial in zip(short_list, trials, strict=True):
             key = tried_one.candidate.key
             if isinstance(trial, Failure):
@@ -160,6 +159,19 @@ class Round:
                 self.refused[key] = reason
             else:
                 self._believed.append(trial)
+
+    def _confirmed(self, one: Probe) -> Trial:
+        """A trial; of a play between hard contacts that does not simulate, that between soft ones if it does better.
+
+        The balance forgets every flight at the next impact, and hardly tells how hard the contacts are; in simulation
+        those that are too hard bounce too often.
+        """
+        trial = confirm(self.current, self.data, one)
+        if not is_read_off(self.current.model, self.data.training, one.candidate) or not worse_in_simulation(trial):
+            return trial
+        soft = probe(self.current.baseline, self.data.training, one.candidate, soft=True)
+        softer = confirm(self.current, self.data, soft)
+        return trial if worse_in_simulation(softer) else softer
 
     @cached_property
     def timed(self) -> InTime:

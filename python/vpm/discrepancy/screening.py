@@ -115,11 +115,15 @@ def _short(model: Model, candidate: Candidate, name: str) -> str:
     return next(short for short, dotted in effect.parameter_names.items() if dotted == name)
 
 
-def probe(base: Baseline, data: InverseDynamicsProblem, candidate: Candidate) -> Probe:
-    """Try all start values of a candidate and keep the best, a possible one before an impossible one."""
+def probe(base: Baseline, data: InverseDynamicsProblem, candidate: Candidate, *, soft: bool = False) -> Probe:
+    """Try all start values of a candidate and keep the best, a possible one before an impossible one.
+
+    A play that is read off the motion has one start, with hard contacts or ``soft`` ones.
+    """
     if is_read_off(base.model, data, candidate):
         base = replace(base, model=believed(base.model, data.nominal, base.free))
-        return _probe_start(base, data, read_off(base.model, base.free, data, candidate), still=True)
+        start = read_off(base.model, base.free, data, candidate, soft=soft)
+        return _probe_start(base, data, start, still=True)
     probes = [_probe_start(base, data, candidate, start) for start in candidate.starts]
     best = max(probes, key=lambda p: p.drop)
     possible = [p for p in probes if not impossible_values(p)]
