@@ -124,7 +124,7 @@ FIGURES: dict[str, tuple[Callable[[], Figure], list[str]]] = {
     ),
     "ladder": (
         lambda: plot.plot_ladder([1e-6, 2e-6], [0.3, 0.1], 1),
-        ["time of one step [µs]", "error / measured signal [%]", "chosen", "tried"],
+        ["time of one step [µs]", "error / signal [%]", "chosen", "tried"],
     ),
     "step_cost": (
         lambda: plot.plot_step_cost({"p50": 1e-6, "max": 1.2e-3}, 1e-3),

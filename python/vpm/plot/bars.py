@@ -177,7 +177,12 @@ def plot_candidates(candidates: Sequence[CandidateLike]) -> Figure:
 
 @styled
 def plot_ladder(
-    seconds: Sequence[float], errors: Sequence[float], chosen: int, front: Sequence[int] = (), allowed: float = np.inf
+    seconds: Sequence[float],
+    errors: Sequence[float],
+    chosen: int,
+    front: Sequence[int] = (),
+    allowed: float = np.inf,
+    limit: float = np.inf,
 ) -> Figure:
     """Draw error against step time of the rungs of a simplification, the chosen one marked, both axes logarithmic.
 
@@ -193,6 +198,8 @@ def plot_ladder(
         Indices of those that no other one beats.
     allowed : float
         Share of the period that a step may take, s.
+    limit : float
+        Largest error that is allowed.
     """
     figure, axes = panels(1, height=3.0)
     axis = axes[0][0]
@@ -203,11 +210,13 @@ def plot_ladder(
         axis.step(times[places], gaps[places], where="post", color=BLUE, linewidth=1.2, label="nothing beats these")
     if np.isfinite(allowed):
         axis.axvline(1e6 * allowed, color=SOFT, linestyle="--", linewidth=1.0, label="allowed share of the period")
+    if np.isfinite(limit):
+        axis.axhline(100.0 * limit, color=SOFT, linestyle=":", linewidth=1.0, label="allowed error")
     axis.set_xscale("log")
     axis.set_yscale("log")
     axis.plot(times[chosen], gaps[chosen], "D", color=BLUE, markersize=8, label="chosen")
     axis.set_xlabel("time of one step [µs]")
-    axis.set_ylabel("error / measured signal [%]")
+    axis.set_ylabel("error / signal [%]")
     axis.legend(loc="upper right")
     return figure
 

@@ -171,7 +171,14 @@ class Ladder(Result):
 
         seconds, errors = [r.seconds for r in self.rungs], [r.error for r in self.rungs]
         front = pareto(list(zip(seconds, errors, strict=True)))
-        return plot_ladder(seconds, errors, self.rungs.index(self.chosen), front, self.share / self.rate)
+        return plot_ladder(
+            seconds,
+            errors,
+            self.rungs.index(self.chosen),
+            front,
+            self.share / self.rate,
+            self.chosen.error - self.chosen.loss + self.tolerance,
+        )
 
 
 def pareto(points: Sequence[tuple[float, float]]) -> list[int]:

@@ -26,8 +26,8 @@ from vpm.simulate import Setup
 FORESEEN, TRIED = 100_000, 8
 #: Times of steps of less than a microsecond differ by so much for no reason on a machine that does other things too.
 ALIKE = 1.3
-#: Steps timed of the chosen one.
-CHOSEN_STEPS = 100_000
+#: Steps timed of the chosen one: as many as these seconds allow, within these numbers.
+CHOSEN_SECONDS, CHOSEN_STEPS = 1.0, (10_000, 100_000)
 
 Sites = dict[tuple[str, str], tuple[Reduction, ...]]
 
@@ -223,7 +223,7 @@ def _concluded(trials: Trials, sites: Sites, share: float, against: str) -> Ladd
         model,
         rate=judge.rate,
         share=share,
-        steps=CHOSEN_STEPS,
+        steps=int(min(max(CHOSEN_SECONDS / chosen.seconds, CHOSEN_STEPS[0]), CHOSEN_STEPS[1])),
         integrator=chosen.integrator,
         substeps=chosen.substeps,
         experiment=judge.driven,

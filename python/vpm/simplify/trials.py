@@ -16,7 +16,7 @@ from vpm.simplify.reductions import Reduction, reduced
 from vpm.simulate import FIXED_STEP, Setup
 
 #: Steps timed for each rung: as many as these seconds allow, within these numbers. A 99.9 % quantile needs the least.
-TIMED_SECONDS = 0.1
+TIMED_SECONDS = 0.05
 TIMED_STEPS = (1_000, 20_000)
 #: Every integrator of fixed steps is tried with these numbers of steps in a period.
 SUBSTEPS = (1, 2, 4)
