@@ -148,6 +148,10 @@ def _seen(model: Model, experiment: Experiment, theta: Array, state: Array, inte
             internal[place] = _reading(model, experiment, theta, name, row)
         elif quantity == "chamber_a":
             internal[place : place + 2] = _chambers(model, experiment, theta, owner, state, internal[place:], row)
+        elif quantity == "load":
+            first, second = _chambers(model, experiment, theta, owner, state, np.full(2, np.nan), row)
+            full, ring = _areas(model, theta, owner)
+            internal[place] = np.nan_to_num(first - ring / full * second, nan=float(internal[place]))
     return internal
 
 

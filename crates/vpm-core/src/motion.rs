@@ -68,10 +68,15 @@ fn state_channels(description: &Description) -> Vec<Option<Channel>> {
                 channels.push(Some(Channel::Current { dc_motor }));
                 dc_motor += 1;
             }
-            Drive::Hydraulic(_) => {
-                let one = |quantity| Some(Channel::Hydraulic { hydraulic, quantity });
-                let [a, b] = [HydraulicQuantity::PressureA, HydraulicQuantity::PressureB].map(one);
-                channels.extend([one(HydraulicQuantity::Spool), None, a, b]);
+            Drive::Hydraulic(law) => {
+                let shown = |state: &&str| match *state {
+                    "spool" => Some(HydraulicQuantity::Spool),
+                    "chamber_a" => Some(HydraulicQuantity::PressureA),
+                    "chamber_b" => Some(HydraulicQuantity::PressureB),
+                    _ => None,
+                };
+                let one = |quantity| Channel::Hydraulic { hydraulic, quantity };
+                channels.extend(law.states().iter().map(|state| shown(state).map(one)));
                 hydraulic += 1;
             }
         }

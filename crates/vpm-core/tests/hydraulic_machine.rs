@@ -263,7 +263,7 @@ fn machine_in_numbers_with_derivatives_allocates_nothing_in_a_step() {
 fn an_explicit_step_too_long_for_the_oil_is_refused() {
     // A slow spool and no damping leave the vibration of the mass on the oil, whose closed form is that of the rig.
     let mut servo = nominal();
-    servo.valve.frequency = 20.0;
+    servo.valve.frequency = Some(20.0);
     servo.load.damping = 0.0;
     servo.cylinder.internal_leakage = 0.0;
     let machine = machine(&servo, On::Line);
@@ -288,7 +288,7 @@ fn natural_sizes_are_those_of_the_parts() {
     machine.system().scales(&mut sizes);
     let valve = &complete().valve;
     // The spool as it is: 0.4 ms come on top of the inverse of its frequency.
-    let rate = valve.stroke / (1.0 / valve.frequency + 4e-4);
+    let rate = valve.stroke / (1.0 / valve.frequency.unwrap() + 4e-4);
     close(sizes[4], rate, 1e-12 * rate);
     sizes[4] = 0.0;
     assert_eq!(sizes, [1e-2, 1.0, 5e-3, valve.stroke, 0.0, 1e5, 1e5, 1e5]);

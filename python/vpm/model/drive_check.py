@@ -9,7 +9,7 @@ from vpm.errors import UnitError, near_match
 from vpm.model.drive_parameters import flow_gain_unit
 from vpm.model.drives import COMPLIANT, Actuator, DcMotor
 from vpm.model.entry import Quantity
-from vpm.model.hydraulic import Cylinder, Hydraulic, Supply, Valve
+from vpm.model.hydraulic import EXAMPLES, SPOOL_DAMPING, Cylinder, Hydraulic, Supply, Valve
 from vpm.model.messages import Problem, place
 from vpm.model.parameters import Parameter
 from vpm.model.sampled_check import sampled_problems
@@ -30,6 +30,8 @@ def drive_problems(document: Document, structure: Structure) -> Iterator[Problem
             yield from _supply_problems(name, actuator, document)
             yield from _alternatives(("actuators", name, "cylinder"), actuator.cylinder)
             yield from _rating_keys(("actuators", name, "valve"), actuator.valve)
+            yield from _spool_keys(("actuators", name, "valve"), actuator.valve)
+            yield from _late_spool(name, actuator.valve, document)
     yield from sampled_problems(document, structure)
 
 
@@ -103,6 +105,23 @@ def _rating_keys(keys: tuple[str, ...], valve: Valve) -> Iterator[Problem]:
         yield Problem(place(*keys, missing[0]), rest)
 
 
+def _spool_keys(keys: tuple[str, ...], valve: Valve) -> Iterator[Problem]:
+    """A frequency of what moves, and none of what follows at once."""
+    if valve.spool == "second_order" and valve.frequency is None:
+        rest = f'is missing; add it, for example {EXAMPLES["actuators.frequency"]}, or take spool = "static"'
+        yield Problem(place(*keys, "frequency"), rest)
+    for key in ("frequency", "damping"):
+        if valve.spool == "static" and getattr(valve, key) is not None:
+            rest = 'is given, but a static spool follows at once and has none; remove it, or spool = "static"'
+            yield Problem(place(*keys, key), rest)
+
+
+def _late_spool(name: str, valve: Valve, document: Document) -> Iterator[Problem]:
+    if valve.spool == "static" and any(e.type == "valve_dynamics" and e.at == name for e in document.effects):
+        rest = "is static, but the effect valve_dynamics makes it slower; remove one of them"
+        yield Problem(place("actuators", name, "valve", "spool"), rest)
+
+
 def unit_problems(document: Document) -> Iterator[Problem]:
     """Commands of the wrong kind, and numbers of a data sheet that cannot be right."""
     for name, actuator in document.actuators.items():
@@ -115,7 +134,8 @@ def unit_problems(document: Document) -> Iterator[Problem]:
         if isinstance(actuator, Hydraulic):
             keys = ("actuators", name, "valve")
             yield from _rated_problems(keys, actuator.valve, si_unit(actuator.command_unit))
-            yield from _turns_problems((*keys, "frequency"), actuator.valve.frequency)
+            if actuator.valve.frequency is not None:
+                yield from _turns_problems((*keys, "frequency"), actuator.valve.frequency)
 
 
 def _rated_problems(keys: tuple[str, ...], valve: Valve, command: str) -> Iterator[Problem]:
@@ -151,12 +171,20 @@ def _turns_problems(keys: tuple[str, ...], frequency: Quantity) -> Iterator[Prob
 
 
 def complete_drives(document: Document) -> Document:
-    """Give every valve its gain: the rated flow of a data sheet stands for ``rated_flow / (current sqrt(drop))``."""
+    """Give every valve its gain, for which the rated flow of a data sheet stands, and every moving spool its damping.
+
+    The gain is ``rated_flow / (current sqrt(drop))``.
+    """
     actuators = dict(document.actuators)
     for name, actuator in document.actuators.items():
-        if isinstance(actuator, Hydraulic) and actuator.valve.flow_gain is None:
-            valve = _rated(actuator.valve, si_unit(actuator.command_unit))
-            actuators[name] = actuator.model_copy(update={"valve": valve})
+        if not isinstance(actuator, Hydraulic):
+            continue
+        valve = actuator.valve
+        if valve.flow_gain is None:
+            valve = _rated(valve, si_unit(actuator.command_unit))
+        if valve.spool == "second_order" and valve.damping is None:
+            valve = valve.model_copy(update={"damping": Quantity(value=SPOOL_DAMPING)})
+        actuators[name] = actuator.model_copy(update={"valve": valve})
     return document.model_copy(update={"actuators": actuators})
 
 

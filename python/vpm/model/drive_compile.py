@@ -63,6 +63,8 @@ def drive_json(name: str, actuator: Actuator, structure: Structure, index: Index
                 "valve": {**_valve(f"{name}.valve", index), "delay": index.get(f"{name}.valve_dynamics.time")},
                 "cylinder": _cylinder(name, actuator, index),
             }
+            if actuator.cylinder.pressures != "chambers":
+                law["pressures"] = actuator.cylinder.pressures
         case Narx():
             law = narx_json(name, actuator, structure)
         case MaxwellNarx():
@@ -72,7 +74,8 @@ def drive_json(name: str, actuator: Actuator, structure: Structure, index: Index
 
 def _valve(way: str, index: Index) -> dict[str, Any]:
     return {
-        **{key: index[f"{way}.{key}"] for key in ("gain", "frequency", "damping", "stroke", "overlap")},
+        **{key: index[f"{way}.{key}"] for key in ("gain", "stroke", "overlap")},
+        **{key: index.get(f"{way}.{key}") for key in ("frequency", "damping")},
         "orifice": {"gain": index[f"{way}.flow_gain"], "transition_pressure": index[f"{way}.transition_pressure"]},
     }
 

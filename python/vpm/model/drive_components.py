@@ -8,6 +8,7 @@ from functools import cached_property
 from vpm.errors import ModelError, near_match
 from vpm.model.check import Checked
 from vpm.model.drives import COMPLIANT
+from vpm.model.hydraulic import Hydraulic
 from vpm.model.pose import Pose
 from vpm.model.structure import Mount, Structure
 
@@ -15,8 +16,9 @@ from vpm.model.structure import Mount, Structure
 DRIVE_STATES: Mapping[str, tuple[str, ...]] = {
     "dc_motor": ("current",),
     "maxwell": ("stretch",),
-    "hydraulic": ("spool", "spool_rate", "chamber_a", "chamber_b"),
 }
+#: States of a cylinder by how its pressures come about.
+OIL_STATES: Mapping[str, tuple[str, ...]] = {"chambers": ("chamber_a", "chamber_b"), "load": ("load",)}
 
 
 class DriveComponents:
@@ -115,7 +117,12 @@ class DriveComponents:
     def _states_of(self, actuator: str) -> Iterator[str]:
         if self.has_lag(actuator):
             yield f"{actuator}.lag"
-        for state in DRIVE_STATES.get(self.actuator_type(actuator), ()):
+        entry = self._checked.document.actuators[actuator]
+        states = DRIVE_STATES.get(entry.type, ())
+        if isinstance(entry, Hydraulic):
+            moving = entry.valve.spool == "second_order"
+            states = (*(("spool", "spool_rate") if moving else ()), *OIL_STATES[entry.cylinder.pressures])
+        for state in states:
             yield f"{actuator}.{state}"
 
     def _states_of_supply(self, supply: str) -> Iterator[str]:
@@ -129,7 +136,7 @@ class DriveComponents:
     def internal_unit(self, state: str) -> str:
         """SI unit of a state of `internal_names`."""
         owner, _, name = state.partition(".")
-        pressures = dict.fromkeys(("chamber_a", "chamber_b", "pressure", "drop"), "Pa")
+        pressures = dict.fromkeys(("chamber_a", "chamber_b", "load", "pressure", "drop"), "Pa")
         units = {"current": "A", "stretch": "m", "memory": "1"} | pressures
         if name in units:
             return units[name]

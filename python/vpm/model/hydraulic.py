@@ -11,6 +11,8 @@ from vpm.model.entry import ZERO, Entry, ParameterValue, Quantity, Text
 
 #: Standard atmosphere, Pa (NIST SP 811, appendix B).
 ATMOSPHERE = 101325.0
+#: Damping ratio of a spool, where none is given.
+SPOOL_DAMPING = 0.7
 #: Adiabatic exponent of air.
 ADIABATIC = 1.4
 
@@ -43,7 +45,7 @@ class Supply(Entry):
 
 
 class Valve(Entry):
-    """Servovalve: a spool of second order, and four edges; the spool is in the unit of the command.
+    """Servovalve: a spool, of second order or following at once, and four edges; the spool is in the unit of the command.
 
     The gain of the edges is given as such, or by the rated flow of a data sheet.
     """
@@ -52,8 +54,9 @@ class Valve(Entry):
     rated_flow: ParameterValue | None = None
     rated_drop: ParameterValue | None = None
     rated_current: ParameterValue | None = None
-    frequency: ParameterValue
-    damping: ParameterValue = Quantity(value=0.7)
+    spool: Literal["second_order", "static"] = "second_order"
+    frequency: ParameterValue | None = None
+    damping: ParameterValue | None = None
     stroke: ParameterValue
     overlap: ParameterValue = ZERO
     gain: ParameterValue = Quantity(value=1.0)
@@ -74,6 +77,7 @@ class Cylinder(Entry):
     external_leakage: ParameterValue = ZERO
     stop_stiffness: ParameterValue = Quantity(value=5e8)
     stop_damping: ParameterValue = Quantity(value=2e4)
+    pressures: Literal["chambers", "load"] = "chambers"
 
 
 class SealFriction(Entry):

@@ -72,7 +72,7 @@ impl<P> Drive<P> {
             Self::Ideal(_) | Self::SpringDamper(_) | Self::Narx(_) | Self::MaxwellNarx(_) => &[],
             Self::DcMotor(_) => &["current"],
             Self::Maxwell(_) => &["stretch"],
-            Self::Hydraulic(_) => &["spool", "spool_rate", "chamber_a", "chamber_b"],
+            Self::Hydraulic(law) => law.states(),
         }
     }
 

@@ -1,7 +1,7 @@
 //! Drives and supplies of a machine: what they push, and how their states change.
 
 use super::Dynamics;
-use crate::actuator::hydraulic::{Chambers, DriveState, Source, Supply};
+use crate::actuator::hydraulic::{Source, Supply};
 use crate::actuator::{Actuator, Drive, Maxwell, SpringDamper, Target};
 use crate::data::LineSlot;
 use crate::dynamics::flexible;
@@ -154,15 +154,15 @@ impl<S: Scalar> Dynamics<S> {
                     let [length, rate] = moving();
                     let (piston, [pressure, drawn]) = (law.piston(length), &mut shown.supplies[law.supply]);
                     let pressure = *pressure - shown.drops[law.supply];
-                    let [spool, spool_rate, a, b] = [0, 1, 2, 3].map(|k| states[at + k]);
-                    let state = DriveState { spool, spool_rate, chambers: Chambers { a, b } };
-                    let action = law.action(state, input, [piston, rate], (&supplies[law.supply], pressure));
-                    rates[at..at + 4].copy_from_slice(&action.rates);
+                    let own = at..at + law.states().len();
+                    let fed = (&supplies[law.supply], pressure);
+                    let action = law.action(&states[own.clone()], &mut rates[own.clone()], input, [piston, rate], fed);
                     *drawn += action.flows.supply;
                     shown.drawn[cylinders] = action.flows.supply;
                     let (pressures, flows) = (action.pressures, action.flows);
-                    shown.hydraulics[cylinders] = [spool, pressures.a, pressures.b, flows.into_a, flows.out_of_b];
-                    (at, cylinders) = (at + 4, cylinders + 1);
+                    shown.hydraulics[cylinders] =
+                        [action.spool, pressures.a, pressures.b, flows.into_a, flows.out_of_b];
+                    (at, cylinders) = (own.end, cylinders + 1);
                     let seal = match seals[number] {
                         Some(resistance) => -(resistance * rate),
                         None => law.cylinder.seal.force(rate),

@@ -2,7 +2,6 @@
 
 use super::Dynamics;
 use super::drives::motion;
-use crate::actuator::hydraulic::Chambers;
 use crate::actuator::{Actuator, Drive};
 use crate::scalar::Scalar;
 
@@ -23,10 +22,7 @@ impl<S: Scalar> Dynamics<S> {
                 Drive::Ideal(_) | Drive::SpringDamper(_) | Drive::Narx(_) | Drive::MaxwellNarx(_) => {}
                 Drive::DcMotor(_) => next(S::zero()),
                 Drive::Maxwell(law) => next(law.settled(length)),
-                Drive::Hydraulic(law) => {
-                    let Chambers { a, b } = law.rest(&self.supplies[law.supply]);
-                    [S::zero(), S::zero(), a, b].into_iter().for_each(&mut next);
-                }
+                Drive::Hydraulic(law) => law.settle(&self.supplies[law.supply], &mut next),
             }
         }
         for supply in &self.supplies {
@@ -94,8 +90,14 @@ impl<S: Scalar> Dynamics<S> {
                 Drive::DcMotor(_) => next(1.0),
                 Drive::Maxwell(_) => next(STRETCH),
                 Drive::Hydraulic(law) => {
-                    let (stroke, frequency) = (law.valve.stroke.re(), law.valve.own_frequency().re());
-                    [stroke, stroke * frequency, PRESSURE, PRESSURE].into_iter().for_each(&mut next);
+                    let stroke = law.valve.stroke.re();
+                    let rate = law.valve.own_frequency().map_or(1.0, |frequency| stroke * frequency.re());
+                    let size = |state: &&str| match *state {
+                        "spool" => stroke,
+                        "spool_rate" => rate,
+                        _ => PRESSURE,
+                    };
+                    law.states().iter().map(|state| size(state)).for_each(&mut next);
                 }
             }
         }

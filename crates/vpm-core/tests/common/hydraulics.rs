@@ -26,8 +26,8 @@ pub fn nominal() -> ServoCylinder<f64> {
         fluid: Fluid { bulk_modulus: 1.2e9, vapour_pressure: 1e3, air: None, more_air: None },
         valve: Valve {
             gain: 1.0,
-            frequency: std::f64::consts::TAU * 250.0,
-            damping: 0.7,
+            frequency: Some(std::f64::consts::TAU * 250.0),
+            damping: Some(0.7),
             delay: None,
             stroke: 0.01,
             overlap: DeadZone { width: 0.0 },
@@ -97,7 +97,7 @@ impl Ode<f64> for Chirped {
         }
     }
     fn scales(&self, scales: &mut [f64]) {
-        let (spool, frequency) = (self.servo.valve.stroke, self.servo.valve.frequency);
+        let (spool, frequency) = (self.servo.valve.stroke, self.servo.valve.frequency.unwrap());
         scales.copy_from_slice(&[1e-2, spool, 1.0, spool * frequency, 1e5, 1e5, 1.0]);
     }
 }

@@ -2,7 +2,8 @@
 
 use serde::Deserialize;
 
-use super::{Chambers, Cylinder, Flows, Supply, Valve};
+use super::load::chambers_under_load;
+use super::{Chambers, Cylinder, Flows, Pressures, Supply, Valve};
 use crate::effect::Domain;
 use crate::scalar::Scalar;
 
@@ -10,7 +11,8 @@ use crate::scalar::Scalar;
 ///
 /// Law: the piston's place from mid-stroke is `x = s - retracted_length - stroke/2`, with s the length of the line or the coordinate of
 /// the joint, m. The effort is `A pa - alpha A pb` and that of seals and stops, N, positive where it pushes apart.
-/// State: spool, its rate, the state of both chambers; see [`Valve`] and [`Cylinder`].
+/// State: spool and its rate, unless the spool follows at once; then the state of both chambers, see [`Valve`] and [`Cylinder`], or the
+/// load pressure, see [`Pressures`].
 /// Source: D'Imperio 2016, section 4.1 and appendix A. Checked: see valve and cylinder; the retracted length is any number.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -23,17 +25,9 @@ pub struct HydraulicDrive<P> {
     pub valve: Valve<P>,
     /// The cylinder.
     pub cylinder: Cylinder<P>,
-}
-
-/// States of the drive.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct DriveState<S> {
-    /// Place of the spool, spool unit.
-    pub spool: S,
-    /// Its rate, spool unit/s.
-    pub spool_rate: S,
-    /// States of the chambers, Pa.
-    pub chambers: Chambers<S>,
+    /// How its pressures come about.
+    #[serde(default)]
+    pub pressures: Pressures,
 }
 
 /// What a drive does in a state.
@@ -41,8 +35,8 @@ pub struct DriveState<S> {
 pub struct DriveAction<S> {
     /// Force of the oil on the piston, and of the stops, N.
     pub force: S,
-    /// Rates of spool, spool rate and both chambers.
-    pub rates: [S; 4],
+    /// Place of the spool, spool unit.
+    pub spool: S,
     /// Pressures of the chambers, Pa.
     pub pressures: Chambers<S>,
     /// Flows through the valve, m^3/s.
@@ -57,7 +51,24 @@ impl<P> HydraulicDrive<P> {
             retracted_length: f(&self.retracted_length),
             valve: self.valve.map(f),
             cylinder: self.cylinder.map(f),
+            pressures: self.pressures,
         }
+    }
+
+    /// Names of its states, in their order.
+    pub fn states(&self) -> &'static [&'static str] {
+        match (self.valve.frequency.is_some(), self.pressures) {
+            (true, Pressures::Chambers) => &["spool", "spool_rate", "chamber_a", "chamber_b"],
+            (true, Pressures::Load) => &["spool", "spool_rate", "load"],
+            (false, Pressures::Chambers) => &["chamber_a", "chamber_b"],
+            (false, Pressures::Load) => &["load"],
+        }
+    }
+
+    /// Number of states of its spool, which are the first.
+    #[inline]
+    fn of_spool(&self) -> usize {
+        if self.valve.frequency.is_some() { 2 } else { 0 }
     }
 
     /// The parameters and where each is defined.
@@ -76,32 +87,58 @@ impl<S: Scalar> HydraulicDrive<S> {
         s - self.retracted_length - self.cylinder.stroke * 0.5
     }
 
-    /// What it does under a `current` (A), with the piston at `x` (m) and moving with `v` (m/s), fed from `supply` at `pressure` (Pa).
-    /// The friction of the seals, [`super::SealFriction::force`], is not in it.
+    /// What it does in its `states` under a `current` (A), with the piston at `x` (m) and moving with `v` (m/s), fed from `supply` at
+    /// `pressure` (Pa); the `rates` of its states are written. The friction of the seals, [`super::SealFriction::force`], is not in it.
     #[inline]
     pub fn action(
         &self,
-        state: DriveState<S>,
+        states: &[S],
+        rates: &mut [S],
         current: S,
         [x, v]: [S; 2],
         (supply, pressure): (&Supply<S>, S),
     ) -> DriveAction<S> {
         let (oil, tank, cylinder) = (&supply.oil, supply.tank_pressure, &self.cylinder);
-        let pressures = Chambers { a: oil.pressure(state.chambers.a), b: oil.pressure(state.chambers.b) };
-        let flows = self.valve.flows(state.spool, pressure, tank, [pressures.a, pressures.b]);
-        let inflow = Chambers { a: flows.into_a, b: -flows.out_of_b };
-        let chambers = cylinder.rates(oil, state.chambers, [x, v], inflow, tank);
-        let spool = self.valve.spool_acceleration(state.spool, state.spool_rate, current);
-        DriveAction {
-            force: cylinder.force(pressures) + cylinder.stop.force(x, v, cylinder.stroke * 0.5),
-            rates: [state.spool_rate, spool, chambers.a, chambers.b],
-            pressures,
-            flows,
+        let (of_spool, of_oil) = states.split_at(self.of_spool());
+        let (spool_rates, oil_rates) = rates.split_at_mut(self.of_spool());
+        let mut spool = self.valve.target(current);
+        if let (&[place, rate], [first, second]) = (of_spool, spool_rates) {
+            spool = place;
+            *first = rate;
+            *second = self.valve.spool_acceleration(place, rate, current).unwrap_or_else(S::zero);
         }
+        let areas = cylinder.areas();
+        let alpha = areas.b / areas.a;
+        let held = match *of_oil {
+            [a, b] => Chambers { a, b },
+            [load] => chambers_under_load(load, self.valve.opening(spool), [pressure, tank], alpha),
+            _ => self.rest(supply),
+        };
+        let pressures = Chambers { a: oil.pressure(held.a), b: oil.pressure(held.b) };
+        let flows = self.valve.flows(spool, pressure, tank, [pressures.a, pressures.b]);
+        let inflow = Chambers { a: flows.into_a, b: -flows.out_of_b };
+        let change = cylinder.rates(oil, held, [x, v], inflow, tank);
+        match oil_rates {
+            [a, b] => (*a, *b) = (change.a, change.b),
+            [load] => *load = change.a - alpha * change.b,
+            _ => {}
+        }
+        let force = cylinder.force(pressures) + cylinder.stop.force(x, v, cylinder.stroke * 0.5);
+        DriveAction { force, spool, pressures, flows }
     }
 
     /// Chambers (Pa) at rest without net force: `A pa = alpha A pb`, `pa + pb = ps + pt`.
     pub fn rest(&self, supply: &Supply<S>) -> Chambers<S> {
         self.cylinder.rest(supply.pressure, supply.tank_pressure)
+    }
+
+    /// Writes its states at rest without a command and without net force.
+    pub fn settle(&self, supply: &Supply<S>, next: &mut impl FnMut(S)) {
+        let Chambers { a, b } = self.rest(supply);
+        (0..self.of_spool()).for_each(|_| next(S::zero()));
+        match self.pressures {
+            Pressures::Chambers => [a, b].into_iter().for_each(next),
+            Pressures::Load => next(S::zero()),
+        }
     }
 }

@@ -7,6 +7,7 @@
 mod cylinder;
 mod drive;
 mod fluid;
+mod load;
 mod orifice;
 mod piston;
 mod servo;
@@ -15,8 +16,9 @@ mod supply;
 mod valve;
 
 pub use cylinder::{Chambers, Cylinder};
-pub use drive::{DriveAction, DriveState, HydraulicDrive};
+pub use drive::{DriveAction, HydraulicDrive};
 pub use fluid::{EntrainedAir, Fluid};
+pub use load::{Pressures, chambers_under_load};
 pub use orifice::Orifice;
 pub use piston::{EndStop, SealFriction};
 pub use servo::{Load, ServoCylinder, ServoRig, ServoState};

@@ -133,7 +133,7 @@ impl<S: Scalar> ServoCylinder<S> {
             position: v,
             spool: state.spool_rate,
             velocity: (driven - load.damping * v - load.stiffness * x - force) / load.mass,
-            spool_rate: self.valve.spool_acceleration(state.spool, state.spool_rate, current),
+            spool_rate: self.valve.spool_acceleration(state.spool, state.spool_rate, current).unwrap_or_else(S::zero),
             chambers: self.cylinder.rates(&self.fluid, state.chambers, [x, v], inflow, self.tank_pressure),
         }
     }
@@ -160,6 +160,10 @@ impl<S: Scalar> ServoRig<S> {
             if !domain.contains(value) {
                 return Err(Error::Domain { path: name.to_owned(), condition: domain.condition(), value });
             }
+        }
+        if servo.valve.frequency.is_none() {
+            let (condition, repair) = ("be that of a spool with a motion of its own".to_owned(), "give its frequency");
+            return Err(Error::Setting { setting: "the spool of a rig", condition, value: 0.0, repair });
         }
         if let PistonSize::Diameters { bore, rod } = servo.cylinder.size
             && rod.re() >= bore.re()
@@ -209,7 +213,7 @@ impl<S: Scalar> Ode<S> for ServoRig<S> {
 
     /// Position 1 cm, velocity 1 m/s, the stroke of the spool and its rate at the natural frequency, pressures 1 bar.
     fn scales(&self, scales: &mut [f64]) {
-        let (spool, frequency) = (self.servo.valve.stroke.re(), self.servo.valve.frequency.re());
+        let (spool, frequency) = (self.servo.valve.stroke.re(), self.servo.valve.frequency.map_or(1.0, |own| own.re()));
         scales.copy_from_slice(&[1e-2, spool, 1.0, spool * frequency, 1e5, 1e5]);
     }
 }

@@ -20,7 +20,7 @@ pub struct Flows<S> {
     pub tank: S,
 }
 
-/// 4-way servovalve with a spool of second order.
+/// 4-way servovalve with a spool of second order, or one that follows at once.
 ///
 /// Law: `z'' = w^2 (sat(gain i) - z) - 2 D w z'` with `1/w = 1/frequency + delay`, i the current in A, z the spool's place in a unit of the user's choice (`gain` units
 /// of z per A), sat the limit `±stroke`. What opens is `u = dead_zone(sat(z))`: an overshoot beyond the stroke, at most
@@ -29,16 +29,19 @@ pub struct Flows<S> {
 /// `qb = -flow(-u, ps - pb)`, qa into a and qb out of b.
 /// Source: D'Imperio 2016, section 4.1 and appendix A; Merritt 1967, "Hydraulic Control Systems", section 5-3 (overlap). The stroke
 /// as a limit of what drives and of what opens, not as an impact that would need steps of its own, is an assumption.
+/// A valve without a frequency is its static gain, `z = sat(gain i)`: the limit of a fast spool (Merritt 1967, section 6-3).
 /// Checked: frequency and stroke are positive, damping and overlap not negative.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Valve<P> {
     /// Place of the spool per current, spool unit/A.
     pub gain: P,
-    /// Natural frequency of the spool, rad/s.
-    pub frequency: P,
-    /// Damping ratio of the spool.
-    pub damping: P,
+    /// Natural frequency of the spool, rad/s; none of a spool that follows at once.
+    #[serde(default = "crate::actuator::none")]
+    pub frequency: Option<P>,
+    /// Damping ratio of the spool; none of one that follows at once.
+    #[serde(default = "crate::actuator::none")]
+    pub damping: Option<P>,
     /// How much slower than that a worn or cold valve is, s: it adds to the inverse of the frequency.
     #[serde(default = "crate::actuator::none")]
     pub delay: Option<P>,
@@ -55,8 +58,8 @@ impl<P> Valve<P> {
     pub fn map<T>(&self, f: &mut impl FnMut(&P) -> T) -> Valve<T> {
         Valve {
             gain: f(&self.gain),
-            frequency: f(&self.frequency),
-            damping: f(&self.damping),
+            frequency: self.frequency.as_ref().map(&mut *f),
+            damping: self.damping.as_ref().map(&mut *f),
             delay: self.delay.as_ref().map(&mut *f),
             stroke: f(&self.stroke),
             overlap: self.overlap.map(f),
@@ -68,11 +71,11 @@ impl<P> Valve<P> {
     pub fn domains(&self) -> Vec<NamedDomain<'_, P>> {
         let mut domains = vec![
             ("valve.gain", &self.gain, Domain::Any),
-            ("valve.frequency", &self.frequency, Domain::Positive),
-            ("valve.damping", &self.damping, Domain::NonNegative),
             ("valve.stroke", &self.stroke, Domain::Positive),
             ("valve.overlap", &self.overlap.width, Domain::NonNegative),
         ];
+        domains.extend(self.frequency.as_ref().map(|frequency| ("valve.frequency", frequency, Domain::Positive)));
+        domains.extend(self.damping.as_ref().map(|damping| ("valve.damping", damping, Domain::NonNegative)));
         domains.extend(self.orifice.domains());
         domains.extend(self.delay.as_ref().map(|delay| ("valve.delay", delay, Domain::NonNegative)));
         domains
@@ -80,18 +83,25 @@ impl<P> Valve<P> {
 }
 
 impl<S: Scalar> Valve<S> {
-    /// Natural frequency of the spool as it is, rad/s.
+    /// Natural frequency of the spool as it is, rad/s; none of one that follows at once.
     #[inline]
-    pub fn own_frequency(&self) -> S {
-        self.delay.map_or(self.frequency, |delay| self.frequency / (self.frequency * delay + 1.0))
+    pub fn own_frequency(&self) -> Option<S> {
+        let frequency = self.frequency?;
+        Some(self.delay.map_or(frequency, |delay| frequency / (frequency * delay + 1.0)))
     }
 
-    /// Acceleration of a spool at `place` with `rate` under a `current` (A), spool unit/s^2.
+    /// Where a held `current` (A) leads the spool to, spool units.
     #[inline]
-    pub fn spool_acceleration(&self, place: S, rate: S, current: S) -> S {
-        let frequency = self.own_frequency();
-        let target = Saturation { limit: self.stroke }.apply(self.gain * current);
-        frequency * frequency * (target - place) - self.damping * frequency * rate * 2.0
+    pub fn target(&self, current: S) -> S {
+        Saturation { limit: self.stroke }.apply(self.gain * current)
+    }
+
+    /// Acceleration of a spool at `place` with `rate` under a `current` (A), spool unit/s^2; none of one that follows at once.
+    #[inline]
+    pub fn spool_acceleration(&self, place: S, rate: S, current: S) -> Option<S> {
+        let frequency = self.own_frequency()?;
+        let resistance = self.damping.unwrap_or_else(S::zero) * frequency * rate * 2.0;
+        Some(frequency * frequency * (self.target(current) - place) - resistance)
     }
 
     /// What a spool at `place` opens, in spool units: positive from supply to a.
