@@ -26,7 +26,7 @@ def reduced(*, static: bool = False, load: bool = False) -> dict[str, Any]:
     return content
 
 
-def moved(model: vpm.Model) -> vpm.simulate.Run:
+def moved(model: vpm.Model) -> vpm.Run:
     time = 1e-3 * np.arange(500)
     current = 1.5e-3 * np.sin(2.0 * np.pi * 4.0 * time)
     record = vpm.Experiment.from_arrays(time, {"servo.command": current}, model=model)
@@ -53,7 +53,7 @@ def test_reduced_drives_lose_states_and_little_motion(
 
 def test_file_keeps_what_was_reduced(tmp_path: Path) -> None:
     model = vpm.Model(reduced(static=True, load=True))
-    again = vpm.Model.load(model.save(tmp_path / "reduced.toml") or tmp_path / "reduced.toml")
+    again = vpm.Model.load(model.save(tmp_path / "reduced.toml"))
     assert again.internal_names == ("servo.load",)
     assert "servo.valve.frequency" not in again.parameters
 

@@ -45,7 +45,7 @@ class Supply(Entry):
 
 
 class Valve(Entry):
-    """Servovalve: a spool, of second order or following at once, and four edges; the spool is in the unit of the command.
+    """Servovalve: a spool, of second order or following at once, and four edges; spool in the command's unit.
 
     The gain of the edges is given as such, or by the rated flow of a data sheet.
     """
