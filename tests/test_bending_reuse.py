@@ -1,6 +1,7 @@
 """How links bend is worked out once: the same numbers as by simulating everything, and a fit on the tangent."""
 
 import sys
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -25,10 +26,16 @@ def record() -> vpm.Experiment:
     return vpm.Experiment.from_arrays(time, data, units={"motor.command": "A", "shoulder.position": "rad"})
 
 
+def flexed() -> vpm.Model:
+    """The rigid arm whose link bends by an effect."""
+    return arm("rigid").with_effect("link_flexibility", at="link", stiffness=17.0, time=1e-3)
+
+
+@pytest.mark.parametrize("bent", [arm, flexed], ids=["described", "by an effect"])
 def test_laws_beside_the_bending_are_what_a_whole_simulation_gives(
-    record: vpm.Experiment, monkeypatch: pytest.MonkeyPatch
+    bent: Callable[[], vpm.Model], record: vpm.Experiment, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    model = arm().with_effect("viscous_friction", at="shoulder", viscous=0.03)
+    model = bent().with_effect("viscous_friction", at="shoulder", viscous=0.03)
     model = model.with_effect("torque_ripple", at="shoulder", period=0.3, cosine=0.02, sine=0.01)
     model = model.with_effect("rotor_inertia", at="shoulder", inertia=0.01)
     model = model.with_effect("actuator_lag", at="motor", time_constant=0.004)

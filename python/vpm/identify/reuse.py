@@ -103,9 +103,10 @@ def parts_of(model: Model, joints: tuple[str, ...]) -> Parts | None:
 
 
 def _held(model: Model, plays: Sequence[Effect]) -> Model:
-    """The machine with rigid links and without its plays."""
-    for play in plays:
-        model = model.without_effect(play.name, play.at)
+    """The machine with rigid links and without its plays; a beam that bends by an effect does so at every level."""
+    bent = [effect for effect in model.effects if effect.name == "link_flexibility"]
+    for effect in (*plays, *bent):
+        model = model.without_effect(effect.name, effect.at)
     return model.at("rigid") if model.core.n_elastic else model
 
 
