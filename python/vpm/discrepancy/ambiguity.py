@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 from vpm.discrepancy.candidates import Candidate, candidates
-from vpm.discrepancy.choice import Accepted
+from vpm.discrepancy.choice import Accepted, alike
 from vpm.discrepancy.confirmation import Data, Judged, Trial, confirm, judge
 from vpm.discrepancy.diagnosis import Ambiguity
 from vpm.discrepancy.refusal import LEAST_GAIN
 from vpm.discrepancy.round import HEAVY
 from vpm.discrepancy.screening import Probe, impossible_values, probe
-from vpm.errors import DivergedError
+from vpm.discrepancy.side_by_side import Failure, SideBySide
 from vpm.identify import gain, segments
 from vpm.identify.along import bends
 
@@ -26,11 +27,24 @@ AS_GOOD = 0.05
 
 @dataclass(frozen=True)
 class Rivals:
-    """An accepted effect, and the models in which something else does its work as well."""
+    """An accepted effect, and the models in which something else does its work.
+
+    Attributes
+    ----------
+    effect, site : str
+    trials : tuple of Trial
+        Those that predict the unseen data as well.
+    tried : tuple of Trial
+        All that were refitted in its place.
+    without : Judged or None
+        The model without it; None where that cannot be computed.
+    """
 
     effect: str
     site: str
     trials: tuple[Trial, ...]
+    tried: tuple[Trial, ...] = ()
+    without: Judged | None = None
 
     @property
     def label(self) -> str:
@@ -52,42 +66,85 @@ def listed(known: Sequence[Ambiguity], found: Sequence[Rivals]) -> tuple[Ambigui
 
 
 def rivals(
-    final: Judged, data: Data, accepted: Sequence[Accepted], effects: Sequence[str] | None = None
+    final: Judged,
+    data: Data,
+    accepted: Sequence[Accepted],
+    effects: Sequence[str] | None = None,
+    each: SideBySide | None = None,
 ) -> tuple[Rivals, ...]:
     """Replace each accepted effect in turn by every other that could do its work, and keep those that do it as well.
 
     All rivals are screened on the model without the effect; the few that take nearly as much from the training
     residual are refitted, and have to predict the unseen records as the effect does.
     """
-    return tuple(_of_one(final, data, entry, effects) for entry in accepted)
+    each = each or SideBySide(1)
+    told = [entry.trial.probe.candidate.label for entry in accepted]
+    left = each("what each adds: refitting without", partial(_without, final, data), accepted, _label)
+    known = [None if isinstance(one, Failure) else one for one in left]
+    jobs = [
+        (place, candidate)
+        for place, (entry, without) in enumerate(zip(accepted, known, strict=True))
+        if without is not None
+        for candidate in _others(without, data, entry, effects)
+    ]
+
+    def screened(job: tuple[int, Candidate]) -> Probe | None:
+        base = known[job[0]]
+        return None if base is None else probe(base.baseline, data.training, job[1])
+
+    probes = each("what else would do: screening", screened, jobs, lambda job: f"{job[1].label} for {told[job[0]]}")
+    short = []
+    for place, without in enumerate(known):
+        mine = [p for (owner, _), p in zip(jobs, probes, strict=True) if owner == place and isinstance(p, Probe)]
+        short += [(place, p) for p in _short_list(final, without, accepted[place], mine)]
+
+    def refitted(job: tuple[int, Probe]) -> Trial | None:
+        base = known[job[0]]
+        return None if base is None else confirm(base, data, job[1])
+
+    trials = each(
+        "what else would do: refitting", refitted, short, lambda job: f"{job[1].candidate.label} for {told[job[0]]}"
+    )
+    found = []
+    for place, (entry, without) in enumerate(zip(accepted, known, strict=True)):
+        own = [t for (owner, _), t in zip(short, trials, strict=True) if owner == place]
+        tried = tuple(t for t in own if isinstance(t, Trial))
+        found.append(Rivals(*entry.key, tuple(t for t in tried if as_good(final, t, data)), tried, without))
+    return tuple(found)
 
 
-def _of_one(final: Judged, data: Data, entry: Accepted, effects: Sequence[str] | None) -> Rivals:
-    name, site = entry.key
-    try:
-        model = final.model.without_effect(name, site)
-        free = tuple(n for n in final.free if n in model.parameters)
-        without = judge(model, free, data, {n: pair for n, pair in final.bounds.items() if n in free})
-    except DivergedError:
-        return Rivals(name, site, ())
-    taken = _power(without) - _power(final)
+def _label(entry: Accepted) -> str:
+    return entry.trial.probe.candidate.label
+
+
+def _without(final: Judged, data: Data, entry: Accepted) -> Judged:
+    """The model without an effect, all that is left fitted again."""
+    model = final.model.without_effect(*entry.key)
+    free = tuple(n for n in final.free if n in model.parameters)
+    return judge(model, free, data, {n: pair for n, pair in final.bounds.items() if n in free})
+
+
+def _others(without: Judged, data: Data, entry: Accepted, effects: Sequence[str] | None) -> list[Candidate]:
+    """Candidates that could do the work of an effect."""
+    model, name = without.model, entry.key[0]
     others = [c for c in candidates(model, data.training, without.fit.residual, effects) if _near(c, entry)]
     if bends(model) and name not in HEAVY:  # a spring more would not have been tried beside what is lighter and does
         others = [c for c in others if c.effect.name not in HEAVY]
-    probes = [probe(without.baseline, data.training, candidate) for candidate in others]
+    return others
+
+
+def _short_list(final: Judged, without: Judged | None, entry: Accepted, probes: Sequence[Probe]) -> list[Probe]:
+    """Rivals worth a refit: those that promise most for their numbers, and what might refine the effect most."""
+    if without is None:
+        return []
+    taken = _power(without) - _power(final)
     good = [
         p for p in probes if p.free and not impossible_values(p) and p.drop * _power(without) >= LEAST_SHARE * taken
     ]
     good.sort(key=lambda p: -p.score)
-    trials = [_tried(without, data, p) for p in good[:SHORT_LIST]]
-    return Rivals(name, site, tuple(t for t in trials if t is not None and _as_good(final, t, data)))
-
-
-def _tried(without: Judged, data: Data, promising: Probe) -> Trial | None:
-    try:
-        return confirm(without, data, promising)
-    except DivergedError:
-        return None
+    own = entry.trial.probe.candidate
+    finer = [p for p in good[SHORT_LIST:] if alike(p.candidate, own)]
+    return good[:SHORT_LIST] + sorted(finer, key=lambda p: -p.drop)[:1]
 
 
 def _near(candidate: Candidate, entry: Accepted) -> bool:
@@ -99,7 +156,8 @@ def _near(candidate: Candidate, entry: Accepted) -> bool:
     return candidate.site == site or candidate.effect.name in own.confused_with or candidate.effect.site == "actuator"
 
 
-def _as_good(final: Judged, trial: Trial, data: Data) -> bool:
+def as_good(final: Judged, trial: Trial, data: Data) -> bool:
+    """Whether something in the place of an effect predicts the unseen data as the effect does."""
     if not trial.clear:
         return False
     change = gain(final.unseen, trial.judged.unseen, segments(data.unseen)).relative

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vpm.catalogue import EFFECTS
-from vpm.discrepancy.candidates import Key
+from vpm.discrepancy.candidates import Candidate, Key
 from vpm.discrepancy.confirmation import Data, Trial
 from vpm.discrepancy.driven import compare_driven
 from vpm.discrepancy.motion_only import LATE
@@ -94,10 +94,14 @@ def _cost(trial: Trial) -> float:
 
 def _plainer(trial: Trial, first: Trial) -> bool:
     """Whether a trial says in fewer numbers nearly what ``first`` says, at the same site and confusable with it."""
-    mine, other = trial.probe.candidate, first.probe.candidate
-    alike = other.effect.name in mine.effect.confused_with or mine.effect.name in other.effect.confused_with
     fewer = len(trial.parameters) < len(first.parameters)
-    return mine.site == other.site and alike and fewer and REFINED * _left(trial) <= _left(first)
+    return alike(trial.probe.candidate, first.probe.candidate) and fewer and REFINED * _left(trial) <= _left(first)
+
+
+def alike(one: Candidate, other: Candidate) -> bool:
+    """Whether two candidates act at the same site and the catalogue knows that one is taken for the other."""
+    confused = other.effect.name in one.effect.confused_with or one.effect.name in other.effect.confused_with
+    return one.site == other.site and confused
 
 
 def _as_good(trial: Trial, first: Trial) -> bool:

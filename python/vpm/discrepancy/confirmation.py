@@ -190,10 +190,10 @@ def confirm(current: Judged, data: Data, probe: Probe) -> Trial:
         (*doubtful, *held),
         gain(
             current.fit.residual,
-            judged.fit.residual * _shrinkage(data.training, current, judged),
+            judged.fit.residual * shrinkage(data.training, current, judged),
             segments(data.training),
         ),
-        gain(current.unseen, judged.unseen * _shrinkage(data.unseen, current, judged), segments(data.unseen)),
+        gain(current.unseen, judged.unseen * shrinkage(data.unseen, current, judged), segments(data.unseen)),
         _simulated_gain(current, judged, data),
         timed.unseen if timed is not None else _away_gain(current, judged, data.unseen, probe),
         diverged,
@@ -264,7 +264,7 @@ def _origin(data: InverseDynamicsProblem, probe: Probe, start: Model) -> Array |
     return probe.model.theta if alike or probe.candidate.neutral else None
 
 
-def _shrinkage(problem: InverseDynamicsProblem, current: Judged, judged: Judged) -> float:
+def shrinkage(problem: InverseDynamicsProblem, current: Judged, judged: Judged) -> float:
     """How much weaker the actuators have become, at least 1.
 
     An effect that swallows the command leaves a small gap between two small efforts; errors are compared relative to

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import TypeVar
 
 import numpy as np
@@ -32,6 +33,7 @@ from vpm.discrepancy.floor import noise_floor
 from vpm.discrepancy.remainder import Remainder, remainder
 from vpm.discrepancy.search import Search, ambiguities, search
 from vpm.discrepancy.side_by_side import Progress, SideBySide
+from vpm.discrepancy.standing import in_order, replaced
 from vpm.discrepancy.structure import structure
 from vpm.discrepancy.telling_apart import experiments as experiments_for
 from vpm.discrepancy.timing import in_time
@@ -138,9 +140,13 @@ def diagnose(
     recalibrated = judge(model, (*free, *transitions), data, bounds)
     data.training.workers = 1  # candidates share the cores from here on
     notes.extend(_moved_far(model, recalibrated))
-    found = search(recalibrated, data, effects, limit, say, SideBySide(workers, progress))
+    each = SideBySide(workers, progress)
+    found = search(recalibrated, data, effects, limit, say, each)
     if found.interrupted:
         notes.append(STOPPED)
+    say("looking for what else would do in the place of each effect")
+    nothing: tuple[Rivals, ...] = ()
+    (found, ambiguous), late = _until_stopped(partial(_settled, found, data, effects, each), (found, nothing))
     say("measuring the noise floor")
     floor = noise_floor(found.final.model, data.unseen, found.final.unseen, mode, setup)
     gap = _gaps(data, nominal, recalibrated, found.final, floor)
@@ -160,9 +166,9 @@ def diagnose(
             empirical, final = beside(found.final, empirical, final, data)
         gap = _gaps(data, nominal, recalibrated, final, floor)
         summary = f"{summary} {empirical.sentence}"
-    say("looking for what else would do, and for the experiment that tells it apart")
-    nothing: tuple[Rivals, ...] = ()
-    ambiguous, late = _until_stopped(lambda: rivals(found.final, data, accepted, effects), nothing)
+    if not accepted:
+        ambiguous = ()
+    say("looking for the experiment that tells effects apart")
     if stopped or late:
         notes.append(STOPPED_LATE)
     noise = {channel: g.noise_floor for channel, g in gap.items() if g.mode == "inverse_dynamics"}
@@ -188,6 +194,17 @@ def diagnose(
         empirical,
         experiments_for(found.final, ambiguous, data.training, noise),
     )
+
+
+def _settled(
+    found: Search, data: Data, effects: Sequence[str] | None, each: SideBySide
+) -> tuple[Search, tuple[Rivals, ...]]:
+    """Names and their order when each effect has been taken out again, with what would do in its place."""
+    known = rivals(found.final, data, found.accepted, effects, each)
+    changed, known = replaced(found, known, data)
+    if changed is not found and len(changed.accepted) > 1:
+        known = rivals(changed.final, data, changed.accepted, effects, each)
+    return in_order(changed, known)
 
 
 def _until_stopped(work: Callable[[], Found], nothing: Found) -> tuple[Found, bool]:

@@ -1,4 +1,4 @@
-"""The answer of a diagnosis: verdict, effects in the order of acceptance, and everything needed to doubt it."""
+"""The answer of a diagnosis: verdict, effects in the order of what they add, and everything needed to doubt it."""
 
 from __future__ import annotations
 
@@ -286,7 +286,7 @@ class Diagnosis(Result):
     summary : str
         The verdict in a sentence or two.
     effects : tuple of AcceptedEffect
-        In the order of acceptance.
+        By what each adds to the prediction of unseen data given all the others, the most first.
     gap : dict of str to ChannelGap
         On unseen data.
     refused : tuple of RefusedEffect

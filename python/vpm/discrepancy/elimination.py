@@ -11,6 +11,7 @@ from vpm.discrepancy.play import is_read_off, only_winds_up
 from vpm.discrepancy.refusal import LEAST_GAIN, NORMAL_95_ONE_SIDED
 from vpm.errors import DivergedError, ModelError
 from vpm.identify import gain, segments
+from vpm.model import Model
 
 #: Factor by which the last fit may exceed the bound of a transition velocity.
 MORE_ROOM = 3.0
@@ -31,16 +32,16 @@ def drop_replaced(stages: list[Stage], accepted: list[Accepted], data: Data, dro
 
     Where a parameter of a later effect was held because the data show it only together with one of the earlier effect,
     it is set free for the trial: a spring whose rest was held beside a constant force needs that force no more if it
-    may rest elsewhere. One name for what two would say is the shorter answer. A size that was held is another force
-    under another name, as a difference of dry friction is a constant one in motion: the first one named stays.
+    may rest elsewhere. One name for what two would say is the shorter answer. So is it where a size was held, as that
+    of a difference of dry friction beside a constant force, which are one in motion: with the later effect sure, its
+    own size does that work. Where neither size has work to do beside it, these data do not tell, and both names stay.
     """
     newest = accepted[-1]
     for entry in accepted[:-1]:
         current = stages[-1].judged
         own = set(entry.trial.parameters)
         freed = {alias.parameter for other in accepted for alias in other.trial.held if alias.partner in own}
-        if any(current.model.parameters[name].kind == "linear" for name in freed):
-            continue
+        renamed = any(current.model.parameters[name].kind == "linear" for name in freed)
         try:
             model = current.model.without_effect(*entry.key)
             known = tuple(name for name in current.free if name in model.parameters)
@@ -50,11 +51,27 @@ def drop_replaced(stages: list[Stage], accepted: list[Accepted], data: Data, dro
         except (DivergedError, ModelError):
             continue  # without it the model cannot follow the unseen data at all, or another effect cannot stand
         loss = gain(reduced.unseen, current.unseen, segments(data.unseen))
-        if loss.relative < LEAST_GAIN:
+        if loss.relative < LEAST_GAIN and (not renamed or _renamed(current, reduced, model, known, data)):
             accepted.remove(entry)
             accepted[:] = [_released(other, freed) for other in accepted]
             stages.append(Stage("removed", *entry.key, reduced))
             dropped[entry.key] = f"it is not needed any more beside {newest.trial.probe.candidate.label}"
+
+
+def _renamed(current: Judged, reduced: Judged, model: Model, free: tuple[str, ...], data: Data) -> bool:
+    """Whether the numbers that were set free do the work of the effect that went, and there is such work.
+
+    Without them, and without the effect, the unseen data are predicted worse, in ``model`` with ``free`` fitted; with
+    them the unseen records are simulated as well. Where there is none, as many numbers as before would tell nothing.
+    """
+    if current.simulated is not None and reduced.simulated is not None and data.simulation is not None:
+        simulated = gain(current.simulated, reduced.simulated, segments(data.simulation))
+        if simulated.relative < -LEAST_GAIN and simulated.harm > NORMAL_95_ONE_SIDED:
+            return False
+    bounds = {name: pair for name, pair in current.bounds.items() if name in free}
+    bare = judge(model, free, replace(data, simulation=None), bounds)
+    work = gain(bare.unseen, reduced.unseen, segments(data.unseen))
+    return work.relative >= LEAST_GAIN and work.score >= NORMAL_95_ONE_SIDED
 
 
 def without_tight_bounds(final: Judged, data: Data) -> Judged:

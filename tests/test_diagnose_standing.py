@@ -1,0 +1,92 @@
+"""Accepted effects when the search has ended: what takes the place of a plainer name, and the order they stand in."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import cast
+
+import numpy as np
+import pytest
+
+import vpm
+from blind import make_case
+from vpm.discrepancy.ambiguity import Rivals
+from vpm.discrepancy.search import Search
+from vpm.discrepancy.standing import in_order
+
+
+def test_a_spring_takes_the_place_of_the_constant_force_that_was_the_plainer_name() -> None:
+    case = make_case("axis_rotary", "spring", 7)
+    (hidden,) = case.truth.hidden
+    why = vpm.diagnose(case.model(), case.train, case.validate, effects=["bias_force", "spring"], workers=1)
+    assert [(s.change, s.effect) for s in why.steps][-2:] == [("removed", "bias_force"), ("added", "spring")]
+    assert [(effect.name, effect.site) for effect in why.effects] == [("spring", "axis")]
+    assert [c.name for c in why.candidates if c.accepted] == ["spring"]
+    reasons = {refused.name: refused.reason for refused in why.refused}
+    assert "spring at axis in its place predicts the unseen data better" in reasons["bias_force"]
+    (stiffness, _) = why.effects[0].parameters
+    assert stiffness.value == pytest.approx(hidden.parameters["stiffness"], abs=3.0 * stiffness.std)
+
+
+def test_a_constant_force_keeps_its_name_where_finer_laws_know_nothing_more() -> None:
+    case = make_case("axis_rotary", "bias_force", 2)
+    tried = ["bias_force", "spring", "asymmetric_friction"]
+    why = vpm.diagnose(case.model(), case.train, case.validate, effects=tried, workers=1)
+    assert [effect.name for effect in why.effects] == ["bias_force"]
+
+
+@dataclass
+class _Alias:
+    partner: str
+
+
+@dataclass
+class _Trial:
+    parameters: tuple[str, ...]
+    held: tuple[_Alias, ...] = ()
+
+
+@dataclass
+class _Entry:
+    trial: _Trial
+
+
+@dataclass
+class _Judged:
+    unseen: np.ndarray = field(default_factory=lambda: np.ones(4))
+
+
+@dataclass(frozen=True)
+class _Found:
+    accepted: tuple[_Entry, ...]
+    final: _Judged
+
+
+def _known(power: float | None) -> Rivals:
+    without = None if power is None else _Judged(np.full(4, power))
+    return Rivals("effect", "site", (), (), cast("vpm.discrepancy.confirmation.Judged | None", without))
+
+
+def _ordered(entries: dict[str, tuple[_Entry, float | None]]) -> list[str]:
+    """Names in the order they stand in, of effects with what is left of the unseen data without each."""
+    accepted = tuple(entry for entry, _ in entries.values())
+    found = cast("Search", _Found(accepted, _Judged()))
+    changed, known = in_order(found, [_known(power) for _, power in entries.values()])
+    assert len(known) == len(accepted)
+    names = {id(entry): name for name, (entry, _) in entries.items()}
+    return [names[id(one)] for one in changed.accepted]
+
+
+def test_the_effect_without_which_most_is_left_comes_first() -> None:
+    first, second, third = (_Entry(_Trial((name,))) for name in "abc")
+    assert _ordered({"a": (first, 2.0), "b": (second, 5.0), "c": (third, None)}) == ["c", "b", "a"]
+
+
+def test_an_effect_stands_after_the_one_that_a_number_of_it_was_held_for() -> None:
+    plain, finer = _Entry(_Trial(("axis.bias.force",))), _Entry(_Trial(("x",), (_Alias("axis.bias.force"),)))
+    other = _Entry(_Trial(("y",)))
+    assert _ordered({"plain": (plain, 1.1), "finer": (finer, 9.0), "other": (other, 2.0)}) == [
+        "other",
+        "plain",
+        "finer",
+    ]
