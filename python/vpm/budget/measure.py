@@ -9,7 +9,7 @@ import numpy as np
 from vpm.budget.instructions import count_instructions
 from vpm.budget.machine import describe
 from vpm.budget.report import REST, BudgetReport, Stage
-from vpm.budget.steps import Timed, commands, time_steps
+from vpm.budget.steps import Timed, commands, start_state, time_steps
 from vpm.errors import SimulationError
 from vpm.experiment import Experiment
 from vpm.model import Model
@@ -48,7 +48,8 @@ def budget(
     integrator, substeps
         See :class:`vpm.simulate.Setup`; ``auto`` takes steps whose time has a bound.
     experiment : Experiment, optional
-        Its commands drive the model, over and over; without it a sum of sines at one unit of command does.
+        Its commands drive the model, over and over (from its beginning, where contacts or oil do not let any motion
+        follow any other); without it a sum of sines at one unit of command does.
     latency : float
         Time, s, to watch how late an idle loop at this rate wakes up; never part of the step times. 0 for not at all.
     instructions : bool
@@ -76,7 +77,8 @@ def budget(
         raise SimulationError(f"latency is {latency:g} s; give a time that is not negative")
     setup = Setup(integrator, substeps)
     inputs = commands(model, rate, experiment)
-    timed = time_steps(model, rate, setup, steps, inputs, states=STATES, tell=tell, priority=priority)
+    start = start_state(model, experiment)
+    timed = time_steps(model, rate, setup, steps, inputs, states=STATES, tell=tell, priority=priority, start=start)
     median = float(np.median(timed.seconds))
     counted = count_instructions(model, rate, setup, inputs, median, tell) if instructions else None
     return BudgetReport(

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from vpm.errors import SimulationError
 from vpm.experiment import Experiment
+from vpm.initial import initial_state
 from vpm.model import Model
 from vpm.realtime import Loop
 from vpm.simulate import Setup, simulate
@@ -47,7 +48,13 @@ class Timed:
 
 
 def step_times(
-    model: Model, rate: float, setup: Setup, steps: int, inputs: Array, priority: int | None = None
+    model: Model,
+    rate: float,
+    setup: Setup,
+    steps: int,
+    inputs: Array,
+    priority: int | None = None,
+    start: Array | None = None,
 ) -> Array:
     """Duration of each step, s.
 
@@ -62,13 +69,15 @@ def step_times(
         Repeated as often as needed.
     priority : int, optional
         Time them before all ordinary threads, see `vpm.realtime.Loop`, if permitted.
+    start : ndarray, shape (states,), optional
+        Where each way through the inputs starts; by default at rest at zero, once.
 
     Raises
     ------
     SimulationError
         The commands do not lead through a simulation in these steps.
     """
-    return time_steps(model, rate, setup, steps, inputs, priority=priority).seconds
+    return time_steps(model, rate, setup, steps, inputs, priority=priority, start=start).seconds
 
 
 def time_steps(
@@ -81,8 +90,11 @@ def time_steps(
     states: int = 0,
     tell: Callable[[str], None] | None = None,
     priority: int | None = None,
+    start: Array | None = None,
 ) -> Timed:
     """Time steps, and at so many ``states`` along the way their stages; with a ``priority`` before ordinary threads.
+
+    Each way through the inputs begins at ``start``, if it is given.
 
     Raises
     ------
@@ -96,12 +108,14 @@ def time_steps(
     allocations = memory = done = 0
     stages: list[tuple[str, float, float]] = []
     chunk = CHUNK if tell else steps
+    chunk = chunk if start is None else min(chunk, len(inputs))
+    first = model.state() if start is None else start
     while done < steps:
         count = min(chunk, steps - done)
         try:
             with _ahead(rate, priority):
                 seconds, asked, memory, found = model.core.time_steps(
-                    model.theta, model.state(), inputs, 1.0 / rate, setup.substeps, method, count, 0 if done else states
+                    model.theta, first, inputs, 1.0 / rate, setup.substeps, method, count, 0 if done else states
                 )
         except (Diverged, ValueError) as error:
             raise SimulationError(f"{model.name}: {error}") from error
@@ -109,7 +123,7 @@ def time_steps(
         stages = stages or found
         allocations += asked
         done += count
-        if tell:
+        if tell and (start is None or done == steps):
             tell(f"timed {done} of {steps} steps, {1e6 * float(np.median(seconds)):.3g} us each")
     return Timed(np.concatenate(durations) if durations else np.empty(0), allocations, memory, stages)
 
@@ -117,6 +131,17 @@ def time_steps(
 def _ahead(rate: float, priority: int | None) -> AbstractContextManager[object]:
     """Before all ordinary threads, as a controller runs; nothing without a priority."""
     return nullcontext() if priority is None else Loop(rate, priority=priority)
+
+
+def start_state(model: Model, experiment: Experiment | None) -> Array | None:
+    """Where a model starts while it is timed: where a record does, if contacts or oil make zero no place to be.
+
+    Parameters
+    ----------
+    model : Model
+    experiment : Experiment or None
+    """
+    return initial_state(model, experiment, model.theta) if experiment is not None and model.is_abrupt else None
 
 
 def commands(model: Model, rate: float, experiment: Experiment | None = None) -> Array:

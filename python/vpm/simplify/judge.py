@@ -8,10 +8,13 @@ from vpm.errors import SimulationError
 from vpm.experiment import Experiment
 from vpm.identify import InverseDynamicsProblem, OutputErrorProblem, Problem, estimate, gaps
 from vpm.model import Model
+from vpm.simplify.surrogates import commanded
 from vpm.simulate import Setup, judging_mode, simulate
 
 #: How many steps finer the full model is simulated than the controller's period, where it is the reference.
 FINER = 2
+#: Drives in sampled time.
+SAMPLED = ("narx", "maxwell_narx")
 #: Integrator of fits: the one that is stable whatever the reduced model is like.
 FITTING = "linearly_implicit"
 #: Fits end where parameters or sum of squares move by less than this share, and after so many evaluations in any case:
@@ -45,6 +48,7 @@ class Judge:
         mode: str,
         channels: Sequence[str] | None = None,
     ) -> None:
+        self.model = model
         self.records, self.unseen, self.mode, self.rate = tuple(records), tuple(unseen), mode, rate
         self.channels = tuple(channels) if channels is not None else None
         self.per_sample = steps_per_sample((*self.records, *self.unseen), rate)
@@ -66,7 +70,8 @@ class Judge:
         model : Model
         """
         free = [p.name for p in model.parameters.values() if p.adjustable]
-        if not free:
+        # Elements in sampled time were fitted as a whole, and no parameter of the machine can be fitted beside them.
+        if not free or any(model.actuator_type(name) in SAMPLED for name in model.actuators):
             return model
         data: Problem
         if self._balances:
@@ -99,7 +104,9 @@ class Judge:
         return {channel: share for channel, (_, share, _) in gaps(data, residual).items()}
 
     def _outputs(self, model: Model, records: Sequence[Experiment], setup: Setup) -> OutputErrorProblem:
-        return OutputErrorProblem(model, records, self.mode, channels=self.channels, setup=setup)
+        driven = [commanded(model, self.model, each) for each in records]
+        mode = "free_run" if self.mode == "closed_loop" and not model.controlled_actuators else self.mode
+        return OutputErrorProblem(model, driven, mode, channels=self.channels, setup=setup)
 
 
 def steps_per_sample(records: Sequence[Experiment], rate: float) -> int:

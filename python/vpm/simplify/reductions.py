@@ -1,4 +1,4 @@
-"""What of a model can be made simpler: effects left out, links at a coarser level, deformations held rigid.
+"""What of a model can be made simpler: effects left out, links coarser, deformations held rigid, drives with less oil.
 
 Each place of a model where something can be simpler is a *site* with a list of *changes* that exclude each other; a
 reduced model takes one change, or none, at each site.
@@ -14,6 +14,7 @@ from vpm.errors import VpmError
 from vpm.model import Model
 from vpm.model.level import deforms_of, size_of
 from vpm.results import Storable
+from vpm.simplify.hydraulics import hydraulic_drives, possible_changes, simpler
 
 #: Levels that a flexible link is offered, where they have fewer coordinates than its own; docs/beams.md compares them.
 OFFERED = (
@@ -39,12 +40,13 @@ class Reduction(Storable):
 
     Attributes
     ----------
-    kind : {"effect", "level", "component"}
-        An effect that is left out, a coarser level of a flexible link, a deformation of a link that is held rigid.
+    kind : {"effect", "level", "component", "drive"}
+        An effect that is left out, a coarser level of a flexible link, a deformation of a link that is held rigid, a
+        hydraulic drive with fewer states.
     name : str
-        Effect, level or component.
+        Effect, level, component or change of a drive, see `vpm.simplify.hydraulics`.
     at : str
-        Site of the effect, or flexible link.
+        Site of the effect, flexible link, or drive.
     """
 
     kind: str
@@ -57,12 +59,15 @@ class Reduction(Storable):
                 return f"{self.at} as {self.name}"
             case "component":
                 return f"{self.at} rigid in {self.name}"
+            case "drive":
+                return f"{self.at} with {self.name}"
         return f"{self.name} at {self.at}"
 
     @property
     def site(self) -> tuple[str, str]:
         """What it excludes: other reductions of the same site."""
-        return ("level", self.at) if self.kind == "level" else (f"{self.kind} {self.name}", self.at)
+        alone = self.kind in ("level", "drive")
+        return (self.kind if alone else f"{self.kind} {self.name}", self.at)
 
     def applied(self, model: Model) -> Model:
         """Model with this change.
@@ -81,18 +86,22 @@ class Reduction(Storable):
                 return model.without_effect(self.name, self.at)
             case "level":
                 return model.at({self.at: self.name})
+            case "drive":
+                return simpler(model, self.at, self.name)
         content = model.to_dict()
         beam = content["beams"][self.at]
         beam["deforms"] = [component for component in deforms_of(beam) if component != self.name]
         return type(model)(content)
 
 
-def reductions(model: Model) -> dict[tuple[str, str], tuple[Reduction, ...]]:
+def reductions(model: Model, learnt: Sequence[Reduction] = ()) -> dict[tuple[str, str], tuple[Reduction, ...]]:
     """Changes that can be made to a model, by site.
 
     Parameters
     ----------
     model : Model
+    learnt : sequence of Reduction
+        More of them, which records tell: `vpm.simplify.surrogates`.
 
     Returns
     -------
@@ -100,7 +109,7 @@ def reductions(model: Model) -> dict[tuple[str, str], tuple[Reduction, ...]]:
         Those of which the reduced model is a valid one. Levels of a link come finest first.
     """
     found: dict[tuple[str, str], tuple[Reduction, ...]] = {}
-    for reduction in _imaginable(model):
+    for reduction in (*_imaginable(model), *learnt):
         if _possible(model, reduction):
             found[reduction.site] = (*found.get(reduction.site, ()), reduction)
     return found
@@ -120,8 +129,8 @@ def reduced(model: Model, changes: Sequence[Reduction]) -> Model:
     ModelError
         They contradict each other.
     """
-    # A rigid link has no components: levels come last.
-    for change in sorted(changes, key=lambda each: each.kind == "level"):
+    # A rigid link has no components, and a spool that follows at once no effect that slows it: those come last.
+    for change in sorted(changes, key=lambda each: each.kind in ("level", "drive")):
         model = change.applied(model)
     return model
 
@@ -138,6 +147,9 @@ def _imaginable(model: Model) -> Iterator[Reduction]:
         for component in HELD_FIRST:
             if component in deforms and len(deforms) > 1:
                 yield Reduction("component", component, name)
+    for drive in hydraulic_drives(model):
+        for change in possible_changes(model, drive):
+            yield Reduction("drive", change, drive)
 
 
 def _beams(model: Model) -> Mapping[str, Any]:

@@ -19,6 +19,7 @@ from vpm.model import Model
 from vpm.simplify.judge import Judge, by_the_model, reference_mode, shown
 from vpm.simplify.ladder import Ladder, Rung, pareto
 from vpm.simplify.reductions import OFFERED, Reduction, reduced, reductions
+from vpm.simplify.surrogates import surrogates
 from vpm.simplify.trials import NEGLIGIBLE, PRIORITY, Changes, Trials
 from vpm.simulate import Setup
 
@@ -102,7 +103,7 @@ def simplify(
         records, unseen = ([known[id(each)] for each in group] for group in (records, unseen))
     judge = Judge(model, records, unseen, rate, mode, channels)
     trials = Trials(model, judge, lambda changes: bool(changes) or against == "data", say, tolerance)
-    sites = reductions(model)
+    sites = reductions(model, surrogates(model, judge.records, mode, rate))
     try:
         _descend(trials, sites)
     except KeyboardInterrupt:
@@ -226,7 +227,7 @@ def _concluded(trials: Trials, sites: Sites, share: float, against: str) -> Ladd
         steps=int(min(max(CHOSEN_SECONDS / chosen.seconds, CHOSEN_STEPS[0]), CHOSEN_STEPS[1])),
         integrator=chosen.integrator,
         substeps=chosen.substeps,
-        experiment=judge.driven,
+        experiment=trials.courses.record(model),
         priority=PRIORITY,
     )
     place = rungs.index(chosen)

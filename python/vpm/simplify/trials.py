@@ -7,9 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from vpm.budget import commands, step_times
+from vpm.budget import step_times
 from vpm.errors import SimulationError, VpmError
 from vpm.model import Model
+from vpm.simplify.course import Courses
 from vpm.simplify.judge import Judge
 from vpm.simplify.ladder import Rung
 from vpm.simplify.reductions import Reduction, reduced
@@ -61,7 +62,8 @@ class Trials:
     ) -> None:
         self.model, self.judge, self.tolerance = model, judge, tolerance
         self._refit, self._tell = refit, tell
-        self._inputs = commands(model, judge.rate, judge.driven)
+        #: Along what models are timed.
+        self.courses = Courses(model, judge)
         #: Why the last way that did not work did not.
         self.reason = ""
         self._rungs: dict[frozenset[Reduction], list[Rung]] = {}
@@ -161,7 +163,8 @@ class Trials:
         return found
 
     def _glance(self, model: Model, setup: Setup) -> float:
-        return float(np.min(step_times(model, self.judge.rate, setup, GLANCE, self._inputs)))
+        inputs, start = self.courses.of(model)
+        return float(np.min(step_times(model, self.judge.rate, setup, GLANCE, inputs, start=start)))
 
     def _step(self, changes: Changes, glances: Mapping[str, float]) -> None:
         """Every integrator with one step in a period, the quickest first; then more steps where they could pay."""
@@ -227,9 +230,9 @@ class Trials:
         model : Model
         setup : Setup
         """
-        rate = self.judge.rate
-        times = step_times(model, rate, setup, TIMED_STEPS[0], self._inputs, PRIORITY)
+        rate, (inputs, start) = self.judge.rate, self.courses.of(model)
+        times = step_times(model, rate, setup, TIMED_STEPS[0], inputs, PRIORITY, start)
         steps = int(np.clip(TIMED_SECONDS / np.median(times), *TIMED_STEPS))
         if steps > TIMED_STEPS[0]:
-            times = step_times(model, rate, setup, steps, self._inputs, PRIORITY)
+            times = step_times(model, rate, setup, steps, inputs, PRIORITY, start)
         return float(np.median(times)), float(np.quantile(times, 0.999))

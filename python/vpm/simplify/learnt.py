@@ -1,0 +1,154 @@
+"""Elements in sampled time from what a drive did: Maxwell and polynomial NARX, as actuators of a model file.
+
+How rich an element is, its degree, is chosen among the records to learn from, each left out in turn.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vpm.errors import VpmError
+from vpm.narx import MaxwellNarx, MaxwellSignals, Narx, identify, refine_maxwell
+
+Array = NDArray[np.float64]
+#: Force that pulls the ends together (N), length (m), its rate (m/s), drive signal.
+Record = Mapping[str, Array]
+Entry = dict[str, object]
+Element = TypeVar("Element")
+
+#: Total degrees that are tried: of the maps of a Maxwell element, and of a NARX model.
+MAXWELL_DEGREES, NARX_DEGREES = (1, 2, 3), (1, 2, 3)
+SIGNALS = MaxwellSignals(force="force", length="length", drive="drive")
+#: What fast motion meets beside the stiffness at rest, in parts of that, where a fit begins.
+FAST = 10.0
+#: Most terms of a NARX model: each costs time.
+TERMS = 16
+
+
+def maxwell_entry(records: Sequence[Record], step: float) -> Entry | None:
+    """Maxwell NARX element as an actuator; None where no degree gives one.
+
+    Parameters
+    ----------
+    records : sequence of mapping of str to ndarray, shape (N,)
+    step : float
+        Between samples, s.
+    """
+    found = _chosen(records, MAXWELL_DEGREES, lambda some, degree: _maxwell(some, step, degree), _maxwell_gap)
+    if found is None:
+        return None
+    maps = {"k0": found.k0.tolist(), "s0": found.s0.tolist()}
+    return {**_sampled("maxwell_narx", step), **maps, "k1": found.k1, "c1": found.c1, "scheme": found.scheme}
+
+
+def narx_entry(records: Sequence[Record], step: float, channels: Mapping[str, str]) -> Entry | None:
+    """Polynomial NARX model as an actuator; None where no degree gives one.
+
+    Parameters
+    ----------
+    records : sequence of mapping of str to ndarray, shape (N,)
+    step : float
+        Between samples, s.
+    channels : mapping of str to str
+        Channel of the model file for ``drive``, ``length`` and ``rate``.
+    """
+    found = _chosen([_pushing(each) for each in records], NARX_DEGREES, _narx, _narx_gap)
+    if found is None:
+        return None
+    terms = dict(zip(found.term_names, map(float, found.coefficients), strict=True))
+    used = {name: channels[name] for name in found.inputs if any(f"{name}[" in term for term in terms)}
+    first = float(records[0]["force"][0])
+    return {**_sampled("narx", step), "inputs": used, "terms": terms, "limit": found.limit, "initial_effort": -first}
+
+
+def _sampled(kind: str, step: float) -> Entry:
+    return {"type": kind, "sample_time": step, "command_unit": "1"}
+
+
+def _chosen(
+    records: Sequence[Record],
+    degrees: Sequence[int],
+    fit: Callable[[Sequence[Record], int], Element | None],
+    gap: Callable[[Element, Record], float],
+) -> Element | None:
+    """Model of the degree that predicts records left out best, fitted to all of them."""
+    parts = records if len(records) > 1 else _halves(records[0])
+    errors: dict[int, float] = {}
+    for degree in degrees:
+        total = 0.0
+        for place, test in enumerate(parts):
+            model = fit([*parts[:place], *parts[place + 1 :]], degree)
+            total += float("inf") if model is None else gap(model, test)
+        errors[degree] = total
+    for degree in sorted(degrees, key=lambda each: errors[each]):
+        whole = fit(records, degree)
+        if whole is not None and np.isfinite(errors[degree]):
+            return whole
+    return None
+
+
+def _halves(record: Record) -> list[Record]:
+    half = len(record["force"]) // 2
+    return [{name: values[part] for name, values in record.items()} for part in (slice(half), slice(half, None))]
+
+
+def _maxwell(records: Sequence[Record], step: float, degree: int) -> MaxwellNarx | None:
+    """Element fitted in free runs, from least squares of a spring and a damper; none that no file could hold."""
+    joined = {name: np.concatenate([record[name] for record in records]) for name in records[0]}
+    force, length, rate = joined["force"], joined["length"], joined["rate"]
+    fixed = np.column_stack([np.ones_like(force), joined["drive"], rate])
+    stiffness = np.linalg.lstsq(np.column_stack([fixed, length]), force, rcond=None)[0][-1]
+    if not stiffness > 0.0:
+        # Length and drive signal went together, so that the records do not tell their parts.
+        stiffness = float(np.std(force) / np.std(length))
+    constant, drive, damping = np.linalg.lstsq(fixed, force - stiffness * length, rcond=None)[0]
+    free = np.array([-constant / stiffness, -drive / stiffness])
+    c1 = float(damping) if damping > 0.0 else stiffness * step
+    try:
+        start = MaxwellNarx(np.array([stiffness]), free, FAST * stiffness, c1, step)
+        element = refine_maxwell(start, [dict(each) for each in records], SIGNALS, degree=degree).element
+    except VpmError:
+        return None
+    return element if element.k1 > 0.0 and element.c1 > 0.0 else None
+
+
+def _maxwell_gap(element: MaxwellNarx, record: Record) -> float:
+    """Root mean square error of the force in a free run."""
+    force = record["force"]
+    try:
+        found = element.simulate_free_run(record["length"], (force[0], force[1]), record["drive"])
+    except VpmError:
+        return float("inf")
+    return float(np.sqrt(np.mean(np.square(found - force))))
+
+
+def _pushing(record: Record) -> Record:
+    return {"effort": -record["force"], **{name: record[name] for name in ("drive", "length", "rate", "force")}}
+
+
+def _narx(records: Sequence[Record], degree: int) -> Narx | None:
+    lags = {name: [0, 1] for name in ("drive", "length", "rate")}
+    try:
+        return identify(
+            [dict(each) for each in records],
+            output="effort",
+            inputs=tuple(lags),
+            output_lags=1,
+            input_lags=lags,
+            degree=degree,
+            max_terms=TERMS,
+        )
+    except VpmError:
+        return None
+
+
+def _narx_gap(model: Narx, record: Record) -> float:
+    try:
+        run = model.simulate_free_run(dict(record))
+    except VpmError:
+        return float("inf")
+    return float(np.sqrt(np.mean(np.square(run.values - run.measured))))

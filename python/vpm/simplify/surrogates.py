@@ -1,0 +1,129 @@
+"""Elements in sampled time in the place of servo-cylinders and their controllers, learnt from the full model.
+
+An element stands for a drive with its loop: a Maxwell element (D'Imperio 2016, section 5.2.5) or a polynomial NARX
+model, whose drive signal is the reference of the controller, or the command of a drive without one. It is fitted to
+what the full model does on the records to learn from.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vpm.experiment import Experiment
+from vpm.model import Model
+from vpm.simplify.hydraulics import hydraulic_drives, replaced
+from vpm.simplify.learnt import maxwell_entry, narx_entry
+from vpm.simplify.reductions import Reduction
+from vpm.simulate import simulate
+
+Array = NDArray[np.float64]
+Record = dict[str, Array]
+
+
+@dataclass(frozen=True)
+class Surrogate(Reduction):
+    """A Maxwell NARX element or NARX model in the place of a servo-cylinder and its controller.
+
+    Attributes
+    ----------
+    entry : str
+        The actuator of the model file as JSON.
+    """
+
+    entry: str = ""
+
+    def __str__(self) -> str:
+        """Words for a rung."""
+        return f"{self.at} as {self.name}"
+
+    def applied(self, model: Model) -> Model:
+        """Model with this element.
+
+        Parameters
+        ----------
+        model : Model
+        """
+        return replaced(model, self.at, self.entry)
+
+
+def surrogates(model: Model, records: Sequence[Experiment], mode: str, rate: float) -> tuple[Surrogate, ...]:
+    """An element for each servo-cylinder that one can be found for.
+
+    Parameters
+    ----------
+    model : Model
+        The full one, which is learnt from.
+    records : sequence of Experiment
+        To learn from.
+    mode : str
+        Sampled drives run in free runs and closed loops only.
+    rate : float
+        Samples of the element in a second, Hz.
+    """
+    drives = hydraulic_drives(model)
+    if not drives or mode not in ("free_run", "closed_loop"):
+        return ()
+    taught = [_taught(model, record, mode, rate) for record in records]
+    return tuple(found for drive in drives for found in _learnt(model, drive, taught, 1.0 / rate))
+
+
+def commanded(model: Model, full: Model, record: Experiment) -> Experiment:
+    """The record with the reference of each drive that lost its controller as its command.
+
+    Parameters
+    ----------
+    model, full : Model
+    record : Experiment
+    """
+    lost = [name for name in full.controlled_actuators if name not in model.controlled_actuators]
+    if not lost:
+        return record
+    values = {name: record[name] for name in record.channels if not name.startswith(tuple(f"{x}." for x in lost))}
+    kept = {name: record[name] for name in record.channels if name not in values and name in model.output_channels}
+    commands = {f"{name}.command": record[f"{name}.reference"] for name in lost}
+    return Experiment.from_arrays(record.time, {**values, **kept, **commands}, model=model, name=record.name)
+
+
+def _taught(model: Model, record: Experiment, mode: str, rate: float) -> Record:
+    """What the full model does on a record, in samples of the controller."""
+    fine = _held(record, round(record.dt * rate), model)
+    run = simulate(model, fine, mode)
+    inputs = {name: fine[name] for name in fine.channels if name.endswith((".reference", ".command"))}
+    return {**inputs, **{name: run[name] for name in run.channels}}
+
+
+def _held(record: Experiment, count: int, model: Model) -> Experiment:
+    """The record with its inputs held over ``count`` samples for each of its own."""
+    if count == 1:
+        return record
+    time = record.time[0] + record.dt / count * np.arange(count * len(record))
+    values = {name: np.repeat(record[name], count) for name in record.channels}
+    return Experiment.from_arrays(time, values, model=model, name=record.name)
+
+
+def _learnt(model: Model, drive: str, taught: Sequence[Record], step: float) -> Iterator[Surrogate]:
+    """What stands for one drive: Maxwell and NARX, the one with fewer numbers last."""
+    line = model.line_of_actuator(drive)
+    moving = [f"{line}.length", f"{line}.rate"]
+    if line is None:
+        joint = model.joint_of_actuator(drive)
+        moving = [f"{joint}.position", f"{joint}.velocity"]
+    signal = "reference" if drive in model.controlled_actuators else "command"
+    names = dict(zip(("length", "rate"), moving, strict=True))
+    records = [
+        {
+            "force": -each[f"{drive}.force"],
+            "drive": each[f"{drive}.{signal}"],
+            **{name: each[channel] for name, channel in names.items()},
+        }
+        for each in taught
+    ]
+    narx = narx_entry(records, step, {**names, "drive": f"{drive}.command"})
+    for entry in (narx, maxwell_entry(records, step)):
+        if entry is not None:
+            yield Surrogate("drive", str(entry["type"]), drive, json.dumps(entry))
