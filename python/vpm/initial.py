@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -106,7 +107,12 @@ def _worked_out(model: Model, theta: Array, m: Motion) -> tuple[Array, Array, Ar
 
 
 def _along(model: Model, theta: Array, given: tuple[Array, Array, Array], joints: tuple[str, ...], dt: float) -> Array:
-    """Outputs (N, channels) along a motion of some joints, the others passive."""
+    """Outputs (N, channels) along a motion of some joints, the others passive.
+
+    What a followed joint remembers of its way changes the effort that it takes, not how the others move.
+    """
+    model, places = _forgetful(model, joints)
+    theta = theta[places]
     followed = [place for place, name in enumerate(model.joints) if name in joints]
     passive = [place for place in range(len(model.joints)) if place not in followed]
     whole = np.zeros((3, len(given[0]), len(model.joints)))
@@ -116,6 +122,16 @@ def _along(model: Model, theta: Array, given: tuple[Array, Array, Array], joints
         theta, whole[0], whole[1], whole[2], dt, 1, "linearly_implicit", [], passive
     )
     return outputs
+
+
+@lru_cache(maxsize=128)
+def _forgetful(model: Model, joints: tuple[str, ...]) -> tuple[Model, NDArray[np.int64]]:
+    """A machine without the hystereses of some joints, with its parameters among those that it had."""
+    bare = model
+    for effect in model.effects:
+        if effect.name == "hysteresis" and effect.at in joints:
+            bare = bare.without_effect(effect.name, effect.at)
+    return bare, np.array([model.index(name) for name in bare.parameter_names], dtype=np.int64)
 
 
 def _settled(model: Model, theta: Array, positions: Array, dt: float) -> Array:

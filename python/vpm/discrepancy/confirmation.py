@@ -41,6 +41,8 @@ FEW_EVALUATIONS = 6
 #: A refit that has lowered the training error by less than this share of its mean square in so many evaluations, and
 #: hardly goes on, is ended: ten times as much is asked of it on unseen data.
 SLOW_GAIN, SLOW_EVALUATIONS = 0.01, 10
+#: Dotted name, behind the site, of the width of a play.
+PLAY = ".backlash.gap"
 #: A joint that winds up before it moves on looks like one that sticks.
 WOUND_UP = "joint_compliance"
 
@@ -370,9 +372,11 @@ def is_clear(judged: Judged, own: tuple[str, ...]) -> bool:
     """Whether an effect's linear parameters (its size) differ from zero together, for the shape that was found.
 
     Size and shape of a law often make up for each other (a friction close to rest that is higher and fades sooner), and
-    where there is no size, there is no shape to be uncertain of.
+    where there is no size, there is no shape to be uncertain of. The size of a play is its width, however hard its
+    contacts are: what is as hard as rigid has a stiffness that no data bound from above.
     """
-    size = [n for n in own if judged.model.parameters[n].kind == "linear"] or list(own)
+    size = [n for n in own if n.endswith(PLAY)]
+    size = size or [n for n in own if judged.model.parameters[n].kind == "linear"] or list(own)
     shape = [judged.free.index(name) for name in own if name not in size]
     index = [judged.free.index(name) for name in size]
     full = judged.fit.covariance

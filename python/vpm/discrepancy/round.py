@@ -11,7 +11,14 @@ from vpm.discrepancy.choice import Accepted, choose
 from vpm.discrepancy.confirmation import Data, Judged, Trial, confirm
 from vpm.discrepancy.diagnosis import RankedCandidate
 from vpm.discrepancy.play import is_read_off, only_winds_up
-from vpm.discrepancy.refusal import Thresholds, refuse_probe, refuse_timing, refuse_trial, worse_in_simulation
+from vpm.discrepancy.refusal import (
+    CLEAR_GAIN,
+    Thresholds,
+    refuse_probe,
+    refuse_timing,
+    refuse_trial,
+    worse_in_simulation,
+)
 from vpm.discrepancy.ringing import NOISE_ONLY, noise_alone, only_ringing
 from vpm.discrepancy.screening import Probe, prepare, probe
 from vpm.discrepancy.side_by_side import Failure, SideBySide
@@ -64,19 +71,33 @@ class Round:
     def heavy(self, effects: Sequence[str] | None, without: set[Key]) -> Accepted | None:
         """The best of those with a motion of their own, tried where more than noise is left to explain.
 
-        A spring that swings within the whole band leaves what is as white as noise: of rigid machines in which nothing
-        was found before it, one that promises much of the residual is refitted all the same.
+        A spring that swings within the whole band leaves what is as white as noise: of rigid machines one that promises
+        much of the residual is refitted all the same.
         """
         model = self.current.model
         left = structure(model, self.data.training, self.data.unseen, self.timed.fitted, self.timed.unseen)
         quiet = not left.present and left.coloured <= NOISE_ONLY
-        if (quiet and (self.number > 1 or bends(model) or has_own_drives(model))) or self.done():
+        if (quiet and self._takes_long()) or self.done():
             return None
         self.screen(effects, without, heavy=True)
         if quiet:
             self._promising = [one for one in self._promising if one.drop >= RINGING]
         self.confirm()
         return self.best()
+
+    def weak(self, best: Accepted) -> bool:
+        """Whether what would come in leaves most of the unseen gap, so that it may only imitate what moves by itself.
+
+        A motion that nobody measures shows in the efforts of all joints, in part as any of several lighter effects
+        would: what explains little has to compete with it. Where links bend already, or drives have states, its probes
+        take long, and come after all others.
+        """
+        tried = any(name in HEAVY[:1] for name, _ in self._ranking)
+        return best.trial.unseen.relative < CLEAR_GAIN and not tried and not self._takes_long()
+
+    def _takes_long(self) -> bool:
+        """Whether the probes of a motion of its own take long on this machine."""
+        return bends(self.current.model) or has_own_drives(self.current.model)
 
     def screen(self, effects: Sequence[str] | None, without: set[Key], *, heavy: bool) -> None:
         """Probe every candidate and set aside those that cannot be."""
@@ -199,7 +220,8 @@ class Round:
         if not self._believed:
             return None
         best = choose(self._believed, self.data)
-        self._ranking[best.key] = replace(self._ranking[best.key], accepted=True)
+        for key, told in self._ranking.items():
+            self._ranking[key] = replace(told, accepted=key == best.key)
         return best
 
     def ranked(self) -> list[RankedCandidate]:

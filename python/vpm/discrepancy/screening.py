@@ -15,6 +15,7 @@ from scipy.special import chdtri
 
 from vpm.discrepancy.candidates import Candidate
 from vpm.discrepancy.play import believed, is_read_off, read_off
+from vpm.discrepancy.structural import in_series
 from vpm.identify import InverseDynamicsProblem, robust_covariance, segments
 from vpm.identify.along import bends
 from vpm.identify.identifiability import closest_column, column_lengths, is_alias
@@ -189,16 +190,28 @@ def _probe_start(
         values, (_, _, left) = np.zeros_like(values), _linear_step(data, known, residual)
     power = float(base.residual @ base.residual)
     free = names[len(base.free) :]
-    return Probe(
-        candidate,
-        model,
-        free,
-        held,
-        invisible,
-        dict(zip(free, (values + start_values)[len(base.free) :].tolist(), strict=True)),
-        dict(zip(free, std[len(base.free) :].tolist(), strict=True)),
-        1.0 - left / power if power > 0.0 and free else 0.0,
-    )
+    estimates = dict(zip(free, (values + start_values)[len(base.free) :].tolist(), strict=True))
+    deviations = dict(zip(free, std[len(base.free) :].tolist(), strict=True))
+    drop = 1.0 - left / power if power > 0.0 and free else 0.0
+    for name in free:
+        if _short(model, candidate, name) in in_series(candidate.effect.name):
+            estimates[name], deviations[name] = softened(
+                model.parameters[name].value, estimates[name], deviations[name]
+            )
+    return Probe(candidate, model, free, held, invisible, estimates, deviations, drop)
+
+
+def softened(start: float, estimate: float, std: float) -> tuple[float, float]:
+    """Stiffness of a spring in series after the same step, taken in its compliance, with its standard deviation.
+
+    Under an effort F it gives way by F/k, which is linear in 1/k: from a start that is k0, a step dk is one of -dk/k0^2
+    in the compliance. Taken in k, a spring half as stiff as its start, or less, would come out below zero. What comes
+    out stiffer than rigid stays as it is.
+    """
+    ratio = 2.0 - estimate / start if start > 0.0 else 0.0
+    if ratio <= 0.0:
+        return estimate, std
+    return start / ratio, std / ratio**2
 
 
 def _sizes(model: Model, candidate: Candidate, known: Sequence[str], added: Sequence[str]) -> tuple[Array, Array]:

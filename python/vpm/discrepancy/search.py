@@ -46,7 +46,9 @@ def search(
         best = None
         try:
             if len(accepted) < limit and not (accepted and outcome.done()):
-                best = outcome.light(effects, set(dropped)) or outcome.heavy(effects, set(dropped))
+                best = outcome.light(effects, set(dropped))
+                if best is None or outcome.weak(best):
+                    best = outcome.heavy(effects, set(dropped)) or best
         except KeyboardInterrupt:
             interrupted = True
         ranking += outcome.ranked()

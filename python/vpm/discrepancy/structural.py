@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 from vpm.catalogue import EFFECTS, EffectType
 from vpm.experiment.signal import differentiate
 from vpm.identify import InverseDynamicsProblem
+from vpm.identify.along import has_own_drives
+from vpm.identify.reuse import SPLITTING
 from vpm.model import Model
 
 Array = NDArray[np.float64]
@@ -22,6 +24,8 @@ Array = NDArray[np.float64]
 STRUCTURAL = frozenset({"joint_compliance", "backlash", "link_flexibility"})
 #: Effects that add coordinates that nobody measures.
 HIDING = STRUCTURAL
+#: Their springs, which lie between motor and link, so that a softer one does more.
+SERIES = "stiffness"
 #: Frequencies at which a spring lets the link swing behind a motor that stands still, Hz, and damping ratios there.
 FREQUENCIES = (3.0, 8.0, 20.0, 50.0)
 LOOSE, CONTACT = 0.05, 0.1
@@ -66,14 +70,18 @@ def sites_worth_trying(effect: EffectType, model: Model) -> tuple[str, ...]:
 def beyond(effect: EffectType, site: str, model: Model, measured: Sequence[str]) -> str:
     """Why a model with one effect more could not be built, or balanced along the ``measured`` joints, or "".
 
-    A motion with joints that nobody measures is integrated, and there no hysteresis carries its memory along.
+    A motion with joints that nobody measures is integrated, and there no hysteresis carries its memory along; but it
+    does on the motor side of a joint that is split where that is measured, see `vpm.identify.reuse.parts_of`.
     """
     remembering = [entry.at for entry in model.effects if entry.name == "hysteresis"]
-    if effect.name == "hysteresis" and tuple(model.joints) != tuple(measured):
+    split_off = {f"{entry.at}_deflection" for entry in model.effects if entry.name in SPLITTING}
+    alone = tuple(joint for joint in model.joints if joint not in split_off) == tuple(measured)
+    known = alone and not has_own_drives(model) and not any(entry.name == "rotor_inertia" for entry in model.effects)
+    if effect.name == "hysteresis" and tuple(model.joints) != tuple(measured) and not known:
         return "its memory cannot be balanced beside what moves unseen in this model"
     if effect.name not in HIDING:
         return ""
-    if remembering:
+    if remembering and not (known and effect.name in SPLITTING):
         return f"what moves unseen cannot be balanced beside the memory of the hysteresis at {remembering[0]}"
     split = [(entry.name, entry.at) for entry in model.effects if entry.name in HIDING]
     whole = model
@@ -83,6 +91,11 @@ def beyond(effect: EffectType, site: str, model: Model, measured: Sequence[str])
         if _joint(whole, at) == _joint(whole, site):
             return f"the joint is split already by {name} at {at}, and no inertia is between"
     return ""
+
+
+def in_series(effect: str) -> tuple[str, ...]:
+    """Short names of the parameters of an effect that do less the larger they are."""
+    return (SERIES,) if effect in STRUCTURAL else ()
 
 
 def coupled(model: Model) -> bool:

@@ -25,6 +25,8 @@ Array = NDArray[np.float64]
 
 #: Effects of joints that add a motion of their own, and those that weigh the acceleration: the tree has them.
 SPLITTING = frozenset({"joint_compliance", "backlash"})
+#: The law of a joint that depends on the way it came.
+REMEMBERS = "hysteresis"
 #: Simulations that are kept for each record: those of one round of a search.
 KEPT = 48
 #: Values that have moved by no more than this share of themselves leave derivatives good enough for a first look: by
@@ -71,8 +73,13 @@ class Parts:
 
 @lru_cache(maxsize=128)
 def parts_of(model: Model, joints: tuple[str, ...]) -> Parts | None:
-    """Split a machine whose measured ``joints`` are all that it has beside plays; None where nothing bends or flies."""
-    plays = [e for e in model.effects if e.name == "backlash" and f"{e.at}_deflection" in model.joints]
+    """Split a machine whose measured ``joints`` are all that it has beside plays; None where nothing bends or flies.
+
+    Where a joint remembers its way, joints that wind up count as plays do: a motion that is worked out carries no
+    memory along, and the measured joint, on the side of the motor, is the one that remembers.
+    """
+    splits = SPLITTING if any(effect.name == REMEMBERS for effect in model.effects) else frozenset({"backlash"})
+    plays = [e for e in model.effects if e.name in splits and f"{e.at}_deflection" in model.joints]
     flying = {f"{e.at}_deflection" for e in plays}
     if tuple(joint for joint in model.joints if joint not in flying) != joints:
         return None

@@ -1,0 +1,144 @@
+"""Effects with a motion of their own: the step of their screening, their size, and what has to meet them."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import vpm
+from vpm.discrepancy.candidates import Candidate
+from vpm.discrepancy.confirmation import is_clear
+from vpm.discrepancy.round import Round, _twins
+from vpm.discrepancy.screening import Probe, softened
+from vpm.identify import Estimate, InverseDynamicsProblem, Worth, estimate
+
+DT = 1e-3
+AXIS = """
+name = "axis"
+gravity = [0.0, 0.0, 0.0]
+bodies.load = { mass = 1.0, inertia = [0.02, 0.02, 0.02, 0.0, 0.0, 0.0] }
+joints.axis = { type = "revolute", parent = "world", child = "load", axis = [0, 0, 1], rotor_inertia = 0.01 }
+actuators.drive = { joint = "axis", gain = 1.0, command_unit = "N m" }
+
+[[effects]]
+type = "viscous_friction"
+at = "axis"
+viscous = { value = 0.05, uncertainty = 0.02 }
+"""
+HYSTERESIS = {"force": 0.3, "displacement": 0.05, "shape": 0.0}
+
+
+def record(truth: vpm.Model) -> vpm.Experiment:
+    """The machine's own run, without noise, held by a spring so that it stays near."""
+    held = truth.with_effect("spring", at="axis", stiffness=0.5, rest=0.0)
+    time = np.arange(4000) * DT
+    torque = sum(size * np.sin(2 * np.pi * f * time) for size, f in ((0.6, 0.7), (0.5, 1.9), (0.6, 4.3)))
+    units = {"drive.command": "N m", "axis.position": "rad"}
+    given = vpm.Experiment.from_arrays(time, {"drive.command": torque}, units={"drive.command": "N m"})
+    run = vpm.simulate(held, given)
+    data = {"drive.command": torque, "axis.position": run["axis.position"]}
+    return vpm.Experiment.from_arrays(time, data, units=units)
+
+
+@pytest.mark.parametrize("start", [150.0, 1e3, 1e5])
+def test_a_spring_in_series_is_found_from_starts_far_stiffer(start: float) -> None:
+    """Where nothing swings, one step finds it exactly; taken in the stiffness it would end below zero from 200 on."""
+    effort, stiffness = np.sin(np.linspace(0.0, 9.0, 50)), 100.0
+    slope = -effort / start**2
+    step = float(slope @ (effort / stiffness - effort / start) / (slope @ slope))
+    assert (start + step > 0.0) == (start < 200.0)
+    found, std = softened(start, start + step, 2.0)
+    assert found == pytest.approx(stiffness, rel=1e-9)
+    assert std / found**2 == pytest.approx(2.0 / start**2, rel=1e-9), "the same uncertainty of the compliance"
+
+
+def test_what_comes_out_stiffer_than_rigid_stays_as_it_is() -> None:
+    assert softened(100.0, 250.0, 3.0) == (250.0, 3.0)
+
+
+def test_a_joint_that_winds_up_is_balanced_with_the_memory_of_its_motor_side() -> None:
+    """The machine's own run balances, which neither the hysteresis nor the spring alone would do."""
+    rigid = vpm.Model.from_toml(AXIS).with_effect("spring", at="axis", stiffness=0.5, rest=0.0)
+    soft = rigid.with_effect("joint_compliance", at="axis", stiffness=20.0, damping=0.02)
+    both = soft.with_effect("hysteresis", at="axis", **HYSTERESIS)
+    data = InverseDynamicsProblem(rigid, [record(both.without_effect("spring", "axis"))])
+
+    def left(model: vpm.Model) -> float:
+        return float(np.sqrt(np.mean(data.evaluate(model, model.theta)[0] ** 2)))
+
+    least = min(left(soft), left(rigid.with_effect("hysteresis", at="axis", **HYSTERESIS)))
+    assert left(both) < 0.05 * least
+    names = ("axis.hysteresis.force", "axis.compliance.stiffness", "axis.friction.viscous")
+    _, slopes = data.evaluate(both, both.theta, [both.index(name) for name in names])
+    for name, column in zip(names, slopes.T, strict=True):
+        step = 1e-4 * both.parameters[name].value
+        sides = [both.with_parameters({name: both.parameters[name].value + sign * step}) for sign in (1.0, -1.0)]
+        more, less = (data.evaluate(side, side.theta)[0] for side in sides)
+        assert np.linalg.norm(column - (more - less) / (2.0 * step)) < 0.02 * np.linalg.norm(column), name
+
+
+def test_the_size_of_a_play_is_its_width_however_hard_its_contacts_are() -> None:
+    own = ("axis.backlash.gap", "axis.backlash.stiffness", "axis.backlash.contact_damping")
+    model = vpm.Model.from_toml(AXIS).with_effect("backlash", at="axis", gap=2e-3, stiffness=4e3)
+
+    def clear(gap: float) -> bool:
+        stds = np.array([gap, 8e3, 20.0])  # contacts as hard as rigid: no data bound their stiffness from above
+        values = np.array([model.parameters[name].value for name in own])
+        fit = Estimate(own, values, np.zeros(9), np.zeros((9, 3)), np.diag(stds**2), (), (), 1)
+        judged: Any = SimpleNamespace(model=model, free=own, fit=fit)
+        return is_clear(judged, own)
+
+    assert clear(1e-4)
+    assert not clear(2e-3)
+
+
+@pytest.mark.parametrize(("taken", "others", "meets"), [(0.3, (), True), (0.8, (), False), (0.3, ("axis",), False)])
+def test_what_takes_little_has_to_meet_motions_of_their_own_once(
+    taken: float, others: tuple[str, ...], meets: bool
+) -> None:
+    current: Any = SimpleNamespace(model=vpm.Model.from_toml(AXIS))
+    unused: Any = None
+    outcome = Round(current, unused, 1, lambda _: None, unused)
+    outcome._ranking = {("joint_compliance", site): unused for site in others}
+    best: Any = SimpleNamespace(trial=SimpleNamespace(unseen=SimpleNamespace(relative=taken)))
+    assert outcome.weak(best) == meets
+
+
+def promise(name: str, drop: float, free: tuple[str, ...] = ("stiffness",)) -> Probe:
+    effect: Any = SimpleNamespace(name=name)
+    unused: Any = None
+    return Probe(Candidate(effect, "axis", ()), unused, free, (), (), {}, {}, drop)
+
+
+def test_a_link_that_bends_at_its_root_is_the_twin_of_a_drive_that_winds_up() -> None:
+    soft, bent = promise("joint_compliance", 0.7), promise("link_flexibility", 0.7 * (1.0 + 1e-8))
+    assert _twins([soft, bent]) == {("link_flexibility", "axis"): ("joint_compliance", "axis")}
+    assert not _twins([soft, promise("link_flexibility", 0.7001)])
+    assert not _twins([soft, promise("link_flexibility", 0.7, ("stiffness", "time"))])
+    assert not _twins([promise("spring", 0.7), promise("bias_force", 0.7)])
+
+
+def test_a_fit_is_lost_if_it_is_late_and_hardly_comes_nearer() -> None:
+    worth = Worth(cost=1.0, evaluations=4)
+    assert not worth.lost([9.0, 8.9, 8.8]), "not late yet"
+    assert worth.lost([9.0, 8.9, 8.8, 8.7])
+    assert not worth.lost([9.0, 8.0, 7.0, 6.0]), "it still comes nearer"
+    assert not worth.lost([9.0, 1.0, 1.0, 1.0]), "it has come near enough"
+
+
+def test_a_fit_without_worth_ends_early_with_the_best_until_then() -> None:
+    """Steep at first and flat afterwards: what it has to reach is out of reach."""
+    model = vpm.Model.from_toml(AXIS).with_effect("spring", at="axis", stiffness=0.5, rest=0.0)
+    truth = model.without_effect("spring", "axis").with_effect("coulomb_friction", at="axis", coulomb=0.2)
+    data = InverseDynamicsProblem(model, [record(truth)])
+    start = model.with_effect("torque_ripple", at="axis", period=0.11, cosine=0.02)
+    free = ("axis.friction.viscous", "axis.ripple.period", "axis.ripple.cosine")
+    whole = estimate(start, data, free, tolerance=1e-14)
+    least = float(whole.residual @ whole.residual)
+    ended = estimate(start, data, free, tolerance=1e-14, worth=Worth(0.5 * least, 3))
+    assert ended.evaluations < whole.evaluations
+    assert not ended.interrupted
+    assert float(ended.residual @ ended.residual) <= 1.05 * least
