@@ -275,3 +275,25 @@ def test_sensors_count_scale_shift_and_lag() -> None:
 def test_model_texts_can_be_written_and_read_back(made: dict[str, dict[str, Case]]) -> None:
     model = made["axis_linear"]["parameters"].model()
     assert Model.from_toml(model.to_toml()) == model
+
+
+@pytest.mark.parametrize(
+    ("machine", "pair"),
+    [
+        ("axis_rotary", ("asymmetric_friction", "coulomb_friction")),
+        ("axis_linear", ("asymmetric_friction", "viscous_friction")),
+        ("arm2r", ("coulomb_friction@elbow", "stribeck_friction@elbow")),
+    ],
+)
+def test_a_refinement_can_be_hidden_with_what_it_refines(machine: str, pair: tuple[str, str]) -> None:
+    for seed in range(4):
+        plan = _plan(MACHINES[machine], pair, seed, 1.0, recalibrate=False)
+        hidden = {h.name: h for h in plan.truth.hidden}
+        assert list(hidden) == [name.partition("@")[0] for name in pair]
+        assert not {(h.name, h.site) for h in hidden.values()} & set(plan.base), "the nominal model lacks both"
+        assert not any(h.name in key and key.startswith(h.site) for h in hidden.values() for key in plan.truth.nominal)
+        if "coulomb_friction" in hidden and "asymmetric_friction" in hidden:
+            difference = hidden["asymmetric_friction"].parameters["coulomb_difference"]
+            assert abs(difference) < 2.0 * hidden["coulomb_friction"].parameters["coulomb"], "each direction dissipates"
+    model = Model.from_toml(plan.machine.text({**plan.without, **plan.truth.nominal}, plan.draft, plan.base))
+    assert not {(effect.name, effect.at) for effect in model.effects} & {(h.name, h.site) for h in hidden.values()}

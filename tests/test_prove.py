@@ -102,6 +102,27 @@ def test_equivalent_effects_leave_the_same_records(
     assert np.all(size > 0.0)
 
 
+@pytest.mark.parametrize("seed", [2, 1002])
+def test_a_payload_behind_a_turning_axis_is_its_centre_and_inertia(seed: int) -> None:
+    """Both of which may be calibrated: nobody can tell it from them, so that it does not count."""
+    payload = _plan(MACHINES["axis_rotary"], "payload", seed, 0.0, recalibrate=False)
+    payload = replace(payload, paths=tuple(path[:, : round(3.0 * payload.draft.rate)] for path in payload.paths[:1]))
+    true, bare = payload.with_effect, payload.without
+    mass, load, lever = true["body.mass"], true["body.payload.mass"], true["body.payload.lever"]
+    centre = true["body.centre"] + load * lever / mass
+    inertia = true["body.inertia"] + mass * (true["body.centre"] ** 2 - centre**2) + load * lever**2
+    assert {"body.centre", "body.inertia"} <= set(payload.truth.nominal)
+    assert inertia > 0.0
+    calibrated = replace(payload, with_effect={**bare, "body.centre": centre, "body.inertia": inertia})
+    first, second, none = (
+        records[0][:, :, column]
+        for plan, column in ((payload, 1), (calibrated, 1), (payload, 2))
+        for _, records in simulated([plan])
+    )
+    assert np.abs(first - second).max() < 1e-6 * np.abs(first - none).max()
+    assert ("axis_rotary", "payload") in proving.ABSORBED
+
+
 def test_both_of_a_pair_have_to_be_named() -> None:
     both = answer("spring@axis bias_force@axis", "bias_force@axis", "spring@axis")
     assert score.all_named(both)

@@ -11,7 +11,7 @@ from __future__ import annotations
 import json
 import zlib
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -35,6 +35,8 @@ OFF, CLEARLY_OFF = 0.1, (0.1, 0.25)
 #: Shortest and longest record [s].
 SHORTEST, LONGEST = 9.0, 12.0
 NOTHING, PARAMETERS = "none", "parameters"
+#: Effects that others refine.
+NEEDED = frozenset(need for effect in EFFECTS.values() for need in effect.needs)
 
 
 @dataclass(frozen=True)
@@ -156,11 +158,8 @@ def _plan(machine: Machine, hidden: str | Sequence[str], seed: int, noise_level:
     effects = [_placed(machine, name, seed) for name in names if name not in {NOTHING, PARAMETERS}]
     needs = [f"{need}@{site}" for name, site in effects for need in EFFECTS[name].needs]
     draft = machine.draft(drawn, needs)
-    found = []
-    for name, site in effects:
-        parameters = EFFECTS[name].draw(_own_generator(machine, name, seed), draft.scales[site])
-        found.append(Hidden(name, site, parameters, EFFECTS[name].known))
-    absent = {f"{name}@{site}" for name, site in effects} - set(needs)
+    found = _drawn(machine, draft, effects, seed)
+    absent = {f"{name}@{site}" for name, site in effects}
     base = tuple((name, site) for name, site in draft.base if f"{name}@{site}" not in absent)
     keys = {f"{h.site}.{h.name}.{p}": value for h in found for p, value in h.parameters.items()}
     without = {k: v for k, v in draft.values.items() if k not in keys}
@@ -175,6 +174,22 @@ def _plan(machine: Machine, hidden: str | Sequence[str], seed: int, noise_level:
     paths = _paths(machine, draft, _own_generator(machine, "motion", seed))
     varied = tuple(nominal) if recalibrate else ()
     return Plan(machine, seed, noise_level, draft, base, truth, {**without, **keys}, without, varied, paths, own)
+
+
+def _drawn(machine: Machine, draft: Draft, effects: Sequence[tuple[str, str]], seed: int) -> list[Hidden]:
+    """Effects with their sizes, in the order asked for; what refines another hidden one is drawn beside its true size.
+
+    A difference between directions, say, is bounded by the friction that is there, hidden or not.
+    """
+    scales = dict(draft.scales)
+    hidden: dict[tuple[str, str], Hidden] = {}
+    for name, site in sorted(effects, key=lambda effect: len(EFFECTS[effect[0]].needs)):
+        parameters = EFFECTS[name].draw(_own_generator(machine, name, seed), scales[site])
+        hidden[name, site] = Hidden(name, site, parameters, EFFECTS[name].known)
+        same = {key: value for key, value in parameters.items() if key in {"coulomb", "viscous"}}
+        if name in NEEDED:
+            scales[site] = replace(scales[site], **same)
+    return [hidden[effect] for effect in effects]
 
 
 def _paths(machine: Machine, draft: Draft, generator: Generator) -> tuple[Array, ...]:

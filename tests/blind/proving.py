@@ -28,8 +28,9 @@ BATCH = 30
 #: Cases without a missing effect for each case of an effect: a rate of a few per cent takes many of them.
 NOTHING, PAIRS = 4, 5
 #: Effects that a calibratable parameter is, exactly: a payload of a slide is its mass, one at the tip of a link the tip
-#: mass. The oracle, which recalibrates by a straight line, leaves something of a large one, but nobody can name it.
-ABSORBED = frozenset({("axis_linear", "payload"), ("flexible_arm", "payload")})
+#: mass, one behind a single turning axis its centre and inertia. The oracle, which recalibrates by a straight line,
+#: leaves something of a large one, but nobody can name it.
+ABSORBED = frozenset({("axis_linear", "payload"), ("axis_rotary", "payload"), ("flexible_arm", "payload")})
 
 
 @dataclass(frozen=True)
