@@ -122,10 +122,12 @@ def _impossible(probe: Probe, name: str) -> str:
 def _too_short(trial: Trial, interval: float) -> str:
     """A delay or lag below one sampling interval cannot be told from the hold of the sampled command.
 
-    The time of a lossy link is no delay: it is a share of its stiffness.
+    The hold is that of all commands: where one of several drives, or of several joints' instruments, is late and the
+    others are not, `refuse_timing` judges it beside a shift of them all. The time of a lossy link is no delay: it is a
+    share of its stiffness.
     """
     model = trial.judged.model
-    if trial.probe.candidate.effect.site in {"link", "body", "beam"}:
+    if trial.probe.candidate.effect.site in {"link", "body", "beam"} or has_peers(model, trial.probe.candidate.site):
         return ""
     for name in trial.parameters:
         parameter = model.parameters[name]
@@ -135,6 +137,12 @@ def _too_short(trial: Trial, interval: float) -> str:
                 f"{1e3 * interval:.3g} ms: it cannot be told from the sampling itself"
             )
     return ""
+
+
+def has_peers(model: Model, site: str) -> bool:
+    """Whether a drive is one of several, or an instrument of a joint's position one of several, on one clock."""
+    encoders = {model.sensor_of(f"{joint}.position") for joint in model.joints} - {None}
+    return any(site in group and len(group) > 1 for group in (set(model.actuators), encoders))
 
 
 def _no_way(trial: Trial) -> str:
