@@ -40,6 +40,8 @@ class Rung(Storable):
         Typical time of a period (median), s: what the rungs are ranked by.
     slowest : float
         Its 99.9 % quantile, s: what has to fit the period.
+    errors : tuple of (str, float)
+        Relative error of each channel.
     """
 
     removed: tuple[str, ...]
@@ -51,6 +53,7 @@ class Rung(Storable):
     loss: float
     seconds: float
     slowest: float
+    errors: tuple[tuple[str, float], ...] = ()
 
     @property
     def stepping(self) -> str:
@@ -163,6 +166,7 @@ class Ladder(Result):
         return {
             "simpler": [", ".join(r.removed) for r in self.rungs],
             **{name: [getattr(r, name) for r in self.rungs] for name in names},
+            **{f"error[{c}]": [dict(r.errors)[c] for r in self.rungs] for c, _ in self.chosen.errors},
         }
 
     def plot(self) -> Figure:

@@ -217,8 +217,8 @@ class Trials:
         except SimulationError as reason:
             self.reason = str(reason)
             return None
-        labels, states = tuple(map(str, changes)), model.core.n_states
-        rung = Rung(labels, setup.integrator, setup.substeps, states, error, loudest, error, seconds, slowest)
+        labels, states, told = tuple(map(str, changes)), model.core.n_states, tuple(errors.items())
+        rung = Rung(labels, setup.integrator, setup.substeps, states, error, loudest, error, seconds, slowest, told)
         self._rungs[key].append(rung)
         return rung
 
