@@ -48,10 +48,10 @@ def simplify(
 ) -> Ladder:
     """Make a model simpler, place by place, as far as the tolerance allows, and find the cheapest way to step it.
 
-    Effects are left out, flexible links made coarser or rigid in single deformations, and every integrator of fixed
-    steps is tried with one, two and four steps in a period. The adjustable parameters of every reduced model are fitted
-    again before it is judged by simulation, so that what remains may take over what it can. Ctrl-C ends the search
-    with what is known.
+    Effects are left out, flexible links made coarser or rigid in single deformations, spools of hydraulic drives made
+    static, their pressures one, NARX elements put in their place, and every integrator of fixed steps is tried with
+    one, two and four steps in a period. The adjustable parameters of every reduced model are fitted again before it is
+    judged by simulation, so that what remains may take over what it can. Ctrl-C ends the search with what is known.
 
     Parameters
     ----------
