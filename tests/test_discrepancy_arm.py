@@ -35,6 +35,16 @@ def test_two_delays_are_found_although_one_alone_makes_the_simulation_worse() ->
         assert diagnosis.model.parameters[name].value == pytest.approx(0.006, rel=0.05)
 
 
+@pytest.mark.parametrize("late", [(0, 6), (6, 6)])
+def test_what_is_late_by_less_than_a_sample_is_one_drive_and_not_the_clock_of_all(late: tuple[int, int]) -> None:
+    """All commands may hold a little later than is said; of one drive beside another on its clock it is physics."""
+    arm, effects = Arm(late=late), ["input_delay", "coulomb_friction", "sensor_offset"]
+    diagnosis = diagnose(nominal(), record(arm, 10.0, 1), record(arm, 8.0, 2), effects=effects)
+    assert named(diagnosis) == ({("input_delay", "second")} if late[0] == 0 else set())
+    if late[0] == 0:
+        assert diagnosis.model.parameters["second.delay.time"].value == pytest.approx(0.0012, rel=0.05)
+
+
 def test_wrong_weights_are_not_a_missing_effect() -> None:
     diagnosis = of(Arm())
     assert diagnosis.verdict == "parameters_only"

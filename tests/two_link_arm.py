@@ -6,7 +6,6 @@ Control*, section 6.4), angles counted downwards from the horizontal, driven by 
 
 from __future__ import annotations
 
-from collections import deque
 from dataclasses import dataclass
 
 import numpy as np
@@ -72,7 +71,7 @@ viscous = { value = 0.2, unit = "N m s/rad", uncertainty = 0.2 }
 
 @dataclass(frozen=True)
 class Arm:
-    """What the arm really is; zero means that the effect is not there."""
+    """What the arm really is; zero means that the effect is not there. Drives are ``late`` by tenths of a sample."""
 
     masses: tuple[float, float] = (3.0, 2.0)
     centres: tuple[float, float] = (0.215, 0.17)
@@ -82,6 +81,7 @@ class Arm:
     coulomb: tuple[float, float] = (0.0, 0.0)
     bias: tuple[float, float] = (0.0, 0.0)
     delay: int = 0
+    late: tuple[int, int] = (0, 0)
     noise: float = 2e-5
 
     def weight(self, q: Array) -> Array:
@@ -128,15 +128,15 @@ def record(arm: Arm, seconds: float, seed: int) -> Experiment:
     positions, commands = np.zeros((count, 2)), np.zeros((count, 2))
     q, v = np.zeros(2), np.zeros(2)
     before = q
-    queue: deque[Array] = deque(maxlen=arm.delay + 1)
+    late = arm.delay * FINE + np.array(arm.late)
     for k in range(count):
         y = q + arm.noise * generator.standard_normal(2)
         speed, before = (y - before) / DT, y
         feedback = PROPORTIONAL * (target[:, k] - y) - DERIVATIVE * speed
         positions[k], commands[k] = y, (feedback + arm.weight(y)) / GAINS
-        queue.append(commands[k])
-        for _ in range(FINE):
-            q, v = midpoint(arm, q, v, GAINS * queue[0], DT / FINE)
+        for step in range(FINE):
+            held = np.diag(commands[np.maximum((k * FINE + step - late) // FINE, 0)])
+            q, v = midpoint(arm, q, v, GAINS * held, DT / FINE)
     channels = {
         "shoulder.position": positions[:, 0],
         "elbow.position": positions[:, 1],
