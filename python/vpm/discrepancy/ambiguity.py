@@ -12,7 +12,7 @@ from vpm.discrepancy.confirmation import Data, Judged, Trial, confirm, judge
 from vpm.discrepancy.diagnosis import Ambiguity
 from vpm.discrepancy.refusal import LEAST_GAIN
 from vpm.discrepancy.round import HEAVY
-from vpm.discrepancy.screening import Probe, impossible_values, probe
+from vpm.discrepancy.screening import Probe, impossible_values, probe, refit_effort, screening_effort
 from vpm.discrepancy.side_by_side import Failure, SideBySide
 from vpm.identify import gain, segments
 from vpm.identify.along import bends
@@ -92,7 +92,13 @@ def rivals(
         base = known[job[0]]
         return None if base is None else probe(base.baseline, data.training, job[1])
 
-    probes = each("what else would do: screening", screened, jobs, lambda job: f"{job[1].label} for {told[job[0]]}")
+    probes = each(
+        "what else would do: screening",
+        screened,
+        jobs,
+        lambda job: f"{job[1].label} for {told[job[0]]}",
+        lambda job: screening_effort(job[1]),
+    )
     short = []
     for place, without in enumerate(known):
         mine = [p for (owner, _), p in zip(jobs, probes, strict=True) if owner == place and isinstance(p, Probe)]
@@ -103,7 +109,11 @@ def rivals(
         return None if base is None else confirm(base, data, job[1])
 
     trials = each(
-        "what else would do: refitting", refitted, short, lambda job: f"{job[1].candidate.label} for {told[job[0]]}"
+        "what else would do: refitting",
+        refitted,
+        short,
+        lambda job: f"{job[1].candidate.label} for {told[job[0]]}",
+        lambda job: refit_effort(job[1]),
     )
     found = []
     for place, (entry, without) in enumerate(zip(accepted, known, strict=True)):

@@ -185,11 +185,34 @@ def confirm(current: Judged, data: Data, probe: Probe) -> Trial:
     timed = _timed(current, judged, data, probe)
     if timed is not None:
         judged, diverged = _judged(judged.model, free, data, {**bounds, **timed.bounds}, origin)
+    return _trial(current, data, probe, judged, own, (*doubtful, *held), timed, diverged)
+
+
+def finished(current: Judged, data: Data, trial: Trial) -> Trial:
+    """A trial of which the refit ended early, fitted to the end; any other one as it is."""
+    if not trial.judged.fit.early:
+        return trial
+    known = trial.judged
+    judged, diverged = _judged(known.model, known.free, data, dict(known.bounds))
+    return _trial(current, data, trial.probe, judged, trial.parameters, trial.held, None, diverged)
+
+
+def _trial(
+    current: Judged,
+    data: Data,
+    probe: Probe,
+    judged: Judged,
+    own: tuple[str, ...],
+    held: tuple[Alias, ...],
+    timed: Timed | None,
+    diverged: str,
+) -> Trial:
+    """What a refit gains on all the data; of something late it counts what it gains in motion, if that was timed."""
     return Trial(
         probe,
         judged,
         own,
-        (*doubtful, *held),
+        held,
         gain(
             current.fit.residual,
             judged.fit.residual * shrinkage(data.training, current, judged),

@@ -154,7 +154,7 @@ def diagnose(
     timed = in_time(found.final, data)
     left = structure(found.final.model, data.training, data.unseen, timed.fitted, timed.unseen)
     rest, stopped = _until_stopped(
-        lambda: _rest(recalibrated, found, data) if found.accepted or not is_negligible(gap) else None, None
+        lambda: _rest(recalibrated, found, data, workers) if found.accepted or not is_negligible(gap) else None, None
     )
     word, summary, described = verdict(data, nominal, recalibrated, found, gap, left, rest)
     final, empirical, accepted = found.final, None, found.accepted
@@ -318,10 +318,10 @@ def _moved_far(model: Model, recalibrated: Judged) -> list[str]:
     return notes
 
 
-def _rest(recalibrated: Judged, found: Search, data: Data) -> Remainder:
+def _rest(recalibrated: Judged, found: Search, data: Data, workers: int | None) -> Remainder:
     """What is left; what an interrupted search accepted stands, for rounds that would have judged it were not to be."""
     start = found.final if found.interrupted or not found.accepted else recalibrated
-    return remainder(start, found.final, data, min(m.dt for m in data.training.motions))
+    return remainder(start, found.final, data, min(m.dt for m in data.training.motions), worker_count(workers))
 
 
 def _gaps(

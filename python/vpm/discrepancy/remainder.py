@@ -8,6 +8,7 @@ that leave much of what a mere fit finds were only the nearest of the catalogue.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,7 @@ from vpm.discrepancy.empirical import describe
 from vpm.discrepancy.refusal import WORTH_A_NAME, Thresholds
 from vpm.discrepancy.timing import in_time
 from vpm.identify import gain, segments
+from vpm.identify.parallel import in_order
 
 Array = NDArray[np.float64]
 
@@ -68,7 +70,7 @@ class Remainder:
         return first[0] if first and last.told.after >= CLEARLY * first[0].told.after else last
 
 
-def remainder(recalibrated: Judged, final: Judged, data: Data, interval: float) -> Remainder:
+def remainder(recalibrated: Judged, final: Judged, data: Data, interval: float, workers: int = 1) -> Remainder:
     """Describe what is left of a model, and of the one that it began with.
 
     Parameters
@@ -78,9 +80,11 @@ def remainder(recalibrated: Judged, final: Judged, data: Data, interval: float) 
     data : Data
     interval : float
         Sampling interval, s.
+    workers : int
+        Models that are described at a time; the result does not depend on it.
     """
     bases = [final] if recalibrated is final else [recalibrated, final]
-    choices = tuple(Described(base, *describe(base, data)) for base in bases)
+    choices = tuple(in_order([partial(_described, base, data) for base in bases], workers))
     view = _View(data, motion_band(data.training, final.model), Thresholds(DESCRIBED, interval))
     left = view(final)
     clear = [view.clearly_better(choice, left) for choice in choices]
@@ -93,6 +97,10 @@ def remainder(recalibrated: Judged, final: Judged, data: Data, interval: float) 
     instead = recalibrated is not final and clear[0] and plain and not choices[0].told.remark
     instead = instead and _power(view(choices[0].judged)) < HALF * _power(left)
     return Remainder(choices, repeats=True, open=float(share), instead=instead)
+
+
+def _described(base: Judged, data: Data) -> Described:
+    return Described(base, *describe(base, data))
 
 
 def _power(values: Array) -> float:

@@ -8,7 +8,7 @@ from functools import cached_property, partial
 
 from vpm.discrepancy.candidates import Candidate, Key, candidates, left_out
 from vpm.discrepancy.choice import Accepted, choose
-from vpm.discrepancy.confirmation import Data, Judged, Trial, confirm
+from vpm.discrepancy.confirmation import Data, Judged, Trial, confirm, finished
 from vpm.discrepancy.diagnosis import RankedCandidate
 from vpm.discrepancy.play import is_read_off, only_winds_up
 from vpm.discrepancy.refusal import (
@@ -20,7 +20,7 @@ from vpm.discrepancy.refusal import (
     worse_in_simulation,
 )
 from vpm.discrepancy.ringing import NOISE_ONLY, noise_alone, only_ringing
-from vpm.discrepancy.screening import Probe, prepare, probe
+from vpm.discrepancy.screening import Probe, prepare, probe, refit_effort, screening_effort
 from vpm.discrepancy.side_by_side import Failure, SideBySide
 from vpm.discrepancy.structure import structure
 from vpm.discrepancy.timing import InTime, in_time
@@ -108,7 +108,7 @@ class Round:
         listed = [c for c in found if c.key not in without and self._is_heavy(c) == heavy]
         self.tell(f"round {self.number}: screening {len(listed)} candidates")
         screen = partial(probe, prepare(current.baseline, data.training, listed), data.training)
-        results = self.each(f"round {self.number}: screening", screen, listed, lambda c: c.label)
+        results = self.each(f"round {self.number}: screening", screen, listed, lambda c: c.label, screening_effort)
         for candidate, result in zip(listed, results, strict=True):
             key = candidate.key
             if isinstance(result, Failure):
@@ -167,9 +167,9 @@ class Round:
 
     def _refit(self, short_list: Sequence[Probe]) -> None:
         """Refit with each of some candidates, and believe or refuse it."""
-        tried = len(self._ranking) * self.number
-        thresholds = Thresholds(tried, min(m.dt for m in self.data.training.motions))
-        trials = self.each(f"round {self.number}: refitting", self._confirmed, short_list, lambda p: p.candidate.label)
+        thresholds = self._thresholds()
+        what = f"round {self.number}: refitting"
+        trials = self.each(what, self._confirmed, short_list, lambda p: p.candidate.label, refit_effort)
         for tried_one, trial in zip(short_list, trials, strict=True):
             key = tried_one.candidate.key
             if isinstance(trial, Failure):
@@ -194,6 +194,11 @@ class Round:
         softer = confirm(self.current, self.data, soft)
         return trial if worse_in_simulation(softer) else softer
 
+    def _thresholds(self) -> Thresholds:
+        """What is asked of an effect when so many have been tried."""
+        tried = len(self._ranking) * self.number
+        return Thresholds(tried, min(m.dt for m in self.data.training.motions))
+
     @cached_property
     def timed(self) -> InTime:
         """Residuals of the model at hand with what the times of samples leave open."""
@@ -216,13 +221,21 @@ class Round:
         return refuse_timing(timed, self.timed.shift, thresholds)
 
     def best(self) -> Accepted | None:
-        """The one that comes in, if any is believed."""
-        if not self._believed:
-            return None
-        best = choose(self._believed, self.data)
-        for key, told in self._ranking.items():
-            self._ranking[key] = replace(told, accepted=key == best.key)
-        return best
+        """The one that comes in, if any is believed; fitted to the end it has to stand as it did before."""
+        while self._believed:
+            best = choose(self._believed, self.data)
+            whole = finished(self.current, self.data, best.trial)
+            if whole is best.trial:
+                for key, told in self._ranking.items():
+                    self._ranking[key] = replace(told, accepted=key == best.key)
+                return best
+            place = next(n for n, trial in enumerate(self._believed) if trial is best.trial)
+            if reason := self._refused(whole, self._thresholds()):
+                self.refused[best.key] = reason
+                del self._believed[place]
+            else:
+                self._believed[place] = whole
+        return None
 
     def ranked(self) -> list[RankedCandidate]:
         """Candidates of this round: what was accepted, what helped on unseen data, then by what screening promises."""

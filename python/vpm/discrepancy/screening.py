@@ -135,6 +135,18 @@ def probe(base: Baseline, data: InverseDynamicsProblem, candidate: Candidate, *,
     return best
 
 
+def screening_effort(candidate: Candidate) -> float:
+    """Guess of the time that `probe` takes, in starts that do nothing: a play is searched by its flights."""
+    searched = 50.0 if candidate.effect.name == "backlash" else 0.0
+    return searched + len(candidate.starts) * (1.0 if candidate.neutral else 2.0)
+
+
+def refit_effort(probe: Probe) -> float:
+    """Guess of the time that a refit takes: linear parameters are found in one step, shapes are not."""
+    own = (*probe.free, *probe.invisible)
+    return float(sum(probe.model.parameters[name].kind != "linear" for name in own))
+
+
 def impossible_values(probe: Probe) -> list[str]:
     """Parameters whose estimate lies outside the physical range by more than one standard deviation."""
     outside = []

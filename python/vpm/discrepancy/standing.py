@@ -14,7 +14,7 @@ import numpy as np
 
 from vpm.discrepancy.ambiguity import Rivals, as_good
 from vpm.discrepancy.choice import Accepted, alike
-from vpm.discrepancy.confirmation import Data, Judged, Trial, shrinkage
+from vpm.discrepancy.confirmation import Data, Judged, Trial, finished, shrinkage
 from vpm.discrepancy.diagnosis import RefusedEffect
 from vpm.discrepancy.elimination import Stage
 from vpm.discrepancy.refusal import LEAST_GAIN, NORMAL_95_ONE_SIDED, Thresholds, refuse_trial
@@ -42,10 +42,12 @@ def replaced(found: Search, known: Sequence[Rivals], data: Data) -> tuple[Search
         for trial in known[place].tried
         if (score := _preferred(found.final, entry, trial, data, thresholds)) > 0.0
     ]
-    if not winners:
-        return found, tuple(known)
-    _, place, trial = max(winners, key=lambda w: w[0])
-    return _exchanged(found, known, data, place, trial)
+    for _, place, trial in sorted(winners, key=lambda w: -w[0]):
+        without = known[place].without
+        whole = trial if without is None else finished(without, data, trial)
+        if _preferred(found.final, found.accepted[place], whole, data, thresholds) > 0.0:
+            return _exchanged(found, known, data, place, whole)
+    return found, tuple(known)
 
 
 def _preferred(final: Judged, entry: Accepted, trial: Trial, data: Data, thresholds: Thresholds) -> float:
@@ -90,7 +92,7 @@ def _exchanged(
         ranking=tuple(ranking),
     )
     outgoing = replace(entry.trial, judged=found.final)
-    tried = tuple(t for t in (*mine.tried, outgoing) if t is not trial)
+    tried = tuple(t for t in (*mine.tried, outgoing) if t.probe is not trial.probe)
     rest = tuple(t for t in tried if as_good(trial.judged, t, data))
     told = Rivals(*new.key, rest, tried, mine.without)
     return changed, tuple(told if n == place else one for n, one in enumerate(known))

@@ -192,16 +192,14 @@ def respond(
 
 def _filtered(answer: Response, keep: Filter) -> Response:
     """The same at the samples that are compared."""
-    sides = [keep(side) for side in (answer.required, answer.applied, answer.seen)]
-    required, applied, seen = (side.reshape(len(sides[0]), -1) for side in sides)
-    columns = answer.balance.shape[2]
-    if not columns:
-        empty = np.zeros((*required.shape, 0)), np.zeros((*seen.shape, 0))
-        return Response(required, applied, empty[0], seen, empty[1])
-    slopes = np.concatenate([answer.balance, answer.slopes], axis=1)
-    flat = keep(slopes.reshape(len(slopes), -1)).reshape(len(required), -1, columns)
-    joints = required.shape[1]
-    return Response(required, applied, flat[:, :joints], seen, flat[:, joints:])
+    parts = (answer.required, answer.applied, answer.seen, answer.balance, answer.slopes)
+    widths = [int(np.prod(part.shape[1:])) for part in parts]
+    # All side by side: each pass of the filter begins with the same solution of its equations at rest.
+    flat = [part.reshape(len(part), width) for part, width in zip(parts, widths, strict=True)]
+    kept = np.split(keep(np.concatenate(flat, axis=1)), np.cumsum(widths)[:-1], axis=1)
+    sides = [side.reshape(len(side), *part.shape[1:]) for side, part in zip(kept, parts, strict=True)]
+    required, applied, seen, balance, slopes = sides
+    return Response(required, applied, balance, seen, slopes)
 
 
 def _rigid(model: Model, theta: Array, m: Motion, columns: Sequence[int], channels: Sequence[str]) -> Response:

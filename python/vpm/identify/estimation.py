@@ -23,6 +23,8 @@ MOST_EVALUATIONS = 40
 #: A fit that lowers the sum of squares by less than this share in half of the evaluations that it has to show its worth
 #: hardly comes nearer.
 PROGRESS = 0.05
+#: The same for a fit that has shown its worth: towards a bound, steps shrink with the distance and never end.
+CREEPING = 0.002
 
 #: Called after every evaluation with (evaluations so far, root mean square of the weighted residual).
 Progress = Callable[[int, float], None]
@@ -30,7 +32,7 @@ Progress = Callable[[int, float], None]
 
 @dataclass(frozen=True)
 class Estimate:
-    """Result of one least-squares run, as arrays over the free parameters."""
+    """Result of one least-squares run, as arrays over the free parameters; ``early`` if `Worth` ended it."""
 
     names: tuple[str, ...]
     values: Array
@@ -41,6 +43,7 @@ class Estimate:
     at_bounds: tuple[str, ...]
     evaluations: int
     interrupted: bool = False
+    early: bool = False
 
     @property
     def std(self) -> Array:
@@ -93,7 +96,7 @@ def estimate(
     low, high = limits(model, free, bounds or {})
     counter = _Counter(model, data, columns, progress, worth)
     start = np.clip(model.theta[columns], low, high)
-    interrupted = False
+    interrupted = early = False
     try:
         if columns:
             start = _linear_step(counter, start, low, high)
@@ -107,6 +110,7 @@ def estimate(
             raise
         start, (residual, jacobian) = counter.best
         interrupted = isinstance(reason, KeyboardInterrupt)
+        early = not interrupted
     unseen = unseen_combinations(jacobian, free)
     covariance = _covariance(data, residual, jacobian, unseen, free)
     touching = tuple(
@@ -114,7 +118,9 @@ def estimate(
         for name, x, lo, hi in zip(free, start, low, high, strict=True)
         if np.isclose(x, lo, rtol=1e-6, atol=1e-12) or np.isclose(x, hi, rtol=1e-6, atol=1e-12)
     )
-    return Estimate(tuple(free), start, residual, jacobian, covariance, unseen, touching, counter.count, interrupted)
+    return Estimate(
+        tuple(free), start, residual, jacobian, covariance, unseen, touching, counter.count, interrupted, early
+    )
 
 
 @dataclass(frozen=True)
@@ -133,10 +139,15 @@ class Worth:
     evaluations: int
 
     def lost(self, reached: Sequence[float]) -> bool:
-        """Whether least sums of squares after each evaluation say that a fit is not, and will not be."""
-        if len(reached) < self.evaluations or reached[-1] <= self.cost:
+        """Whether least sums of squares after each evaluation say that a fit is not, and will not be.
+
+        One that is worth its time but creeps ends too: what is left to gain decides nothing, and who takes the result
+        fits it to the end.
+        """
+        if len(reached) < self.evaluations:
             return False
-        return reached[-1] > (1.0 - PROGRESS) * reached[-1 - self.evaluations // 2]
+        progress = CREEPING if reached[-1] <= self.cost else PROGRESS
+        return reached[-1] > (1.0 - progress) * reached[-1 - self.evaluations // 2]
 
 
 class _HopelessError(Exception):
