@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 
-from vpm.discrepancy.candidates import Candidate, candidates
+from vpm.discrepancy.candidates import Candidate, Key, candidates
 from vpm.discrepancy.choice import Accepted, alike
 from vpm.discrepancy.confirmation import Data, Judged, Trial, confirm, judge
 from vpm.discrepancy.diagnosis import Ambiguity
 from vpm.discrepancy.refusal import LEAST_GAIN
 from vpm.discrepancy.round import HEAVY
 from vpm.discrepancy.screening import Probe, impossible_values, probe, refit_effort, screening_effort
+from vpm.discrepancy.search import Tried
 from vpm.discrepancy.side_by_side import Failure, SideBySide
 from vpm.identify import gain, segments
 from vpm.identify.along import bends
@@ -71,64 +72,87 @@ def rivals(
     accepted: Sequence[Accepted],
     effects: Sequence[str] | None = None,
     each: SideBySide | None = None,
+    last: Tried | None = None,
 ) -> tuple[Rivals, ...]:
     """Replace each accepted effect in turn by every other that could do its work, and keep those that do it as well.
 
     All rivals are screened on the model without the effect; the few that take nearly as much from the training
-    residual are refitted, and have to predict the unseen records as the effect does.
+    residual are refitted, and have to predict the unseen records as the effect does. What the ``last`` effect competed
+    with when it came in is not worked out again.
     """
     each = each or SideBySide(1)
-    told = [entry.trial.probe.candidate.label for entry in accepted]
-    left = each("what each adds: refitting without", partial(_without, final, data), accepted, _label)
-    known = [None if isinstance(one, Failure) else one for one in left]
+    known = {last.key: last} if last is not None else {}
+    left = each("what each adds: refitting without", partial(_without, final, data, known), accepted, _label)
+    bases = [None if isinstance(one, Failure) else one for one in left]
     jobs = [
-        (place, candidate)
-        for place, (entry, without) in enumerate(zip(accepted, known, strict=True))
-        if without is not None
+        _Job(entry, without, candidate)
+        for entry, without in zip(accepted, bases, strict=True)
+        if without is not None and entry.key not in known
         for candidate in _others(without, data, entry, effects)
     ]
-
-    def screened(job: tuple[int, Candidate]) -> Probe | None:
-        base = known[job[0]]
-        return None if base is None else probe(base.baseline, data.training, job[1])
-
     probes = each(
         "what else would do: screening",
-        screened,
+        lambda job: probe(job.base.baseline, data.training, job.candidate),
         jobs,
-        lambda job: f"{job[1].label} for {told[job[0]]}",
-        lambda job: screening_effort(job[1]),
+        lambda job: job.label,
+        lambda job: screening_effort(job.candidate),
     )
-    short = []
-    for place, without in enumerate(known):
-        mine = [p for (owner, _), p in zip(jobs, probes, strict=True) if owner == place and isinstance(p, Probe)]
-        short += [(place, p) for p in _short_list(final, without, accepted[place], mine)]
-
-    def refitted(job: tuple[int, Probe]) -> Trial | None:
-        base = known[job[0]]
-        return None if base is None else confirm(base, data, job[1])
-
+    seen = [(job.entry, p) for job, p in zip(jobs, probes, strict=True) if isinstance(p, Probe)]
+    if last is not None:
+        seen += [(e, p) for e in accepted if e.key == last.key for p in _beside(last, e)]
+    refits, tried = [], list[tuple[Accepted, Trial]]()
+    for entry, without in zip(accepted, bases, strict=True):
+        done = {t.probe.candidate.key: t for t in known[entry.key].trials} if entry.key in known else {}
+        for p in _short_list(final, without, entry, [p for owner, p in seen if owner is entry]):
+            if p.candidate.key in done:
+                tried.append((entry, done[p.candidate.key]))
+            elif without is not None:
+                refits.append((_Job(entry, without, p.candidate), p))
     trials = each(
         "what else would do: refitting",
-        refitted,
-        short,
-        lambda job: f"{job[1].candidate.label} for {told[job[0]]}",
+        lambda job: confirm(job[0].base, data, job[1]),
+        refits,
+        lambda job: job[0].label,
         lambda job: refit_effort(job[1]),
     )
+    tried += [(job.entry, t) for (job, _), t in zip(refits, trials, strict=True) if isinstance(t, Trial)]
     found = []
-    for place, (entry, without) in enumerate(zip(accepted, known, strict=True)):
-        own = [t for (owner, _), t in zip(short, trials, strict=True) if owner == place]
-        tried = tuple(t for t in own if isinstance(t, Trial))
-        found.append(Rivals(*entry.key, tuple(t for t in tried if as_good(final, t, data)), tried, without))
+    for entry, without in zip(accepted, bases, strict=True):
+        mine = tuple(t for owner, t in tried if owner is entry)
+        found.append(Rivals(*entry.key, tuple(t for t in mine if as_good(final, t, data)), mine, without))
     return tuple(found)
+
+
+@dataclass(frozen=True)
+class _Job:
+    """A candidate for the place of an accepted effect, and the model without that."""
+
+    entry: Accepted
+    base: Judged
+    candidate: Candidate
+
+    @property
+    def label(self) -> str:
+        """What is told of it."""
+        return f"{self.candidate.label} for {_label(self.entry)}"
 
 
 def _label(entry: Accepted) -> str:
     return entry.trial.probe.candidate.label
 
 
-def _without(final: Judged, data: Data, entry: Accepted) -> Judged:
+def _beside(last: Tried, entry: Accepted) -> list[Probe]:
+    """What was screened when an effect came in, of that which could do its work."""
+    near = [p for p in last.probes if _near(p.candidate, entry)]
+    if bends(last.without.model) and last.key[0] not in HEAVY:
+        near = [p for p in near if p.candidate.effect.name not in HEAVY]
+    return near
+
+
+def _without(final: Judged, data: Data, known: Mapping[Key, Tried], entry: Accepted) -> Judged:
     """The model without an effect, all that is left fitted again."""
+    if entry.key in known:
+        return known[entry.key].without
     model = final.model.without_effect(*entry.key)
     free = tuple(n for n in final.free if n in model.parameters)
     return judge(model, free, data, {n: pair for n, pair in final.bounds.items() if n in free})

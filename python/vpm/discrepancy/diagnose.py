@@ -200,7 +200,7 @@ def _settled(
     found: Search, data: Data, effects: Sequence[str] | None, each: SideBySide
 ) -> tuple[Search, tuple[Rivals, ...]]:
     """Names and their order when each effect has been taken out again, with what would do in its place."""
-    known = rivals(found.final, data, found.accepted, effects, each)
+    known = rivals(found.final, data, found.accepted, effects, each, found.last)
     changed, known = replaced(found, known, data)
     if changed is not found and len(changed.accepted) > 1:
         known = rivals(changed.final, data, changed.accepted, effects, each)

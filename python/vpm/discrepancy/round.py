@@ -52,6 +52,8 @@ class Round:
         self._ranking: dict[Key, RankedCandidate] = {}
         self._promising: list[Probe] = []
         self._believed: list[Trial] = []
+        self.probes: list[Probe] = []
+        self.trials: list[Trial] = []
 
     def done(self) -> bool:
         """Whether what is left is noise alone, as far as links that bend make it ring."""
@@ -116,6 +118,7 @@ class Round:
                 self.refused[key] = result.reason
                 continue
             self._ranking[key] = RankedCandidate(*key, self.number, result.drop, float("nan"), accepted=False)
+            self.probes.append(result)
             if reason := refuse_probe(result):
                 self.refused[key] = reason
             else:
@@ -176,6 +179,7 @@ class Round:
                 self.refused[key] = trial.reason
                 continue
             self._ranking[key] = replace(self._ranking[key], unseen=trial.unseen.relative)
+            self.trials.append(trial)
             if reason := self._refused(trial, thresholds):
                 self.refused[key] = reason
             else:

@@ -7,23 +7,48 @@ from dataclasses import dataclass, replace
 
 from vpm.discrepancy.candidates import Key
 from vpm.discrepancy.choice import Accepted
-from vpm.discrepancy.confirmation import Data, Judged
+from vpm.discrepancy.confirmation import Data, Judged, Trial
 from vpm.discrepancy.diagnosis import Ambiguity, RankedCandidate, RefusedEffect
 from vpm.discrepancy.elimination import Stage, drop_replaced, drop_springs, settled, without_tight_bounds
 from vpm.discrepancy.round import Round, Tell
+from vpm.discrepancy.screening import Probe
 from vpm.discrepancy.side_by_side import SideBySide
 from vpm.identify.tangent import has_tangent
 
 
 @dataclass(frozen=True)
+class Tried:
+    """What was tried in the place of one effect before it came in: of the last one, all that may do its work.
+
+    Attributes
+    ----------
+    key : Key
+        The effect.
+    without : Judged
+        The model without it, everything else fitted.
+    probes : tuple of Probe
+    trials : tuple of Trial
+    """
+
+    key: Key
+    without: Judged
+    probes: tuple[Probe, ...]
+    trials: tuple[Trial, ...]
+
+
+@dataclass(frozen=True)
 class Search:
-    """Outcome of the whole search, or of what was done of it when Ctrl-C was pressed."""
+    """Outcome of the whole search, or of what was done of it when Ctrl-C was pressed.
+
+    ``last`` is given if nothing has changed since the last effect came in.
+    """
 
     stages: tuple[Stage, ...]
     accepted: tuple[Accepted, ...]
     refused: tuple[RefusedEffect, ...]
     ranking: tuple[RankedCandidate, ...]
     interrupted: bool = False
+    last: Tried | None = None
 
     @property
     def final(self) -> Judged:
@@ -40,6 +65,7 @@ def search(
     ranking: list[RankedCandidate] = []
     dropped: dict[Key, str] = {}
     refused: dict[Key, str] = {}
+    last: Tried | None = None
     interrupted = start.fit.interrupted
     for number in range(1, 0 if interrupted else 2 * limit + 2):
         outcome = Round(stages[-1].judged, data, number, tell, each)
@@ -57,6 +83,7 @@ def search(
             break
         if has_tangent(best.trial.judged.model, data.training):
             best = settled(best, data)
+        last = Tried(best.key, outcome.current, tuple(outcome.probes), tuple(outcome.trials))
         accepted.append(best)
         stages.append(Stage("added", *best.key, best.trial.judged))
         tell(f"round {number}: accepted {best.trial.probe.candidate.label}")
@@ -70,9 +97,11 @@ def search(
             interrupted = True
             break
     if not interrupted:
-        stages[-1] = replace(stages[-1], judged=without_tight_bounds(stages[-1].judged, data))
+        loosened = replace(stages[-1], judged=without_tight_bounds(stages[-1].judged, data))
+        last = last if loosened.judged is stages[-1].judged and not dropped else None
+        stages[-1] = loosened
     listed = _listed({**dropped, **refused})
-    return Search(tuple(stages), tuple(accepted), listed, tuple(ranking), interrupted)
+    return Search(tuple(stages), tuple(accepted), listed, tuple(ranking), interrupted, last)
 
 
 def _listed(refused: dict[Key, str]) -> tuple[RefusedEffect, ...]:
