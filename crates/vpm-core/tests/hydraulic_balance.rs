@@ -73,7 +73,7 @@ fn a_spool_rings_as_its_closed_form_and_stops_at_its_stroke() -> vpm_core::Resul
         let times = (1..=500).map(|k| 1e-5 * f64::from(k)).collect();
         Ok((times, places))
     };
-    let (w, d) = (servo.valve.frequency.unwrap(), servo.valve.damping.unwrap());
+    let (w, d) = (servo.valve.frequency.unwrap_or_default(), servo.valve.damping.unwrap_or_default());
     let damped = w * (1.0 - d * d).sqrt();
     let (times, places) = run(4e-3)?;
     for (t, z) in times.into_iter().zip(places) {

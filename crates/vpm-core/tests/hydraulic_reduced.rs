@@ -42,7 +42,7 @@ fn moved(machine: &Machine, place: f64, currents: &[f64]) -> [Vec<f64>; 4] {
     let bench = Bench::new(machine, STEP, 4, Method::Rosenbrock);
     let q = [MIDDLE + place];
     let mut start = vec![q[0], 0.0];
-    start.extend(vpm_core::evaluate::internal_state(&bench.description, &machine.values, &q).unwrap());
+    start.extend(vpm_core::evaluate::internal_state(&bench.description, &machine.values, &q).unwrap_or_default());
     let (run, layout) = (bench.free(&start, currents), bench.description.layout());
     let width = bench.description.n_outputs();
     let column = |at: usize| run.outputs.chunks_exact(width).map(|row| row[at]).collect::<Vec<_>>();

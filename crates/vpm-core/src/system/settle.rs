@@ -97,7 +97,7 @@ impl<S: Scalar> Dynamics<S> {
                         "spool_rate" => rate,
                         _ => PRESSURE,
                     };
-                    law.states().iter().map(|state| size(state)).for_each(&mut next);
+                    law.states().iter().map(size).for_each(&mut next);
                 }
             }
         }

@@ -97,7 +97,7 @@ impl Ode<f64> for Chirped {
         }
     }
     fn scales(&self, scales: &mut [f64]) {
-        let (spool, frequency) = (self.servo.valve.stroke, self.servo.valve.frequency.unwrap());
+        let (spool, frequency) = (self.servo.valve.stroke, self.servo.valve.frequency.unwrap_or_default());
         scales.copy_from_slice(&[1e-2, spool, 1.0, spool * frequency, 1e5, 1e5, 1.0]);
     }
 }
