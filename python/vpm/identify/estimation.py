@@ -139,15 +139,16 @@ class Worth:
     evaluations: int
 
     def lost(self, reached: Sequence[float]) -> bool:
-        """Whether least sums of squares after each evaluation say that a fit is not, and will not be.
+        """Whether least sums of squares after each evaluation say that a fit is not, and will not be."""
+        return reached[-1] > self.cost and self._hardly_nearer(reached, PROGRESS)
 
-        One that is worth its time but creeps ends too: what is left to gain decides nothing, and who takes the result
-        fits it to the end.
-        """
-        if len(reached) < self.evaluations:
-            return False
-        progress = CREEPING if reached[-1] <= self.cost else PROGRESS
-        return reached[-1] > (1.0 - progress) * reached[-1 - self.evaluations // 2]
+    def creeps(self, reached: Sequence[float]) -> bool:
+        """Whether they say that what is left to gain decides nothing; who takes the result fits it to the end."""
+        return self._hardly_nearer(reached, CREEPING)
+
+    def _hardly_nearer(self, reached: Sequence[float], progress: float) -> bool:
+        late = len(reached) >= self.evaluations
+        return late and reached[-1] > (1.0 - progress) * reached[-1 - self.evaluations // 2]
 
 
 class _HopelessError(Exception):
@@ -215,7 +216,7 @@ class _Counter:
         self._reached.append(min([float(residual @ residual), *self._reached[-1:]]))
         if self.progress is not None:
             self.progress(self.count, float(np.sqrt(np.mean(residual**2))))
-        if self.worth is not None and self.worth.lost(self._reached):
+        if self.worth is not None and (self.worth.lost(self._reached) or self.worth.creeps(self._reached)):
             raise _HopelessError
 
     def _evaluate(self, x: Array, columns: list[int]) -> tuple[Array, Array]:
