@@ -20,6 +20,8 @@ mod connections;
 #[path = "../crates/vpm-core/tests/common/flexible.rs"]
 mod trees;
 use connections::{bushing, chain, contact, load_cell};
+#[path = "common/share.rs"]
+mod share;
 
 /// A slider along z, then hip and knee about y.
 fn leg(change: impl FnOnce(&mut Value)) -> Result<Description> {
@@ -76,6 +78,10 @@ fn main() -> Result<()> {
                 integrator.step(&mut system, black_box(&mut x), 1e-4);
                 x
             });
+        });
+        share::print(&format!("leg, {name}"), 1e-4, || {
+            let mut x = state;
+            integrator.step(&mut system, black_box(&mut x), 1e-4);
         });
     }
     Ok(())

@@ -11,6 +11,8 @@ use vpm_core::error::Error;
 #[path = "../crates/vpm-core/tests/common/flexible_arm.rs"]
 mod flexible_arm;
 use flexible_arm::{Case, Errors, arm};
+#[path = "common/share.rs"]
+mod share;
 
 /// Length of the motion in s.
 const MOTION: f64 = 24.0;
@@ -48,7 +50,17 @@ fn main() -> Result<()> {
     criterion.bench_function("flexible_arm/24s_four_coordinates_fourth_order_10ms", |bencher| bencher.iter(&mut high));
     criterion.final_summary();
     report("2 ms, second order", &mut usual, &case.run::<5, 10>(Order::Second, 5, 2e-3)?);
+    period::<5, 10>("four coordinates", &case)?;
+    period::<4, 8>("three coordinates", &case)?;
     report("10 ms, fourth order", &mut high, &case.run::<5, 10>(Order::Fourth, 5, 1e-2)?);
+    Ok(())
+}
+
+/// Prints what a step of 1 ms takes of a control period, at a motion that goes on.
+fn period<const EACH: usize, const ALL: usize>(name: &str, case: &Case) -> Result<()> {
+    let (mut arm, reference) = (arm::<EACH, ALL>(Order::Second, 5, share::PERIOD)?, case.reference());
+    let mut state = State::default();
+    share::print(&format!("planar arm, {name} per link"), share::PERIOD, || arm.step(black_box(&mut state), reference));
     Ok(())
 }
 

@@ -9,6 +9,8 @@ use vpm_core::error::Result;
 use vpm_core::integrator::{Integrator, Method};
 use vpm_core::ode::Ode;
 
+#[path = "common/share.rs"]
+mod share;
 #[path = "../crates/vpm-core/tests/common/two_link.rs"]
 mod two_link;
 
@@ -35,6 +37,10 @@ fn main() -> Result<()> {
                     integrator.step(&mut system, black_box(&mut x), 1e-4);
                     x
                 });
+            });
+            share::print(&format!("two-link arm, {name}, {}", method.name()), 1e-4, || {
+                let mut x = start.clone();
+                integrator.step(&mut system, black_box(&mut x), 1e-4);
             });
         }
     }

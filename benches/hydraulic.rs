@@ -19,6 +19,8 @@ use vpm_core::ode::Ode;
 #[path = "../crates/vpm-core/tests/common/hydraulics.rs"]
 mod hydraulics;
 use hydraulics::{Chirp, Chirped, nominal};
+#[path = "common/share.rs"]
+mod share;
 
 /// How often the motions are compared.
 const ROWS: usize = 100;
@@ -118,6 +120,11 @@ fn cost<O: Ode<f64>>(
             integrator.step(&mut ode, black_box(&mut x), 1e-3);
             time += 0.05;
         });
+    });
+    share::print(&format!("hydraulic {name}"), share::PERIOD, || {
+        hold(&mut ode, 1e-3 * time.sin());
+        integrator.step(&mut ode, black_box(&mut x), share::PERIOD);
+        time += 0.05;
     });
 }
 

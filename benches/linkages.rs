@@ -8,6 +8,9 @@ use vpm_core::linkage::Newton;
 use vpm_core::linkage::karl::{Karl, KarlGeometry};
 use vpm_core::linkage::leg::{HyqData, Leg, LegParameters};
 
+#[path = "common/share.rs"]
+mod share;
+
 fn leg(criterion: &mut Criterion) -> Result<()> {
     let leg = Leg::new(LegParameters::hyq(HyqData::Cad, 0.341))?;
     let (q, v, a) = ([0.35, -1.4], [2.0, -3.0], [4.0, -5.0]);
@@ -17,6 +20,10 @@ fn leg(criterion: &mut Criterion) -> Result<()> {
     group.bench_function("leg_newton_euler", |bench| bench.iter(|| leg.newton_euler(black_box(q), v, black_box(a))));
     group.bench_function("leg_forward", |bench| bench.iter(|| leg.acceleration(black_box(q), black_box(v), a)));
     group.finish();
+    // What a semi-implicit step of the closed leg is made of: one evaluation of its accelerations.
+    share::print("closed leg, accelerations", share::PERIOD, || {
+        let _ = black_box(leg.acceleration(black_box(q), black_box(v), a));
+    });
     Ok(())
 }
 

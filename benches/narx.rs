@@ -17,6 +17,9 @@ use vpm_core::narx::{
 use vpm_core::samples::Random;
 use vpm_core::simulate::Stepping;
 
+#[path = "common/share.rs"]
+mod share;
+
 /// Samples per call, so that the clock does not count.
 const SAMPLES: usize = 1000;
 
@@ -35,6 +38,10 @@ fn model_steps(criterion: &mut Criterion, inputs: &[f64]) -> Result<()> {
     let mut stepper = model.stepper();
     criterion.bench_function("narx/20_terms/1000_steps", |b| {
         b.iter(|| inputs.iter().map(|&u| stepper.step(black_box(&[u]))).sum::<f64>());
+    });
+    let mut along = inputs.iter().copied().cycle();
+    share::print("NARX model of 20 terms", share::PERIOD, || {
+        black_box(stepper.step(black_box(&[along.next().unwrap_or(0.0)])));
     });
     let start = vec![0.0; SAMPLES];
     let record = Record { name: "noise", output: &start, inputs };
@@ -62,6 +69,11 @@ fn maxwell_steps(criterion: &mut Criterion, inputs: &[f64]) -> Result<()> {
         b.iter(|| {
             inputs.iter().map(|&u| element.step(&mut state, black_box(u), black_box(0.3 + 0.01 * u))).sum::<f64>()
         });
+    });
+    let mut along = inputs.iter().copied().cycle();
+    share::print("Maxwell NARX element", share::PERIOD, || {
+        let u = along.next().unwrap_or(0.0);
+        black_box(element.step(&mut state, black_box(u), black_box(0.3 + 0.01 * u)));
     });
     Ok(())
 }
@@ -99,6 +111,10 @@ fn machine_steps(criterion: &mut Criterion) -> Result<()> {
                     sign = -sign;
                     live.step(black_box(&[sign])).map(<[f64]>::len)
                 });
+            });
+            share::print(&format!("carriage, {name}, {}", method.name()), 1e-4, || {
+                sign = -sign;
+                let _ = black_box(live.step(black_box(&[sign])).map(<[f64]>::len));
             });
         }
     }

@@ -55,7 +55,7 @@ def test_the_chosen_model_keeps_both_strains_on_a_motion_that_the_fit_did_not_se
     full: vpm.Model, ladder: Ladder
 ) -> None:
     chosen = ladder.chosen
-    assert len(chosen.removed) == 2
+    assert {change.split()[0] for change in chosen.removed} >= {"strip_1", "strip_2"}
     assert chosen.states < ladder.full.states / 2
     assert chosen.seconds < ladder.full.seconds / 4
     unseen = record(full, "fast_slow")
@@ -68,7 +68,8 @@ def test_the_chosen_model_keeps_both_strains_on_a_motion_that_the_fit_did_not_se
 
 
 def test_the_coarsest_come_first_and_what_is_dear_is_not_fitted(ladder: Ladder, told: list[str]) -> None:
-    assert told[1:3] == ["the full model", "strip_1 as rigid, strip_2 as rigid"]
+    assert told[1].startswith("velocity terms take")
+    assert told[2:4] == ["the full model", "strip_1 as rigid, strip_2 as rigid"]
     assert ladder.cut > 0
     # Four-stage steps of a model that is as good as the full one take several times as long as its linear ones.
     stepped = {

@@ -40,6 +40,9 @@ use crate::system::{Build, Dynamics, System};
 pub struct Description {
     /// Gravity in the world frame, m/s^2.
     pub gravity: [f64; 3],
+    /// Whether products of rates are left out of the dynamics: Coriolis, centrifugal and gyroscopic terms.
+    #[serde(default)]
+    pub drop_velocity_terms: bool,
     /// Value of each parameter.
     pub parameters: Vec<f64>,
     /// Dotted name of each parameter, for messages.
@@ -225,6 +228,7 @@ impl Description {
             markers: self.markers.clone(),
             gauges: self.gauges.clone(),
             attachments: self.attachments(),
+            drop_velocity_terms: self.drop_velocity_terms,
         };
         for effect in &self.effects {
             if let EffectEntry::Tree(law) = effect {

@@ -37,6 +37,7 @@ pub struct Model<S> {
     n_coordinates: usize,
     n_frames: usize,
     recursive: bool,
+    drops_velocity_terms: bool,
 }
 
 /// A node of the tree, which comes after all that it hangs on.
@@ -148,6 +149,12 @@ impl<S: Scalar> Model<S> {
     #[inline]
     pub fn is_recursive(&self) -> bool {
         self.recursive
+    }
+
+    /// Whether products of rates count: Coriolis, centrifugal and gyroscopic terms. Without them `h(q, v) = h(q, 0)`.
+    #[inline]
+    pub fn keeps_velocity_terms(&self) -> bool {
+        !self.drops_velocity_terms
     }
 
     /// Gravity in m/s^2, in the world frame.

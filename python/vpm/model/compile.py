@@ -62,6 +62,8 @@ def description(checked: Checked) -> str:
         "bushings": [bushing_json(name, entry, structure, index) for name, entry in document.bushings.items()],
         "load_cells": [cell_json(name, entry, structure) for name, entry in document.load_cells.items()],
     }
+    if not document.velocity_terms:
+        content["drop_velocity_terms"] = True
     return json.dumps(_unsigned(content), allow_nan=False)
 
 

@@ -121,6 +121,7 @@ class Document(Entry):
 
     name: Text
     gravity: Vector
+    velocity_terms: Annotated[bool, Field(strict=True)] = True
     bodies: dict[str, Body] = Field(default_factory=dict)
     joints: dict[str, Joint] = Field(default_factory=dict)
     beams: dict[str, Beam] = Field(default_factory=dict)

@@ -1,4 +1,4 @@
-"""What of a model can be made simpler: effects left out, links coarser, deformations held rigid, drives with less oil.
+"""What of a model can be made simpler: effects and velocity terms left out, links coarser, drives with less oil.
 
 Each place of a model where something can be simpler is a *site* with a list of *changes* that exclude each other; a
 reduced model takes one change, or none, at each site.
@@ -40,13 +40,14 @@ class Reduction(Storable):
 
     Attributes
     ----------
-    kind : {"effect", "level", "component", "drive"}
+    kind : {"effect", "level", "component", "drive", "terms"}
         An effect that is left out, a coarser level of a flexible link, a deformation of a link that is held rigid, a
-        hydraulic drive with fewer states.
+        hydraulic drive with fewer states, terms of the equations of motion that are left out.
     name : str
-        Effect, level, component or change of a drive, see `vpm.simplify.hydraulics`.
+        Effect, level, component, change of a drive, see `vpm.simplify.hydraulics`, or ``"velocity"``: products of
+        rates.
     at : str
-        Site of the effect, flexible link, or drive.
+        Site of the effect, flexible link, drive, or ``"the machine"``.
     """
 
     kind: str
@@ -61,6 +62,8 @@ class Reduction(Storable):
                 return f"{self.at} rigid in {self.name}"
             case "drive":
                 return f"{self.at} with {self.name}"
+            case "terms":
+                return f"{self.at} without {self.name} terms"
         return f"{self.name} at {self.at}"
 
     @property
@@ -88,10 +91,16 @@ class Reduction(Storable):
                 return model.at({self.at: self.name})
             case "drive":
                 return simpler(model, self.at, self.name)
+            case "terms":
+                return without_velocity_terms(model)
         content = model.to_dict()
         beam = content["beams"][self.at]
         beam["deforms"] = [component for component in deforms_of(beam) if component != self.name]
         return type(model)(content)
+
+
+#: Products of rates left out of the whole machine.
+VELOCITY_TERMS = Reduction("terms", "velocity", "the machine")
 
 
 def reductions(model: Model, learnt: Sequence[Reduction] = ()) -> dict[tuple[str, str], tuple[Reduction, ...]]:
@@ -150,6 +159,18 @@ def _imaginable(model: Model) -> Iterator[Reduction]:
     for drive in hydraulic_drives(model):
         for change in possible_changes(model, drive):
             yield Reduction("drive", change, drive)
+    if model.to_dict().get("velocity_terms", True):
+        yield VELOCITY_TERMS
+
+
+def without_velocity_terms(model: Model) -> Model:
+    """Model without products of rates: Coriolis, centrifugal and gyroscopic terms.
+
+    Parameters
+    ----------
+    model : Model
+    """
+    return type(model)({**model.to_dict(), "velocity_terms": False})
 
 
 def _beams(model: Model) -> Mapping[str, Any]:

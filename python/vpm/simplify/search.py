@@ -16,13 +16,16 @@ from vpm.budget import budget
 from vpm.errors import SimulationError
 from vpm.experiment import Experiment, as_records
 from vpm.model import Model
-from vpm.simplify.judge import Judge, by_the_model, reference_mode, shown
+from vpm.simplify.judge import FITTING, Judge, by_the_model, reference_mode, shown
 from vpm.simplify.ladder import Ladder, Rung, pareto
-from vpm.simplify.reductions import OFFERED, Reduction, reduced, reductions
+from vpm.simplify.reductions import OFFERED, VELOCITY_TERMS, Reduction, reduced, reductions
+from vpm.simplify.shares import velocity_share
 from vpm.simplify.surrogates import surrogates
 from vpm.simplify.trials import NEGLIGIBLE, PRIORITY, Changes, Trials
 from vpm.simulate import Setup
 
+#: Share of the efforts, in tolerances, from which on no model is tried without its velocity terms.
+WEIGHTY = 5.0
 #: Combinations that are foreseen, and of those the ones that are tried.
 FORESEEN, TRIED = 100_000, 8
 #: Times of steps of less than a microsecond differ by so much for no reason on a machine that does other things too.
@@ -105,6 +108,7 @@ def simplify(
     trials = Trials(model, judge, lambda changes: bool(changes) or against == "data", say, tolerance)
     sites = reductions(model, surrogates(model, judge.records, mode, rate))
     try:
+        _weigh_velocity_terms(trials, sites)
         _descend(trials, sites)
     except KeyboardInterrupt:
         if not trials.rungs:
@@ -126,6 +130,20 @@ def _descend(trials: Trials, sites: Sites) -> None:
     for changes in _foreseen(trials, base, singles, limit):
         trials.attempt(changes, _within(trials.rungs, limit).seconds)
     _polish(trials, sites, limit)
+
+
+def _weigh_velocity_terms(trials: Trials, sites: Sites) -> None:
+    """Products of rates that are too much of the efforts along the motion stay in without a trial."""
+    judge = trials.judge
+    if VELOCITY_TERMS.site not in sites or judge.mode not in ("free_run", "closed_loop"):
+        return
+    try:
+        share = velocity_share(trials.model, judge.unseen, judge.mode, Setup(FITTING, judge.per_sample))
+    except SimulationError:
+        return
+    trials.say(f"velocity terms take {100 * share:.2g} % of the efforts")
+    if share > WEIGHTY * trials.tolerance:
+        del sites[VELOCITY_TERMS.site]
 
 
 def _together(trials: Trials, sites: Sites, limit: float) -> Changes:

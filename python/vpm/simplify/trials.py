@@ -61,7 +61,7 @@ class Trials:
         tolerance: float,
     ) -> None:
         self.model, self.judge, self.tolerance = model, judge, tolerance
-        self._refit, self._tell = refit, tell
+        self._refit, self.say = refit, tell
         #: Along what models are timed.
         self.courses = Courses(model, judge)
         #: Why the last way that did not work did not.
@@ -114,7 +114,7 @@ class Trials:
                 if changes and min(glances.values(), default=0.0) > min(below, self._dear()):
                     self._cut.add(key)
                     return []
-                self._tell(", ".join(map(str, changes)) or "the full model")
+                self.say(", ".join(map(str, changes)) or "the full model")
                 self._models[key] = self.judge.fitted(model) if self._refit(changes) else model
                 self._rungs[key] = []
                 self._step(changes, glances)

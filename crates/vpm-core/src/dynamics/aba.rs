@@ -46,17 +46,22 @@ pub(super) fn singular_joint<S: Scalar>(
 }
 
 fn velocities<S: Scalar>(model: &Model<S>, data: &mut Data<S>, q: &[S], v: &[S]) {
-    let slots = &mut data.aba;
+    let (slots, keeps) = (&mut data.aba, model.keeps_velocity_terms());
     slots[0].velocity = Twist::zero();
     for (k, ((link, &q), &v)) in model.links().iter().zip(q).zip(v).enumerate() {
         let (before, rest) = slots.split_at_mut(k + 1);
         let (parent, slot) = (&before[link.parent], &mut rest[0]);
         slot.pose = link.pose(q);
+        slot.inertia = link.inertia.into();
+        if !keeps {
+            // All that this algorithm asks of velocities are their products.
+            (slot.bias_acceleration, slot.bias_wrench) = (Twist::zero(), Wrench::zero());
+            continue;
+        }
         slot.velocity = slot.pose.inverse_twist(parent.velocity);
         link.kind.add_rate(&mut slot.velocity, v);
         slot.bias_acceleration = link.kind.rate_cross(&slot.velocity, v);
         slot.bias_wrench = slot.velocity.cross_wrench(link.inertia.apply(slot.velocity));
-        slot.inertia = link.inertia.into();
     }
 }
 

@@ -22,10 +22,7 @@ pub fn terms<S: Scalar>(model: &Model<S>, data: &mut Data<S>, q: &[S], v: &[S]) 
     let Data { composite, mass_matrix, .. } = data;
     mass_matrix.fill(S::zero());
     composite.bias.fill(S::zero());
-    for slot in composite.frames.iter_mut().skip(1) {
-        let momentum = slot.inertia.apply(slot.velocity);
-        slot.wrench = slot.inertia.apply(slot.acceleration) + slot.velocity.cross_wrench(momentum);
-    }
+    weigh_frames(model, &mut composite.frames);
     for node in model.order().iter().rev() {
         match node {
             Node::Body(number, beyond) => body(&model.links()[*number], *number, beyond, composite, mass_matrix),
@@ -38,6 +35,17 @@ pub fn terms<S: Scalar>(model: &Model<S>, data: &mut Data<S>, q: &[S], v: &[S]) 
         massive_lines(model, data);
     }
     mirror(&mut data.mass_matrix, model.n_coordinates());
+}
+
+/// The wrench on each frame that its own inertia needs in the motion of [`super::frames()`].
+pub(super) fn weigh_frames<S: Scalar>(model: &Model<S>, frames: &mut [FrameSlot<S>]) {
+    let keeps = model.keeps_velocity_terms();
+    for slot in frames.iter_mut().skip(1) {
+        slot.wrench = slot.inertia.apply(slot.acceleration);
+        if keeps {
+            slot.wrench += slot.velocity.cross_wrench(slot.inertia.apply(slot.velocity));
+        }
+    }
 }
 
 /// A joint: its own entries of the mass matrix, and everything it carries one frame further in.
@@ -118,7 +126,7 @@ fn entry<S>(mass: &mut [S], n: usize, i: usize, j: usize) -> &mut S {
 /// `bias += m J^T a + I J_u^T u''` at zero coordinate accelerations. Source: D'Imperio 2016, eqs 2.85 to 2.95, in space.
 fn massive_lines<S: Scalar>(model: &Model<S>, data: &mut Data<S>) {
     let Data { composite: Composite { lines, bias, .. }, mass_matrix: mass, .. } = data;
-    let n = bias.len();
+    let (n, keeps) = (bias.len(), model.keeps_velocity_terms());
     for (Wire { barrel, rod, .. }, slot) in model.lines().iter().zip(lines) {
         if barrel.is_none() && rod.is_none() {
             continue;
@@ -129,7 +137,8 @@ fn massive_lines<S: Scalar>(model: &Model<S>, data: &mut Data<S>) {
         let (rate, change) = (to.velocity - from.velocity, to.acceleration - from.acceleration);
         let (stretch, spin) = (u.dot(rate), turn(rate));
         // u'' from d^2/dt^2 (s u), s the length.
-        let swing = turn(change) - spin * (stretch * shrink * 2.0) - *u * spin.dot(spin);
+        let swing = turn(change);
+        let swing = if keeps { swing - spin * (stretch * shrink * 2.0) - *u * spin.dot(spin) } else { swing };
         for (turned, (&to, &from)) in turns.iter_mut().zip(to.columns.iter().zip(&from.columns)) {
             *turned = turn(to - from);
         }

@@ -10,10 +10,11 @@ use crate::spatial::{Pose, Twist, Vector3};
 ///
 /// Law: `V_F = X^-1 V_P + V_PF`, `A_F = X^-1 A_P + V_F x V_PF + dV_PF/dt` with V_PF the twist of F relative to P in the axes of F
 /// (Featherstone 2008, section 5.3; a station of a beam is a joint of as many coordinates). Gravity is an upward acceleration of the
-/// world.
+/// world. Where the model drops its velocity terms, `A_F = X^-1 A_P`.
 pub fn frames<S: Scalar>(model: &Model<S>, data: &mut Data<S>, q: &[S], v: &[S]) {
     debug_assert!(q.len() == model.n_coordinates() && v.len() == model.n_coordinates());
     let Composite { frames, sections, .. } = &mut data.composite;
+    let keeps = model.keeps_velocity_terms();
     frames[0].acceleration = Twist::new(Vector3::zero(), -model.gravity());
     for node in model.order() {
         match node {
@@ -25,8 +26,10 @@ pub fn frames<S: Scalar>(model: &Model<S>, data: &mut Data<S>, q: &[S], v: &[S])
                 slot.across = link.pose(q[*number]);
                 slot.velocity = slot.across.inverse_twist(velocity);
                 link.kind.add_rate(&mut slot.velocity, v[*number]);
-                let across = link.kind.rate_cross(&slot.velocity, v[*number]);
-                slot.acceleration = slot.across.inverse_twist(acceleration) + across;
+                slot.acceleration = slot.across.inverse_twist(acceleration);
+                if keeps {
+                    slot.acceleration += link.kind.rate_cross(&slot.velocity, v[*number]);
+                }
                 slot.inertia = link.inertia;
             }
             Node::Beam(number, _) => {
@@ -39,8 +42,10 @@ pub fn frames<S: Scalar>(model: &Model<S>, data: &mut Data<S>, q: &[S], v: &[S])
                 for ((slot, section), inertia) in stations {
                     slot.across = root * section.pose;
                     slot.velocity = slot.across.inverse_twist(parent.velocity) + section.twist;
-                    let across = slot.velocity.cross(section.twist) + section.acceleration;
-                    slot.acceleration = slot.across.inverse_twist(parent.acceleration) + across;
+                    slot.acceleration = slot.across.inverse_twist(parent.acceleration);
+                    if keeps {
+                        slot.acceleration += slot.velocity.cross(section.twist) + section.acceleration;
+                    }
                     slot.inertia = *inertia;
                 }
             }
@@ -99,10 +104,11 @@ pub(crate) fn lines<S: Scalar>(model: &Model<S>, data: &mut Data<S>) {
 /// As [`lines`], but without the velocities per unit rate of the coordinates.
 pub(super) fn bare_lines<S: Scalar>(model: &Model<S>, data: &mut Data<S>) {
     let Composite { frames, lines, .. } = &mut data.composite;
+    let keeps = model.keeps_velocity_terms();
     for (Wire { from, to, .. }, slot) in model.lines().iter().zip(lines) {
         let LineSlot { length, direction, from: begin, to: end, .. } = slot;
         for (place, point) in [(from, &mut *begin), (to, &mut *end)] {
-            move_point(&frames[place.frame], place, point);
+            move_point(&frames[place.frame], place, point, keeps);
         }
         let across = end.place - begin.place;
         *length = across.dot(across).sqrt();
@@ -111,12 +117,13 @@ pub(super) fn bare_lines<S: Scalar>(model: &Model<S>, data: &mut Data<S>) {
 }
 
 /// A point fixed to a frame: where it is and how it moves.
-fn move_point<S: Scalar>(frame: &FrameSlot<S>, place: &Place, point: &mut PointSlot<S>) {
+fn move_point<S: Scalar>(frame: &FrameSlot<S>, place: &Place, point: &mut PointSlot<S>, keeps: bool) {
     let at = Vector3::from_f64(place.pose.translation.to_array());
     let FrameSlot { pose, velocity, acceleration, .. } = frame;
     let speed = velocity.linear + velocity.angular.cross(at);
     // The conventional acceleration of a point from the spatial one (Featherstone 2008, section 2.11).
-    let change = acceleration.linear + acceleration.angular.cross(at) + velocity.angular.cross(speed);
+    let change = acceleration.linear + acceleration.angular.cross(at);
+    let change = if keeps { change + velocity.angular.cross(speed) } else { change };
     point.place = pose.point(at);
     point.velocity = pose.rotation * speed;
     point.acceleration = pose.rotation * change;

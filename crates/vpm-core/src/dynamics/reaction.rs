@@ -1,5 +1,6 @@
 //! Reaction wrenches: what the joints of a machine carry.
 
+use super::flexible::weigh_frames;
 use super::frames::{bare_lines, frames, poses};
 use crate::data::{Composite, Data, LineSlot, PointSlot};
 use crate::model::{Elastic, Model, Node, Wire};
@@ -41,10 +42,7 @@ pub(crate) fn weigh<S: Scalar>(
     tensions: &[S],
     applied: impl FnOnce(&mut Data<S>),
 ) {
-    for slot in data.composite.frames.iter_mut().skip(1) {
-        let momentum = slot.inertia.apply(slot.velocity);
-        slot.wrench = slot.inertia.apply(slot.acceleration) + slot.velocity.cross_wrench(momentum);
-    }
+    weigh_frames(model, &mut data.composite.frames);
     for (number, wire) in model.lines().iter().enumerate() {
         line(wire, number, data, tensions.get(number).copied().unwrap_or(S::zero()));
     }

@@ -18,7 +18,7 @@ pub fn rnea<'d, S: Scalar>(model: &Model<S>, data: &'d mut Data<S>, q: &[S], v: 
 }
 
 fn outward<S: Scalar>(model: &Model<S>, data: &mut Data<S>, q: &[S], v: &[S], a: &[S]) {
-    let slots = &mut data.rnea;
+    let (slots, keeps) = (&mut data.rnea, model.keeps_velocity_terms());
     slots[0].velocity = Twist::zero();
     slots[0].acceleration = Twist::new(Vector3::zero(), -model.gravity());
     for (k, (((link, &q), &v), &a)) in model.links().iter().zip(q).zip(v).zip(a).enumerate() {
@@ -27,10 +27,15 @@ fn outward<S: Scalar>(model: &Model<S>, data: &mut Data<S>, q: &[S], v: &[S], a:
         slot.pose = link.pose(q);
         slot.velocity = slot.pose.inverse_twist(parent.velocity);
         link.kind.add_rate(&mut slot.velocity, v);
-        slot.acceleration = slot.pose.inverse_twist(parent.acceleration) + link.kind.rate_cross(&slot.velocity, v);
+        slot.acceleration = slot.pose.inverse_twist(parent.acceleration);
+        if keeps {
+            slot.acceleration += link.kind.rate_cross(&slot.velocity, v);
+        }
         link.kind.add_rate(&mut slot.acceleration, a);
-        let momentum = link.inertia.apply(slot.velocity);
-        slot.wrench = link.inertia.apply(slot.acceleration) + slot.velocity.cross_wrench(momentum);
+        slot.wrench = link.inertia.apply(slot.acceleration);
+        if keeps {
+            slot.wrench += slot.velocity.cross_wrench(link.inertia.apply(slot.velocity));
+        }
     }
 }
 

@@ -32,6 +32,8 @@ pub struct Parts<S> {
     pub gauges: Vec<Gauge>,
     /// Frames that contacts and bushings act on.
     pub attachments: Vec<Marker>,
+    /// Whether products of rates are left out of the dynamics.
+    pub drop_velocity_terms: bool,
 }
 
 /// A tree on its way.

@@ -42,6 +42,7 @@ impl<S: Scalar> Assembly<'_, S> {
             order: self.nodes(order, &links),
             n_frames: self.inertias.len(),
             recursive: sorted && rigid && !lines.iter().any(Wire::is_massive),
+            drops_velocity_terms: self.parts.drop_velocity_terms,
             links,
             frames,
             lines,

@@ -34,6 +34,7 @@ pub fn lift<S: Scalar>(parts: &Parts<f64>) -> Parts<S> {
         markers: parts.markers.clone(),
         gauges: parts.gauges.clone(),
         attachments: parts.attachments.clone(),
+        drop_velocity_terms: false,
     }
 }
 
