@@ -18,9 +18,7 @@ pub fn print(name: &str, step: f64, mut make: impl FnMut()) {
     }
     let mean = begin.elapsed().as_secs_f64() / f64::from(count);
     let steps = (PERIOD / step).round().max(1.0);
-    let percent = 100.0 * steps * mean / PERIOD;
-    let (micro, milli) = (1e6 * mean, 1e3 * step);
-    println!(
-        "{name}: one step of {milli} ms takes {micro:.3} us, {percent:.3} % of a 1 ms period with {steps} of them"
-    );
+    let (micro, percent) = (1e6 * mean, 100.0 * steps * mean / PERIOD);
+    let many = if steps > 1.0 { format!("; {steps} of them take") } else { ",".to_owned() };
+    println!("{name}: one step of {} ms takes {micro:.3} us{many} {percent:.3} % of a 1 ms period", 1e3 * step);
 }
