@@ -33,7 +33,17 @@ def main_gaps(gap: Mapping[str, ChannelGap]) -> list[ChannelGap]:
 
 def is_negligible(gap: Mapping[str, ChannelGap]) -> bool:
     """Whether what is left is nothing beside the efforts; of a gap hardly larger, effects may still explain little."""
-    return all(g.after <= NEGLIGIBLE * g.signal or g.signal == 0.0 for g in main_gaps(gap))
+    return all(map(_is_nothing, main_gaps(gap)))
+
+
+def _is_nothing(gap: ChannelGap) -> bool:
+    """Whether what is left of one channel is nothing beside its signal."""
+    return gap.after <= NEGLIGIBLE * gap.signal or gap.signal == 0.0
+
+
+def _above(main: list[ChannelGap]) -> float:
+    """How far what is left stands above the noise, in the channel where it does most; 0 without channels."""
+    return max((g.after / g.noise_floor if g.noise_floor > 0.0 else np.inf for g in main), default=0.0)
 
 
 def verdict(
@@ -59,9 +69,9 @@ def verdict(
         None where nothing was found and what is left is negligible.
     """
     main = main_gaps(gap)
-    above = max((g.after / g.noise_floor if g.noise_floor > 0.0 else np.inf) for g in main)
-    small = is_negligible(gap)
-    structured = left.present and above > FLOOR_FACTOR and not small
+    above, small = _above(main), is_negligible(gap)
+    # A channel far above its noise that is nothing beside its signal says nothing of one that is not.
+    structured = left.present and _above([g for g in main if not _is_nothing(g)]) > FLOOR_FACTOR
     remaining = structured or (rest is not None and rest.repeats and not small)
     worst = max(main, key=lambda g: g.recalibrated / g.signal if g.signal else 0.0)
     numbers = f"{_percent(worst.before, worst)} before, {_percent(worst.recalibrated, worst)} recalibrated"
