@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from scipy.special import stdtrit
 
 from vpm.discrepancy.confirmation import Trial
+from vpm.discrepancy.motion_only import LATE
 from vpm.discrepancy.screening import Probe, impossible_values
 from vpm.discrepancy.structural import coupled
 from vpm.identify import Gain
@@ -25,6 +26,9 @@ MODEST_GAIN, MODEST_FACTOR = 0.3, 3.0
 #: From this drop on, the balance of effort decides alone on a machine of several joints: with two effects missing, the
 #: simulation of a machine that has one of them may well be worse, because errors of coupled joints had cancelled.
 CLEAR_GAIN = 0.5
+#: A delay or lag that the times of samples leave open is named from this drop on: what explains most of what was left
+#: is worth telling, be it the drive that is late or the record. Below it, sampling explains it as well.
+MOST_OF_IT = 0.5
 #: One-sided 95 % quantile of the normal distribution: a simulation that is worse by less is worse by chance.
 NORMAL_95_ONE_SIDED = 1.6448536269514722
 #: Drop of the training mean square below which a candidate is not refitted at all.
@@ -40,7 +44,7 @@ class Thresholds:
     candidates : int
         Number of candidates tried in the whole diagnosis; the false-alarm level is divided by it (Bonferroni).
     interval : float
-        Sampling interval of the coarsest record, s; delays and lags below it are part of sampling.
+        Sampling interval of the coarsest record, s; delays and lags below it that explain little are part of sampling.
     """
 
     candidates: int
@@ -102,6 +106,11 @@ def refuse_ringing(share: float, trial: Trial) -> str:
     )
 
 
+def explains_most(trial: Trial) -> bool:
+    """Whether a delay or lag explains so much that it is named even where the times of samples would leave it open."""
+    return trial.probe.candidate.effect.name in LATE and trial.unseen.relative >= MOST_OF_IT
+
+
 def refuse_timing(timed: Gain, shift: float, thresholds: Thresholds) -> str:
     """Reason not to accept a candidate that does no more than a shift of the commands within the sampling interval."""
     if thresholds.met(timed):
@@ -120,21 +129,23 @@ def _impossible(probe: Probe, name: str) -> str:
 
 
 def _too_short(trial: Trial, interval: float) -> str:
-    """A delay or lag below one sampling interval cannot be told from the hold of the sampled command.
+    """A delay or lag below one sampling interval that explains little is as well a matter of how commands are logged.
 
     The hold is that of all commands: where one of several drives, or of several joints' instruments, is late and the
     others are not, `refuse_timing` judges it beside a shift of them all. The time of a lossy link is no delay: it is a
     share of its stiffness.
     """
     model = trial.judged.model
-    if trial.probe.candidate.effect.site in {"link", "body", "beam"} or has_peers(model, trial.probe.candidate.site):
+    site = trial.probe.candidate.effect.site
+    if site in {"link", "body", "beam"} or has_peers(model, trial.probe.candidate.site) or explains_most(trial):
         return ""
     for name in trial.parameters:
         parameter = model.parameters[name]
         if parameter.unit == "s" and parameter.value < interval:
             return (
                 f"{name} comes out as {1e3 * parameter.value:.3g} ms, less than the sampling interval of "
-                f"{1e3 * interval:.3g} ms: it cannot be told from the sampling itself"
+                f"{1e3 * interval:.3g} ms, and lowers the unseen error by {_percent(max(trial.unseen.relative, 0.0))} "
+                "of its mean square: so little cannot be told from the sampling itself"
             )
     return ""
 

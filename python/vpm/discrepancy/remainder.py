@@ -17,6 +17,7 @@ from vpm.discrepancy.band import below, motion_band
 from vpm.discrepancy.confirmation import Data, Judged
 from vpm.discrepancy.diagnosis import Empirical
 from vpm.discrepancy.empirical import describe
+from vpm.discrepancy.motion_only import LATE
 from vpm.discrepancy.refusal import WORTH_A_NAME, Thresholds
 from vpm.discrepancy.timing import in_time
 from vpm.identify import gain, segments
@@ -90,7 +91,7 @@ def remainder(recalibrated: Judged, final: Judged, data: Data, interval: float, 
     clear = [view.clearly_better(choice, left) for choice in choices]
     if not any(clear):
         return Remainder(choices, repeats=False, open=0.0, instead=False)
-    power, whole = (_power(in_time(judged, data).unseen) for judged in (final, recalibrated))
+    power, whole = _power(in_time(final, data).unseen), _power(_before(recalibrated, final, data))
     least = min(view.leaves(choice) for choice, better in zip(choices, clear, strict=True) if better)
     share = np.clip((power - least) / max(whole - least, 1e-300), 0.0, 1.0)
     plain = len(choices[0].judged.free) <= len(final.free)
@@ -101,6 +102,13 @@ def remainder(recalibrated: Judged, final: Judged, data: Data, interval: float, 
 
 def _described(base: Judged, data: Data) -> Described:
     return Described(base, *describe(base, data))
+
+
+def _before(recalibrated: Judged, final: Judged, data: Data) -> Array:
+    """What the recalibrated model leaves, less a shift within the sampling interval unless that is what was named."""
+    known = {(effect.name, effect.at) for effect in recalibrated.model.effects}
+    late = any(effect.name in LATE and (effect.name, effect.at) not in known for effect in final.model.effects)
+    return recalibrated.unseen if late else in_time(recalibrated, data).unseen
 
 
 def _power(values: Array) -> float:

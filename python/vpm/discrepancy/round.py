@@ -14,6 +14,7 @@ from vpm.discrepancy.play import is_read_off, only_winds_up
 from vpm.discrepancy.refusal import (
     CLEAR_GAIN,
     Thresholds,
+    explains_most,
     refuse_probe,
     refuse_timing,
     refuse_trial,
@@ -218,7 +219,7 @@ class Round:
 
     def _only_timing(self, trial: Trial, thresholds: Thresholds) -> str:
         """Why a trial that would be believed does no more than a shift of the commands does, or ""."""
-        if self.timed.shift == 0.0:
+        if self.timed.shift == 0.0 or explains_most(trial):
             return ""
         unseen = in_time(trial.judged, self.data).unseen
         timed = gain(self.timed.unseen, unseen, segments(self.data.unseen))

@@ -186,27 +186,6 @@ class InverseDynamicsProblem:
             jacobians.append(-np.concatenate([answer.balance[:, self._joints], answer.slopes], axis=1))
         return self._stack(residuals), self._stack(jacobians)
 
-    def along_others(self, model: Model, logs: Sequence[Experiment]) -> InverseDynamicsProblem:
-        """The same samples and weights on other logs of these records, such as those of a simulation.
-
-        Parameters
-        ----------
-        model : Model
-        logs : sequence of Experiment
-            One for each record, sampled as it is.
-        """
-        others = copy(self)
-        moved = [joint_motion(log, model, m.cutoff, commanded=True) for log, m in zip(logs, self.motions, strict=True)]
-        quantities = ("position", "velocity", "acceleration", "inputs")
-        motions = tuple(
-            replace(m, **{name: getattr(other, name) for name in quantities})
-            for m, other in zip(self.motions, moved, strict=True)
-        )
-        whole = tuple(replace(m, edge=0) for m in motions)
-        kept = self._held(logs, motions)
-        vars(others).update(experiments=tuple(logs), motions=motions, _whole=whole, _kept=kept)
-        return others
-
     def _hold_gains(self, model: Model) -> dict[str, float]:
         """How firmly gauges hold links, the same for all records and for all models that are compared."""
         if not bends(model):
