@@ -107,8 +107,13 @@ def refuse_ringing(share: float, trial: Trial) -> str:
 
 
 def explains_most(trial: Trial) -> bool:
-    """Whether a delay or lag explains so much that it is named even where the times of samples would leave it open."""
-    return trial.probe.candidate.effect.name in LATE and trial.unseen.relative >= MOST_OF_IT
+    """Whether a delay or lag explains so much that it is named even where the times of samples would leave it open.
+
+    Where there are peers on its clock, a shift of all commands tells what is physics.
+    """
+    candidate = trial.probe.candidate
+    late = candidate.effect.name in LATE and not has_peers(trial.judged.model, candidate.site)
+    return late and trial.unseen.relative >= MOST_OF_IT
 
 
 def refuse_timing(timed: Gain, shift: float, thresholds: Thresholds) -> str:
