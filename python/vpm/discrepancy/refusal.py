@@ -29,6 +29,9 @@ CLEAR_GAIN = 0.5
 #: A delay or lag that the times of samples leave open is named from this drop on: what explains most of what was left
 #: is worth telling, be it the drive that is late or the record. Below it, sampling explains it as well.
 MOST_OF_IT = 0.5
+#: Neither a residual nor an error of an instrument's gain means anything below this share of the signal: links are
+#: cut into pieces and gauges calibrated to no better.
+NEGLIGIBLE = 0.005
 #: One-sided 95 % quantile of the normal distribution: a simulation that is worse by less is worse by chance.
 NORMAL_95_ONE_SIDED = 1.6448536269514722
 #: Drop of the training mean square below which a candidate is not refitted at all.
@@ -83,6 +86,7 @@ def refuse_trial(trial: Trial, thresholds: Thresholds) -> str:
     reasons = (
         _too_short(trial, thresholds.interval),
         _no_way(trial),
+        _trifling_gain(trial),
         _only_training(trial),
         _not_clear(trial),
         worse_in_simulation(trial),
@@ -174,6 +178,19 @@ def _no_way(trial: Trial) -> str:
     return (
         f"{name} comes out at the {least:.3g} {parameter.unit} that the joint passes between two samples: it cannot be "
         "told from dry friction"
+    )
+
+
+def _trifling_gain(trial: Trial) -> str:
+    """An instrument that would be right within what no instrument and no model of its link is better than."""
+    if trial.probe.candidate.effect.name != "sensor_gain":
+        return ""
+    value = trial.judged.model.parameters[trial.parameters[0]].value
+    if abs(value - 1.0) >= NEGLIGIBLE:
+        return ""
+    return (
+        f"{trial.parameters[0]} comes out as {value:.4g}: less than {_percent(NEGLIGIBLE)} of the signal is no error "
+        "to be told from that of the model"
     )
 
 

@@ -9,7 +9,7 @@ from scipy.special import ndtri
 
 from vpm.discrepancy.confirmation import Data, Judged
 from vpm.discrepancy.diagnosis import ChannelGap
-from vpm.discrepancy.refusal import FALSE_ALARM_LEVEL, LEAST_GAIN
+from vpm.discrepancy.refusal import FALSE_ALARM_LEVEL, LEAST_GAIN, NEGLIGIBLE
 from vpm.discrepancy.remainder import Remainder
 from vpm.discrepancy.search import Search
 from vpm.discrepancy.structure import Structure
@@ -17,8 +17,6 @@ from vpm.identify import gain, segments
 
 #: A residual within this factor of the noise floor has nothing left to explain, unless it repeats.
 FLOOR_FACTOR = 1.3
-#: Neither has one below this share of the measured effort.
-NEGLIGIBLE = 0.005
 #: Where so much of what could be explained remains, what was found is not the explanation.
 MOSTLY_OPEN = 0.15
 
