@@ -18,7 +18,6 @@ from math import ceil
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
-from scipy.signal.windows import tukey
 
 from vpm.discrepancy.confirmation import Data, Judged
 from vpm.errors import VpmError
@@ -128,6 +127,8 @@ def _run(judged: Judged, fine: OutputErrorProblem, coarse: OutputErrorProblem) -
 
 def _spectra(problem: OutputErrorProblem, columns: Array) -> Spectra:
     """Transforms of what the runs leave of each reading; a command is what the controller made of the readings."""
+    from scipy.signal.windows import tukey  # takes a second, and few need it
+
     found: Spectra = []
     for block in problem.blocks:
         if not block.channel.endswith(".command"):
