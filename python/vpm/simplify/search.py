@@ -21,11 +21,12 @@ from vpm.simplify.ladder import Ladder, Rung, pareto
 from vpm.simplify.reductions import OFFERED, VELOCITY_TERMS, Reduction, reduced, reductions
 from vpm.simplify.shares import velocity_share
 from vpm.simplify.surrogates import surrogates
-from vpm.simplify.trials import NEGLIGIBLE, PRIORITY, Changes, Trials
+from vpm.simplify.trials import CLOCK, NEGLIGIBLE, PRIORITY, Changes, Trials
 from vpm.simulate import Setup
 
-#: Share of the efforts, in tolerances, from which on no model is tried without its velocity terms.
-WEIGHTY = 5.0
+#: Share of the efforts, in tolerances, from which on no model is tried without its velocity terms, and share that is
+#: rounding: a single joint about a fixed axis has none of them.
+WEIGHTY, ROUNDING = 5.0, 1e-12
 #: Combinations that are foreseen, and of those the ones that are tried.
 FORESEEN, TRIED = 100_000, 8
 #: Times of steps of less than a microsecond differ by so much for no reason on a machine that does other things too.
@@ -133,7 +134,7 @@ def _descend(trials: Trials, sites: Sites) -> None:
 
 
 def _weigh_velocity_terms(trials: Trials, sites: Sites) -> None:
-    """Products of rates that are too much of the efforts along the motion stay in without a trial."""
+    """Products of rates that are too much of the efforts along the motion, or none, are no matter of a trial."""
     judge = trials.judge
     if VELOCITY_TERMS.site not in sites or judge.mode not in ("free_run", "closed_loop"):
         return
@@ -142,7 +143,7 @@ def _weigh_velocity_terms(trials: Trials, sites: Sites) -> None:
     except SimulationError:
         return
     trials.say(f"velocity terms take {100 * share:.2g} % of the efforts")
-    if share > WEIGHTY * trials.tolerance:
+    if not ROUNDING < share <= WEIGHTY * trials.tolerance:
         del sites[VELOCITY_TERMS.site]
 
 
@@ -169,7 +170,7 @@ def _alone(trials: Trials, base: Changes, changes: Sequence[Reduction]) -> dict[
     found: dict[Reduction, tuple[float, float]] = {}
     for change in _coarser(changes, base):
         # Something that saves little by itself may save more with others, so it is tried if it is hardly dearer.
-        rungs = trials.attempt(_with(base, change), ALIKE * start.seconds)
+        rungs = trials.attempt(_with(base, change), ALIKE * start.seconds + CLOCK)
         if rungs:
             best = _best(rungs)
             found[change] = (start.seconds - best.seconds, best.error - start.error)
@@ -270,7 +271,8 @@ def _concluded(trials: Trials, sites: Sites, share: float, against: str) -> Ladd
 def _simplest(rungs: Sequence[Rung]) -> Rung:
     """The cheapest, or what seems dearer by no more than times are uncertain by and has more left out or errs less."""
     best = rungs[0]
-    alike = [rung for rung in rungs if set(rung.removed) >= set(best.removed) and rung.seconds <= ALIKE * best.seconds]
+    longest = ALIKE * best.seconds + CLOCK
+    alike = [rung for rung in rungs if set(rung.removed) >= set(best.removed) and rung.seconds <= longest]
     return max(alike, key=lambda rung: (len(rung.removed), -rung.error))
 
 

@@ -3,7 +3,7 @@
 #[cfg(target_os = "linux")]
 use rustix::mm::{MlockAllFlags, mlockall, munlockall};
 #[cfg(target_os = "linux")]
-use rustix::process::{Resource, geteuid, getrlimit};
+use rustix::process::{Resource, geteuid, getpriority_process, getrlimit};
 use thread_priority::{
     RealtimeThreadSchedulePolicy, ThreadPriority, ThreadPriorityValue, ThreadSchedulePolicy,
     set_thread_priority_and_policy, thread_native_id, thread_schedule_policy_param,
@@ -84,9 +84,11 @@ fn raise(priority: u8) -> (Right, Option<(ThreadSchedulePolicy, ThreadPriority)>
         );
     };
     let before = thread_schedule_policy_param(thread_native_id()).ok().map(|(policy, params)| {
-        let value =
-            u8::try_from(params.sched_priority).ok().and_then(|value| ThreadPriorityValue::try_from(value).ok());
-        (policy, value.map_or(ThreadPriority::Min, ThreadPriority::Crossplatform))
+        let value = match policy {
+            ThreadSchedulePolicy::Normal(_) => as_nice(nice()),
+            ThreadSchedulePolicy::Realtime(_) => u8::try_from(params.sched_priority).unwrap_or(0),
+        };
+        (policy, ThreadPriorityValue::try_from(value).map_or(ThreadPriority::Min, ThreadPriority::Crossplatform))
     });
     let policy = ThreadSchedulePolicy::Realtime(RealtimeThreadSchedulePolicy::Fifo);
     match set_thread_priority_and_policy(thread_native_id(), ThreadPriority::Crossplatform(value), policy) {
@@ -98,4 +100,24 @@ fn raise(priority: u8) -> (Right, Option<(ThreadSchedulePolicy, ThreadPriority)>
             (Right::Refused(message), None)
         }
     }
+}
+
+/// Nice value of this thread, -20 to 19.
+#[cfg(target_os = "linux")]
+fn nice() -> i32 {
+    getpriority_process(None).unwrap_or(0)
+}
+
+#[cfg(not(target_os = "linux"))]
+fn nice() -> i32 {
+    0
+}
+
+/// Value from 0 to 99 that `thread_priority` takes for a nice value: it cuts 39 (1 - value / 99) - 20 to a whole number.
+///
+/// With the lowest one instead, an ordinary thread would come out of a loop as the last of all (nice 19), and only root
+/// could change that.
+fn as_nice(nice: i32) -> u8 {
+    let value = 99.0 * (1.0 - (f64::from(nice) + 20.5) / 39.0);
+    value.round().clamp(0.0, 99.0) as u8
 }
