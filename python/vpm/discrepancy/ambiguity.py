@@ -17,6 +17,7 @@ from vpm.discrepancy.search import Tried
 from vpm.discrepancy.side_by_side import Failure, SideBySide
 from vpm.identify import gain, segments
 from vpm.identify.along import bends
+from vpm.model import Model
 
 #: Rivals that are refitted in the place of an effect.
 SHORT_LIST = 3
@@ -143,10 +144,7 @@ def _label(entry: Accepted) -> str:
 
 def _beside(last: Tried, entry: Accepted) -> list[Probe]:
     """What was screened when an effect came in, of that which could do its work."""
-    near = [p for p in last.probes if _near(p.candidate, entry)]
-    if bends(last.without.model) and last.key[0] not in HEAVY:
-        near = [p for p in near if p.candidate.effect.name not in HEAVY]
-    return near
+    return [p for p in last.probes if _could_do(last.without.model, entry, p.candidate)]
 
 
 def _without(final: Judged, data: Data, known: Mapping[Key, Tried], entry: Accepted) -> Judged:
@@ -160,11 +158,14 @@ def _without(final: Judged, data: Data, known: Mapping[Key, Tried], entry: Accep
 
 def _others(without: Judged, data: Data, entry: Accepted, effects: Sequence[str] | None) -> list[Candidate]:
     """Candidates that could do the work of an effect."""
-    model, name = without.model, entry.key[0]
-    others = [c for c in candidates(model, data.training, without.fit.residual, effects) if _near(c, entry)]
-    if bends(model) and name not in HEAVY:  # a spring more would not have been tried beside what is lighter and does
-        others = [c for c in others if c.effect.name not in HEAVY]
-    return others
+    offered = candidates(without.model, data.training, without.fit.residual, effects)
+    return [c for c in offered if _could_do(without.model, entry, c)]
+
+
+def _could_do(model: Model, entry: Accepted, candidate: Candidate) -> bool:
+    """Whether a candidate acts near an effect; where links bend, a spring more would not have been tried beside it."""
+    heavier = candidate.effect.name in HEAVY and entry.key[0] not in HEAVY
+    return _near(candidate, entry) and not (heavier and bends(model))
 
 
 def _short_list(final: Judged, without: Judged | None, entry: Accepted, probes: Sequence[Probe]) -> list[Probe]:
