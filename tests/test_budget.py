@@ -59,6 +59,17 @@ def test_a_model_made_too_slow_fails_and_names_what_made_it_slow(tmp_path: Path)
     assert f"is: {slow.largest.name}" in slow.verdict
 
 
+def test_a_record_drives_the_model_at_its_own_speed_whatever_the_rate(record: Experiment) -> None:
+    model = nominal()
+    command = record[model.input_channels[0]]
+    faster = commands(model, 4.0 * record.rate, record)[:, 0]
+    slower = commands(model, record.rate / 5.0, record)[:, 0]
+    np.testing.assert_array_equal(commands(model, record.rate, record)[:, 0], command)
+    np.testing.assert_array_equal(faster, np.repeat(command, 4))
+    np.testing.assert_array_equal(slower, command[::5][: len(slower)])
+    assert len(slower) * 5 == pytest.approx(len(command), abs=5)
+
+
 def test_report_saves_and_loads(report: BudgetReport, tmp_path: Path) -> None:
     assert BudgetReport.load(report.save(tmp_path / "budget.npz")) == report
 

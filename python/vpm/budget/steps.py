@@ -153,10 +153,14 @@ def commands(model: Model, rate: float, experiment: Experiment | None = None) ->
     rate : float
         Hz.
     experiment : Experiment, optional
-        Its commands, or what the model's controllers make of its references; without it a sum of sines.
+        Its commands, or what the model's controllers make of its references, each held until the record's next sample;
+        without it a sum of sines.
     """
     if experiment is not None:
-        columns = _driving(model, experiment)
+        # The machine moves as fast as it was measured, whatever the rate of the log.
+        count = max(1, round((experiment.duration + experiment.dt) * rate))
+        held = np.minimum((np.arange(count) / (rate * experiment.dt) + 1e-6).astype(int), len(experiment.time) - 1)
+        columns = [column[held] for column in _driving(model, experiment)]
     else:
         time = np.arange(SWEEP_SAMPLES) / rate
         wave = np.mean([np.sin(2.0 * np.pi * f * time) for f in SWEEP_FREQUENCIES], axis=0)

@@ -11,7 +11,6 @@ from rich.console import Console
 from vpm.catalogue import EFFECTS
 from vpm.compare import compare
 from vpm.demo.files import FOLDER, MODEL, TRAIN, TRUTH, VALIDATION
-from vpm.demo.generate import generate
 from vpm.demo.hidden import HIDDEN, LISTED, REFUSED
 from vpm.discrepancy import Diagnosis, diagnose
 from vpm.errors import DiagnosisError, near_match
@@ -48,6 +47,9 @@ def run_demo(out: Path, console: Console, tell: Callable[[str], None], hide: str
         check_hidden(hide)
         tell(f"simulating a machine with {hide}")
         folder = out / "log"
+        # Not at the top: the module is run as a program too, which wants to load it first.
+        from vpm.demo.generate import generate
+
         generate(folder, hide)
     model = Model.load(folder / MODEL.name)
     training, unseen = (Experiment.load(folder / path.name, model=model) for path in (TRAIN, VALIDATION))
