@@ -39,3 +39,4 @@ def test_the_end_that_no_record_reached_stays_where_no_joint_comes() -> None:
     assert values["low"] == -1e9
     assert values["high"] == pytest.approx(hidden.parameters["high"], rel=2e-3)
     assert values["stiffness"] == pytest.approx(hidden.parameters["stiffness"], rel=0.02)
+    assert values["damping"] == pytest.approx(hidden.parameters["damping"], rel=0.1)

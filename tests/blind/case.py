@@ -230,10 +230,13 @@ def _nominal(
 
 
 def _as_catalogued(hidden: Hidden, values: Mapping[str, float]) -> Hidden:
-    """The same with parameters that say what is there: gain, stiffness of a link [N m^2], loss in a contact."""
+    """The same with parameters that say what is there: gain, stiffness of a link [N m^2], loss in a contact or a stop."""
     if hidden.name == "backlash":
         named = {"contact_damping" if name == "damping" else name: v for name, v in hidden.parameters.items()}
         return Hidden(hidden.name, hidden.site, named, hidden.known)
+    if hidden.name == "end_stop":
+        share = hidden.parameters["damping"] / hidden.parameters["stiffness"]
+        return Hidden(hidden.name, hidden.site, {**hidden.parameters, "damping": share}, hidden.known)
     if hidden.name == "sensor_gain":
         return Hidden(hidden.name, hidden.site, {"value": 1.0 + hidden.parameters["excess"]}, hidden.known)
     if hidden.name == "link_flexibility":
