@@ -230,7 +230,7 @@ def _nominal(
 
 
 def _as_catalogued(hidden: Hidden, values: Mapping[str, float]) -> Hidden:
-    """The same with parameters that say what is there: gain, stiffness of a link [N m^2], loss in a contact or a stop."""
+    """The same with parameters that say what is there: gain, stiffness of a link [N m^2], loss in a contact or stop."""
     if hidden.name == "backlash":
         named = {"contact_damping" if name == "damping" else name: v for name, v in hidden.parameters.items()}
         return Hidden(hidden.name, hidden.site, named, hidden.known)
