@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from importlib import import_module
+
 import numpy as np
 import pytest
 
@@ -48,6 +50,24 @@ def test_remembered_answers_are_those_of_a_problem_that_remembers_nothing(exact:
     np.testing.assert_array_equal(residual, expected)
     np.testing.assert_array_equal(jacobian, slopes)
     np.testing.assert_array_equal(first[1], slopes[:, :3])
+
+
+def test_long_steps_show_less_than_the_noise(exact: Exact, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What no log shows is not worth three times the time; where it would show, steps stay short."""
+    model, training, _ = exact
+    quick = InverseDynamicsProblem(model, training.experiments)
+    quick.take_long_steps()
+    assert set(quick.integrators) == {"linearly_implicit"}
+    columns = [model.index(name) for name in ("servo.valve.flow_gain", "pump.oil.bulk_modulus")]
+    residual, slopes = training.evaluate(model, model.theta, columns)
+    rough, rough_slopes = quick.evaluate(model, model.theta, columns)
+    assert 0.0 < np.linalg.norm(rough - residual) < 0.03 * np.linalg.norm(residual)
+    assert np.linalg.norm(rough_slopes - slopes) < 0.01 * np.linalg.norm(slopes)
+    monkeypatch.setattr(import_module(InverseDynamicsProblem.__module__), "ROUGH", 1e-9)
+    exacting = InverseDynamicsProblem(model, training.experiments)
+    exacting.take_long_steps()
+    assert set(exacting.integrators) == {"auto"}
+    np.testing.assert_array_equal(exacting.evaluate(model, model.theta)[0], residual)
 
 
 @pytest.mark.parametrize("name", ["slide.mass", "axis.friction.viscous", "servo.valve.flow_gain"])

@@ -7,6 +7,8 @@ looks like a slow disturbance that nothing explains; its spectrum follows from t
 from __future__ import annotations
 
 from dataclasses import replace
+from threading import Lock
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +18,8 @@ from vpm.experiment import Experiment, Motion, noise_std
 from vpm.experiment.signal import RETAINED_BAND as _BAND
 from vpm.identify import InverseDynamicsProblem
 from vpm.identify.along import has_own_drives, respond
+from vpm.identify.drive_memory import DriveMemory
+from vpm.identify.drives_apart import moves_drives
 from vpm.model import Model
 
 Array = NDArray[np.float64]
@@ -24,6 +28,11 @@ Array = NDArray[np.float64]
 SEED, TIMES, SHARE = 20160331, 6, 0.01
 #: Neighbouring frequencies over which a spectrum of noise is smoothed, as a share of the band.
 SMOOTHED = 0.08
+#: Share by which parameters of drives may differ for the same colours: these are smoothed over as much.
+NEAR = 0.05
+#: Colours worked out last for each problem, with their model: one round of a search asks for those of the last one.
+_KNOWN: WeakKeyDictionary[InverseDynamicsProblem, tuple[Model, tuple[Array | None, ...]]] = WeakKeyDictionary()
+_LOCK = Lock()
 
 
 def noise_shapes(model: Model, problem: InverseDynamicsProblem) -> tuple[Array | None, ...]:
@@ -43,11 +52,23 @@ def noise_shapes(model: Model, problem: InverseDynamicsProblem) -> tuple[Array |
     """
     if not problem.shown or not has_own_drives(model):
         return (None,) * len(problem.blocks)
-    generator = np.random.default_rng(SEED)
-    shapes: list[Array | None] = []
-    for record in range(len(problem.motions)):
-        shapes += _of_record(model, problem, record, generator)
-    return tuple(shapes)
+    with _LOCK:
+        known, shapes = _KNOWN.get(problem, (None, ()))
+    if known is None or not _alike(model, known):
+        generator = np.random.default_rng(SEED)
+        shapes = tuple(s for r in range(len(problem.motions)) for s in _of_record(model, problem, r, generator))
+        with _LOCK:
+            _KNOWN[problem] = model, shapes
+    return shapes
+
+
+def _alike(model: Model, known: Model) -> bool:
+    """Whether drives of two models colour noise alike: they have the same parameters, at nearly the same values."""
+    own, others = (
+        {name: entry.value for name, entry in one.parameters.items() if moves_drives(one, name)}
+        for one in (model, known)
+    )
+    return own.keys() == others.keys() and all(abs(own[n] - others[n]) <= NEAR * abs(others[n]) for n in own)
 
 
 def noise_spectrum(residual: Array, shape: Array, quiet: float) -> Array:
@@ -89,9 +110,9 @@ def periodogram(residual: Array) -> Array:
 def _of_record(
     model: Model, problem: InverseDynamicsProblem, record: int, generator: np.random.Generator
 ) -> list[Array | None]:
-    m, experiment = problem.motions[record], problem.experiments[record]
+    m = problem.motions[record]
     whole = replace(m, edge=0)
-    clean = _shown(model, problem, m, whole, experiment)
+    clean = _shown(model, problem, record, whole)
     sizes = SHARE * np.sqrt(np.mean(m.inputs**2, axis=0))
     drives = np.zeros_like(_powers(clean))
     first = record * (len(problem.joints) + len(problem.shown)) + len(problem.joints)
@@ -99,7 +120,7 @@ def _of_record(
     counted = np.column_stack([block.moving for block in blocks])
     for _ in range(TIMES):
         told = whole.inputs + sizes * generator.standard_normal(whole.inputs.shape)
-        change = _shown(model, problem, m, replace(whole, inputs=told), experiment) - clean
+        change = _shown(model, problem, record, replace(whole, inputs=told)) - clean
         drives += _powers(change * counted) / TIMES
     own = _of_instruments(model, problem, record, generator)
     shapes: list[Array | None] = [None] * len(problem.joints)
@@ -114,10 +135,12 @@ def _of_instruments(
     model: Model, problem: InverseDynamicsProblem, record: int, generator: np.random.Generator
 ) -> list[Array]:
     """Powers of what the noise of all instruments makes of each shown channel, by adding it once more."""
-    one = [problem.experiments[record]]
-    cutoff, band = problem.motions[record].cutoff, problem.motions[record].band
-    clean = InverseDynamicsProblem(model, one, cutoff=cutoff, band=band)
-    noisy = InverseDynamicsProblem(model, [with_noise(model, one[0], generator)], cutoff=cutoff, band=band)
+    one = problem.experiments[record]
+    m, steps = problem.motions[record], problem.integrators[record]
+    clean, noisy = (
+        InverseDynamicsProblem(model, [log], cutoff=m.cutoff, band=m.band, integrator=steps)
+        for log in (one, with_noise(model, one, generator))
+    )
     change = noisy.evaluate(model, model.theta)[0] / _weights(noisy) - clean.evaluate(model, model.theta)[0] / (
         _weights(clean)
     )
@@ -143,8 +166,9 @@ def with_noise(model: Model, experiment: Experiment, generator: np.random.Genera
     return experiment
 
 
-def _shown(model: Model, problem: InverseDynamicsProblem, m: Motion, whole: Motion, experiment: Experiment) -> Array:
-    return m.parallel(respond(model, model.theta, whole, experiment, (), problem.shown).seen)
+def _shown(model: Model, problem: InverseDynamicsProblem, record: int, whole: Motion) -> Array:
+    memory = DriveMemory(problem.motions[record].parallel, problem.integrators[record])
+    return respond(model, model.theta, whole, problem.experiments[record], (), problem.shown, memory).seen
 
 
 def _powers(values: Array) -> Array:

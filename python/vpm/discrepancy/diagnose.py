@@ -257,6 +257,7 @@ def _data(
     # One filter for all unseen records: a gap that is measured in another band is another gap.
     predicted = InverseDynamicsProblem(model, unseen, cutoff=min(states), band=min(bands))
     for problem in (fitted, predicted):
+        problem.take_long_steps()
         for number, (record, m) in enumerate(zip(problem.experiments, problem.motions, strict=True)):
             still = problem.standstill(number)
             rest = f"; {100 * still:.0f} % at standstill left out of the balance" if still > 0.0 else ""

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,15 +50,13 @@ def noise_floor(
     setup : Setup, optional
     """
     generator = np.random.default_rng(SEED)
-    filters = [(m.cutoff, m.band) for m in unseen.motions]
     expected: dict[str, list[tuple[float, int]]] = {}
-    for experiment, (cutoff, band) in zip(unseen.experiments, filters, strict=True):
+    for experiment, m, steps in zip(unseen.experiments, unseen.motions, unseen.integrators, strict=True):
+        balance = partial(InverseDynamicsProblem, model, cutoff=m.cutoff, band=m.band, integrator=steps)
         own = own_log(model, experiment, setup, generator) if mode == "closed_loop" else None
-        change = _balance(model, own, cutoff, band) if own is not None else None
+        change = _balance(model, balance, own) if own is not None else None
         if change is None:
-            clean = InverseDynamicsProblem(model, [experiment], cutoff=cutoff, band=band)
-            once_more = with_noise(model, experiment, generator)
-            noisy = InverseDynamicsProblem(model, [once_more], cutoff=cutoff, band=band)
+            clean, noisy = balance([experiment]), balance([with_noise(model, experiment, generator)])
             change = clean, noisy.evaluate(model, model.theta)[0] - clean.evaluate(model, model.theta)[0]
         for channel, (rms, _, _) in gaps(*change).items():
             expected.setdefault(channel, []).append((rms**2, change[1].size))
@@ -129,9 +129,11 @@ def own_log(
     return own
 
 
-def _balance(model: Model, own: Experiment, cutoff: float, band: float) -> tuple[InverseDynamicsProblem, Array] | None:
+def _balance(
+    model: Model, balance: Callable[[list[Experiment]], InverseDynamicsProblem], own: Experiment
+) -> tuple[InverseDynamicsProblem, Array] | None:
     try:
-        problem = InverseDynamicsProblem(model, [own], cutoff=cutoff, band=band)
+        problem = balance([own])
         return problem, problem.evaluate(model, model.theta)[0]
     except VpmError:
         return None

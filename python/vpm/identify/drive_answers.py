@@ -16,7 +16,7 @@ from vpm.identify.drive_memory import DriveMemory
 from vpm.identify.drives_apart import drives_of
 from vpm.initial import measured_states
 from vpm.model import Model
-from vpm.simulate import Setup
+from vpm.simulate import AUTOMATIC, Setup
 
 Array = NDArray[np.float64]
 
@@ -44,7 +44,7 @@ def together(
     internal = first_drives(model, theta, m, experiment)
     effects = tuple((effect.name, effect.at) for effect in model.effects)
     key = (model.description(), effects, theta.tobytes(), internal.tobytes(), tuple(channels))
-    work = partial(_answered, model, theta, m, experiment, channels, internal)
+    work = partial(_answered, model, theta, m, experiment, channels, internal, memory.integrator)
     return memory.recall(key, [model.parameter_names[column] for column in columns], work)
 
 
@@ -71,7 +71,7 @@ def apart(
         shown = [place for place, channel in enumerate(channels) if channel.rpartition(".")[0] in alone.actuators]
         read, pushed = [channels[place] for place in shown], replace(m, inputs=m.inputs[:, drives.inputs])
         key = (drives.structure, tuple(read), mine[drives.own].tobytes(), first.tobytes())
-        work = partial(_answered, alone, mine, pushed, experiment, read, first)
+        work = partial(_answered, alone, mine, pushed, experiment, read, first, memory.integrator)
         names = [model.parameter_names[column] for column in dict.fromkeys([*asked, *moved])]
         outputs, slopes = memory.recall(key, names, work)
         steps = (theta - start)[[model.index(name) for name in names]]
@@ -123,11 +123,12 @@ def _answered(
     experiment: Experiment,
     channels: Sequence[str],
     internal: Array,
+    integrator: str,
     names: Sequence[str],
 ) -> tuple[Array, Array]:
     """Channels, then efforts of drives on joints (N, k), and their derivative by the named parameters."""
     columns = [model.index(name) for name in names]
-    outputs, slopes = driven(model, theta, m, experiment, columns, internal)
+    outputs, slopes = driven(model, theta, m, experiment, columns, internal, integrator)
     seen, derivative = picked(model, outputs, slopes, slice(None), channels)
     first = len(model.output_channels)
     return np.hstack([seen, outputs[:, first:]]), np.concatenate([derivative, slopes[:, first:]], axis=1)
@@ -149,10 +150,16 @@ def first_drives(model: Model, theta: Array, m: Motion, experiment: Experiment) 
 
 
 def driven(
-    model: Model, theta: Array, m: Motion, experiment: Experiment, columns: Sequence[int], internal: Array
+    model: Model,
+    theta: Array,
+    m: Motion,
+    experiment: Experiment,
+    columns: Sequence[int],
+    internal: Array,
+    integrator: str = AUTOMATIC,
 ) -> tuple[Array, Array]:
     """Outputs with the efforts of the drives on the joints behind them, and their derivative."""
-    setup = Setup()
+    setup = Setup(integrator)
     motion = (m.position, m.velocity, m.acceleration, m.inputs)
     places, seen = _measured_states(model, experiment)
     stepping = (m.dt, setup.substeps, setup.method(model), list(columns))

@@ -15,6 +15,8 @@ from threading import Lock
 import numpy as np
 from numpy.typing import NDArray
 
+from vpm.simulate import AUTOMATIC
+
 Array = NDArray[np.float64]
 
 #: Answers that are kept for each record: what one round of a search asks, the next one asks again.
@@ -39,12 +41,20 @@ class DriveMemory:
     ----------
     keep : callable
         Filter of a record, from (N, k) to the (n, k) that are compared.
+    integrator : str, optional
+        How drives are run along the motion, as `vpm.simulate.Setup` names it.
     """
 
-    def __init__(self, keep: Filter) -> None:
-        self.keep = keep
+    def __init__(self, keep: Filter, integrator: str = AUTOMATIC) -> None:
+        self.keep, self.integrator = keep, integrator
         self._lock = Lock()
         self._answers: OrderedDict[Hashable, Answer] = OrderedDict()
+
+    def take(self, integrator: str) -> None:
+        """Run drives in another way from here on."""
+        with self._lock:
+            self.integrator = integrator
+            self._answers.clear()
 
     def recall(
         self, key: Hashable, names: Sequence[str], work: Callable[[Sequence[str]], tuple[Array, Array]]
