@@ -7,11 +7,13 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 
 import vpm
 from model_texts import DAMPED_AXIS
 from vpm.catalogue import effect_type
 from vpm.catalogue.empirical import TERMS
+from vpm.discrepancy.dependence import _other_half
 from vpm.errors import ModelError
 
 Array = NDArray[np.float64]
@@ -177,6 +179,18 @@ def test_a_rhythm_in_time_is_told_in_words_and_made_no_law() -> None:
     assert "repeats every 0.303 s whatever the machine does" in why.summary
     assert not why.empirical.formula
     assert not any(effect.name == "empirical_force" for effect in why.model.effects)
+
+
+def test_a_line_whose_phase_wanders_is_no_rhythm() -> None:
+    generator, time = np.random.default_rng(3), np.arange(0.0, 20.0, 0.01)
+    beat = np.sin(2.0 * np.pi * 4.0 * time)
+    # Noise through a lightly damped mode at the same frequency, which forgets within about a second.
+    root = np.exp((-1.0 + 2j * np.pi * 4.0) * 0.01)
+    ringing = lfilter([1.0], [1.0, -2.0 * root.real, abs(root) ** 2], generator.standard_normal(time.size))
+    for values, least, most in ((beat, 0.95, 1.0), (ringing / np.std(ringing), -np.inf, 0.1)):
+        noisy = values + 0.1 * generator.standard_normal(time.size)
+        left = _other_half(time, noisy, 4.0)
+        assert least < 1.0 - left / float(noisy @ noisy) < most
 
 
 def test_a_drift_in_time_is_told_in_words_and_made_no_law() -> None:

@@ -49,7 +49,7 @@ class Shares:
 
 @dataclass(frozen=True)
 class Rhythm:
-    """A disturbance that repeats in time: its period in s, and the share of the unseen residual that it takes."""
+    """A disturbance that repeats in time: its period in s, and the share of the unseen residual that it predicts."""
 
     period: float
     share: float
@@ -112,9 +112,11 @@ def _share(rest: Array, target: Array) -> float:
 
 
 def rhythm(data: Data, final: Judged, joint: int) -> Rhythm | None:
-    """The frequency in time that stands out of the training residual, with its share of the unseen one.
+    """The frequency in time that stands out of the training residual, with the share of the unseen one that it predicts.
 
-    The phase is free on the unseen records: nobody knows when they began in the beat of the disturbance.
+    The phase is free on the unseen records: nobody knows when they began in the beat of the disturbance. But a
+    disturbance keeps it: each half of a record has to predict the other one. Links that ring with noise have a line of
+    their own, whose phase wanders within the time in which they forget.
     """
     series = [_series(data.training, final.fit.residual, joint), _series(data.unseen, final.unseen, joint)]
     shortest = min(time[-1] - time[0] for time, _ in series[0])
@@ -127,8 +129,8 @@ def rhythm(data: Data, final: Judged, joint: int) -> Rhythm | None:
     fine = best + np.linspace(-0.2, 0.2, 41) / shortest
     best = float(fine[int(np.argmax([sum(_line(t, x, f) for t, x in series[0]) for f in fine]))])
     total = sum(float(values @ values) for _, values in series[1])
-    share = sum(_line(time, values, best) for time, values in series[1]) / total if total > 0.0 else 0.0
-    return Rhythm(1.0 / best, share)
+    left = sum(_other_half(time, values, best) for time, values in series[1])
+    return Rhythm(1.0 / best, max(0.0, 1.0 - left / total) if total > 0.0 else 0.0)
 
 
 def _series(problem: InverseDynamicsProblem, residual: Array, joint: int) -> list[tuple[Array, Array]]:
@@ -137,9 +139,24 @@ def _series(problem: InverseDynamicsProblem, residual: Array, joint: int) -> lis
     return [(b.time[::t], residual[b.samples][::t]) for b, t in zip(blocks, thin, strict=True)]
 
 
-def _line(time: Array, values: Array, frequency: float) -> float:
+def _other_half(time: Array, values: Array, frequency: float) -> float:
+    """Sum of squares that a line leaves of each half of a record when it was fitted to the other half."""
+    columns, middle = _waves(time, frequency), time.size // 2
+    halves = slice(None, middle), slice(middle, None)
+    left = 0.0
+    for seen, met in (halves, halves[::-1]):
+        size = np.linalg.lstsq(columns[seen], values[seen], rcond=None)[0]
+        left += float(np.sum((values[met] - columns[met] @ size) ** 2))
+    return left
+
+
+def _waves(time: Array, frequency: float) -> Array:
     phase = 2.0 * np.pi * frequency * time
-    columns = np.column_stack([np.cos(phase), np.sin(phase)])
+    return np.column_stack([np.cos(phase), np.sin(phase)])
+
+
+def _line(time: Array, values: Array, frequency: float) -> float:
+    columns = _waves(time, frequency)
     right = columns.T @ values
     return float(right @ np.linalg.lstsq(columns.T @ columns, right, rcond=None)[0])
 

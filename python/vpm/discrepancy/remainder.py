@@ -130,10 +130,16 @@ class _View:
     def clearly_better(self, choice: Described, left: Array) -> bool:
         """Whether a description predicts more than the effects do, as surely as an effect has to."""
         if choice.told.remark:
-            return (1.0 - choice.told.predicted) * _power(self(choice.base)) < (1.0 - WORTH_A_NAME) * _power(left)
+            own = self(choice.base)
+            return _power(own) - self._said(choice, own) < (1.0 - WORTH_A_NAME) * _power(left)
         return self.thresholds.met(gain(left, self(choice.judged), segments(self.data.unseen)))
 
     def leaves(self, choice: Described) -> float:
         """Sum of squares over all frequencies that a description leaves."""
-        left = _power(in_time(choice.judged, self.data).unseen)
-        return (1.0 - choice.told.predicted) * left if choice.told.remark else left
+        own = in_time(choice.judged, self.data).unseen
+        return _power(own) - self._said(choice, own) if choice.told.remark else _power(own)
+
+    def _said(self, choice: Described, own: Array) -> float:
+        """What a remark predicts of a residual: of the effort that it speaks of, and of nothing else."""
+        blocks = (block for block in self.data.unseen.blocks if block.channel == choice.told.channel)
+        return choice.told.predicted * sum(_power(own[block.samples]) for block in blocks)
