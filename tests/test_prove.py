@@ -120,7 +120,22 @@ def test_a_payload_behind_a_turning_axis_is_its_centre_and_inertia(seed: int) ->
         for _, records in simulated([plan])
     )
     assert np.abs(first - second).max() < 1e-6 * np.abs(first - none).max()
-    assert ("axis_rotary", "payload") in proving.ABSORBED
+    assert proving.absorbed("axis_rotary", "payload", "body")
+
+
+def test_where_the_angle_of_a_level_arm_is_counted_from_shows_nowhere() -> None:
+    """An offset of its first encoder leaves the log of an arm without one whose angles are all counted from there."""
+    hidden = _plan(MACHINES["flexible_arm"], "sensor_offset@encoder_1", 1, 0.0, recalibrate=False)
+    hidden = replace(hidden, paths=tuple(path[:, : round(0.5 * hidden.draft.rate)] for path in hidden.paths[:1]))
+    (offset,) = hidden.truth.hidden[0].parameters.values()
+    turned = replace(hidden, with_effect=hidden.without, paths=tuple(p - [[offset], [0.0]] for p in hidden.paths))
+    (_, (first,)), (_, (second,)) = (next(iter(simulated([plan]))) for plan in (hidden, turned))
+    shift = np.zeros(first.shape[1])
+    shift[0] = offset
+    assert np.abs(first[:, :, 1] - second[:, :, 1] - shift).max() < 1e-9
+    assert np.abs(first[:, :, 1] - first[:, :, 2]).max() > 0.5 * abs(offset)
+    assert proving.absorbed("flexible_arm", "sensor_offset", "encoder_1")
+    assert not proving.absorbed("flexible_arm", "sensor_offset", "encoder_2")
 
 
 def test_both_of_a_pair_have_to_be_named() -> None:

@@ -30,7 +30,9 @@ NOTHING, PAIRS = 4, 5
 #: Effects that a calibratable parameter is, exactly: a payload of a slide is its mass, one at the tip of a link the tip
 #: mass, one behind a single turning axis its centre and inertia. The oracle, which recalibrates by a straight line,
 #: leaves something of a large one, but nobody can name it.
-ABSORBED = frozenset({("axis_linear", "payload"), ("axis_rotary", "payload"), ("flexible_arm", "payload")})
+#: Nor can they name where the angle of an arm in a level plane is counted from: all directions of it are alike.
+ABSORBED = frozenset({("axis_linear", "payload", ""), ("axis_rotary", "payload", ""), ("flexible_arm", "payload", "")})
+ABSORBED |= {("flexible_arm", "sensor_offset", "encoder_1")}
 
 
 @dataclass(frozen=True)
@@ -173,11 +175,16 @@ def make(batch: Sequence[Job]) -> list[Made]:
             own: tuple[float, ...] = (case.oracle.strength,) if case.truth.hidden else ()
             if len(job.request) > 1:
                 own = tuple(strengths.get(((name,), job.seed), np.nan) for name in job.request)
-            parts = zip(own, job.request, strict=False)
-            own = tuple(0.0 if (machine, name.partition("@")[0]) in ABSORBED else s for s, name in parts)
+            parts = zip(own, case.truth.hidden, strict=False)
+            own = tuple(0.0 if absorbed(machine, h.name, h.site) else s for s, h in parts)
             slim = replace(case.oracle, with_effect=(), without_effect=())
             result.append((job, replace(case, oracle=slim), own, each, ""))
     return result
+
+
+def absorbed(machine: str, name: str, site: str) -> bool:
+    """Whether an effect at a site is one that nobody can tell from what the model has."""
+    return not ABSORBED.isdisjoint({(machine, name, ""), (machine, name, site)})
 
 
 def ask(made: Made, limit: float) -> Answer:

@@ -112,7 +112,7 @@ def _share(rest: Array, target: Array) -> float:
 
 
 def rhythm(data: Data, final: Judged, joint: int) -> Rhythm | None:
-    """The frequency in time that stands out of the training residual, with the share of the unseen one that it predicts.
+    """The frequency in time that stands out of the training residual, with what it predicts of the unseen one.
 
     The phase is free on the unseen records: nobody knows when they began in the beat of the disturbance. But a
     disturbance keeps it: each half of a record has to predict the other one. Links that ring with noise have a line of
