@@ -12,7 +12,7 @@ from vpm.discrepancy.coloured import noise_shapes, noise_spectrum
 from vpm.discrepancy.floor import noise_floor
 from vpm.discrepancy.structure import structure
 from vpm.identify import InverseDynamicsProblem, gaps
-from vpm.identify.drive_answers import apart, together
+from vpm.identify.drive_answers import SLOPE_STEP, apart, together
 from vpm.identify.drive_memory import DriveMemory
 from vpm.identify.drives_apart import drives_of
 from vpm.model import Model
@@ -58,16 +58,27 @@ def test_long_steps_show_less_than_the_noise(exact: Exact, monkeypatch: pytest.M
     quick = InverseDynamicsProblem(model, training.experiments)
     quick.take_long_steps()
     assert set(quick.integrators) == {"linearly_implicit"}
-    columns = [model.index(name) for name in ("servo.valve.flow_gain", "pump.oil.bulk_modulus")]
+    assert training.motions[0].dt < SLOPE_STEP
+    columns = [
+        model.index(name) for name in ("servo.valve.flow_gain", "pump.oil.bulk_modulus", "servo.valve.frequency")
+    ]
     residual, slopes = training.evaluate(model, model.theta, columns)
     rough, rough_slopes = quick.evaluate(model, model.theta, columns)
     assert 0.0 < np.linalg.norm(rough - residual) < 0.03 * np.linalg.norm(residual)
-    assert np.linalg.norm(rough_slopes - slopes) < 0.01 * np.linalg.norm(slopes)
+    assert np.all(np.linalg.norm(rough_slopes - slopes, axis=0) < 0.01 * np.linalg.norm(slopes, axis=0))
     monkeypatch.setattr(import_module(InverseDynamicsProblem.__module__), "ROUGH", 1e-9)
     exacting = InverseDynamicsProblem(model, training.experiments)
     exacting.take_long_steps()
     assert set(exacting.integrators) == {"auto"}
     np.testing.assert_array_equal(exacting.evaluate(model, model.theta)[0], residual)
+
+
+def test_what_later_commands_ask_for_is_not_remembered_from_others(exact: Exact) -> None:
+    model, training, _ = exact
+    residual, _ = training.evaluate(model, model.theta)
+    later, _ = training.later().evaluate(model, model.theta)
+    assert np.linalg.norm(later - residual) > 0.03 * np.linalg.norm(residual)
+    np.testing.assert_array_equal(training.evaluate(model, model.theta)[0], residual)
 
 
 @pytest.mark.parametrize("name", ["slide.mass", "axis.friction.viscous", "servo.valve.flow_gain"])

@@ -20,6 +20,10 @@ from vpm.simulate import AUTOMATIC, Setup
 
 Array = NDArray[np.float64]
 
+#: Where drives are run by one step per sample, derivatives are taken by steps of up to this, s: what is compared
+#: of them is ten times as slow, and each costs as much as the run itself.
+SLOPE_STEP = 2e-3
+
 
 def picked(model: Model, outputs: Array, jacobian: Array, rows: slice, channels: Sequence[str]) -> tuple[Array, Array]:
     """Some outputs with their derivative; of what a machine lacks, nothing shows."""
@@ -128,10 +132,36 @@ def _answered(
 ) -> tuple[Array, Array]:
     """Channels, then efforts of drives on joints (N, k), and their derivative by the named parameters."""
     columns = [model.index(name) for name in names]
-    outputs, slopes = driven(model, theta, m, experiment, columns, internal, integrator)
+    run = partial(driven, model, theta, m, experiment, internal=internal, integrator=integrator)
+    every = int(SLOPE_STEP / m.dt + 1e-6) if integrator != AUTOMATIC else 1
+    if not columns or every < 2:
+        return _shown(model, *run(columns), channels)
+    values, _ = _shown(model, *run(()), channels)
+    _, slopes = _shown(model, *run(columns, every=every), channels)
+    return values, _between(slopes, every, len(values))
+
+
+def _shown(model: Model, outputs: Array, slopes: Array, channels: Sequence[str]) -> tuple[Array, Array]:
+    """Channels, then efforts of drives on joints, of all that drives answer, and their derivative."""
     seen, derivative = picked(model, outputs, slopes, slice(None), channels)
     first = len(model.output_channels)
     return np.hstack([seen, outputs[:, first:]]), np.concatenate([derivative, slopes[:, first:]], axis=1)
+
+
+def _thinned(m: Motion, every: int) -> Motion:
+    """Every so many samples of a motion, with commands that hold in the mean what they held."""
+    rows = np.arange(0, len(m.time), every)
+    held = np.add.reduceat(m.inputs, rows) / np.diff(np.append(rows, len(m.time)))[:, None]
+    motion = {name: getattr(m, name)[rows] for name in ("time", "position", "velocity", "acceleration")}
+    return replace(m, **motion, inputs=held, dt=every * m.dt)
+
+
+def _between(slopes: Array, every: int, samples: int) -> Array:
+    """Derivatives at all samples from those at every so many."""
+    from scipy.interpolate import CubicSpline
+
+    grid = every * np.arange(len(slopes))
+    return np.asarray(CubicSpline(grid, slopes)(np.minimum(np.arange(samples), grid[-1])))
 
 
 def first_drives(model: Model, theta: Array, m: Motion, experiment: Experiment) -> Array:
@@ -157,13 +187,15 @@ def driven(
     columns: Sequence[int],
     internal: Array,
     integrator: str = AUTOMATIC,
+    every: int = 1,
 ) -> tuple[Array, Array]:
-    """Outputs with the efforts of the drives on the joints behind them, and their derivative."""
+    """Outputs and efforts of the drives on their joints, and their derivative, at ``every`` so many samples."""
     setup = Setup(integrator)
+    m = m if every == 1 else _thinned(m, every)
     motion = (m.position, m.velocity, m.acceleration, m.inputs)
     places, seen = _measured_states(model, experiment)
     stepping = (m.dt, setup.substeps, setup.method(model), list(columns))
-    outputs, _, jacobian = model.core.simulate_drives(theta, *motion, internal, places, seen, *stepping)
+    outputs, _, jacobian = model.core.simulate_drives(theta, *motion, internal, places, seen[::every], *stepping)
     return outputs, jacobian
 
 

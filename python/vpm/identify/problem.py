@@ -199,7 +199,9 @@ class InverseDynamicsProblem:
         """The same, but for commands, each of which holds from the sample after its own on."""
         moved = tuple(replace(m, inputs=np.concatenate([m.inputs[:1], m.inputs[:-1]])) for m in self._whole)
         same = copy(self)
-        vars(same)["_whole"] = moved
+        # What drives answered to commands at their own times is no answer to these.
+        memories = tuple(DriveMemory(memory.keep, memory.integrator) for memory in self._memories)
+        vars(same).update(_whole=moved, _memories=memories)
         return same
 
     def evaluate(
