@@ -96,10 +96,3 @@ impl<'a> Course<'a> {
         row
     }
 }
-
-/// Duration in s of each of `count` steps, see [`Course`].
-pub fn time_steps(setting: Setting<'_>, initial_state: &[f64], inputs: Table<'_>, count: usize) -> Result<Vec<f64>> {
-    let mut durations = vec![0.0; count];
-    Course::new(setting, initial_state, inputs)?.time(&mut durations)?;
-    Ok(durations)
-}

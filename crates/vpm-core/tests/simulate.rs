@@ -13,7 +13,7 @@ use vpm_core::inverse::{Motion, inverse_dynamics};
 use vpm_core::samples::{Random, arm7, double_pendulum, pendulum, slider};
 use vpm_core::simulate::{Setting, Stepping, free_run};
 use vpm_core::table::Table;
-use vpm_core::timing::time_steps;
+use vpm_core::timing::Course;
 
 /// A positioning axis: friction, delay, a cascade.
 fn axis() -> Machine {
@@ -182,8 +182,8 @@ fn steps_are_timed_one_by_one() {
     let bench = Bench::new(&axis(), 1e-3, 1, Method::LinearlyImplicit);
     let inputs = [0.1; 10];
     let table = Table::new("inputs", &inputs, 10, 1).unwrap();
-    let durations = time_steps(bench.setting(), &[0.0, 0.0], table, 37).unwrap();
-    assert_eq!(durations.len(), 37);
+    let mut durations = [-1.0; 37];
+    Course::new(bench.setting(), &[0.0, 0.0], table).unwrap().time(&mut durations).unwrap();
     assert!(durations.iter().all(|&duration| duration >= 0.0) && durations.iter().sum::<f64>() > 0.0);
 }
 
