@@ -50,6 +50,12 @@ def stop_when(asked: Callable[[], bool] | None) -> None:
     Ctrl-C reaches Python's main thread only; this is how it tells the threads that work for it. None ends it.
     """
 
+def plastic_flights(pull: ArrayLike, gaps: ArrayLike, interval: float) -> NDArray[np.float64]:
+    """Acceleration (N, k) of a link against the motor in plays of k widths, ``pull`` (N,) moving it between impacts.
+
+    Every impact is plastic: where the link arrives it stays until ``pull`` turns.
+    """
+
 def check_integrator(name: str) -> None:
     """Raise ``ValueError`` for a name that is no integrator's, or a tolerance in it that means nothing."""
 
@@ -295,11 +301,35 @@ class System:
         acceleration: ArrayLike,
         time_step: float,
         sensitivities: Sequence[int] = ...,
+        effects: bool = ...,
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Effort (N, n) that a measured motion needs, as in `inverse_dynamics`, and its derivatives (N, n, k).
 
-        The drives may be any: what they deliver does not enter.
+        The drives may be any: what they deliver does not enter. Without ``effects`` those on joints are left out, see
+        `effort_of_effect`.
         """
+    def effort_of_effect(
+        self,
+        theta: ArrayLike,
+        effect: int,
+        position: ArrayLike,
+        velocity: ArrayLike,
+        acceleration: ArrayLike,
+        time_step: float,
+        sensitivities: Sequence[int] = ...,
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Effort (N,) that one effect of the description puts on its joint along a measured motion (N, n).
+
+        All of them together with `required` without effects are what `required` gives, but for a share of the load that
+        an effect takes.
+
+        Returns
+        -------
+        effort, jacobian : ndarray
+            (N,), and its derivatives (N, k).
+        """
+    def check(self, theta: ArrayLike) -> None:
+        """Raise ValueError for parameters with which the machine does not exist."""
     def delivered(
         self, theta: ArrayLike, inputs: ArrayLike, time_step: float, sensitivities: Sequence[int] = ...
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -197,6 +197,12 @@ impl Description {
         check_regular(&model, &mut Data::new(&model))
     }
 
+    /// Whether all laws are defined with these parameters: right length, finite, each within its domain. Whether the machine moves with
+    /// them, [`Description::check_values`] says.
+    pub(crate) fn check_numbers(&self, theta: &[f64]) -> Result<()> {
+        check::parameters(self, theta)
+    }
+
     /// The machine with the parameters `theta`, after [`Description::check_values`].
     pub fn system<S: Scalar>(&self, theta: &[S]) -> Result<System<S>> {
         let values: Vec<f64> = theta.iter().map(Scalar::re).collect();
@@ -264,14 +270,22 @@ impl EffectEntry {
         }
     }
 
-    fn on_joint<S: Scalar>(&self, theta: &[S]) -> Option<(usize, crate::effect::JointEffect<S>)> {
+    /// The joint that it puts an effort on; none for what belongs to the tree.
+    pub(crate) fn joint(&self) -> Option<usize> {
+        match self {
+            Self::Joint { joint, .. } | Self::Hysteresis { joint, .. } => Some(*joint),
+            Self::Payload { .. } | Self::Tree(_) => None,
+        }
+    }
+
+    pub(crate) fn on_joint<S: Scalar>(&self, theta: &[S]) -> Option<(usize, crate::effect::JointEffect<S>)> {
         match self {
             Self::Joint { joint, law } => Some((*joint, law.map(&mut |&index| theta[index]))),
             Self::Payload { .. } | Self::Hysteresis { .. } | Self::Tree(_) => None,
         }
     }
 
-    fn with_memory<S: Scalar>(&self, theta: &[S]) -> Option<(usize, crate::effect::Hysteresis<S>)> {
+    pub(crate) fn with_memory<S: Scalar>(&self, theta: &[S]) -> Option<(usize, crate::effect::Hysteresis<S>)> {
         match self {
             Self::Hysteresis { joint, law } => Some((*joint, law.map(&mut |&index| theta[index]))),
             Self::Payload { .. } | Self::Joint { .. } | Self::Tree(_) => None,

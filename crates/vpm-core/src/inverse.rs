@@ -1,7 +1,7 @@
 //! Inverse dynamics of a whole record: the effort that the motion needs against the effort that the actuators deliver.
 
 use crate::actuator::{Drive, Target};
-use crate::description::Description;
+use crate::description::{Description, EffectEntry};
 use crate::error::{DriveError, Error, Result};
 use crate::motion::{JointMotion, position_sensors};
 use crate::scalar::Scalar;
@@ -106,26 +106,95 @@ pub fn required(
     description: &Description,
     theta: &[f64],
     (motion, time_step): (JointMotion<'_>, f64),
+    part: Part,
     sensitivities: &[usize],
     interrupt: Interrupt<'_>,
 ) -> Result<(Vec<f64>, Vec<f64>)> {
     if let Some((beam, _)) = description.beams.iter().zip(description.elastic()).find(|(_, len)| **len > 0) {
         return Err(Error::Flexible { beam: beam.name.clone() });
     }
+    check_motion(description, motion)?;
+    check_time_step(time_step)?;
+    let job = Required { description, motion, time_step, part, interrupt };
+    let (pair, jacobian) = differentiate(&job, theta, sensitivities, |pass: &Pair<_>, place| pass.first[place])?;
+    Ok((pair.first, jacobian))
+}
+
+/// Efforts that the effect with the given number puts on its joint along a measured motion, one per sample, and their derivatives: what
+/// it takes off the efforts of [`required`]. A number beyond the effects, and one of an effect that belongs to the tree, is an error.
+///
+/// An effect that follows the load of its joint counts without that: its share depends on all others.
+pub fn effort_of_effect(
+    description: &Description,
+    theta: &[f64],
+    (motion, time_step): (JointMotion<'_>, f64),
+    effect: usize,
+    sensitivities: &[usize],
+) -> Result<(Vec<f64>, Vec<f64>)> {
+    check_motion(description, motion)?;
+    check_time_step(time_step)?;
+    description.check_numbers(theta)?;
+    let law = || {
+        let what = "the request for an effort".to_owned();
+        Error::Reference { what, target: "effect on a joint", index: effect, count: description.effects.len() }
+    };
+    let entry = description.effects.get(effect).filter(|entry| entry.joint().is_some()).ok_or_else(law)?;
+    let job = OfEffect { description, motion, time_step, entry };
+    let (pair, jacobian) = differentiate(&job, theta, sensitivities, |pass: &Pair<_>, place| pass.first[place])?;
+    Ok((pair.first, jacobian))
+}
+
+fn check_motion(description: &Description, motion: JointMotion<'_>) -> Result<()> {
     let (rows, joints) = (motion.position.rows(), description.n_joints());
     motion.position.expect("position", rows, joints)?;
     motion.velocity.expect("velocity", rows, joints)?;
-    motion.acceleration.expect("acceleration", rows, joints)?;
-    check_time_step(time_step)?;
-    let job = Required { description, motion, time_step, interrupt };
-    let (pair, jacobian) = differentiate(&job, theta, sensitivities, |pass: &Pair<_>, place| pass.first[place])?;
-    Ok((pair.first, jacobian))
+    motion.acceleration.expect("acceleration", rows, joints)
+}
+
+struct OfEffect<'a> {
+    description: &'a Description,
+    motion: JointMotion<'a>,
+    time_step: f64,
+    entry: &'a EffectEntry,
+}
+
+impl Job for OfEffect<'_> {
+    fn run<S: Scalar>(&self, theta: &[S]) -> Result<Pair<S>> {
+        let Some(joint) = self.entry.joint() else { return Ok(Pair { first: Vec::new(), second: Vec::new() }) };
+        let sensors = position_sensors(self.description, theta);
+        let behind = |k| self.motion.behind(self.time_step, k, joint, sensors[joint].as_ref());
+        let rows = 0..self.motion.position.rows();
+        let first = match (self.entry.on_joint(theta), self.entry.with_memory(theta)) {
+            (Some((_, law)), _) => rows.map(|k| behind(k)).map(|[q, v, _]| law.effort(q, v)).collect(),
+            (None, Some((_, law))) => {
+                let (mut memory, mut before) = (S::zero(), None);
+                let next = |[q, _, _]: [S; 3]| {
+                    memory = before.map_or(memory, |before| law.advance(memory, q - before));
+                    before = Some(q);
+                    law.effort(memory)
+                };
+                rows.map(|k| behind(k)).map(next).collect()
+            }
+            (None, None) => Vec::new(),
+        };
+        Ok(Pair { first, second: Vec::new() })
+    }
+}
+
+/// Which part of what a motion needs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Part {
+    /// All of it.
+    Whole,
+    /// Without the effects on joints, see [`effort_of_effect`].
+    WithoutEffects,
 }
 
 struct Required<'a> {
     description: &'a Description,
     motion: JointMotion<'a>,
     time_step: f64,
+    part: Part,
     interrupt: Interrupt<'a>,
 }
 
@@ -134,6 +203,9 @@ impl Job for Required<'_> {
         let values: Vec<f64> = theta.iter().map(Scalar::re).collect();
         self.description.check_values(&values)?;
         let mut dynamics = Build::dynamics(&self.description, theta)?;
+        if self.part == Part::WithoutEffects {
+            dynamics.leave_effects();
+        }
         let sensors = position_sensors(self.description, theta);
         let Self { motion, time_step, interrupt, .. } = *self;
         let (first, _) = efforts_of_motion(&mut dynamics, &sensors, motion, time_step, interrupt)?;

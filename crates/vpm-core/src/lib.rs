@@ -18,6 +18,7 @@ pub mod dynamics;
 pub mod effect;
 pub mod error;
 pub mod evaluate;
+pub mod flight;
 pub mod integrator;
 pub mod inverse;
 pub mod joint;

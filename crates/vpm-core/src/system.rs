@@ -115,6 +115,12 @@ impl<S: Scalar> Dynamics<S> {
         Self { memories: Memories::new(laws), ..self }
     }
 
+    /// Leaves out all effects on joints; those of the tree stay.
+    pub(crate) fn leave_effects(&mut self) {
+        self.effects.clear();
+        self.memories = Memories::new(Vec::new());
+    }
+
     /// Number of joints.
     #[inline]
     pub fn joints(&self) -> usize {

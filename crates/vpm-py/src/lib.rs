@@ -7,6 +7,7 @@ use pyo3::prelude::*;
 mod arrays;
 mod dynamics;
 mod errors;
+mod flight;
 mod interrupt;
 mod linkage;
 mod narx;
@@ -22,6 +23,8 @@ mod _core {
     use crate::dynamics::Dynamics;
     #[pymodule_export]
     use crate::errors::Diverged;
+    #[pymodule_export]
+    use crate::flight::plastic_flights;
     #[pymodule_export]
     use crate::interrupt::stop_when;
     #[pymodule_export]

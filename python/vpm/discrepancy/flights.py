@@ -51,10 +51,13 @@ def flights(model: Model, site: str, data: InverseDynamicsProblem, gaps: Sequenc
     gaps : sequence of float
         Widths, m or rad.
     """
+    import vpm._core as core
+
+    fly = getattr(core, "plastic_flights", None) or (lambda p, g, i: _swing(p, np.asarray(g), i))
     added = []
     for m in data.motions:
         course = _course(model, site, m)
-        swing = _swing(course.pull, np.asarray(gaps), course.interval)
+        swing = fly(course.pull, gaps, course.interval)
         added.append(course.column[:, :, None] * swing[:, None, :])
     return data.added(added)
 

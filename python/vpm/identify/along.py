@@ -8,7 +8,7 @@ without a sensor, and the states inside of drives.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 
@@ -19,8 +19,11 @@ from vpm.errors import DivergedError, SimulationError, VpmError
 from vpm.experiment import Experiment, Motion
 from vpm.identify.drive_answers import apart, driven, first_drives, needed, picked, together
 from vpm.identify.drive_memory import DriveMemory, Filter
+from vpm.identify.effort_parts import delivered, part_delivered, parts_needed
+from vpm.identify.effort_parts import needed as needed_by_parts
 from vpm.identify.gauges import Hold
-from vpm.identify.reuse import Kept, Parts, parts_of
+from vpm.identify.hidden_motion import with_hidden
+from vpm.identify.reuse import Kept
 from vpm.initial import whole_motion
 from vpm.model import Model
 from vpm.simulate import Setup, copied_channels
@@ -176,8 +179,14 @@ def respond(
                 return _with_known_drives(model, bare, theta, m, experiment, (columns, channels), remembered)
             answer = _with_both(model, theta, m, experiment, columns, channels)
         elif has_hidden(model, m.joints):
-            answer = _with_hidden(model, theta, m, columns, channels, kept or Kept(), origin)
+            remembered = memory or DriveMemory(lambda values: values[m.kept])
+            near = kept or Kept()
+            swing = partial(_swung, m=m, hold=near.hold)
+            return Response(*with_hidden(model, theta, m, (columns, channels), (remembered, near, origin), swing))
         else:
+            known = None if memory is None else _by_parts(model, theta, m, (columns, channels), memory)
+            if known is not None:
+                return known
             answer = _rigid(model, theta, m, columns, channels)
         return answer if memory is None else _filtered(answer, memory.keep)
     except Diverged as error:
@@ -210,6 +219,20 @@ def _rigid(model: Model, theta: Array, m: Motion, columns: Sequence[int], channe
     nothing = np.zeros((len(m.time[rows]), len(channels)))
     slopes = np.zeros((*nothing.shape, len(columns)))
     return Response(required[rows], applied[rows], jacobian[rows], nothing, slopes)
+
+
+def _by_parts(
+    model: Model, theta: Array, m: Motion, wanted: tuple[Sequence[int], Sequence[str]], memory: DriveMemory
+) -> Response | None:
+    """The same of parts that are worked out once; None where they do not add up."""
+    (columns, channels), parts, drives = wanted, parts_needed(model), part_delivered(model)
+    if parts is None or drives is None:
+        return None
+    names = [model.parameter_names[column] for column in columns]
+    required, slopes = needed_by_parts(parts, model, theta, m, names, memory)
+    applied, less = delivered(drives, model, theta, m, names, memory)
+    nothing = np.zeros((len(required), len(channels)))
+    return Response(required, applied, slopes - less, nothing, np.zeros((*nothing.shape, len(columns))))
 
 
 def shows_drives_alone(model: Model, channels: Sequence[str]) -> bool:
@@ -305,73 +328,7 @@ def _with_both(
     )
 
 
-def _with_hidden(
-    model: Model,
-    theta: Array,
-    m: Motion,
-    columns: Sequence[int],
-    channels: Sequence[str],
-    kept: Kept,
-    origin: Array | None,
-) -> Response:
-    """Elastic links, and joints that nobody measures, on the motion of the others; ideal drives."""
-    measured = [place for place, joint in enumerate(model.joints) if joint in m.joints]
-    read = [f"{model.joints[place]}.effort" for place in measured] + list(channels)
-
-    def bend(machine: Model, values: Array, wanted: Sequence[int]) -> tuple[Array, Array]:
-        return picked(machine, *_swung(machine, values, m, wanted, kept.hold), slice(None), read)
-
-    parts = parts_of(model, m.joints)
-    if parts is None:
-        outputs, jacobian = bend(model, theta, columns)
-    else:
-        outputs, jacobian = _bent(parts, theta, columns, partial(kept.near, work=bend), origin)
-        _add_laws(parts, theta, m, columns, outputs, jacobian)
-    rows, efforts = m.kept, len(measured)
-    applied, slopes = model.core.delivered(theta, m.inputs, m.dt, list(columns))
-    return Response(
-        outputs[rows][:, :efforts],
-        applied[rows][:, measured],
-        (jacobian[:, :efforts] - slopes[:, measured])[rows],
-        outputs[rows][:, efforts:],
-        jacobian[rows][:, efforts:],
-    )
-
-
-def _bent(
-    parts: Parts, theta: Array, columns: Sequence[int], near: Callable[..., tuple[Array, Array]], origin: Array | None
-) -> tuple[Array, Array]:
-    """Channels of the bare machine and their derivative by ``columns`` of the whole one; copies."""
-    places = parts.places.tolist()
-    mine = {column: places.index(column) for column in columns if column in parts.moving}
-    values = theta[places]
-    start = values if origin is None else np.where(parts.still, values, origin[places])
-    channels, slopes = near(parts, start, values, list(mine.values()))
-    jacobian = np.zeros((*channels.shape, len(columns)))
-    for k, column in enumerate(mine):
-        jacobian[:, :, columns.index(column)] = slopes[:, :, k]
-    return channels.copy(), jacobian
-
-
-def _add_laws(parts: Parts, theta: Array, m: Motion, columns: Sequence[int], channels: Array, jacobian: Array) -> None:
-    """Add what the laws of joints take, the difference of two machines with rigid links, to the efforts."""
-    if parts.laws is None or parts.shell is None:
-        return
-    motion = (m.position, m.velocity, m.acceleration, m.inputs, m.dt)
-    mine, bare = parts.of_laws.tolist(), parts.of_shell.tolist()
-    with_laws = [column for column in columns if column in parts.felt and column in mine]
-    without = [column for column in with_laws if column in bare]
-    required, _, slopes = parts.laws.core.inverse_dynamics(theta[mine], *motion, [mine.index(c) for c in with_laws])
-    plain, _, less = parts.shell.core.inverse_dynamics(theta[bare], *motion, [bare.index(c) for c in without])
-    efforts = required.shape[1]
-    channels[:, :efforts] += required - plain
-    for k, column in enumerate(with_laws):
-        jacobian[:, :efforts, columns.index(column)] += slopes[:, :, k]
-    for k, column in enumerate(without):
-        jacobian[:, :efforts, columns.index(column)] -= less[:, :, k]
-
-
-def _swung(model: Model, theta: Array, m: Motion, columns: Sequence[int], hold: Hold | None) -> tuple[Array, Array]:
+def _swung(model: Model, theta: Array, columns: Sequence[int], m: Motion, hold: Hold | None) -> tuple[Array, Array]:
     """As `_hidden`, with derivatives on fewer samples where gauges hold links: each costs as much as the outputs.
 
     What rings freely would lose its phase by that.

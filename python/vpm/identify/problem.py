@@ -164,7 +164,8 @@ class InverseDynamicsProblem:
         self.joints = tuple(measured[place] for place in self._joints)
         #: Channels beside the balance that are compared too: what shows inside of drives, strains of links.
         self.shown = shown_channels(model, measured, experiments)
-        self._memories = tuple(DriveMemory(m.parallel, integrator) for m in self.motions)
+        origin = {name: parameter.value for name, parameter in model.parameters.items()}
+        self._memories = tuple(DriveMemory(m.parallel, integrator, origin) for m in self.motions)
         self._compared = tuple(self._measured(m, e) for m, e in zip(self.motions, self.experiments, strict=True))
         self._gains = self._hold_gains(model)
         self._kept = self._held(self.experiments, self.motions)
@@ -199,8 +200,8 @@ class InverseDynamicsProblem:
         """The same, but for commands, each of which holds from the sample after its own on."""
         moved = tuple(replace(m, inputs=np.concatenate([m.inputs[:1], m.inputs[:-1]])) for m in self._whole)
         same = copy(self)
-        # What drives answered to commands at their own times is no answer to these.
-        memories = tuple(DriveMemory(memory.keep, memory.integrator) for memory in self._memories)
+        # What drives answered to commands at their own times is no answer to these; what the motion needs is.
+        memories = tuple(memory.under(commands=1) for memory in self._memories)
         vars(same).update(_whole=moved, _memories=memories)
         return same
 

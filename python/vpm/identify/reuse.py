@@ -71,14 +71,19 @@ class Parts:
     structure: str
 
 
-@lru_cache(maxsize=128)
 def parts_of(model: Model, joints: tuple[str, ...]) -> Parts | None:
     """Split a machine whose measured ``joints`` are all that it has beside plays; None where nothing bends or flies.
 
     Where a joint remembers its way, joints that wind up count as plays do: a motion that is worked out carries no
     memory along, and the measured joint, on the side of the motor, is the one that remembers.
     """
-    splits = SPLITTING if any(effect.name == REMEMBERS for effect in model.effects) else frozenset({"backlash"})
+    remembers = any(effect.name == REMEMBERS for effect in model.effects)
+    return split(model, joints, SPLITTING if remembers else frozenset({"backlash"}))
+
+
+@lru_cache(maxsize=128)
+def split(model: Model, joints: tuple[str, ...], splits: frozenset[str]) -> Parts | None:
+    """The same where all ``splits``, effects that bring a coordinate of their own, count as plays do."""
     plays = [e for e in model.effects if e.name in splits and f"{e.at}_deflection" in model.joints]
     flying = {f"{e.at}_deflection" for e in plays}
     if tuple(joint for joint in model.joints if joint not in flying) != joints:
