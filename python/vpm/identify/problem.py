@@ -193,7 +193,7 @@ class InverseDynamicsProblem:
                 rough = self._answer(model, model.theta, record)
             except DivergedError:
                 rough = None
-            if rough is None or not _alike(exact, rough):
+            if rough is None or not _alike(exact, rough, self._compared[record]):
                 memory.take(known)
 
     def later(self) -> InverseDynamicsProblem:
@@ -425,11 +425,17 @@ class InverseDynamicsProblem:
         return np.concatenate([(x.T * (block.weight * block.moving)).T for x, block in scaled])
 
 
-def _alike(exact: Response, rough: Response) -> bool:
-    """Whether what drives answer differs by less than `ROUGH` of its size."""
-    pairs = [(exact.applied, rough.applied), (exact.seen, rough.seen)]
-    sizes = [(np.linalg.norm(a - b, axis=0), np.linalg.norm(a, axis=0)) for a, b in pairs]
-    return all(bool(np.all(off <= ROUGH * size)) for off, size in sizes)
+def _alike(exact: Response, rough: Response, measured: Array) -> bool:
+    """Whether what drives answer differs by less than `ROUGH` of its size, or of what was measured in its place.
+
+    Where something is missing the one may be many times the other, and it is the measured one that is to be explained.
+    """
+    triples = [(exact.applied, rough.applied, exact.applied), (exact.seen, rough.seen, measured)]
+    for one, other, log in triples:
+        size = np.maximum(np.linalg.norm(one, axis=0), np.linalg.norm(log, axis=0))
+        if np.any(np.linalg.norm(one - other, axis=0) > ROUGH * size):
+            return False
+    return True
 
 
 def _each(value: float | Sequence[float] | None, records: Sequence[Experiment]) -> Sequence[float | None]:
