@@ -62,12 +62,15 @@ class DriveMemory:
         self.commands = 0
         self._lock = Lock()
         self._answers: OrderedDict[Hashable, Answer] = OrderedDict()
+        #: How many numbers the answers hold; in a list, for it is one memory whatever the commands.
+        self._numbers = [0]
 
     def take(self, integrator: str) -> None:
         """Run drives in another way from here on."""
         with self._lock:
             self.integrator = integrator
             self._answers.clear()
+            self._numbers[0] = 0
 
     def under(self, commands: int) -> DriveMemory:
         """The same memory, asked about drives that are given other commands."""
@@ -104,9 +107,9 @@ class DriveMemory:
     def _keep(self, key: Hashable, answer: Answer) -> None:
         with self._lock:
             # What is read elsewhere is never changed: an answer that learnt more takes its place.
+            before = self._answers.pop(key, None)
             self._answers[key] = answer
-            self._answers.move_to_end(key)
-            numbers = sum(each.numbers for each in self._answers.values())
-            while len(self._answers) > KEPT or (numbers > MOST_NUMBERS and len(self._answers) > 1):
+            self._numbers[0] += answer.numbers - (before.numbers if before else 0)
+            while len(self._answers) > KEPT or (self._numbers[0] > MOST_NUMBERS and len(self._answers) > 1):
                 _, oldest = self._answers.popitem(last=False)
-                numbers -= oldest.numbers
+                self._numbers[0] -= oldest.numbers

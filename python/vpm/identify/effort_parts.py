@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -133,19 +133,30 @@ def needed(parts: Parts, model: Model, theta: Array, m: Motion, names: Sequence[
         The machine does not exist with these parameters.
     """
     model.core.check(theta)
-    efforts, slopes = of_tree(parts.tree, model, theta, m, names, memory)
-    required = efforts.copy()
-    for law in parts.laws:
+    required, slopes = of_tree(parts.tree, model, theta, m, names, memory)
+    if not parts.laws:
+        return required, slopes
+    taken, own = of_laws(parts.laws, model, theta, m, names, memory)
+    return required - taken, slopes - own
 
-        def work(values: Array, asked: Sequence[int], number: int = law.number) -> Pair:
-            motion = (m.position, m.velocity, m.acceleration, m.dt)
-            effort, own = model.core.effort_of_effect(values, number, *motion, list(asked))
-            return effort[:, None], own[:, None]
 
-        effort, own = _answer(law, model, theta, names, (memory, work))
-        required[:, law.joint] -= effort[:, 0]
-        slopes[:, law.joint] -= own[:, 0]
-    return required, slopes
+def of_laws(
+    laws: Sequence[Part], model: Model, theta: Array, m: Motion, names: Sequence[str], memory: DriveMemory
+) -> Pair:
+    """What effects, at least one, put on the joints (n, joints), filtered, and its derivative."""
+
+    def work(number: int, values: Array, asked: Sequence[int]) -> Pair:
+        motion = (m.position, m.velocity, m.acceleration, m.dt)
+        effort, own = model.core.effort_of_effect(values, number, *motion, list(asked))
+        return effort[:, None], own[:, None]
+
+    answers = [_answer(law, model, theta, names, (memory, partial(work, law.number))) for law in laws]
+    total = np.zeros((len(answers[0][0]), len(model.joints)))
+    slopes = np.zeros((*total.shape, len(names)))
+    for law, (effort, own) in zip(laws, answers, strict=True):
+        total[:, law.joint] += effort[:, 0]
+        slopes[:, law.joint] += own[:, 0]
+    return total, slopes
 
 
 def of_tree(tree: Part, model: Model, theta: Array, m: Motion, names: Sequence[str], memory: DriveMemory) -> Pair:

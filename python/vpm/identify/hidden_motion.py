@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from vpm.experiment import Motion
 from vpm.identify.drive_answers import picked
 from vpm.identify.drive_memory import DriveMemory
-from vpm.identify.effort_parts import delivered, needed, of_tree, part_delivered, parts_needed
+from vpm.identify.effort_parts import delivered, needed, of_laws, of_tree, part_delivered, parts_needed
 from vpm.identify.reuse import SPLITTING, Kept, Parts, parts_of, split
 from vpm.model import Model
 
@@ -129,6 +129,10 @@ def _with_laws(
     if parts is None or plain is None:
         required, slopes = _required(whole, theta, m, names, memory)
         less, own = _required(shell, bare, m, shared, memory)
+    elif parts.tree.text == plain.tree.text:
+        whole.core.check(theta)
+        taken, slopes = of_laws(parts.laws, whole, theta, m, names, memory)
+        return -taken, -slopes
     else:
         required, slopes = needed(parts, whole, theta, m, names, memory)
         less, own = of_tree(plain.tree, shell, bare, m, shared, memory)

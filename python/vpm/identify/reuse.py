@@ -9,10 +9,11 @@ from __future__ import annotations
 
 import json
 from collections import OrderedDict
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from threading import Lock
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -93,9 +94,8 @@ def split(model: Model, joints: tuple[str, ...], splits: frozenset[str]) -> Part
     aside = [e for e in model.effects if e.type.site in {"joint", "actuator"} and e.name not in SPLITTING]
     if len(aside) + len(plays) < sum(e.type.site in {"joint", "actuator"} for e in model.effects):
         return None
-    bare = model
-    for effect in aside:
-        bare = bare.without_effect(effect.name, effect.at)
+    content = model.to_dict()
+    bare = _without(content, aside)
     places = np.array([model.index(name) for name in bare.parameter_names], dtype=np.int64)
     owners = {*model.actuators, *model.controllers}
     still = np.array([name.partition(".")[0] in owners for name in bare.parameter_names], dtype=np.bool_)
@@ -109,17 +109,28 @@ def split(model: Model, joints: tuple[str, ...], splits: frozenset[str]) -> Part
     felt = {model.index(name) for effect in laws for name in effect.parameter_names.values()}
     read = [effect for effect in model.effects if effect.type.site == "sensor"]
     felt |= {model.index(name) for effect in read for name in effect.parameter_names.values()}
-    whole, shell = _held(model, plays), _held(bare, plays)
+    # With rigid links; a beam that bends by an effect does so at every level.
+    bent = [*plays, *(effect for effect in model.effects if effect.name == "link_flexibility")]
+    rigid = bool(model.core.n_elastic)
+    whole, shell = (_without(content, effects, rigid=rigid) for effects in (bent, [*bent, *aside]))
     of_laws, of_shell = (np.array([model.index(n) for n in m.parameter_names], dtype=np.int64) for m in (whole, shell))
     return Parts(bare, places, whole, shell, of_laws, of_shell, frozenset(felt), moving, still, structure)
 
 
-def _held(model: Model, plays: Sequence[Effect]) -> Model:
-    """The machine with rigid links and without its plays; a beam that bends by an effect does so at every level."""
-    bent = [effect for effect in model.effects if effect.name == "link_flexibility"]
-    for effect in (*plays, *bent):
-        model = model.without_effect(effect.name, effect.at)
-    return model.at("rigid") if model.core.n_elastic else model
+def _without(content: Mapping[str, Any], effects: Sequence[Effect], *, rigid: bool = False) -> Model:
+    """The machine of a model file's content without some effects, and with rigid links."""
+    gone = {(effect.name, effect.at) for effect in effects}
+    kept = [entry for entry in content.get("effects", ()) if (entry["type"], entry["at"]) not in gone]
+    changed = {**content, "effects": kept}
+    if rigid:
+        changed["beams"] = {name: {**beam, "level": "rigid"} for name, beam in content["beams"].items()}
+    return _machine(json.dumps(changed))
+
+
+@lru_cache(maxsize=128)
+def _machine(text: str) -> Model:
+    """One machine for all that are the same without what was left out: it is checked and compiled once."""
+    return Model.from_dict(json.loads(text))
 
 
 @dataclass
