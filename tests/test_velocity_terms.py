@@ -8,7 +8,7 @@ import pytest
 import vpm
 from vpm.errors import ModelError
 from vpm.simplify import Ladder, reductions, simplify
-from vpm.simplify.reductions import VELOCITY_TERMS, without_velocity_terms
+from vpm.simplify.reductions import VELOCITY_TERMS
 from vpm.simplify.shares import parts
 
 #: Two rods in a horizontal plane: masses at 0.5 m and 0.4 m from their joints, the second joint at 0.8 m.
@@ -70,7 +70,7 @@ def coriolis(q: np.ndarray, v: np.ndarray) -> np.ndarray:
 
 
 def test_what_is_missing_is_the_closed_form_and_comes_back_with_the_key(arm: vpm.Model) -> None:
-    still = without_velocity_terms(arm)
+    still = VELOCITY_TERMS.applied(arm)
     assert "velocity_terms = false" in still.to_toml()
     assert vpm.Model.from_toml(still.to_toml()).to_dict() == still.to_dict()
     random = np.random.default_rng(3)
@@ -117,7 +117,7 @@ def test_a_search_leaves_them_out_where_the_motion_allows_it(arm: vpm.Model) -> 
     assert 0.0 < share_of(told) <= 0.1
     assert any(rung.loss <= 0.02 for rung in without)
     assert VELOCITY_TERMS.site in reductions(arm)
-    assert VELOCITY_TERMS.site not in reductions(without_velocity_terms(arm))
+    assert VELOCITY_TERMS.site not in reductions(VELOCITY_TERMS.applied(arm))
 
 
 def test_a_search_keeps_them_untried_where_they_are_much_of_the_efforts(arm: vpm.Model) -> None:
@@ -130,7 +130,7 @@ def test_a_search_keeps_them_untried_where_they_are_much_of_the_efforts(arm: vpm
 def test_a_servo_yields_to_what_is_missing_as_much_as_its_gain_says(arm: vpm.Model) -> None:
     record = swing(arm, 0.02)
     full, without = (
-        vpm.simulate(model, record, "closed_loop", substeps=8) for model in (arm, without_velocity_terms(arm))
+        vpm.simulate(model, record, "closed_loop", substeps=8) for model in (arm, VELOCITY_TERMS.applied(arm))
     )
     states = np.column_stack([full["shoulder.position"], full["elbow.position"]])
     rates = np.gradient(states, record.dt, axis=0)

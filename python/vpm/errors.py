@@ -165,11 +165,21 @@ class ValidityWarning(UserWarning):
         When that was (s).
     """
 
-    def __init__(self, beam: str, slope: float, time: float, limit: float, level: str) -> None:
-        super().__init__(
-            f"{beam} bends by {slope:.3g} rad at t = {time:.4g} s, but its level {level} is right within 1 % up to "
-            f"{limit:.3g} rad only; use a level that is exact at any deflection: "
+    def __init__(
+        self, beam: str, slope: float, time: float, limit: float, level: str, *, second_order: bool = True
+    ) -> None:
+        exact = (
+            "use a level that is exact at any deflection: "
             f'level = "strain(3)" in the model file, or model.at({{"{beam}": "strain(3)"}})'
+        )
+        what, repair = (
+            (f"its level {level}", exact)
+            if second_order
+            else ("a deflection to first order", f"remove second_order = false from [beams.{beam}]")
+        )
+        super().__init__(
+            f"{beam} bends by {slope:.3g} rad at t = {time:.4g} s, but {what} is right within 1 % up to "
+            f"{limit:.3g} rad only; {repair}"
         )
         self.beam = beam
         self.slope = slope

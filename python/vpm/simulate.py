@@ -375,13 +375,21 @@ def judged(model: Model, run: Run, states: Array) -> Run:
     if not model.beams or len(states) == 0:
         return run
     slopes = model.core.slopes(model.theta, states)
-    limit = model.core.slope_limit
+    limits = model.slope_limits
     largest = np.max(np.where(np.isnan(slopes), 0.0, slopes), axis=0)
-    if not np.any(largest > limit):
+    if not np.any(largest > limits):
         return run
-    beam = int(np.argmax(largest))
+    beam = int(np.argmax(largest / limits))
     when = float(run.time[int(np.nanargmax(slopes[:, beam]))])
-    warning = ValidityWarning(model.beams[beam], float(largest[beam]), when, limit, model.levels[model.beams[beam]])
+    name = model.beams[beam]
+    warning = ValidityWarning(
+        name,
+        float(largest[beam]),
+        when,
+        float(limits[beam]),
+        model.levels[name],
+        second_order=name not in model.first_order_beams,
+    )
     warnings.warn(warning, stacklevel=3)
     return replace(run, notes=(*run.notes, str(warning)))
 

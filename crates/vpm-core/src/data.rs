@@ -1,6 +1,6 @@
 //! Every buffer the recursions need, allocated once per model.
 
-use crate::algebra::Cholesky;
+use crate::algebra::BlockCholesky;
 use crate::beam::Sections;
 use crate::model::Model;
 use crate::scalar::Scalar;
@@ -18,6 +18,8 @@ pub struct Data<S> {
     pub(crate) effort: Vec<S>,
     pub(crate) acceleration: Vec<S>,
     pub(crate) mass_matrix: Vec<S>,
+    /// Acceleration of frames by products of rates alone, where some parts of the model do without them.
+    pub(crate) drifts: Vec<Twist<S>>,
     pub(crate) composite: Composite<S>,
 }
 
@@ -32,7 +34,7 @@ pub(crate) struct Composite<S> {
     pub(crate) columns: Vec<Wrench<S>>,
     /// Velocity terms and gravity, counted as loads.
     pub(crate) bias: Vec<S>,
-    pub(crate) factors: Cholesky<S>,
+    pub(crate) factors: BlockCholesky<S>,
     pub(crate) lines: Vec<LineSlot<S>>,
 }
 
@@ -133,6 +135,7 @@ impl<S: Scalar> Data<S> {
             effort: vec![S::zero(); n],
             acceleration: vec![S::zero(); count],
             mass_matrix: vec![S::zero(); count * count],
+            drifts: vec![Twist::zero(); model.n_frames()],
             composite: Composite::new(model),
         }
     }
@@ -211,7 +214,7 @@ impl<S: Scalar> Composite<S> {
             sections: model.beams().iter().map(|elastic| elastic.beam.sections()).collect(),
             columns: vec![Wrench::zero(); n],
             bias: vec![S::zero(); n],
-            factors: Cholesky::new(n),
+            factors: BlockCholesky::new(model.blocks()),
             lines: model.lines().iter().map(|_| line()).collect(),
         }
     }

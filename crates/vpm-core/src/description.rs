@@ -28,7 +28,7 @@ use crate::data::Data;
 use crate::dynamics::check_regular;
 use crate::error::{Error, Result};
 use crate::line::Line;
-use crate::model::{Model, Parts};
+use crate::model::{Model, Omissions, Parts};
 use crate::mount::{Gauge, Marker};
 use crate::scalar::Scalar;
 use crate::sensor::{Layout, Sensor};
@@ -43,6 +43,9 @@ pub struct Description {
     /// Whether products of rates are left out of the dynamics: Coriolis, centrifugal and gyroscopic terms.
     #[serde(default)]
     pub drop_velocity_terms: bool,
+    /// What else the dynamics leave out, part by part.
+    #[serde(default)]
+    pub omissions: Omissions,
     /// Value of each parameter.
     pub parameters: Vec<f64>,
     /// Dotted name of each parameter, for messages.
@@ -235,6 +238,7 @@ impl Description {
             gauges: self.gauges.clone(),
             attachments: self.attachments(),
             drop_velocity_terms: self.drop_velocity_terms,
+            omissions: self.omissions.clone(),
         };
         for effect in &self.effects {
             if let EffectEntry::Tree(law) = effect {

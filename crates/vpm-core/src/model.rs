@@ -2,10 +2,13 @@
 
 mod assemble;
 mod finish;
+mod omissions;
 mod order;
 mod place;
 
 pub use assemble::Parts;
+pub use omissions::Omissions;
+pub(crate) use omissions::Products;
 pub(crate) use place::Place;
 
 use crate::beam::{Beam, Gauge};
@@ -38,6 +41,11 @@ pub struct Model<S> {
     n_frames: usize,
     recursive: bool,
     drops_velocity_terms: bool,
+    /// Which products of rates count, frame by frame.
+    products: Vec<Products>,
+    /// The block of the mass matrix that each coordinate is in.
+    blocks: Vec<usize>,
+    couples: bool,
 }
 
 /// A node of the tree, which comes after all that it hangs on.
@@ -145,7 +153,8 @@ impl<S: Scalar> Model<S> {
         self.n_coordinates - self.links.len()
     }
 
-    /// Whether the algorithms for rigid trees apply: no elastic beams, no lines with mass, parents listed before their children.
+    /// Whether the algorithms for rigid trees apply: no elastic beams, no lines with mass, parents listed before their children, a mass matrix
+    /// in one piece.
     #[inline]
     pub fn is_recursive(&self) -> bool {
         self.recursive
@@ -155,6 +164,33 @@ impl<S: Scalar> Model<S> {
     #[inline]
     pub fn keeps_velocity_terms(&self) -> bool {
         !self.drops_velocity_terms
+    }
+
+    /// Whether the mass matrix is in one piece.
+    #[inline]
+    pub fn couples(&self) -> bool {
+        self.couples
+    }
+
+    /// Which products of rates count, frame by frame.
+    #[inline]
+    pub(crate) fn products(&self) -> &[Products] {
+        &self.products
+    }
+
+    /// Whether the accelerations by products of rates of a beam's sections are asked for.
+    #[inline]
+    pub(crate) fn accelerates(&self, beam: usize) -> bool {
+        self.beams[beam].frame.is_none_or(|first| {
+            let stations = first..first + self.beams[beam].beam.stations();
+            self.products[stations].iter().any(|products| *products != Products::Dropped)
+        })
+    }
+
+    /// The block of the mass matrix that each coordinate is in.
+    #[inline]
+    pub(crate) fn blocks(&self) -> &[usize] {
+        &self.blocks
     }
 
     /// Gravity in m/s^2, in the world frame.

@@ -14,6 +14,7 @@ use vpm_core::description::Description;
 use vpm_core::evaluate::{energy, internal_state};
 use vpm_core::integrator::{Integrator, Method};
 use vpm_core::linearize::linearize;
+use vpm_core::model::Omissions;
 use vpm_core::ode::Ode;
 use vpm_core::samples::Random;
 use vpm_core::system::System;
@@ -34,11 +35,20 @@ fn numbered(content: &mut Value, name: &str, value: &Value) -> Value {
 /// The tree with everything, with drives on both of its lines, whose parts weigh something.
 #[cfg(test)]
 fn machine(drives: [&Value; 2]) -> Description {
+    reduced(drives, Omissions::default())
+}
+
+/// The same without some of its terms.
+#[cfg(test)]
+fn reduced(drives: [&Value; 2], omissions: Omissions) -> Description {
     let mut parts = everything(3);
     for beam in &mut parts.beams {
         beam.damping = vpm_core::beam::DampingEntry::default();
     }
     description(&parts, |content| {
+        content["omissions"] = json!({"velocity_of_bodies": omissions.velocity_of_bodies,
+            "velocity_of_beams": omissions.velocity_of_beams, "coupling": omissions.coupling,
+            "second_order": omissions.second_order});
         let oil = json!({"bulk_modulus": 1.2e9, "vapour_pressure": 1e3});
         let source = json!({"sagging": {"resistance": 2e10, "capacitance": 1e-12}});
         let supply = json!({"pressure": 16e6, "tank_pressure": 1e5, "source": source, "oil": oil});
@@ -80,8 +90,21 @@ fn moving(d: &Description) -> Result<(System<f64>, Vec<f64>)> {
 #[test]
 fn jacobian_through_the_forces_is_that_of_the_whole_right_hand_side() -> Result<()> {
     // Two cylinders that let one supply sag; a cylinder beside an element without a flow; two springs that stretch.
-    for drives in [[&cylinder(), &cylinder()], [&cylinder(), &maxwell(0.4)], [&maxwell(0.4), &maxwell(0.5)]] {
-        let d = machine(drives);
+    // And a machine without some of its terms.
+    let some = Omissions {
+        velocity_of_bodies: vec![1, 4],
+        velocity_of_beams: vec![0],
+        coupling: vec![0, 2],
+        second_order: vec![1],
+    };
+    for (drives, omissions) in [
+        ([&cylinder(), &cylinder()], Omissions::default()),
+        ([&cylinder(), &maxwell(0.4)], Omissions::default()),
+        ([&maxwell(0.4), &maxwell(0.5)], Omissions::default()),
+        ([&cylinder(), &maxwell(0.4)], Omissions { coupling: Vec::new(), ..some.clone() }),
+        ([&cylinder(), &maxwell(0.4)], some),
+    ] {
+        let d = reduced(drives, omissions);
         let (mut system, mut x) = moving(&d)?;
         let (n, dim) = (d.n_coordinates(), x.len());
         // Both valves open, to different sides.

@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import AfterValidator, Field
 
-from vpm.model.entry import ORIGIN, ZERO, Entry, Number, ParameterValue, Quantity, Text, Vector
+from vpm.model.entry import ORIGIN, ZERO, Entry, Number, ParameterValue, Quantity, Switch, Text, Vector
 from vpm.model.level import USUAL, Component, Level, parse_level
 
 
@@ -112,7 +112,11 @@ def _different(components: tuple[Component, ...]) -> tuple[Component, ...]:
 
 
 class Beam(Entry):
-    """Flexible link, fixed to its parent at its root; the axis is z of the root frame."""
+    """Flexible link, fixed to its parent at its root; the axis is z of the root frame.
+
+    Without its `velocity_terms` no products of rates load it; without `second_order` its deflection is linear in its
+    coordinates.
+    """
 
     parent: Text
     at: Number | None = None
@@ -125,6 +129,8 @@ class Beam(Entry):
     section: Section | None = None
     sections: Annotated[tuple[Section, ...], Field(min_length=1)] | None = None
     damping: Damping = Damping()
+    velocity_terms: Switch = True
+    second_order: Switch = True
 
     @property
     def detail(self) -> Level:

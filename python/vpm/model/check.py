@@ -15,6 +15,7 @@ from vpm.model.drive_check import complete_drives, drive_problems, unit_problems
 from vpm.model.effects import complete_effects, effect_problems
 from vpm.model.form import schema_problems
 from vpm.model.messages import Problem, place, raise_first
+from vpm.model.omissions import omission_problems
 from vpm.model.parameters import Parameter, Slot, slots, table
 from vpm.model.references import gauge_problems, reference_problems
 from vpm.model.sampled_files import with_files
@@ -66,6 +67,7 @@ def check_document(content: Mapping[str, object], path: str | None = None) -> Ch
     structure = build_structure(document)
     references = [*reference_problems(document, structure), *drive_problems(document, structure)]
     references += connection_problems(document, structure)
+    references += omission_problems(document, structure)
     _stop_at([*references, *_command_problems(document)], path)
     _stop_at(
         [*unit_problems(document), *effect_problems(document, structure), *_channel_problems(document, structure)], path

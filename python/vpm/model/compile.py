@@ -21,6 +21,7 @@ from vpm.model.controller import ComputedTorque, Controller
 from vpm.model.drive_compile import drive_json, supply_json
 from vpm.model.effect_compile import EFFECT_SITES, effect_json
 from vpm.model.effects import effects_of
+from vpm.model.omissions import omissions
 from vpm.model.parameters import INERTIA_AXES
 from vpm.model.pose import Pose, pose
 from vpm.model.structure import HYDRAULIC_CHANNELS, SUPPLY_CHANNELS, Axis, Frame, Structure
@@ -64,6 +65,8 @@ def description(checked: Checked) -> str:
     }
     if not document.velocity_terms:
         content["drop_velocity_terms"] = True
+    if omitted := omissions(structure):
+        content["omissions"] = omitted
     return json.dumps(_unsigned(content), allow_nan=False)
 
 

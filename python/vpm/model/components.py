@@ -109,6 +109,12 @@ class Components(DriveComponents):
         return MappingProxyType({name: str(beams[name].detail) for name in self.beams})
 
     @property
+    def first_order_beams(self) -> frozenset[str]:
+        """Beams whose deflection is linear in their coordinates."""
+        beams = self._checked.document.beams.items()
+        return frozenset(name for name, beam in beams if not beam.second_order)
+
+    @property
     def sensors(self) -> tuple[str, ...]:
         """Sensors."""
         return tuple(self._checked.document.sensors)

@@ -11,6 +11,8 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 #: A number that may be infinite: bounds, and the uncertainty of what is not known beforehand. NaN is refused later.
 WideNumber = Annotated[float, Field(strict=True)]
+#: Yes or no; numbers are refused.
+Switch = Annotated[bool, Field(strict=True)]
 Text = Annotated[str, Field(strict=True, min_length=1)]
 Vector = Annotated[tuple[Number, ...], Field(min_length=3, max_length=3)]
 

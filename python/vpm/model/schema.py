@@ -14,17 +14,21 @@ from vpm.model.beam import Beam, Gauge, Line, Marker
 from vpm.model.contact import Bushing, Contact, LoadCell
 from vpm.model.controller import TYPES, Controller
 from vpm.model.drives import ACTUATOR_TYPES, Actuator
-from vpm.model.entry import ORIGIN, ZERO, Entry, Number, ParameterValue, Quantity, Text, Vector
+from vpm.model.entry import ORIGIN, ZERO, Entry, Number, ParameterValue, Quantity, Switch, Text, Vector
 from vpm.model.hydraulic import Supply
 from vpm.units import parse_unit
 
 
 class Body(Entry):
-    """Rigid body: mass, centre of mass in the body frame, inertia about the centre of mass (xx yy zz xy xz yz)."""
+    """Rigid body: mass, centre of mass in the body frame, inertia about the centre of mass (xx yy zz xy xz yz).
+
+    Without its `velocity_terms` no products of rates load it.
+    """
 
     mass: ParameterValue
     center_of_mass: Annotated[tuple[ParameterValue, ...], Field(min_length=3, max_length=3)] = (ZERO,) * 3
     inertia: Annotated[tuple[ParameterValue, ...], Field(min_length=6, max_length=6)] = (ZERO,) * 6
+    velocity_terms: Switch = True
 
 
 class DenavitHartenberg(Entry):
@@ -41,7 +45,10 @@ JointType = Literal["prismatic", "revolute", "helical", "cylindrical", "planar",
 
 
 class Joint(Entry):
-    """Joint between a body and its parent, a body or a beam; its frame is the frame of the child."""
+    """Joint between a body and its parent, a body or a beam; its frame is the frame of the child.
+
+    Without `inertia_coupling` the mass matrix has no entries between what is inward of it and what is beyond.
+    """
 
     type: JointType
     parent: Text
@@ -53,6 +60,7 @@ class Joint(Entry):
     translation: Vector = ORIGIN
     rotation: Vector = ORIGIN
     dh: DenavitHartenberg | None = None
+    inertia_coupling: Switch = True
 
 
 class Sensor(Entry):
@@ -113,7 +121,7 @@ class ChannelEntry(BaseModel):
     scale: Annotated[Number, AfterValidator(_not_zero)] = 1.0
     offset: Number = 0.0
     delay: Number = 0.0
-    optional: Annotated[bool, Field(strict=True)] = False
+    optional: Switch = False
 
 
 class Document(Entry):
@@ -121,7 +129,7 @@ class Document(Entry):
 
     name: Text
     gravity: Vector
-    velocity_terms: Annotated[bool, Field(strict=True)] = True
+    velocity_terms: Switch = True
     bodies: dict[str, Body] = Field(default_factory=dict)
     joints: dict[str, Joint] = Field(default_factory=dict)
     beams: dict[str, Beam] = Field(default_factory=dict)

@@ -1,4 +1,4 @@
-"""What of a model can be made simpler: effects and velocity terms left out, links coarser, drives with less oil.
+"""What of a model can be made simpler: effects and terms left out, links coarser, drives with less oil.
 
 Each place of a model where something can be simpler is a *site* with a list of *changes* that exclude each other; a
 reduced model takes one change, or none, at each site.
@@ -15,6 +15,7 @@ from vpm.model import Model
 from vpm.model.level import deforms_of, size_of
 from vpm.results import Storable
 from vpm.simplify.hydraulics import hydraulic_drives, possible_changes, simpler
+from vpm.simplify.terms import MACHINE, removable, terms_site, without_terms
 
 #: Levels that a flexible link is offered, where they have fewer coordinates than its own; docs/beams.md compares them.
 OFFERED = (
@@ -44,10 +45,11 @@ class Reduction(Storable):
         An effect that is left out, a coarser level of a flexible link, a deformation of a link that is held rigid, a
         hydraulic drive with fewer states, terms of the equations of motion that are left out.
     name : str
-        Effect, level, component, change of a drive, see `vpm.simplify.hydraulics`, or ``"velocity"``: products of
-        rates.
+        Effect, level, component, change of a drive, see `vpm.simplify.hydraulics`, or of terms ``"velocity"`` (products
+        of rates), ``"coupling"`` (entries of the mass matrix across joints), ``"second-order"`` (in the deflection).
     at : str
-        Site of the effect, flexible link, drive, or ``"the machine"``.
+        Site of the effect, flexible link, drive; of velocity terms bodies and links, of coupling joints, with commas
+        between them, or ``"the machine"``.
     """
 
     kind: str
@@ -69,6 +71,8 @@ class Reduction(Storable):
     @property
     def site(self) -> tuple[str, str]:
         """What it excludes: other reductions of the same site."""
+        if self.kind == "terms":
+            return (f"terms {self.name}", terms_site(self.name, self.at))
         alone = self.kind in ("level", "drive")
         return (self.kind if alone else f"{self.kind} {self.name}", self.at)
 
@@ -92,15 +96,15 @@ class Reduction(Storable):
             case "drive":
                 return simpler(model, self.at, self.name)
             case "terms":
-                return without_velocity_terms(model)
+                return without_terms(model, self.name, self.at)
         content = model.to_dict()
         beam = content["beams"][self.at]
         beam["deforms"] = [component for component in deforms_of(beam) if component != self.name]
         return type(model)(content)
 
 
-#: Products of rates left out of the whole machine.
-VELOCITY_TERMS = Reduction("terms", "velocity", "the machine")
+#: Products of rates, and entries of the mass matrix across joints, left out of the whole machine.
+VELOCITY_TERMS, COUPLING_TERMS = (Reduction("terms", name, MACHINE) for name in ("velocity", "coupling"))
 
 
 def reductions(model: Model, learnt: Sequence[Reduction] = ()) -> dict[tuple[str, str], tuple[Reduction, ...]]:
@@ -159,18 +163,8 @@ def _imaginable(model: Model) -> Iterator[Reduction]:
     for drive in hydraulic_drives(model):
         for change in possible_changes(model, drive):
             yield Reduction("drive", change, drive)
-    if model.to_dict().get("velocity_terms", True):
-        yield VELOCITY_TERMS
-
-
-def without_velocity_terms(model: Model) -> Model:
-    """Model without products of rates: Coriolis, centrifugal and gyroscopic terms.
-
-    Parameters
-    ----------
-    model : Model
-    """
-    return type(model)({**model.to_dict(), "velocity_terms": False})
+    for name, at in removable(model):
+        yield Reduction("terms", name, at)
 
 
 def _beams(model: Model) -> Mapping[str, Any]:

@@ -18,15 +18,14 @@ from vpm.experiment import Experiment, as_records
 from vpm.model import Model
 from vpm.simplify.judge import FITTING, Judge, by_the_model, reference_mode, shown
 from vpm.simplify.ladder import Ladder, Rung, pareto
-from vpm.simplify.reductions import OFFERED, VELOCITY_TERMS, Reduction, reduced, reductions
-from vpm.simplify.shares import velocity_share
+from vpm.simplify.reductions import COUPLING_TERMS, OFFERED, VELOCITY_TERMS, Reduction, reduced, reductions
+from vpm.simplify.shares import ROUNDING, deformation_share, effort_share, motions, ranked
 from vpm.simplify.surrogates import surrogates
 from vpm.simplify.trials import CLOCK, NEGLIGIBLE, PRIORITY, Changes, Trials
 from vpm.simulate import Setup
 
-#: Share of the efforts, in tolerances, from which on no model is tried without its velocity terms, and share that is
-#: rounding: a single joint about a fixed axis has none of them.
-WEIGHTY, ROUNDING = 5.0, 1e-12
+#: Share of efforts or deformations, in tolerances, from which on no model is tried without the terms.
+WEIGHTY = 5.0
 #: Combinations that are foreseen, and of those the ones that are tried.
 FORESEEN, TRIED = 100_000, 8
 #: Times of steps of less than a microsecond differ by so much for no reason on a machine that does other things too.
@@ -53,8 +52,9 @@ def simplify(
     """Make a model simpler, place by place, as far as the tolerance allows, and find the cheapest way to step it.
 
     Effects are left out, flexible links made coarser or rigid in single deformations, spools of hydraulic drives made
-    static, their pressures one, NARX elements put in their place, and every integrator of fixed steps is tried with
-    one, two and four steps in a period. The adjustable parameters of every reduced model are fitted again before it is
+    static, their pressures one, NARX elements put in their place, velocity terms, coupling across joints and terms of
+    second order of links left out where their shares allow it, and every integrator of fixed steps is tried with one,
+    two and four steps in a period. The adjustable parameters of every reduced model are fitted again before it is
     judged by simulation, so that what remains may take over what it can. Ctrl-C ends the search with what is known.
 
     Parameters
@@ -109,7 +109,7 @@ def simplify(
     trials = Trials(model, judge, lambda changes: bool(changes) or against == "data", say, tolerance)
     sites = reductions(model, surrogates(model, judge.records, mode, rate))
     try:
-        _weigh_velocity_terms(trials, sites)
+        _weigh_terms(trials, sites)
         _descend(trials, sites)
     except KeyboardInterrupt:
         if not trials.rungs:
@@ -133,18 +133,28 @@ def _descend(trials: Trials, sites: Sites) -> None:
     _polish(trials, sites, limit)
 
 
-def _weigh_velocity_terms(trials: Trials, sites: Sites) -> None:
-    """Products of rates that are too much of the efforts along the motion, or none, are no matter of a trial."""
-    judge = trials.judge
-    if VELOCITY_TERMS.site not in sites or judge.mode not in ("free_run", "closed_loop"):
+def _weigh_terms(trials: Trials, sites: Sites) -> None:
+    """Terms that are too much of efforts or deformations along the motion, or none, are no matter of a trial."""
+    judge, model, limit = trials.judge, trials.model, WEIGHTY * trials.tolerance
+    terms = [site for site in sites if site[0].startswith("terms")]
+    if not terms or judge.mode not in ("free_run", "closed_loop"):
         return
     try:
-        share = velocity_share(trials.model, judge.unseen, judge.mode, Setup(FITTING, judge.per_sample))
+        along = motions(model, judge.unseen, judge.mode, Setup(FITTING, judge.per_sample))
     except SimulationError:
         return
-    trials.say(f"velocity terms take {100 * share:.2g} % of the efforts")
-    if not ROUNDING < share <= WEIGHTY * trials.tolerance:
-        del sites[VELOCITY_TERMS.site]
+    for site in terms:
+        if site in (VELOCITY_TERMS.site, COUPLING_TERMS.site):
+            left, share = ranked(model, sites[site], lambda each: effort_share(model, each, along), limit)
+            trials.say(f"{sites[site][-1].name} terms take {100 * share:.2g} % of the efforts")
+        else:
+            share = deformation_share(model, site[1], along)
+            left = sites[site] if ROUNDING < share <= limit else ()
+            trials.say(f"second-order terms take {100 * share:.2g} % of the deformation of {site[1]}")
+        if left:
+            sites[site] = left
+        else:
+            del sites[site]
 
 
 def _together(trials: Trials, sites: Sites, limit: float) -> Changes:

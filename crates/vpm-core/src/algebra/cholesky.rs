@@ -22,16 +22,23 @@ impl<S: Scalar> Cholesky<S> {
     /// Factorises `matrix`, of which the lower triangle counts, row by row.
     pub fn factorise(&mut self, matrix: &[S]) {
         let n = self.dim;
+        self.factorise_by(|row, column| matrix[row * n + column]);
+    }
+
+    /// Factorises the matrix of these entries, of which the lower triangle is asked for.
+    #[inline]
+    pub(super) fn factorise_by(&mut self, entry: impl Fn(usize, usize) -> S) {
+        let n = self.dim;
         for row in 0..n {
             let (above, rest) = self.lower.split_at_mut(row * n);
             let own = &mut rest[..n];
             for column in 0..row {
                 let other = &above[column * n..column * n + column];
                 let sum = dot(&own[..column], other);
-                own[column] = (matrix[row * n + column] - sum) * above[column * n + column];
+                own[column] = (entry(row, column) - sum) * above[column * n + column];
             }
             let square = dot(&own[..row], &own[..row]);
-            own[row] = (matrix[row * n + row] - square).sqrt().recip();
+            own[row] = (entry(row, row) - square).sqrt().recip();
         }
     }
 
@@ -47,6 +54,21 @@ impl<S: Scalar> Cholesky<S> {
             let below = self.lower.chunks_exact(n).skip(row + 1).map(|line| line[row]);
             let sum: S = below.zip(known.iter()).map(|(entry, &x)| entry * x).sum();
             rest[row] = (rest[row] - sum) * self.lower[row * n + row];
+        }
+    }
+
+    /// As [`Cholesky::solve`], with entry i of b at `places[i]`.
+    pub(super) fn solve_at(&self, b: &mut [S], places: &[usize]) {
+        let n = self.dim;
+        for (row, &place) in places.iter().enumerate() {
+            let known = self.lower[row * n..row * n + row].iter().zip(places);
+            let sum: S = known.map(|(&entry, &known)| entry * b[known]).sum();
+            b[place] = (b[place] - sum) * self.lower[row * n + row];
+        }
+        for (row, &place) in places.iter().enumerate().rev() {
+            let below = (row + 1..n).map(|line| self.lower[line * n + row] * b[places[line]]);
+            let sum: S = below.sum();
+            b[place] = (b[place] - sum) * self.lower[row * n + row];
         }
     }
 

@@ -1,7 +1,7 @@
 //! From the entry of a beam to its map, its stations and its constant matrices.
 
 use super::damping::damping;
-use super::deflection::{DeflectionAxis, modal};
+use super::deflection::{DeflectionAxis, LinearAxis, modal};
 use super::entry::{BeamEntry, Component, Level};
 use super::fields::{Field, Fields, Interpolated, basis};
 use super::flexible::{Axis, Beam, Map};
@@ -17,6 +17,13 @@ const STRAIN_STATIONS: usize = 4;
 /// Stations on each element.
 const ELEMENT_STATIONS: usize = 3;
 
+/// Up to which order in the deflection the map is right.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Order {
+    First,
+    Second,
+}
+
 /// A section that carries inertia, something else, or both.
 #[derive(Clone, Copy, Debug)]
 struct Place {
@@ -28,6 +35,16 @@ struct Place {
 impl<S: Scalar> Beam<S> {
     /// The beam of an entry with additional stations at the arc lengths `marks` (m). Checked: as by [`BeamEntry::check`], marks on the beam.
     pub fn new(entry: &BeamEntry<S>, marks: &[f64]) -> Result<Self> {
+        Self::of_order(entry, marks, Order::Second)
+    }
+
+    /// As [`Beam::new`], but with a deflection that is linear in the coordinates: nothing that is of second order in it. Rigid beams have no
+    /// deflection, and the hinges of lumped ones no terms of second order apart from the others: those are as they are.
+    pub fn first_order(entry: &BeamEntry<S>, marks: &[f64]) -> Result<Self> {
+        Self::of_order(entry, marks, Order::First)
+    }
+
+    fn of_order(entry: &BeamEntry<S>, marks: &[f64], order: Order) -> Result<Self> {
         entry.check()?;
         for &mark in marks {
             entry.check_place("at", mark)?;
@@ -36,12 +53,12 @@ impl<S: Scalar> Beam<S> {
         match entry.level {
             Level::Rigid => Self::segmented(entry, &profile, (&[], 1), marks),
             Level::Lumped(n) => Self::segmented(entry, &profile, (&entry.deforms, n), marks),
-            _ => Self::smooth(entry, &profile, marks),
+            _ => Self::smooth(entry, &profile, marks, order),
         }
     }
 
     /// A beam whose strain or deflection is interpolated.
-    fn smooth(entry: &BeamEntry<S>, profile: &Profile<S>, marks: &[f64]) -> Result<Self> {
+    fn smooth(entry: &BeamEntry<S>, profile: &Profile<S>, marks: &[f64], order: Order) -> Result<Self> {
         let field = |&component| Ok(Field { component, basis: basis(entry.level, component, entry.length)? });
         let mut list = entry.deforms.iter().map(field).collect::<Result<Vec<_>>>()?;
         let (interpolated, points) = match entry.level {
@@ -59,6 +76,7 @@ impl<S: Scalar> Beam<S> {
         let (places, marks) = merged(rule.iter().map(|at| Place { at: at.place, weight: at.weight }).collect(), marks);
         let at: Vec<f64> = places.iter().map(|place| place.at).collect();
         let axis = match interpolated {
+            _ if order == Order::First => Axis::Linear(LinearAxis::new(&fields, &at)),
             Interpolated::Deflection => Axis::Deflection(DeflectionAxis::new(&fields, &at)),
             Interpolated::Strain => {
                 PlaneAxis::new(&fields, &at).map_or_else(|| Axis::Space(SpaceAxis::new(&fields, &at)), Axis::Plane)

@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use super::deflection::DeflectionAxis;
+use super::deflection::{DeflectionAxis, LinearAxis};
 use super::eigen::{self, Modes};
 use super::fields::Fields;
 use super::gauge::Gauge;
@@ -34,6 +34,7 @@ pub(super) enum Axis {
     Plane(PlaneAxis),
     Space(SpaceAxis),
     Deflection(DeflectionAxis),
+    Linear(LinearAxis),
     Lumped(LumpedAxis),
 }
 
@@ -78,18 +79,24 @@ impl<S: Scalar> Beam<S> {
         let scratch = match &self.axis {
             Axis::Plane(axis) => axis.scratch(),
             Axis::Deflection(axis) => axis.scratch(),
-            Axis::Space(_) | Axis::Lumped(_) => 0,
+            Axis::Linear(_) | Axis::Space(_) | Axis::Lumped(_) => 0,
         };
         Sections::new(self.stations(), self.len(), scratch)
     }
 
     /// Poses, twists, accelerations and Jacobian columns of all sections at coordinates `q` and rates `v`; allocates nothing.
     pub fn motion(&self, q: &[S], v: &[S], out: &mut Sections<S>) {
+        self.sweep(q, v, out, true);
+    }
+
+    /// As [`Beam::motion`], but the accelerations only if they are asked for; else they mean nothing.
+    pub(crate) fn sweep(&self, q: &[S], v: &[S], out: &mut Sections<S>, accelerates: bool) {
         debug_assert!(q.len() == self.len() && v.len() == self.len() && out.at.len() == self.stations());
         match &self.axis {
             Axis::Plane(axis) => axis.motion(q, v, out),
-            Axis::Space(axis) => axis.motion(q, v, out),
-            Axis::Deflection(axis) => axis.motion(q, v, out),
+            Axis::Space(axis) => axis.motion(q, v, out, accelerates),
+            Axis::Deflection(axis) => axis.motion(q, v, out, accelerates),
+            Axis::Linear(axis) => axis.motion(q, v, out, accelerates),
             Axis::Lumped(axis) => axis.motion(q, v, out),
         }
     }
@@ -124,11 +131,12 @@ impl<S: Scalar> Beam<S> {
         self.gauge(mu).strain(q)
     }
 
-    /// The largest slope of the axis against its direction at the root in rad, where the map is right to second order in it only; none
-    /// where it is exact.
+    /// The largest slope of the axis against its direction at the root in rad, where the map is right to first or second order in it only;
+    /// none where it is exact.
     pub fn slope(&self, q: &[S]) -> Option<S> {
         match &self.axis {
             Axis::Deflection(axis) => Some(axis.slope(q)),
+            Axis::Linear(axis) => Some(axis.slope(q)),
             _ => None,
         }
     }

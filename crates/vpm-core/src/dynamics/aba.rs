@@ -2,7 +2,7 @@
 
 use crate::data::Data;
 use crate::joint::JointKind;
-use crate::model::Model;
+use crate::model::{Model, Products};
 use crate::scalar::Scalar;
 use crate::spatial::{ArticulatedInertia, Symmetric3, Twist, Vector3, Wrench};
 
@@ -46,22 +46,32 @@ pub(super) fn singular_joint<S: Scalar>(
 }
 
 fn velocities<S: Scalar>(model: &Model<S>, data: &mut Data<S>, q: &[S], v: &[S]) {
-    let (slots, keeps) = (&mut data.aba, model.keeps_velocity_terms());
+    let Data { aba: slots, drifts, .. } = data;
     slots[0].velocity = Twist::zero();
     for (k, ((link, &q), &v)) in model.links().iter().zip(q).zip(v).enumerate() {
         let (before, rest) = slots.split_at_mut(k + 1);
         let (parent, slot) = (&before[link.parent], &mut rest[0]);
         slot.pose = link.pose(q);
         slot.inertia = link.inertia.into();
-        if !keeps {
-            // All that this algorithm asks of velocities are their products.
-            (slot.bias_acceleration, slot.bias_wrench) = (Twist::zero(), Wrench::zero());
-            continue;
+        // All that this algorithm asks of velocities are their products.
+        (slot.bias_acceleration, slot.bias_wrench) = (Twist::zero(), Wrench::zero());
+        let products = model.products()[k + 1];
+        let moves = match products {
+            Products::Kept => true,
+            Products::Dropped => continue,
+            Products::Mixed(mixed) => mixed.moves,
+        };
+        if moves {
+            slot.velocity = slot.pose.inverse_twist(parent.velocity);
+            link.kind.add_rate(&mut slot.velocity, v);
+            slot.bias_acceleration = link.kind.rate_cross(&slot.velocity, v);
         }
-        slot.velocity = slot.pose.inverse_twist(parent.velocity);
-        link.kind.add_rate(&mut slot.velocity, v);
-        slot.bias_acceleration = link.kind.rate_cross(&slot.velocity, v);
-        slot.bias_wrench = slot.velocity.cross_wrench(link.inertia.apply(slot.velocity));
+        if let Products::Mixed(mixed) = products {
+            slot.bias_acceleration = mixed.step(&slot.pose, slot.bias_acceleration, drifts, (link.parent, k + 1));
+        }
+        if products.own() {
+            slot.bias_wrench = slot.velocity.cross_wrench(link.inertia.apply(slot.velocity));
+        }
     }
 }
 

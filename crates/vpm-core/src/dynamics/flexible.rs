@@ -14,6 +14,7 @@ use crate::spatial::{Pose, SpatialInertia, Vector3, Wrench};
 
 /// Mass matrix and bias at coordinates `q` and rates `v`, left in `data`.
 ///
+/// Across joints that do not couple the entries of M are zero.
 /// Law: `M = sum J^T m J`, `bias = sum J^T (m A + V x* m V)` over bodies, stations and lines, A with gravity taken off.
 /// Checked: against `crba`, `rnea` and `aba` on rigid trees, Lagrange's equations of the energy on flexible ones, a leg with closed
 /// loops on lines.
@@ -39,10 +40,9 @@ pub fn terms<S: Scalar>(model: &Model<S>, data: &mut Data<S>, q: &[S], v: &[S]) 
 
 /// The wrench on each frame that its own inertia needs in the motion of [`super::frames()`].
 pub(super) fn weigh_frames<S: Scalar>(model: &Model<S>, frames: &mut [FrameSlot<S>]) {
-    let keeps = model.keeps_velocity_terms();
-    for slot in frames.iter_mut().skip(1) {
+    for (slot, products) in frames.iter_mut().zip(model.products()).skip(1) {
         slot.wrench = slot.inertia.apply(slot.acceleration);
-        if keeps {
+        if products.own() {
             slot.wrench += slot.velocity.cross_wrench(slot.inertia.apply(slot.velocity));
         }
     }
@@ -126,7 +126,8 @@ fn entry<S>(mass: &mut [S], n: usize, i: usize, j: usize) -> &mut S {
 /// `bias += m J^T a + I J_u^T u''` at zero coordinate accelerations. Source: D'Imperio 2016, eqs 2.85 to 2.95, in space.
 fn massive_lines<S: Scalar>(model: &Model<S>, data: &mut Data<S>) {
     let Data { composite: Composite { lines, bias, .. }, mass_matrix: mass, .. } = data;
-    let (n, keeps) = (bias.len(), model.keeps_velocity_terms());
+    let (n, keeps, blocks) = (bias.len(), model.keeps_velocity_terms(), model.blocks());
+    let couples = model.couples();
     for (Wire { barrel, rod, .. }, slot) in model.lines().iter().zip(lines) {
         if barrel.is_none() && rod.is_none() {
             continue;
@@ -149,8 +150,11 @@ fn massive_lines<S: Scalar>(model: &Model<S>, data: &mut Data<S>) {
             for (i, (&turning, &column)) in turns.iter().zip(&point.columns).enumerate() {
                 let moving = column + turning * center;
                 bias[i] += moving.dot(acceleration) + turning.dot(swing) * part.inertia;
-                let others = turns.iter().zip(&point.columns);
-                for (entry, (&other, &column)) in mass[i * n..=i * n + i].iter_mut().zip(others) {
+                let others = turns.iter().zip(&point.columns).zip(blocks);
+                for (entry, ((&other, &column), &block)) in mass[i * n..=i * n + i].iter_mut().zip(others) {
+                    if !couples && block != blocks[i] {
+                        continue;
+                    }
                     let along = moving.dot(column + other * center) * part.mass;
                     *entry += along + turning.dot(other) * part.inertia;
                 }

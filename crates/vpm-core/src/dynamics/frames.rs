@@ -2,7 +2,7 @@
 
 use crate::beam::Sections;
 use crate::data::{Composite, Data, FrameSlot, LineSlot, PointSlot};
-use crate::model::{Elastic, Model, Node, Place, Wire};
+use crate::model::{Elastic, Model, Node, Place, Products, Wire};
 use crate::scalar::Scalar;
 use crate::spatial::{Pose, Twist, Vector3};
 
@@ -10,11 +10,10 @@ use crate::spatial::{Pose, Twist, Vector3};
 ///
 /// Law: `V_F = X^-1 V_P + V_PF`, `A_F = X^-1 A_P + V_F x V_PF + dV_PF/dt` with V_PF the twist of F relative to P in the axes of F
 /// (Featherstone 2008, section 5.3; a station of a beam is a joint of as many coordinates). Gravity is an upward acceleration of the
-/// world. Where the model drops its velocity terms, `A_F = X^-1 A_P`.
+/// world. Where the model drops its velocity terms, `A_F = X^-1 A_P`; where it drops those of some parts, see [`Products`].
 pub fn frames<S: Scalar>(model: &Model<S>, data: &mut Data<S>, q: &[S], v: &[S]) {
     debug_assert!(q.len() == model.n_coordinates() && v.len() == model.n_coordinates());
-    let Composite { frames, sections, .. } = &mut data.composite;
-    let keeps = model.keeps_velocity_terms();
+    let Data { composite: Composite { frames, sections, .. }, drifts, .. } = data;
     frames[0].acceleration = Twist::new(Vector3::zero(), -model.gravity());
     for node in model.order() {
         match node {
@@ -27,8 +26,13 @@ pub fn frames<S: Scalar>(model: &Model<S>, data: &mut Data<S>, q: &[S], v: &[S])
                 slot.velocity = slot.across.inverse_twist(velocity);
                 link.kind.add_rate(&mut slot.velocity, v[*number]);
                 slot.acceleration = slot.across.inverse_twist(acceleration);
-                if keeps {
-                    slot.acceleration += link.kind.rate_cross(&slot.velocity, v[*number]);
+                let across = || link.kind.rate_cross(&slot.velocity, v[*number]);
+                match model.products()[number + 1] {
+                    Products::Kept => slot.acceleration += across(),
+                    Products::Dropped => {}
+                    Products::Mixed(mixed) => {
+                        slot.acceleration += mixed.step(&slot.across, across(), drifts, (link.parent, number + 1));
+                    }
                 }
                 slot.inertia = link.inertia;
             }
@@ -36,15 +40,20 @@ pub fn frames<S: Scalar>(model: &Model<S>, data: &mut Data<S>, q: &[S], v: &[S])
                 let Elastic { beam, root, coordinate, frame, inertias, .. } = &model.beams()[*number];
                 let (own, parent) = (*coordinate..coordinate + beam.len(), frames[root.frame]);
                 let sections = &mut sections[*number];
-                beam.motion(&q[own.clone()], &v[own], sections);
-                let root = Pose::from_f64(root.pose);
-                let stations = frames.iter_mut().skip(frame.unwrap_or(0)).zip(&sections.at).zip(inertias);
-                for ((slot, section), inertia) in stations {
-                    slot.across = root * section.pose;
+                beam.sweep(&q[own.clone()], &v[own], sections, model.accelerates(*number));
+                let (begin, first) = (Pose::from_f64(root.pose), frame.unwrap_or(0));
+                let stations = frames.iter_mut().enumerate().skip(first).zip(&sections.at).zip(inertias);
+                for (((station, slot), section), inertia) in stations {
+                    slot.across = begin * section.pose;
                     slot.velocity = slot.across.inverse_twist(parent.velocity) + section.twist;
                     slot.acceleration = slot.across.inverse_twist(parent.acceleration);
-                    if keeps {
-                        slot.acceleration += slot.velocity.cross(section.twist) + section.acceleration;
+                    let across = || slot.velocity.cross(section.twist) + section.acceleration;
+                    match model.products()[station] {
+                        Products::Kept => slot.acceleration += across(),
+                        Products::Dropped => {}
+                        Products::Mixed(mixed) => {
+                            slot.acceleration += mixed.step(&slot.across, across(), drifts, (root.frame, station));
+                        }
                     }
                     slot.inertia = *inertia;
                 }
@@ -103,12 +112,18 @@ pub(crate) fn lines<S: Scalar>(model: &Model<S>, data: &mut Data<S>) {
 
 /// As [`lines`], but without the velocities per unit rate of the coordinates.
 pub(super) fn bare_lines<S: Scalar>(model: &Model<S>, data: &mut Data<S>) {
-    let Composite { frames, lines, .. } = &mut data.composite;
+    let Data { composite: Composite { frames, lines, .. }, drifts, .. } = data;
     let keeps = model.keeps_velocity_terms();
     for (Wire { from, to, .. }, slot) in model.lines().iter().zip(lines) {
         let LineSlot { length, direction, from: begin, to: end, .. } = slot;
         for (place, point) in [(from, &mut *begin), (to, &mut *end)] {
             move_point(&frames[place.frame], place, point, keeps);
+            // The lines themselves keep their products of rates, whatever the frames do.
+            if keeps && !model.products()[place.frame].own() {
+                let Twist { angular, linear } = drifts[place.frame];
+                let at = Vector3::from_f64(place.pose.translation.to_array());
+                point.acceleration += frames[place.frame].pose.rotation * (linear + angular.cross(at));
+            }
         }
         let across = end.place - begin.place;
         *length = across.dot(across).sqrt();

@@ -44,7 +44,8 @@ pub(crate) fn weigh<S: Scalar>(
 ) {
     weigh_frames(model, &mut data.composite.frames);
     for (number, wire) in model.lines().iter().enumerate() {
-        line(wire, number, data, tensions.get(number).copied().unwrap_or(S::zero()));
+        let tension = tensions.get(number).copied().unwrap_or(S::zero());
+        line(wire, number, data, (tension, model.keeps_velocity_terms()));
     }
     applied(data);
     inward(model, data);
@@ -109,13 +110,14 @@ fn accelerate<S: Scalar>(model: &Model<S>, data: &mut Data<S>, a: &[S], extra: &
 /// Loads the frames of a line's ends with what its parts need and its force takes.
 ///
 /// As in the equations of motion: a part moves with `J = J_end + c J_u`, so that its own end carries it along the line and both do across.
-fn line<S: Scalar>(wire: &Wire<S>, number: usize, data: &mut Data<S>, tension: S) {
+fn line<S: Scalar>(wire: &Wire<S>, number: usize, data: &mut Data<S>, (tension, keeps): (S, bool)) {
     let LineSlot { length, direction: u, from, to, .. } = &data.composite.lines[number];
     let shrink = length.recip();
     let turn = |v: Vector3<S>| (v - *u * u.dot(v)) * shrink;
     let (rate, change) = (to.velocity - from.velocity, to.acceleration - from.acceleration);
     let (stretch, spin) = (u.dot(rate), turn(rate));
-    let swing = turn(change) - spin * (stretch * shrink * 2.0) - *u * spin.dot(spin);
+    let swing = turn(change);
+    let swing = if keeps { swing - spin * (stretch * shrink * 2.0) - *u * spin.dot(spin) } else { swing };
     // What the beginning and the end have to give, in world axes.
     let mut needed = [*u * tension, -(*u * tension)];
     for (part, point, sign, own) in [(&wire.barrel, from, 1.0, 0), (&wire.rod, to, -1.0, 1)] {

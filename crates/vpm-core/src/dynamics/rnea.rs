@@ -1,7 +1,7 @@
 //! Inverse dynamics by the recursive Newton-Euler algorithm.
 
 use crate::data::Data;
-use crate::model::Model;
+use crate::model::{Model, Products};
 use crate::scalar::Scalar;
 use crate::spatial::{Twist, Vector3};
 
@@ -18,22 +18,27 @@ pub fn rnea<'d, S: Scalar>(model: &Model<S>, data: &'d mut Data<S>, q: &[S], v: 
 }
 
 fn outward<S: Scalar>(model: &Model<S>, data: &mut Data<S>, q: &[S], v: &[S], a: &[S]) {
-    let (slots, keeps) = (&mut data.rnea, model.keeps_velocity_terms());
+    let Data { rnea: slots, drifts, .. } = data;
     slots[0].velocity = Twist::zero();
     slots[0].acceleration = Twist::new(Vector3::zero(), -model.gravity());
     for (k, (((link, &q), &v), &a)) in model.links().iter().zip(q).zip(v).zip(a).enumerate() {
         let (before, rest) = slots.split_at_mut(k + 1);
         let (parent, slot) = (&before[link.parent], &mut rest[0]);
         slot.pose = link.pose(q);
-        slot.velocity = slot.pose.inverse_twist(parent.velocity);
-        link.kind.add_rate(&mut slot.velocity, v);
+        let products = model.products()[k + 1];
         slot.acceleration = slot.pose.inverse_twist(parent.acceleration);
-        if keeps {
-            slot.acceleration += link.kind.rate_cross(&slot.velocity, v);
+        if products != Products::Dropped {
+            slot.velocity = slot.pose.inverse_twist(parent.velocity);
+            link.kind.add_rate(&mut slot.velocity, v);
+            let across = link.kind.rate_cross(&slot.velocity, v);
+            slot.acceleration += match products {
+                Products::Mixed(mixed) => mixed.step(&slot.pose, across, drifts, (link.parent, k + 1)),
+                Products::Kept | Products::Dropped => across,
+            };
         }
         link.kind.add_rate(&mut slot.acceleration, a);
         slot.wrench = link.inertia.apply(slot.acceleration);
-        if keeps {
+        if products.own() {
             slot.wrench += slot.velocity.cross_wrench(link.inertia.apply(slot.velocity));
         }
     }

@@ -1,7 +1,7 @@
 //! From the parts of a machine to its tree.
 
 use super::order::{Hanging, Part};
-use super::{Elastic, Model, Place};
+use super::{Elastic, Model, Omissions, Place};
 use crate::beam::{Beam, BeamEntry, Level};
 use crate::body::{Body, PointMass, Site, Weld, check_physical};
 use crate::error::{Error, Result};
@@ -34,6 +34,8 @@ pub struct Parts<S> {
     pub attachments: Vec<Marker>,
     /// Whether products of rates are left out of the dynamics.
     pub drop_velocity_terms: bool,
+    /// What else is left out, part by part.
+    pub omissions: Omissions,
 }
 
 /// A tree on its way.
@@ -108,6 +110,11 @@ impl<S: Scalar> Parts<S> {
                 return Err(Error::Section { what, beam: name.clone(), at, length: *length });
             }
         }
+        for (index, target, count) in self.omitting() {
+            if index >= count {
+                return Err(Error::Reference { what: "what is left out".to_owned(), target, index, count });
+            }
+        }
         for (payload, point) in self.point_masses.iter().enumerate() {
             let (body, bodies) = match point.on {
                 Site::Body(body) => (body, self.bodies.len()),
@@ -120,6 +127,16 @@ impl<S: Scalar> Parts<S> {
             check_point_mass(self.site_name(point.on), point)?;
         }
         Ok(())
+    }
+
+    /// Numbers of the parts of which something is left out, with what they are and how many of it there are.
+    fn omitting(&self) -> impl Iterator<Item = (usize, &'static str, usize)> {
+        let Omissions { velocity_of_bodies, velocity_of_beams, coupling, second_order } = &self.omissions;
+        let (bodies, beams) = (self.bodies.len(), self.beams.len());
+        let of_bodies = velocity_of_bodies.iter().map(move |&body| (body, "body", bodies));
+        let of_joints = coupling.iter().map(move |&joint| (joint, "joint", bodies));
+        let of_beams = velocity_of_beams.iter().chain(second_order).map(move |&beam| (beam, "beam", beams));
+        of_bodies.chain(of_joints).chain(of_beams)
     }
 
     fn site_name(&self, site: Site) -> &str {
@@ -154,8 +171,11 @@ impl<'a, S: Scalar> Assembly<'a, S> {
         let marks: Vec<_> = (0..parts.beams.len()).map(|beam| parts.marks(beam)).collect();
         let (mut coordinate, mut frame) = (parts.bodies.len(), parts.bodies.len() + 1);
         let mut beams = Vec::new();
-        for (entry, marks) in parts.beams.iter().zip(&marks) {
-            let beam = Beam::new(entry, marks)?;
+        for (number, (entry, marks)) in parts.beams.iter().zip(&marks).enumerate() {
+            let beam = match parts.omissions.second_order.contains(&number) {
+                true => Beam::first_order(entry, marks)?,
+                false => Beam::new(entry, marks)?,
+            };
             let (first, rigid) = (coordinate, entry.level == Level::Rigid);
             let of_first_station = (!rigid).then_some(frame);
             (coordinate, frame) = (coordinate + beam.len(), frame + if rigid { 0 } else { beam.stations() });

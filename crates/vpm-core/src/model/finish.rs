@@ -1,6 +1,7 @@
 //! The last step of an assembly: everything in the frames and the order that the algorithms want.
 
 use super::assemble::Assembly;
+use super::omissions::Tree;
 use super::order::Part;
 use super::{BodyFrame, Elastic, Link, Model, Node, Place, Strip, Wire};
 use crate::error::Result;
@@ -36,13 +37,22 @@ impl<S: Scalar> Assembly<'_, S> {
             }
         }
         let sorted = links.iter().enumerate().all(|(number, link)| link.parent <= number);
+        let order = self.nodes(order, &links);
+        let (omissions, n_frames) = (&self.parts.omissions, self.inertias.len());
+        let tree = Tree { links: &links, beams: &self.beams, lines: &lines, order: &order, n_frames };
+        let products = tree.products(omissions, self.parts.drop_velocity_terms);
+        let blocks = tree.blocks(omissions);
+        let couples = blocks.windows(2).all(|pair| pair[0] == pair[1]);
         let rigid = n_coordinates == n_joints && self.beams.iter().all(|elastic| elastic.frame.is_none());
         Ok(Model {
             gravity: Vector3::from(self.parts.gravity),
-            order: self.nodes(order, &links),
-            n_frames: self.inertias.len(),
-            recursive: sorted && rigid && !lines.iter().any(Wire::is_massive),
+            order,
+            n_frames,
+            recursive: sorted && rigid && couples && !lines.iter().any(Wire::is_massive),
             drops_velocity_terms: self.parts.drop_velocity_terms,
+            products,
+            blocks,
+            couples,
             links,
             frames,
             lines,
@@ -86,6 +96,9 @@ impl<S: Scalar> Assembly<'_, S> {
                     let mut carried: Vec<usize> = std::mem::take(&mut beyond[number + 1]);
                     let node = Node::Body(number, carried.clone());
                     carried.push(number);
+                    if self.parts.omissions.coupling.contains(&number) {
+                        carried.clear();
+                    }
                     (links[number].parent, carried, node)
                 }
                 Part::Beam(number) => {

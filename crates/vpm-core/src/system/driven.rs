@@ -4,7 +4,8 @@ use super::places::{Place, all_fed, places};
 use super::tangent::Laws;
 use super::{Build, Dynamics};
 use crate::actuator::Target;
-use crate::dynamics::{flexible, project, reach, weigh};
+use crate::contact::ContactFriction;
+use crate::dynamics::{flexible, poses, project, reach, weigh};
 use crate::scalar::{Dual, Scalar};
 use crate::spatial::Twist;
 
@@ -188,7 +189,14 @@ impl<S: Scalar> Driven<S> {
         let Dynamics {
             model, data, connections, tensions, efforts, actuators, forces, effects, memories, loads, ..
         } = dynamics;
-        reach(model, data, [q, v, acceleration], extra);
+        // Newton and Euler's recursion has the whole mass matrix in it; one that falls apart has to be there.
+        let couples = model.couples();
+        if couples {
+            reach(model, data, [q, v, acceleration], extra);
+        } else {
+            flexible::terms(model, data, q, v);
+            poses(model, data);
+        }
         efforts.fill(Dual::default());
         tensions.fill(Dual::default());
         for (actuator, force) in actuators.iter().zip(&*forces) {
@@ -202,15 +210,22 @@ impl<S: Scalar> Driven<S> {
                 Target::Line(line) => tensions[line] += force,
             }
         }
-        weigh(model, data, tensions, |data| {
-            connections.take_off(data, |law, square, normal| laws.resistance(law, square, normal))
-        });
+        let resistance = |law: &ContactFriction<Number<S>>, square, normal| laws.resistance(law, square, normal);
+        if couples {
+            weigh(model, data, tensions, |data| connections.take_off(data, resistance));
+        }
         loads.fill(Dual::default());
         loads[..efforts.len()].copy_from_slice(efforts);
         laws.add(effects, [q, v, efforts], &mut loads[..efforts.len()]);
         memories.add_efforts(&mut loads[..efforts.len()]);
-        flexible::subtract_elastic(model, q, v, loads);
-        project(model, data, residual);
+        if couples {
+            flexible::subtract_elastic(model, q, v, loads);
+            project(model, data, residual);
+        } else {
+            flexible::add_line_forces(data, tensions, loads);
+            connections.add_loads(model, data, resistance, loads);
+            flexible::required(model, data, (q, v), acceleration, residual);
+        }
         for (residual, &load) in residual.iter_mut().zip(&*loads) {
             *residual -= load;
         }

@@ -80,9 +80,10 @@ impl Dynamics<f64> {
             }
         } else {
             let outward = seconds(|| frames(model, data, black_box(q), v));
-            for (elastic, sections) in model.beams().iter().zip(&mut data.composite.sections) {
+            for (number, (elastic, sections)) in model.beams().iter().zip(&mut data.composite.sections).enumerate() {
                 let own = elastic.coordinate..elastic.coordinate + elastic.beam.len();
-                parts.beams += seconds(|| elastic.beam.motion(black_box(&q[own.clone()]), &v[own.clone()], sections));
+                let (beam, asked) = (&elastic.beam, model.accelerates(number));
+                parts.beams += seconds(|| beam.sweep(black_box(&q[own.clone()]), &v[own.clone()], sections, asked));
             }
             let terms = seconds(|| flexible::terms(model, data, black_box(q), v));
             parts.mass_matrix = (terms - outward).max(0.0);

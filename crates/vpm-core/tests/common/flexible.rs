@@ -34,7 +34,8 @@ pub fn lift<S: Scalar>(parts: &Parts<f64>) -> Parts<S> {
         markers: parts.markers.clone(),
         gauges: parts.gauges.clone(),
         attachments: parts.attachments.clone(),
-        drop_velocity_terms: false,
+        drop_velocity_terms: parts.drop_velocity_terms,
+        omissions: parts.omissions.clone(),
     }
 }
 

@@ -7,8 +7,10 @@
 //! shortening, without which a beam that turns fast loses its centrifugal stiffening.
 
 mod forms;
+mod linear;
 mod modal;
 
+pub(super) use linear::LinearAxis;
 pub(super) use modal::modal;
 
 use super::entry::Component;
@@ -57,47 +59,20 @@ impl DeflectionAxis {
         self.forms.slopes()
     }
 
-    /// Poses, twists, columns and accelerations of all sections.
-    pub fn motion<S: Scalar>(&self, q: &[S], v: &[S], out: &mut Sections<S>) {
+    /// Poses, twists and columns of all sections, and their accelerations if these are asked for.
+    pub fn motion<S: Scalar>(&self, q: &[S], v: &[S], out: &mut Sections<S>, accelerates: bool) {
         out.scratch.fill(S::zero());
         let mut second = Second::zero();
         for station in 0..self.places.len() {
             self.forms.advance(station, (q, v), &mut second, &mut out.scratch);
             let screw = self.screw(station, (q, v), &second);
-            self.section(station, &screw, out);
+            self.section(station, &screw, out, accelerates);
         }
     }
 
     /// The largest slope of the axis against its direction at the root, in rad.
     pub fn slope<S: Scalar>(&self, q: &[S]) -> S {
-        let n = self.components.len();
-        let mut most = S::zero();
-        for rows in self.rows.chunks_exact(n) {
-            let mut slope = [S::zero(); 2];
-            for ((&component, &[_, entry]), &q) in self.components.iter().zip(rows).zip(q) {
-                match component {
-                    Component::BendingY | Component::ShearX => slope[0] += q * entry,
-                    Component::BendingX | Component::ShearY => slope[1] += q * entry,
-                    Component::Torsion | Component::Extension => {}
-                }
-            }
-            most = most.max(slope[0] * slope[0] + slope[1] * slope[1]);
-        }
-        // The root of zero has no derivative; there the slope is at its least.
-        if most.re() > 0.0 { most.sqrt() } else { S::zero() }
-    }
-
-    /// The rows of the first-order fields (rotation vector, displacement) per unit of a coordinate.
-    #[inline]
-    fn linear(component: Component, [value, slope]: [f64; 2]) -> [(usize, f64); 2] {
-        match component {
-            Component::BendingX => [(0, -slope), (4, value)],
-            Component::BendingY => [(1, slope), (3, value)],
-            Component::Torsion => [(2, value), (2, 0.0)],
-            Component::ShearX => [(3, value), (3, 0.0)],
-            Component::ShearY => [(4, value), (4, 0.0)],
-            Component::Extension => [(5, value), (5, 0.0)],
-        }
+        largest_slope(&self.components, &self.rows, q)
     }
 
     /// Rotation vector and displacement of a section.
@@ -105,7 +80,7 @@ impl DeflectionAxis {
         let n = self.components.len();
         let Second { mut value, mut rate, change: second } = *forms;
         for (k, &component) in self.components.iter().enumerate() {
-            for (target, entry) in Self::linear(component, self.rows[station * n + k]) {
+            for (target, entry) in first_order(component, self.rows[station * n + k]) {
                 value[target] += q[k] * entry;
                 rate[target] += v[k] * entry;
             }
@@ -114,13 +89,13 @@ impl DeflectionAxis {
         Screw { value, rate, second }
     }
 
-    fn section<S: Scalar>(&self, station: usize, screw: &Screw<S>, out: &mut Sections<S>) {
+    fn section<S: Scalar>(&self, station: usize, screw: &Screw<S>, out: &mut Sections<S>, accelerates: bool) {
         let n = self.components.len();
         let Screw { value, rate, second } = screw;
         let halves = |six: &[S; 6]| (Vector3::new(six[0], six[1], six[2]), Vector3::new(six[3], six[4], six[5]));
         let ((w, p), (w_rate, p_rate), (w_second, p_second)) = (halves(value), halves(rate), halves(second));
         let (turn, tangent) = rotation(w);
-        let turning = turning(w, w_rate, w_second);
+        let turning = if accelerates { turning(w, w_rate, w_second) } else { [tangent * w_rate, Vector3::zero()] };
         let speed = turn.transpose_mul(p_rate);
         let change = turn.transpose_mul(p_second) - turning[0].cross(speed);
         out.at[station] = SectionMotion {
@@ -133,7 +108,7 @@ impl DeflectionAxis {
         for ((&component, column), &entries) in self.components.iter().zip(&mut *columns).zip(&self.rows[station * n..])
         {
             *column = Twist::zero();
-            for (target, entry) in Self::linear(component, entries) {
+            for (target, entry) in first_order(component, entries) {
                 rows.add(column, target, S::from_f64(entry));
             }
         }
@@ -142,6 +117,37 @@ impl DeflectionAxis {
                 rows.add(column, target, slope);
             }
         }
+    }
+}
+
+/// The largest slope of an axis with these rows, section by section, in rad.
+fn largest_slope<S: Scalar>(components: &[Component], rows: &[[f64; 2]], q: &[S]) -> S {
+    let mut most = S::zero();
+    for rows in rows.chunks_exact(components.len()) {
+        let mut slope = [S::zero(); 2];
+        for ((&component, &[_, entry]), &q) in components.iter().zip(rows).zip(q) {
+            match component {
+                Component::BendingY | Component::ShearX => slope[0] += q * entry,
+                Component::BendingX | Component::ShearY => slope[1] += q * entry,
+                Component::Torsion | Component::Extension => {}
+            }
+        }
+        most = most.max(slope[0] * slope[0] + slope[1] * slope[1]);
+    }
+    // The root of zero has no derivative; there the slope is at its least.
+    if most.re() > 0.0 { most.sqrt() } else { S::zero() }
+}
+
+/// The rows of the first-order fields (rotation vector, displacement) per unit of a coordinate.
+#[inline]
+fn first_order(component: Component, [value, slope]: [f64; 2]) -> [(usize, f64); 2] {
+    match component {
+        Component::BendingX => [(0, -slope), (4, value)],
+        Component::BendingY => [(1, slope), (3, value)],
+        Component::Torsion => [(2, value), (2, 0.0)],
+        Component::ShearX => [(3, value), (3, 0.0)],
+        Component::ShearY => [(4, value), (4, 0.0)],
+        Component::Extension => [(5, value), (5, 0.0)],
     }
 }
 

@@ -67,12 +67,22 @@ impl SpaceAxis {
     /// Law: fourth-order Magnus step with exact moments (Iserles et al. 2000, section 5.3): `Omega = A + A x B`, `A = int e dmu`,
     /// `B = 1/h int (mu - m) e dmu` with m the middle; the sign of the bracket is that of a strain that multiplies from the right.
     pub(super) fn cross<S: Scalar>(&self, piece: usize, c: &[S], rates: &[S]) -> Crossing<S> {
+        self.cross_as_asked(piece, (c, rates), true)
+    }
+
+    /// As [`SpaceAxis::cross`], but the acceleration only if it is asked for.
+    fn cross_as_asked<S: Scalar>(&self, piece: usize, (c, rates): (&[S], &[S]), accelerates: bool) -> Crossing<S> {
         let (size, rows) = (self.pieces[piece].size, self.rows(piece));
         let [mut whole, moment] = rows.map(|row| self.sum(row, c));
         whole.linear.z = whole.linear.z + size;
         let [whole_rate, moment_rate] = rows.map(|row| self.sum(row, rates));
         let screw = whole + whole.cross(moment);
         let rate = whole_rate + whole_rate.cross(moment) + whole.cross(moment_rate);
+        if !accelerates {
+            let tangent = Tangent::new(screw);
+            let (pose, twist, acceleration) = (exponential(screw), tangent.apply(rate), Twist::zero());
+            return Crossing { pose, twist, acceleration, moments: [whole, moment], tangent };
+        }
         let second = whole_rate.cross(moment_rate) * S::from_f64(2.0);
         // The exponent as a function of time: its rate and the rate of that make twist and acceleration.
         let tangent = Tangent::new(along(screw, rate));
@@ -98,12 +108,12 @@ impl SpaceAxis {
         Some(crossing.tangent.apply(change))
     }
 
-    /// Poses, twists, columns and accelerations of all sections.
-    pub fn motion<S: Scalar>(&self, q: &[S], v: &[S], out: &mut Sections<S>) {
+    /// Poses, twists and columns of all sections, and their accelerations if these are asked for.
+    pub fn motion<S: Scalar>(&self, q: &[S], v: &[S], out: &mut Sections<S>, accelerates: bool) {
         let (n, mut station) = (self.components.len(), 0);
         let mut moving = out.begin(station, n);
         for (number, piece) in self.pieces.iter().enumerate() {
-            let crossing = self.cross(number, q, v);
+            let crossing = self.cross_as_asked(number, (q, v), accelerates);
             moving.advance(&crossing.pose, crossing.twist, crossing.acceleration);
             for (k, column) in out.columns[station * n..(station + 1) * n].iter_mut().enumerate() {
                 *column = crossing.pose.inverse_twist(*column);
