@@ -132,7 +132,13 @@ def test_places_and_their_changes_exclude_each_other() -> None:
         ARM.replace('deforms = ["bending_y"]', 'deforms = ["bending_y", "torsion", "extension"]')
     )
     sites = reductions(spatial)
-    assert {site for site, _ in sites} == {"level", "component torsion", "component extension", "terms velocity"}
+    assert {site for site, _ in sites} == {
+        "level",
+        "component torsion",
+        "component extension",
+        "terms velocity",
+        "terms second-order",
+    }
     levels = [change.name for change in sites["level", "link"]]
     assert levels[-1] == "rigid"
     assert "elements(8)" not in levels

@@ -183,7 +183,7 @@ impl<S: Scalar> Model<S> {
     pub(crate) fn accelerates(&self, beam: usize) -> bool {
         self.beams[beam].frame.is_none_or(|first| {
             let stations = first..first + self.beams[beam].beam.stations();
-            self.products[stations].iter().any(|products| *products != Products::Dropped)
+            self.products[stations].iter().any(|products| products.accelerates())
         })
     }
 

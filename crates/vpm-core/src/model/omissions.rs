@@ -79,6 +79,16 @@ impl Mixed {
 }
 
 impl Products {
+    /// Whether the acceleration by products of rates over a joint or along a beam is asked for.
+    #[inline]
+    pub(crate) fn accelerates(self) -> bool {
+        match self {
+            Self::Kept => true,
+            Self::Dropped => false,
+            Self::Mixed(Mixed { own, tracked, .. }) => own || tracked,
+        }
+    }
+
     /// Whether they count at the frame itself.
     #[inline]
     pub(crate) fn own(self) -> bool {
