@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
@@ -9,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from vpm.errors import SimulationError
+from vpm.errors import SimulationError, ValidityWarning
 from vpm.experiment import Experiment
 from vpm.initial import initial_state
 from vpm.model import Model
@@ -174,5 +175,8 @@ def _driving(model: Model, experiment: Experiment) -> list[Array]:
     missing = [name for name in model.input_channels if name not in experiment]
     if not missing or not model.controlled_actuators:
         return [experiment[name] for name in model.input_channels]
-    run = simulate(model, experiment, "closed_loop")
+    with warnings.catch_warnings():
+        # The commands alone are asked for, which the place of a tip does not change.
+        warnings.simplefilter("ignore", ValidityWarning)
+        run = simulate(model, experiment, "closed_loop")
     return [run[name] if name in missing else experiment[name] for name in model.input_channels]
