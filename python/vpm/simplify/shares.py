@@ -128,7 +128,7 @@ def ranked(
     if not of_machine > ROUNDING:
         return (), of_machine
     found = [whole] if of_machine <= limit else []
-    # Entries of the mass matrix that are nothing along the motion are worked out all the same: without them it is quicker.
+    # Entries of the mass matrix that are nothing along the motion cost as much as others.
     least = -1.0 if whole.name == "coupling" else ROUNDING
     parts, sets = [], []
     for change in sorted(single, key=lambda each: share(each.applied(model)))[:-1]:
