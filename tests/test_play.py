@@ -81,7 +81,8 @@ def test_flights_show_the_gap_best_where_it_is(loose: tuple[Experiment, ...]) ->
     data = InverseDynamicsProblem(model, loose[:1])
     residual, _ = data.evaluate(model, model.theta)
     gaps = GAP * np.array([0.25, 0.5, 0.8, 1.0, 1.25, 2.0, 4.0])
-    added = flights(model.with_effect("backlash", at="axis", gap=GAP, stiffness=1.0), "axis", data, gaps.tolist())
+    loose_model = model.with_effect("backlash", at="axis", gap=GAP, stiffness=1.0)
+    added = flights(loose_model, "axis", data, gaps, np.full(7, 14.0), np.full(7, 0.5))
     left = np.sum((residual[:, None] + added) ** 2, axis=0)
     assert int(np.argmin(left)) in {2, 3, 4}
     assert left.min() < 0.6 * np.sum(residual**2)
@@ -98,7 +99,7 @@ def test_soft_contacts_are_read_off_as_soft_and_the_gap_between_them_is_not_wide
     model = Model.from_toml(TEXT)
     data = InverseDynamicsProblem(model, [record(WIDE, 1, 4.0, SOFT, SOFT_DAMPING)])
     candidate = Candidate(EFFECTS["backlash"], "axis", ({},))
-    hard, soft = (read_off(model, ("body.mass",), data, candidate, soft=each).starts[0] for each in (False, True))
+    soft, hard = (read_off(model, ("body.mass",), data, candidate, hard=each).starts[0] for each in (False, True))
     assert soft["gap"] == pytest.approx(WIDE, rel=0.03)
     assert soft["gap"] < hard["gap"]
     assert 0.5 * SOFT < soft["stiffness"] < 2.0 * SOFT

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from vpm.discrepancy.motion_only import CREEPING, LATE, Timed, is_dry, timed_in_motion
 from vpm.discrepancy.screening import Alias, Baseline, Probe, size_is_clear
+from vpm.discrepancy.slow import has_impacts, slow
 from vpm.errors import DivergedError
 from vpm.identify import (
     Estimate,
@@ -78,7 +79,12 @@ class Judged:
     @property
     def baseline(self) -> Baseline:
         """As the start of the next round of screening."""
-        return Baseline(self.model, self.free, self.fit.residual, self.fit.jacobian)
+        pushed = {}
+        for name in self.fit.at_bounds:
+            parameter = self.model.parameters[name]
+            low, high = self.bounds.get(name, (parameter.minimum, parameter.maximum))
+            pushed[name] = 1 if high - parameter.value < parameter.value - low else -1
+        return Baseline(self.model, self.free, self.fit.residual, self.fit.jacobian, pushed)
 
 
 @dataclass(frozen=True)
@@ -100,6 +106,8 @@ class Trial:
     away : Gain or None
         The unseen gain away from reversals, for an effect of a drive or an instrument, or a joint that winds up, on a
         machine with dry friction.
+    slow : Gain or None
+        The unseen gain of the slow part, where a play is in the model already; None elsewhere.
     diverged : str
         Why the simulation of the unseen records stopped, or "".
     clear : bool
@@ -116,6 +124,7 @@ class Trial:
     away: Gain | None
     diverged: str
     clear: bool
+    slow: Gain | None = None
 
     @property
     def score(self) -> float:
@@ -223,6 +232,7 @@ def _trial(
         timed.unseen if timed is not None else _away_gain(current, judged, data.unseen, probe),
         diverged,
         is_clear(judged, own),
+        _slow_gain(current, judged, data.unseen),
     )
 
 
@@ -304,6 +314,13 @@ def _simulated_gain(current: Judged, judged: Judged, data: Data) -> Gain | None:
     if data.simulation is None or current.simulated is None or judged.simulated is None:
         return None
     return gain(current.simulated, judged.simulated, segments(data.simulation))
+
+
+def _slow_gain(current: Judged, judged: Judged, data: InverseDynamicsProblem) -> Gain | None:
+    if not has_impacts(current.model):
+        return None
+    shrunk = judged.unseen * shrinkage(data, current, judged)
+    return gain(slow(data, current.unseen), slow(data, shrunk), segments(data))
 
 
 def _timed(current: Judged, judged: Judged, data: Data, probe: Probe) -> Timed | None:

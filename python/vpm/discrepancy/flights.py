@@ -1,8 +1,12 @@
-"""Flights of a link through a play along the measured motion, from contact to contact, each of which ends at rest."""
+"""Flights of a link through a play along the measured motion, from one soft contact to the other.
+
+Along a motion that is measured with noise and within a band, nothing can be said of every bounce between hard contacts:
+each enlarges the error of the one before. Soft, well damped contacts forget the flight before, pass on what is slow as
+hard ones do, and so show how wide the play is, however hard it is in truth.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,12 +38,15 @@ class _Course:
     interval: float
 
 
-def flights(model: Model, site: str, data: InverseDynamicsProblem, gaps: Sequence[float]) -> Array:
-    """What plays would add to the residual of the balance, shape (n, gaps).
+def flights(
+    model: Model, site: str, data: InverseDynamicsProblem, gaps: Array, frequencies: Array, dampings: Array
+) -> Array:
+    """What plays would add to the residual of the balance, shape (n, plays).
 
-    Law: within the gap the link feels none of the effort that the motion passes on; where it arrives it stays until
-    that effort turns. A plastic impact (restitution 0) forgets the flight before it, so that errors do not add up.
-    Source: the hard limit of the dead-zone model of Nordin and Gutman, Automatica 38(10), 2002, section 2.
+    Law: within the gap the link feels none of the effort that the motion passes on; beyond it a spring and a damper
+    hold it, ``y'' = pull - w^2 (y -+ gap/2) - 2 z w y'`` with ``w = 2 pi frequency`` and the damping ratio z, stepped
+    with the damping at the new velocity, which is stable up to ``w`` times the interval of 2.
+    Source: dead-zone model of Nordin and Gutman, Automatica 38(10), 2002, section 2.
 
     Parameters
     ----------
@@ -48,16 +55,14 @@ def flights(model: Model, site: str, data: InverseDynamicsProblem, gaps: Sequenc
     site : str
         Its joint.
     data : InverseDynamicsProblem
-    gaps : sequence of float
-        Widths, m or rad.
+    gaps, frequencies, dampings : ndarray, shape (plays,)
+        Widths, m or rad; Hz at which the link swings on a contact while the motor stands; damping ratios there.
     """
-    import vpm._core as core
 
-    fly = getattr(core, "plastic_flights", None) or (lambda p, g, i: _swing(p, np.asarray(g), i))
     added = []
     for m in data.motions:
         course = _course(model, site, m)
-        swing = fly(course.pull, gaps, course.interval)
+        swing = _swing(course, 0.5 * gaps, 2.0 * np.pi * frequencies, dampings)
         added.append(course.column[:, :, None] * swing[:, None, :])
     return data.added(added)
 
@@ -76,19 +81,15 @@ def _course(model: Model, site: str, m: Motion) -> _Course:
     return _Course(-held[:, behind] / column[:, behind], -column[:, before], m.dt)
 
 
-def _swing(pull: Array, gaps: Array, interval: float) -> Array:
-    """Acceleration of the link against the motor, impacts included, for each width, shape (N, gaps)."""
-    half = 0.5 * gaps
-    place, speed, side = np.zeros_like(half), np.zeros_like(half), np.zeros_like(half)
-    way = np.zeros((pull.size, half.size))
-    for k, acceleration in enumerate(pull.tolist()):
-        way[k] = place
-        held = side * acceleration > 0.0
-        speed = np.where(held, 0.0, speed + interval * acceleration)
-        reached = place + interval * speed
-        place = np.minimum(np.maximum(reached, -half), half)
-        side = np.where(held, side, np.where(reached == place, 0.0, np.sign(reached)))
-        speed = np.where(side != 0.0, 0.0, speed)
-    swing = np.zeros_like(way)
-    swing[1:-1] = (way[2:] - 2.0 * way[1:-1] + way[:-2]) / interval**2
+def _swing(course: _Course, half: Array, pace: Array, dampings: Array) -> Array:
+    """Acceleration of the link against the motor for each pair of soft contacts, shape (N, plays)."""
+    h = course.interval
+    spring, held = h * pace**2, 1.0 / (1.0 + 2.0 * h * dampings * pace)
+    place, speed = np.zeros_like(half), np.zeros_like(half)
+    swing = np.zeros((course.pull.size, half.size))
+    for k, acceleration in enumerate(course.pull.tolist()):
+        beyond = place - np.minimum(np.maximum(place, -half), half)
+        new = (speed + h * acceleration - spring * beyond) * np.where(beyond == 0.0, 1.0, held)
+        swing[k] = (new - speed) / h
+        place, speed = place + h * new, new
     return swing

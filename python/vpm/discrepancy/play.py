@@ -2,8 +2,9 @@
 
 Along the motion of the motor, what sits in the play flies freely whenever the effort that is passed on changes its
 sign, and comes to rest at the other side. How long that takes, and so the gap, is seen in the balance: until the link
-has arrived, the drive accelerates nothing but itself. In contacts that swallow every impact the flights begin anew each
-time, so that no error of one passes on to the next; in lively ones each bounce enlarges the error of the one before.
+has arrived, the drive accelerates nothing but itself. In soft contacts that swallow most of an impact the flights begin
+anew each time, so that no error of one passes on to the next; in lively ones each bounce enlarges the error of the one
+before. So widths are looked for between soft contacts, and how hard the contacts are is asked around the width found.
 """
 
 from __future__ import annotations
@@ -25,23 +26,21 @@ from vpm.model import Model
 
 Array = NDArray[np.float64]
 
-#: Widths tried, as shares of the half travel: 17 % apart, the flights of neighbours end within each other's impacts.
-SHARES = tuple(np.geomspace(5e-5, 5e-2, 44).tolist())
-#: Finer factors on the best of them, and frequencies of the contacts, Hz, with the damping ratios of these.
-FINER = (0.92, 0.96, 1.04, 1.08)
-FINEST = (0.95, 0.98, 1.02, 1.05)
-#: So many of the widths are refined.
+#: Widths tried, as shares of the half travel: 23 % apart, as near as the flights of neighbours end together.
+SHARES = np.geomspace(5e-5, 5e-2, 34)
+#: Contacts between which widths are looked for: frequencies, Hz, and damping ratio.
+SURVEYED, SURVEYED_DAMPING = (8.0, 14.0, 22.0), 0.5
+#: So many of the plays are looked at along the motion as the model has it.
 MOST = 3
-CONTACTS = (30.0, 45.0, 65.0, 90.0)
-DAMPINGS = (0.4, 0.7, 1.0)
-#: Softer contacts, tried where hard ones do not simulate. They give way further, which hard ones take for a wider gap:
-#: shares of theirs, tried with the damping ratio in the middle of those.
-SOFT_CONTACTS = (7.0, 10.0, 14.0, 20.0)
-SOFT_DAMPINGS = (0.2, 0.4, 0.7, 1.0)
-CLOSER = (0.86, 0.9, 0.94, 0.98)
-MIDDLING = 0.5
-#: Contact of the first look.
-CONTACT, DAMPING = 60.0, 1.0
+#: Frequencies of contacts tried at the best width, Hz, with what the survey took for them, and damping ratios.
+CONTACTS = (7.0, 10.0, 14.0, 20.0, 30.0, 45.0, 65.0, 90.0)
+DAMPINGS = (0.2, 1.0)
+#: Least frequency of contacts that count as hard, tried where soft ones do not simulate, and their damping ratios.
+HARD, HARD_DAMPINGS = 30.0, (0.4, 0.7, 1.0)
+#: Factors on the width between the contacts found, on these, and on the width once more.
+FINER = (0.84, 0.92, 1.08, 1.16)
+BESIDE = (0.84, 1.19)
+FINEST = (0.95, 0.98, 1.02, 1.05)
 #: Fastest contact that samples show, rad per interval.
 FASTEST = 0.7
 #: Way over which a contact closes, as a share of the gap: it must not pull the link out of the middle.
@@ -98,7 +97,7 @@ def only_winds_up(model: Model, site: str, data: InverseDynamicsProblem) -> str:
 
 
 def read_off(
-    model: Model, free: Sequence[str], data: InverseDynamicsProblem, candidate: Candidate, *, soft: bool = False
+    model: Model, free: Sequence[str], data: InverseDynamicsProblem, candidate: Candidate, *, hard: bool = False
 ) -> Candidate:
     """The candidate with the one start that leaves least.
 
@@ -111,17 +110,15 @@ def read_off(
     data : InverseDynamicsProblem
     candidate : Candidate
         A play.
-    soft : bool
-        Between soft contacts. Plastic flights show hard ones well; along soft ones the link sways, and both leave about
-        as little in the balance where the swaying is lost in the errors of earlier bounces.
+    hard : bool
+        Between hard contacts. Soft ones show the width best; what swings in them may still not simulate.
     """
     search = _Search(model, free, data, candidate)
-    widths, left = search.survey()
-    order = np.argsort(left)[:MOST]
-    best = _Look(float(widths[order[0]]), search.slowed(CONTACT), DAMPING, math.inf)
-    if left[order[0]] < HOPELESS * search.power:
-        best = search.best(best, [replace(best, gap=f * float(widths[k])) for k in order for f in (1.0, *FINER)])
-        best = search.soft(best) if soft else search.hard(best)
+    looks = search.survey()
+    best = replace(looks[0], left=math.inf)
+    if looks[0].left < HOPELESS * search.power:
+        best = search.best(best, looks)
+        best = search.hard(best) if hard else search.soft(best)
         best = search.best(best, [replace(best, gap=factor * best.gap) for factor in FINEST])
     return replace(candidate, starts=(search.values(best.gap, best.frequency, best.damping),))
 
@@ -156,16 +153,17 @@ class _Search:
 
     def hard(self, found: _Look) -> _Look:
         """The best of hard contacts around a width."""
-        contacts = sorted({self.slowed(frequency) for frequency in CONTACTS})
-        return self.best(found, [replace(found, frequency=f, damping=d) for f in contacts for d in DAMPINGS])
+        contacts = sorted({self.slowed(frequency) for frequency in CONTACTS if frequency >= HARD})
+        first = replace(found, left=math.inf)
+        return self.best(first, [replace(first, frequency=f, damping=d) for f in contacts for d in HARD_DAMPINGS])
 
     def soft(self, found: _Look) -> _Look:
-        """The best of soft contacts, whose gap is narrower than that of hard ones."""
-        contacts = sorted({self.slowed(frequency) for frequency in SOFT_CONTACTS})
-        pairs = [(f, share * found.gap) for f in contacts for share in CLOSER]
-        first = [_Look(gap, f, MIDDLING, math.inf) for f, gap in pairs]
-        best = self.best(replace(first[0], left=math.inf), first)
-        return self.best(best, [replace(best, damping=damping) for damping in SOFT_DAMPINGS])
+        """The best of all contacts around a width: one number after the other."""
+        contacts = sorted({self.slowed(frequency) for frequency in CONTACTS})
+        found = self.best(found, [replace(found, frequency=f) for f in contacts])
+        found = self.best(found, [replace(found, damping=d) for d in DAMPINGS])
+        found = self.best(found, [replace(found, gap=factor * found.gap) for factor in FINER])
+        return self.best(found, [replace(found, frequency=self.slowed(factor * found.frequency)) for factor in BESIDE])
 
     def slowed(self, frequency: float) -> float:
         """A frequency of contacts, or the fastest that samples show."""
@@ -177,13 +175,18 @@ class _Search:
         resistance = 2.0 * damping * math.sqrt(stiffness * self.inertia)
         return {"gap": gap, "stiffness": stiffness, "contact_damping": resistance, "width": ROUNDING * gap}
 
-    def survey(self) -> tuple[Array, Array]:
-        """Widths, and what each of them leaves where every impact is plastic."""
-        widths = np.array(SHARES) * self.travel
-        start = self.values(float(widths[0]), CONTACT, DAMPING)
+    def survey(self) -> list[_Look]:
+        """The plays between soft contacts that leave least, the least first."""
+        contacts = sorted({self.slowed(frequency) for frequency in SURVEYED})
+        widths, frequencies = (each.ravel() for each in np.meshgrid(SHARES * self.travel, contacts))
+        start = self.values(float(widths[0]), contacts[0], SURVEYED_DAMPING)
         model = self.model.with_effect("backlash", at=self.candidate.site, **start)
-        added = flights(model, self.candidate.site, self.data, widths.tolist())
-        return widths, self._left(self.residual[:, None] + added)
+        dampings = np.full_like(widths, SURVEYED_DAMPING)
+        left = self._left(
+            self.residual[:, None] + flights(model, self.candidate.site, self.data, widths, frequencies, dampings)
+        )
+        order = np.argsort(left)[:MOST]
+        return [_Look(float(widths[k]), float(frequencies[k]), SURVEYED_DAMPING, float(left[k])) for k in order]
 
     def _left(self, residual: Array) -> Array:
         """Sum of squares, of each column, beside the best change of what is free."""

@@ -92,6 +92,7 @@ def refuse_trial(trial: Trial, thresholds: Thresholds) -> str:
         worse_in_simulation(trial),
         _too_little(trial, thresholds),
         _only_reversals(trial),
+        _only_impacts(trial),
     )
     return next(filter(None, reasons), "")
 
@@ -215,8 +216,27 @@ def _not_clear(trial: Trial) -> str:
     return f"the 95 % interval of {worst} covers zero ({low:.3g} to {high:.3g} {model.parameters[worst].unit})"
 
 
+def _only_impacts(trial: Trial) -> str:
+    """Beside a play: a law that is right helps what is slow as well, where impacts hardly show."""
+    if trial.slow is None or trial.slow.relative >= -LEAST_GAIN:
+        return ""
+    return (
+        f"it lowers the unseen error by {_percent(trial.unseen.relative)} of its mean square and raises its slow part "
+        f"({_rms(trial.slow.before, trial.slow.after)}): it makes up for single impacts of the play"
+    )
+
+
+def slow_shows_it(trial: Trial, thresholds: Thresholds) -> bool:
+    """Whether what is slow shows an effect that single impacts of a play cover, and does not speak alone."""
+    unseen, sure = trial.unseen, NORMAL_95_ONE_SIDED
+    whole = unseen.relative >= LEAST_GAIN and unseen.score >= sure
+    return trial.slow is not None and whole and thresholds.met(trial.slow)
+
+
 def _too_little(trial: Trial, thresholds: Thresholds) -> str:
     unseen = trial.unseen
+    if slow_shows_it(trial, thresholds):
+        return ""
     if unseen.relative < WORTH_A_NAME:
         return (
             f"it lowers the unseen error by only {_percent(unseen.relative)} of its mean square "

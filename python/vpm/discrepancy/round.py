@@ -18,11 +18,13 @@ from vpm.discrepancy.refusal import (
     refuse_probe,
     refuse_timing,
     refuse_trial,
+    slow_shows_it,
     worse_in_simulation,
 )
 from vpm.discrepancy.ringing import NOISE_ONLY, noise_alone, only_ringing
 from vpm.discrepancy.screening import Probe, prepare, probe, refit_effort, screening_effort
 from vpm.discrepancy.side_by_side import Failure, SideBySide
+from vpm.discrepancy.slow import slow
 from vpm.discrepancy.structure import structure
 from vpm.discrepancy.timing import InTime, in_time
 from vpm.identify import gain, segments
@@ -187,17 +189,16 @@ class Round:
                 self._believed.append(trial)
 
     def _confirmed(self, one: Probe) -> Trial:
-        """A trial; of a play between hard contacts that does not simulate, that between soft ones if it does better.
+        """A trial; of a play between soft contacts that does not simulate, that between hard ones if it does better.
 
-        The balance forgets every flight at the next impact, and hardly tells how hard the contacts are; in simulation
-        those that are too hard bounce too often.
+        The balance hardly tells how hard the contacts are, for errors of the flights add up between lively ones.
         """
         trial = confirm(self.current, self.data, one)
         if not is_read_off(self.current.model, self.data.training, one.candidate) or not worse_in_simulation(trial):
             return trial
-        soft = probe(self.current.baseline, self.data.training, one.candidate, soft=True)
-        softer = confirm(self.current, self.data, soft)
-        return trial if worse_in_simulation(softer) else softer
+        other = probe(self.current.baseline, self.data.training, one.candidate, hard=True)
+        harder = confirm(self.current, self.data, other)
+        return trial if worse_in_simulation(harder) else harder
 
     def _thresholds(self) -> Thresholds:
         """What is asked of an effect when so many have been tried."""
@@ -222,7 +223,10 @@ class Round:
         if self.timed.shift == 0.0 or explains_most(trial):
             return ""
         unseen = in_time(trial.judged, self.data).unseen
-        timed = gain(self.timed.unseen, unseen, segments(self.data.unseen))
+        before = self.timed.unseen
+        if slow_shows_it(trial, thresholds):
+            before, unseen = (slow(self.data.unseen, each) for each in (before, unseen))
+        timed = gain(before, unseen, segments(self.data.unseen))
         return refuse_timing(timed, self.timed.shift, thresholds)
 
     def best(self) -> Accepted | None:

@@ -7,7 +7,7 @@ that a candidate is never credited with what a better value of a known parameter
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,12 +74,16 @@ class Probe:
 
 @dataclass(frozen=True)
 class Baseline:
-    """The model that candidates are added to, with its training residual and regressor."""
+    """The model that candidates are added to, with its training residual and regressor.
+
+    ``pushed`` says of parameters that a bound holds on which side: 1 at the upper one, -1 at the lower one.
+    """
 
     model: Model
     free: tuple[str, ...]
     residual: Array
     jacobian: Array
+    pushed: Mapping[str, int] = field(default_factory=dict)
 
 
 def prepare(base: Baseline, data: InverseDynamicsProblem, listed: Sequence[Candidate]) -> Baseline:
@@ -116,14 +120,14 @@ def _short(model: Model, candidate: Candidate, name: str) -> str:
     return next(short for short, dotted in effect.parameter_names.items() if dotted == name)
 
 
-def probe(base: Baseline, data: InverseDynamicsProblem, candidate: Candidate, *, soft: bool = False) -> Probe:
+def probe(base: Baseline, data: InverseDynamicsProblem, candidate: Candidate, *, hard: bool = False) -> Probe:
     """Try all start values of a candidate and keep the best, a possible one before an impossible one.
 
-    A play that is read off the motion has one start, with hard contacts or ``soft`` ones.
+    A play that is read off the motion has one start, with the contacts that suit it or ``hard`` ones.
     """
     if is_read_off(base.model, data, candidate):
         base = replace(base, model=believed(base.model, data.nominal, base.free))
-        start = read_off(base.model, base.free, data, candidate, soft=soft)
+        start = read_off(base.model, base.free, data, candidate, hard=hard)
         return _probe_start(base, data, start, still=True)
     probes = [_probe_start(base, data, candidate, start) for start in candidate.starts]
     best = max(probes, key=lambda p: p.drop)
@@ -198,6 +202,12 @@ def _probe_start(
     names = (*base.free, *(added[i] for i in keep))
     start_values = np.concatenate([np.zeros(len(base.free)), model.theta[[columns[i] for i in keep]]])
     values, std, left = _linear_step(data, chosen, residual)
+    outwards = [i for i, name in enumerate(base.free) if base.pushed.get(name, 0) * values[i] > 0.0]
+    if outwards:
+        # What a bound holds stays there: beyond it, it would seem to explain what no fit can.
+        moves = [i for i in range(len(names)) if i not in outwards]
+        values, std = np.zeros(len(names)), np.zeros(len(names))
+        values[moves], std[moves], left = _linear_step(data, chosen[:, moves], residual)
     if still:
         values, (_, _, left) = np.zeros_like(values), _linear_step(data, known, residual)
     power = float(base.residual @ base.residual)
