@@ -35,6 +35,7 @@ def trial(value: float) -> Trial:
             simulated=None,
             diverged="",
             away=None,
+            slow=None,
             clear=True,
         ),
     )
@@ -49,3 +50,23 @@ def test_a_gain_that_no_instrument_keeps_is_no_finding(error: float) -> None:
 @pytest.mark.parametrize("error", [-1.2 * NEGLIGIBLE, 1.2 * NEGLIGIBLE])
 def test_a_gain_beyond_that_is_one(error: float) -> None:
     assert refuse_trial(trial(1.0 + error), Thresholds(30, 1e-3)) == ""
+
+
+def beside_play(whole: Gain, slow: Gain) -> str:
+    """What is said of a trial beside a play, with these gains of the whole unseen residual and of its slow part."""
+    one = trial(1.1)
+    return refuse_trial(
+        cast("Trial", SimpleNamespace(**{**vars(one), "unseen": whole, "slow": slow})), Thresholds(30, 1e-3)
+    )
+
+
+def test_what_helps_impacts_and_hurts_what_is_slow_is_refused_beside_a_play() -> None:
+    assert "single impacts of the play" in beside_play(gained(), Gain(1.0, 1.5, 0.3, 2.0, 20))
+
+
+def test_what_is_slow_shows_an_effect_that_impacts_cover_unless_it_speaks_alone() -> None:
+    covered = Gain(before=1.0, after=0.96, weight=0.8, score=3.0, pieces=40)
+    assert beside_play(covered, gained()) == ""
+    assert "only 7.8 %" in beside_play(covered, Gain(1.0, 0.99, 0.5, 2.0, 20))
+    assert beside_play(Gain(before=1.0, after=0.995, weight=0.5, score=3.0, pieces=40), gained())
+    assert beside_play(Gain(before=1.0, after=0.96, weight=0.5, score=1.0, pieces=40), gained())

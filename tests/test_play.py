@@ -95,6 +95,15 @@ def test_the_gap_is_read_off_from_the_motor_alone(loose: tuple[Experiment, ...])
     assert found["gap"] == pytest.approx(GAP, rel=0.15)
 
 
+def test_a_play_between_hard_contacts_that_ring_is_found_as_wide_as_it_is() -> None:
+    """Contacts at 60 Hz, a twentieth of critically damped: their bounces can be followed for no more than a few."""
+    wide, hard = 1.5e-3, MASS * (2.0 * np.pi * 60.0) ** 2
+    model = Model.from_toml(TEXT)
+    data = InverseDynamicsProblem(model, [record(wide, 4, 4.0, hard, 0.1 * np.sqrt(hard * MASS))])
+    found = read_off(model, ("body.mass",), data, Candidate(EFFECTS["backlash"], "axis", ({},))).starts[0]
+    assert found["gap"] == pytest.approx(wide, rel=0.2)
+
+
 def test_soft_contacts_are_read_off_as_soft_and_the_gap_between_them_is_not_widened() -> None:
     model = Model.from_toml(TEXT)
     data = InverseDynamicsProblem(model, [record(WIDE, 1, 4.0, SOFT, SOFT_DAMPING)])

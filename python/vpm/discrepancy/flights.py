@@ -58,7 +58,6 @@ def flights(
     gaps, frequencies, dampings : ndarray, shape (plays,)
         Widths, m or rad; Hz at which the link swings on a contact while the motor stands; damping ratios there.
     """
-
     added = []
     for m in data.motions:
         course = _course(model, site, m)
