@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import scipy.signal
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
@@ -113,6 +114,14 @@ def test_parallel_filter_is_one_linear_map(decimation: int, count: int, a: float
     np.testing.assert_allclose(together, apart, atol=1e-9)
     assert together.shape == (-(-count // decimation), 3)
     np.testing.assert_allclose(parallel_filter(x[:, 1], decimation), parallel_filter(x, decimation)[:, 1], atol=1e-12)
+
+
+@pytest.mark.parametrize("shape", [(700,), (700, 3), (5, 2)])
+def test_forward_and_backward_is_what_scipy_makes_of_it(shape: tuple[int, ...]) -> None:
+    values = np.cumsum(np.random.default_rng(1).standard_normal(shape), axis=0)
+    sections = scipy.signal.cheby1(8, 0.05, 0.8 / 6.0, output="sos")
+    expected = scipy.signal.sosfiltfilt(sections, values, axis=0, padlen=min(len(values) - 1, 240))
+    np.testing.assert_allclose(anti_alias(values, 6.0), expected, rtol=1e-12)
 
 
 def test_decimation_follows_the_cutoff() -> None:
