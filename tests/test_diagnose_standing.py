@@ -11,8 +11,11 @@ import pytest
 import vpm
 from blind import make_case
 from vpm.discrepancy.ambiguity import Rivals
+from vpm.discrepancy.candidates import candidates
+from vpm.discrepancy.screening import Baseline, probe
 from vpm.discrepancy.search import Search
 from vpm.discrepancy.standing import in_order
+from vpm.identify import InverseDynamicsProblem, estimate
 
 
 def test_a_spring_takes_the_place_of_the_constant_force_that_was_the_plainer_name() -> None:
@@ -33,6 +36,33 @@ def test_a_constant_force_keeps_its_name_where_finer_laws_know_nothing_more() ->
     tried = ["bias_force", "spring", "asymmetric_friction"]
     why = vpm.diagnose(case.model(), case.train, case.validate, effects=tried, workers=1)
     assert [effect.name for effect in why.effects] == ["bias_force"]
+
+
+def test_a_spring_that_looked_like_a_shifted_centre_of_mass_is_found_beside_the_constant_force() -> None:
+    case = make_case("axis_rotary", "spring", 106)
+    (hidden,) = case.truth.hidden
+    why = vpm.diagnose(case.model(), case.train, case.validate, effects=["bias_force", "spring"], workers=1)
+    assert [(s.change, s.effect) for s in why.steps][1:] == [
+        ("added", "bias_force"),
+        ("removed", "bias_force"),
+        ("added", "spring"),
+    ]
+    for parameter in why.effects[0].parameters:
+        assert parameter.value == pytest.approx(hidden.parameters[parameter.name], abs=3.0 * parameter.std)
+
+
+def test_a_spring_is_screened_with_the_place_where_it_rests() -> None:
+    case = make_case("axis_rotary", "spring", 100)
+    (hidden,) = case.truth.hidden
+    data = InverseDynamicsProblem(case.model(), case.train)
+    free = tuple(p.name for p in data.nominal.parameters.values() if p.adjustable)
+    fit = estimate(data.nominal, data, free)
+    model = data.nominal.with_parameters(dict(zip(free, map(float, fit.values), strict=True)))
+    (candidate,) = (c for c in candidates(model, data, fit.residual, ["spring"]) if c.site == "axis")
+    found = probe(Baseline(model, free, fit.residual, fit.jacobian), data, candidate)
+    assert found.drop > 0.99
+    for short, value in hidden.parameters.items():
+        assert found.values[f"axis.spring.{short}"] == pytest.approx(value, rel=0.05)
 
 
 @dataclass

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.special import chdtri
 
 from vpm.discrepancy.candidates import Candidate
+from vpm.discrepancy.place import free_place
 from vpm.discrepancy.play import believed, is_read_off, read_off
 from vpm.discrepancy.structural import in_series
 from vpm.identify import InverseDynamicsProblem, robust_covariance, segments
@@ -195,26 +196,40 @@ def _probe_start(
         all_columns = [model.index(name) for name in base.free] + columns
         residual, jacobian = data.evaluate(model, model.theta, all_columns)
         known, fresh = jacobian[:, : len(base.free)], jacobian[:, len(base.free) :]
+    place = free_place(data, model, candidate, added, fresh)
+    if place is not None:
+        fresh[:, place.where] = place.column
     keep, held, invisible = _sort_columns(
         added, fresh, known, base.free, residual, _sizes(model, candidate, base.free, added)
     )
+    if place is not None and place.where in keep and place.size not in keep:
+        keep.remove(place.where)
+        invisible = (*invisible, added[place.where])
     chosen = np.column_stack([known, fresh[:, keep]])
     names = (*base.free, *(added[i] for i in keep))
     start_values = np.concatenate([np.zeros(len(base.free)), model.theta[[columns[i] for i in keep]]])
-    values, std, left = _linear_step(data, chosen, residual)
+    values, std, left = linear_step(data, chosen, residual)
     outwards = [i for i, name in enumerate(base.free) if base.pushed.get(name, 0) * values[i] > 0.0]
     if outwards:
         # What a bound holds stays there: beyond it, it would seem to explain what no fit can.
         moves = [i for i in range(len(names)) if i not in outwards]
         values, std = np.zeros(len(names)), np.zeros(len(names))
-        values[moves], std[moves], left = _linear_step(data, chosen[:, moves], residual)
+        values[moves], std[moves], left = linear_step(data, chosen[:, moves], residual)
     if still:
-        values, (_, _, left) = np.zeros_like(values), _linear_step(data, known, residual)
+        values, (_, _, left) = np.zeros_like(values), linear_step(data, known, residual)
     power = float(base.residual @ base.residual)
     free = names[len(base.free) :]
     estimates = dict(zip(free, (values + start_values)[len(base.free) :].tolist(), strict=True))
     deviations = dict(zip(free, std[len(base.free) :].tolist(), strict=True))
     drop = 1.0 - left / power if power > 0.0 and free else 0.0
+    if place is not None and place.where in keep:
+        size, where = added[place.size], added[place.where]
+        if estimates[size] <= model.parameters[size].minimum:
+            free, invisible = tuple(name for name in free if name != where), (*invisible, where)
+        else:
+            first = model.parameters[where].value
+            estimates[where] = first + (estimates[where] - first) / estimates[size]
+            deviations[where] /= abs(estimates[size])
     for name in free:
         if _short(model, candidate, name) in in_series(candidate.effect.name):
             estimates[name], deviations[name] = softened(
@@ -276,7 +291,7 @@ def _sort_columns(
     return keep, tuple(held), invisible
 
 
-def _linear_step(data: InverseDynamicsProblem, jacobian: Array, residual: Array) -> tuple[Array, Array, float]:
+def linear_step(data: InverseDynamicsProblem, jacobian: Array, residual: Array) -> tuple[Array, Array, float]:
     """Unbounded least-squares step, its standard deviations and the remaining sum of squares."""
     if jacobian.shape[1] == 0:
         return np.zeros(0), np.zeros(0), float(residual @ residual)

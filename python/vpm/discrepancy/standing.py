@@ -17,6 +17,7 @@ from vpm.discrepancy.choice import Accepted, alike
 from vpm.discrepancy.confirmation import Data, Judged, Trial, finished, shrinkage
 from vpm.discrepancy.diagnosis import RefusedEffect
 from vpm.discrepancy.elimination import Stage
+from vpm.discrepancy.finer import contains
 from vpm.discrepancy.refusal import LEAST_GAIN, NORMAL_95_ONE_SIDED, Thresholds, refuse_trial
 from vpm.discrepancy.search import Search
 from vpm.identify import gain, segments
@@ -57,7 +58,11 @@ def _preferred(final: Judged, entry: Accepted, trial: Trial, data: Data, thresho
     judged = trial.judged
     fitted = gain(final.fit.residual, judged.fit.residual, segments(data.training))
     unseen = gain(final.unseen, judged.unseen * shrinkage(data.unseen, final, judged), segments(data.unseen))
-    if fitted.relative <= 0.0 or unseen.score < thresholds.score(unseen.pieces) or unseen.harm > -NORMAL_95_ONE_SIDED:
+    if fitted.relative <= 0.0 or unseen.score < thresholds.score(unseen.pieces):
+        return 0.0
+    finer = contains(judged, trial.parameters, final, entry.trial.parameters)
+    shown = finer and fitted.score >= thresholds.score(fitted.pieces)
+    if unseen.harm > (0.0 if shown else -NORMAL_95_ONE_SIDED):
         return 0.0
     if data.simulation is not None and final.simulated is not None and judged.simulated is not None:
         simulated = gain(final.simulated, judged.simulated, segments(data.simulation))
