@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from importlib import import_module
 
 import numpy as np
@@ -12,6 +13,7 @@ from vpm.discrepancy.coloured import noise_shapes, noise_spectrum
 from vpm.discrepancy.floor import noise_floor
 from vpm.discrepancy.structure import structure
 from vpm.identify import InverseDynamicsProblem, gaps
+from vpm.identify.along import Response
 from vpm.identify.drive_answers import SLOPE_STEP, apart, together
 from vpm.identify.drive_memory import DriveMemory
 from vpm.identify.drives_apart import drives_of
@@ -71,6 +73,16 @@ def test_long_steps_show_less_than_the_noise(exact: Exact, monkeypatch: pytest.M
     exacting.take_long_steps()
     assert set(exacting.integrators) == {"auto"}
     np.testing.assert_array_equal(exacting.evaluate(model, model.theta)[0], residual)
+
+
+def test_long_steps_may_be_off_by_a_share_of_what_was_measured() -> None:
+    """A model that lacks something may answer with next to nothing where a lot was measured."""
+    alike = import_module(InverseDynamicsProblem.__module__)._alike
+    effort, none = np.ones((50, 1)), np.zeros((50, 1, 0))
+    exact, rough = (Response(effort, effort, none, np.full((50, 1), seen), none) for seen in (1.0, 1.01))
+    assert not alike(exact, rough, np.ones((50, 1)))
+    assert alike(exact, rough, np.full((50, 1), 20.0))
+    assert not alike(exact, replace(exact, applied=1.01 * effort), np.full((50, 1), 20.0))
 
 
 def test_what_later_commands_ask_for_is_not_remembered_from_others(exact: Exact) -> None:
