@@ -42,6 +42,8 @@ FEW_EVALUATIONS = 6
 #: A refit that has lowered the training error by less than this share of its mean square in so many evaluations, and
 #: hardly goes on, is ended: ten times as much is asked of it on unseen data.
 SLOW_GAIN, SLOW_EVALUATIONS = 0.01, 10
+#: Of two candidates, one that leaves so many times what the other leaves is not the one that comes in.
+HOPELESS = 10.0
 #: Dotted name, behind the site, of the width of a play.
 PLAY = ".backlash.gap"
 #: A joint that winds up before it moves on looks like one that sticks.
@@ -143,7 +145,7 @@ def judge(
     """Fit ``free`` on the training records and predict the unseen ones; see `vpm.identify.tangent` for ``origin``.
 
     Where links bend and nothing else is worked out, the tangent at the start is taken if none is given. A fit that is
-    not on a tangent ends early if it is not ``worth`` its time.
+    not on a tangent of links ends early if it is not ``worth`` its time.
 
     Raises
     ------
@@ -158,7 +160,7 @@ def judge(
             model, data.training, free, bounds=bounds, tolerance=TOLERANCE, most_evaluations=most, worth=worth
         )
     else:
-        fit = estimate_on_tangent(model, data.training, free, origin, bounds=bounds, tolerance=TOLERANCE)
+        fit = estimate_on_tangent(model, data.training, free, origin, bounds=bounds, tolerance=TOLERANCE, worth=worth)
     fitted = model.with_parameters(dict(zip(free, map(float, fit.values), strict=True)))
     unseen, _ = data.unseen.evaluate(fitted, fitted.theta)
     simulated = None
@@ -167,8 +169,12 @@ def judge(
     return Judged(fitted, free, fit, unseen, simulated, dict(bounds))
 
 
-def confirm(current: Judged, data: Data, probe: Probe) -> Trial:
-    """Refit with the candidate, release what has become visible, and measure the gain on unseen data."""
+def confirm(current: Judged, data: Data, probe: Probe, rival: float = np.inf) -> Trial:
+    """Refit with the candidate, release what has become visible, and measure the gain on unseen data.
+
+    ``rival`` is the sum of squares that another one leaves of the training records: one that stays above ``HOPELESS``
+    times that has no chance beside it, and its refit may end early.
+    """
     bounds = {**current.bounds, **_bounds(probe)}
     start = probe.model.with_parameters(_inside(probe, bounds))
     free = (*current.free, *probe.free)
@@ -183,7 +189,7 @@ def confirm(current: Judged, data: Data, probe: Probe) -> Trial:
         free = (*free, *released)
         origin = start.theta if moved else origin
     cost = float(current.fit.residual @ current.fit.residual)
-    worth = Worth((1.0 - SLOW_GAIN) * cost, SLOW_EVALUATIONS)
+    worth = Worth(min((1.0 - SLOW_GAIN) * cost, HOPELESS * rival), SLOW_EVALUATIONS)
     judged, diverged = _judged(start, free, data, bounds, origin, worth)
     doubtful = probe.held
     if seen := _seen_by_now(judged, data, probe):

@@ -6,6 +6,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cached_property, partial
 
+import numpy as np
+
 from vpm.discrepancy.candidates import Candidate, Key, candidates, left_out
 from vpm.discrepancy.choice import Accepted, choose
 from vpm.discrepancy.confirmation import Data, Judged, Trial, confirm, finished
@@ -29,6 +31,7 @@ from vpm.discrepancy.structure import structure
 from vpm.discrepancy.timing import InTime, in_time
 from vpm.identify import gain, segments
 from vpm.identify.along import bends, has_own_drives
+from vpm.identify.tangent import drives_on_tangent
 
 #: Candidates refitted in one round: those that promise most for their numbers, and those that promise most of all.
 #: Without the latter, several names of one regressor, as a constant force and a tilted world, crowd out a law of two
@@ -173,9 +176,23 @@ class Round:
 
     def _refit(self, short_list: Sequence[Probe]) -> None:
         """Refit with each of some candidates, and believe or refuse it."""
+        if drives_on_tangent(self.current.model, self.data.training) and len(short_list) > 1:
+            # What one of them explains tells which of the others are worth more than a glance.
+            first = max(short_list, key=lambda p: p.drop)
+            believed = len(self._believed)
+            self._tried([first], np.inf)
+            rest = [one for one in short_list if one is not first]
+            left = [float(t.judged.fit.residual @ t.judged.fit.residual) for t in self._believed[believed:]]
+            self._tried(rest, min(left, default=np.inf))
+        else:
+            self._tried(short_list, np.inf)
+
+    def _tried(self, short_list: Sequence[Probe], rival: float) -> None:
+        """Refit with some candidates beside each other; ``rival`` is what another one leaves, see `confirm`."""
         thresholds = self._thresholds()
         what = f"round {self.number}: refitting"
-        trials = self.each(what, self._confirmed, short_list, lambda p: p.candidate.label, refit_effort)
+        confirmed = partial(self._confirmed, rival=rival)
+        trials = self.each(what, confirmed, short_list, lambda p: p.candidate.label, refit_effort)
         for tried_one, trial in zip(short_list, trials, strict=True):
             key = tried_one.candidate.key
             if isinstance(trial, Failure):
@@ -188,12 +205,12 @@ class Round:
             else:
                 self._believed.append(trial)
 
-    def _confirmed(self, one: Probe) -> Trial:
+    def _confirmed(self, one: Probe, rival: float) -> Trial:
         """A trial; of a play between soft contacts that does not simulate, that between hard ones if it does better.
 
         The balance hardly tells how hard the contacts are, for errors of the flights add up between lively ones.
         """
-        trial = confirm(self.current, self.data, one)
+        trial = confirm(self.current, self.data, one, rival)
         if not is_read_off(self.current.model, self.data.training, one.candidate) or not worse_in_simulation(trial):
             return trial
         other = probe(self.current.baseline, self.data.training, one.candidate, hard=True)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from vpm.errors import DivergedError
 from vpm.identify.along import bends, has_hidden, has_own_drives, shows_drives_alone
-from vpm.identify.estimation import Estimate, estimate
+from vpm.identify.estimation import Estimate, Worth, estimate
 from vpm.identify.problem import InverseDynamicsProblem
 from vpm.identify.reuse import parts_of
 from vpm.model import Model
@@ -60,6 +60,7 @@ def estimate_on_tangent(
     *,
     bounds: Mapping[str, tuple[float, float]],
     tolerance: float,
+    worth: Worth | None = None,
 ) -> Estimate:
     """A fit on one tangent after the other, until where it ends the tangent still holds.
 
@@ -73,9 +74,12 @@ def estimate_on_tangent(
         Where the tangent touches.
     bounds : mapping
     tolerance : float
+    worth : Worth, optional
+        A fit of drives that has not reached it after a whole step, nor was to by the tangent, ends there.
     """
     residual, _ = data.evaluate(model, model.theta)
     cost, at, columns = float(residual @ residual), model, [model.index(name) for name in free]
+    early = False
     flying = not bends(model) and has_hidden(model, data.motions[0].joints)
     for _ in range(FLYING if flying else TANGENTS):
         rough = estimate(at, Tangent(data, origin), free, bounds=bounds, tolerance=tolerance)
@@ -93,8 +97,12 @@ def estimate_on_tangent(
         near = share == 1.0 and np.linalg.norm(residual - rough.residual) <= OFF * np.linalg.norm(residual)
         if near or rough.interrupted:
             break
+        least = float(min(residual @ residual, rough.residual @ rough.residual))
+        early = worth is not None and share == 1.0 and drives_on_tangent(model, data) and least > worth.cost
+        if early:
+            break
         cost, at, origin = float(residual @ residual), reached, reached.theta
-    return replace(rough, values=reached.theta[columns], residual=residual)
+    return replace(rough, values=reached.theta[columns], residual=residual, early=early)
 
 
 def _residual(data: InverseDynamicsProblem, model: Model) -> Array:
