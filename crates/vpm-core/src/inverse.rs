@@ -165,7 +165,7 @@ impl Job for OfEffect<'_> {
         let behind = |k| self.motion.behind(self.time_step, k, joint, sensors[joint].as_ref());
         let rows = 0..self.motion.position.rows();
         let first = match (self.entry.on_joint(theta), self.entry.with_memory(theta)) {
-            (Some((_, law)), _) => rows.map(|k| behind(k)).map(|[q, v, _]| law.effort(q, v)).collect(),
+            (Some((_, law)), _) => rows.map(&behind).map(|[q, v, _]| law.effort(q, v)).collect(),
             (None, Some((_, law))) => {
                 let (mut memory, mut before) = (S::zero(), None);
                 let next = |[q, _, _]: [S; 3]| {
@@ -173,7 +173,7 @@ impl Job for OfEffect<'_> {
                     before = Some(q);
                     law.effort(memory)
                 };
-                rows.map(|k| behind(k)).map(next).collect()
+                rows.map(behind).map(next).collect()
             }
             (None, None) => Vec::new(),
         };
