@@ -41,7 +41,7 @@ fn still(bodies: &[usize]) -> Omissions {
 fn lagrange(body: usize, q: &[f64], v: &[f64]) -> Result<Vec<f64>> {
     let (n, step, parts) = (q.len(), 1e-5, arm());
     let mut heavier = parts.clone();
-    for inertia in &mut heavier.bodies[body].inertia {
+    if let Some(inertia) = &mut heavier.bodies[body].inertia {
         inertia.mass *= 2.0;
         inertia.moments = inertia.moments.map(|moment| 2.0 * moment);
     }
