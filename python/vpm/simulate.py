@@ -420,6 +420,7 @@ def _run(model: Model, experiment: Experiment, mode: str, arrays: SimulatedArray
         measured,
         np.arange(len(arrays.starts), dtype=np.int64) * length,
         settings,
+        model.beyond_tables(experiment.time[arrays.rows], dict(zip(channels, values.T, strict=True))),
     )
 
 

@@ -62,7 +62,7 @@ fn state_channels(description: &Description) -> Vec<Option<Channel>> {
             channels.push(None);
         }
         match &actuator.drive {
-            Drive::Ideal(_) | Drive::SpringDamper(_) | Drive::Narx(_) | Drive::MaxwellNarx(_) => {}
+            Drive::Ideal(_) | Drive::SpringDamper(_) | Drive::Table(_) | Drive::Narx(_) | Drive::MaxwellNarx(_) => {}
             Drive::Maxwell(_) => channels.push(None),
             Drive::DcMotor(_) => {
                 channels.push(Some(Channel::Current { dc_motor }));

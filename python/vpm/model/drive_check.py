@@ -15,6 +15,7 @@ from vpm.model.parameters import Parameter
 from vpm.model.sampled_check import sampled_problems
 from vpm.model.schema import Document
 from vpm.model.structure import Structure
+from vpm.model.table import Table, table_problems
 from vpm.units import convert, parse_unit, require_dimension, si_unit
 
 _RATED: Mapping[str, str] = {"rated_flow": "m^3/s", "rated_drop": "Pa", "rated_current": ""}
@@ -32,6 +33,9 @@ def drive_problems(document: Document, structure: Structure) -> Iterator[Problem
             yield from _rating_keys(("actuators", name, "valve"), actuator.valve)
             yield from _spool_keys(("actuators", name, "valve"), actuator.valve)
             yield from _late_spool(name, actuator.valve, document)
+            yield from _shut_valve(name, actuator)
+        if isinstance(actuator, Table):
+            yield from table_problems(name, actuator)
     yield from sampled_problems(document, structure)
 
 
@@ -120,6 +124,14 @@ def _late_spool(name: str, valve: Valve, document: Document) -> Iterator[Problem
     if valve.spool == "static" and any(e.type == "valve_dynamics" and e.at == name for e in document.effects):
         rest = "is static, but the effect valve_dynamics makes it slower; remove one of them"
         yield Problem(place("actuators", name, "valve", "spool"), rest)
+
+
+def _shut_valve(name: str, actuator: Hydraulic) -> Iterator[Problem]:
+    """Pressures without states balance flows, and a valve that shuts has none."""
+    if actuator.cylinder.pressures == "quasi_static" and actuator.valve.clearance is None:
+        rest = 'is missing; with pressures = "quasi_static" a valve that shuts would lock the piston in its middle; '
+        rest += f"add it, for example {EXAMPLES['actuators.clearance']}"
+        yield Problem(place("actuators", name, "valve", "clearance"), rest)
 
 
 def unit_problems(document: Document) -> Iterator[Problem]:
@@ -232,6 +244,13 @@ def value_problems(document: Document, parameters: Mapping[str, Parameter]) -> I
             if not rod < bore:
                 rest = f"is {rod:g} m, but has to be thinner than the bore, {bore:g} m; correct one of them"
                 yield Problem(place("actuators", name, "cylinder", "rod"), rest)
+        clearance = f"{name}.valve.clearance"
+        if clearance in parameters and not value(clearance) < value(f"{name}.valve.stroke"):
+            unit, shown = parameters[clearance].unit, (value(clearance), value(f"{name}.valve.stroke"))
+            rest = (
+                f"is {shown[0]:g} {unit}, but the spool moves by {shown[1]:g} {unit} only, so that it would never shut"
+            )
+            yield Problem(place("actuators", name, "valve", "clearance"), f"{rest}; correct one of them")
         overlap, stroke = value(f"{name}.valve.overlap"), value(f"{name}.valve.stroke")
         if not overlap < stroke:
             unit = parameters[f"{name}.valve.stroke"].unit

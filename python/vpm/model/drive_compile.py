@@ -10,6 +10,7 @@ from vpm.model.hydraulic import Hydraulic, Supply
 from vpm.model.sampled import MaxwellNarx, Narx
 from vpm.model.sampled_compile import maxwell_json, narx_json
 from vpm.model.structure import Structure
+from vpm.model.table import Table
 
 Index = Mapping[str, int]
 
@@ -65,6 +66,11 @@ def drive_json(name: str, actuator: Actuator, structure: Structure, index: Index
             }
             if actuator.cylinder.pressures != "chambers":
                 law["pressures"] = actuator.cylinder.pressures
+            if actuator.valve.clearance is not None:
+                law["valve"]["clearance"] = index[f"{name}.valve.clearance"]
+        case Table():
+            law = {key: list(getattr(actuator, key)) for key in ("commands", "velocities")}
+            law["efforts"] = [effort for row in actuator.efforts for effort in row]
         case Narx():
             law = narx_json(name, actuator, structure)
         case MaxwellNarx():

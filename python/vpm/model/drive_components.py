@@ -5,20 +5,29 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from functools import cached_property
 
+import numpy as np
+from numpy.typing import NDArray
+
 from vpm.errors import ModelError, near_match
 from vpm.model.check import Checked
 from vpm.model.drives import COMPLIANT
 from vpm.model.hydraulic import Hydraulic
 from vpm.model.pose import Pose
 from vpm.model.structure import Mount, Structure
+from vpm.model.table import Table, beyond
 
+Array = NDArray[np.float64]
 #: States of a drive beside its lag, in the order of the core.
 DRIVE_STATES: Mapping[str, tuple[str, ...]] = {
     "dc_motor": ("current",),
     "maxwell": ("stretch",),
 }
 #: States of a cylinder by how its pressures come about.
-OIL_STATES: Mapping[str, tuple[str, ...]] = {"chambers": ("chamber_a", "chamber_b"), "load": ("load",)}
+OIL_STATES: Mapping[str, tuple[str, ...]] = {
+    "chambers": ("chamber_a", "chamber_b"),
+    "load": ("load",),
+    "quasi_static": (),
+}
 
 
 class DriveComponents:
@@ -65,7 +74,9 @@ class DriveComponents:
         return bool(document.contacts) or any(entry.type == "hydraulic" for entry in document.actuators.values())
 
     def actuator_type(self, actuator: str) -> str:
-        """Type of an actuator: "ideal", "dc_motor", "spring_damper", "maxwell", "hydraulic", "narx" or "maxwell_narx".
+        """Type of an actuator.
+
+        "ideal", "dc_motor", "spring_damper", "maxwell", "hydraulic", "table", "narx" or "maxwell_narx".
 
         Raises
         ------
@@ -73,6 +84,28 @@ class DriveComponents:
             There is no such actuator.
         """
         return self._checked.document.actuators[self._known(actuator, self.actuators, "actuator")].type
+
+    def beyond_tables(self, time: Array, columns: Mapping[str, Array]) -> tuple[str, ...]:
+        """Sentences on where a run left the tables of its drives; none as a rule.
+
+        Parameters
+        ----------
+        time : ndarray, shape (N,)
+            s.
+        columns : mapping of str to ndarray, shape (N,)
+            Channels of the run.
+        """
+        found = []
+        for name, entry in self._checked.document.actuators.items():
+            if isinstance(entry, Table):
+                moving = f"{entry.joint}.velocity" if entry.joint is not None else f"{entry.line}.rate"
+                axes = {f"{name}.command": entry.commands, moving: entry.velocities}
+                units = self._checked.structure.unit
+                told = (
+                    beyond(key, axis, columns[key], units(key), time) for key, axis in axes.items() if key in columns
+                )
+                found += [sentence for sentence in told if sentence]
+        return tuple(found)
 
     def supply_of_actuator(self, actuator: str) -> str | None:
         """Supply of a hydraulic actuator; None for the others.

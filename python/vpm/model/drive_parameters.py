@@ -11,6 +11,7 @@ from vpm.model.drives import Actuator, DcMotor, Ideal, Maxwell, SpringDamper
 from vpm.model.entry import Entry, Quantity
 from vpm.model.hydraulic import Hydraulic, Supply
 from vpm.model.sampled import MaxwellNarx, Narx
+from vpm.model.table import Table
 from vpm.units import si_unit
 
 Range = tuple[float, float]
@@ -111,6 +112,7 @@ def _valve(command: str) -> _Rules:
         "damping": ("1", NOT_NEGATIVE, _FEEDING),
         "stroke": (command, ABOVE_ZERO, "a spool without a way opens nothing"),
         "overlap": (command, NOT_NEGATIVE, "a valve that is open in the middle is not described by an overlap"),
+        "clearance": (command, ABOVE_ZERO, "edges that shut quite are those of a valve without the key"),
         "gain": ("1", ANY, ""),
         "transition_pressure": ("Pa", ABOVE_ZERO, "1e4 Pa is usual; the slope of the flow would be infinite at zero"),
     }
@@ -162,7 +164,7 @@ def actuator_rows(actuator: Actuator, effort: str, kind: JointKind | None) -> It
             yield from _rows((), actuator, _MAXWELL)
         case Hydraulic():
             yield from _hydraulic_rows(actuator, command)
-        case Narx() | MaxwellNarx():
+        case Table() | Narx() | MaxwellNarx():
             return  # their numbers belong together, so that none is a parameter of its own
 
 

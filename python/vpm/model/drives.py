@@ -7,10 +7,11 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, Discriminator, Tag
 
-from vpm.model import hydraulic, sampled
+from vpm.model import hydraulic, sampled, table
 from vpm.model.entry import Entry, ParameterValue, Quantity, Text
 from vpm.model.hydraulic import Hydraulic
 from vpm.model.sampled import MaxwellNarx, Narx
+from vpm.model.table import Table
 
 ONE = Quantity(value=1.0)
 
@@ -80,6 +81,7 @@ Actuator = Annotated[
     | Annotated[SpringDamper, Tag("spring_damper")]
     | Annotated[Maxwell, Tag("maxwell")]
     | Annotated[Hydraulic, Tag("hydraulic")]
+    | Annotated[Table, Tag("table")]
     | Annotated[Narx, Tag("narx")]
     | Annotated[MaxwellNarx, Tag("maxwell_narx")],
     Discriminator(_type_of),
@@ -94,6 +96,7 @@ ACTUATOR_TYPES: Mapping[str, type[Entry]] = {
     "spring_damper": SpringDamper,
     "maxwell": Maxwell,
     "hydraulic": Hydraulic,
+    "table": Table,
     "narx": Narx,
     "maxwell_narx": MaxwellNarx,
 }
@@ -102,6 +105,7 @@ ACTUATOR_TYPES: Mapping[str, type[Entry]] = {
 EXAMPLES: Mapping[str, str] = {
     **hydraulic.EXAMPLES,
     **sampled.EXAMPLES,
+    **table.EXAMPLES,
     "actuators.gain": 'gain = { value = 1.0, unit = "N/V" }',
     "actuators.resistance": 'resistance = { value = 1.2, unit = "Ohm" }',
     "actuators.time_constant": 'time_constant = { value = 2, unit = "ms" }',

@@ -59,6 +59,7 @@ class Valve(Entry):
     damping: ParameterValue | None = None
     stroke: ParameterValue
     overlap: ParameterValue = ZERO
+    clearance: ParameterValue | None = None
     gain: ParameterValue = Quantity(value=1.0)
     transition_pressure: ParameterValue = Quantity(value=1e4)
 
@@ -77,7 +78,7 @@ class Cylinder(Entry):
     external_leakage: ParameterValue = ZERO
     stop_stiffness: ParameterValue = Quantity(value=5e8)
     stop_damping: ParameterValue = Quantity(value=2e4)
-    pressures: Literal["chambers", "load"] = "chambers"
+    pressures: Literal["chambers", "load", "quasi_static"] = "chambers"
 
 
 class SealFriction(Entry):
@@ -121,6 +122,7 @@ EXAMPLES: dict[str, str] = {
     "actuators.retracted_length": 'retracted_length = { value = 281, unit = "mm" }',
     "actuators.valve": 'valve = { flow_gain = 6.7e-6, frequency = { value = 250, unit = "rev/s" }, stroke = 0.01 }',
     "actuators.frequency": 'frequency = { value = 250, unit = "rev/s" }',
+    "actuators.clearance": 'clearance = { value = 0.2, unit = "mA" }',
     "actuators.cylinder": "cylinder = { bore = 0.016, rod = 0.01, stroke = 0.08, line_a = 2.9e-6, line_b = 2.9e-6 }",
     "actuators.stroke": 'stroke = { value = 80, unit = "mm" }',
     "actuators.line_a": 'line_a = { value = 2.9, unit = "cm^3" }',

@@ -1,4 +1,4 @@
-"""Simpler hydraulic drives: valves that follow at once, one load pressure for both chambers, an element in their place.
+"""Simpler hydraulic drives: valves that follow at once, one load pressure or none, an element in their place.
 
 The laws of the reduced drives are in docs/hydraulics.md, those of the Maxwell element in docs/maxwell_narx.md.
 """
@@ -14,8 +14,11 @@ from vpm.model import Model
 
 #: Changes of a servo-cylinder, the one that changes least first.
 STATIC, LOAD = "a static spool", "one load pressure"
-BOTH = f"{STATIC} and {LOAD}"
-SIMPLER = (STATIC, LOAD, BOTH)
+QUASI_STATIC = "quasi-static pressures"
+BOTH, NO_STATE = f"{STATIC} and {LOAD}", f"{STATIC} and {QUASI_STATIC}"
+SIMPLER = (STATIC, LOAD, QUASI_STATIC, BOTH, NO_STATE)
+#: Clearance of a valve that has none, in parts of its stroke, where a fit begins; as uncertain as it is large.
+CLEARANCE = 0.02
 
 
 def hydraulic_drives(model: Model) -> tuple[str, ...]:
@@ -38,8 +41,11 @@ def possible_changes(model: Model, drive: str) -> tuple[str, ...]:
     """
     entry = model.to_dict()["actuators"][drive]
     static = entry["valve"].get("spool") == "static"
-    load = entry["cylinder"].get("pressures") == "load"
-    return {(False, False): SIMPLER, (True, False): (LOAD,), (False, True): (STATIC,), (True, True): ()}[static, load]
+    have = entry["cylinder"].get("pressures", "chambers")
+    fewer = {"chambers": (LOAD, QUASI_STATIC), "load": (QUASI_STATIC,), "quasi_static": ()}[have]
+    if static:
+        return fewer
+    return (STATIC, *fewer, *(f"{STATIC} and {change}" for change in fewer))
 
 
 def simpler(model: Model, drive: str, change: str) -> Model:
@@ -59,11 +65,16 @@ def simpler(model: Model, drive: str, change: str) -> Model:
     """
     content = model.to_dict()
     entry = content["actuators"][drive]
-    if change in (STATIC, BOTH):
+    if change in (STATIC, BOTH, NO_STATE):
         kept = {key: value for key, value in entry["valve"].items() if key not in ("frequency", "damping")}
         entry["valve"] = {**kept, "spool": "static"}
     if change in (LOAD, BOTH):
         entry["cylinder"] = {**entry["cylinder"], "pressures": "load"}
+    if change in (QUASI_STATIC, NO_STATE):
+        entry["cylinder"] = {**entry["cylinder"], "pressures": "quasi_static"}
+        if "clearance" not in entry["valve"]:
+            size = CLEARANCE * model.parameters[f"{drive}.valve.stroke"].value
+            entry["valve"] = {**entry["valve"], "clearance": {"value": size, "uncertainty": size}}
     return type(model)(content)
 
 

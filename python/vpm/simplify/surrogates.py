@@ -19,6 +19,7 @@ from vpm.model import Model
 from vpm.simplify.hydraulics import hydraulic_drives, replaced
 from vpm.simplify.learnt import maxwell_entry, narx_entry
 from vpm.simplify.reductions import Reduction
+from vpm.simplify.tables import tables
 from vpm.simulate import simulate
 
 Array = NDArray[np.float64]
@@ -51,8 +52,8 @@ class Surrogate(Reduction):
         return replaced(model, self.at, self.entry)
 
 
-def surrogates(model: Model, records: Sequence[Experiment], mode: str, rate: float) -> tuple[Surrogate, ...]:
-    """An element for each servo-cylinder that one can be found for.
+def surrogates(model: Model, records: Sequence[Experiment], mode: str, rate: float) -> tuple[Reduction, ...]:
+    """Elements and a table for each servo-cylinder that they can be found for.
 
     Parameters
     ----------
@@ -69,7 +70,8 @@ def surrogates(model: Model, records: Sequence[Experiment], mode: str, rate: flo
     if not drives or mode not in ("free_run", "closed_loop"):
         return ()
     taught = [_taught(model, record, mode, rate) for record in records]
-    return tuple(found for drive in drives for found in _learnt(model, drive, taught, 1.0 / rate))
+    elements = (found for drive in drives for found in _learnt(model, drive, taught, 1.0 / rate))
+    return (*elements, *tables(model, taught))
 
 
 def commanded(model: Model, full: Model, record: Experiment) -> Experiment:

@@ -3,7 +3,7 @@
 use serde::Deserialize;
 
 use super::hydraulic::HydraulicDrive;
-use super::{DcMotor, Ideal, Maxwell, MaxwellNarxDrive, NarxDrive, SpringDamper};
+use super::{DcMotor, Ideal, Maxwell, MaxwellNarxDrive, NarxDrive, SpringDamper, TableDrive};
 use crate::effect::Domain;
 use crate::scalar::Scalar;
 
@@ -21,6 +21,8 @@ pub enum Drive<P> {
     Maxwell(Maxwell<P>),
     /// A cylinder behind a servovalve; the command is the current in the valve.
     Hydraulic(Box<HydraulicDrive<P>>),
+    /// An effort looked up by the command and the velocity.
+    Table(Box<TableDrive>),
     /// A polynomial NARX model; its input in the equations of motion is the effort that it holds.
     Narx(Box<NarxDrive>),
     /// A Maxwell element in sampled time; likewise.
@@ -36,6 +38,7 @@ impl<P> Drive<P> {
             Self::SpringDamper(law) => Drive::SpringDamper(law.map(f)),
             Self::Maxwell(law) => Drive::Maxwell(law.map(f)),
             Self::Hydraulic(law) => Drive::Hydraulic(Box::new(law.map(f))),
+            Self::Table(law) => Drive::Table(law.clone()),
             Self::Narx(law) => Drive::Narx(law.clone()),
             Self::MaxwellNarx(law) => Drive::MaxwellNarx(law.clone()),
         }
@@ -49,7 +52,7 @@ impl<P> Drive<P> {
             Self::SpringDamper(law) => law.domains(),
             Self::Maxwell(law) => law.domains(),
             Self::Hydraulic(law) => law.domains(),
-            Self::Narx(_) | Self::MaxwellNarx(_) => Vec::new(),
+            Self::Table(_) | Self::Narx(_) | Self::MaxwellNarx(_) => Vec::new(),
         }
     }
 
@@ -61,6 +64,7 @@ impl<P> Drive<P> {
             Self::SpringDamper(_) => "spring_damper",
             Self::Maxwell(_) => "maxwell",
             Self::Hydraulic(_) => "hydraulic",
+            Self::Table(_) => "table",
             Self::Narx(_) => "narx",
             Self::MaxwellNarx(_) => "maxwell_narx",
         }
@@ -69,7 +73,7 @@ impl<P> Drive<P> {
     /// Names of its states, in their order.
     pub fn states(&self) -> &'static [&'static str] {
         match self {
-            Self::Ideal(_) | Self::SpringDamper(_) | Self::Narx(_) | Self::MaxwellNarx(_) => &[],
+            Self::Ideal(_) | Self::SpringDamper(_) | Self::Table(_) | Self::Narx(_) | Self::MaxwellNarx(_) => &[],
             Self::DcMotor(_) => &["current"],
             Self::Maxwell(_) => &["stretch"],
             Self::Hydraulic(law) => law.states(),

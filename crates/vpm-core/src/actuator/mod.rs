@@ -11,6 +11,7 @@ mod maxwell;
 mod sampled;
 mod saturation;
 mod spring_damper;
+mod table;
 
 use serde::Deserialize;
 
@@ -24,6 +25,7 @@ pub use maxwell::Maxwell;
 pub use sampled::{MaxwellNarxDrive, NarxDrive, Reading, Scheme};
 pub use saturation::Saturation;
 pub use spring_damper::SpringDamper;
+pub use table::TableDrive;
 
 use crate::effect::Domain;
 use crate::scalar::Scalar;

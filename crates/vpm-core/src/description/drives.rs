@@ -3,7 +3,7 @@
 use super::Description;
 use super::check::within;
 use super::sampled;
-use crate::actuator::hydraulic::PistonSize;
+use crate::actuator::hydraulic::{PistonSize, Pressures};
 use crate::actuator::{Actuator, Drive, Target};
 use crate::error::{DriveError, Error, Result};
 use crate::joint::JointKind;
@@ -14,6 +14,14 @@ pub(super) fn references(description: &Description) -> Result<()> {
         if let Drive::Hydraulic(law) = &actuator.drive {
             let what = format!("actuator `{}`", actuator.name);
             within(&what, "supply", law.supply, description.supplies.len())?;
+            if law.pressures == Pressures::QuasiStatic && law.valve.clearance.is_none() {
+                return Err(DriveError::Clearance { actuator: actuator.name.clone() }.into());
+            }
+        }
+        if let Drive::Table(law) = &actuator.drive
+            && let Some((what, repair)) = law.complaint()
+        {
+            return Err(DriveError::Table { actuator: actuator.name.clone(), what, repair }.into());
         }
         target(description, actuator)?;
         sampled::references(description, actuator)?;

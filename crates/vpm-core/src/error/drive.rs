@@ -18,6 +18,25 @@ pub enum DriveError {
         /// What it can act on.
         needed: &'static str,
     },
+    /// A cylinder without states of its pressures behind a valve that shuts quite.
+    #[error(
+        "actuator `{actuator}` has quasi-static pressures, but a valve without clearance would lock its piston in the middle; give the \
+         valve a clearance, or take pressures with states"
+    )]
+    Clearance {
+        /// Name of the actuator.
+        actuator: String,
+    },
+    /// A table of efforts that cannot be one.
+    #[error("the table of actuator `{actuator}` {what}; {repair}")]
+    Table {
+        /// Name of the actuator.
+        actuator: String,
+        /// What is wrong, with the numbers.
+        what: String,
+        /// What to do.
+        repair: &'static str,
+    },
     /// Two parameters whose order has no meaning.
     #[error("`{path}` must be below `{other}` ({limit}), got {value}; {repair}")]
     Order {

@@ -124,7 +124,7 @@ impl<S: Scalar> Driven<S> {
                 let own = (0..count).map(move |lane| (first + lane, lane, 1.0));
                 own.chain(fed().map(|state| (state.at, PRESSURE, state.sign)))
             };
-            if count == 0 {
+            if count == 0 && supply.iter().all(Option::is_none) {
                 continue;
             }
             column.fill(S::zero());

@@ -132,6 +132,7 @@ impl<S: Scalar> Dynamics<S> {
             let force = match &actuator.drive {
                 Drive::Ideal(law) => law.effort(input),
                 Drive::Narx(_) | Drive::MaxwellNarx(_) => input,
+                Drive::Table(law) => law.effort(input, moving()[1]),
                 Drive::DcMotor(law) => {
                     let (current, [_, rate]) = (states[at], moving());
                     rates[at] = law.current_rate(current, input, rate);

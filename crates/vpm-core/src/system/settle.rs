@@ -19,7 +19,8 @@ impl<S: Scalar> Dynamics<S> {
             }
             let [length, _] = motion(actuator.on, q, &zero, &self.data.composite.lines);
             match &actuator.drive {
-                Drive::Ideal(_) | Drive::SpringDamper(_) | Drive::Narx(_) | Drive::MaxwellNarx(_) => {}
+                Drive::Ideal(_) | Drive::SpringDamper(_) | Drive::Table(_) | Drive::Narx(_) | Drive::MaxwellNarx(_) => {
+                }
                 Drive::DcMotor(_) => next(S::zero()),
                 Drive::Maxwell(law) => next(law.settled(length)),
                 Drive::Hydraulic(law) => law.settle(&self.supplies[law.supply], &mut next),
@@ -86,7 +87,8 @@ impl<S: Scalar> Dynamics<S> {
                 next(actuator.saturation.map_or(1.0, |saturation| saturation.limit.re()));
             }
             match &actuator.drive {
-                Drive::Ideal(_) | Drive::SpringDamper(_) | Drive::Narx(_) | Drive::MaxwellNarx(_) => {}
+                Drive::Ideal(_) | Drive::SpringDamper(_) | Drive::Table(_) | Drive::Narx(_) | Drive::MaxwellNarx(_) => {
+                }
                 Drive::DcMotor(_) => next(1.0),
                 Drive::Maxwell(_) => next(STRETCH),
                 Drive::Hydraulic(law) => {

@@ -31,6 +31,7 @@ pub fn nominal() -> ServoCylinder<f64> {
             delay: None,
             stroke: 0.01,
             overlap: DeadZone { width: 0.0 },
+            clearance: None,
             orifice: Orifice { gain, transition_pressure: 1e4 },
         },
         cylinder,

@@ -39,7 +39,7 @@ pub fn drive(servo: &ServoCylinder<f64>) -> Value {
     };
     json!({"type": "hydraulic", "supply": 0, "retracted_length": MIDDLE - 0.5 * cylinder.stroke,
         "valve": {"gain": valve.gain, "frequency": valve.frequency, "damping": valve.damping, "stroke": valve.stroke,
-            "overlap": valve.overlap.width, "delay": valve.delay,
+            "overlap": valve.overlap.width, "delay": valve.delay, "clearance": valve.clearance,
             "orifice": {"gain": valve.orifice.gain, "transition_pressure": valve.orifice.transition_pressure}},
         "cylinder": {"size": size, "stroke": cylinder.stroke, "line_a": cylinder.line_a, "line_b": cylinder.line_b,
             "internal_leakage": cylinder.internal_leakage, "worn_leakage": cylinder.worn_leakage, "external_leakage": cylinder.external_leakage,

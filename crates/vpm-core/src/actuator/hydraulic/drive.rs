@@ -3,7 +3,7 @@
 use serde::Deserialize;
 
 use super::load::chambers_under_load;
-use super::{Chambers, Cylinder, Flows, Pressures, Supply, Valve};
+use super::{Balance, Chambers, Cylinder, Flows, Pressures, Supply, Valve};
 use crate::effect::Domain;
 use crate::scalar::Scalar;
 
@@ -12,7 +12,7 @@ use crate::scalar::Scalar;
 /// Law: the piston's place from mid-stroke is `x = s - retracted_length - stroke/2`, with s the length of the line or the coordinate of
 /// the joint, m. The effort is `A pa - alpha A pb` and that of seals and stops, N, positive where it pushes apart.
 /// State: spool and its rate, unless the spool follows at once; then the state of both chambers, see [`Valve`] and [`Cylinder`], or the
-/// load pressure, see [`Pressures`].
+/// load pressure, or nothing, see [`Pressures`].
 /// Source: D'Imperio 2016, section 4.1 and appendix A. Checked: see valve and cylinder; the retracted length is any number.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -62,6 +62,8 @@ impl<P> HydraulicDrive<P> {
             (true, Pressures::Load) => &["spool", "spool_rate", "load"],
             (false, Pressures::Chambers) => &["chamber_a", "chamber_b"],
             (false, Pressures::Load) => &["load"],
+            (true, Pressures::QuasiStatic) => &["spool", "spool_rate"],
+            (false, Pressures::QuasiStatic) => &[],
         }
     }
 
@@ -112,16 +114,18 @@ impl<S: Scalar> HydraulicDrive<S> {
         let held = match *of_oil {
             [a, b] => Chambers { a, b },
             [load] => chambers_under_load(load, self.valve.opening(spool), [pressure, tank], alpha),
-            _ => self.rest(supply),
+            _ => Balance::new(&self.valve, cylinder, oil, spool, [pressure, tank]).chambers(v),
         };
         let pressures = Chambers { a: oil.pressure(held.a), b: oil.pressure(held.b) };
         let flows = self.valve.flows(spool, pressure, tank, [pressures.a, pressures.b]);
         let inflow = Chambers { a: flows.into_a, b: -flows.out_of_b };
-        let change = cylinder.rates(oil, held, [x, v], inflow, tank);
-        match oil_rates {
-            [a, b] => (*a, *b) = (change.a, change.b),
-            [load] => *load = change.a - alpha * change.b,
-            _ => {}
+        if !oil_rates.is_empty() {
+            let change = cylinder.rates(oil, held, [x, v], inflow, tank);
+            match oil_rates {
+                [a, b] => (*a, *b) = (change.a, change.b),
+                [load] => *load = change.a - alpha * change.b,
+                _ => {}
+            }
         }
         let force = cylinder.force(pressures) + cylinder.stop.force(x, v, cylinder.stroke * 0.5);
         DriveAction { force, spool, pressures, flows }
@@ -139,6 +143,7 @@ impl<S: Scalar> HydraulicDrive<S> {
         match self.pressures {
             Pressures::Chambers => [a, b].into_iter().for_each(next),
             Pressures::Load => next(S::zero()),
+            Pressures::QuasiStatic => {}
         }
     }
 }

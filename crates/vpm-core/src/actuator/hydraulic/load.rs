@@ -1,4 +1,4 @@
-//! Quasi-static pressures: both chambers from the load pressure alone.
+//! How the pressures of a cylinder come about; both chambers from the load pressure alone.
 
 use serde::Deserialize;
 
@@ -14,6 +14,8 @@ pub enum Pressures {
     Chambers,
     /// The load pressure is the state, and both chambers follow from it and the balance of flows: [`chambers_under_load`].
     Load,
+    /// None is a state: both chambers follow from what flows in and out, see [`super::Balance`].
+    QuasiStatic,
 }
 
 /// Pressures (Pa) of both chambers at a load pressure `load = pa - alpha pb` (Pa) and an `opening` of the valve, between `supply`

@@ -4,6 +4,7 @@
 //! Equation numbers are those of D'Imperio 2016, "Modelling and simulation techniques for advanced robotic systems", chapter 4;
 //! where a printed equation is wrong the corrected one is given. All pressures are absolute, in Pa.
 
+mod balance;
 mod cylinder;
 mod drive;
 mod fluid;
@@ -15,6 +16,7 @@ mod size;
 mod supply;
 mod valve;
 
+pub use balance::Balance;
 pub use cylinder::{Chambers, Cylinder};
 pub use drive::{DriveAction, HydraulicDrive};
 pub use fluid::{EntrainedAir, Fluid};

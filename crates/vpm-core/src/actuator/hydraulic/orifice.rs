@@ -50,6 +50,19 @@ impl<S: Scalar> Orifice<S> {
         self.gain * opening * self.root(drop)
     }
 
+    /// How the flow of [`Orifice::flow`] changes with the drop, m^3/(s Pa): never zero where it is open.
+    #[inline]
+    pub fn conductance(&self, opening: S, drop: S) -> S {
+        let size = drop.abs();
+        let slope = if size < self.transition_pressure {
+            let share = size / self.transition_pressure;
+            (-share * 2.0 + 3.0) * 0.5 / self.transition_pressure.sqrt()
+        } else {
+            (size.sqrt() * 2.0).recip()
+        };
+        self.gain * opening * slope
+    }
+
     /// The signed root of a pressure drop, in sqrt(Pa).
     #[inline]
     fn root(&self, drop: S) -> S {

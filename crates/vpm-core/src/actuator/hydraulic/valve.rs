@@ -30,7 +30,10 @@ pub struct Flows<S> {
 /// Source: D'Imperio 2016, section 4.1 and appendix A; Merritt 1967, "Hydraulic Control Systems", section 5-3 (overlap). The stroke
 /// as a limit of what drives and of what opens, not as an impact that would need steps of its own, is an assumption.
 /// A valve without a frequency is its static gain, `z = sat(gain i)`: the limit of a fast spool (Merritt 1967, section 6-3).
-/// Checked: frequency and stroke are positive, damping and overlap not negative.
+/// No edge shuts quite: with a `clearance` c those that u opens are open by `(root + u) / 2`, the others by `(root - u) / 2`, with
+/// `root = sqrt(u^2 + c^2)`, c in spool units; in the middle all four let the valve's leakage pass (Merritt 1967, section 5-3, leakage of practical
+/// critical-centre valves; the hyperbola is an assumption). Without one an edge is open by u or shut.
+/// Checked: frequency, stroke and clearance are positive, damping and overlap not negative.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Valve<P> {
@@ -49,6 +52,9 @@ pub struct Valve<P> {
     pub stroke: P,
     /// How far the spool moves before it opens, spool unit.
     pub overlap: DeadZone<P>,
+    /// What an edge lets pass where it should be shut, as an opening, spool unit: see the law.
+    #[serde(default = "crate::actuator::none")]
+    pub clearance: Option<P>,
     /// Each of the four edges; its opening is in spool units.
     pub orifice: Orifice<P>,
 }
@@ -63,6 +69,7 @@ impl<P> Valve<P> {
             delay: self.delay.as_ref().map(&mut *f),
             stroke: f(&self.stroke),
             overlap: self.overlap.map(f),
+            clearance: self.clearance.as_ref().map(&mut *f),
             orifice: self.orifice.map(f),
         }
     }
@@ -76,6 +83,7 @@ impl<P> Valve<P> {
         ];
         domains.extend(self.frequency.as_ref().map(|frequency| ("valve.frequency", frequency, Domain::Positive)));
         domains.extend(self.damping.as_ref().map(|damping| ("valve.damping", damping, Domain::NonNegative)));
+        domains.extend(self.clearance.as_ref().map(|clearance| ("valve.clearance", clearance, Domain::Positive)));
         domains.extend(self.orifice.domains());
         domains.extend(self.delay.as_ref().map(|delay| ("valve.delay", delay, Domain::NonNegative)));
         domains
@@ -110,9 +118,42 @@ impl<S: Scalar> Valve<S> {
         self.overlap.apply(Saturation { limit: self.stroke }.apply(place))
     }
 
+    /// How far both edges from the supply to a and from b to the tank are open with the spool at `place`, and how far the two others,
+    /// spool units.
+    #[inline]
+    pub fn edges(&self, place: S) -> [S; 2] {
+        match self.clearance {
+            Some(clearance) => {
+                // In the very middle a dead zone, be it of no width, has no slope.
+                let within = Saturation { limit: self.stroke }.apply(place);
+                let opening = if self.overlap.width.re() == 0.0 { within } else { self.overlap.apply(within) };
+                let (root, square) = ((opening * opening + clearance * clearance).sqrt(), clearance * clearance);
+                // The smaller one as a quotient, so that nothing is lost where the valve is wide open.
+                let wide = (root + opening.abs()) * 0.5;
+                let narrow = square * 0.25 / wide;
+                if opening.re() < 0.0 { [narrow, wide] } else { [wide, narrow] }
+            }
+            None => {
+                let opening = self.opening(place);
+                [opening.max(S::zero()), (-opening).max(S::zero())]
+            }
+        }
+    }
+
     /// Flows with the spool at `place` between the pressures of the `supply`, the `tank` and the ports `[a, b]`, all in Pa.
     #[inline]
     pub fn flows(&self, place: S, supply: S, tank: S, [a, b]: [S; 2]) -> Flows<S> {
+        if self.clearance.is_some() {
+            let [forward, backward] = self.edges(place);
+            let [to_a, from_a] = [self.orifice.flow(forward, supply - a), self.orifice.flow(backward, a - tank)];
+            let [to_b, from_b] = [self.orifice.flow(backward, supply - b), self.orifice.flow(forward, b - tank)];
+            return Flows {
+                into_a: to_a - from_a,
+                out_of_b: from_b - to_b,
+                supply: to_a + to_b,
+                tank: from_a + from_b,
+            };
+        }
         let opening = self.opening(place);
         if opening.re() > 0.0 {
             let (into_a, out_of_b) = (self.orifice.flow(opening, supply - a), self.orifice.flow(opening, b - tank));

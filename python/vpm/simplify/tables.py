@@ -1,0 +1,189 @@
+"""Tables in the place of servo-cylinders: what the quasi-static drive pushes, by command and velocity.
+
+The force of a servo-cylinder whose spool follows at once and whose pressures are quasi-static depends on the command
+and the velocity alone, so that it can be looked up (docs/hydraulics.md). The ends of the stroke are not in a table.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vpm.errors import VpmError
+from vpm.model import Model
+from vpm.simplify.hydraulics import NO_STATE, hydraulic_drives, simpler
+from vpm.simplify.reductions import Reduction
+
+Array = NDArray[np.float64]
+
+#: Nodes along commands and velocities; odd, so that zero is one of them.
+NODES = (41, 25)
+#: How much closer nodes are in the middle than at the ends: the exponent of a hyperbolic sine.
+CROWDED = 4.0
+#: A table reaches this much farther than the fastest motion that it is learnt for.
+SPARE = 1.5
+#: Mass (kg) and step (s) of the rig on which the drive is read: nothing moves while it is.
+MASS, STEP = 1e9, 1e-9
+#: Effects that belong to the oil and the valve, which a table contains, and those that a table cannot have.
+INSIDE, OUTSIDE = ("internal_leakage",), ("valve_dynamics",)
+
+
+@dataclass(frozen=True)
+class TableReduction(Reduction):
+    """A table in the place of a servo-cylinder; its controller stays.
+
+    Attributes
+    ----------
+    entry : str
+        The actuator of the model file as JSON.
+    """
+
+    entry: str = ""
+
+    def __str__(self) -> str:
+        """Words for a rung."""
+        return f"{self.at} as {self.name}"
+
+    def applied(self, model: Model) -> Model:
+        """Model with this table.
+
+        Parameters
+        ----------
+        model : Model
+        """
+        return tabled(model, self.at, self.entry)
+
+
+def tables(model: Model, taught: Sequence[Mapping[str, Array]]) -> tuple[TableReduction, ...]:
+    """A table for each servo-cylinder that one can be read of.
+
+    Parameters
+    ----------
+    model : Model
+        The full one.
+    taught : sequence of mapping of str to ndarray, shape (N,)
+        What it does on the records to learn from: how fast its drives move.
+    """
+    return tuple(_read(model, taught))
+
+
+def _read(model: Model, taught: Sequence[Mapping[str, Array]]) -> Iterator[TableReduction]:
+    for drive in hydraulic_drives(model):
+        line = model.line_of_actuator(drive)
+        channel = f"{model.joint_of_actuator(drive)}.velocity" if line is None else f"{line}.rate"
+        fastest = SPARE * max(float(np.max(np.abs(each[channel]))) for each in taught)
+        value = {key: model.parameters[f"{drive}.valve.{key}"].value for key in ("stroke", "gain")}
+        if not fastest > 0.0 or value["gain"] == 0.0:
+            continue
+        commands, velocities = (
+            _axis(reach, count)
+            for reach, count in zip((value["stroke"] / abs(value["gain"]), fastest), NODES, strict=True)
+        )
+        try:
+            efforts = force_map(model, drive, commands, velocities)
+        except VpmError:
+            continue
+        axes = {"commands": commands.tolist(), "velocities": velocities.tolist(), "efforts": efforts.tolist()}
+        yield TableReduction("drive", "table", drive, json.dumps({"type": "table", **axes}))
+
+
+def _axis(reach: float, count: int) -> Array:
+    return reach * np.sinh(CROWDED * np.linspace(-1.0, 1.0, count)) / np.sinh(CROWDED)
+
+
+def force_map(model: Model, drive: str, commands: Array, velocities: Array) -> Array:
+    """Forces of a servo-cylinder with a static spool and quasi-static pressures at mid-stroke.
+
+    Parameters
+    ----------
+    model : Model
+    drive : str
+    commands : ndarray, shape (n,)
+        SI.
+    velocities : ndarray, shape (m,)
+        m/s.
+
+    Returns
+    -------
+    ndarray, shape (n, m)
+        N, the friction of the seals in it.
+    """
+    rig = _rig(model, drive)
+    grid = np.array([(u, v) for u in commands for v in velocities])
+    states = np.column_stack([np.zeros(len(grid)), grid[:, 1]])
+    inputs = np.repeat(grid[:, :1], 2, axis=0)
+    starts = 2 * np.arange(len(grid))
+    outputs, _ = rig.core.restart(rig.theta, states, starts, 2, inputs, STEP, 1, "semi_implicit", [])
+    forces: Array = np.asarray(outputs)[:, 0, rig.output_channels.index(f"{drive}.force")]
+    return np.reshape(forces, (len(commands), len(velocities)))
+
+
+def _rig(model: Model, drive: str) -> Model:
+    """The drive alone, pushing a mass that nothing moves, its piston at mid-stroke at zero."""
+    content = model.to_dict()
+    content["effects"] = [e for e in content.get("effects", ()) if not (e["at"] == drive and e["type"] in OUTSIDE)]
+    content = simpler(type(model)(content), drive, NO_STATE).to_dict()
+    entry = {key: value for key, value in content["actuators"][drive].items() if key not in ("line", "joint")}
+    stroke = model.parameters[f"{drive}.cylinder.stroke"].value
+    supply = {key: value for key, value in content["supplies"][entry["supply"]].items() if key not in _SAGGING}
+    return type(model)(
+        {
+            "name": f"{drive} alone",
+            "gravity": [0.0, 0.0, 0.0],
+            "bodies": {"slide": {"mass": MASS}},
+            "joints": {"axis": {"type": "prismatic", "parent": "world", "child": "slide", "axis": [1.0, 0.0, 0.0]}},
+            "supplies": {entry["supply"]: supply},
+            "actuators": {drive: {**entry, "joint": "axis", "retracted_length": -0.5 * stroke}},
+            "effects": [e for e in content.get("effects", ()) if e["at"] == drive and e["type"] in INSIDE],
+        }
+    )
+
+
+_SAGGING = ("source", "resistance", "capacitance")
+
+
+def tabled(model: Model, drive: str, entry: str) -> Model:
+    """Model with a table in the place of a servo-cylinder.
+
+    Parameters
+    ----------
+    model : Model
+    drive : str
+    entry : str
+        The table as JSON, without what it acts on and the unit of its command.
+
+    Raises
+    ------
+    ModelError
+        Something else in the model refers to what is gone.
+    """
+    content: dict[str, Any] = model.to_dict()
+    own = content["actuators"][drive]
+    place = {key: own[key] for key in ("joint", "line") if key in own}
+    content["actuators"][drive] = {**place, "command_unit": own.get("command_unit", "A"), **json.loads(entry)}
+    used = {each.get("supply") for each in content["actuators"].values()}
+    content["supplies"] = {name: each for name, each in content["supplies"].items() if name in used}
+    gone = set(model.supplies) - used
+    content["effects"] = [
+        e
+        for e in content.get("effects", ())
+        if e["at"] not in gone and not (e["at"] == drive and e["type"] in (*INSIDE, *OUTSIDE))
+    ]
+    content["sensors"] = {
+        name: sensor
+        for name, sensor in content.get("sensors", {}).items()
+        if _still(str(sensor["measures"]), gone, drive)
+    }
+    return type(model)(
+        {key: each for key, each in content.items() if each or key not in ("supplies", "effects", "sensors")}
+    )
+
+
+def _still(channel: str, gone: set[str], drive: str) -> bool:
+    owner, _, what = channel.rpartition(".")
+    return owner not in gone and (owner != drive or what in ("command", "force"))
