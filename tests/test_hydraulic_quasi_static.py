@@ -175,7 +175,7 @@ def test_what_is_no_table_is_refused(change: dict[str, Any], message: str) -> No
 def test_both_are_offered() -> None:
     run = moved(RIG)
     taught = {channel: run[channel] for channel in run.channels}
-    offered = reductions(RIG, tables(RIG, [taught]))["drive", "servo"]
+    offered = reductions(RIG, tables(RIG, [taught], lambda model: [moved(model)]))["drive", "servo"]
     words = [str(change) for change in offered]
     assert "servo with quasi-static pressures" in words
     assert "servo with a static spool and quasi-static pressures" in words

@@ -20,7 +20,7 @@ from vpm.simplify.hydraulics import hydraulic_drives, replaced
 from vpm.simplify.learnt import maxwell_entry, narx_entry
 from vpm.simplify.reductions import Reduction
 from vpm.simplify.tables import tables
-from vpm.simulate import simulate
+from vpm.simulate import Run, simulate
 
 Array = NDArray[np.float64]
 Record = dict[str, Array]
@@ -71,7 +71,12 @@ def surrogates(model: Model, records: Sequence[Experiment], mode: str, rate: flo
         return ()
     taught = [_taught(model, record, mode, rate) for record in records]
     elements = (found for drive in drives for found in _learnt(model, drive, taught, 1.0 / rate))
-    return (*elements, *tables(model, taught))
+    fine = [_held(record, round(record.dt * rate), model) for record in records]
+
+    def moved(other: Model) -> list[Run]:
+        return [simulate(other, each, mode, integrator="guarded") for each in fine]
+
+    return (*elements, *tables(model, taught, moved))
 
 
 def commanded(model: Model, full: Model, record: Experiment) -> Experiment:

@@ -7,7 +7,7 @@ and the velocity alone, so that it can be looked up (docs/hydraulics.md). The en
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 
 from vpm.errors import VpmError
 from vpm.model import Model
-from vpm.simplify.hydraulics import NO_STATE, hydraulic_drives, simpler
+from vpm.simplify.hydraulics import CLEARANCE, NO_STATE, hydraulic_drives, simpler
 from vpm.simplify.reductions import Reduction
+from vpm.simulate import Run
 
 Array = NDArray[np.float64]
 
@@ -27,6 +28,8 @@ NODES = (41, 25)
 CROWDED = 4.0
 #: A table reaches this much farther than the fastest motion that it is learnt for.
 SPARE = 1.5
+#: Clearances that are tried for a valve without one, in parts of its stroke.
+CLEARANCES = (0.0025, 0.005, 0.01, 0.02, 0.05)
 #: Mass (kg) and step (s) of the rig on which the drive is read: nothing moves while it is.
 MASS, STEP = 1e9, 1e-9
 #: Effects that belong to the oil and the valve, which a table contains, and those that a table cannot have.
@@ -59,20 +62,30 @@ class TableReduction(Reduction):
         return tabled(model, self.at, self.entry)
 
 
-def tables(model: Model, taught: Sequence[Mapping[str, Array]]) -> tuple[TableReduction, ...]:
+def tables(
+    model: Model,
+    taught: Sequence[Mapping[str, Array]],
+    runs: Callable[[Model], Sequence[Run]],
+) -> tuple[TableReduction, ...]:
     """A table for each servo-cylinder that one can be read of.
+
+    Where its valve has no clearance, that one is taken with which the quasi-static drive moves most like the full one.
 
     Parameters
     ----------
     model : Model
         The full one.
     taught : sequence of mapping of str to ndarray, shape (N,)
-        What it does on the records to learn from: how fast its drives move.
+        What it does on the records to learn from.
+    runs : callable
+        What another model does on these.
     """
-    return tuple(_read(model, taught))
+    return tuple(_read(model, taught, runs))
 
 
-def _read(model: Model, taught: Sequence[Mapping[str, Array]]) -> Iterator[TableReduction]:
+def _read(
+    model: Model, taught: Sequence[Mapping[str, Array]], runs: Callable[[Model], Sequence[Run]]
+) -> Iterator[TableReduction]:
     for drive in hydraulic_drives(model):
         line = model.line_of_actuator(drive)
         channel = f"{model.joint_of_actuator(drive)}.velocity" if line is None else f"{line}.rate"
@@ -85,15 +98,46 @@ def _read(model: Model, taught: Sequence[Mapping[str, Array]]) -> Iterator[Table
             for reach, count in zip((value["stroke"] / abs(value["gain"]), fastest), NODES, strict=True)
         )
         try:
-            efforts = force_map(model, drive, commands, velocities)
+            likest = _with_clearance(model, drive, channel, taught, runs)
+            if likest is None:
+                continue
+            efforts = force_map(likest, drive, commands, velocities)
         except VpmError:
             continue
         axes = {"commands": commands.tolist(), "velocities": velocities.tolist(), "efforts": efforts.tolist()}
         yield TableReduction("drive", "table", drive, json.dumps({"type": "table", **axes}))
 
 
+def _with_clearance(
+    model: Model,
+    drive: str,
+    channel: str,
+    taught: Sequence[Mapping[str, Array]],
+    runs: Callable[[Model], Sequence[Run]],
+) -> Model | None:
+    """Model whose drive is quasi-static, with the clearance that suits best; None where none can be simulated."""
+    content = model.to_dict()
+    content["effects"] = [e for e in content.get("effects", ()) if not (e["at"] == drive and e["type"] in OUTSIDE)]
+    reduced = simpler(type(model)(content), drive, NO_STATE)
+    name = f"{drive}.valve.clearance"
+    given = f"{drive}.valve.clearance" in model.parameters
+    sizes = [1.0] if given else [share / CLEARANCE for share in CLEARANCES]
+    best, least = None, np.inf
+    for size in sizes:
+        candidate = reduced.with_parameters({name: size * reduced.parameters[name].value})
+        try:
+            pairs = zip(runs(candidate), taught, strict=True)
+            gap = float(np.sqrt(sum(np.sum(np.square(run[channel] - each[channel])) for run, each in pairs)))
+        except VpmError:
+            continue
+        if gap < least:
+            best, least = candidate, gap
+    return best
+
+
 def _axis(reach: float, count: int) -> Array:
-    return reach * np.sinh(CROWDED * np.linspace(-1.0, 1.0, count)) / np.sinh(CROWDED)
+    axis: Array = reach * np.sinh(CROWDED * np.linspace(-1.0, 1.0, count)) / np.sinh(CROWDED)
+    return axis
 
 
 def force_map(model: Model, drive: str, commands: Array, velocities: Array) -> Array:
@@ -119,15 +163,14 @@ def force_map(model: Model, drive: str, commands: Array, velocities: Array) -> A
     inputs = np.repeat(grid[:, :1], 2, axis=0)
     starts = 2 * np.arange(len(grid))
     outputs, _ = rig.core.restart(rig.theta, states, starts, 2, inputs, STEP, 1, "semi_implicit", [])
-    forces: Array = np.asarray(outputs)[:, 0, rig.output_channels.index(f"{drive}.force")]
-    return np.reshape(forces, (len(commands), len(velocities)))
+    forces = outputs[:, 0, rig.output_channels.index(f"{drive}.force")]
+    efforts: Array = np.reshape(forces, (len(commands), len(velocities)))
+    return efforts
 
 
 def _rig(model: Model, drive: str) -> Model:
     """The drive alone, pushing a mass that nothing moves, its piston at mid-stroke at zero."""
-    content = model.to_dict()
-    content["effects"] = [e for e in content.get("effects", ()) if not (e["at"] == drive and e["type"] in OUTSIDE)]
-    content = simpler(type(model)(content), drive, NO_STATE).to_dict()
+    content = simpler(model, drive, NO_STATE).to_dict()
     entry = {key: value for key, value in content["actuators"][drive].items() if key not in ("line", "joint")}
     stroke = model.parameters[f"{drive}.cylinder.stroke"].value
     supply = {key: value for key, value in content["supplies"][entry["supply"]].items() if key not in _SAGGING}

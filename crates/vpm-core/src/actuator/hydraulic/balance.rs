@@ -5,7 +5,7 @@ use crate::scalar::Scalar;
 
 /// Most steps of one search for a pressure, and how near its end has to be in shares of the supply's pressure.
 const STEPS: usize = 40;
-const NEAR: f64 = 1e-7;
+const NEAR: f64 = 1e-5;
 
 /// Flows of a cylinder's chambers behind a valve that stands still, with oil that does not give way.
 ///
@@ -210,14 +210,14 @@ fn falling_zero(start: f64, [mut low, mut high]: [f64; 2], near: f64, f: impl Fn
             high = at;
         }
         let mut next = at - value / slope;
+        if (next - at).abs() <= near {
+            return next;
+        }
         if !(next > low && next < high && (next - at).abs() <= 0.5 * before) {
             next = 0.5 * (low + high);
         }
         before = (next - at).abs();
         at = next;
-        if before <= near {
-            break;
-        }
     }
     at
 }
