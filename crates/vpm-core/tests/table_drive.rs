@@ -140,7 +140,10 @@ fn what_is_no_table_is_refused() {
     let refusal = |drive: Value| Description::from_json(&machine(drive).json()).map(|_| ()).unwrap_err().to_string();
     for (drive, part) in [
         (json!({"commands": [0.0], "velocities": [0.0, 1.0], "efforts": [1.0, 2.0]}), "has 1 of commands"),
-        (json!({"commands": [0.0, 1.0], "velocities": [1.0, 1.0], "efforts": [1.0, 1.0, 1.0, 1.0]}), "do not rise: 1, then 1"),
+        (
+            json!({"commands": [0.0, 1.0], "velocities": [1.0, 1.0], "efforts": [1.0, 1.0, 1.0, 1.0]}),
+            "do not rise: 1, then 1",
+        ),
         (json!({"commands": [0.0, 1.0], "velocities": [0.0, 1.0], "efforts": [1.0, 1.0, 1.0]}), "has 3 efforts"),
     ] {
         let told = refusal(drive);

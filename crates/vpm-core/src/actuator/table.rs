@@ -95,9 +95,9 @@ impl TableDrive {
             (self.commands[row + 1] - self.commands[row], self.velocities[column + 1] - self.velocities[column]);
         let (over_u, mut over_v) = (hermite(u), hermite(v));
         let [least, most] = [self.velocities[0], self.velocities[self.velocities.len() - 1]];
-        if velocity.re() > most {
+        if velocity.re() >= most {
             over_v[1][1] = (velocity - most) * (1.0 / dv);
-        } else if velocity.re() < least {
+        } else if velocity.re() <= least {
             over_v[0][1] = (velocity - least) * (1.0 / dv);
         }
         let mut effort = S::zero();
