@@ -21,6 +21,7 @@ from vpm.simplify.ladder import Ladder, Rung, pareto
 from vpm.simplify.reductions import COUPLING_TERMS, OFFERED, VELOCITY_TERMS, Reduction, reduced, reductions
 from vpm.simplify.shares import ROUNDING, deformation_share, effort_share, motions, ranked
 from vpm.simplify.surrogates import surrogates
+from vpm.simplify.terms import CURVED
 from vpm.simplify.trials import CLOCK, NEGLIGIBLE, PRIORITY, Changes, Trials
 from vpm.simulate import Setup
 
@@ -190,6 +191,9 @@ def _alone(trials: Trials, base: Changes, changes: Sequence[Reduction]) -> dict[
 
 def _coarser(changes: Sequence[Reduction], base: Changes) -> Sequence[Reduction]:
     """Changes of one site beyond that in the base: they come finest first, and what is finer costs more."""
+    straight = {each.at for each in base if each.kind == "level" and not each.name.startswith(CURVED)}
+    # Hinges between rigid segments have no terms of second order to leave out.
+    changes = [each for each in changes if each.name != "second-order" or each.at not in straight]
     taken = next((each for each in base if each in changes), None)
     return changes if taken is None else changes[changes.index(taken) + 1 :]
 
