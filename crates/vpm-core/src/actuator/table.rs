@@ -142,7 +142,7 @@ fn place<S: Scalar>(axis: &[f64], number: S) -> (usize, S) {
     if number.re() >= last {
         return (axis.len() - 2, S::one());
     }
-    if !(number.re() > first) {
+    if number.re() <= first || number.re().is_nan() {
         return (0, S::zero());
     }
     let at = axis.partition_point(|&node| node <= number.re()) - 1;
