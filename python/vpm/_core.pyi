@@ -50,10 +50,12 @@ def stop_when(asked: Callable[[], bool] | None) -> None:
     Ctrl-C reaches Python's main thread only; this is how it tells the threads that work for it. None ends it.
     """
 
-def plastic_flights(pull: ArrayLike, gaps: ArrayLike, interval: float) -> NDArray[np.float64]:
-    """Acceleration (N, k) of a link against the motor in plays of k widths, ``pull`` (N,) moving it between impacts.
+def soft_flights(
+    pull: ArrayLike, gaps: ArrayLike, rates: ArrayLike, dampings: ArrayLike, interval: float
+) -> NDArray[np.float64]:
+    """Acceleration (N, k) of a link against the motor in k plays, ``pull`` (N,) moving it within them.
 
-    Every impact is plastic: where the link arrives it stays until ``pull`` turns.
+    Beyond a gap (m or rad) a spring and a damper hold it: it would swing at ``rates`` (rad/s) with these ``dampings``.
     """
 
 def check_integrator(name: str) -> None:

@@ -24,7 +24,7 @@ mod _core {
     #[pymodule_export]
     use crate::errors::Diverged;
     #[pymodule_export]
-    use crate::flight::plastic_flights;
+    use crate::flight::soft_flights;
     #[pymodule_export]
     use crate::interrupt::stop_when;
     #[pymodule_export]
