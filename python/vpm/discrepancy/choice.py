@@ -10,11 +10,13 @@ import numpy as np
 from vpm.catalogue import EFFECTS
 from vpm.discrepancy.candidates import Candidate, Key
 from vpm.discrepancy.confirmation import Data, Trial
-from vpm.discrepancy.driven import compare_driven
-from vpm.discrepancy.motion_only import LATE
+from vpm.discrepancy.driven import ODDS, compare_driven
+from vpm.discrepancy.motion_only import LATE_OR_SLOW
 from vpm.discrepancy.refusal import LEAST_GAIN
 from vpm.discrepancy.structural import coupled
 
+#: What comes late; each of the others of its kind is slow and looks late.
+DELAYS = ("input_delay", "sensor_delay")
 #: An instrument is blamed for what the machine may have done only if it leaves less than this share of the gap.
 SENSOR_SHARE = 0.25
 #: What leaves up to so many times as much as the best explains the data as well, if it is also little of the whole gap.
@@ -52,22 +54,28 @@ def choose(believed: Sequence[Trial], data: Data) -> Accepted:
 
 
 def _late_or_slow(chosen: Trial, believed: Sequence[Trial], data: Data) -> Trial:
-    """Of delay and lag, where both would do: what the reference tells from the other, else the delay.
+    """Of delay, lag and slow spool, where several would do: what the reference tells from the others, else the delay.
 
     A delay shifts in time; a lag does so too and weakens what is fast, which has to be seen.
     """
-    if chosen.probe.candidate.effect.name not in LATE:
+    if _name(chosen) not in LATE_OR_SLOW:
         return chosen
-    alike = [t for t in believed if t.probe.candidate.effect.name in LATE and _left(t) <= SAME * _left(chosen)]
-    lags = [t for t in alike if t.probe.candidate.effect.name == LATE[0]]
-    delays = [t for t in alike if t not in lags]
-    if not lags or not delays:
-        return chosen
-    lag, delay = min(lags, key=_evidence), min(delays, key=_evidence)
-    told = compare_driven(lag.judged, delay.judged, data)
-    if told is None:
-        return chosen
-    return lag if told.prefers_first else delay
+    alike = [t for t in believed if _left(t) <= SAME * _left(chosen)]
+    slow = [(name,) for name in LATE_OR_SLOW if name not in DELAYS]
+    kinds = [[t for t in alike if _name(t) in kind] for kind in (DELAYS, *slow)]
+    rest = [min(kind, key=_evidence) for kind in kinds if kind]
+    best = rest.pop(0)
+    for rival in rest:
+        told = compare_driven(rival.judged, best.judged, data)
+        if told is None:
+            return chosen
+        if told.prefers_first(ODDS if _name(best) in DELAYS else 1.0):
+            best = rival
+    return best
+
+
+def _name(trial: Trial) -> str:
+    return trial.probe.candidate.effect.name
 
 
 def _first_named(equals: Sequence[Trial]) -> Trial:

@@ -8,7 +8,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from vpm.discrepancy.motion_only import CREEPING, LATE, Timed, is_dry, timed_in_motion
+from vpm.discrepancy.late import gain_alone, timed_alone
+from vpm.discrepancy.motion_only import CREEPING, Timed, is_dry, is_late
+from vpm.discrepancy.own_run import OwnRun
 from vpm.discrepancy.screening import Alias, Baseline, Probe, size_is_clear
 from vpm.discrepancy.slow import has_impacts, slow
 from vpm.errors import DivergedError
@@ -197,10 +199,11 @@ def confirm(current: Judged, data: Data, probe: Probe, rival: float = np.inf) ->
         origin = None if origin is None else judged.model.theta
         judged, diverged = _judged(judged.model, free, data, bounds, origin, worth)
     own = free[len(current.free) :]
-    timed = _timed(current, judged, data, probe)
+    timed, alone = _timed(current, judged, data, probe)
     if timed is not None:
         judged, diverged = _judged(judged.model, free, data, {**bounds, **timed.bounds}, origin)
-    return _trial(current, data, probe, judged, own, (*doubtful, *held), timed, diverged)
+    trial = _trial(current, data, probe, judged, own, (*doubtful, *held), timed, diverged)
+    return _witnessed(trial, current, alone, data)
 
 
 def finished(current: Judged, data: Data, trial: Trial) -> Trial:
@@ -329,12 +332,20 @@ def _slow_gain(current: Judged, judged: Judged, data: InverseDynamicsProblem) ->
     return gain(slow(data, current.unseen), slow(data, shrunk), segments(data))
 
 
-def _timed(current: Judged, judged: Judged, data: Data, probe: Probe) -> Timed | None:
-    """A late drive or instrument on a machine with dry friction, timed in motion; None for anything else."""
-    if probe.candidate.effect.name not in LATE or not is_dry(current.model) or has_tangent(probe.model, data.training):
-        return None
+def _timed(current: Judged, judged: Judged, data: Data, probe: Probe) -> tuple[Timed | None, OwnRun | None]:
+    """A late drive or instrument on a machine with dry friction, timed in motion, and the run that timed it if any."""
+    if not is_late(probe.candidate.effect.name, current.model) or has_tangent(probe.model, data.training):
+        return None, None
     before, late = (current.model, current.free), (judged.model, judged.free)
-    return timed_in_motion(before, late, data.training, data.unseen, judged.bounds)
+    return timed_alone(before, late, data.training, data.unseen, data.simulation, judged.bounds)
+
+
+def _witnessed(trial: Trial, current: Judged, alone: OwnRun | None, data: Data) -> Trial:
+    """A trial; of something late that makes simulations worse those count in which each model suits its own run."""
+    if alone is None or data.simulation is None or trial.simulated is None or trial.simulated.relative >= 0.0:
+        return trial
+    told = gain_alone(current.model, current.free, alone, data.simulation)
+    return trial if told is None else replace(trial, simulated=told)
 
 
 def _away_gain(current: Judged, judged: Judged, data: InverseDynamicsProblem, probe: Probe) -> Gain | None:

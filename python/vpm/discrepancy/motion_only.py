@@ -27,6 +27,8 @@ DRY = ("coulomb_friction", "stribeck_friction", "hysteresis")
 CREEPING = 0.05
 #: A lag, and the delays that it may be taken for.
 LATE = ("actuator_lag", "input_delay", "sensor_delay")
+#: The same of the command, with the spool that is slow to follow it.
+LATE_OR_SLOW = (*LATE, "valve_dynamics")
 #: Samples in clear motion that a fit needs, for each fitted number.
 FEWEST = 10
 #: A parameter that shows less of itself in motion than this share of its regressor's power stays as it is.
@@ -70,6 +72,11 @@ class Timed:
 def is_dry(model: Model) -> bool:
     """Whether a joint of a model can stick."""
     return any(effect.name in DRY for effect in model.effects)
+
+
+def is_late(effect: str, model: Model) -> bool:
+    """Whether an effect comes late in a model that can stick, so that it has to be timed where nothing does."""
+    return effect in LATE and is_dry(model)
 
 
 def in_motion(problem: InverseDynamicsProblem) -> Array:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from scipy.special import stdtrit
 
 from vpm.discrepancy.confirmation import Trial
-from vpm.discrepancy.motion_only import LATE
+from vpm.discrepancy.motion_only import LATE_OR_SLOW
 from vpm.discrepancy.screening import Probe, impossible_values
 from vpm.discrepancy.structural import coupled
 from vpm.identify import Gain
@@ -112,12 +112,12 @@ def refuse_ringing(share: float, trial: Trial) -> str:
 
 
 def explains_most(trial: Trial) -> bool:
-    """Whether a delay or lag explains so much that it is named even where the times of samples would leave it open.
+    """Whether what is late explains so much that it is named even where the times of samples would leave it open.
 
     Where there are peers on its clock, a shift of all commands tells what is physics.
     """
     candidate = trial.probe.candidate
-    late = candidate.effect.name in LATE and not has_peers(trial.judged.model, candidate.site)
+    late = candidate.effect.name in LATE_OR_SLOW and not has_peers(trial.judged.model, candidate.site)
     return late and trial.unseen.relative >= MOST_OF_IT
 
 

@@ -12,6 +12,7 @@ from vpm.discrepancy.candidates import Candidate, Key, candidates, left_out
 from vpm.discrepancy.choice import Accepted, choose
 from vpm.discrepancy.confirmation import Data, Judged, Trial, confirm, finished
 from vpm.discrepancy.diagnosis import RankedCandidate
+from vpm.discrepancy.motion_only import in_motion, is_late
 from vpm.discrepancy.play import is_read_off, only_winds_up
 from vpm.discrepancy.refusal import (
     CLEAR_GAIN,
@@ -243,6 +244,9 @@ class Round:
         before = self.timed.unseen
         if slow_shows_it(trial, thresholds):
             before, unseen = (slow(self.data.unseen, each) for each in (before, unseen))
+        if is_late(trial.probe.candidate.effect.name, trial.judged.model):
+            # What sticks is late by itself, with a shift as without: what is late is judged where nothing sticks.
+            before, unseen = (in_motion(self.data.unseen) * each for each in (before, unseen))
         timed = gain(before, unseen, segments(self.data.unseen))
         return refuse_timing(timed, self.timed.shift, thresholds)
 

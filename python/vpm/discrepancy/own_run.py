@@ -1,0 +1,198 @@
+"""A model that runs the records by itself, in closed loop, fitted to them at every frequency.
+
+The balance of effort compares a few hertz and believes the measured motion, so that what sticks looks late and what is
+late looks slow. A run along the reference has neither trouble, if its own parameters are the best ones for it: errors
+of a time by half of it, which a balance makes where a joint sticks, would be larger than what parts a delay from a lag.
+Each frequency counts by the noise that is left there: maximum likelihood with an unknown spectrum (P. Whittle, *J.
+Royal Statistical Society B* 15, 1953), by steps of Gauss and Newton.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import ceil
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
+
+from vpm.errors import VpmError
+from vpm.experiment import Experiment
+from vpm.identify import OutputErrorProblem
+from vpm.identify.identifiability import column_lengths
+from vpm.model import Model
+from vpm.simulate import Setup
+
+Array = NDArray[np.float64]
+Spectra = list[NDArray[np.complex128]]
+
+#: Steps of the integration in one delay or lag, and most of them in one sampling interval: both times may be shorter
+#: than that, and an error of steps is as small a difference as theirs.
+STEPS, MOST_STEPS = 3, 10
+#: Tapered share of each record; frequencies left out at the low end, where a record is one slope.
+TAPERED, LOWEST = 0.1, 2
+#: The spectrum of noise is the mean over this share of the frequencies, and over so many at least.
+SMOOTHED, FEWEST = 1.0 / 60.0, 15
+#: Times that the spectrum is taken again from what is left.
+ROUNDS = 3
+#: Share of itself from which on a column stands beside others.
+RANK = 1e-10
+#: Most steps of a fit, and the gain in squares of a standard deviation below which none is made.
+MOST_FITS, WORTH_A_STEP = 5, 1.0
+#: Largest factor by which a step changes a number that cannot be negative, and how often a step that does not help is
+#: made shorter, by this factor.
+LEAP, TRIES, SHORTER = 3.0, 3, 0.4
+
+
+@dataclass(frozen=True)
+class OwnRun:
+    """A model that runs the records by itself.
+
+    Attributes
+    ----------
+    model : Model
+    free : tuple of str
+        Parameters that were fitted.
+    problem : OutputErrorProblem
+        All records in closed loop.
+    left : ndarray, shape (n,)
+        What the run leaves of the logs.
+    slopes : ndarray, shape (n, free)
+        Derivatives of that by the fitted parameters.
+    """
+
+    model: Model
+    free: tuple[str, ...]
+    problem: OutputErrorProblem
+    left: Array
+    slopes: Array
+
+    def spectra(self) -> Spectra:
+        """Transforms of what is left and of the slopes."""
+        return spectra(self.problem, np.column_stack([self.left, self.slopes]))
+
+    def estimated(self, name: str) -> tuple[float, float]:
+        """A fitted parameter, and its standard deviation."""
+        _, _, rows = least(self.spectra())
+        lengths = column_lengths(rows[:, 1:])
+        triangle = np.linalg.qr(rows[:, 1:] / lengths, mode="r")
+        place = self.free.index(name)
+        spread = float(np.linalg.norm(np.linalg.pinv(triangle, rcond=RANK)[place])) / float(lengths[place])
+        return self.model.parameters[name].value, spread
+
+
+def own_run(
+    model: Model, free: Sequence[str], records: Sequence[Experiment], setup: Setup, beside: OwnRun | None = None
+) -> OwnRun:
+    """The run of a model, its free parameters fitted to records; they begin at those of a run ``beside`` it.
+
+    Raises
+    ------
+    VpmError
+        The model cannot follow the references.
+    """
+    found = _at(model if beside is None else _like(model, free, beside), tuple(free), records, setup)
+    for _ in range(MOST_FITS):
+        better = _step(found, setup)
+        if better is None:
+            break
+        found = better
+    return found
+
+
+def spectra(problem: OutputErrorProblem, columns: Array) -> Spectra:
+    """Transforms of columns over all samples, for each reading; a command is what the controller made of readings."""
+    from scipy.signal.windows import tukey  # takes a second, and few need it
+
+    found: Spectra = []
+    for block in problem.blocks:
+        if not block.channel.endswith(".command"):
+            window = tukey(block.time.size, TAPERED)
+            found.append(np.fft.rfft(columns[block.samples] * window[:, None], axis=0)[LOWEST:])
+    return found
+
+
+def weighted(spectrum: NDArray[np.complex128], left: NDArray[np.complex128]) -> Array:
+    """Real and imaginary parts relative to the noise, whose spectrum is the mean of what is left near a frequency."""
+    power = np.abs(left) ** 2
+    smooth = uniform_filter1d(power, max(FEWEST, int(SMOOTHED * power.size)), mode="reflect")
+    weight = np.sqrt(2.0 / np.maximum(smooth, 1e-12 * max(float(smooth.max()), 1e-300)))
+    return np.asarray(np.vstack([spectrum.real * weight[:, None], spectrum.imag * weight[:, None]]))
+
+
+def least(transforms: Spectra) -> tuple[Array, Spectra, Array]:
+    """The change that makes the first column least by all others, the noise that is left then, and weighted rows."""
+    noise = [s[:, 0] for s in transforms]
+    for _ in range(ROUNDS):
+        rows = np.vstack([weighted(s, one) for s, one in zip(transforms, noise, strict=True)])
+        lengths = column_lengths(rows[:, 1:])
+        step = np.asarray(np.linalg.lstsq(rows[:, 1:] / lengths, -rows[:, 0], rcond=RANK)[0] / lengths)
+        noise = [s[:, 0] + s[:, 1:] @ step for s in transforms]
+    return step, noise, rows
+
+
+def _like(model: Model, free: Sequence[str], beside: OwnRun) -> Model:
+    """A model with the parameters of another one's run; a time that only one of them has is that of the other."""
+    theirs = beside.model.parameters
+    values = {name: theirs[name].value for name in free if name in beside.free}
+    mine = [name for name in free if name not in beside.free]
+    other = [name for name in beside.free if name not in free]
+    if len(mine) == len(other) == 1 and model.parameters[mine[0]].unit == theirs[other[0]].unit:
+        values[mine[0]] = theirs[other[0]].value
+    return model.with_parameters(values)
+
+
+def _at(model: Model, free: tuple[str, ...], records: Sequence[Experiment], setup: Setup) -> OwnRun:
+    """The run of a model as it is."""
+    problem = OutputErrorProblem(model, records, "closed_loop", setup=_fine(model, free, records, setup))
+    left, _ = problem.evaluate(model, model.theta)
+    return _with_slopes(model, free, problem, left, setup)
+
+
+def _with_slopes(model: Model, free: tuple[str, ...], problem: OutputErrorProblem, left: Array, setup: Setup) -> OwnRun:
+    """A run with its derivatives, which are worth few digits and so no finer steps."""
+    coarse = OutputErrorProblem(model, problem.experiments, "closed_loop", setup=setup)
+    _, slopes = coarse.evaluate(model, model.theta, [model.index(name) for name in free])
+    return OwnRun(model, free, problem, left, slopes)
+
+
+def _fine(model: Model, free: Sequence[str], records: Sequence[Experiment], setup: Setup) -> Setup:
+    """Steps that are as short as the times of a model ask for."""
+    times = [model.parameters[name] for name in free]
+    shortest = min((time.value for time in times if time.unit == "s" and time.value > 0.0), default=np.inf)
+    interval = max(record.dt for record in records)
+    return replace(setup, substeps=max(setup.substeps, min(MOST_STEPS, ceil(STEPS * interval / shortest))))
+
+
+def _step(run: OwnRun, setup: Setup) -> OwnRun | None:
+    """A better run, or None where none is near."""
+    step, noise, rows = least(run.spectra())
+    cost = float(rows[:, 0] @ rows[:, 0])
+    if cost - float(np.sum((rows[:, 0] + rows[:, 1:] @ step) ** 2)) < WORTH_A_STEP:
+        return None
+    records = run.problem.experiments
+    for share in SHORTER ** np.arange(TRIES):
+        model = run.model.with_parameters(_moved(run, share * step))
+        try:
+            problem = OutputErrorProblem(model, records, "closed_loop", setup=_fine(model, run.free, records, setup))
+            left, _ = problem.evaluate(model, model.theta)
+        except VpmError:
+            continue
+        transforms = spectra(problem, left[:, None])
+        now = sum(float(np.sum(weighted(s, n) ** 2)) for s, n in zip(transforms, noise, strict=True))
+        if now < cost:
+            return _with_slopes(model, run.free, problem, left, setup)
+    return None
+
+
+def _moved(run: OwnRun, step: Array) -> dict[str, float]:
+    """Values after a step, within their bounds and within a leap of what they were if they cannot be negative."""
+    values = {}
+    for name, change in zip(run.free, map(float, step), strict=True):
+        parameter = run.model.parameters[name]
+        value = parameter.value + change
+        if parameter.minimum >= 0.0 and parameter.value > 0.0:
+            value = min(max(value, parameter.value / LEAP), parameter.value * LEAP)
+        values[name] = min(max(value, parameter.minimum), parameter.maximum)
+    return values
