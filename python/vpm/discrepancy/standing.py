@@ -18,6 +18,7 @@ from vpm.discrepancy.confirmation import Data, Judged, Trial, finished, shrinkag
 from vpm.discrepancy.diagnosis import RefusedEffect
 from vpm.discrepancy.elimination import Stage
 from vpm.discrepancy.finer import contains
+from vpm.discrepancy.motion_only import LATE_OR_SLOW
 from vpm.discrepancy.refusal import LEAST_GAIN, NORMAL_95_ONE_SIDED, Thresholds, refuse_trial
 from vpm.discrepancy.search import Search
 from vpm.identify import gain, segments
@@ -53,6 +54,8 @@ def replaced(found: Search, known: Sequence[Rivals], data: Data) -> tuple[Search
 
 def _preferred(final: Judged, entry: Accepted, trial: Trial, data: Data, thresholds: Thresholds) -> float:
     """Standard deviations by which the unseen data prefer a rival, 0 if not beyond chance or not in every view."""
+    if {trial.probe.candidate.effect.name, entry.key[0]} <= set(LATE_OR_SLOW):
+        return 0.0  # their runs along the reference said which, and the balance knows less of it
     if not alike(trial.probe.candidate, entry.trial.probe.candidate) or refuse_trial(trial, thresholds):
         return 0.0
     judged = trial.judged
