@@ -185,7 +185,6 @@ def test_a_memory_forgets_what_is_oldest(monkeypatch: pytest.MonkeyPatch) -> Non
     assert worked == [1, 2, 3, 1]
 
 
-@pytest.mark.skipif(not hasattr(vpm._core, "soft_flights"), reason="the core was built before it knew soft flights")
 def test_flights_are_those_of_one_step_after_the_other() -> None:
     generator = np.random.default_rng(5)
     pull = np.cumsum(generator.standard_normal(3000)) * 0.05

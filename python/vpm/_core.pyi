@@ -24,6 +24,7 @@ __all__ = [
     "narx_candidates",
     "narx_fit",
     "narx_select",
+    "soft_flights",
     "stop_when",
 ]
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-import vpm._core as core
+from vpm._core import soft_flights
 from vpm.experiment import Motion
 from vpm.identify import InverseDynamicsProblem
 from vpm.model import Model
@@ -59,12 +59,10 @@ def flights(
     gaps, frequencies, dampings : ndarray, shape (plays,)
         Widths, m or rad; Hz at which the link swings on a contact while the motor stands; damping ratios there.
     """
-    # A core built before it knew them leaves them to the same steps here.
-    fly = getattr(core, "soft_flights", _swing)
     added = []
     for m in data.motions:
         course = _course(model, site, m)
-        swing = fly(course.pull, gaps, 2.0 * np.pi * frequencies, dampings, course.interval)
+        swing = soft_flights(course.pull, gaps, 2.0 * np.pi * frequencies, dampings, course.interval)
         added.append(course.column[:, :, None] * swing[:, None, :])
     return data.added(added)
 
@@ -81,17 +79,3 @@ def _course(model: Model, site: str, m: Motion) -> _Course:
     moved, _, _ = model.core.inverse_dynamics(model.theta, motion[0], motion[1], motion[2], m.inputs, m.dt)
     column = moved - held
     return _Course(-held[:, behind] / column[:, behind], -column[:, before], m.dt)
-
-
-def _swing(pull: Array, gaps: Array, pace: Array, dampings: Array, h: float) -> Array:
-    """Acceleration of the link against the motor for each play, at steps ``h``, shape (N, plays)."""
-    half = 0.5 * gaps
-    spring, held = h * pace**2, 1.0 / (1.0 + 2.0 * h * dampings * pace)
-    place, speed = np.zeros_like(half), np.zeros_like(half)
-    swing = np.zeros((pull.size, half.size))
-    for k, acceleration in enumerate(pull.tolist()):
-        beyond = place - np.minimum(np.maximum(place, -half), half)
-        new = (speed + h * acceleration - spring * beyond) * np.where(beyond == 0.0, 1.0, held)
-        swing[k] = (new - speed) / h
-        place, speed = place + h * new, new
-    return swing

@@ -73,8 +73,6 @@ class Parts:
 @lru_cache(maxsize=512)
 def parts_needed(model: Model) -> Parts | None:
     """Parts of what a motion of all joints needs of a rigid machine; None where they do not add up."""
-    if not hasattr(model.core, "effort_of_effect"):
-        return None
     if any(effect.name in WITH_COORDINATES or _follows_load(effect) for effect in model.effects):
         return None
     laws = [effect for effect in model.effects if effect.type.site == "joint" and effect.name != OF_THE_TREE]
