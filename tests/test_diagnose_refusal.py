@@ -52,6 +52,29 @@ def test_a_gain_beyond_that_is_one(error: float) -> None:
     assert refuse_trial(trial(1.0 + error), Thresholds(30, 1e-3)) == ""
 
 
+def test_a_gain_that_explains_as_little_as_an_imitation_blames_no_instrument() -> None:
+    little = Gain(before=1.0, after=0.88, weight=1.0, score=50.0, pieces=40)
+    one = cast("Trial", SimpleNamespace(**{**vars(trial(1.02)), "unseen": little}))
+    assert "an instrument is blamed" in refuse_trial(one, Thresholds(30, 1e-3))
+
+
+@pytest.mark.parametrize(("way", "believed"), [(1.9e-4, False), (2.1e-4, True)])
+def test_a_hysteresis_within_two_samples_is_dry_friction(way: float, believed: bool) -> None:
+    model = Model.load(MODEL).with_effect("hysteresis", at="shoulder", force=0.1, displacement=way)
+    name = "shoulder.hysteresis.displacement"
+    one = trial(1.1)
+    held = {
+        "probe": SimpleNamespace(
+            candidate=SimpleNamespace(effect=SimpleNamespace(name="hysteresis", site="joint"), site="shoulder")
+        ),
+        "judged": SimpleNamespace(model=model, bounds={name: (1e-4, 1.0)}),
+        "parameters": ("shoulder.hysteresis.force", name),
+    }
+    reason = refuse_trial(cast("Trial", SimpleNamespace(**{**vars(one), **held})), Thresholds(30, 1e-3))
+    assert (reason == "") == believed
+    assert believed or "between two samples" in reason
+
+
 def beside_play(whole: Gain, slow: Gain) -> str:
     """What is said of a trial beside a play, with these gains of the whole unseen residual and of its slow part."""
     one = trial(1.1)

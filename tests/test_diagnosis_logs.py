@@ -151,7 +151,8 @@ def test_the_load_behind_unequal_directions_of_a_cylinder_is_named() -> None:
 def test_without_a_load_to_blame_unequal_directions_stay_unexplained() -> None:
     found, _ = crane_with(load_known=True)
     assert found.verdict == "unexplained"
-    assert "asymmetric_friction at boom" in found.summary
+    # With the load known, unequal directions and a spring with its rest come equally close, and neither explains it.
+    assert {candidate.name for candidate in found.candidates[:2]} == {"asymmetric_friction", "spring"}
 
 
 # ---- what they rest on -----------------------------------------------------------------------------------------------

@@ -69,7 +69,9 @@ def test_the_chosen_model_keeps_both_strains_on_a_motion_that_the_fit_did_not_se
 
 def test_the_coarsest_come_first_and_what_is_dear_is_not_fitted(ladder: Ladder, told: list[str]) -> None:
     assert told[1].startswith("velocity terms take")
-    assert told[2:4] == ["the full model", "strip_1 as rigid, strip_2 as rigid"]
+    first = told.index("the full model")
+    assert all(" terms take " in line and " % of the " in line for line in told[1:first])
+    assert told[first + 1] == "strip_1 as rigid, strip_2 as rigid"
     assert ladder.cut > 0
     # Four-stage steps of a model that is as good as the full one take several times as long as its linear ones.
     stepped = {

@@ -71,7 +71,8 @@ def test_inverse_dynamics_gives_back_the_effort(record: Experiment) -> None:
     model = nominal()
     time, applied, required = InverseDynamicsProblem(model, [record]).effort(model, model.theta, 0)
     for ours, theirs in ((run.time, time), (run.measured, applied), (run.values, required)):
-        np.testing.assert_array_equal(ours, theirs)
+        # Sums of parts in another order, each behind the filter of the motion.
+        np.testing.assert_allclose(ours, theirs, rtol=0.0, atol=1e-10 * np.abs(ours).max())
 
 
 def test_simulation_does_not_depend_on_the_number_of_substeps_in_the_limit(record: Experiment) -> None:

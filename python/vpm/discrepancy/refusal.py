@@ -34,6 +34,8 @@ MOST_OF_IT = 0.5
 NEGLIGIBLE = 0.005
 #: One-sided 95 % quantile of the normal distribution: a simulation that is worse by less is worse by chance.
 NORMAL_95_ONE_SIDED = 1.6448536269514722
+#: Samples that what builds up over a way has to last, to be seen to build up.
+SAMPLED = 2.0
 #: Drop of the training mean square below which a candidate is not refitted at all.
 LEAST_SCREENED = 0.005
 
@@ -142,12 +144,14 @@ def _too_short(trial: Trial, interval: float) -> str:
     """A delay or lag below one sampling interval that explains little is as well a matter of how commands are logged.
 
     The hold is that of all commands: where one of several drives, or of several joints' instruments, is late and the
-    others are not, `refuse_timing` judges it beside a shift of them all. The time of a lossy link is no delay: it is a
-    share of its stiffness.
+    others are not, `refuse_timing` judges it beside a shift of them all, if it explains more than an imitation would:
+    instruments are read one after the other, and links are cut into pieces. The time of a lossy link is no delay: it
+    is a share of its stiffness.
     """
     model = trial.judged.model
     site = trial.probe.candidate.effect.site
-    if site in {"link", "body", "beam"} or has_peers(model, trial.probe.candidate.site) or explains_most(trial):
+    peers = has_peers(model, trial.probe.candidate.site) and trial.unseen.relative >= MODEST_GAIN
+    if site in {"link", "body", "beam"} or peers or explains_most(trial):
         return ""
     for name in trial.parameters:
         parameter = model.parameters[name]
@@ -167,32 +171,41 @@ def has_peers(model: Model, site: str) -> bool:
 
 
 def _no_way(trial: Trial) -> str:
-    """A hysteresis that turns round within the way of one sample is dry friction, as far as the data can see."""
+    """A hysteresis that turns round within the way of two samples is dry friction, as far as the data can see."""
     candidate, bounds = trial.probe.candidate, trial.judged.bounds
     if candidate.effect.name != "hysteresis":
         return ""
     name = f"{candidate.site}.hysteresis.displacement"
     parameter = trial.judged.model.parameters[name]
     least = bounds[name][0]
-    if parameter.value > 1.001 * least:
+    if parameter.value > SAMPLED * least:
         return ""
     return (
-        f"{name} comes out at the {least:.3g} {parameter.unit} that the joint passes between two samples: it cannot be "
-        "told from dry friction"
+        f"{name} comes out as {parameter.value:.3g} {parameter.unit}, and the joint passes {least:.3g} "
+        f"{parameter.unit} between two samples: what builds up within two of them cannot be told from dry friction"
     )
 
 
 def _trifling_gain(trial: Trial) -> str:
-    """An instrument that would be right within what no instrument and no model of its link is better than."""
+    """An instrument that would be right within what no instrument and no model of its link is better than.
+
+    A gain scales whatever else of its signal the model has not quite right, and imitates some of it.
+    """
     if trial.probe.candidate.effect.name != "sensor_gain":
         return ""
-    value = trial.judged.model.parameters[trial.parameters[0]].value
-    if abs(value - 1.0) >= NEGLIGIBLE:
-        return ""
-    return (
-        f"{trial.parameters[0]} comes out as {value:.4g}: less than {_percent(NEGLIGIBLE)} of the signal is no error "
-        "to be told from that of the model"
-    )
+    name, drop = trial.parameters[0], trial.unseen.relative
+    value = trial.judged.model.parameters[name].value
+    if abs(value - 1.0) < NEGLIGIBLE:
+        return (
+            f"{name} comes out as {value:.4g}: less than {_percent(NEGLIGIBLE)} of the signal is no error "
+            "to be told from that of the model"
+        )
+    if trial.slow is None and 0.0 <= drop < MODEST_GAIN:
+        return (
+            f"{name} comes out as {value:.4g} and lowers the unseen error by only {_percent(drop)} of its mean square: "
+            "an instrument is blamed where it explains more than an imitation would"
+        )
+    return ""
 
 
 def _only_training(trial: Trial) -> str:
