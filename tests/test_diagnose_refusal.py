@@ -58,8 +58,10 @@ def test_a_gain_that_explains_as_little_as_an_imitation_blames_no_instrument() -
     assert "an instrument is blamed" in refuse_trial(one, Thresholds(30, 1e-3))
 
 
-@pytest.mark.parametrize(("way", "believed"), [(1.9e-4, False), (2.1e-4, True)])
-def test_a_hysteresis_within_two_samples_is_dry_friction(way: float, believed: bool) -> None:
+@pytest.mark.parametrize(
+    ("way", "std", "believed"), [(1.9e-4, 6e-5, False), (1.9e-4, 5e-5, True), (2.1e-4, 6e-5, True)]
+)
+def test_a_hysteresis_within_two_samples_is_dry_friction(way: float, std: float, believed: bool) -> None:
     model = Model.load(MODEL).with_effect("hysteresis", at="shoulder", force=0.1, displacement=way)
     name = "shoulder.hysteresis.displacement"
     one = trial(1.1)
@@ -67,7 +69,9 @@ def test_a_hysteresis_within_two_samples_is_dry_friction(way: float, believed: b
         "probe": SimpleNamespace(
             candidate=SimpleNamespace(effect=SimpleNamespace(name="hysteresis", site="joint"), site="shoulder")
         ),
-        "judged": SimpleNamespace(model=model, bounds={name: (1e-4, 1.0)}),
+        "judged": SimpleNamespace(
+            model=model, bounds={name: (1e-4, 1.0)}, fit=SimpleNamespace(names=[name], std=[std])
+        ),
         "parameters": ("shoulder.hysteresis.force", name),
     }
     reason = refuse_trial(cast("Trial", SimpleNamespace(**{**vars(one), **held})), Thresholds(30, 1e-3))

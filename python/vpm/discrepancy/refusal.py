@@ -171,17 +171,23 @@ def has_peers(model: Model, site: str) -> bool:
 
 
 def _no_way(trial: Trial) -> str:
-    """A hysteresis that turns round within the way of two samples is dry friction, as far as the data can see."""
+    """A hysteresis that turns round within the way of one sample is dry friction, as far as the data can see.
+
+    So is one within the way of two, unless its way is clearly longer than that of one.
+    """
     candidate, bounds = trial.probe.candidate, trial.judged.bounds
     if candidate.effect.name != "hysteresis":
         return ""
     name = f"{candidate.site}.hysteresis.displacement"
     parameter = trial.judged.model.parameters[name]
     least = bounds[name][0]
-    if parameter.value > SAMPLED * least:
+    fit = trial.judged.fit
+    std = float(fit.std[fit.names.index(name)])
+    clear = parameter.value - NORMAL_95_ONE_SIDED * std > 1.001 * least
+    if clear or parameter.value > SAMPLED * least:
         return ""
     return (
-        f"{name} comes out as {parameter.value:.3g} {parameter.unit}, and the joint passes {least:.3g} "
+        f"{parameter_text(trial.judged.model, name, std)}, and the joint passes {least:.3g} "
         f"{parameter.unit} between two samples: what builds up within two of them cannot be told from dry friction"
     )
 
