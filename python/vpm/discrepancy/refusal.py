@@ -182,7 +182,7 @@ def _no_way(trial: Trial) -> str:
     parameter = trial.judged.model.parameters[name]
     least = bounds[name][0]
     fit = trial.judged.fit
-    std = float(fit.std[fit.names.index(name)])
+    std = float(fit.std[fit.names.index(name)]) if name in fit.names else 0.0
     clear = parameter.value - NORMAL_95_ONE_SIDED * std > 1.001 * least
     if clear or parameter.value > SAMPLED * least:
         return ""
