@@ -10,7 +10,7 @@ use crate::spatial::{Pose, Twist, Vector3};
 ///
 /// Law: `V_F = X^-1 V_P + V_PF`, `A_F = X^-1 A_P + V_F x V_PF + dV_PF/dt` with V_PF the twist of F relative to P in the axes of F
 /// (Featherstone 2008, section 5.3; a station of a beam is a joint of as many coordinates). Gravity is an upward acceleration of the
-/// world. Where the model drops its velocity terms, `A_F = X^-1 A_P`; where it drops those of some parts, see [`Products`].
+/// world. Where the model drops its velocity terms, `A_F = X^-1 A_P`; where it drops those of some parts, they go on from one joint to the next.
 pub fn frames<S: Scalar>(model: &Model<S>, data: &mut Data<S>, q: &[S], v: &[S]) {
     debug_assert!(q.len() == model.n_coordinates() && v.len() == model.n_coordinates());
     let Data { composite: Composite { frames, sections, .. }, drifts, .. } = data;
