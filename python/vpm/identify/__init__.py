@@ -1,5 +1,6 @@
 """Identification: parameters, their uncertainty, and what the data cannot see."""
 
+from vpm.identify.balance import InverseDynamicsProblem
 from vpm.identify.comparison import FIT_MODES, problem
 from vpm.identify.estimation import Estimate, Worth, estimate
 from vpm.identify.fit import Fit, identify
@@ -13,7 +14,8 @@ from vpm.identify.intervals import Bootstrap, Profile, bootstrap, profile_interv
 from vpm.identify.oil import identify_oil
 from vpm.identify.oil_equations import CylinderGeometry, pressures_from_force
 from vpm.identify.oil_fit import OilFit
-from vpm.identify.problem import Block, InverseDynamicsProblem, OutputErrorProblem, Problem, gaps, segments
+from vpm.identify.output_error import OutputErrorProblem
+from vpm.identify.problem import Block, Problem, gaps, segments
 from vpm.identify.settings import Fitting
 from vpm.identify.shooting import ShootingProblem
 from vpm.identify.statistics import Gain, gain, robust_covariance

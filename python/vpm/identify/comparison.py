@@ -6,10 +6,11 @@ from collections.abc import Mapping, Sequence
 
 from vpm.errors import IdentificationError
 from vpm.experiment import Experiment
+from vpm.identify.balance import InverseDynamicsProblem
 from vpm.identify.input_error import InputErrorProblem
 from vpm.identify.objective import AnyProblem
+from vpm.identify.output_error import OutputErrorProblem
 from vpm.identify.parallel import worker_count
-from vpm.identify.problem import InverseDynamicsProblem, OutputErrorProblem
 from vpm.identify.settings import Fitting
 from vpm.identify.shooting import ShootingProblem
 from vpm.identify.ties import TiedProblem

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from vpm.errors import IdentificationError, near_match
 from vpm.experiment import Experiment
+from vpm.identify.balance import InverseDynamicsProblem
 from vpm.identify.inertial_regression import InertialRegression
-from vpm.identify.problem import InverseDynamicsProblem
 from vpm.model import Model
 
 Array = NDArray[np.float64]

@@ -21,8 +21,9 @@ from numpy.typing import NDArray
 
 from vpm.errors import IdentificationError, SimulationError
 from vpm.experiment import Experiment
+from vpm.identify.output_error import compared_channels
 from vpm.identify.parallel import in_order
-from vpm.identify.problem import FEWEST_SAMPLES, Block, compared_channels
+from vpm.identify.problem import FEWEST_SAMPLES, Block
 from vpm.initial import initial_state, measured_states
 from vpm.model import Model
 from vpm.simulate import Setup, restart_grid, simulation_inputs

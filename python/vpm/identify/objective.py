@@ -8,8 +8,10 @@ from threading import Lock
 import numpy as np
 from numpy.typing import NDArray
 
+from vpm.identify.balance import InverseDynamicsProblem
 from vpm.identify.input_error import InputErrorProblem
-from vpm.identify.problem import Block, InverseDynamicsProblem, OutputErrorProblem
+from vpm.identify.output_error import OutputErrorProblem
+from vpm.identify.problem import Block
 from vpm.identify.settings import Fitting
 from vpm.identify.shooting import ShootingProblem
 from vpm.identify.solver import Point

@@ -18,8 +18,9 @@ from numpy.typing import NDArray
 from vpm.errors import IdentificationError, near_match
 from vpm.experiment import Experiment
 from vpm.identify.first_state import add_first_state, first_state_slopes
+from vpm.identify.output_error import OutputErrorProblem
 from vpm.identify.parallel import in_order
-from vpm.identify.problem import FEWEST_SAMPLES, Block, OutputErrorProblem
+from vpm.identify.problem import FEWEST_SAMPLES, Block
 from vpm.initial import initial_state, measured_states
 from vpm.model import Model
 from vpm.simulate import Setup, simulate_arrays, simulation_inputs

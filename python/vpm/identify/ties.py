@@ -8,8 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.errors import IdentificationError, near_match
+from vpm.identify.balance import InverseDynamicsProblem
 from vpm.identify.input_error import InputErrorProblem
-from vpm.identify.problem import Block, InverseDynamicsProblem, OutputErrorProblem
+from vpm.identify.output_error import OutputErrorProblem
+from vpm.identify.problem import Block
 from vpm.model import Model
 from vpm.units import parse_unit
 

@@ -1,0 +1,309 @@
+"""The balance of effort along measured motions, joint by joint, as a residual."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from copy import copy
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vpm.errors import DivergedError, IdentificationError
+from vpm.experiment import Experiment, Motion
+from vpm.identify.along import Response, bends, check_along, has_own_drives, respond, shown_channels
+from vpm.identify.counted import Counted, settled
+from vpm.identify.drive_memory import DriveMemory
+from vpm.identify.gauges import gauge_gains, hold_of
+from vpm.identify.parallel import in_order
+from vpm.identify.problem import FEWEST_SAMPLES, Block
+from vpm.identify.reuse import Kept, parts_of
+from vpm.initial import joint_motion
+from vpm.model import Model
+from vpm.simulate import AUTOMATIC
+
+Array = NDArray[np.float64]
+
+#: One step of second order for each sample, and the share of what drives answer that it may be off by: noise of
+#: pressures and currents is ten times as large on the best of logs.
+LONG_STEPS, ROUGH = "linearly_implicit", 1e-3
+
+
+class InverseDynamicsProblem:
+    """Balance of effort at each joint: what the actuators deliver minus what the measured motion needs.
+
+    Both sides, and so the regressor's columns, pass the same zero-phase low-pass and decimation: the parallel
+    filtering of the inverse dynamic identification model (M. Gautier, *Annual Reviews in Control*, 1997; A. Janot et
+    al., *IEEE Trans. Control Systems Technology* 22, 2014).
+
+    What nobody measures is worked out along the motion, see `vpm.identify.along`: states inside of drives, elastic
+    coordinates, joints without a sensor. Of what shows of it, all that the logs hold is compared too: pressures,
+    currents, strains.
+
+    Samples at which a joint stands still do not count, as long as half of them remain: friction at rest takes whatever
+    value holds the joint, which no balance can predict. Nor do those at which a piston touches an end of its stroke.
+
+    Parameters
+    ----------
+    model : Model
+        Names the joints and actuators; its parameters do not enter the balance.
+    experiments : sequence of Experiment
+        Each with the position of every joint that moves by an actuator, and the command of every actuator.
+    cutoff : float or sequence of float, optional
+        Cut-off frequency of the motion filter, for all or for each record, Hz; chosen from each record if not given.
+    band : float or sequence of float, optional
+        Highest frequency that is compared, Hz; without it what the motion filter leaves alone.
+    integrator : str
+        How drives with states of their own are run along the motion, as `vpm.simulate.Setup` names it.
+    """
+
+    mode = "inverse_dynamics"
+
+    def __init__(
+        self,
+        model: Model,
+        experiments: Sequence[Experiment],
+        *,
+        cutoff: float | Sequence[float] | None = None,
+        band: float | Sequence[float] | None = None,
+        integrator: str = AUTOMATIC,
+    ) -> None:
+        self.experiments = tuple(experiments)
+        #: What was given: the model before any fit.
+        self.nominal = model
+        self.motions: tuple[Motion, ...] = tuple(
+            joint_motion(e, model, one, commanded=True, band=other)
+            for e, one, other in zip(experiments, _each(cutoff, experiments), _each(band, experiments), strict=True)
+        )
+        for m in self.motions:
+            check_along(model, m.joints)
+        # The parallel filter passes over whole records: where one begins and ends at rest there is nothing to settle.
+        self._whole = tuple(replace(m, edge=0) for m in self.motions)
+        measured = self.motions[0].joints
+        moved = {joint for name in model.actuators for joint in model.joints_of_actuator(name)}
+        self._joints = [place for place, joint in enumerate(measured) if joint in moved] or list(range(len(measured)))
+        self.joints = tuple(measured[place] for place in self._joints)
+        #: Channels beside the balance that are compared too: what shows inside of drives, strains of links.
+        self.shown = shown_channels(model, measured, experiments)
+        origin = {name: parameter.value for name, parameter in model.parameters.items()}
+        self._memories = tuple(DriveMemory(m.parallel, integrator, origin) for m in self.motions)
+        self._compared = tuple(self._measured(m, e) for m, e in zip(self.motions, self.experiments, strict=True))
+        self._gains = self._hold_gains(model)
+        self._kept = self._held(self.experiments, self.motions)
+        self.workers = 1
+        self.blocks = self._lay_out(model)
+
+    @property
+    def integrators(self) -> tuple[str, ...]:
+        """How drives with states of their own are run along each record."""
+        return tuple(memory.integrator for memory in self._memories)
+
+    def take_long_steps(self) -> None:
+        """Run drives by one step of second order for each sample, along the records where that shows nothing.
+
+        A search runs them hundreds of times, and the nominal model tells once whether steps as long as a sample do: the
+        band that is compared ends far below the sampling rate.
+        """
+        model = self.nominal
+        if not has_own_drives(model):
+            return
+        for record, memory in enumerate(self._memories):
+            known, exact = memory.integrator, self._answer(model, model.theta, record)
+            memory.take(LONG_STEPS)
+            try:
+                rough = self._answer(model, model.theta, record)
+            except DivergedError:
+                rough = None
+            if rough is None or not _alike(exact, rough, self._compared[record]):
+                memory.take(known)
+
+    def later(self) -> InverseDynamicsProblem:
+        """The same, but for commands, each of which holds from the sample after its own on."""
+        moved = tuple(replace(m, inputs=np.concatenate([m.inputs[:1], m.inputs[:-1]])) for m in self._whole)
+        same = copy(self)
+        # What drives answered to commands at their own times is no answer to these; what the motion needs is.
+        memories = tuple(memory.under(commands=1) for memory in self._memories)
+        vars(same).update(_whole=moved, _memories=memories)
+        return same
+
+    def evaluate(
+        self, model: Model, theta: Array, columns: Sequence[int] = (), origin: Array | None = None
+    ) -> tuple[Array, Array]:
+        """Residual of the balance and its derivative; see :class:`Problem`.
+
+        With ``origin``, values of the parameters, links bend and drives answer as on the tangent there.
+        """
+        residuals, jacobians = [], []
+        jobs = [partial(self._answer, model, theta, record, columns, origin) for record in range(len(self.motions))]
+        for measured, answer in zip(self._compared, in_order(jobs, self.workers), strict=True):
+            residuals.append(np.hstack([(answer.applied - answer.required)[:, self._joints], measured - answer.seen]))
+            jacobians.append(-np.concatenate([answer.balance[:, self._joints], answer.slopes], axis=1))
+        return self._stack(residuals), self._stack(jacobians)
+
+    def _hold_gains(self, model: Model) -> dict[str, float]:
+        """How firmly gauges hold links, the same for all records and for all models that are compared."""
+        if not bends(model):
+            return {}
+        names, m = self.motions[0].joints, self.motions[0]
+        middle = np.array([m.position[:, names.index(j)].mean() if j in names else 0.0 for j in model.joints])
+        return gauge_gains(model, self.experiments, middle)
+
+    def _held(self, experiments: Sequence[Experiment], motions: Sequence[Motion]) -> tuple[Kept, ...]:
+        return tuple(Kept(hold_of(self._gains, e, m)) for e, m in zip(experiments, motions, strict=True))
+
+    def share(self, whole: Model, others: Sequence[tuple[Model, Sequence[str]]]) -> None:
+        """Let ``others`` take how links bend from ``whole``, which moves as they do; see `vpm.identify.reuse.Kept`.
+
+        With each goes the list of its own parameters: those that ``whole`` was not differentiated by have no influence.
+        """
+        for m, kept in zip(self.motions, self._kept, strict=True):
+            source = parts_of(whole, m.joints)
+            for model, own in others:
+                target = parts_of(model, m.joints)
+                if source is not None and target is not None:
+                    pair = (source, whole.theta[source.places]), (target, model.theta[target.places])
+                    kept.share(*pair, own)
+
+    def share_again(self, base: Model, others: Sequence[Model]) -> bool:
+        """Let ``others``, which move as ``base`` does, have its motion and the derivatives that `share` gave before.
+
+        Returns
+        -------
+        bool
+            Whether all of them were shared before, at values not far from these.
+        """
+        self.evaluate(base, base.theta)
+        for m, kept in zip(self.motions, self._kept, strict=True):
+            parts = [(parts_of(model, m.joints), model.theta) for model in (base, *others)]
+            known = [(part, theta[part.places]) for part, theta in parts if part is not None]
+            if len(known) < len(parts) or not kept.share_again(known[0], known[1:]):
+                return False
+        return True
+
+    def added(self, efforts: Sequence[Array]) -> Array:
+        """What efforts add to the residual, filtered and weighed as it is, shape (n, k).
+
+        Parameters
+        ----------
+        efforts : sequence of ndarray, shape (N, joints, k)
+            At the measured joints along each record, applied minus required; k of them side by side.
+        """
+        records = []
+        for m, values in zip(self.motions, efforts, strict=True):
+            flat = m.parallel(values.reshape(len(values), -1))
+            mine = flat.reshape(len(flat), *values.shape[1:])[:, self._joints]
+            others = np.zeros((len(flat), len(self.shown), values.shape[2]))
+            records.append(np.concatenate([mine, others], axis=1))
+        return self._stack(records)
+
+    def effort(self, model: Model, theta: Array, record: int) -> tuple[Array, Array, Array]:
+        """Time, applied and required effort (n, joints) of one record, filtered as in the residual."""
+        m = self.motions[record]
+        answer = self._answer(model, theta, record)
+        return m.time[m.retained], answer.applied[:, self._joints], answer.required[:, self._joints]
+
+    def _answer(
+        self, model: Model, theta: Array, record: int, columns: Sequence[int] = (), origin: Array | None = None
+    ) -> Response:
+        """What shows along one record, filtered."""
+        whole, experiment, memory = self._whole[record], self.experiments[record], self._memories[record]
+        return respond(
+            model, theta, whole, experiment, columns, self.shown, memory, kept=self._kept[record], origin=origin
+        )
+
+    def strength(self, model: Model) -> float:
+        """Root mean square of the weighted applied effort over all records: what a relative error is relative to."""
+        power, count = 0.0, 0.0
+        for record in range(len(self.motions)):
+            _, applied, _ = self.effort(model, model.theta, record)
+            for block, column in zip(self.efforts(record), applied.T, strict=True):
+                power += float(np.sum((column * block.weight * block.moving) ** 2))
+                count += float(block.moving.sum())
+        return float(np.sqrt(power / count))
+
+    def standstill(self, record: int) -> float:
+        """Share of the samples of one record that do not count because a joint stands still."""
+        blocks = self.efforts(record)
+        away = settled(len(blocks[0].time), self.motions[record].decimation) > 0.0
+        return 1.0 - float(np.mean([block.moving[away].mean() for block in blocks]))
+
+    def state(self, record: int) -> tuple[Array, Array, Array]:
+        """Position, velocity and acceleration (n, joints) of one record at the retained samples."""
+        m = self.motions[record]
+        position, velocity, acceleration = (
+            x[m.retained][:, self._joints] for x in (m.position, m.velocity, m.acceleration)
+        )
+        return position, velocity, acceleration
+
+    def efforts(self, record: int) -> tuple[Block, ...]:
+        """Blocks of the balance of one record, one for each of `joints`."""
+        first = record * (len(self.joints) + len(self.shown))
+        return self.blocks[first : first + len(self.joints)]
+
+    def _measured(self, m: Motion, experiment: Experiment) -> Array:
+        """Logged channels (n, shown), filtered."""
+        columns = [experiment[channel] for channel in self.shown]
+        return m.parallel(np.column_stack(columns)) if columns else np.zeros((len(m.retained), 0))
+
+    def _lay_out(self, model: Model) -> tuple[Block, ...]:
+        sizes, moving = self._sizes(model)
+        typical = np.sqrt(np.mean(np.square(sizes), axis=0))
+        channels = (*(f"{joint}.effort" for joint in self.joints), *self.shown)
+        blocks, start = [], 0
+        for record, m in enumerate(self.motions):
+            time = m.time[m.retained]
+            for column, channel in enumerate(channels):
+                weight = 1.0 if len(channels) == 1 or typical[column] == 0.0 else 1.0 / float(typical[column])
+                scale, counts = float(sizes[record][column]), moving[record][:, column]
+                samples = slice(start, start + time.size)
+                name, unit = self.experiments[record].name, model.channel_unit(channel)
+                blocks.append(Block(name, channel, unit, samples, time, scale, weight, counts))
+                start += time.size
+        return tuple(blocks)
+
+    def _sizes(self, model: Model) -> tuple[list[Array], list[Array]]:
+        """For each record the size of each channel, and (n, channels) which samples count.
+
+        Efforts are as large as what the drives deliver; of other channels, such as pressures, it is the spread.
+        """
+        counted = Counted(self.experiments, self.motions, self.joints, self._joints)
+        sizes, moving = [], counted.moving(model)
+        for record, (m, experiment) in enumerate(zip(self.motions, self.experiments, strict=True)):
+            _, applied, _ = self.effort(model, model.theta, record)
+            if len(applied) < FEWEST_SAMPLES:
+                raise IdentificationError(
+                    f"{experiment.name}: only {len(applied)} samples are left after filtering at "
+                    f"{m.cutoff:.3g} Hz; record longer or pass a higher cutoff"
+                )
+            efforts = np.sqrt(np.average(applied**2, axis=0, weights=moving[record]))
+            spread = np.std(self._compared[record], axis=0)
+            sizes.append(np.concatenate([efforts, spread]))
+            ends = settled(len(applied), m.decimation)
+            columns = [counted.of_channel(model, channel, record, ends) for channel in self.shown]
+            moving[record] = np.column_stack([moving[record], *columns])
+        return sizes, moving
+
+    def _stack(self, records: list[Array]) -> Array:
+        """Concatenate (n, channels, ...) arrays block by block and apply the weights."""
+        columns = [record[:, c] for record in records for c in range(record.shape[1])]
+        scaled = zip(columns, self.blocks, strict=True)
+        return np.concatenate([(x.T * (block.weight * block.moving)).T for x, block in scaled])
+
+
+def _alike(exact: Response, rough: Response, measured: Array) -> bool:
+    """Whether what drives answer differs by less than `ROUGH` of its size, or of what was measured in its place.
+
+    Where something is missing the one may be many times the other, and it is the measured one that is to be explained.
+    """
+    triples = [(exact.applied, rough.applied, exact.applied), (exact.seen, rough.seen, measured)]
+    for one, other, log in triples:
+        size = np.maximum(np.linalg.norm(one, axis=0), np.linalg.norm(log, axis=0))
+        if np.any(np.linalg.norm(one - other, axis=0) > ROUGH * size):
+            return False
+    return True
+
+
+def _each(value: float | Sequence[float] | None, records: Sequence[Experiment]) -> Sequence[float | None]:
+    """One value for each record."""
+    return [value] * len(records) if value is None or isinstance(value, int | float) else value

@@ -1,0 +1,132 @@
+"""Which samples of a balance count: not those at standstill, at a stop, or where the filter settles."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter1d, uniform_filter1d
+
+from vpm.experiment import Experiment, Motion
+from vpm.identify.along import bends
+from vpm.identify.problem import FEWEST_SAMPLES
+from vpm.identify.stops import at_stops, check_left
+from vpm.model import Model
+
+Array = NDArray[np.float64]
+
+#: A joint stands still where it is slower than this share of its largest speed for one decimated sample on end: the
+#: filter of the motion shows no shorter rest.
+STANDSTILL_SHARE = 0.005
+#: A drive rests where its joint is slower than this share of its largest speed, in the mean over this time, s.
+REST_SHARE, REST_TIME = 0.03, 0.1
+#: A joint that moves for less than this share of all records is judged at standstill too: nothing else is left of it.
+LEAST_MOVING = 0.5
+#: Retained samples at each end of a record in which the parallel filter settles: what a record that ends in motion sets
+#: off near the new Nyquist frequency falls by about two fifths from one retained sample to the next.
+SETTLING = 8
+
+
+@dataclass(frozen=True)
+class Counted:
+    """Which samples of some records count.
+
+    Attributes
+    ----------
+    experiments : sequence of Experiment
+    motions : sequence of Motion
+    joints : sequence of str
+        Those whose balance is drawn up.
+    places : sequence of int
+        Their columns in the motions.
+    """
+
+    experiments: Sequence[Experiment]
+    motions: Sequence[Motion]
+    joints: Sequence[str]
+    places: Sequence[int]
+
+    def moving(self, model: Model) -> list[Array]:
+        """For each record (n, joints): 1 where a joint moves, 0 where it stands still; all 1 if it mostly stands.
+
+        Zero too where the parallel filter settles, and where a piston that moves it touches an end of its stroke.
+        """
+        speeds = [np.abs(m.velocity[:, self.places]) for m in self.motions]
+        kept = [speed[m.kept] for speed, m in zip(speeds, self.motions, strict=True)]
+        largest = np.max([np.quantile(speed, 0.999, axis=0) for speed in kept], axis=0)
+        masks = [
+            ~_widened(_standing(speed, STANDSTILL_SHARE * largest, _period(m) // (2 if bends(model) else 1)), m)[
+                m.retained
+            ]
+            for m, speed in zip(self.motions, speeds, strict=True)
+        ]
+        moves = np.mean(np.vstack(masks), axis=0) >= LEAST_MOVING
+        free = [self.free(model, record) for record in range(len(masks))]
+        return [
+            (np.where(moves, mask, True) & away) * settled(len(mask), m.decimation)[:, None]
+            for mask, away, m in zip(masks, free, self.motions, strict=True)
+        ]
+
+    def of_channel(self, model: Model, channel: str, record: int, ends: Array) -> Array:
+        """Which samples of a shown channel count: those of a drive not while its joint rests.
+
+        What a shut valve encloses drifts with the smallest leak, and whatever load dry friction takes up does not show.
+        """
+        owner = channel.rpartition(".")[0]
+        if owner not in model.actuators:
+            return ends
+        joints = [self.joints.index(joint) for joint in model.joints_of_actuator(owner) if joint in self.joints]
+        counts: Array = ends * np.prod(self.busy(record)[:, joints], axis=1)
+        return counts
+
+    def busy(self, record: int) -> Array:
+        """(n, joints): 0 where a joint is slow in the mean over ``REST_TIME``: noise must not pass for motion."""
+        speeds = [np.abs(each.velocity[each.kept][:, self.places]) for each in self.motions]
+        largest = np.max([np.quantile(speed, 0.999, axis=0) for speed in speeds], axis=0)
+        m = self.motions[record]
+        width = max(1, round(REST_TIME / m.dt))
+        mean = np.abs(uniform_filter1d(m.velocity[:, self.places], width, axis=0))
+        moving = maximum_filter1d(mean, width, axis=0) > REST_SHARE * largest
+        busy = moving[m.retained].astype(np.float64)
+        return busy if busy.mean() >= 0.5 else np.ones_like(busy)
+
+    def free(self, model: Model, record: int) -> NDArray[np.bool_]:
+        """Where (n, joints) no piston of one record touches an end, as far as the filters carry the touch."""
+        m, experiment = self.motions[record], self.experiments[record]
+        away = np.ones((len(m.retained), len(self.joints)), dtype=np.bool_)
+        for name, touching in at_stops(model, experiment, m).items():
+            # An impact rings, in the oil and in the filters: three times as long as the ends of the record settle.
+            near = maximum_filter1d(touching.view(np.uint8), 6 * m.edge + 1)[m.retained] > 0
+            for column, joint in enumerate(self.joints):
+                if near.any() and joint in model.joints_of_actuator(name):
+                    away[:, column] &= ~near
+                    check_left(experiment, joint, name, int(away[:, column].sum()), FEWEST_SAMPLES)
+        return away
+
+
+def settled(samples: int, decimation: int) -> Array:
+    """1 for retained samples behind and ahead of which the parallel filter has all that it needs, else 0.
+
+    A short record loses no more than a fifth at each end: what little there is has to do.
+    """
+    ends = min(SETTLING, samples // 5) if decimation > 1 else 0
+    place = np.arange(samples)
+    return ((place >= ends) & (place < samples - ends)).astype(np.float64)
+
+
+def _period(m: Motion) -> int:
+    """Samples in which the motion filter tells a stop from a reversal, no more than the parallel filter keeps apart."""
+    return min(m.decimation, max(1, round(1.0 / (m.cutoff * m.dt))))
+
+
+def _standing(speed: Array, limit: Array, samples: int) -> NDArray[np.bool_]:
+    """Where all speeds within ``samples`` to both sides are below the limit."""
+    return np.asarray(maximum_filter1d(speed, 2 * samples + 1, axis=0) < limit)
+
+
+def _widened(standing: NDArray[np.bool_], m: Motion) -> NDArray[np.bool_]:
+    """Standstill with its surroundings, into which the filters carry what happens in it."""
+    reach = m.decimation + max(m.decimation, round(1.0 / (m.cutoff * m.dt)))
+    return np.asarray(maximum_filter1d(standing.view(np.uint8), 2 * reach + 1, axis=0).astype(np.bool_))

@@ -1,0 +1,172 @@
+"""The residual of simulated outputs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vpm.errors import IdentificationError, near_match
+from vpm.experiment import Experiment, Motion
+from vpm.identify.first_state import add_first_state, first_state_slopes
+from vpm.identify.parallel import in_order
+from vpm.identify.problem import FEWEST_SAMPLES, Block
+from vpm.initial import initial_state, joint_motion
+from vpm.model import Model
+from vpm.simulate import Setup, SimulatedArrays, copied_channels, simulate_arrays
+
+Array = NDArray[np.float64]
+
+#: Modes that simulate a record as a whole from its first sample.
+WHOLE = ("free_run", "closed_loop")
+
+
+class OutputErrorProblem:
+    """Measured minus simulated outputs in free run, restarts, closed loop or on a prescribed motion.
+
+    Parameters
+    ----------
+    model : Model
+    experiments : sequence of Experiment
+    mode : {"free_run", "restarts", "closed_loop", "prescribed_motion"}
+    channels : sequence of str, optional
+        Compared outputs; by default all measured ones that the simulation does not prescribe.
+    setup : Setup, optional
+        Integrator, substeps and horizon.
+    cutoff : float, optional
+        Of the motion that the joints follow, Hz.
+    workers : int
+        Records that are simulated at a time; the residual does not depend on it.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        experiments: Sequence[Experiment],
+        mode: str,
+        *,
+        channels: Sequence[str] | None = None,
+        setup: Setup | None = None,
+        cutoff: float | None = None,
+        workers: int = 1,
+    ) -> None:
+        self.mode = mode
+        self.workers = workers
+        self.experiments = tuple(experiments)
+        self._setup = setup or Setup()
+        follows = mode == "prescribed_motion"
+        self._followed = [joint_motion(e, model, cutoff) if follows else None for e in self.experiments]
+        self._channels = compared_channels(model, experiments, mode, channels)
+        self.blocks = self._lay_out(model)
+
+    @property
+    def setup(self) -> Setup:
+        """Integrator, substeps and horizon."""
+        return self._setup
+
+    def evaluate(self, model: Model, theta: Array, columns: Sequence[int] = ()) -> tuple[Array, Array]:
+        """Residual of the outputs and its derivative; see :class:`Problem`."""
+        residuals, jacobians = [], []
+        index = [model.output_channels.index(channel) for channel in self._channels]
+        blocks = iter(self.blocks)
+        jobs = [
+            partial(self._simulated, model, e, theta, list(columns), followed)
+            for e, followed in zip(self.experiments, self._followed, strict=True)
+        ]
+        results = in_order(jobs, self.workers)
+        for experiment, result in zip(self.experiments, results, strict=True):
+            for column, channel in zip(index, self._channels, strict=True):
+                block = next(blocks)
+                weight = block.weight * block.moving
+                residuals.append((experiment[channel][result.rows] - result.outputs[:, column]) * weight)
+                jacobians.append(-result.jacobian[:, column, :] * weight[:, None])
+        return np.concatenate(residuals), np.concatenate(jacobians)
+
+    def _simulated(
+        self, model: Model, experiment: Experiment, theta: Array, columns: list[int], followed: Motion | None
+    ) -> SimulatedArrays:
+        """Simulation of one record; its derivative knows what parameters do to the first state of a whole record."""
+        run = partial(simulate_arrays, model, experiment, self.mode, theta=theta, setup=self._setup)
+        if not columns or self.mode not in WHOLE:
+            return run(columns=columns, followed=followed)
+        state = initial_state(model, experiment, theta)
+        result = run(columns=columns, initial_state=state)
+        slopes = first_state_slopes(partial(initial_state, model, experiment), theta, columns)
+        add_first_state(result.jacobian, lambda x: run(initial_state=x).outputs, state, slopes, theta[columns])
+        return result
+
+    def _lay_out(self, model: Model) -> tuple[Block, ...]:
+        blocks, start = [], 0
+        counted = [self._counted(experiment) for experiment in self.experiments]
+        parts = list(zip(self.experiments, counted, strict=True))
+        spread = {c: float(np.sqrt(np.mean([np.var(e[c][n]) for e, n in parts]))) for c in self._channels}
+        for (experiment, counts), followed in zip(parts, self._followed, strict=True):
+            rows = simulate_arrays(model, experiment, self.mode, setup=self._setup, followed=followed).rows
+            moving = counts[rows].astype(np.float64)
+            for channel in self._channels:
+                weight = 1.0 / spread[channel] if spread[channel] > 0.0 else 1.0
+                scale = float(np.sqrt(np.mean(experiment[channel][counts] ** 2)))
+                samples = slice(start, start + rows.size)
+                unit = model.channel_unit(channel)
+                blocks.append(
+                    Block(experiment.name, channel, unit, samples, experiment.time[rows], scale, weight, moving)
+                )
+                start += rows.size
+        return tuple(blocks)
+
+    def _counted(self, experiment: Experiment) -> NDArray[np.bool_]:
+        """Samples that count: not those while the first state settles."""
+        settling = 0.0 if self.mode == "restarts" else self._setup.settling
+        counted = experiment.time - experiment.time[0] >= settling - 0.5 * experiment.dt
+        if settling > 0.0 and counted.sum() < FEWEST_SAMPLES:
+            raise IdentificationError(
+                f"{experiment.name}: {int(counted.sum())} samples are left after {settling:g} s of settling; "
+                "give a longer record or less settling"
+            )
+        return np.asarray(counted)
+
+
+def compared_channels(
+    model: Model, experiments: Sequence[Experiment], mode: str, channels: Sequence[str] | None
+) -> tuple[str, ...]:
+    """Outputs that are compared: those given, or all that every log holds and the mode does not copy from it.
+
+    Raises
+    ------
+    IdentificationError
+        There is none, or one is not in the model or a log.
+    """
+    chosen = tuple(channels) if channels is not None else _compared(model, experiments, mode)
+    if not chosen:
+        raise IdentificationError(
+            f"no measured channel to compare in mode '{mode}': the logs hold {', '.join(experiments[0].channels)}; "
+            "log a position or velocity, or choose another mode"
+        )
+    _check_channels(model, experiments, chosen)
+    return chosen
+
+
+def _compared(model: Model, experiments: Sequence[Experiment], mode: str) -> tuple[str, ...]:
+    """Outputs that every log holds and that the mode does not simply copy from the log."""
+    prescribed = copied_channels(model, mode)
+    return tuple(
+        channel
+        for channel in model.output_channels
+        if channel not in prescribed and all(channel in experiment for experiment in experiments)
+    )
+
+
+def _check_channels(model: Model, experiments: Sequence[Experiment], channels: Sequence[str]) -> None:
+    """Complain about compared channels that the model does not give or a log does not hold."""
+    for channel in channels:
+        if channel not in model.output_channels:
+            repair = near_match(channel, model.output_channels)
+            raise IdentificationError(f'channels: {model.name} has no output "{channel}"; {repair}')
+        for experiment in experiments:
+            if channel not in experiment:
+                raise IdentificationError(
+                    f'channels: "{channel}" is not in {experiment.name}, which holds {", ".join(experiment.channels)}; '
+                    "leave it out"
+                )

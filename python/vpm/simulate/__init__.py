@@ -1,0 +1,24 @@
+"""Simulation of a log: `modes.py` says which question each mode answers."""
+
+from vpm.simulate.inputs import restart_grid, simulation_inputs
+from vpm.simulate.modes import MODES, check_balance, judging_mode, simulate, simulate_arrays
+from vpm.simulate.run import Run, SimulatedArrays, copied_channels, judged
+from vpm.simulate.setup import AUTOMATIC, FIXED_STEP, INTEGRATORS, Setup
+
+__all__ = [
+    "AUTOMATIC",
+    "FIXED_STEP",
+    "INTEGRATORS",
+    "MODES",
+    "Run",
+    "Setup",
+    "SimulatedArrays",
+    "check_balance",
+    "copied_channels",
+    "judged",
+    "judging_mode",
+    "restart_grid",
+    "simulate",
+    "simulate_arrays",
+    "simulation_inputs",
+]

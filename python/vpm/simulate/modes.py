@@ -1,0 +1,232 @@
+"""Simulation of a log in five modes, each with its own question.
+
+===================  =====================================================================================
+free_run             Given the measured commands, where does the machine go?
+inverse_dynamics     Given the measured motion, what effort did it take?
+restarts             As free run, begun afresh from the measured state every horizon: for machines that
+                     integrate or are unstable, whose free run drifts away for any error however small.
+closed_loop          Given the references, what do controller and machine do together?
+prescribed_motion    Given the measured motion of the joints, how do the flexible links respond: which strains,
+                     which efforts? The counterpart of inverse dynamics for machines with elastic coordinates.
+                     A joint without an actuator whose position the log does not hold is passive: it moves freely
+                     with its effects, from its rest under gravity.
+===================  =====================================================================================
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vpm.errors import DivergedError, SimulationError, VpmError
+from vpm.experiment import Experiment, Motion
+from vpm.initial import initial_state as start
+from vpm.initial import joint_motion, measured_states, whole_motion
+from vpm.model import Model
+from vpm.simulate.inputs import check_controllers, held_inputs, references_of, restart_grid, uncontrolled
+from vpm.simulate.run import Run, SimulatedArrays, judged, run_of
+from vpm.simulate.setup import AUTOMATIC, Setup
+
+Array = NDArray[np.float64]
+
+MODES = ("free_run", "inverse_dynamics", "restarts", "closed_loop", "prescribed_motion")
+
+
+def simulate(
+    model: Model,
+    experiment: Experiment,
+    mode: str = "free_run",
+    *,
+    integrator: str = AUTOMATIC,
+    substeps: int = 1,
+    horizon: float = 0.25,
+    cutoff: float | None = None,
+    initial_state: Array | None = None,
+) -> Run:
+    """Simulate ``model`` on the inputs of ``experiment``.
+
+    Parameters
+    ----------
+    model : Model
+    experiment : Experiment
+        Holds the commands (free run, restarts), the motion (inverse dynamics, prescribed motion) or the references
+        (closed loop).
+    mode : {"free_run", "inverse_dynamics", "restarts", "closed_loop", "prescribed_motion"}
+    integrator, substeps, horizon
+        See :class:`Setup`.
+    cutoff : float, optional
+        Cut-off frequency of the motion filter, Hz (inverse dynamics, prescribed motion, initial velocities).
+    initial_state : ndarray, shape (states,), optional
+        By default estimated from the first samples of the measured positions; at rest at zero without them. Flexible
+        links start from the deflection of their equilibrium there.
+
+    Returns
+    -------
+    Run
+
+    Raises
+    ------
+    SimulationError, ExperimentError
+        A setting is wrong or a channel that the mode needs is missing.
+    DivergedError
+        The state left the finite numbers, or no step of ``adaptive`` can follow it; carries the run up to there.
+
+    Warns
+    -----
+    ValidityWarning
+        A flexible link in displacement coordinates bends more than its kinematics allow.
+    """
+    if mode == "inverse_dynamics":
+        return _inverse_dynamics_run(model, experiment, cutoff)
+    setup = Setup(integrator, substeps, horizon)
+    arrays = simulate_arrays(model, experiment, mode, setup=setup, cutoff=cutoff, initial_state=initial_state)
+    run = run_of(model, experiment, mode, arrays, setup)
+    return run if arrays.states is None else judged(model, run, arrays.states)
+
+
+def simulate_arrays(
+    model: Model,
+    experiment: Experiment,
+    mode: str,
+    *,
+    theta: Array | None = None,
+    columns: Sequence[int] = (),
+    setup: Setup | None = None,
+    cutoff: float | None = None,
+    initial_state: Array | None = None,
+    followed: Motion | None = None,
+) -> SimulatedArrays:
+    """Outputs of a simulation and their exact derivative by parameters ``columns``, as plain arrays.
+
+    ``followed`` is what `joint_motion` gave, for callers that prescribe the same motion again and again.
+    """
+    from vpm._core import Diverged
+
+    setup = setup or Setup()
+    theta = model.theta if theta is None else theta
+    try:
+        if mode == "prescribed_motion":
+            return _prescribed(model, followed or joint_motion(experiment, model, cutoff), theta, list(columns), setup)
+        return _dispatch(model, experiment, mode, theta, list(columns), setup, cutoff, initial_state)
+    except Diverged as error:
+        partial = SimulatedArrays(
+            error.outputs, np.zeros((*error.outputs.shape, 0)), np.arange(len(error.outputs)), np.zeros(1, np.int64)
+        )
+        run = run_of(model, experiment, mode, partial, setup)
+        raise DivergedError(
+            str(error), run=run, time=float(experiment.time[0]) + len(run.time) * experiment.dt
+        ) from None
+    except VpmError:
+        raise
+    except ValueError as error:  # of the core: sizes, numbers and steps that no simulation can take
+        raise SimulationError(f"{experiment.name}: {error}") from error
+
+
+def judging_mode(model: Model, records: Sequence[Experiment]) -> str:
+    """Mode in which a simulation of these records says most: closed loop where controllers and references are known.
+
+    Elsewhere restarts, which need no more than position and command.
+    """
+    held = model.controlled_actuators
+    needed = [f"{name}.reference" for name in held]
+    needed += [f"{name}.command" for name in uncontrolled(model) if f"{name}.command" not in model.optional_inputs]
+    known = all(channel in record for channel in needed for record in records)
+    return "closed_loop" if held and known else "restarts"
+
+
+def _dispatch(
+    model: Model,
+    experiment: Experiment,
+    mode: str,
+    theta: Array,
+    columns: list[int],
+    setup: Setup,
+    cutoff: float | None,
+    initial_state: Array | None,
+) -> SimulatedArrays:
+    rows = np.arange(len(experiment))
+    begin = np.zeros(1, dtype=np.int64)
+    stepping = (experiment.dt, setup.substeps, setup.method(model), columns)
+    if mode == "free_run":
+        inputs = held_inputs(model, experiment, mode)
+        state = start(model, experiment, theta) if initial_state is None else initial_state
+        outputs, states, jacobian = model.core.simulate(theta, state, inputs, *stepping)
+        return SimulatedArrays(outputs, jacobian, rows, begin, states)
+    if mode == "closed_loop":
+        check_controllers(model)
+        references, disturbances = references_of(model, experiment, mode)
+        state = start(model, experiment, theta) if initial_state is None else initial_state
+        outputs, states, jacobian = model.core.simulate_closed_loop(theta, state, references, disturbances, *stepping)
+        return SimulatedArrays(outputs, jacobian, rows, begin, states)
+    if mode == "restarts":
+        inputs = held_inputs(model, experiment, mode)
+        starts, length = restart_grid(experiment, setup.horizon)
+        states = measured_states(model, experiment, theta, starts, cutoff)
+        outputs, jacobian = model.core.restart(theta, states, starts, length, inputs, *stepping)
+        rows = (starts[:, None] + np.arange(length)).ravel()
+        flat = outputs.reshape(-1, outputs.shape[-1])
+        return SimulatedArrays(flat, jacobian.reshape(len(flat), flat.shape[1], -1), rows, starts)
+    raise SimulationError(f"unknown mode '{mode}'; choose one of {', '.join(MODES)}")
+
+
+def _prescribed(model: Model, m: Motion, theta: Array, columns: list[int], setup: Setup) -> SimulatedArrays:
+    """Joints on the filtered motion, from behind the filter's settling to before it; those it lacks are passive."""
+    followed = [place for place, joint in enumerate(model.joints) if joint in m.joints]
+    passive = [place for place in range(len(model.joints)) if place not in followed]
+    motion = np.zeros((3, len(m.time[m.kept]), len(model.joints)))
+    for order, values in enumerate((m.position, m.velocity, m.acceleration)):
+        motion[order][:, followed] = values[m.kept]
+    q, v, a = motion
+    outputs, states, jacobian = model.core.simulate_prescribed(
+        theta, q, v, a, m.dt, setup.substeps, setup.method(model), columns, passive
+    )
+    rows = np.arange(len(m.time))[m.kept]
+    return SimulatedArrays(outputs, jacobian, rows, np.zeros(1, dtype=np.int64), states)
+
+
+def _inverse_dynamics_run(model: Model, experiment: Experiment, cutoff: float | None) -> Run:
+    check_balance(model)
+    m = whole_motion(model, experiment, model.theta, cutoff)
+    required, applied, _ = model.core.inverse_dynamics(
+        model.theta, m.position, m.velocity, m.acceleration, m.inputs, m.dt, []
+    )
+    channels = tuple(f"{joint}.effort" for joint in model.joints)
+    return Run(
+        model.name,
+        experiment.name,
+        "inverse_dynamics",
+        m.time[m.retained],
+        channels,
+        tuple(model.channel_unit(channel) for channel in channels),
+        m.parallel(required),
+        m.parallel(applied),
+        settings={"cutoff": m.cutoff, "decimation": m.decimation},
+    )
+
+
+def check_balance(model: Model) -> None:
+    """Complain, with the way on, if a balance of effort cannot be drawn up.
+
+    Nobody measures elastic coordinates, and the effort of a drive with a life of its own does not follow from its
+    command.
+
+    Raises
+    ------
+    SimulationError
+        A flexible link has elastic coordinates, or an actuator is not ideal.
+    """
+    for name in model.actuators:
+        kind = model.actuator_type(name)
+        if kind != "ideal":
+            raise SimulationError(
+                f"mode 'inverse_dynamics' gives efforts sample by sample, but that of {name} (type {kind}) does not "
+                "follow from its command alone; use the mode 'free_run' or 'restarts', or describe it as ideal"
+            )
+    if model.core.n_elastic:
+        elastic = [name for name in model.beams if model.levels[name] != "rigid"]
+        raise SimulationError(
+            f"mode 'inverse_dynamics' needs the motion of every coordinate, but no log holds the elastic ones of "
+            f"{', '.join(elastic)}; use the mode 'prescribed_motion', or model.at('rigid')"
+        )

@@ -1,0 +1,94 @@
+"""How a simulation steps."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from vpm.errors import SimulationError
+from vpm.model import Model
+from vpm.results import Storable
+
+#: Integrators of fixed steps, whose work is bounded.
+FIXED_STEP = ("linearly_implicit", "rosenbrock", "rk4", "semi_implicit")
+#: Chooses by what a machine contains.
+AUTOMATIC = "auto"
+INTEGRATORS = (AUTOMATIC, *FIXED_STEP, "guarded", "adaptive")
+
+
+@dataclass(frozen=True)
+class Setup(Storable):
+    """How a simulation steps.
+
+    Attributes
+    ----------
+    integrator : {"auto", "linearly_implicit", "rosenbrock", "rk4", "semi_implicit", "guarded", "adaptive"}
+        Or, with a tolerance, ``"adaptive(1e-8)"``.
+        ``auto`` is ``adaptive`` for machines with contacts or hydraulic drives, which impacts and oil make abrupt, and
+        ``linearly_implicit`` for all others. The next two are stable whatever is stiff, of order 2 and 4; the first of
+        them also stops on dry friction far sharper than a step. Then come two that are explicit, but for the constant
+        stiffness of flexible links in the second.
+        ``adaptive`` takes as many steps of ``rosenbrock`` as keep the error of each within a tolerance, 1e-6 or the
+        one in brackets, relative to each state and its natural size: for impacts, oil and other things that change
+        between microseconds and seconds. Its time is not bounded. ``guarded`` is its counterpart for real time: one
+        step of ``rosenbrock``, or up to 16 where an impact or a jump makes its error larger than 1 %.
+    substeps : int
+        Integration steps per sample of the log; with ``adaptive`` and ``guarded`` pieces of a sample that take one
+        step at least.
+    horizon : float
+        Length of each restart, s.
+    settling : float
+        Time at the beginning of each record, s, that a fit simulates but does not compare: until what nobody knows of
+        the first state, such as vibrations, has died away. Restarts have none.
+    """
+
+    integrator: str = AUTOMATIC
+    substeps: int = 1
+    horizon: float = 0.25
+    settling: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Check the choices."""
+        _check_integrator(self.integrator)
+        if self.substeps < 1:
+            raise SimulationError(f"substeps is {self.substeps}; give a whole number of at least 1")
+        if not self.horizon > 0.0:
+            raise SimulationError(f"horizon is {self.horizon} s; give a positive time")
+        if not self.settling >= 0.0:
+            raise SimulationError(f"settling is {self.settling} s; give a time that is not negative")
+
+    def method(self, model: Model, *, bounded: bool = False) -> str:
+        """Integrator for a model, as the core names it.
+
+        Parameters
+        ----------
+        model : Model
+        bounded : bool
+            Where ``auto`` would step adaptively, take ``guarded``, whose time has a bound.
+        """
+        if self.integrator != AUTOMATIC:
+            return self.integrator
+        if not model.is_abrupt:
+            return "linearly_implicit"
+        return "guarded" if bounded else "adaptive"
+
+
+def _check_integrator(name: str) -> None:
+    """Complain about a name that is none, or a tolerance that means nothing.
+
+    Raises
+    ------
+    SimulationError
+    """
+    from vpm._core import check_integrator
+
+    if name in INTEGRATORS:
+        return
+    if not name.startswith("adaptive("):
+        choice = ", ".join(INTEGRATORS)
+        raise SimulationError(
+            f"unknown integrator '{name}'; choose one of {choice} or, with a tolerance, adaptive(1e-8)"
+        )
+    try:
+        check_integrator(name)
+    except ValueError as error:
+        raise SimulationError(str(error)) from None
