@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.catalogue import EFFECTS, EffectType
+from vpm.discrepancy.limit import seen_limit
 from vpm.discrepancy.structural import (
     STRUCTURAL,
     beyond,
@@ -80,13 +81,14 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Excitation:
-    """How far the data move one joint or actuator."""
+    """How far the data move one joint or actuator, and the number of that among the inputs."""
 
     speed: float
     middle: float
     travel: float
     interval: float
     command: float
+    input: int
 
 
 def candidates(
@@ -168,7 +170,7 @@ def _candidate(effect: EffectType, site: str, model: Model, data: InverseDynamic
     if effect.name == "payload":
         return Candidate(effect, site, _payload_places(model, site))
     if effect.name in {"actuator_lag", "saturation"}:
-        return _in_drive(effect, site, seen)
+        return _in_drive(effect, site, seen, seen_limit(data, model.joints[joint], seen.input, residual))
     if effect.name == "supply_drop":
         return Candidate(effect, site, tuple({"time_constant": t} for t in DROP_TIMES), {"time_constant": (1e-3, 5.0)})
     if effect.name == "entrained_air":
@@ -177,14 +179,14 @@ def _candidate(effect: EffectType, site: str, model: Model, data: InverseDynamic
     return Candidate(effect, site, ({},))
 
 
-def _in_drive(effect: EffectType, site: str, seen: Excitation) -> Candidate:
-    """Lag and limit of a drive, which are never quite without effect."""
+def _in_drive(effect: EffectType, site: str, seen: Excitation, guessed: float | None) -> Candidate:
+    """Lag and limit of a drive, which are never quite without effect; a limit is ``guessed`` from the residual too."""
     if effect.name == "actuator_lag":
         name, bounds = "time_constant", (0.02 * seen.interval, np.inf)
         values = [n * seen.interval for n in LAG_INTERVALS]
     else:
         name, bounds = "limit", (0.02 * seen.command, seen.command)
-        values = [share * seen.command for share in LIMIT_SHARES]
+        values = [share * seen.command for share in LIMIT_SHARES] + ([] if guessed is None else [guessed])
     return Candidate(effect, site, tuple({name: value} for value in values), {name: bounds}, neutral=False)
 
 
@@ -243,6 +245,7 @@ def _excitation(data: InverseDynamicsProblem, model: Model, joint: int, actuator
         max(0.5 * (high - low), 1e-12),
         min(m.dt for m in data.motions),
         max(command, 1e-12),
+        column,
     )
 
 
