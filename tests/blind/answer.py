@@ -207,7 +207,7 @@ def informed(case: Case) -> tuple[Model, tuple[str, ...]]:
     for h in case.truth.hidden:
         values = {name: value for name, value in h.parameters.items() if abs(value) < NOWHERE}
         model = model.with_effect(h.name, at=h.site, **values)
-        effect = next(e for e in model.effects if (e.name, e.at) == (h.name, h.site))
+        effect = model.effect(h.name, h.site)
         free += [effect.parameter_names[name] for name in values if name in effect.parameter_names]
     return model, tuple(free)
 

@@ -352,7 +352,7 @@ def _signal(problem: InverseDynamicsProblem | OutputErrorProblem, channel: str) 
 
 def _accepted_effect(entry: Accepted, final: Judged) -> AcceptedEffect:
     candidate = entry.trial.probe.candidate
-    effect = next(e for e in final.model.effects if (e.name, e.at) == (candidate.effect.name, candidate.site))
+    effect = final.model.effect(*candidate.key)
     estimates = []
     for short, dotted in effect.parameter_names.items():
         parameter = final.model.parameters[dotted]

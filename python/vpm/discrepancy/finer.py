@@ -93,5 +93,5 @@ def contains(rival: Judged, parameters: tuple[str, ...], final: Judged, own: tup
 
 def _held_at_start(probe: Probe) -> list[str]:
     candidate = probe.candidate
-    effect = next(e for e in probe.model.effects if (e.name, e.at) == candidate.key)
+    effect = probe.model.effect(*candidate.key)
     return [effect.parameter_names[short] for short in candidate.fixed]

@@ -57,7 +57,7 @@ def free_place(
     """
     if not candidate.neutral or len(candidate.starts) > 1 or len(added) != PLACED:
         return None
-    effect = next(e for e in model.effects if (e.name, e.at) == candidate.key)
+    effect = model.effect(*candidate.key)
     short = {dotted: name for name, dotted in effect.parameter_names.items()}
     own = [candidate.effect.parameter(short[name]) for name in added]
     anywhere = [i for i, p in enumerate(own) if p.shape and tuple(p.physical) == ANYWHERE]

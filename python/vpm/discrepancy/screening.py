@@ -117,7 +117,7 @@ def prepare(base: Baseline, data: InverseDynamicsProblem, listed: Sequence[Candi
 
 def _short(model: Model, candidate: Candidate, name: str) -> str:
     """Short name of a parameter of a candidate."""
-    effect = next(e for e in model.effects if (e.name, e.at) == candidate.key)
+    effect = model.effect(*candidate.key)
     return next(short for short, dotted in effect.parameter_names.items() if dotted == name)
 
 

@@ -196,6 +196,20 @@ class Model(Evaluations, Storable):
         """Effects in the order of the file."""
         return effects_of(self._checked.document)
 
+    def effect(self, name: str, at: str) -> Effect:
+        """The effect of one name at one site.
+
+        Raises
+        ------
+        ModelError
+            The model has no such effect at this site.
+        """
+        for effect in self.effects:
+            if (effect.name, effect.at) == (name, at):
+                return effect
+        present = ", ".join(f"{effect.name} at {effect.at}" for effect in self.effects) or "none"
+        raise ModelError(f'{self.name} has no effect {name} at "{at}"; its effects are: {present}', where=name)
+
     def with_effect(self, name: str, at: str, **values: float) -> Self:
         """Model with one effect more.
 
@@ -266,12 +280,9 @@ class Model(Evaluations, Storable):
         ModelError
             The model has no such effect at this site.
         """
+        self.effect(name, at)
         content = self.to_dict()
-        kept = [entry for entry in content.get("effects", []) if (entry["type"], entry["at"]) != (name, at)]
-        if len(kept) == len(self.effects):
-            present = ", ".join(f"{effect.name} at {effect.at}" for effect in self.effects) or "none"
-            raise ModelError(f'{self.name} has no effect {name} at "{at}"; its effects are: {present}', where=name)
-        content["effects"] = kept
+        content["effects"] = [entry for entry in content["effects"] if (entry["type"], entry["at"]) != (name, at)]
         return type(self)(content)
 
     def sites(self, kind: str) -> tuple[str, ...]:
