@@ -1,5 +1,6 @@
 """Efforts balanced along a measured motion, of machines that hold more than their joints show."""
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -8,6 +9,9 @@ import pytest
 import vpm
 from vpm.errors import DivergedError, SimulationError
 from vpm.identify import InverseDynamicsProblem, gaps
+from vpm.simplify.hydraulics import NO_STATE, SIMPLER, simpler
+from vpm.simplify.replacement import replaced
+from vpm.simplify.tables import force_map
 
 ROOT = Path(__file__).resolve().parent.parent
 DT = 1e-3
@@ -69,6 +73,34 @@ def test_a_drives_own_run_balances(cylinder: vpm.Model) -> None:
     assert problem.shown == ("servo.pressure_a", "servo.pressure_b")
     for channel, (_, share, _) in gaps(problem, problem.evaluate(cylinder, cylinder.theta)[0]).items():
         assert share < 0.01, channel
+
+
+#: Without a spool or a pressure that is a state, the force jumps with every command that is held for a sample, by a
+#: share of what a light slide needs; a heavy one needs more.
+HEAVY = 1000.0
+
+
+@pytest.mark.parametrize("change", SIMPLER)
+def test_a_drive_with_fewer_states_balances_its_own_run(cylinder: vpm.Model, change: str) -> None:
+    """With a slow spool or none, one pressure or none that is a state."""
+    reduced = simpler(cylinder, "servo", change)
+    if change == NO_STATE:
+        reduced = reduced.with_parameters({"slide.mass": HEAVY})
+    problem = InverseDynamicsProblem(reduced, [cylinder_record(reduced)])
+    for channel, (_, share, _) in gaps(problem, problem.evaluate(reduced, reduced.theta)[0]).items():
+        assert share < 0.05, channel
+
+
+def test_a_table_of_the_force_balances_its_own_run(cylinder: vpm.Model) -> None:
+    likest = simpler(cylinder, "servo", NO_STATE)
+    axes = [reach * np.sinh(np.linspace(-4.0, 4.0, 41)) / np.sinh(4.0) for reach in (2e-3, 0.3)]
+    names, numbers = ("commands", "velocities", "efforts"), (*axes, force_map(likest, "servo", axes[0], axes[1]))
+    entry = dict(zip(names, (each.tolist() for each in numbers), strict=True))
+    tabled = replaced(cylinder, "servo", json.dumps({"type": "table", "command_unit": "A", **entry}))
+    tabled = tabled.with_parameters({"slide.mass": HEAVY})
+    problem = InverseDynamicsProblem(tabled, [cylinder_record(tabled, ())])
+    ((_, share, _),) = gaps(problem, problem.evaluate(tabled, tabled.theta)[0]).values()
+    assert share < 0.05
 
 
 def test_faults_show_where_they_are(cylinder: vpm.Model) -> None:

@@ -13,7 +13,8 @@ import pytest
 import vpm
 from vpm.errors import ModelError
 from vpm.simplify.reductions import reductions
-from vpm.simplify.tables import force_map, tabled, tables
+from vpm.simplify.replacement import replaced
+from vpm.simplify.tables import force_map, tables
 from vpm.simulate import Setup, simulate_arrays
 
 RIG = vpm.Model.load(Path(__file__).parents[1] / "examples" / "servo_cylinder" / "rig.toml")
@@ -188,7 +189,6 @@ def test_both_are_offered() -> None:
 
 def test_table_forgets_what_only_a_valve_has() -> None:
     slow = RIG.with_effect("valve_dynamics", at="servo", time=1e-3)
-    entry = {key: value for key, value in table(quasi_static()).items() if key != "command_unit"}
-    model = tabled(slow, "servo", json.dumps(entry))
+    model = replaced(slow, "servo", json.dumps(table(quasi_static())))
     assert model.supplies == ()
     assert all(effect.at != "servo" for effect in model.effects)

@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 import vpm
 from vpm.errors import ModelError
 from vpm.simplify import Ladder, reductions, simplify
-from vpm.simplify.hydraulics import BOTH, LOAD, NO_STATE, QUASI_STATIC, SIMPLER, STATIC, replaced, simpler
+from vpm.simplify.hydraulics import BOTH, LOAD, NO_STATE, QUASI_STATIC, SIMPLER, STATIC, simpler
 from vpm.simplify.judge import Judge, by_the_model
 from vpm.simplify.learnt import maxwell_entry, narx_entry
+from vpm.simplify.replacement import replaced
 from vpm.simplify.surrogates import commanded, surrogates
 
 Array = NDArray[np.float64]

@@ -8,69 +8,28 @@ use vpm_core::joint::{Joint, JointKind};
 use vpm_core::model::{Model, Omissions, Parts};
 use vpm_core::mount::Mount;
 use vpm_core::samples::Random;
-use vpm_core::spatial::{Pose, Twist, Vector3};
 use vpm_core::{Dual, Result};
 
+#[path = "common/derivatives.rs"]
+mod derivatives;
 #[path = "common/entries.rs"]
 mod entries;
-use entries::{ALL, STEEL, entry, lift};
+use entries::{STEEL, entry, lift, mixes};
 
 use Component::{BendingX, BendingY, Extension, Torsion};
 
 /// Beams of all levels that have terms of second order, with all that they can do.
 fn levels() -> Vec<BeamEntry<f64>> {
-    let levels = [Level::Strain(3), Level::Elements(2), Level::Bezier(3), Level::Hermite(2), Level::Modal(2)];
-    let deforms = [&[BendingX][..], &[BendingY], &[BendingX, BendingY, Torsion], &[Torsion, Extension], &ALL];
-    let all = levels.iter().flat_map(|&level| deforms.iter().map(move |&deforms| (level, deforms)));
-    all.map(|(level, deforms)| entry(level, deforms, 0.8, [0.02, 0.01])).collect()
-}
-
-fn parts(twist: Twist<f64>) -> [f64; 6] {
-    let [[a, b, c], [d, e, f]] = [twist.angular, twist.linear].map(Vector3::to_array);
-    [a, b, c, d, e, f]
-}
-
-fn same(found: Twist<f64>, expected: Twist<f64>, what: &str) {
-    for (found, expected) in parts(found).into_iter().zip(parts(expected)) {
-        assert!((found - expected).abs() < 1e-10 * (1.0 + expected.abs()), "{what}: {found} is not {expected}");
-    }
-}
-
-/// `R^T dR/dt` as a vector and `R^T dr/dt`, from a pose that carries its time derivative.
-fn velocity(pose: &Pose<Dual<f64, 1>>) -> Twist<f64> {
-    let value = |v: Vector3<Dual<f64, 1>>| Vector3::from(v.to_array().map(|number| number.value));
-    let rate = |v: Vector3<Dual<f64, 1>>| Vector3::from(v.to_array().map(|number| number.gradient[0]));
-    let [x, y, z] = pose.rotation.columns;
-    let angular = Vector3::new(value(z).dot(rate(y)), value(x).dot(rate(z)), value(y).dot(rate(x)));
-    let [a, b, c] = [x, y, z].map(|axis| value(axis).dot(rate(pose.translation)));
-    Twist::new(angular, Vector3::new(a, b, c))
+    mixes(&[Level::Strain(3), Level::Elements(2), Level::Bezier(3), Level::Hermite(2), Level::Modal(2)])
 }
 
 #[test]
 fn columns_twists_and_accelerations_are_derivatives_of_the_map_itself() -> Result<()> {
     let mut random = Random::new(3);
     for entry in levels() {
-        let what = format!("{:?} {:?}", entry.level, entry.deforms);
-        let beam = Beam::first_order(&entry, &[0.8])?;
         let moving = Beam::first_order(&lift::<Dual<f64, 1>>(&entry), &[0.8])?;
-        let (n, mut out, mut change) = (beam.len(), beam.sections(), moving.sections());
-        let [q, v] = [0.3, 1.0].map(|size| random.numbers(n, size));
-        beam.motion(&q, &v, &mut out);
-        for k in 0..=n {
-            let rate = |i: usize| if k == n { v[i] } else { f64::from(u8::from(i == k)) };
-            let along: Vec<_> = (0..n).map(|i| Dual { value: q[i], gradient: [rate(i)] }).collect();
-            let rates: Vec<_> = v.iter().map(|&v| Dual::constant(if k == n { v } else { 0.0 })).collect();
-            moving.motion(&along, &rates, &mut change);
-            for (station, at) in change.at.iter().enumerate() {
-                let found = if k == n { out.at[station].twist } else { out.columns[station * n + k] };
-                same(found, velocity(&at.pose), &what);
-                if k == n {
-                    let rate = |v: Vector3<Dual<f64, 1>>| Vector3::from(v.to_array().map(|number| number.gradient[0]));
-                    let expected = Twist::new(rate(at.twist.angular), rate(at.twist.linear));
-                    same(out.at[station].acceleration, expected, &what);
-                }
-            }
-        }
+        let what = format!("{:?} {:?}", entry.level, entry.deforms);
+        derivatives::are_those_of_poses(&Beam::first_order(&entry, &[0.8])?, &moving, &mut random, &what);
     }
     Ok(())
 }

@@ -12,11 +12,10 @@ mod servo_machine;
 use common::{Bench, Machine, close};
 use hydraulics::nominal;
 use serde_json::{Value, json};
-use servo_machine::{MIDDLE, drive, supply};
+use servo_machine::{MIDDLE, with_pressures};
 use vpm_core::actuator::hydraulic::{Balance, Chambers, PistonSize, ServoCylinder};
 use vpm_core::integrator::Method;
 use vpm_core::ode::Ode;
-use vpm_core::samples::slider;
 use vpm_core::{Dual, Scalar};
 
 /// The nominal servo-cylinder behind a valve that follows at once and leaks in its middle.
@@ -116,17 +115,6 @@ fn slopes_and_slopes_of_slopes_are_those_of_differences() {
     }
 }
 
-/// The rig with the pressures of `kind`.
-fn machine(servo: &ServoCylinder<f64>, kind: &str, source: Value) -> Machine {
-    let mut machine = Machine::new(&slider(servo.load.mass));
-    machine.effect("viscous_friction", 0, &[("viscous", servo.load.damping)]);
-    machine.add("supplies", json!({"name": "pump"}), supply(servo, source));
-    let mut law = drive(servo);
-    law["pressures"] = json!(kind);
-    machine.add("actuators", json!({"name": "hip", "on": {"joint": 0}}), json!({"drive": law}));
-    machine
-}
-
 /// Velocity and pressures at samples under `currents`, from rest at mid-stroke.
 fn moved(machine: &Machine, (step, method): (f64, Method), currents: &[f64]) -> vpm_core::Result<[Vec<f64>; 3]> {
     let bench = Bench::new(machine, step, 1, method);
@@ -147,12 +135,12 @@ fn stiff_oil_comes_near_to_it_in_first_order() -> vpm_core::Result<()> {
     // A spool of its own, so that no pressure jumps with the held current.
     (servo.valve.frequency, servo.valve.damping) = (Some(1570.0), Some(0.7));
     let fine = (STEP, Method::Rosenbrock);
-    let limit = moved(&machine(&servo, "quasi_static", json!("constant")), fine, &currents)?;
+    let limit = moved(&with_pressures(&servo, "quasi_static", json!("constant")), fine, &currents)?;
     let mut gaps = Vec::new();
     for stiffer in [4.0, 16.0, 64.0] {
         let mut stiff = servo;
         stiff.fluid.bulk_modulus *= stiffer;
-        let full = moved(&machine(&stiff, "chambers", json!("constant")), fine, &currents)?;
+        let full = moved(&with_pressures(&stiff, "chambers", json!("constant")), fine, &currents)?;
         gaps.push([0, 1, 2].map(|channel| {
             let most = limit[channel].iter().fold(0.0_f64, |most, value| most.max(value.abs()));
             let gap = limit[channel][400..].iter().zip(&full[channel][400..]).map(|(a, b)| (a - b).abs());
@@ -183,7 +171,7 @@ fn steps_of_a_millisecond_follow_it() -> vpm_core::Result<()> {
         for clearance in [1e-4, 5e-4] {
             let mut servo = leaking(clearance);
             servo.load.mass = mass;
-            let described = machine(&servo, "quasi_static", json!("constant"));
+            let described = with_pressures(&servo, "quasi_static", json!("constant"));
             let [fine, ..] = moved(&described, (1e-4, Method::Guarded), &fine_currents)?;
             for &method in methods {
                 let [velocity, ..] = moved(&described, (1e-3, method), &currents)?;
@@ -207,7 +195,7 @@ fn state_jacobian_is_that_of_differences_for_every_supply() {
             if spool > 0 {
                 (servo.valve.frequency, servo.valve.damping) = (Some(1570.0), Some(0.7));
             }
-            let described = machine(&servo, "quasi_static", source.clone());
+            let described = with_pressures(&servo, "quasi_static", source.clone());
             let mut system = described.system();
             let dim = 2 + spool + states;
             assert_eq!(system.dim(), dim);
@@ -249,7 +237,7 @@ fn state_jacobian_is_that_of_differences_for_every_supply() {
 fn a_valve_that_shuts_is_refused() {
     let mut servo = leaking(1e-4);
     servo.valve.clearance = None;
-    let described = machine(&servo, "quasi_static", json!("constant"));
+    let described = with_pressures(&servo, "quasi_static", json!("constant"));
     let told = vpm_core::description::Description::from_json(&described.json()).map(|_| ()).unwrap_err().to_string();
     assert!(told.contains("`hip` has quasi-static pressures") && told.contains("clearance"), "{told}");
 }

@@ -12,23 +12,16 @@ mod servo_machine;
 use common::{Bench, Machine, close};
 use hydraulics::nominal;
 use serde_json::json;
-use servo_machine::{MIDDLE, drive, supply};
+use servo_machine::{MIDDLE, with_pressures};
 use vpm_core::actuator::hydraulic::{Chambers, PistonSize, ServoCylinder, chambers_under_load};
 use vpm_core::integrator::Method;
 use vpm_core::ode::Ode;
-use vpm_core::samples::slider;
 
 const STEP: f64 = 1e-4;
 
-/// The rig with or without quasi-static pressures; a valve without a frequency follows at once.
+/// The rig with the pressures of a kind; a valve without a frequency follows at once.
 fn machine(servo: &ServoCylinder<f64>, pressures: &str) -> Machine {
-    let mut machine = Machine::new(&slider(servo.load.mass));
-    machine.effect("viscous_friction", 0, &[("viscous", servo.load.damping)]);
-    machine.add("supplies", json!({"name": "pump"}), supply(servo, json!("constant")));
-    let mut law = drive(servo);
-    law["pressures"] = json!(pressures);
-    machine.add("actuators", json!({"name": "hip", "on": {"joint": 0}}), json!({"drive": law}));
-    machine
+    with_pressures(servo, pressures, json!("constant"))
 }
 
 fn at_once(servo: &ServoCylinder<f64>) -> ServoCylinder<f64> {

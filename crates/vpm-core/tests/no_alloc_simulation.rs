@@ -2,10 +2,18 @@
 
 #[cfg(test)]
 mod common;
+#[cfg(test)]
+#[path = "common/hydraulics.rs"]
+mod hydraulics;
+#[cfg(test)]
+#[path = "common/servo_machine.rs"]
+mod servo_machine;
 
 use allocation_counter::measure;
 use common::{Bench, Machine};
+use hydraulics::nominal;
 use serde_json::json;
+use servo_machine::{rest, simpler_drives};
 use vpm_core::integrator::Method;
 use vpm_core::samples::double_pendulum;
 
@@ -54,4 +62,22 @@ fn pieces_of_restarts_allocate_nothing() {
         measure(|| drop(bench.restart(&states, &starts, 20, &inputs))).count_total
     };
     assert_eq!(pieces(2), pieces(18));
+}
+
+#[test]
+fn drives_with_fewer_states_allocate_nothing() {
+    let mut servo = nominal();
+    // Heavy enough for steps of every method beside pressures that follow at once.
+    servo.load.mass = 300.0;
+    let currents: Vec<f64> = (0..200).map(|k| 2e-3 * (0.05 * f64::from(k)).sin()).collect();
+    for (name, machine) in simpler_drives(&servo) {
+        let start = rest(&machine);
+        for method in Method::ALL {
+            for sensitivities in [&[][..], &[0, 3][..]] {
+                let bench = Bench { sensitivities: sensitivities.to_vec(), ..Bench::new(&machine, 1e-5, 2, method) };
+                let free = |rows: usize| measure(|| drop(bench.free(&start, &currents[..rows]))).count_total;
+                assert_eq!(free(20), free(200), "{name}, {}", method.name());
+            }
+        }
+    }
 }

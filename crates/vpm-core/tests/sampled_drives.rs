@@ -130,6 +130,9 @@ fn steps_allocate_nothing() {
     let inputs = commands(2000);
     let free = |rows: usize| measure(|| drop(bench.free(&START, &inputs[..2 * rows]))).count_total;
     assert_eq!(free(20), free(2000));
+    let element = Bench::new(&sprung(&sampled_maxwell(STEP), Value::Null), STEP, 1, Method::Rk4);
+    let free = |rows: usize| measure(|| drop(element.free(&[0.05, 0.0], &inputs[..rows]))).count_total;
+    assert_eq!(free(20), free(2000));
 }
 
 /// A mass on a rail and a Maxwell element from the world to it, as a differential or as a difference equation.

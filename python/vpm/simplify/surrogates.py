@@ -9,47 +9,21 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vpm.experiment import Experiment
 from vpm.model import Model
-from vpm.simplify.hydraulics import hydraulic_drives, replaced
+from vpm.simplify.hydraulics import hydraulic_drives
 from vpm.simplify.learnt import maxwell_entry, narx_entry
 from vpm.simplify.reductions import Reduction
+from vpm.simplify.replacement import Replacement
 from vpm.simplify.tables import tables
 from vpm.simulate import Run, simulate
 
 Array = NDArray[np.float64]
 Record = dict[str, Array]
-
-
-@dataclass(frozen=True)
-class Surrogate(Reduction):
-    """A Maxwell NARX element or NARX model in the place of a servo-cylinder and its controller.
-
-    Attributes
-    ----------
-    entry : str
-        The actuator of the model file as JSON.
-    """
-
-    entry: str = ""
-
-    def __str__(self) -> str:
-        """Words for a rung."""
-        return f"{self.at} as {self.name}"
-
-    def applied(self, model: Model) -> Model:
-        """Model with this element.
-
-        Parameters
-        ----------
-        model : Model
-        """
-        return replaced(model, self.at, self.entry)
 
 
 def surrogates(model: Model, records: Sequence[Experiment], mode: str, rate: float) -> tuple[Reduction, ...]:
@@ -113,7 +87,7 @@ def _held(record: Experiment, count: int, model: Model) -> Experiment:
     return Experiment.from_arrays(time, values, model=model, name=record.name)
 
 
-def _learnt(model: Model, drive: str, taught: Sequence[Record], step: float) -> Iterator[Surrogate]:
+def _learnt(model: Model, drive: str, taught: Sequence[Record], step: float) -> Iterator[Replacement]:
     """What stands for one drive: Maxwell and NARX, the one with fewer numbers last."""
     line = model.line_of_actuator(drive)
     moving = [f"{line}.length", f"{line}.rate"]
@@ -133,4 +107,4 @@ def _learnt(model: Model, drive: str, taught: Sequence[Record], step: float) -> 
     narx = narx_entry(records, step, {**names, "drive": f"{drive}.command"})
     for entry in (narx, maxwell_entry(records, step)):
         if entry is not None:
-            yield Surrogate("drive", str(entry["type"]), drive, json.dumps(entry))
+            yield Replacement("drive", str(entry["type"]), drive, json.dumps(entry))

@@ -8,8 +8,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +15,7 @@ from numpy.typing import NDArray
 from vpm.errors import VpmError
 from vpm.model import Model
 from vpm.simplify.hydraulics import CLEARANCE, NO_STATE, hydraulic_drives, simpler
-from vpm.simplify.reductions import Reduction
+from vpm.simplify.replacement import OF_OIL, OF_SPOOL, TABLE, Replacement
 from vpm.simulate import Run
 
 Array = NDArray[np.float64]
@@ -32,41 +30,15 @@ SPARE = 1.5
 CLEARANCES = (0.0025, 0.005, 0.01, 0.02, 0.05)
 #: Mass (kg) and step (s) of the rig on which the drive is read: nothing moves while it is.
 MASS, STEP = 1e9, 1e-9
-#: Effects that belong to the oil and the valve, which a table contains, and those that a table cannot have.
-INSIDE, OUTSIDE = ("internal_leakage",), ("valve_dynamics",)
-
-
-@dataclass(frozen=True)
-class TableReduction(Reduction):
-    """A table in the place of a servo-cylinder; its controller stays.
-
-    Attributes
-    ----------
-    entry : str
-        The actuator of the model file as JSON.
-    """
-
-    entry: str = ""
-
-    def __str__(self) -> str:
-        """Words for a rung."""
-        return f"{self.at} as {self.name}"
-
-    def applied(self, model: Model) -> Model:
-        """Model with this table.
-
-        Parameters
-        ----------
-        model : Model
-        """
-        return tabled(model, self.at, self.entry)
+#: What a supply can have besides its pressure and its oil.
+SAGGING = ("source", "resistance", "capacitance")
 
 
 def tables(
     model: Model,
     taught: Sequence[Mapping[str, Array]],
     runs: Callable[[Model], Sequence[Run]],
-) -> tuple[TableReduction, ...]:
+) -> tuple[Replacement, ...]:
     """A table for each servo-cylinder that one can be read of.
 
     Where its valve has no clearance, that one is taken with which the quasi-static drive moves most like the full one.
@@ -85,7 +57,7 @@ def tables(
 
 def _read(
     model: Model, taught: Sequence[Mapping[str, Array]], runs: Callable[[Model], Sequence[Run]]
-) -> Iterator[TableReduction]:
+) -> Iterator[Replacement]:
     for drive in hydraulic_drives(model):
         line = model.line_of_actuator(drive)
         channel = f"{model.joint_of_actuator(drive)}.velocity" if line is None else f"{line}.rate"
@@ -104,8 +76,9 @@ def _read(
             efforts = force_map(likest, drive, commands, velocities)
         except VpmError:
             continue
+        unit = model.to_dict()["actuators"][drive].get("command_unit", "A")
         axes = {"commands": commands.tolist(), "velocities": velocities.tolist(), "efforts": efforts.tolist()}
-        yield TableReduction("drive", "table", drive, json.dumps({"type": "table", **axes}))
+        yield Replacement("drive", TABLE, drive, json.dumps({"type": TABLE, "command_unit": unit, **axes}))
 
 
 def _with_clearance(
@@ -117,7 +90,7 @@ def _with_clearance(
 ) -> Model | None:
     """Model whose drive is quasi-static, with the clearance that suits best; None where none can be simulated."""
     content = model.to_dict()
-    content["effects"] = [e for e in content.get("effects", ()) if not (e["at"] == drive and e["type"] in OUTSIDE)]
+    content["effects"] = [e for e in content.get("effects", ()) if not (e["at"] == drive and e["type"] in OF_SPOOL)]
     reduced = simpler(type(model)(content), drive, NO_STATE)
     name = f"{drive}.valve.clearance"
     given = f"{drive}.valve.clearance" in model.parameters
@@ -173,7 +146,7 @@ def _rig(model: Model, drive: str) -> Model:
     content = simpler(model, drive, NO_STATE).to_dict()
     entry = {key: value for key, value in content["actuators"][drive].items() if key not in ("line", "joint")}
     stroke = model.parameters[f"{drive}.cylinder.stroke"].value
-    supply = {key: value for key, value in content["supplies"][entry["supply"]].items() if key not in _SAGGING}
+    supply = {key: value for key, value in content["supplies"][entry["supply"]].items() if key not in SAGGING}
     return type(model)(
         {
             "name": f"{drive} alone",
@@ -182,51 +155,6 @@ def _rig(model: Model, drive: str) -> Model:
             "joints": {"axis": {"type": "prismatic", "parent": "world", "child": "slide", "axis": [1.0, 0.0, 0.0]}},
             "supplies": {entry["supply"]: supply},
             "actuators": {drive: {**entry, "joint": "axis", "retracted_length": -0.5 * stroke}},
-            "effects": [e for e in content.get("effects", ()) if e["at"] == drive and e["type"] in INSIDE],
+            "effects": [e for e in content.get("effects", ()) if e["at"] == drive and e["type"] in OF_OIL],
         }
     )
-
-
-_SAGGING = ("source", "resistance", "capacitance")
-
-
-def tabled(model: Model, drive: str, entry: str) -> Model:
-    """Model with a table in the place of a servo-cylinder.
-
-    Parameters
-    ----------
-    model : Model
-    drive : str
-    entry : str
-        The table as JSON, without what it acts on and the unit of its command.
-
-    Raises
-    ------
-    ModelError
-        Something else in the model refers to what is gone.
-    """
-    content: dict[str, Any] = model.to_dict()
-    own = content["actuators"][drive]
-    place = {key: own[key] for key in ("joint", "line") if key in own}
-    content["actuators"][drive] = {**place, "command_unit": own.get("command_unit", "A"), **json.loads(entry)}
-    used = {each.get("supply") for each in content["actuators"].values()}
-    content["supplies"] = {name: each for name, each in content["supplies"].items() if name in used}
-    gone = set(model.supplies) - used
-    content["effects"] = [
-        e
-        for e in content.get("effects", ())
-        if e["at"] not in gone and not (e["at"] == drive and e["type"] in (*INSIDE, *OUTSIDE))
-    ]
-    content["sensors"] = {
-        name: sensor
-        for name, sensor in content.get("sensors", {}).items()
-        if _still(str(sensor["measures"]), gone, drive)
-    }
-    return type(model)(
-        {key: each for key, each in content.items() if each or key not in ("supplies", "effects", "sensors")}
-    )
-
-
-def _still(channel: str, gone: set[str], drive: str) -> bool:
-    owner, _, what = channel.rpartition(".")
-    return owner not in gone and (owner != drive or what in ("command", "force"))

@@ -27,6 +27,14 @@ pub fn entry(level: Level, deforms: &[Component], length: f64, [width, height]: 
     }
 }
 
+/// Beams of these levels in several mixes of components, up to all that there are.
+pub fn mixes(levels: &[Level]) -> Vec<BeamEntry<f64>> {
+    use Component::{BendingX, BendingY, Extension, Torsion};
+    let deforms = [&[BendingX][..], &[BendingY], &[BendingX, BendingY, Torsion], &[Torsion, Extension], &ALL];
+    let all = levels.iter().flat_map(|&level| deforms.iter().map(move |&deforms| (level, deforms)));
+    all.map(|(level, deforms)| entry(level, deforms, 0.8, [0.02, 0.01])).collect()
+}
+
 /// The same beam over another number type, without derivatives.
 pub fn lift<S: Scalar>(entry: &BeamEntry<f64>) -> BeamEntry<S> {
     entry.map(&mut |&value| S::from_f64(value))

@@ -79,6 +79,38 @@ pub fn machine_fed(servo: &ServoCylinder<f64>, on: On, source: Value) -> Machine
     machine
 }
 
+/// The mass on its rail without a spring, pushed by a cylinder with the pressures of `kind`: `chambers`, `load` or `quasi_static`.
+pub fn with_pressures(servo: &ServoCylinder<f64>, kind: &str, source: Value) -> Machine {
+    let mut machine = Machine::new(&slider(servo.load.mass));
+    machine.effect("viscous_friction", 0, &[("viscous", servo.load.damping)]);
+    machine.add("supplies", json!({"name": "pump"}), supply(servo, source));
+    let mut law = drive(servo);
+    law["pressures"] = json!(kind);
+    machine.add("actuators", json!({"name": "hip", "on": {"joint": 0}}), json!({"drive": law}));
+    machine
+}
+
+/// The mass with every drive that is simpler than chambers behind a spool, each with its name; a table of its force is one of them.
+pub fn simpler_drives(servo: &ServoCylinder<f64>) -> Vec<(&'static str, Machine)> {
+    let mut leaking = *servo;
+    leaking.valve.clearance = Some(2e-4);
+    let mut at_once = leaking;
+    (at_once.valve.frequency, at_once.valve.damping) = (None, None);
+    let of = |servo, kind| with_pressures(servo, kind, json!("constant"));
+    let mut table = Machine::new(&slider(servo.load.mass));
+    let law = json!({"type": "table", "commands": [-5e-3, 0.0, 5e-3], "velocities": [-0.2, 0.2],
+        "efforts": [-900.0, -1100.0, 100.0, -100.0, 1100.0, 900.0]});
+    table.add("actuators", json!({"name": "hip", "on": {"joint": 0}, "drive": law}), json!({}));
+    vec![
+        ("load", of(servo, "load")),
+        ("static spool", of(&at_once, "chambers")),
+        ("static spool, load", of(&at_once, "load")),
+        ("quasi-static", of(&leaking, "quasi_static")),
+        ("static spool, quasi-static", of(&at_once, "quasi_static")),
+        ("table", table),
+    ]
+}
+
 /// The state at rest at mid-stroke.
 pub fn rest(machine: &Machine) -> Vec<f64> {
     let internal = internal_state(&machine.build(), &machine.values, &[MIDDLE]).unwrap();

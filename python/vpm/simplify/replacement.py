@@ -1,0 +1,103 @@
+"""Another drive in the place of a servo-cylinder: an element for it and its controller, or a table of its force.
+
+The laws of these drives are in docs/maxwell_narx.md, docs/narx.md and docs/hydraulics.md.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from vpm.errors import ModelError
+from vpm.model import Model
+from vpm.simplify.reductions import Reduction
+
+#: The drive that stands for the cylinder alone: its controller stays. All others stand for both.
+TABLE = "table"
+#: Effects of the oil, which a table contains, and of the spool, which it cannot have.
+OF_OIL, OF_SPOOL = ("internal_leakage",), ("valve_dynamics",)
+#: What sensors can still show of a drive without spool and pressures.
+STILL_MEASURED = ("command", "force")
+#: Parts of a model file that one without such parts does not have.
+OPTIONAL = ("controllers", "supplies", "effects", "sensors")
+
+
+@dataclass(frozen=True)
+class Replacement(Reduction):
+    """Another drive in the place of a servo-cylinder: ``narx``, ``maxwell_narx`` or ``table``.
+
+    Attributes
+    ----------
+    entry : str
+        The actuator of the model file as JSON, without what it acts on.
+    """
+
+    entry: str = ""
+
+    def __str__(self) -> str:
+        """Words for a rung."""
+        return f"{self.at} as {self.name}"
+
+    def applied(self, model: Model) -> Model:
+        """Model with this drive.
+
+        Parameters
+        ----------
+        model : Model
+        """
+        return replaced(model, self.at, self.entry)
+
+
+def replaced(model: Model, drive: str, entry: str) -> Model:
+    """Model with another drive in the place of a servo-cylinder.
+
+    A table gets the commands of the controller. What is no table stands for the controller too, and its command is the
+    reference.
+
+    Parameters
+    ----------
+    model : Model
+    drive : str
+    entry : str
+        The other drive as JSON, without the joint or line that it acts on.
+
+    Raises
+    ------
+    ModelError
+        A controller that should go commands other drives as well, or something else refers to what is gone.
+    """
+    content, other = model.to_dict(), json.loads(entry)
+    place = {key: value for key, value in content["actuators"][drive].items() if key in ("joint", "line")}
+    content["actuators"][drive] = {**place, **other}
+    lost: tuple[str, ...] = (*OF_OIL, *OF_SPOOL)
+    if other["type"] != TABLE:
+        lost = tuple(effect.name for effect in model.effects if effect.at == drive)
+        content["controllers"] = _without_controller(model, content.get("controllers", {}), drive)
+    used = {each.get("supply") for each in content["actuators"].values()}
+    gone = set(model.supplies) - used
+    content["supplies"] = {name: each for name, each in content["supplies"].items() if name in used}
+    content["effects"] = [
+        effect
+        for effect in content.get("effects", ())
+        if effect["at"] not in gone and not (effect["at"] == drive and effect["type"] in lost)
+    ]
+    content["sensors"] = _kept_sensors(content.get("sensors", {}), {drive, *gone})
+    return type(model)({key: each for key, each in content.items() if each or key not in OPTIONAL})
+
+
+def _without_controller(model: Model, controllers: Mapping[str, Any], drive: str) -> dict[str, Any]:
+    alone = {name for name, controller in controllers.items() if controller.get("actuator") == drive}
+    if drive in model.controlled_actuators and not alone:
+        raise ModelError(
+            f"the controller of {drive} commands other drives as well, so that no element can stand for both; "
+            "give each drive a controller of its own"
+        )
+    return {name: controller for name, controller in controllers.items() if name not in alone}
+
+
+def _kept_sensors(sensors: Mapping[str, Any], gone: set[str]) -> dict[str, Any]:
+    parts = {name: str(sensor["measures"]).rpartition(".") for name, sensor in sensors.items()}
+    kept = (name for name, (owner, _, what) in parts.items() if owner not in gone or what in STILL_MEASURED)
+    return {name: sensors[name] for name in kept}
