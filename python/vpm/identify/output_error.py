@@ -15,7 +15,7 @@ from vpm.identify.parallel import in_order
 from vpm.identify.problem import FEWEST_SAMPLES, Block
 from vpm.initial import initial_state, joint_motion
 from vpm.model import Model
-from vpm.simulate import Setup, SimulatedArrays, copied_channels, simulate_arrays
+from vpm.simulate import Setup, SimulatedArrays, copied_channels, simulate_arrays, simulated_rows
 
 Array = NDArray[np.float64]
 
@@ -103,7 +103,7 @@ class OutputErrorProblem:
         parts = list(zip(self.experiments, counted, strict=True))
         spread = {c: float(np.sqrt(np.mean([np.var(e[c][n]) for e, n in parts]))) for c in self._channels}
         for (experiment, counts), followed in zip(parts, self._followed, strict=True):
-            rows = simulate_arrays(model, experiment, self.mode, setup=self._setup, followed=followed).rows
+            rows = simulated_rows(experiment, self.mode, self._setup, followed)
             moving = counts[rows].astype(np.float64)
             for channel in self._channels:
                 weight = 1.0 / spread[channel] if spread[channel] > 0.0 else 1.0

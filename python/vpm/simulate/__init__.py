@@ -1,7 +1,7 @@
 """Simulation of a log: `modes.py` says which question each mode answers."""
 
 from vpm.simulate.inputs import restart_grid, simulation_inputs
-from vpm.simulate.modes import MODES, check_balance, judging_mode, simulate, simulate_arrays
+from vpm.simulate.modes import MODES, check_balance, judging_mode, simulate, simulate_arrays, simulated_rows
 from vpm.simulate.run import Run, SimulatedArrays, copied_channels, judged
 from vpm.simulate.setup import AUTOMATIC, FIXED_STEP, INTEGRATORS, Setup
 
@@ -20,5 +20,6 @@ __all__ = [
     "restart_grid",
     "simulate",
     "simulate_arrays",
+    "simulated_rows",
     "simulation_inputs",
 ]

@@ -136,6 +136,16 @@ def judging_mode(model: Model, records: Sequence[Experiment]) -> str:
     return "closed_loop" if held and known else "restarts"
 
 
+def simulated_rows(
+    experiment: Experiment, mode: str, setup: Setup, followed: Motion | None = None
+) -> NDArray[np.int64]:
+    """Rows of a log that the outputs of a simulation stand for; ``followed`` is the motion of its joints, if given."""
+    if mode == "restarts":
+        starts, length = restart_grid(experiment, setup.horizon)
+        return (starts[:, None] + np.arange(length)).ravel()
+    return np.arange(len(experiment)) if followed is None else np.arange(len(followed.time))[followed.kept]
+
+
 def _dispatch(
     model: Model,
     experiment: Experiment,
@@ -146,7 +156,7 @@ def _dispatch(
     cutoff: float | None,
     initial_state: Array | None,
 ) -> SimulatedArrays:
-    rows = np.arange(len(experiment))
+    rows = simulated_rows(experiment, mode, setup)
     begin = np.zeros(1, dtype=np.int64)
     stepping = (experiment.dt, setup.substeps, setup.method(model), columns)
     if mode == "free_run":
@@ -165,7 +175,6 @@ def _dispatch(
         starts, length = restart_grid(experiment, setup.horizon)
         states = measured_states(model, experiment, theta, starts, cutoff)
         outputs, jacobian = model.core.restart(theta, states, starts, length, inputs, *stepping)
-        rows = (starts[:, None] + np.arange(length)).ravel()
         flat = outputs.reshape(-1, outputs.shape[-1])
         return SimulatedArrays(flat, jacobian.reshape(len(flat), flat.shape[1], -1), rows, starts)
     raise SimulationError(f"unknown mode '{mode}'; choose one of {', '.join(MODES)}")
