@@ -22,15 +22,18 @@ from vpm.simplify.reductions import COUPLING_TERMS, OFFERED, VELOCITY_TERMS, Red
 from vpm.simplify.shares import ROUNDING, deformation_share, effort_share, motions, ranked
 from vpm.simplify.surrogates import surrogates
 from vpm.simplify.terms import CURVED
-from vpm.simplify.trials import CLOCK, NEGLIGIBLE, PRIORITY, Changes, Trials
+from vpm.simplify.trials import ALIKE, CLOCK, NEGLIGIBLE, PRIORITY, Changes, Trials
 from vpm.simulate import Setup
 
 #: Share of efforts or deformations, in tolerances, from which on no model is tried without the terms.
 WEIGHTY = 5.0
 #: Combinations that are foreseen, and of those the ones that are tried.
 FORESEEN, TRIED = 100_000, 8
-#: Times of steps of less than a microsecond differ by so much for no reason on a machine that does other things too.
-ALIKE = 1.3
+#: How near to the least error one is that a quicker way may have instead, and what time a round has to save to be
+#: followed by another.
+NEAR, SAVED = 1.1, 0.95
+#: A change that alone loses so many tolerances is not tried on the cheapest model.
+TOO_MUCH = 2.0
 #: Steps timed of the chosen one: as many as these seconds allow, within these numbers.
 CHOSEN_SECONDS, CHOSEN_STEPS = 1.0, (10_000, 100_000)
 
@@ -128,10 +131,11 @@ def _descend(trials: Trials, sites: Sites) -> None:
         )
     limit = min(rung.error for rung in full) + trials.tolerance
     base = _together(trials, sites, limit)
-    singles = {site: _alone(trials, base, changes) for site, changes in sites.items()}
-    for changes in _foreseen(trials, base, singles, limit):
+    alone = {site: _alone(trials, base, changes) for site, changes in sites.items()}
+    for changes in _foreseen(trials, base, {site: _paying(found) for site, found in alone.items()}, limit):
         trials.attempt(changes, _within(trials.rungs, limit).seconds)
-    _polish(trials, sites, limit)
+    lost = {change: added for found in alone.values() for change, (_, added) in found.items()}
+    _polish(trials, sites, limit, {change for change, added in lost.items() if added > TOO_MUCH * trials.tolerance})
 
 
 def _weigh_terms(trials: Trials, sites: Sites) -> None:
@@ -176,37 +180,54 @@ def _together(trials: Trials, sites: Sites, limit: float) -> Changes:
 
 
 def _alone(trials: Trials, base: Changes, changes: Sequence[Reduction]) -> dict[Reduction, tuple[float, float]]:
-    """Seconds saved and error added by each change of one site on the common start; not what another beats."""
-    start = _best(trials.attempt(base))
+    """Seconds saved and error added by each change of one site on the common start; what is dearer there is not tried.
+
+    The common start loses next to nothing: what takes longer can win nothing, by itself or with others.
+    """
+    start, longest = _best(trials.attempt(base)), trials.as_quick_as(base)
     found: dict[Reduction, tuple[float, float]] = {}
     for change in _coarser(changes, base):
-        # Something that saves little by itself may save more with others, so it is tried if it is hardly dearer.
-        rungs = trials.attempt(_with(base, change), ALIKE * start.seconds + CLOCK)
+        rungs = trials.attempt(_with(base, change), longest)
         if rungs:
             best = _best(rungs)
             found[change] = (start.seconds - best.seconds, best.error - start.error)
+    return found
+
+
+def _paying(found: dict[Reduction, tuple[float, float]]) -> dict[Reduction, tuple[float, float]]:
+    """Changes of one site that no other one beats."""
     names = list(found)
     return {names[k]: found[names[k]] for k in pareto([(-saved, added) for saved, added in found.values()])}
 
 
 def _coarser(changes: Sequence[Reduction], base: Changes) -> Sequence[Reduction]:
     """Changes of one site beyond that in the base: they come finest first, and what is finer costs more."""
-    straight = {each.at for each in base if each.kind == "level" and not each.name.startswith(CURVED)}
-    # Hinges between rigid segments have no terms of second order to leave out.
-    changes = [each for each in changes if each.name != "second-order" or each.at not in straight]
+    straight = _straight(base)
+    changes = [each for each in changes if not _is_idle(each, straight)]
     taken = next((each for each in base if each in changes), None)
     return changes if taken is None else changes[changes.index(taken) + 1 :]
+
+
+def _straight(changes: Changes) -> set[str]:
+    """Links of hinges between rigid segments, or rigid ones: they have no terms of second order to leave out."""
+    return {each.at for each in changes if each.kind == "level" and not each.name.startswith(CURVED)}
+
+
+def _is_idle(change: Reduction, straight: set[str]) -> bool:
+    return change.name == "second-order" and change.at in straight
 
 
 def _best(rungs: Sequence[Rung]) -> Rung:
     """The cheapest rung among those whose error is near the least."""
     least = min(rung.error for rung in rungs)
-    return min((rung for rung in rungs if rung.error <= 1.1 * least), key=lambda rung: rung.seconds)
+    return min((rung for rung in rungs if rung.error <= NEAR * least), key=lambda rung: rung.seconds)
 
 
 def _with(base: Changes, change: Reduction) -> Changes:
-    """Changes with one more, in the place of that of the same site."""
-    return (*(each for each in base if each.site != change.site), change)
+    """Changes with one more, in the place of that of the same site, and without those that do nothing beside it."""
+    changes = (*(each for each in base if each.site != change.site), change)
+    straight = _straight(changes)
+    return tuple(each for each in changes if not _is_idle(each, straight))
 
 
 def _foreseen(
@@ -232,15 +253,16 @@ def _foreseen(
     return result
 
 
-def _polish(trials: Trials, sites: Sites, limit: float) -> None:
+def _polish(trials: Trials, sites: Sites, limit: float, hopeless: set[Reduction]) -> None:
     """From the cheapest within the limit, single changes as long as one pays."""
     while True:
         best = _within(trials.rungs, limit)
         base = trials.changes_of(best)
         for changes in sites.values():
             for change in _coarser(changes, base):
-                trials.attempt(_with(base, change), best.seconds)
-        if not _within(trials.rungs, limit).seconds < 0.95 * best.seconds:
+                if change not in hopeless:
+                    trials.attempt(_with(base, change), best.seconds)
+        if not _within(trials.rungs, limit).seconds < SAVED * best.seconds:
             return
 
 

@@ -21,12 +21,17 @@ TIMED_SECONDS = 0.05
 TIMED_STEPS = (1_000, 20_000)
 #: Every integrator of fixed steps is tried with these numbers of steps in a period.
 SUBSTEPS = (1, 2, 4)
-#: More steps of an integrator are tried while they lower the error to this share.
+#: More steps of an integrator are tried while they lower the error to this share; two integrators that differ by less
+#: both show the error of the model itself.
 PAYS = 0.7
 #: What a clock and a busy machine add to the time of any step, s: differences below it say nothing.
 CLOCK = 5e-7
+#: Times of steps of less than a microsecond differ by so much for no reason on a machine that does other things too.
+ALIKE = 1.3
 #: Steps of a first glance, and how much slower than another way that works one may be if it does not fit the period.
 GLANCE, SLOWER = 20, 5.0
+#: What glances at one model differ by.
+REPEATED = 1.05
 #: Share of the tolerance that is next to nothing, and how much slower than what loses no more than that a way may be.
 NEGLIGIBLE, SPARE = 0.2, 2.0
 #: Steps are timed before all ordinary threads where that is permitted, as a controller runs.
@@ -68,6 +73,8 @@ class Trials:
         self.courses = Courses(model, judge)
         #: Why the last way that did not work did not.
         self.reason = ""
+        #: Fastest step of each model at a glance, s.
+        self._glanced: dict[frozenset[Reduction], float] = {}
         self._rungs: dict[frozenset[Reduction], list[Rung]] = {}
         self._models: dict[frozenset[Reduction], Model] = {}
         self._cut: set[frozenset[Reduction]] = set()
@@ -106,24 +113,38 @@ class Trials:
         ----------
         changes : tuple of Reduction
         below : float
-            Time of a period (s) from which on nobody asks for the model.
+            Time of a period at a glance (s) from which on nobody asks for the model.
         """
         key = frozenset(changes)
         if key not in self._rungs:
             try:
                 model = reduced(self.model, changes)
                 glances = self._glances(model)
-                if changes and min(glances.values(), default=0.0) > min(below, self._dear()):
+                self._glanced[key] = min(glances.values(), default=0.0)
+                if changes and self._glanced[key] > min(below, self._dear()):
                     self._cut.add(key)
                     return []
                 self.say(", ".join(map(str, changes)) or "the full model")
-                self._models[key] = self.judge.fitted(model) if self._refit(changes) else model
+                self._models[key] = self.judge.fitted(self._begun(model, key)) if self._refit(changes) else model
                 self._rungs[key] = []
                 self._step(changes, glances)
             except VpmError as error:
                 self.reason = str(error)
                 self._rungs.setdefault(key, [])
         return self._rungs[key]
+
+    def as_quick_as(self, changes: Changes) -> float:
+        """Time of a period at a glance (s) up to which a model is no dearer than one that was tried."""
+        return REPEATED * self._glanced[frozenset(changes)]
+
+    def _begun(self, model: Model, key: frozenset[Reduction]) -> Model:
+        """Model with the parameters of the fitted one that differs in the fewest changes: where its fit begins."""
+        nearest = min(self._models, key=lambda known: len(known ^ key), default=None)
+        if nearest is None:
+            return model
+        known = self._models[nearest].parameters
+        adjustable = [each.name for each in model.parameters.values() if each.adjustable]
+        return model.with_parameters({name: known[name].value for name in adjustable if name in known})
 
     def saved(self, change: Reduction, setup: Setup) -> float:
         """Seconds that a period of the full model takes less with one change, at a glance; none where it does not work.
@@ -197,15 +218,19 @@ class Trials:
 
     def _is_hopeless(self, changes: Changes, integrator: str, substeps: int, glance: float | None) -> bool:
         """Whether a way takes so much longer than one that works, or that loses next to nothing, that none takes it."""
-        fastest = min((rung.seconds for rung in self._rungs[frozenset(changes)]), default=np.inf)
+        known = self._rungs[frozenset(changes)]
+        fastest = min((rung.seconds for rung in known), default=np.inf)
         if glance is None:
             try:
                 glance = self._glance(self._models[frozenset(changes)], Setup(integrator, substeps)) / substeps
             except SimulationError as error:
                 self.reason = str(error)
                 return False
-        few = glance * substeps
-        return few > self._dear() or (few * self.judge.rate > 1.0 and few > SLOWER * fastest)
+        few, enough = glance * substeps, self._enough()
+        if few > self._dear() or (few * self.judge.rate > 1.0 and few > SLOWER * fastest):
+            return True
+        good = min((rung.seconds for rung in known if rung.error <= enough), default=np.inf)
+        return few > ALIKE * good or (few > fastest and _agree(known))
 
     def _add(self, changes: Changes, setup: Setup, demanded: float = np.inf) -> Rung | None:
         """The rung of one way, if it works and its error is less than what is demanded."""
@@ -239,3 +264,12 @@ class Trials:
         if steps > TIMED_STEPS[0]:
             times = step_times(model, rate, setup, steps, inputs, PRIORITY, start)
         return float(np.median(times)), float(np.quantile(times, 0.999))
+
+
+def _agree(rungs: Sequence[Rung]) -> bool:
+    """Whether two integrators, each with its fewest steps that work, err alike: the error is then the model's own."""
+    first: dict[str, float] = {}
+    for rung in rungs:
+        first.setdefault(rung.integrator, rung.error)
+    least = sorted(first.values())[:2]
+    return len(least) == 2 and least[0] > PAYS * least[1]
