@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from vpm import Climb, Experiment, Model, Setup, climb, simulate
 from vpm.climb.levels import ACTUATORS, RIGID, families
 from vpm.errors import IdentificationError
+from vpm.identify import OutputErrorProblem
+
+Array = NDArray[np.float64]
 
 ARM = """
 name = "one flexible link"
@@ -139,6 +144,24 @@ def test_a_climb_saves_loads_and_draws(found: Climb, tmp_path: Path) -> None:
     axes = found.plot().axes
     assert [text.get_text() for text in axes[1].get_xticklabels()] == [level.name for level in found.levels]
     assert list(found.to_frame()["level"]) == [level.name for level in found.levels]
+
+
+def test_the_start_of_a_level_is_simulated_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    starts: list[tuple[Model, bytes]] = []
+    simulated = OutputErrorProblem.evaluate
+
+    def counted(
+        self: OutputErrorProblem, model: Model, theta: Array, columns: Sequence[int] = ()
+    ) -> tuple[Array, Array]:
+        starts.append((model, theta.tobytes()))
+        return simulated(self, model, theta, columns)
+
+    monkeypatch.setattr(OutputErrorProblem, "evaluate", counted)
+    stiff = arm("rigid", lag="{ value = 0.002, uncertainty = 0.002 }")
+    record = swing(arm("rigid"), 1, 5.0)
+    climb(stiff, record, validate=swing(arm("rigid"), 2, 6.3), channels=SHOWN[:1])
+    first = starts[0]
+    assert sum(each[0] is first[0] and each[1] == first[1] for each in starts) == 1
 
 
 def test_levels_end_with_the_models_own() -> None:

@@ -82,6 +82,18 @@ def test_the_coarsest_come_first_and_what_is_dear_is_not_fitted(ladder: Ladder, 
     assert not any("elements" in change for rung in ladder.rungs for change in rung.removed)
 
 
+def test_what_cannot_win_is_not_judged(ladder: Ladder) -> None:
+    ways: dict[tuple[str, ...], list[float]] = {}
+    for rung in ladder.rungs:
+        ways.setdefault(rung.removed, []).append(rung.error)
+        # Hinges between rigid segments have no terms of second order.
+        for strip in ("strip_1", "strip_2"):
+            hinged = any(change.startswith((f"{strip} as lumped", f"{strip} as rigid")) for change in rung.removed)
+            assert not (hinged and f"{strip} without second-order terms" in rung.removed)
+    # Two integrators show the same error: that of the model, which a third one would show again.
+    assert len(ways["strip_1 as rigid", "strip_2 as rigid"]) == 2
+
+
 def test_the_choice_is_timed_as_the_budget_does(ladder: Ladder) -> None:
     assert 10_000 <= ladder.budget.steps <= 100_000
     assert ladder.budget.integrator == ladder.chosen.integrator

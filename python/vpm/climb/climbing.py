@@ -24,6 +24,23 @@ SURE, WORTH = 2.0, 0.02
 SEEN = 1e-6
 
 
+class _Remembered(OutputErrorProblem):
+    """A problem that remembers its last derivatives: what a level shows at its start is where its fit begins."""
+
+    _last: tuple[Model, Array, tuple[int, ...], tuple[Array, Array]] | None = None
+
+    def evaluate(self, model: Model, theta: Array, columns: Sequence[int] = ()) -> tuple[Array, Array]:
+        """Residual and derivative, see `Problem`; from memory where no more is asked than was asked last."""
+        if self._last is not None:
+            of, at, known, (residual, jacobian) = self._last
+            if of is model and set(columns) <= set(known) and np.array_equal(at, theta):
+                return residual.copy(), jacobian[:, [known.index(column) for column in columns]]
+        found = super().evaluate(model, theta, columns)
+        if columns:
+            self._last = (model, theta.copy(), tuple(columns), found)
+        return found
+
+
 @dataclass(frozen=True)
 class _Data:
     """What a level is fitted to, and judged on."""
@@ -105,7 +122,7 @@ def climb(
     say = tell or (lambda _: None)
     records, unseen = as_records(experiments), as_records(validate)
     mode = mode or judging_mode(model, records)
-    data = _Data(*(OutputErrorProblem(model, each, mode, channels=channels, setup=setup) for each in (records, unseen)))
+    data = _Data(*(_Remembered(model, each, mode, channels=channels, setup=setup) for each in (records, unseen)))
     offered = families(model)
     reached: list[_Reached] = []
     vain = 0
@@ -187,6 +204,8 @@ def _climbed(name: str, machine: Model, data: _Data, below: _Reached | None, bes
 def _start(machine: Model, known: dict[str, float], problem: OutputErrorProblem) -> Model:
     """Where the level below left its parameters, or where the model has them if that is nearer to the data."""
     learnt = machine.with_parameters({key: value for key, value in known.items() if key in machine.parameters})
+    if np.array_equal(learnt.theta, machine.theta):
+        return machine
     costs = []
     for each in (learnt, machine):
         residual, _ = problem.evaluate(each, each.theta)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -96,7 +96,7 @@ class Trials:
 
     def changes_of(self, rung: Rung) -> Changes:
         """Changes that gave a rung."""
-        return next(tuple(key) for key in self._rungs if sorted(map(str, key)) == sorted(rung.removed))
+        return next(_in_order(key) for key in self._rungs if sorted(map(str, key)) == sorted(rung.removed))
 
     def cheapest(self, changes: Changes, limit: float) -> Rung | None:
         """Cheapest rung of these changes whose error is within a limit."""
@@ -115,7 +115,7 @@ class Trials:
         below : float
             Time of a period at a glance (s) from which on nobody asks for the model.
         """
-        key = frozenset(changes)
+        key, changes = frozenset(changes), _in_order(changes)
         if key not in self._rungs:
             try:
                 model = reduced(self.model, changes)
@@ -264,6 +264,11 @@ class Trials:
         if steps > TIMED_STEPS[0]:
             times = step_times(model, rate, setup, steps, inputs, PRIORITY, start)
         return float(np.median(times)), float(np.quantile(times, 0.999))
+
+
+def _in_order(changes: Collection[Reduction]) -> Changes:
+    """Changes by their words, terms of the equations last."""
+    return tuple(sorted(changes, key=lambda change: (change.kind == "terms", str(change))))
 
 
 def _agree(rungs: Sequence[Rung]) -> bool:
