@@ -11,8 +11,9 @@ import pytest
 import vpm
 from vpm.discrepancy.candidates import Candidate
 from vpm.discrepancy.confirmation import is_clear
+from vpm.discrepancy.first_step import softened
 from vpm.discrepancy.round import Round, _twins
-from vpm.discrepancy.screening import Probe, softened
+from vpm.discrepancy.screening import Probe, _stepped
 from vpm.identify import Estimate, InverseDynamicsProblem, Worth, estimate
 
 DT = 1e-3
@@ -57,6 +58,21 @@ def test_a_spring_in_series_is_found_from_starts_far_stiffer(start: float) -> No
 
 def test_what_comes_out_stiffer_than_rigid_stays_as_it_is() -> None:
     assert softened(100.0, 250.0, 3.0) == (250.0, 3.0)
+
+
+@pytest.mark.parametrize(("loss", "stays"), [(-3.0, True), (3.0, False)])
+def test_a_loss_that_one_step_has_negative_stays_at_its_start(loss: float, stays: bool) -> None:
+    """Stiffness and loss from a start at (10, 1), where a loss of -3 would end below zero."""
+    phase = np.linspace(0.0, 60.0, 3000)
+    columns = np.column_stack([np.sin(phase), np.cos(phase)])
+    noise = 0.1 * np.random.default_rng(0).standard_normal(phase.size)
+    residual = -columns @ np.array([-4.0, loss]) + noise
+    data: Any = SimpleNamespace(blocks=[SimpleNamespace(samples=slice(0, phase.size))])
+    base: Any = SimpleNamespace(free=(), pushed={})
+    values, std, left = _stepped(base, data, columns, residual, np.array([10.0, 1.0]), [1])
+    assert values[0] == pytest.approx(-4.0, abs=0.02)
+    assert (values[1] == 0.0) == np.isinf(std[1]) == stays
+    assert left > 0.2 * float(residual @ residual) if stays else left < 0.01 * float(residual @ residual)
 
 
 def test_a_joint_that_winds_up_is_balanced_with_the_memory_of_its_motor_side() -> None:

@@ -13,7 +13,8 @@ import numpy as np
 
 from vpm.discrepancy.choice import Accepted, alike
 from vpm.discrepancy.confirmation import Judged
-from vpm.discrepancy.screening import Probe, linear_step
+from vpm.discrepancy.first_step import linear_step
+from vpm.discrepancy.screening import Probe
 from vpm.identify import InverseDynamicsProblem
 from vpm.identify.identifiability import COPY_SHARE, explained_share
 from vpm.identify.statistics import NORMAL_95

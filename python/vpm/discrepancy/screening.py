@@ -14,12 +14,13 @@ from numpy.typing import NDArray
 from scipy.special import chdtri
 
 from vpm.discrepancy.candidates import Candidate
+from vpm.discrepancy.first_step import is_outside, linear_step, softened, step_without
 from vpm.discrepancy.place import free_place
 from vpm.discrepancy.play import believed, is_read_off, read_off
-from vpm.discrepancy.structural import in_series
-from vpm.identify import InverseDynamicsProblem, robust_covariance, segments
+from vpm.discrepancy.structural import LOSSES, in_series
+from vpm.identify import InverseDynamicsProblem
 from vpm.identify.along import bends
-from vpm.identify.identifiability import closest_column, column_lengths, is_alias
+from vpm.identify.identifiability import closest_column, is_alias
 from vpm.identify.tangent import has_tangent
 from vpm.model import Model
 
@@ -154,13 +155,8 @@ def refit_effort(probe: Probe) -> float:
 
 def impossible_values(probe: Probe) -> list[str]:
     """Parameters whose estimate lies outside the physical range by more than one standard deviation."""
-    outside = []
-    for name in probe.free:
-        parameter = probe.model.parameters[name]
-        value, std = probe.values[name], probe.std[name]
-        if value + std < parameter.minimum or value - std > parameter.maximum:
-            outside.append(name)
-    return outside
+    known = probe.model.parameters
+    return [name for name in probe.free if is_outside(known[name], probe.values[name], probe.std[name])]
 
 
 def size_is_clear(names: Sequence[str], values: Array, covariance: Array) -> bool:
@@ -208,13 +204,7 @@ def _probe_start(
     chosen = np.column_stack([known, fresh[:, keep]])
     names = (*base.free, *(added[i] for i in keep))
     start_values = np.concatenate([np.zeros(len(base.free)), model.theta[[columns[i] for i in keep]]])
-    values, std, left = linear_step(data, chosen, residual)
-    outwards = [i for i, name in enumerate(base.free) if base.pushed.get(name, 0) * values[i] > 0.0]
-    if outwards:
-        # What a bound holds stays there: beyond it, it would seem to explain what no fit can.
-        moves = [i for i in range(len(names)) if i not in outwards]
-        values, std = np.zeros(len(names)), np.zeros(len(names))
-        values[moves], std[moves], left = linear_step(data, chosen[:, moves], residual)
+    values, std, left = _stepped(base, data, chosen, residual, start_values, _losses(model, candidate, names))
     if still:
         values, (_, _, left) = np.zeros_like(values), linear_step(data, known, residual)
     power = float(base.residual @ base.residual)
@@ -238,17 +228,31 @@ def _probe_start(
     return Probe(candidate, model, free, held, invisible, estimates, deviations, drop)
 
 
-def softened(start: float, estimate: float, std: float) -> tuple[float, float]:
-    """Stiffness of a spring in series after the same step, taken in its compliance, with its standard deviation.
+def _stepped(
+    base: Baseline, data: InverseDynamicsProblem, jacobian: Array, residual: Array, start: Array, losses: Sequence[int]
+) -> tuple[Array, Array, float]:
+    """Step of the known parameters and those of a candidate, see `linear_step`; some of them stay where they are.
 
-    Under an effort F it gives way by F/k, which is linear in 1/k: from a start that is k0, a step dk is one of -dk/k0^2
-    in the compliance. Taken in k, a spring half as stiff as its start, or less, would come out below zero. What comes
-    out stiffer than rigid stays as it is.
+    What a bound holds stays there: beyond it, it would seem to explain what no fit can. A loss of a spring in series
+    that comes out negative stays at its ``start``: it shows with the square of the compliance, so that a step from a
+    start which is clearly stiffer or softer has it wrong, down to its sign. A refit finds it; whether there is a spring
+    at all, its stiffness tells.
     """
-    ratio = 2.0 - estimate / start if start > 0.0 else 0.0
-    if ratio <= 0.0:
-        return estimate, std
-    return start / ratio, std / ratio**2
+    values, std, left = linear_step(data, jacobian, residual)
+    held = [i for i, name in enumerate(base.free) if base.pushed.get(name, 0) * values[i] > 0.0]
+    if held:
+        values, std, left = step_without(data, jacobian, residual, held)
+    negative = [i for i in losses if start[i] + values[i] + std[i] < 0.0]
+    if negative:
+        values, std, left = step_without(data, jacobian, residual, (*held, *negative))
+        std[negative] = np.inf
+    return values, std, left
+
+
+def _losses(model: Model, candidate: Candidate, names: Sequence[str]) -> list[int]:
+    """Places of the losses of a spring in series among parameters."""
+    own = set(_added(model, candidate)) if in_series(candidate.effect.name) else set()
+    return [i for i, name in enumerate(names) if name in own and _short(model, candidate, name) in LOSSES]
 
 
 def _sizes(model: Model, candidate: Candidate, known: Sequence[str], added: Sequence[str]) -> tuple[Array, Array]:
@@ -289,15 +293,3 @@ def _sort_columns(
             held.append(Alias(added[i], names[closest_column(fresh[:, i], others)]))
             keep.remove(i)
     return keep, tuple(held), invisible
-
-
-def linear_step(data: InverseDynamicsProblem, jacobian: Array, residual: Array) -> tuple[Array, Array, float]:
-    """Unbounded least-squares step, its standard deviations and the remaining sum of squares."""
-    if jacobian.shape[1] == 0:
-        return np.zeros(0), np.zeros(0), float(residual @ residual)
-    lengths = column_lengths(jacobian)
-    scaled = jacobian / lengths
-    step = np.linalg.lstsq(scaled, -residual, rcond=1e-10)[0]
-    left = residual + scaled @ step
-    std = np.sqrt(np.diag(robust_covariance(scaled, left, segments(data)))) / lengths
-    return step / lengths, std, float(left @ left)

@@ -26,6 +26,8 @@ STRUCTURAL = frozenset({"joint_compliance", "backlash", "link_flexibility"})
 HIDING = STRUCTURAL
 #: Their springs, which lie between motor and link, so that a softer one does more.
 SERIES = "stiffness"
+#: What of these springs turns motion into heat, by short names.
+LOSSES = ("damping", "time")
 #: Frequencies at which a spring lets the link swing behind a motor that stands still, Hz, and damping ratios there.
 FREQUENCIES = (3.0, 8.0, 20.0, 50.0)
 LOOSE, CONTACT = 0.05, 0.1
