@@ -408,7 +408,7 @@ def test_changes_that_cannot_be_made(emps: Model) -> None:
         emps.with_parameters({"carriage.mass": 1001.0})
     with pytest.raises(ModelError, match="its effects are: viscous_friction at axis"):
         emps.without_effect("spring", at="axis")
-    with pytest.raises(ModelError, match="has no effect spring at \"axis\""):
+    with pytest.raises(ModelError, match='has no effect spring at "axis"'):
         emps.effect("spring", at="axis")
     with pytest.raises(AttributeError, match="use with_parameters"):
         emps.name = "other"  # type: ignore[misc]

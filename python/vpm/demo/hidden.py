@@ -71,7 +71,11 @@ HIDDEN: Mapping[str, Hidden] = MappingProxyType(
         "backlash": Hidden(
             Machine(gear_stiffness=600.0, gear_damping=0.6, gear_play=0.03, rotor=0.02),
             "shoulder",
-            {"shoulder.backlash.gap": 0.03, "shoulder.backlash.inertia": 0.02},
+            {
+                "shoulder.backlash.gap": 0.03,
+                "shoulder.backlash.stiffness": 600.0,
+                "shoulder.backlash.inertia": 0.02,
+            },
         ),
         "joint_compliance": Hidden(
             Machine(gear_stiffness=80.0, gear_damping=0.6, rotor=0.03),

@@ -17,6 +17,7 @@ from vpm.discrepancy.ambiguity import Rivals, listed, rivals
 from vpm.discrepancy.candidates import slow_speeds
 from vpm.discrepancy.choice import Accepted
 from vpm.discrepancy.confirmation import Data, Judged, is_clear, judge
+from vpm.discrepancy.contacts import told_by_runs
 from vpm.discrepancy.diagnosis import (
     AcceptedEffect,
     ChannelGap,
@@ -204,7 +205,8 @@ def _settled(
     changed, known = replaced(found, known, data)
     if changed is not found and len(changed.accepted) > 1:
         known = rivals(changed.final, data, changed.accepted, effects, each)
-    return in_order(changed, known)
+    changed, known = in_order(changed, known)
+    return told_by_runs(changed, data, each), known
 
 
 def _until_stopped(work: Callable[[], Found], nothing: Found) -> tuple[Found, bool]:
