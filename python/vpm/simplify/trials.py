@@ -120,7 +120,7 @@ class Trials:
             try:
                 model = reduced(self.model, changes)
                 glances = self._glances(model)
-                self._glanced[key] = min(glances.values(), default=0.0)
+                self._glanced[key] = min(map(_period, glances.values()), default=0.0)
                 if changes and self._glanced[key] > min(below, self._dear()):
                     self._cut.add(key)
                     return []
@@ -176,25 +176,27 @@ class Trials:
         least = min((rung.seconds for rung in self._everything() if rung.error <= enough), default=np.inf)
         return SPARE * least + CLOCK
 
-    def _glances(self, model: Model) -> Mapping[str, float]:
-        """Seconds of a period in one step of each integrator, where a glance can tell."""
+    def _glances(self, model: Model) -> Mapping[str, tuple[int, float]]:
+        """Fewest steps in a period with which each integrator works at a glance, and seconds of one of them."""
         found = {}
         for integrator in FIXED_STEP:
-            try:
-                found[integrator] = self._glance(model, Setup(integrator))
-            except SimulationError as error:
-                self.reason = str(error)
+            for substeps in SUBSTEPS:
+                try:
+                    found[integrator] = substeps, self._glance(model, Setup(integrator, substeps)) / substeps
+                    break
+                except SimulationError as error:
+                    self.reason = str(error)
         return found
 
     def _glance(self, model: Model, setup: Setup) -> float:
         inputs, start = self.courses.of(model)
         return float(np.min(step_times(model, self.judge.rate, setup, GLANCE, inputs, start=start)))
 
-    def _step(self, changes: Changes, glances: Mapping[str, float]) -> None:
-        """Every integrator with one step in a period, the quickest first; then more steps where they could pay."""
-        for integrator in sorted(FIXED_STEP, key=lambda name: glances.get(name, np.inf)):
-            for substeps in SUBSTEPS:
-                if self._is_hopeless(changes, integrator, substeps, glances.get(integrator)):
+    def _step(self, changes: Changes, glances: Mapping[str, tuple[int, float]]) -> None:
+        """Every integrator with its fewest steps in a period, the quickest first; then more where they could pay."""
+        for integrator, (fewest, glance) in sorted(glances.items(), key=lambda item: _period(item[1])):
+            for substeps in SUBSTEPS[SUBSTEPS.index(fewest) :]:
+                if self._is_hopeless(changes, glance * substeps):
                     break
                 # Too long a step for this integrator: perhaps a shorter one.
                 if self._add(changes, Setup(integrator, substeps)) is not None:
@@ -216,21 +218,21 @@ class Trials:
                 return
             rung = finer
 
-    def _is_hopeless(self, changes: Changes, integrator: str, substeps: int, glance: float | None) -> bool:
-        """Whether a way takes so much longer than one that works, or that loses next to nothing, that none takes it."""
-        known = self._rungs[frozenset(changes)]
+    def _is_hopeless(self, changes: Changes, glance: float) -> bool:
+        """Whether a way takes so much longer at a glance than one that works that none takes it.
+
+        All that is within reach of the period is tried with the full model: what it errs is the measure of the others.
+        """
+        known, enough = self._rungs[frozenset(changes)], self._enough()
         fastest = min((rung.seconds for rung in known), default=np.inf)
-        if glance is None:
-            try:
-                glance = self._glance(self._models[frozenset(changes)], Setup(integrator, substeps)) / substeps
-            except SimulationError as error:
-                self.reason = str(error)
-                return False
-        few, enough = glance * substeps, self._enough()
-        if few > self._dear() or (few * self.judge.rate > 1.0 and few > SLOWER * fastest):
+        if glance * self.judge.rate > 1.0 and glance > SLOWER * fastest:
+            return True
+        if not changes:
+            return False
+        if glance > self._dear():
             return True
         good = min((rung.seconds for rung in known if rung.error <= enough), default=np.inf)
-        return few > ALIKE * good or (few > fastest and _agree(known))
+        return glance > ALIKE * good or (glance > fastest and _agree(known))
 
     def _add(self, changes: Changes, setup: Setup, demanded: float = np.inf) -> Rung | None:
         """The rung of one way, if it works and its error is less than what is demanded."""
@@ -264,6 +266,12 @@ class Trials:
         if steps > TIMED_STEPS[0]:
             times = step_times(model, rate, setup, steps, inputs, PRIORITY, start)
         return float(np.median(times)), float(np.quantile(times, 0.999))
+
+
+def _period(glance: tuple[int, float]) -> float:
+    """Seconds of a period in so many steps of so many seconds."""
+    substeps, seconds = glance
+    return substeps * seconds
 
 
 def _in_order(changes: Collection[Reduction]) -> Changes:
