@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from vpm.catalogue import EFFECTS
 from vpm.compare import compare
 from vpm.discrepancy.ambiguity import Rivals, listed, rivals
+from vpm.discrepancy.beliefs import moved_far
 from vpm.discrepancy.candidates import slow_speeds
 from vpm.discrepancy.choice import Accepted
 from vpm.discrepancy.confirmation import Data, Judged, is_clear, judge
@@ -56,8 +57,6 @@ STOPPED = "stopped by Ctrl-C before every candidate was tried: this is what was 
 STOPPED_LATE = "stopped by Ctrl-C before what is left, and what else would do, was examined"
 #: Stated uncertainties, on a logarithmic scale, that a recalibration may move what the model is not linear in.
 REACH = 4.0
-#: Parameters that move by more of their stated uncertainties than this are reported.
-FAR = 3.0
 
 Tell = Callable[[str], None]
 Found = TypeVar("Found")
@@ -140,7 +139,7 @@ def diagnose(
     bounds = {**_within_reach(model, free), **transitions}
     recalibrated = judge(model, (*free, *transitions), data, bounds)
     data.training.workers = 1  # candidates share the cores from here on
-    notes.extend(_moved_far(model, recalibrated))
+    notes.extend(moved_far(model, recalibrated))
     each = SideBySide(workers, progress)
     found = search(recalibrated, data, effects, limit, say, each)
     if found.interrupted:
@@ -306,19 +305,6 @@ def _within_reach(model: Model, free: Sequence[str]) -> dict[str, tuple[float, f
             factor = float(np.exp(REACH * spread / value))
             found[name] = max(parameter.minimum, value / factor), min(parameter.maximum, value * factor)
     return found
-
-
-def _moved_far(model: Model, recalibrated: Judged) -> list[str]:
-    notes = []
-    for name in recalibrated.free:
-        before, after = model.parameters[name], recalibrated.model.parameters[name]
-        spread = before.uncertainty
-        if spread is not None and 0.0 < spread < np.inf and abs(after.value - before.value) > FAR * spread:
-            notes.append(
-                f"recalibration moved {name} from {before.value:.5g} to {after.value:.5g} {before.unit}, "
-                f"{abs(after.value - before.value) / spread:.1f} times its stated uncertainty"
-            )
-    return notes
 
 
 def _rest(recalibrated: Judged, found: Search, data: Data, workers: int | None) -> Remainder:

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from scipy.special import ndtri
 
+from vpm.discrepancy.beliefs import driven_away
 from vpm.discrepancy.confirmation import Data, Judged
 from vpm.discrepancy.diagnosis import ChannelGap
 from vpm.discrepancy.refusal import FALSE_ALARM_LEVEL, LEAST_GAIN, NEGLIGIBLE
@@ -77,6 +78,14 @@ def verdict(
     share_left = (worst.after / worst.recalibrated) ** 2 if worst.recalibrated > 0.0 else 0.0
     mostly_open = structured and share_left > MOSTLY_OPEN
     mostly_open = mostly_open or (rest is not None and (rest.open > MOSTLY_OPEN or rest.instead))
+    away = driven_away(nominal.model, recalibrated, found.final) if found.accepted else {}
+    if found.accepted and away and not found.interrupted:
+        return (
+            "unexplained",
+            "Only together with values that the model file rules out do effects of the catalogue explain the gap: with "
+            f"{names}, {_farthest(away)}. Error on unseen data: {numbers}, {_percent(worst.after, worst)} after.",
+            True,
+        )
     if found.accepted and mostly_open:
         return (
             "unexplained",
@@ -100,6 +109,12 @@ def verdict(
             True,
         )
     return (*_nothing_missing(data, nominal, recalibrated, main, numbers), False)
+
+
+def _farthest(away: Mapping[str, float]) -> str:
+    """The parameter that stands farthest from what the model file says of it."""
+    name, times = next(iter(away.items()))
+    return f"{name} would be off by {times:.1f} times its stated uncertainty"
 
 
 def _nothing_missing(

@@ -1,0 +1,62 @@
+"""What a model file believes of its parameters, beside what a fit makes of them.
+
+A stated uncertainty is a measurement that somebody made. An effect that is the explanation brings the known parameters
+back to it; one that only together with a shifted centre of mass draws the shape of another force takes them away: a
+spring and a pendulum that hangs upwards are a spring that hardens.
+"""
+
+from __future__ import annotations
+
+from vpm.discrepancy.confirmation import Judged
+from vpm.identify.statistics import NORMAL_95
+from vpm.model import Model
+
+#: Parameters that move by more of their stated uncertainties than this are reported, and no effect is believed that
+#: drives one so far.
+FAR = 3.0
+
+
+def moved_far(model: Model, recalibrated: Judged) -> list[str]:
+    """Notes on parameters that a recalibration has moved far from a model file."""
+    notes = []
+    for name in recalibrated.free:
+        before, after = model.parameters[name], recalibrated.model.parameters[name]
+        spread = before.uncertainty
+        if spread is not None and 0.0 < spread < float("inf") and abs(after.value - before.value) > FAR * spread:
+            notes.append(
+                f"recalibration moved {name} from {before.value:.5g} to {after.value:.5g} {before.unit}, "
+                f"{abs(after.value - before.value) / spread:.1f} times its stated uncertainty"
+            )
+    return notes
+
+
+def driven_away(nominal: Model, recalibrated: Judged, final: Judged) -> dict[str, float]:
+    """Parameters that effects surely drive far from what the model file says of them.
+
+    Parameters
+    ----------
+    nominal : Model
+        As the file has it.
+    recalibrated, final : Judged
+        Without the effects, and with them.
+
+    Returns
+    -------
+    dict of str to float
+        Stated uncertainties by which the parameter stands away, the farthest first. Those are left out that were as far
+        before, for then the file is wrong whatever is missing, and those that the data hardly show beside the effects.
+    """
+    found = {}
+    for name, std in zip(final.free, final.fit.std, strict=True):
+        if name not in nominal.parameters or name not in recalibrated.model.parameters:
+            continue
+        told = nominal.parameters[name]
+        spread = told.uncertainty
+        if spread is None or not 0.0 < spread < float("inf"):
+            continue
+        after = final.model.parameters[name].value
+        away = abs(after - told.value) - NORMAL_95 * float(std)
+        moved = abs(after - recalibrated.model.parameters[name].value)
+        if min(away, moved) > FAR * spread:
+            found[name] = abs(after - told.value) / spread
+    return dict(sorted(found.items(), key=lambda item: -item[1]))
