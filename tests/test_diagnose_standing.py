@@ -14,8 +14,8 @@ from vpm.discrepancy.ambiguity import Rivals
 from vpm.discrepancy.candidates import candidates
 from vpm.discrepancy.screening import Baseline, probe
 from vpm.discrepancy.search import Search
-from vpm.discrepancy.standing import in_order
-from vpm.identify import InverseDynamicsProblem, estimate
+from vpm.discrepancy.standing import earned, in_order
+from vpm.identify import Gain, InverseDynamicsProblem, estimate
 
 
 def test_a_spring_takes_the_place_of_the_constant_force_that_was_the_plainer_name() -> None:
@@ -63,6 +63,14 @@ def test_a_spring_is_screened_with_the_place_where_it_rests() -> None:
     assert found.drop > 0.99
     for short, value in hidden.parameters.items():
         assert found.values[f"axis.spring.{short}"] == pytest.approx(value, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("left", "more", "paid"), [(0.999, 0, True), (0.999, 1, False), (0.99, 1, True), (0.99, 3, False), (1.01, 0, False)]
+)
+def test_a_rival_earns_its_additional_numbers_where_they_were_fitted(left: float, more: int, paid: bool) -> None:
+    """Of 1000 independent pieces a number has to take 0.7 % of the mean square."""
+    assert earned(Gain(1.0, float(np.sqrt(left)), 1.0, 3.0, 1000), more) == paid
 
 
 @dataclass

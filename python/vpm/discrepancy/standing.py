@@ -21,7 +21,7 @@ from vpm.discrepancy.finer import contains
 from vpm.discrepancy.motion_only import LATE_OR_SLOW
 from vpm.discrepancy.refusal import LEAST_GAIN, NORMAL_95_ONE_SIDED, Thresholds, refuse_trial
 from vpm.discrepancy.search import Search
-from vpm.identify import gain, segments
+from vpm.identify import Gain, gain, segments
 
 
 def replaced(found: Search, known: Sequence[Rivals], data: Data) -> tuple[Search, tuple[Rivals, ...]]:
@@ -61,7 +61,8 @@ def _preferred(final: Judged, entry: Accepted, trial: Trial, data: Data, thresho
     judged = trial.judged
     fitted = gain(final.fit.residual, judged.fit.residual, segments(data.training))
     unseen = gain(final.unseen, judged.unseen * shrinkage(data.unseen, final, judged), segments(data.unseen))
-    if fitted.relative <= 0.0 or unseen.score < thresholds.score(unseen.pieces):
+    more = len(trial.parameters) - len(entry.trial.parameters)
+    if not earned(fitted, more) or unseen.score < thresholds.score(unseen.pieces):
         return 0.0
     finer = contains(judged, trial.parameters, final, entry.trial.parameters)
     shown = finer and fitted.score >= thresholds.score(fitted.pieces)
@@ -72,6 +73,24 @@ def _preferred(final: Judged, entry: Accepted, trial: Trial, data: Data, thresho
         if simulated.harm > NORMAL_95_ONE_SIDED and simulated.relative < -LEAST_GAIN:
             return 0.0
     return unseen.score
+
+
+def earned(fitted: Gain, more: int) -> bool:
+    """Whether a rival lowers the training error by what its additional numbers cost.
+
+    By the information criterion of G. Schwarz (*Annals of Statistics* 6, 1978): numbers that the records they were
+    fitted to do not show tell nothing of other records, where a law of dry friction is wrong in a few reversals.
+
+    Parameters
+    ----------
+    fitted : Gain
+        Of the training records, from the effect to the rival.
+    more : int
+        Numbers that the rival has more than the effect.
+    """
+    pieces = max(fitted.pieces, 3)
+    left = max(1.0 - fitted.relative, 1e-12)
+    return fitted.relative > 0.0 and float(np.log(left)) + max(more, 0) * np.log(pieces) / pieces < 0.0
 
 
 def _exchanged(
