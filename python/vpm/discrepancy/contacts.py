@@ -101,13 +101,13 @@ def beginnings(records: Sequence[Experiment]) -> list[Experiment]:
 
 def _told(model: Model, key: Key) -> tuple[str, ...]:
     """Parameters of a play that a run tells, by dotted name."""
-    effect = next(e for e in model.effects if (e.name, e.at) == key)
+    effect = model.effect(*key)
     return tuple(effect.parameter_names[short] for short in TOLD)
 
 
 def with_contact(model: Model, key: Key, frequency: float, ratio: float) -> Model:
     """The model with contacts on which the link swings at a frequency, Hz, while the motor stands."""
-    effect = next(e for e in model.effects if (e.name, e.at) == key)
+    effect = model.effect(*key)
     stiffness = moved(model, key[1]) * (2.0 * math.pi * frequency) ** 2
     values = {effect.parameter_names["stiffness"]: stiffness}
     return _damped(model.with_parameters(values), key, ratio)
@@ -115,7 +115,7 @@ def with_contact(model: Model, key: Key, frequency: float, ratio: float) -> Mode
 
 def _damped(model: Model, key: Key, ratio: float) -> Model:
     """The model with another damping ratio of its contacts."""
-    names = next(e for e in model.effects if (e.name, e.at) == key).parameter_names
+    names = model.effect(*key).parameter_names
     stiffness = model.parameters[names["stiffness"]].value
     resistance = 2.0 * ratio * math.sqrt(stiffness * moved(model, key[1]))
     return model.with_parameters({names["contact_damping"]: resistance})
