@@ -13,6 +13,7 @@ from vpm.discrepancy.motion_only import CREEPING, Timed, is_dry, is_late
 from vpm.discrepancy.own_run import OwnRun
 from vpm.discrepancy.screening import Alias, Baseline, Probe, size_is_clear
 from vpm.discrepancy.slow import has_impacts, slow
+from vpm.discrepancy.starting import nearer_start
 from vpm.errors import DivergedError
 from vpm.identify import (
     Estimate,
@@ -179,6 +180,7 @@ def confirm(current: Judged, data: Data, probe: Probe, rival: float = np.inf) ->
     """
     bounds = {**current.bounds, **_bounds(probe)}
     start = probe.model.with_parameters(_inside(probe, bounds))
+    start = nearer_start(start, probe.free, current.free, data.training)
     free = (*current.free, *probe.free)
     held: tuple[Alias, ...] = ()
     origin, still = _origin(data.training, probe, start), _still(data.training, probe)

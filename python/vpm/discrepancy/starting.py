@@ -1,0 +1,51 @@
+"""Where the refit of a candidate begins: at what the recalibration left of known parameters, or at what the file says.
+
+A drive with states of its own sums up what its command does. Without an effect of that command a recalibration can only
+make the drive answer less, with oil that is soft and a valve that hardly opens, up to the bounds of what is believed.
+From there the true values of both lie behind a ridge once the effect is there, while those of the file are near.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from vpm.errors import DivergedError
+from vpm.identify import InverseDynamicsProblem
+from vpm.identify.along import has_hidden, has_own_drives
+from vpm.identify.drives_apart import moves_drives
+from vpm.model import Model
+
+
+def nearer_start(start: Model, added: Sequence[str], known: Sequence[str], data: InverseDynamicsProblem) -> Model:
+    """The start, or the same with the ``known`` parameters of the model file, if that leaves less of the records.
+
+    Where nothing of the drives changes, or they have no states, a fit is linear enough to end at one place from both.
+
+    Parameters
+    ----------
+    start : Model
+        With the candidate at its estimated values, and what is known as it was fitted without it.
+    added : sequence of str
+        Dotted names of the candidate's own parameters.
+    known : sequence of str
+        Free parameters of the model without the candidate.
+    data : InverseDynamicsProblem
+    """
+    if not has_own_drives(start) or any(has_hidden(start, m.joints) for m in data.motions):
+        return start
+    shared = {name: data.nominal.parameters[name].value for name in known if name in data.nominal.parameters}
+    if not shared or not any(moves_drives(start, name) for name in added):
+        return start
+    stated = start.with_parameters(shared)
+    return min((start, stated), key=lambda model: _left(model, data))
+
+
+def _left(model: Model, data: InverseDynamicsProblem) -> float:
+    """Sum of squares that a model leaves; infinite where it cannot follow the motion."""
+    try:
+        residual, _ = data.evaluate(model, model.theta)
+    except DivergedError:
+        return np.inf
+    return float(residual @ residual)
