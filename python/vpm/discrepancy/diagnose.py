@@ -165,7 +165,7 @@ def diagnose(
         if accepted:
             empirical, final = beside(found.final, empirical, final, data)
         gap = _gaps(data, nominal, recalibrated, final, floor)
-        summary = f"{summary} {empirical.sentence}"
+        summary = f"{summary} {empirical.sentence}" + (f" {rest.seals.sentence}" if rest.seals is not None else "")
     if not accepted:
         ambiguous = ()
     say("looking for the experiment that tells effects apart")

@@ -19,6 +19,7 @@ from vpm.discrepancy.diagnosis import Empirical
 from vpm.discrepancy.empirical import describe
 from vpm.discrepancy.motion_only import LATE
 from vpm.discrepancy.refusal import WORTH_A_NAME, Thresholds
+from vpm.discrepancy.seals import Seals, seals
 from vpm.discrepancy.timing import in_time
 from vpm.identify import gain, segments
 from vpm.identify.parallel import in_order
@@ -56,13 +57,17 @@ class Remainder:
         Share that the effects leave of the mean square that a fit finds in the recalibrated residual; 0 where nothing
         repeats.
     instead : bool
-        Whether a fit in the place of the effects, with no more numbers, leaves less than ``HALF`` of what they leave.
+        Whether a fit in the place of the effects, with no more numbers, leaves less than ``HALF`` of what they leave,
+        or friction of seals, which is one number of physics, surely less than they do.
+    seals : Seals or None
+        That friction, if it does.
     """
 
     choices: tuple[Described, ...]
     repeats: bool
     open: float
     instead: bool
+    seals: Seals | None = None
 
     @property
     def best(self) -> Described:
@@ -89,15 +94,17 @@ def remainder(recalibrated: Judged, final: Judged, data: Data, interval: float, 
     view = _View(data, motion_band(data.training, final.model), Thresholds(DESCRIBED, interval))
     left = view(final)
     clear = [view.clearly_better(choice, left) for choice in choices]
+    pressed = None if recalibrated is final else view.pressed(recalibrated, left)
     if not any(clear):
-        return Remainder(choices, repeats=False, open=0.0, instead=False)
+        return Remainder(choices, repeats=pressed is not None, open=0.0, instead=pressed is not None, seals=pressed)
     power, whole = _power(in_time(final, data).unseen), _power(_before(recalibrated, final, data))
     least = min(view.leaves(choice) for choice, better in zip(choices, clear, strict=True) if better)
     share = np.clip((power - least) / max(whole - least, 1e-300), 0.0, 1.0)
     plain = len(choices[0].judged.free) <= len(final.free)
     instead = recalibrated is not final and clear[0] and plain and not choices[0].told.remark
     instead = instead and _power(view(choices[0].judged)) < HALF * _power(left)
-    return Remainder(choices, repeats=True, open=float(share), instead=instead)
+    instead = instead or pressed is not None
+    return Remainder(choices, repeats=True, open=float(share), instead=instead, seals=pressed)
 
 
 def _described(base: Judged, data: Data) -> Described:
@@ -133,6 +140,14 @@ class _View:
             own = self(choice.base)
             return _power(own) - self._said(choice, own) < (1.0 - WORTH_A_NAME) * _power(left)
         return self.thresholds.met(gain(left, self(choice.judged), segments(self.data.unseen)))
+
+    def pressed(self, recalibrated: Judged, left: Array) -> Seals | None:
+        """Friction of seals that predicts more in the place of the effects than they do, as surely as one has to."""
+        found = seals(recalibrated, self.data)
+        if found is None:
+            return None
+        alone = below(self.data.unseen, found.unseen, self.frequency)
+        return found if self.thresholds.met(gain(left, alone, segments(self.data.unseen))) else None
 
     def leaves(self, choice: Described) -> float:
         """Sum of squares over all frequencies that a description leaves."""
