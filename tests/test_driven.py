@@ -13,7 +13,7 @@ from blind import Case, make_case
 from vpm.discrepancy.confirmation import Data, judge
 from vpm.discrepancy.driven import Verdict, compare_driven
 from vpm.discrepancy.motion_only import LATE
-from vpm.discrepancy.own_run import own_run
+from vpm.discrepancy.own_run import own_run, spectra, weighted
 from vpm.identify import InverseDynamicsProblem, OutputErrorProblem
 
 
@@ -125,3 +125,25 @@ def test_a_delay_of_a_machine_that_sticks_is_named() -> None:
     assert [effect.name for effect in why.effects] == ["input_delay"]
     truth = case.truth.hidden[0].parameters["time"]
     assert why.effects[0].parameters[0].value == pytest.approx(truth, rel=0.1)
+
+
+def test_one_noise_counts_once_however_many_readings_show_it() -> None:
+    generator = np.random.default_rng(5)
+    noise = generator.standard_normal((2000, 2)) + 1j * generator.standard_normal((2000, 2))
+    gap = generator.standard_normal((2000, 1)) + 1j * generator.standard_normal((2000, 1))
+    # The second reading shows the noise of the first once more, with a little of its own; the gap as well.
+    left = np.column_stack([noise[:, 0], noise[:, 0] + 0.01 * noise[:, 1]])
+    same, single = np.stack([gap, gap], axis=1), gap[:, None, :]
+    both, alone = (float(np.sum(weighted(*pair) ** 2)) for pair in ((same, left), (single, left[:, :1])))
+    assert both == pytest.approx(alone, rel=0.1)
+    # What shows in one reading alone stands out from what both share.
+    apart = np.stack([gap, np.zeros_like(gap)], axis=1)
+    assert float(np.sum(weighted(apart, left) ** 2)) > 1e3 * alone
+
+
+def test_readings_of_a_cylinder_go_with_its_joint_and_those_of_joints_alone() -> None:
+    case = make_case("servo_cylinder", "none", 5, recalibrate=False)
+    model = case.model()
+    problem = OutputErrorProblem(model, case.validate, "closed_loop")
+    (found,) = spectra(model, problem, np.zeros((problem.blocks[-1].samples.stop, 1)))
+    assert found.shape[1] == 3

@@ -77,7 +77,7 @@ def compare_driven(first: Judged, second: Judged, data: Data) -> Verdict | None:
 
 def _against(mine: OwnRun, rival: OwnRun) -> Spectra:
     """Transforms of what one run leaves, of the gap to its rival, and of its slopes."""
-    return spectra(mine.problem, np.column_stack([mine.left, mine.left - rival.left, mine.slopes]))
+    return spectra(mine.model, mine.problem, np.column_stack([mine.left, mine.left - rival.left, mine.slopes]))
 
 
 def _part(transforms: Spectra) -> tuple[float, float]:

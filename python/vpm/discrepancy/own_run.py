@@ -35,6 +35,8 @@ STEPS, MOST_STEPS = 3, 10
 TAPERED, LOWEST = 0.1, 2
 #: The spectrum of noise is the mean over this share of the frequencies, and over so many at least.
 SMOOTHED, FEWEST = 1.0 / 60.0, 15
+#: Share of the power of each reading that is taken for its own, so that readings that agree in all can be told apart.
+ALIKE = 1e-6
 #: Times that the spectrum is taken again from what is left.
 ROUNDS = 3
 #: Share of itself from which on a column stands beside others.
@@ -71,7 +73,7 @@ class OwnRun:
 
     def spectra(self) -> Spectra:
         """Transforms of what is left and of the slopes."""
-        return spectra(self.problem, np.column_stack([self.left, self.slopes]))
+        return spectra(self.model, self.problem, np.column_stack([self.left, self.slopes]))
 
     def estimated(self, name: str) -> tuple[float, float]:
         """A fitted parameter, and its standard deviation."""
@@ -104,34 +106,60 @@ def own_run(
     return found
 
 
-def spectra(problem: OutputErrorProblem, columns: Array) -> Spectra:
-    """Transforms of columns over all samples, for each reading; a command is what the controller made of readings."""
+def spectra(model: Model, problem: OutputErrorProblem, columns: Array) -> Spectra:
+    """Transforms of columns over all samples, for the readings of each joint and its drives (frequencies, k, columns).
+
+    A command is what the controller made of readings, and is left out.
+    """
     from scipy.signal.windows import tukey  # takes a second, and few need it
 
-    found: Spectra = []
+    groups: dict[tuple[str, str], Spectra] = {}
     for block in problem.blocks:
         if not block.channel.endswith(".command"):
             window = tukey(block.time.size, TAPERED)
-            found.append(np.fft.rfft(columns[block.samples] * window[:, None], axis=0)[LOWEST:])
-    return found
+            found = np.fft.rfft(columns[block.samples] * window[:, None], axis=0)[LOWEST:]
+            groups.setdefault((block.experiment, _read_with(model, block.channel)), []).append(found)
+    return [np.stack(group, axis=1) for group in groups.values()]
+
+
+def _read_with(model: Model, channel: str) -> str:
+    """What a reading goes with: of a drive with states of its own the joint that it moves."""
+    owner = channel.rpartition(".")[0]
+    if owner in model.actuators:
+        return model.joint_of_actuator(owner)
+    return owner if owner in model.joints else channel
 
 
 def weighted(spectrum: NDArray[np.complex128], left: NDArray[np.complex128]) -> Array:
-    """Real and imaginary parts relative to the noise, whose spectrum is the mean of what is left near a frequency."""
-    power = np.abs(left) ** 2
-    smooth = uniform_filter1d(power, max(FEWEST, int(SMOOTHED * power.size)), mode="reflect")
-    weight = np.sqrt(2.0 / np.maximum(smooth, 1e-12 * max(float(smooth.max()), 1e-300)))
-    return np.asarray(np.vstack([spectrum.real * weight[:, None], spectrum.imag * weight[:, None]]))
+    """Real and imaginary parts relative to the noise, whose spectrum is the mean of what is left near a frequency.
+
+    The noise of a drive shows in its pressures and in the motion at once: told apart, one noise would count as often as
+    it is read. So the readings of one drive are weighed by the whole matrix of their spectra.
+    """
+    readings = left.shape[1]
+    power = left[:, :, None] * left[:, None, :].conj()
+    length = max(FEWEST * readings, int(SMOOTHED * len(power)))
+    smooth = uniform_filter1d(power.real, length, axis=0, mode="reflect").astype(np.complex128)
+    if readings > 1:
+        smooth += 1j * uniform_filter1d(power.imag, length, axis=0, mode="reflect")
+    own = np.einsum("fii->fi", smooth).real
+    own = np.maximum(own, 1e-12 * np.maximum(own.max(axis=0), 1e-300))
+    scale = np.sqrt(own)
+    alike = smooth / (scale[:, :, None] * scale[:, None, :])
+    alike[:, range(readings), range(readings)] = 1.0 + ALIKE * (readings > 1)
+    apart = np.linalg.solve(np.linalg.cholesky(alike), spectrum / scale[:, :, None]) * np.sqrt(2.0)
+    rows = apart.reshape(-1, spectrum.shape[2])
+    return np.asarray(np.vstack([rows.real, rows.imag]))
 
 
 def least(transforms: Spectra) -> tuple[Array, Spectra, Array]:
     """The change that makes the first column least by all others, the noise that is left then, and weighted rows."""
-    noise = [s[:, 0] for s in transforms]
+    noise = [s[:, :, 0] for s in transforms]
     for _ in range(ROUNDS):
         rows = np.vstack([weighted(s, one) for s, one in zip(transforms, noise, strict=True)])
         lengths = column_lengths(rows[:, 1:])
         step = np.asarray(np.linalg.lstsq(rows[:, 1:] / lengths, -rows[:, 0], rcond=RANK)[0] / lengths)
-        noise = [s[:, 0] + s[:, 1:] @ step for s in transforms]
+        noise = [s[:, :, 0] + s[:, :, 1:] @ step for s in transforms]
     return step, noise, rows
 
 
@@ -182,7 +210,7 @@ def _step(run: OwnRun, setup: Setup) -> OwnRun | None:
             left, _ = problem.evaluate(model, model.theta)
         except VpmError:
             continue
-        transforms = spectra(problem, left[:, None])
+        transforms = spectra(model, problem, left[:, None])
         now = sum(float(np.sum(weighted(s, n) ** 2)) for s, n in zip(transforms, noise, strict=True))
         if now < cost:
             return _with_slopes(model, run.free, problem, left, setup)
