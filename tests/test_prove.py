@@ -123,6 +123,14 @@ def test_a_payload_behind_a_turning_axis_is_its_centre_and_inertia(seed: int) ->
     assert proving.absorbed("axis_rotary", "payload", "body")
 
 
+def test_where_a_machine_begins_says_nothing_of_its_encoder() -> None:
+    """On a level slide only the volumes of oil depend on the place; in gravity an offset shows wherever one begins."""
+    slide = make_case("servo_cylinder", "sensor_offset@encoder", 42, recalibrate=False)
+    assert slide.oracle.strength < 0.5
+    arm = make_case("arm2r", "sensor_offset@encoder_2", 5003, recalibrate=False)
+    assert arm.oracle.solvable
+
+
 def test_where_the_angle_of_a_level_arm_is_counted_from_shows_nowhere() -> None:
     """An offset of its first encoder leaves the log of an arm without one whose angles are all counted from there."""
     hidden = _plan(MACHINES["flexible_arm"], "sensor_offset@encoder_1", 1, 0.0, recalibrate=False)

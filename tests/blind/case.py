@@ -173,7 +173,19 @@ def _plan(machine: Machine, hidden: str | Sequence[str], seed: int, noise_level:
     truth = Truth(tuple(_as_catalogued(h, draft.values) for h in found), free, nominal, wrong)
     paths = _paths(machine, draft, _own_generator(machine, "motion", seed))
     varied = tuple(nominal) if recalibrate else ()
-    return Plan(machine, seed, noise_level, draft, base, truth, {**without, **keys}, without, varied, paths, own)
+    there, bare = {**without, **keys}, {**without, **_starts(machine.layout, keys)}
+    return Plan(machine, seed, noise_level, draft, base, truth, there, bare, varied, paths, own)
+
+
+def _starts(layout: Layout, keys: Mapping[str, float]) -> dict[str, float]:
+    """Where the machine without the effect begins: where its encoders read what those with an offset read.
+
+    What the loop makes of a first error of the place says where the machine was put, which no log knows, and nothing of
+    where its encoder has its zero.
+    """
+    shifts = {s.channel: keys.get(f"{s.name}.sensor_offset.value", 0.0) for s in layout.sensors}
+    moved = {channel.rpartition(".position")[0]: shift for channel, shift in shifts.items() if shift}
+    return {f"{joint}.start": shift for joint, shift in moved.items() if joint}
 
 
 def _drawn(machine: Machine, draft: Draft, effects: Sequence[tuple[str, str]], seed: int) -> list[Hidden]:

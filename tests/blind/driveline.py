@@ -45,7 +45,7 @@ class Driveline:
         self.half_gap = 0.5 * stack(columns, joints, "backlash.gap")
         self.soft = self.stiffness > 0.0
         self.any_soft, self.any_play = bool(self.soft.any()), bool(self.half_gap.any())
-        self.q, self.v, self.a = np.zeros(shape), np.zeros(shape), np.zeros(shape)
+        self.q, self.v, self.a = stack(columns, joints, "start"), np.zeros(shape), np.zeros(shape)
         self.motor_q, self.motor_v, self.motor_a = self.q, self.v, self.a
         self.impulse = np.zeros(shape)
         self.diagonal = np.where(self.soft, 0.0, self.rotor)

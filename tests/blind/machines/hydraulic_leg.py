@@ -67,7 +67,7 @@ class _Plant:
         self.oil = Cylinders(DRIVES, columns, "pump", step)
         self.triangles = Triangles()
         self.seal = stack(columns, DRIVES, "pressure_dependent_friction.area")
-        q = np.repeat(np.array(START)[:, None], len(columns), 1)
+        q = np.array(START)[:, None] + self.joints.q
         self.joints.q = self.joints.motor_q = q
         self.oil.start(links.load(q, np.zeros_like(q)) / self.triangles(q)[1])
 
