@@ -12,8 +12,9 @@ import vpm
 from vpm.discrepancy.candidates import Candidate
 from vpm.discrepancy.confirmation import is_clear
 from vpm.discrepancy.first_step import softened
-from vpm.discrepancy.round import Round, _twins
+from vpm.discrepancy.round import Round
 from vpm.discrepancy.screening import Probe, _stepped
+from vpm.discrepancy.short_list import same_models
 from vpm.identify import Estimate, InverseDynamicsProblem, Worth, estimate
 
 DT = 1e-3
@@ -131,10 +132,10 @@ def promise(name: str, drop: float, free: tuple[str, ...] = ("stiffness",)) -> P
 
 def test_a_link_that_bends_at_its_root_is_the_twin_of_a_drive_that_winds_up() -> None:
     soft, bent = promise("joint_compliance", 0.7), promise("link_flexibility", 0.7 * (1.0 + 1e-8))
-    assert _twins([soft, bent]) == {("link_flexibility", "axis"): ("joint_compliance", "axis")}
-    assert not _twins([soft, promise("link_flexibility", 0.7001)])
-    assert not _twins([soft, promise("link_flexibility", 0.7, ("stiffness", "time"))])
-    assert not _twins([promise("spring", 0.7), promise("bias_force", 0.7)])
+    assert same_models([soft, bent]) == {("link_flexibility", "axis"): ("joint_compliance", "axis")}
+    assert not same_models([soft, promise("link_flexibility", 0.7001)])
+    assert not same_models([soft, promise("link_flexibility", 0.7, ("stiffness", "time"))])
+    assert not same_models([promise("spring", 0.7), promise("bias_force", 0.7)])
 
 
 def test_a_fit_is_lost_if_it_is_late_and_hardly_comes_nearer() -> None:

@@ -117,6 +117,8 @@ class Trial:
         Why the simulation of the unseen records stopped, or "".
     clear : bool
         Whether the effect's size differs from zero on the training data.
+    alone : bool
+        Whether the gains are those of runs of the model itself, of what a balance of effort hardly sees.
     """
 
     probe: Probe
@@ -130,6 +132,7 @@ class Trial:
     diverged: str
     clear: bool
     slow: Gain | None = None
+    alone: bool = False
 
     @property
     def score(self) -> float:

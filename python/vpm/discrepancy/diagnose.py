@@ -348,7 +348,9 @@ def _accepted_effect(entry: Accepted, final: Judged) -> AcceptedEffect:
         estimates.append(EffectParameterEstimate(short, dotted, parameter.value, parameter.unit, std))
     texts = {e.name: f"{e.value:.4g} {e.unit}" for e in estimates}
     notes = [f"{alias.parameter} held: not told from {alias.partner}" for alias in entry.trial.held]
-    if not is_clear(final, tuple(e.dotted for e in estimates if e.std > 0.0)):
+    if entry.trial.alone:
+        notes.append("told by runs of the model itself in closed loop; a balance of effort hardly shows it")
+    elif not is_clear(final, tuple(e.dotted for e in estimates if e.std > 0.0)):
         notes.append("beside the effects that came later, its interval covers zero: one of them may be enough")
     return AcceptedEffect(
         candidate.effect.name,

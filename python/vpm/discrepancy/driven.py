@@ -71,16 +71,16 @@ def compare_driven(first: Judged, second: Judged, data: Data) -> Verdict | None:
         other = own_run(second.model, second.free, records, setup, one)
     except VpmError:
         return None
-    views = [_part(_against(*pair)) for pair in ((one, other), (other, one))]
+    views = [part(against(*pair)) for pair in ((one, other), (other, one))]
     return Verdict(min(views[0][0], views[1][0]), views[0][1], views[1][1])
 
 
-def _against(mine: OwnRun, rival: OwnRun) -> Spectra:
+def against(mine: OwnRun, rival: OwnRun) -> Spectra:
     """Transforms of what one run leaves, of the gap to its rival, and of its slopes."""
     return spectra(mine.model, mine.problem, np.column_stack([mine.left, mine.left - rival.left, mine.slopes]))
 
 
-def _part(transforms: Spectra) -> tuple[float, float]:
+def part(transforms: Spectra) -> tuple[float, float]:
     """Size of the rival's gap beside the parameters, and its part in what is left, both in standard deviations."""
     _, _, rows = least(transforms)
     left, gap, slopes = rows[:, 0], rows[:, 1], rows[:, 2:]

@@ -35,9 +35,10 @@ def drop_replaced(stages: list[Stage], accepted: list[Accepted], data: Data, dro
     may rest elsewhere. One name for what two would say is the shorter answer. So is it where a size was held, as that
     of a difference of dry friction beside a constant force, which are one in motion: with the later effect sure, its
     own size does that work. Where neither size has work to do beside it, these data do not tell, and both names stay.
+    What runs of the model itself told is not judged by a balance that hardly sees it.
     """
     newest = accepted[-1]
-    for entry in accepted[:-1]:
+    for entry in (one for one in accepted[:-1] if not one.trial.alone):
         current = stages[-1].judged
         own = set(entry.trial.parameters)
         freed = {alias.parameter for other in accepted for alias in other.trial.held if alias.partner in own}

@@ -97,7 +97,7 @@ def own_run(
     VpmError
         The model cannot follow the references.
     """
-    found = _at(model if beside is None else _like(model, free, beside), tuple(free), records, setup)
+    found = as_it_is(model if beside is None else _like(model, free, beside), tuple(free), records, setup)
     for _ in range(0 if bends(model) else MOST_FITS):
         better = _step(found, setup)
         if better is None:
@@ -136,6 +136,29 @@ def weighted(spectrum: NDArray[np.complex128], left: NDArray[np.complex128]) -> 
     The noise of a drive shows in its pressures and in the motion at once: told apart, one noise would count as often as
     it is read. So the readings of one drive are weighed by the whole matrix of their spectra.
     """
+    scale, triangle = _noise(left)
+    apart = np.linalg.solve(triangle, spectrum / scale[:, :, None]) * np.sqrt(2.0)
+    rows = apart.reshape(-1, spectrum.shape[2])
+    return np.asarray(np.vstack([rows.real, rows.imag]))
+
+
+def misfit(run: OwnRun, left: Array | None = None) -> float:
+    """Minus the logarithm of the likelihood of what a run leaves, but for a constant, if that is noise.
+
+    With what another run of these records would leave instead, as if that model were as linear in the known parameters
+    and they suited it best.
+    """
+    columns = np.column_stack([run.left if left is None else left, run.slopes])
+    _, noise, _ = least(spectra(run.model, run.problem, columns))
+    total = 0.0
+    for one in noise:
+        scale, triangle = _noise(one)
+        total += 2.0 * float(np.sum(np.log(scale))) + 2.0 * float(np.sum(np.log(np.einsum("fii->fi", triangle).real)))
+    return total
+
+
+def _noise(left: NDArray[np.complex128]) -> tuple[Array, NDArray[np.complex128]]:
+    """Deviations (f, readings) of the noise at each frequency, and the triangle of what its readings share there."""
     readings = left.shape[1]
     power = left[:, :, None] * left[:, None, :].conj()
     length = max(FEWEST * readings, int(SMOOTHED * len(power)))
@@ -147,9 +170,7 @@ def weighted(spectrum: NDArray[np.complex128], left: NDArray[np.complex128]) -> 
     scale = np.sqrt(own)
     alike = smooth / (scale[:, :, None] * scale[:, None, :])
     alike[:, range(readings), range(readings)] = 1.0 + ALIKE * (readings > 1)
-    apart = np.linalg.solve(np.linalg.cholesky(alike), spectrum / scale[:, :, None]) * np.sqrt(2.0)
-    rows = apart.reshape(-1, spectrum.shape[2])
-    return np.asarray(np.vstack([rows.real, rows.imag]))
+    return scale, np.linalg.cholesky(alike)
 
 
 def least(transforms: Spectra) -> tuple[Array, Spectra, Array]:
@@ -174,8 +195,14 @@ def _like(model: Model, free: Sequence[str], beside: OwnRun) -> Model:
     return model.with_parameters(values)
 
 
-def _at(model: Model, free: tuple[str, ...], records: Sequence[Experiment], setup: Setup) -> OwnRun:
-    """The run of a model as it is."""
+def as_it_is(model: Model, free: tuple[str, ...], records: Sequence[Experiment], setup: Setup) -> OwnRun:
+    """The run of a model with the parameters that it has.
+
+    Raises
+    ------
+    VpmError
+        The model cannot follow the references.
+    """
     problem = OutputErrorProblem(model, records, "closed_loop", setup=_fine(model, free, records, setup))
     left, _ = problem.evaluate(model, model.theta)
     return _with_slopes(model, free, problem, left, setup)
@@ -204,8 +231,8 @@ def _step(run: OwnRun, setup: Setup) -> OwnRun | None:
         return None
     records = run.problem.experiments
     for share in SHORTER ** np.arange(TRIES):
-        model = run.model.with_parameters(_moved(run, share * step))
         try:
+            model = run.model.with_parameters(_moved(run, share * step))
             problem = OutputErrorProblem(model, records, "closed_loop", setup=_fine(model, run.free, records, setup))
             left, _ = problem.evaluate(model, model.theta)
         except VpmError:

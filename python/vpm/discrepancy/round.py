@@ -26,22 +26,18 @@ from vpm.discrepancy.refusal import (
 )
 from vpm.discrepancy.ringing import NOISE_ONLY, noise_alone, only_ringing
 from vpm.discrepancy.screening import Probe, prepare, probe, refit_effort, screening_effort
+from vpm.discrepancy.short_list import SHORT_LIST, most_promising, same_models
 from vpm.discrepancy.side_by_side import Failure, SideBySide
 from vpm.discrepancy.slow import slow
+from vpm.discrepancy.sticking import asks_runs, run_without, told_by_runs
 from vpm.discrepancy.structure import structure
 from vpm.discrepancy.timing import InTime, in_time
 from vpm.identify import gain, segments
 from vpm.identify.along import bends, has_own_drives
 from vpm.identify.tangent import drives_on_tangent
 
-#: Candidates refitted in one round: those that promise most for their numbers, and those that promise most of all.
-#: Without the latter, several names of one regressor, as a constant force and a tilted world, crowd out a law of two
-#: numbers that takes more than any of them.
-SHORT_LIST, RICHEST = 7, 2
 #: Effects that add a motion nobody measures, which has to be simulated for every probe.
 HEAVY = ("joint_compliance", "backlash", "link_flexibility")
-#: Share by which what screening promises of two candidates may differ by rounding alone.
-TWIN = 1e-6
 #: Where links bend already, the noise of the measured motion rings in them: a spring more has to promise this share of
 #: the residual, and only the best is refitted.
 RINGING, FEW = 0.2, 1
@@ -93,6 +89,26 @@ class Round:
             self._promising = [one for one in self._promising if one.drop >= RINGING]
         self.confirm()
         return self.best()
+
+    def alone(self, without: set[Key]) -> Accepted | None:
+        """The best of what acts close to rest, which runs of the model itself show where the balance shows nothing."""
+        asked = [p for p in self.probes if p.candidate.key not in without and asks_runs(self.current, self.data, p)]
+        before = run_without(self.current, self.data) if asked else None
+        if before is None:
+            return None
+        self.tell(f"round {self.number}: running with {', '.join(p.candidate.label for p in asked)}")
+        ask = partial(told_by_runs, self.current, self.data, before, self._thresholds())
+        answers = self.each(f"round {self.number}: running", ask, asked, lambda p: p.candidate.label, refit_effort)
+        for one, answer in zip(asked, answers, strict=True):
+            if not isinstance(answer, Trial):
+                self.refused[one.candidate.key] = answer.reason if isinstance(answer, Failure) else answer
+        believed = [answer for answer in answers if isinstance(answer, Trial)]
+        if not believed:
+            return None
+        best = Accepted(max(believed, key=lambda trial: trial.unseen.score), ())
+        self.refused.pop(best.key, None)
+        self._ranking[best.key] = replace(self._ranking[best.key], unseen=best.trial.unseen.relative, accepted=True)
+        return best
 
     def weak(self, best: Accepted) -> bool:
         """Whether what would come in leaves most of the unseen gap, so that it may only imitate what moves by itself.
@@ -156,10 +172,10 @@ class Round:
 
     def confirm(self) -> None:
         """Refit with the most promising ones and judge them on unseen data."""
-        short_list = _short_list(self._promising)
+        short_list = most_promising(self._promising)
         if short_list:
             self.tell(f"round {self.number}: refitting with {', '.join(p.candidate.label for p in short_list)}")
-        twins = _twins(short_list)
+        twins = same_models(short_list)
         self._refit([one for one in short_list if one.candidate.key not in twins])
         believed = {trial.probe.candidate.key for trial in self._believed}
         again = [one for one in short_list if twins.get(one.candidate.key) in believed]
@@ -270,28 +286,6 @@ class Round:
     def ranked(self) -> list[RankedCandidate]:
         """Candidates of this round: what was accepted, what helped on unseen data, then by what screening promises."""
         return sorted(self._ranking.values(), key=_promise)
-
-
-def _twins(short_list: Sequence[Probe]) -> dict[Key, Key]:
-    """Candidates with a motion of their own that are an earlier one by another name, with that one.
-
-    A rigid link that bends at its root is a drive that winds up: no digit of what screening says parts the two. Refits
-    of such machines take long, so that one of each pair has to be enough where it is refused.
-    """
-    found: dict[Key, Key] = {}
-    for place, one in enumerate(short_list):
-        for other in short_list[:place]:
-            heavy = {one.candidate.effect.name, other.candidate.effect.name} == {"joint_compliance", "link_flexibility"}
-            same = len(one.free) == len(other.free) and abs(one.drop - other.drop) <= TWIN * abs(other.drop)
-            if heavy and same and other.candidate.key not in found:
-                found[one.candidate.key] = other.candidate.key
-    return found
-
-
-def _short_list(promising: Sequence[Probe]) -> list[Probe]:
-    """What is refitted, of probes by falling score."""
-    richest = {p.candidate.key for p in sorted(promising, key=lambda p: -p.drop)[:RICHEST]}
-    return [p for rank, p in enumerate(promising) if rank < SHORT_LIST or p.candidate.key in richest]
 
 
 def _promise(candidate: RankedCandidate) -> tuple[int, float]:

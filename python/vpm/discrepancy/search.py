@@ -75,6 +75,7 @@ def search(
                 best = outcome.light(effects, set(dropped))
                 if best is None or outcome.weak(best):
                     best = outcome.heavy(effects, set(dropped)) or best
+                best = best or outcome.alone(set(dropped))
         except KeyboardInterrupt:
             interrupted = True
         ranking += outcome.ranked()
