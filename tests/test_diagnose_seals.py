@@ -66,3 +66,17 @@ def test_a_constant_force_that_is_there_stays_the_explanation() -> None:
     rest = told(data, without, found)
     assert rest.seals is None
     assert not rest.instead
+
+
+def test_it_is_told_at_the_right_cylinder_of_a_leg() -> None:
+    case = make_case("hydraulic_leg", "pressure_dependent_friction@knee_drive", 21, recalibrate=False)
+    model = case.model()
+    training, unseen = (InverseDynamicsProblem(model, records) for records in (case.train, case.validate))
+    for problem in (training, unseen):
+        problem.take_long_steps()
+    data = Data(training, unseen, None)
+    free = tuple(p.name for p in model.parameters.values() if p.adjustable)
+    told_of = seals(judge(model, free, data, {}), data)
+    assert told_of is not None
+    assert told_of.drive == "knee_drive"
+    assert np.isclose(told_of.share * PISTON, case.truth.hidden[0].parameters["area"], rtol=0.1)

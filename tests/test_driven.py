@@ -145,5 +145,9 @@ def test_readings_of_a_cylinder_go_with_its_joint_and_those_of_joints_alone() ->
     case = make_case("servo_cylinder", "none", 5, recalibrate=False)
     model = case.model()
     problem = OutputErrorProblem(model, case.validate, "closed_loop")
-    (found,) = spectra(model, problem, np.zeros((problem.blocks[-1].samples.stop, 1)))
-    assert found.shape[1] == 3
+    found = spectra(model, problem, np.zeros((problem.blocks[-1].samples.stop, 1)))
+    assert [one.shape[1] for one in found] == [3]
+    leg = make_case("hydraulic_leg", "none", 20, recalibrate=False)
+    problem = OutputErrorProblem(leg.model(), leg.validate, "closed_loop")
+    found = spectra(leg.model(), problem, np.zeros((problem.blocks[-1].samples.stop, 1)))
+    assert [one.shape[1] for one in found] == [3, 3]

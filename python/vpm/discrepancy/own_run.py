@@ -126,7 +126,7 @@ def _read_with(model: Model, channel: str) -> str:
     """What a reading goes with: of a drive with states of its own the joint that it moves."""
     owner = channel.rpartition(".")[0]
     if owner in model.actuators:
-        return model.joint_of_actuator(owner)
+        return model.joints_of_actuator(owner)[0]
     return owner if owner in model.joints else channel
 
 

@@ -122,7 +122,8 @@ def _per_pressure(problem: InverseDynamicsProblem, record: int, drive: str) -> A
 def _bends(model: Model, training: InverseDynamicsProblem, drive: str, strokes: Sequence[_Stroke]) -> list[float]:
     """Flows below which friction bends to its other sign, as that of the joint does if it has any."""
     fastest = _fastest([stroke.flow for stroke in strokes])
-    joint, joints = model.joint_of_actuator(drive), training.motions[0].joints
+    moved, joints = model.joints_of_actuator(drive), training.motions[0].joints
+    joint = moved[0] if len(moved) == 1 else ""
     known = model.parameters.get(f"{joint}.friction.transition_velocity")
     if known is None or joint not in joints:
         return [share * fastest for share in TRANSITION_SHARES]
