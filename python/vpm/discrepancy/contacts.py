@@ -21,7 +21,7 @@ from vpm.discrepancy.choice import Accepted
 from vpm.discrepancy.confirmation import Data, Judged, judge
 from vpm.discrepancy.own_run import OwnRun, own_run
 from vpm.discrepancy.play import is_read_off
-from vpm.discrepancy.refusal import LEAST_GAIN, NORMAL_95_ONE_SIDED
+from vpm.discrepancy.refusal import LEAST_GAIN, NORMAL_95_ONE_SIDED, WORTH_A_NAME
 from vpm.discrepancy.search import Search
 from vpm.discrepancy.side_by_side import Failure, SideBySide
 from vpm.discrepancy.structural import moved
@@ -75,7 +75,7 @@ def _harder(final: Judged, entry: Accepted, data: Data, each: SideBySide) -> Jud
     left = each(what, lambda model: runs.evaluate(model, model.theta)[0], tried, lambda _: label)
     costs = [math.inf if isinstance(one, Failure) else float(one @ one) for one in left]
     before, best = left[0], np.argsort(costs)[:FITTED]
-    if isinstance(before, Failure) or not names or best[0] == 0:
+    if isinstance(before, Failure) or not names or costs[best[0]] > (1.0 - WORTH_A_NAME) * costs[0]:
         return final
     fitted = each(
         what,

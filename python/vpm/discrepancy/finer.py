@@ -15,6 +15,7 @@ from vpm.discrepancy.choice import Accepted, alike
 from vpm.discrepancy.confirmation import Judged
 from vpm.discrepancy.first_step import linear_step
 from vpm.discrepancy.screening import Probe
+from vpm.errors import DivergedError
 from vpm.identify import InverseDynamicsProblem
 from vpm.identify.identifiability import COPY_SHARE, explained_share
 from vpm.identify.statistics import NORMAL_95
@@ -37,14 +38,18 @@ def seen_beside(final: Judged, without: Judged, data: InverseDynamicsProblem, en
     -------
     Probe
         To be refitted from the size that one step beside the effect says; ``probe`` where it is none that was held, is
-        not confused with the effect at its site, or has no size that is clear (95 %) beside it.
+        not confused with the effect at its site, cannot be computed beside it, or has no size there that is clear
+        (95 %).
     """
     candidate = probe.candidate
     if probe.free or not probe.held or not candidate.neutral or not alike(candidate, entry.trial.probe.candidate):
         return probe
     names = tuple(alias.parameter for alias in probe.held)
     model = final.model.with_effect(candidate.effect.name, at=candidate.site, **candidate.starts[0])
-    residual, fresh = data.evaluate(model, model.theta, [model.index(name) for name in names])
+    try:
+        residual, fresh = data.evaluate(model, model.theta, [model.index(name) for name in names])
+    except DivergedError:
+        return probe  # beside the effect it cannot be balanced, as a rotor's inertia behind a joint with a memory
     values, std, left = linear_step(data, np.column_stack([final.fit.jacobian, fresh]), residual)
     count = len(names)
     sizes, spread = values[-count:], std[-count:]
