@@ -45,9 +45,9 @@ def choose(believed: Sequence[Trial], data: Data) -> Accepted:
 
     One that refines another only takes its place if it leaves less than ``REFINED`` of what that leaves.
     """
-    first = min(believed, key=_cost)
+    first = min(believed, key=cost)
     plain = [t for t in believed if _plainer(t, first)]
-    first = min(plain, key=_cost) if plain else first
+    first = min(plain, key=cost) if plain else first
     equals = [t for t in believed if _as_good(t, first)]
     chosen = _late_or_slow(_first_named(equals), believed, data)
     return Accepted(chosen, tuple(t.probe.candidate.label for t in equals if t is not chosen))
@@ -94,7 +94,7 @@ def _left(trial: Trial) -> float:
     return max(1.0 - trial.unseen.relative, 1e-12)
 
 
-def _cost(trial: Trial) -> float:
+def cost(trial: Trial) -> float:
     """Information criterion of G. Schwarz (*Annals of Statistics* 6, 1978) per independent piece of the unseen data."""
     pieces = max(trial.unseen.pieces, 3)
     return float(np.log(_left(trial)) + len(trial.parameters) * np.log(pieces) / pieces)

@@ -97,7 +97,7 @@ class Round:
         if before is None:
             return None
         self.tell(f"round {self.number}: running with {', '.join(p.candidate.label for p in asked)}")
-        ask = partial(told_by_runs, self.current, self.data, before, self._thresholds())
+        ask = partial(told_by_runs, self.current, self.data, before, self.thresholds())
         answers = self.each(f"round {self.number}: running", ask, asked, lambda p: p.candidate.label, refit_effort)
         for one, answer in zip(asked, answers, strict=True):
             if not isinstance(answer, Trial):
@@ -206,7 +206,7 @@ class Round:
 
     def _tried(self, short_list: Sequence[Probe], rival: float) -> None:
         """Refit with some candidates beside each other; ``rival`` is what another one leaves, see `confirm`."""
-        thresholds = self._thresholds()
+        thresholds = self.thresholds()
         what = f"round {self.number}: refitting"
         confirmed = partial(self._confirmed, rival=rival)
         trials = self.each(what, confirmed, short_list, lambda p: p.candidate.label, refit_effort)
@@ -234,7 +234,7 @@ class Round:
         harder = confirm(self.current, self.data, other)
         return trial if worse_in_simulation(harder) else harder
 
-    def _thresholds(self) -> Thresholds:
+    def thresholds(self) -> Thresholds:
         """What is asked of an effect when so many have been tried."""
         tried = len(self._ranking) * self.number
         return Thresholds(tried, min(m.dt for m in self.data.training.motions))
@@ -272,16 +272,24 @@ class Round:
             best = choose(self._believed, self.data)
             whole = finished(self.current, self.data, best.trial)
             if whole is best.trial:
-                for key, told in self._ranking.items():
-                    self._ranking[key] = replace(told, accepted=key == best.key)
+                self.mark(best.key)
                 return best
             place = next(n for n, trial in enumerate(self._believed) if trial is best.trial)
-            if reason := self._refused(whole, self._thresholds()):
+            if reason := self._refused(whole, self.thresholds()):
                 self.refused[best.key] = reason
                 del self._believed[place]
             else:
                 self._believed[place] = whole
         return None
+
+    def mark(self, accepted: Key) -> None:
+        """Note in the ranking what comes in."""
+        for key, told in self._ranking.items():
+            self._ranking[key] = replace(told, accepted=key == accepted)
+
+    def after(self, judged: Judged) -> Round:
+        """The round that follows if ``judged`` is the model at hand."""
+        return Round(judged, self.data, self.number + 1, self.tell, self.each)
 
     def ranked(self) -> list[RankedCandidate]:
         """Candidates of this round: what was accepted, what helped on unseen data, then by what screening promises."""

@@ -13,6 +13,7 @@ from vpm.discrepancy.elimination import Stage, drop_replaced, drop_springs, sett
 from vpm.discrepancy.round import Round, Tell
 from vpm.discrepancy.screening import Probe
 from vpm.discrepancy.side_by_side import SideBySide
+from vpm.discrepancy.together import together
 from vpm.identify.tangent import has_tangent
 
 
@@ -69,22 +70,31 @@ def search(
     interrupted = start.fit.interrupted
     for number in range(1, 0 if interrupted else 2 * limit + 2):
         outcome = Round(stages[-1].judged, data, number, tell, each)
-        best = None
+        best, pair = None, None
         try:
             if len(accepted) < limit and not (accepted and outcome.done()):
                 best = outcome.light(effects, set(dropped))
                 if best is None or outcome.weak(best):
                     best = outcome.heavy(effects, set(dropped)) or best
-                best = best or outcome.alone(set(dropped))
+                pair = together(outcome, best, data, effects, set(dropped)) if len(accepted) + 1 < limit else None
+                best = best or (outcome.alone(set(dropped)) if pair is None else None)
         except KeyboardInterrupt:
             interrupted = True
         ranking += outcome.ranked()
+        if pair is not None:
+            accepted.append(pair.first)
+            stages.append(Stage("added", *pair.first.key, pair.first.trial.judged))
+            tell(f"round {number}: accepted {pair.first.trial.probe.candidate.label}, beside another one")
+            outcome, best = pair.outcome, pair.second
+            ranking += outcome.ranked()
         refused = outcome.refused
         if best is None:
             break
         if has_tangent(best.trial.judged.model, data.training):
             best = settled(best, data)
-        last = Tried(best.key, outcome.current, tuple(outcome.probes), tuple(outcome.trials))
+        # Beside the first of a pair little else was tried.
+        known = Tried(best.key, outcome.current, tuple(outcome.probes), tuple(outcome.trials))
+        last = known if pair is None else None
         accepted.append(best)
         stages.append(Stage("added", *best.key, best.trial.judged))
         tell(f"round {number}: accepted {best.trial.probe.candidate.label}")
