@@ -15,8 +15,9 @@ from vpm.simplify import Ladder, reductions, simplify
 from vpm.simplify.hydraulics import BOTH, LOAD, NO_STATE, QUASI_STATIC, SIMPLER, STATIC, simpler
 from vpm.simplify.judge import Judge, by_the_model
 from vpm.simplify.learnt import maxwell_entry, narx_entry
-from vpm.simplify.replacement import replaced
-from vpm.simplify.surrogates import commanded, surrogates
+from vpm.simplify.replacement import commanded, replaced
+from vpm.simplify.surrogates import _learnt, _taught, surrogates
+from vpm.simplify.trained import trained
 
 Array = NDArray[np.float64]
 EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
@@ -173,6 +174,21 @@ def test_narx_model_is_found_from_what_it_does() -> None:
     for name, value in {"effort[k-1]": 0.8, "drive[k]": 2.0, "rate[k-1]": -0.5}.items():
         assert terms.pop(name) == pytest.approx(value, abs=1e-8)
     assert all(abs(value) < 1e-6 for value in terms.values())
+
+
+def test_narx_model_is_trained_in_the_loop_that_it_closes(leg: vpm.Model) -> None:
+    learn, unseen = (
+        [by_the_model(leg, record(leg, name), "closed_loop", 1000.0, CHANNELS) for name in names]
+        for names in (("squat", "sway"), ("pace",))
+    )
+    taught = [_taught(leg, each, "closed_loop", 1000.0) for each in learn]
+    element = next(each for each in _learnt(leg, "knee_drive", taught, 1e-3) if each.name == "narx")
+    judge = Judge(leg, learn, unseen, 1000.0, "closed_loop", CHANNELS)
+    better = trained(leg, element, learn, "closed_loop", CHANNELS)
+    first, second = (max(judge.errors(each.applied(leg), vpm.Setup("rk4", 2)).values()) for each in (element, better))
+    assert second < 0.8 * first
+    # What no simulation can run with stays what it is.
+    assert trained(leg, element, learn, "closed_loop", ["knee_drive.pressure_a"]) is element
 
 
 def test_servo_cylinder_may_lose_its_spool_and_a_chamber() -> None:

@@ -10,7 +10,8 @@ import pytest
 
 import vpm
 from vpm.errors import SimulationError
-from vpm.simplify import Ladder, Reduction, reduced, reductions, simplify
+from vpm.simplify import Ladder, Reduction, Rung, reduced, reductions, simplify
+from vpm.simplify.search import _simplest
 
 ARM = """
 name = "one flexible link"
@@ -154,3 +155,17 @@ def test_steps_of_the_controller_have_to_fill_the_samples(full: vpm.Model) -> No
         simplify(full, record(full, (0.1, 0.0)), against="truth")
     with pytest.raises(SimulationError, match="restarts starts from the measured motion"):
         simplify(full, record(full, (0.1, 0.0)), rate=RATE, against="model", mode="restarts")
+
+
+def test_of_what_a_clock_does_not_tell_apart_the_more_exact_is_taken() -> None:
+    def rung(removed: tuple[str, ...], error: float, seconds: float, states: int = 12) -> Rung:
+        return Rung(removed, "rk4", 1, states, error, "root.strain", error, seconds, seconds)
+
+    quickest = rung(("a", "b"), 0.04, 10.0e-6)
+    exact = rung(("a", "c"), 0.01, 10.4e-6)
+    fuller = rung(("a",), 0.001, 10.4e-6)
+    larger = rung(("a", "d"), 0.001, 10.4e-6, states=14)
+    dearer = rung(("a", "e"), 0.001, 11.0e-6)
+    simpler = rung(("a", "b", "c"), 0.03, 12.0e-6)
+    assert _simplest([quickest, exact, fuller, larger, dearer]) is exact
+    assert _simplest([quickest, exact, simpler]) is simpler

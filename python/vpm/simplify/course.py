@@ -9,7 +9,7 @@ from vpm.budget import commands, start_state
 from vpm.experiment import Experiment
 from vpm.model import Model
 from vpm.simplify.judge import Judge
-from vpm.simplify.surrogates import commanded
+from vpm.simplify.replacement import commanded
 
 Array = NDArray[np.float64]
 

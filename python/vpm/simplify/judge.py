@@ -8,7 +8,7 @@ from vpm.errors import SimulationError
 from vpm.experiment import Experiment
 from vpm.identify import InverseDynamicsProblem, OutputErrorProblem, Problem, estimate, gaps
 from vpm.model import Model
-from vpm.simplify.surrogates import commanded
+from vpm.simplify.replacement import commanded
 from vpm.simulate import Setup, judging_mode, simulate
 
 #: How many steps finer the full model is simulated than the controller's period, where it is the reference.

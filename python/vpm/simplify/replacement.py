@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from vpm.errors import ModelError
+from vpm.experiment import Experiment
 from vpm.model import Model
 from vpm.simplify.reductions import Reduction
 
@@ -85,6 +86,23 @@ def replaced(model: Model, drive: str, entry: str) -> Model:
     ]
     content["sensors"] = _kept_sensors(content.get("sensors", {}), {drive, *gone})
     return type(model)({key: each for key, each in content.items() if each or key not in OPTIONAL})
+
+
+def commanded(model: Model, full: Model, record: Experiment) -> Experiment:
+    """The record with the reference of each drive that lost its controller as its command.
+
+    Parameters
+    ----------
+    model, full : Model
+    record : Experiment
+    """
+    lost = [name for name in full.controlled_actuators if name not in model.controlled_actuators]
+    if not lost:
+        return record
+    values = {name: record[name] for name in record.channels if not name.startswith(tuple(f"{x}." for x in lost))}
+    kept = {name: record[name] for name in record.channels if name not in values and name in model.output_channels}
+    commands = {f"{name}.command": record[f"{name}.reference"] for name in lost}
+    return Experiment.from_arrays(record.time, {**values, **kept, **commands}, model=model, name=record.name)
 
 
 def _without_controller(model: Model, controllers: Mapping[str, Any], drive: str) -> dict[str, Any]:

@@ -22,7 +22,7 @@ from vpm.simplify.reductions import COUPLING_TERMS, OFFERED, VELOCITY_TERMS, Red
 from vpm.simplify.shares import ROUNDING, deformation_share, effort_share, motions, ranked
 from vpm.simplify.surrogates import surrogates
 from vpm.simplify.terms import CURVED
-from vpm.simplify.trials import ALIKE, CLOCK, NEGLIGIBLE, PRIORITY, Changes, Trials
+from vpm.simplify.trials import ALIKE, CLOCK, NEGLIGIBLE, PRIORITY, REPEATED, Changes, Trials
 from vpm.simulate import Setup
 
 #: Share of efforts or deformations, in tolerances, from which on no model is tried without the terms.
@@ -111,7 +111,7 @@ def simplify(
         records, unseen = ([known[id(each)] for each in group] for group in (records, unseen))
     judge = Judge(model, records, unseen, rate, mode, channels)
     trials = Trials(model, judge, lambda changes: bool(changes) or against == "data", say, tolerance)
-    sites = reductions(model, surrogates(model, judge.records, mode, rate))
+    sites = reductions(model, surrogates(model, judge.records, mode, rate, judge.channels))
     try:
         _weigh_terms(trials, sites)
         _descend(trials, sites)
@@ -305,11 +305,17 @@ def _concluded(trials: Trials, sites: Sites, share: float, against: str) -> Ladd
 
 
 def _simplest(rungs: Sequence[Rung]) -> Rung:
-    """The cheapest, or what seems dearer by no more than times are uncertain by and has more left out or errs less."""
+    """The cheapest, or what a clock does not tell from it and has more left out, or as much and errs less."""
     best = rungs[0]
     longest = ALIKE * best.seconds + CLOCK
-    alike = [rung for rung in rungs if set(rung.removed) >= set(best.removed) and rung.seconds <= longest]
-    return max(alike, key=lambda rung: (len(rung.removed), -rung.error))
+    more = [rung for rung in rungs if set(rung.removed) >= set(best.removed) and rung.seconds <= longest]
+    others = [
+        rung
+        for rung in rungs
+        if (len(rung.removed), rung.states) == (len(best.removed), best.states)
+        and rung.seconds <= REPEATED * best.seconds
+    ]
+    return max((*more, *others), key=lambda rung: (len(rung.removed), -rung.error))
 
 
 def _dearest(trials: Trials, sites: Sites) -> tuple[tuple[str, float], ...]:

@@ -20,13 +20,16 @@ from vpm.simplify.learnt import maxwell_entry, narx_entry
 from vpm.simplify.reductions import Reduction
 from vpm.simplify.replacement import Replacement
 from vpm.simplify.tables import tables
+from vpm.simplify.trained import trained
 from vpm.simulate import Run, simulate
 
 Array = NDArray[np.float64]
 Record = dict[str, Array]
 
 
-def surrogates(model: Model, records: Sequence[Experiment], mode: str, rate: float) -> tuple[Reduction, ...]:
+def surrogates(
+    model: Model, records: Sequence[Experiment], mode: str, rate: float, channels: Sequence[str] | None = None
+) -> tuple[Reduction, ...]:
     """Elements and a table for each servo-cylinder that they can be found for.
 
     Parameters
@@ -39,35 +42,21 @@ def surrogates(model: Model, records: Sequence[Experiment], mode: str, rate: flo
         Sampled drives run in free runs and closed loops only.
     rate : float
         Samples of the element in a second, Hz.
+    channels : sequence of str, optional
+        What is to come out right; by default all that the records hold.
     """
     drives = hydraulic_drives(model)
     if not drives or mode not in ("free_run", "closed_loop"):
         return ()
     taught = [_taught(model, record, mode, rate) for record in records]
-    elements = (found for drive in drives for found in _learnt(model, drive, taught, 1.0 / rate))
     fine = [_held(record, round(record.dt * rate), model) for record in records]
+    learnt = (found for drive in drives for found in _learnt(model, drive, taught, 1.0 / rate))
+    elements = (trained(model, each, fine, mode, channels) if each.name == "narx" else each for each in learnt)
 
     def moved(other: Model) -> list[Run]:
         return [simulate(other, each, mode, integrator="guarded") for each in fine]
 
     return (*elements, *tables(model, taught, moved))
-
-
-def commanded(model: Model, full: Model, record: Experiment) -> Experiment:
-    """The record with the reference of each drive that lost its controller as its command.
-
-    Parameters
-    ----------
-    model, full : Model
-    record : Experiment
-    """
-    lost = [name for name in full.controlled_actuators if name not in model.controlled_actuators]
-    if not lost:
-        return record
-    values = {name: record[name] for name in record.channels if not name.startswith(tuple(f"{x}." for x in lost))}
-    kept = {name: record[name] for name in record.channels if name not in values and name in model.output_channels}
-    commands = {f"{name}.command": record[f"{name}.reference"] for name in lost}
-    return Experiment.from_arrays(record.time, {**values, **kept, **commands}, model=model, name=record.name)
 
 
 def _taught(model: Model, record: Experiment, mode: str, rate: float) -> Record:

@@ -30,7 +30,7 @@ CLOCK = 5e-7
 ALIKE = 1.3
 #: Steps of a first glance, and how much slower than another way that works one may be if it does not fit the period.
 GLANCE, SLOWER = 20, 5.0
-#: What glances at one model differ by.
+#: What glances at one model differ by, and medians of its steps.
 REPEATED = 1.05
 #: Share of the tolerance that is next to nothing, and how much slower than what loses no more than that a way may be.
 NEGLIGIBLE, SPARE = 0.2, 2.0
