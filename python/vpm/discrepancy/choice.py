@@ -12,6 +12,7 @@ from vpm.discrepancy.candidates import Candidate, Key
 from vpm.discrepancy.confirmation import Data, Trial
 from vpm.discrepancy.driven import ODDS, compare_driven
 from vpm.discrepancy.motion_only import LATE_OR_SLOW
+from vpm.discrepancy.own_reading import read_by_itself
 from vpm.discrepancy.refusal import LEAST_GAIN
 from vpm.discrepancy.structural import coupled
 
@@ -49,7 +50,7 @@ def choose(believed: Sequence[Trial], data: Data) -> Accepted:
     plain = [t for t in believed if _plainer(t, first)]
     first = min(plain, key=cost) if plain else first
     equals = [t for t in believed if _as_good(t, first)]
-    chosen = _late_or_slow(_first_named(equals), believed, data)
+    chosen = _late_or_slow(read_by_itself(_first_named(equals), equals, data), believed, data)
     return Accepted(chosen, tuple(t.probe.candidate.label for t in equals if t is not chosen))
 
 
