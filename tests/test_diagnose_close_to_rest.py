@@ -25,6 +25,14 @@ def test_what_a_balance_hardly_sees_is_told_by_runs() -> None:
     assert any("runs of the model itself" in note for note in found.notes)
 
 
+def test_what_runs_tell_need_not_close_the_balance() -> None:
+    """Of what the runs leave nine tenths go, of the balance nothing: a fit without physics finds more there."""
+    case = make_case("axis_rotary", "stribeck_friction", 3001)
+    why = vpm.diagnose(case.model(), case.train, case.validate, effects=[CLOSE_TO_REST], workers=1)
+    assert [effect.name for effect in why.effects] == [CLOSE_TO_REST]
+    assert why.verdict == "effect_found"
+
+
 @pytest.mark.parametrize(
     ("machine", "hidden", "seed"),
     [("axis_linear", "none", 3), ("axis_linear", "friction_drift", 9)],

@@ -10,7 +10,7 @@ from scipy.special import ndtri
 from vpm.discrepancy.beliefs import driven_away
 from vpm.discrepancy.confirmation import Data, Judged
 from vpm.discrepancy.diagnosis import ChannelGap
-from vpm.discrepancy.refusal import FALSE_ALARM_LEVEL, LEAST_GAIN, NEGLIGIBLE
+from vpm.discrepancy.refusal import FALSE_ALARM_LEVEL, LEAST_GAIN, MOST_OF_IT, NEGLIGIBLE
 from vpm.discrepancy.remainder import Remainder
 from vpm.discrepancy.search import Search
 from vpm.discrepancy.structure import Structure
@@ -86,7 +86,7 @@ def verdict(
             f"{names}, {_farthest(away)}. Error on unseen data: {numbers}, {_percent(worst.after, worst)} after.",
             True,
         )
-    if found.accepted and mostly_open:
+    if found.accepted and mostly_open and not _told_by_runs(found):
         return (
             "unexplained",
             f"The residual is structured and {above:.2g} times the noise floor. The effects of the catalogue that come "
@@ -115,6 +115,14 @@ def _farthest(away: Mapping[str, float]) -> str:
     """The parameter that stands farthest from what the model file says of it."""
     name, times = next(iter(away.items()))
     return f"{name} would be off by {times:.1f} times its stated uncertainty"
+
+
+def _told_by_runs(found: Search) -> bool:
+    """Whether runs of the model itself told all that was accepted, and it explains most of what they had left.
+
+    What a balance of effort hardly sees may leave as much of it as there was, and be the explanation.
+    """
+    return all(entry.trial.alone and entry.trial.unseen.relative >= MOST_OF_IT for entry in found.accepted)
 
 
 def _nothing_missing(
