@@ -248,3 +248,13 @@ def test_gain_of_a_smaller_residual_is_significant_and_of_noise_is_not() -> None
     assert better.harm < -5.0
     shift = 0.02 * generator.standard_normal(5000)
     assert abs(gain(before, before + shift, [slice(0, 5000)]).harm) < 2.0  # by chance
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+def test_a_simulation_that_has_run_away_is_no_gain() -> None:
+    """Numbers whose squares overflow are finite all the same, and have to be told from an error."""
+    before = np.random.default_rng(0).standard_normal(400)
+    away = np.where(np.arange(400) < 300, before, 1e200)
+    told = gain(before, away, [slice(0, 400)])
+    assert told.relative == -np.inf
+    assert told.harm == np.inf

@@ -37,8 +37,8 @@ def correlation_length(residual: Array) -> int:
     centred = residual - residual.mean()
     power = float(centred @ centred)
     limit = max(1, n // 10)
-    if n < 4 or power == 0.0:
-        return 1
+    if n < 4 or power == 0.0 or not np.isfinite(power):
+        return 1  # of a simulation that has run away no square is a number
     padded = next_fast_len(n + limit, real=True)
     spectrum = np.abs(rfft(centred, padded)) ** 2
     correlation = irfft(spectrum, padded)[: limit + 1] / power
