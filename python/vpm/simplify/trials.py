@@ -135,7 +135,7 @@ class Trials:
 
     def as_quick_as(self, changes: Changes) -> float:
         """Time of a period at a glance (s) up to which a model is no dearer than one that was tried."""
-        return REPEATED * self._glanced[frozenset(changes)]
+        return REPEATED * self._glanced[frozenset(changes)] + CLOCK
 
     def _begun(self, model: Model, key: frozenset[Reduction]) -> Model:
         """Model with the parameters of the fitted one that differs in the fewest changes: where its fit begins."""
