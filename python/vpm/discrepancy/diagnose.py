@@ -10,6 +10,7 @@ from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 
 from vpm.catalogue import EFFECTS
 from vpm.compare import compare
@@ -60,6 +61,7 @@ REACH = 4.0
 
 Tell = Callable[[str], None]
 Found = TypeVar("Found")
+_Records = tuple[tuple[Experiment, ...], tuple[Experiment, ...], list[str]]
 
 
 def diagnose(
@@ -120,11 +122,28 @@ def diagnose(
     ExperimentError
         A channel is missing.
     """
-    began = time.perf_counter()
-    say = tell or (lambda _: None)
     _check_effects(effects)
     worker_count(workers)
-    training, unseen, notes = _records(experiments, validate)
+    # Its linear algebra is small: with threads of its own it would only take the cores from candidates side by side.
+    with threadpool_limits(1, user_api="blas"):
+        records = _records(experiments, validate)
+        return _diagnosis(model, records, effects, cutoff, setup, limit, SideBySide(workers, progress), tell)
+
+
+def _diagnosis(
+    model: Model,
+    records: _Records,
+    effects: Sequence[str] | None,
+    cutoff: float | None,
+    setup: Setup | None,
+    limit: int,
+    each: SideBySide,
+    tell: Tell | None,
+) -> Diagnosis:
+    """See `diagnose`."""
+    began = time.perf_counter()
+    say = tell or (lambda _: None)
+    training, unseen, notes = records
     # A record cut off in the middle of a motion does not say what its controller remembers.
     mode = "restarts" if notes else judging_mode(model, unseen)
     data = _data(model, training, unseen, mode, cutoff, setup, notes)
@@ -135,12 +154,11 @@ def diagnose(
     if not free:
         notes.append("the model file gives no parameter an uncertainty, so none was recalibrated")
     transitions = _transitions(model, data.training)
-    data.training.workers = worker_count(workers)
+    data.training.workers = worker_count(each.workers)
     bounds = {**_within_reach(model, free), **transitions}
     recalibrated = judge(model, (*free, *transitions), data, bounds)
     data.training.workers = 1  # candidates share the cores from here on
     notes.extend(moved_far(model, recalibrated))
-    each = SideBySide(workers, progress)
     found = search(recalibrated, data, effects, limit, say, each)
     if found.interrupted:
         notes.append(STOPPED)
@@ -154,7 +172,7 @@ def diagnose(
     timed = in_time(found.final, data)
     left = structure(found.final.model, data.training, data.unseen, timed.fitted, timed.unseen)
     rest, stopped = _until_stopped(
-        lambda: _rest(recalibrated, found, data, workers) if found.accepted or not is_negligible(gap) else None, None
+        lambda: _rest(recalibrated, found, data, each) if found.accepted or not is_negligible(gap) else None, None
     )
     word, summary, described = verdict(data, nominal, recalibrated, found, gap, left, rest)
     final, empirical, accepted = found.final, None, found.accepted
@@ -229,7 +247,8 @@ def _check_effects(effects: Sequence[str] | None) -> None:
 
 def _records(
     experiments: Experiment | Sequence[Experiment], validate: Experiment | Sequence[Experiment] | None
-) -> tuple[tuple[Experiment, ...], tuple[Experiment, ...], list[str]]:
+) -> _Records:
+    """Records to fit, records to judge on, and notes on both."""
     training = (experiments,) if isinstance(experiments, Experiment) else tuple(experiments)
     if not training:
         raise DiagnosisError("no record was given; pass at least one experiment")
@@ -307,10 +326,10 @@ def _within_reach(model: Model, free: Sequence[str]) -> dict[str, tuple[float, f
     return found
 
 
-def _rest(recalibrated: Judged, found: Search, data: Data, workers: int | None) -> Remainder:
+def _rest(recalibrated: Judged, found: Search, data: Data, each: SideBySide) -> Remainder:
     """What is left; what an interrupted search accepted stands, for rounds that would have judged it were not to be."""
     start = found.final if found.interrupted or not found.accepted else recalibrated
-    return remainder(start, found.final, data, min(m.dt for m in data.training.motions), worker_count(workers))
+    return remainder(start, found.final, data, min(m.dt for m in data.training.motions), worker_count(each.workers))
 
 
 def _gaps(

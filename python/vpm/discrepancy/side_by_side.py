@@ -8,8 +8,6 @@ from functools import partial
 from threading import Lock
 from typing import TypeVar
 
-from threadpoolctl import threadpool_limits
-
 from vpm.errors import VpmError
 from vpm.identify.parallel import in_order, worker_count
 
@@ -74,7 +72,6 @@ class SideBySide:
                     self.progress(what, name(item), done, len(items))
             return outcome
 
-        with threadpool_limits(1, user_api="blas"):
-            begun = sorted(range(len(items)), key=lambda n: 0.0 if effort is None else -effort(items[n]))
-            outcomes = in_order([partial(one, items[n]) for n in begun], worker_count(self.workers))
-            return [outcome for _, outcome in sorted(zip(begun, outcomes, strict=True), key=lambda pair: pair[0])]
+        begun = sorted(range(len(items)), key=lambda n: 0.0 if effort is None else -effort(items[n]))
+        outcomes = in_order([partial(one, items[n]) for n in begun], worker_count(self.workers))
+        return [outcome for _, outcome in sorted(zip(begun, outcomes, strict=True), key=lambda pair: pair[0])]
