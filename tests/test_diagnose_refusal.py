@@ -9,7 +9,8 @@ import pytest
 
 from vpm.demo import MODEL
 from vpm.discrepancy.confirmation import Trial
-from vpm.discrepancy.refusal import NEGLIGIBLE, Thresholds, refuse_trial
+from vpm.discrepancy.refusal import NEGLIGIBLE, Thresholds, refuse_probe, refuse_trial
+from vpm.discrepancy.screening import Probe
 from vpm.identify import Gain
 from vpm.model import Model
 
@@ -97,3 +98,9 @@ def test_what_is_slow_shows_an_effect_that_impacts_cover_unless_it_speaks_alone(
     assert "only 7.8 %" in beside_play(covered, Gain(1.0, 0.99, 0.5, 2.0, 20))
     assert beside_play(Gain(before=1.0, after=0.995, weight=0.5, score=3.0, pieces=40), gained())
     assert beside_play(Gain(before=1.0, after=0.96, weight=0.5, score=1.0, pieces=40), gained())
+
+
+@pytest.mark.parametrize(("drop", "words"), [(-63.0, "larger"), (1e-3, "only 0.1 %")])
+def test_what_screening_promises_nothing_of_is_told_in_words_that_fit(drop: float, words: str) -> None:
+    promised = cast(Probe, SimpleNamespace(free=("axis.backlash.gap",), held=(), drop=drop))
+    assert words in refuse_probe(promised)

@@ -75,6 +75,8 @@ def refuse_probe(probe: Probe) -> str:
             partners = ", ".join(dict.fromkeys(alias.partner for alias in probe.held))
             return f"these data cannot tell it from {partners}"
         return "it has no influence on these data"
+    if probe.drop < 0.0:
+        return "it would make the training error larger wherever it was tried"
     if probe.drop < LEAST_SCREENED:
         return f"it would lower the training error by only {_percent(probe.drop)} of its mean square"
     outside = impossible_values(probe)
