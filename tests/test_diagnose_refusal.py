@@ -102,5 +102,5 @@ def test_what_is_slow_shows_an_effect_that_impacts_cover_unless_it_speaks_alone(
 
 @pytest.mark.parametrize(("drop", "words"), [(-63.0, "larger"), (1e-3, "only 0.1 %")])
 def test_what_screening_promises_nothing_of_is_told_in_words_that_fit(drop: float, words: str) -> None:
-    promised = cast(Probe, SimpleNamespace(free=("axis.backlash.gap",), held=(), drop=drop))
+    promised = cast("Probe", SimpleNamespace(free=("axis.backlash.gap",), held=(), drop=drop))
     assert words in refuse_probe(promised)
