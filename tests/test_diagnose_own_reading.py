@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import pytest
 
+from balances import balances
 from blind import make_case
 from vpm.catalogue import EFFECTS
 from vpm.discrepancy.candidates import Candidate
 from vpm.discrepancy.choice import choose
-from vpm.discrepancy.confirmation import Data, confirm, judge
+from vpm.discrepancy.confirmation import confirm, judge
 from vpm.discrepancy.screening import probe
-from vpm.identify import InverseDynamicsProblem
 
 RIVALS = (("bias_force", "axis"), ("sensor_offset", "gauge_a"), ("sensor_offset", "gauge_b"))
 
@@ -18,12 +18,8 @@ RIVALS = (("bias_force", "axis"), ("sensor_offset", "gauge_a"), ("sensor_offset"
 @pytest.mark.parametrize("there", [("sensor_offset", "gauge_b"), ("bias_force", "axis")])
 def test_a_gauge_is_blamed_for_what_it_reads_and_not_for_a_load(there: tuple[str, str]) -> None:
     case = make_case("servo_cylinder", "@".join(there), 42, recalibrate=False)
-    model = case.model()
-    training, unseen = (InverseDynamicsProblem(model, records) for records in (case.train, case.validate))
-    for problem in (training, unseen):
-        problem.take_long_steps()
-    data = Data(training, unseen, None)
-    without = judge(model, tuple(p.name for p in model.parameters.values() if p.adjustable), data, {})
+    model, free, data = balances(case)
+    without = judge(model, free, data, {})
     listed = [Candidate(EFFECTS[name], site, ({},)) for name, site in RIVALS]
-    trials = [confirm(without, data, probe(without.baseline, training, candidate)) for candidate in listed]
+    trials = [confirm(without, data, probe(without.baseline, data.training, candidate)) for candidate in listed]
     assert choose(trials, data).key == there

@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from balances import balances
 from blind import Case, make_case
 from vpm.catalogue import EFFECTS
 from vpm.discrepancy.candidates import Candidate
-from vpm.discrepancy.confirmation import Data, confirm, judge
+from vpm.discrepancy.confirmation import confirm, judge
 from vpm.discrepancy.screening import probe
 from vpm.discrepancy.starting import nearer_start
 from vpm.identify import InverseDynamicsProblem
@@ -39,15 +40,12 @@ def test_a_refit_leaves_what_a_recalibration_without_the_effect_made_of_the_oil(
 
 
 def test_a_wide_dead_zone_of_a_valve_is_found_from_there(case: Case) -> None:
-    model = case.model()
-    training, unseen = InverseDynamicsProblem(model, case.train), InverseDynamicsProblem(model, case.validate)
-    for problem in (training, unseen):
-        problem.take_long_steps()
-    data = Data(training, unseen, None)
-    free = tuple(p.name for p in model.parameters.values() if p.adjustable)
+    model, free, data = balances(case)
     oil = model.parameters["pump.oil.bulk_modulus"].value
     without = judge(model, free, data, {"pump.oil.bulk_modulus": (oil / 2.2, 2.2 * oil)})
-    trial = confirm(without, data, probe(without.baseline, training, Candidate(EFFECTS["dead_zone"], "servo", ({},))))
+    trial = confirm(
+        without, data, probe(without.baseline, data.training, Candidate(EFFECTS["dead_zone"], "servo", ({},)))
+    )
     width = trial.judged.model.parameters["servo.dead_zone.width"].value
     assert np.isclose(width, case.truth.hidden[0].parameters["width"], rtol=0.03)
     assert trial.unseen.relative > 0.9

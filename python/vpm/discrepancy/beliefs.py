@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from vpm.discrepancy.confirmation import Judged
 from vpm.identify.statistics import NORMAL_95
-from vpm.model import Model
+from vpm.model import Model, Parameter
 
 #: Parameters that move by more of their stated uncertainties than this are reported, and no effect is believed that
 #: drives one so far.
@@ -21,8 +21,8 @@ def moved_far(model: Model, recalibrated: Judged) -> list[str]:
     notes = []
     for name in recalibrated.free:
         before, after = model.parameters[name], recalibrated.model.parameters[name]
-        spread = before.uncertainty
-        if spread is not None and 0.0 < spread < float("inf") and abs(after.value - before.value) > FAR * spread:
+        spread = _stated(before)
+        if abs(after.value - before.value) > FAR * spread:
             notes.append(
                 f"recalibration moved {name} from {before.value:.5g} to {after.value:.5g} {before.unit}, "
                 f"{abs(after.value - before.value) / spread:.1f} times its stated uncertainty"
@@ -51,12 +51,15 @@ def driven_away(nominal: Model, recalibrated: Judged, final: Judged) -> dict[str
         if name not in nominal.parameters or name not in recalibrated.model.parameters:
             continue
         told = nominal.parameters[name]
-        spread = told.uncertainty
-        if spread is None or not 0.0 < spread < float("inf"):
-            continue
+        spread = _stated(told)
         after = final.model.parameters[name].value
         away = abs(after - told.value) - NORMAL_95 * float(std)
         moved = abs(after - recalibrated.model.parameters[name].value)
         if min(away, moved) > FAR * spread:
             found[name] = abs(after - told.value) / spread
     return dict(sorted(found.items(), key=lambda item: -item[1]))
+
+
+def _stated(parameter: Parameter) -> float:
+    """Stated uncertainty; infinite where nothing is stated, or nothing is known."""
+    return parameter.uncertainty or float("inf")

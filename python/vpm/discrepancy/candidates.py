@@ -170,7 +170,9 @@ def _candidate(effect: EffectType, site: str, model: Model, data: InverseDynamic
     if effect.name == "payload":
         return Candidate(effect, site, _payload_places(model, site))
     if effect.name in {"actuator_lag", "saturation"}:
-        return _in_drive(effect, site, seen, seen_limit(data, model.joints[joint], seen.input, residual))
+        limited = effect.name == "saturation"
+        guessed = seen_limit(data, model.joints[joint], seen.input, residual) if limited else None
+        return _in_drive(effect, site, seen, guessed)
     if effect.name == "supply_drop":
         return Candidate(effect, site, tuple({"time_constant": t} for t in DROP_TIMES), {"time_constant": (1e-3, 5.0)})
     if effect.name == "entrained_air":

@@ -15,6 +15,7 @@ from vpm.discrepancy.motion_only import LATE_OR_SLOW
 from vpm.discrepancy.own_reading import read_by_itself
 from vpm.discrepancy.refusal import LEAST_GAIN
 from vpm.discrepancy.structural import coupled
+from vpm.identify import Gain
 
 #: What comes late; each of the others of its kind is slow and looks late.
 DELAYS = ("input_delay", "sensor_delay")
@@ -92,13 +93,30 @@ def _first_named(equals: Sequence[Trial]) -> Trial:
 
 def _left(trial: Trial) -> float:
     """Share of the unseen mean square that a trial leaves."""
-    return max(1.0 - trial.unseen.relative, 1e-12)
+    return _share(trial.unseen)
+
+
+def _share(told: Gain) -> float:
+    return max(1.0 - told.relative, 1e-12)
 
 
 def cost(trial: Trial) -> float:
-    """Information criterion of G. Schwarz (*Annals of Statistics* 6, 1978) per independent piece of the unseen data."""
-    pieces = max(trial.unseen.pieces, 3)
-    return float(np.log(_left(trial)) + len(trial.parameters) * np.log(pieces) / pieces)
+    """Information criterion of the unseen data, see `schwarz`."""
+    return schwarz(trial.unseen, len(trial.parameters))
+
+
+def schwarz(told: Gain, numbers: int) -> float:
+    """Information criterion of G. Schwarz (*Annals of Statistics* 6, 1978) per independent piece; 0 says no change.
+
+    Parameters
+    ----------
+    told : Gain
+        What the numbers gain.
+    numbers : int
+        How many are fitted.
+    """
+    pieces = max(told.pieces, 3)
+    return float(np.log(_share(told)) + numbers * np.log(pieces) / pieces)
 
 
 def _plainer(trial: Trial, first: Trial) -> bool:

@@ -47,7 +47,7 @@ ALL = 0.9
 TOLD = ("stiffness", "inertia")
 
 
-def told_by_runs(found: Search, data: Data, each: SideBySide) -> Search:
+def with_told_contacts(found: Search, data: Data, each: SideBySide) -> Search:
     """The search with contacts of its plays as hard as runs of the model along the training records say.
 
     The numbers of the runs stand if with them the training records are simulated better, beyond chance, and the unseen

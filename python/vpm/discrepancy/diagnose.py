@@ -19,7 +19,7 @@ from vpm.discrepancy.beliefs import moved_far
 from vpm.discrepancy.candidates import slow_speeds
 from vpm.discrepancy.choice import Accepted
 from vpm.discrepancy.confirmation import Data, Judged, is_clear, judge
-from vpm.discrepancy.contacts import told_by_runs
+from vpm.discrepancy.contacts import with_told_contacts
 from vpm.discrepancy.diagnosis import (
     AcceptedEffect,
     ChannelGap,
@@ -223,7 +223,7 @@ def _settled(
     if changed is not found and len(changed.accepted) > 1:
         known = rivals(changed.final, data, changed.accepted, effects, each)
     changed, known = in_order(changed, known)
-    return told_by_runs(changed, data, each), known
+    return with_told_contacts(changed, data, each), known
 
 
 def _until_stopped(work: Callable[[], Found], nothing: Found) -> tuple[Found, bool]:

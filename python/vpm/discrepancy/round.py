@@ -107,7 +107,8 @@ class Round:
             return None
         best = Accepted(max(believed, key=lambda trial: trial.unseen.score), ())
         self.refused.pop(best.key, None)
-        self._ranking[best.key] = replace(self._ranking[best.key], unseen=best.trial.unseen.relative, accepted=True)
+        self._ranking[best.key] = replace(self._ranking[best.key], unseen=best.trial.unseen.relative)
+        self.mark(best.key)
         return best
 
     def weak(self, best: Accepted) -> bool:

@@ -66,12 +66,16 @@ def seals(base: Judged, data: Data) -> Seals | None:
         The recalibrated model without effects.
     data : Data
     """
+    drives = _pressed(base.model, data.training)
+    if not drives:
+        return None
+    _, slopes = data.unseen.evaluate(base.model, base.model.theta, [base.model.index(name) for name in base.free])
     found = []
-    for drive in _pressed(base.model, data.training):
+    for drive in drives:
         seen, met = (_strokes(problem, drive) for problem in (data.training, data.unseen))
         for bend in _bends(base.model, data.training, drive, seen):
             columns = (_column(data.training, seen, bend), _column(data.unseen, met, bend))
-            one = _fitted(base, data, drive, columns)
+            one = _fitted(base, data, drive, columns, slopes)
             if one.share > NORMAL_95 * one.std:
                 found.append(one)
     return min(found, key=lambda one: float(one.fitted @ one.fitted), default=None)
@@ -141,12 +145,13 @@ def _column(problem: InverseDynamicsProblem, strokes: Sequence[_Stroke], bend: f
     return np.asarray(problem.added([effort[:, :, None] for effort in efforts])[:, 0])
 
 
-def _fitted(base: Judged, data: Data, drive: str, columns: tuple[Array, Array]) -> Seals:
-    """One step of everything that is free, beside the size of the friction, in which the effort is linear."""
+def _fitted(base: Judged, data: Data, drive: str, columns: tuple[Array, Array], slopes: Array) -> Seals:
+    """One step of everything that is free, beside the size of the friction, in which the effort is linear.
+
+    ``slopes`` are those of the unseen residual by what is free.
+    """
     known = base.fit.jacobian
     step, std, _ = linear_step(data.training, np.column_stack([known, columns[0]]), base.fit.residual)
-    places = [base.model.index(name) for name in base.free]
-    _, slopes = data.unseen.evaluate(base.model, base.model.theta, places)
     seen = base.fit.residual + known @ step[:-1] + step[-1] * columns[0]
     met = base.unseen + slopes @ step[:-1] + step[-1] * columns[1]
     return Seals(drive, float(step[-1]), float(std[-1]), seen, met)

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from vpm.discrepancy.ambiguity import Rivals, as_good
-from vpm.discrepancy.choice import Accepted, alike
+from vpm.discrepancy.choice import Accepted, alike, schwarz
 from vpm.discrepancy.confirmation import Data, Judged, Trial, finished, shrinkage
 from vpm.discrepancy.diagnosis import RefusedEffect
 from vpm.discrepancy.elimination import Stage
@@ -78,8 +78,8 @@ def _preferred(final: Judged, entry: Accepted, trial: Trial, data: Data, thresho
 def earned(fitted: Gain, more: int) -> bool:
     """Whether a rival lowers the training error by what its additional numbers cost.
 
-    By the information criterion of G. Schwarz (*Annals of Statistics* 6, 1978): numbers that the records they were
-    fitted to do not show tell nothing of other records, where a law of dry friction is wrong in a few reversals.
+    By the information criterion: numbers that the records they were fitted to do not show tell nothing of other
+    records, where a law of dry friction is wrong in a few reversals.
 
     Parameters
     ----------
@@ -88,9 +88,7 @@ def earned(fitted: Gain, more: int) -> bool:
     more : int
         Numbers that the rival has more than the effect.
     """
-    pieces = max(fitted.pieces, 3)
-    left = max(1.0 - fitted.relative, 1e-12)
-    return fitted.relative > 0.0 and float(np.log(left)) + max(more, 0) * np.log(pieces) / pieces < 0.0
+    return fitted.relative > 0.0 and schwarz(fitted, max(more, 0)) < 0.0
 
 
 def _exchanged(
