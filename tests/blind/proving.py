@@ -11,6 +11,7 @@ import zlib
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from dataclasses import dataclass, replace
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -83,6 +84,9 @@ def jobs(
                 count = min(times * each, len(seeds))
                 turns = [seeds[(dealt + k) % len(seeds)] for k in range(count)]
                 found += [Job(machine, kind, request, seed, level) for seed in turns]
+            if "pairs" in kinds:
+                pairs = _pairs(machine, effects, seeds, PAIRS * each)
+                found += [Job(machine, "pairs", pair, seed, level) for pair, seed in pairs]
     if not found:
         raise ValueError("no case is left; the effects make no sense on the machines")
     return found
@@ -104,12 +108,19 @@ def _requests(machine: str, effects: Sequence[str], kinds: Sequence[str]) -> Ite
     for kind in ("none", "parameters"):
         if kind in kinds and not effects:
             yield kind, (kind,), NOTHING
+
+
+def _pairs(
+    machine: str, effects: Sequence[str], seeds: Sequence[int], count: int
+) -> Iterator[tuple[tuple[str, str], int]]:
+    """So many pairs of effects, with seeds that are dealt out in turn: every seed has pairs of its own."""
     names = [name for name in hideable(machine, known=True) if not effects or name in effects]
-    if "pairs" in kinds and len(names) > 1:
-        generator = np.random.default_rng(zlib.crc32(f"pairs of {machine}".encode()))
-        drawn = (tuple(sorted(map(str, generator.choice(names, 2, replace=False)))) for _ in range(PAIRS))
-        for pair in dict.fromkeys(drawn):
-            yield "pairs", pair, 1
+    both = [pair for pair in combinations(sorted(names), 2) if not any(absorbed(machine, name, "") for name in pair)]
+    drawn = {seed: np.random.default_rng([seed, zlib.crc32(f"pairs of {machine}".encode())]) for seed in seeds}
+    orders = {seed: generator.permutation(len(both)) for seed, generator in drawn.items()}
+    for k in range(min(count, len(both) * len(seeds))):
+        seed = seeds[k % len(seeds)]
+        yield both[orders[seed][k // len(seeds)]], seed
 
 
 def answers(
