@@ -233,6 +233,11 @@ def test_cases_are_dealt_out_over_seeds() -> None:
     assert len({job.seed for job in kinds["single"]}) == 5
     assert len(kinds["none"]) == len(kinds["parameters"]) == 5
     assert all(len(job.request) == 2 for job in kinds["pairs"])
+    assert len(kinds["pairs"]) == 10
+    assert len({job.request for job in kinds["pairs"]}) > 7
+    assert {name for job in kinds["pairs"] for name in job.request} <= set(hideable("axis_linear", known=True)) - {
+        "payload"
+    }
     assert len(set(todo)) == len(todo)
     only = proving.jobs(["arm2r", "axis_linear"], ["gravity_tilt"], seeds=[7])
     assert only == [Job("arm2r", "single", ("gravity_tilt",), 7, 1.0)]
@@ -241,17 +246,27 @@ def test_cases_are_dealt_out_over_seeds() -> None:
             proving.jobs(**wrong)
 
 
-def test_a_pair_knows_how_strong_each_effect_is_alone() -> None:
+def test_a_pair_knows_how_strong_each_effect_is_alone_and_beside_the_other() -> None:
     job = Job("axis_linear", "pairs", ("bias_force", "spring"), 2, 1.0)
-    ((_, case, strengths, _, error),) = proving.make([job])
+    ((_, case, strengths, alone, _, error),) = proving.make([job])
     assert not error
     assert case is not None
-    alone = make_cases("axis_linear", [(name, 2) for name in job.request])
-    assert strengths == pytest.approx([one.oracle.strength for one in alone])
+    apart = make_cases("axis_linear", [(name, 2) for name in job.request])
+    assert alone == pytest.approx([one.oracle.strength for one in apart])
+    # A spring's place of rest is unknown too, and that is a constant force.
+    assert strengths[0] < 0.05 * alone[0]
+    assert strengths[1] == pytest.approx(alone[1], rel=0.3)
+
+
+def test_two_names_for_one_physics_cannot_be_told_apart() -> None:
+    job = Job("axis_linear", "pairs", ("input_delay", "sensor_delay"), 2, 1.0)
+    ((_, _, strengths, alone, _, _),) = proving.make([job])
+    assert strengths == (0.0, 0.0)
+    assert min(alone) > 0.0
 
 
 def test_what_is_exactly_a_calibratable_parameter_is_not_solvable() -> None:
-    ((_, _, strengths, _, _),) = proving.make([Job("axis_linear", "single", ("payload",), 0, 1.0)])
+    ((_, _, strengths, _, _, _),) = proving.make([Job("axis_linear", "single", ("payload",), 0, 1.0)])
     assert strengths == (0.0,)
 
 

@@ -15,6 +15,7 @@ import numpy as np
 
 import vpm
 from blind.case import Case
+from blind.oracle import CLEAR
 from vpm.discrepancy import Diagnosis
 from vpm.identify import InverseDynamicsProblem, estimate
 from vpm.model import Model
@@ -47,7 +48,8 @@ class Answer:
         Whether the catalogue is said to have all that is hidden.
     hidden : tuple of Named
     strengths : tuple of float
-        How far each hidden effect alone stands clear of the noise, see `blind.Oracle`; nothing has none.
+        How far each hidden effect stands clear of the noise, see `blind.Oracle`, where the other one of a pair is
+        there with parameters that nobody knows either; nothing has none.
     verdict : str
         Of the diagnosis; "" if it failed.
     named : tuple of Named
@@ -68,6 +70,8 @@ class Answer:
         Why it failed, or "".
     late : bool
         Whether the diagnosis was ended by the limit of time and this is what it knew until then.
+    alone : tuple of float
+        Strengths of effects where the other one of a pair is not there.
     """
 
     machine: str
@@ -91,11 +95,12 @@ class Answer:
     making: float = 0.0
     error: str = ""
     late: bool = False
+    alone: tuple[float, ...] = ()
 
     @property
     def solvable(self) -> bool:
-        """Whether each hidden effect alone stands clear of the noise."""
-        return bool(self.strengths) and min(self.strengths) > 1.0
+        """Whether each hidden effect stands clear of the noise."""
+        return bool(self.strengths) and min(self.strengths) > CLEAR
 
     def to_dict(self) -> dict[str, object]:
         """Plain data for JSON; what is not known is null."""
@@ -111,7 +116,7 @@ class Answer:
         """The same, read back."""
         values: dict[str, object] = {}
         for entry in fields(cls):
-            if entry.name == "late" and entry.name not in stored:
+            if entry.name in {"late", "alone"} and entry.name not in stored:
                 continue
             value = stored[entry.name]
             if entry.name in {"hidden", "named", "ranking"}:
@@ -138,7 +143,7 @@ def answered(case: Case, kind: str, request: Sequence[str], strengths: Sequence[
     kind : str
     request : sequence of str
     strengths : sequence of float
-        Of each hidden effect alone.
+        Of each hidden effect.
     limit : float
         Longest time of the processor for it [s].
     """

@@ -143,7 +143,33 @@ def try_cases(
     recalibrate: bool = True,
 ) -> list[Case | FloatingPointError]:
     """The same, but a case whose simulation does not stay finite gives its error in its place."""
-    plans = [_plan(MACHINES[machine], hidden, seed, noise_level, recalibrate=recalibrate) for hidden, seed in requests]
+    return _cases(
+        [_plan(MACHINES[machine], hidden, seed, noise_level, recalibrate=recalibrate) for hidden, seed in requests]
+    )
+
+
+def strengths_beside(
+    machine: str, requests: Iterable[tuple[Sequence[str], str, int]], noise_level: float = 1.0
+) -> list[float]:
+    """How far one effect stands clear of the noise where another one is there, whose parameters nobody knows either.
+
+    Parameters
+    ----------
+    machine : str
+    requests : iterable of (hidden, name, seed)
+        The two that are hidden, and which of them is judged.
+    noise_level : float
+
+    Returns
+    -------
+    list of float
+        As `Oracle.strength`, NaN where the simulation does not stay finite.
+    """
+    plans = [_plan(MACHINES[machine], hidden, seed, noise_level, judged=name) for hidden, name, seed in requests]
+    return [case.oracle.strength if isinstance(case, Case) else np.nan for case in _cases(plans)]
+
+
+def _cases(plans: Sequence[Plan]) -> list[Case | FloatingPointError]:
     cases: dict[int, Case | FloatingPointError] = {}
     for batch in batches(plans):
         for k, pieces in simulated([plans[k] for k in batch]):
@@ -151,8 +177,16 @@ def try_cases(
     return [cases[k] for k in range(len(plans))]
 
 
-def _plan(machine: Machine, hidden: str | Sequence[str], seed: int, noise_level: float, *, recalibrate: bool) -> Plan:
-    """Draw everything that a case needs."""
+def _plan(
+    machine: Machine,
+    hidden: str | Sequence[str],
+    seed: int,
+    noise_level: float,
+    *,
+    recalibrate: bool = True,
+    judged: str = "",
+) -> Plan:
+    """Draw everything that a case needs; with ``judged``, the oracle is asked for that one of the hidden effects."""
     names = (hidden,) if isinstance(hidden, str) else tuple(hidden)
     drawn = np.random.default_rng([seed, zlib.crc32(machine.name.encode())])
     effects = [_placed(machine, name, seed) for name in names if name not in {NOTHING, PARAMETERS}]
@@ -161,7 +195,10 @@ def _plan(machine: Machine, hidden: str | Sequence[str], seed: int, noise_level:
     found = _drawn(machine, draft, effects, seed)
     absent = {f"{name}@{site}" for name, site in effects}
     base = tuple((name, site) for name, site in draft.base if f"{name}@{site}" not in absent)
-    keys = {f"{h.site}.{h.name}.{p}": value for h in found for p, value in h.parameters.items()}
+    keys = _keys(found)
+    given = _keys(
+        [h for (name, _), h in zip(effects, found, strict=True) if judged and name != judged.partition("@")[0]]
+    )
     without = {k: v for k, v in draft.values.items() if k not in keys}
     for hidden_effect in found:
         for parameter, value in machine.layout.absent.get(hidden_effect.name, {}).items():
@@ -172,9 +209,15 @@ def _plan(machine: Machine, hidden: str | Sequence[str], seed: int, noise_level:
     nominal, wrong = _nominal(own, free, names)
     truth = Truth(tuple(_as_catalogued(h, draft.values) for h in found), free, nominal, wrong)
     paths = _paths(machine, draft, _own_generator(machine, "motion", seed))
-    varied = tuple(nominal) if recalibrate else ()
-    there, bare = {**without, **keys}, {**without, **_starts(machine.layout, keys)}
+    varied = (*nominal, *given) if recalibrate else ()
+    missing = {key: value for key, value in keys.items() if key not in given}
+    there, bare = {**without, **keys}, {**without, **given, **_starts(machine.layout, missing)}
     return Plan(machine, seed, noise_level, draft, base, truth, there, bare, varied, paths, own)
+
+
+def _keys(hidden: Sequence[Hidden]) -> dict[str, float]:
+    """Parameters of effects under the names that the generators know them by."""
+    return {f"{h.site}.{h.name}.{p}": value for h in hidden for p, value in h.parameters.items()}
 
 
 def _starts(layout: Layout, keys: Mapping[str, float]) -> dict[str, float]:

@@ -17,10 +17,11 @@ from typing import Any
 
 import numpy as np
 
-from blind.answer import Answer, answered
-from blind.case import Case, hideable, sites_of, try_cases
+from blind.answer import Answer, Named, answered
+from blind.case import Case, hideable, sites_of, strengths_beside, try_cases
 from blind.effects import EFFECTS
 from blind.machines import MACHINES
+from blind.score import site_right
 from blind.table import failed
 
 KINDS = ("single", "pairs", "none", "parameters", "outside")
@@ -165,32 +166,55 @@ def _batches(todo: Sequence[Job]) -> Iterator[list[Job]]:
             yield mine[k * len(mine) // pieces : (k + 1) * len(mine) // pieces]
 
 
-Made = tuple[Job, Case | None, tuple[float, ...], float, str]
+Strengths = tuple[float, ...]
+Made = tuple[Job, Case | None, Strengths, Strengths, float, str]
 
 
 def make(batch: Sequence[Job]) -> list[Made]:
-    """Cases of a batch with the strength of each hidden effect alone, the time that each took, and errors."""
+    """Cases of a batch with strengths of the hidden effects, those of each one alone, times that they took, errors."""
     began = time.process_time()
-    machine, level = batch[0].machine, batch[0].noise_level
-    wanted = [(job.request, job.seed) for job in batch]
-    alone = [((name,), job.seed) for job in batch if len(job.request) > 1 for name in job.request]
-    made = try_cases(machine, [*wanted, *alone], level)
-    beside = zip(alone, made[len(wanted) :], strict=True)
-    strengths = {pair: case.oracle.strength for pair, case in beside if isinstance(case, Case)}
+    made = try_cases(batch[0].machine, [(job.request, job.seed) for job in batch], batch[0].noise_level)
+    strengths = _strengths(batch, made)
     each = (time.process_time() - began) / len(batch)
     result: list[Made] = []
-    for job, case in zip(batch, made, strict=False):
+    for job, case, (own, alone) in zip(batch, made, strengths, strict=True):
         if isinstance(case, FloatingPointError):
-            result.append((job, None, (), each, str(case)))
+            result.append((job, None, (), (), each, str(case)))
         else:
-            own: tuple[float, ...] = (case.oracle.strength,) if case.truth.hidden else ()
-            if len(job.request) > 1:
-                own = tuple(strengths.get(((name,), job.seed), np.nan) for name in job.request)
-            parts = zip(own, case.truth.hidden, strict=False)
-            own = tuple(0.0 if absorbed(machine, h.name, h.site) else s for s, h in parts)
             slim = replace(case.oracle, with_effect=(), without_effect=())
-            result.append((job, replace(case, oracle=slim), own, each, ""))
+            result.append((job, replace(case, oracle=slim), own, alone, each, ""))
     return result
+
+
+def _strengths(
+    batch: Sequence[Job], made: Sequence[Case | FloatingPointError]
+) -> Iterator[tuple[Strengths, Strengths]]:
+    """Strengths of the hidden effects of each case: beside the other one, where there are two, and alone."""
+    machine, level = batch[0].machine, batch[0].noise_level
+    one = [(job, name) for job in batch if len(job.request) > 1 for name in job.request]
+    beside = dict(
+        zip(one, strengths_beside(machine, [(job.request, name, job.seed) for job, name in one], level), strict=True)
+    )
+    tried = zip(one, try_cases(machine, [((name,), job.seed) for job, name in one], level), strict=True)
+    alone = {key: case.oracle.strength if isinstance(case, Case) else np.nan for key, case in tried}
+    for job, case in zip(batch, made, strict=True):
+        if not isinstance(case, Case) or not case.truth.hidden:
+            yield (), ()
+            continue
+        own: Strengths = (case.oracle.strength,)
+        named = [Named(h.name, h.site) for h in case.truth.hidden]
+        nobody = [absorbed(machine, n.name, n.site) for n in named]
+        if len(named) == 1:
+            yield _but(own, nobody), _but(own, nobody)
+        else:
+            same = [site_right(machine, *named)] * 2
+            keys = [(job, name) for name in job.request]
+            yield _but([beside[key] for key in keys], nobody, same), _but([alone[key] for key in keys], nobody)
+
+
+def _but(strengths: Sequence[float], *never: Sequence[bool]) -> Strengths:
+    """Strengths, but nothing of effects that nobody can name."""
+    return tuple(0.0 if any(reasons) else s for s, *reasons in zip(strengths, *never, strict=True))
 
 
 def absorbed(machine: str, name: str, site: str) -> bool:
@@ -200,13 +224,13 @@ def absorbed(machine: str, name: str, site: str) -> bool:
 
 def ask(made: Made, limit: float) -> Answer:
     """The answer to a case."""
-    job, case, strengths, making, error = made
+    job, case, strengths, alone, making, error = made
     if case is None:
         known = all(EFFECTS[name.partition("@")[0]].known for name in job.request if name not in {"none", "parameters"})
         return Answer(job.machine, job.kind, job.request, job.seed, job.noise_level, known, making=making, error=error)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        return replace(answered(case, job.kind, job.request, strengths, limit), making=making)
+        return replace(answered(case, job.kind, job.request, strengths, limit), alone=alone, making=making)
 
 
 def _here(todo: Sequence[Job], limit: float) -> Iterator[Answer]:

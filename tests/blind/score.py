@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blind.answer import NOWHERE, Answer, Named
+from blind.oracle import CLEAR
 
 Array = NDArray[np.float64]
 ANY = "*"
@@ -178,8 +179,13 @@ def single(answers: Iterable[Answer]) -> list[Answer]:
 
 
 def pairs(answers: Iterable[Answer]) -> list[Answer]:
-    """Cases with two effects, each of which is solvable alone."""
+    """Cases with two effects, each of which is solvable where the other one is there."""
     return [a for a in answers if a.kind == "pairs" and a.solvable]
+
+
+def pairs_alone(answers: Iterable[Answer]) -> list[Answer]:
+    """Cases with two effects, each of which is solvable where the other one is not there."""
+    return [a for a in answers if a.kind == "pairs" and a.alone and min(a.alone) > CLEAR]
 
 
 def outside(answers: Iterable[Answer]) -> list[Answer]:

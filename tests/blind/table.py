@@ -59,7 +59,7 @@ def markdown(header: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
 
 def _summary(answers: Sequence[Answer]) -> str:
     one, two, outside, nothing = (pick(answers) for pick in (score.single, score.pairs, score.outside, score.without))
-    first = [a for a in one if score.top(a, 1)]
+    first, one_by_one = [a for a in one if score.top(a, 1)], score.pairs_alone(answers)
     silent = [a for a in answers if a.kind == "single" and not a.solvable]
     shrunk = score.closed(outside)
     rows: Rows = [
@@ -70,6 +70,7 @@ def _summary(answers: Sequence[Answer]) -> str:
         ("named wrongly: another effect first", score.rate(one, lambda a: bool(a.named) and not score.top(a, 1))),
         ("left open: nothing named", score.rate(one, lambda a: not a.named)),
         ("solvable pairs: both named", score.rate(two, score.all_named)),
+        ("pairs of which each effect is solvable alone: both named", score.rate(one_by_one, score.all_named)),
         ("nothing missing: false alarms", score.rate(nothing, score.alarmed)),
         ("nothing missing: called unexplained", score.rate(nothing, score.unexplained)),
         ("one effect too weak to be solvable: named", score.rate(silent, lambda a: score.top(a, 1))),
