@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from importlib import import_module
 from typing import cast
 
 import numpy as np
 import pytest
 
 import vpm
+from balances import balances
 from blind import make_case
 from vpm.discrepancy.ambiguity import Rivals
 from vpm.discrepancy.candidates import candidates
+from vpm.discrepancy.confirmation import judge
+from vpm.discrepancy.diagnosis import RefusedEffect
+from vpm.discrepancy.elimination import Stage
 from vpm.discrepancy.screening import Baseline, probe
-from vpm.discrepancy.search import Search
+from vpm.discrepancy.search import Search, search
+from vpm.discrepancy.side_by_side import SideBySide
 from vpm.discrepancy.standing import earned, in_order
 from vpm.identify import Gain, InverseDynamicsProblem, estimate
 
@@ -71,6 +77,31 @@ def test_a_spring_is_screened_with_the_place_where_it_rests() -> None:
 def test_a_rival_earns_its_additional_numbers_where_they_were_fitted(left: float, more: int, paid: bool) -> None:
     """Of 1000 independent pieces a number has to take 0.7 % of the mean square."""
     assert earned(Gain(1.0, float(np.sqrt(left)), 1.0, 3.0, 1000), more) == paid
+
+
+def test_a_search_goes_on_beside_what_took_the_place_of_an_effect(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Beside the true name a second effect stands clear; the name that went out does not come back."""
+    diagnose = import_module("vpm.discrepancy.diagnose")
+    model, free, data = balances(make_case("axis_linear", ("spring", "viscous_friction"), 3, recalibrate=False))
+    start, each = judge(model, free, data, {}), SideBySide(1)
+    spring = search(start, data, ["spring"], 6, print, each)
+    gone = (Stage("added", "bias_force", "axis", start), Stage("removed", "bias_force", "axis", start))
+    exchanged = replace(
+        spring,
+        stages=(spring.stages[0], *gone, *spring.stages[1:]),
+        refused=(RefusedEffect("bias_force", "axis", "exchanged"),),
+    )
+    plain = replace(exchanged, accepted=spring.accepted)
+    monkeypatch.setattr(
+        diagnose,
+        "replaced",
+        lambda found, known, _: (exchanged if found is plain else found, known),
+    )
+    found, known = diagnose._settled(plain, data, ["bias_force", "spring", "viscous_friction"], 6, print, each)
+    assert {entry.key for entry in found.accepted} == {("spring", "axis"), ("viscous_friction", "axis")}
+    assert {(one.effect, one.site) for one in known} == {entry.key for entry in found.accepted}
+    assert ("bias_force", "axis") not in {(c.name, c.site) for c in found.ranking}
+    assert [one.reason for one in found.refused if one.name == "bias_force"] == ["exchanged"]
 
 
 @dataclass

@@ -34,7 +34,7 @@ from vpm.discrepancy.evidence import gather
 from vpm.discrepancy.filters import filters
 from vpm.discrepancy.floor import noise_floor
 from vpm.discrepancy.remainder import Remainder, remainder
-from vpm.discrepancy.search import Search, ambiguities, search
+from vpm.discrepancy.search import Search, ambiguities, further, search
 from vpm.discrepancy.side_by_side import Progress, SideBySide
 from vpm.discrepancy.standing import in_order, replaced
 from vpm.discrepancy.structure import structure
@@ -164,7 +164,9 @@ def _diagnosis(
         notes.append(STOPPED)
     say("looking for what else would do in the place of each effect")
     nothing: tuple[Rivals, ...] = ()
-    (found, ambiguous), late = _until_stopped(partial(_settled, found, data, effects, each), (found, nothing))
+    (found, ambiguous), late = _until_stopped(
+        partial(_settled, found, data, effects, limit, say, each), (found, nothing)
+    )
     say("measuring the noise floor")
     floor = noise_floor(found.final.model, data.unseen, found.final.unseen, mode, setup)
     gap = _gaps(data, nominal, recalibrated, found.final, floor)
@@ -215,15 +217,22 @@ def _diagnosis(
 
 
 def _settled(
-    found: Search, data: Data, effects: Sequence[str] | None, each: SideBySide
+    found: Search, data: Data, effects: Sequence[str] | None, limit: int, tell: Tell, each: SideBySide
 ) -> tuple[Search, tuple[Rivals, ...]]:
-    """Names and their order when each effect has been taken out again, with what would do in its place."""
+    """Names and their order when each effect has been taken out again, with what would do in its place.
+
+    Where something takes the place of an effect, the search goes on beside it.
+    """
     known = rivals(found.final, data, found.accepted, effects, each, found.last)
-    changed, known = replaced(found, known, data)
-    if changed is not found and len(changed.accepted) > 1:
-        known = rivals(changed.final, data, changed.accepted, effects, each)
-    changed, known = in_order(changed, known)
-    return with_told_contacts(changed, data, each), known
+    for _ in range(limit):
+        changed, known = replaced(found, known, data)
+        if changed is found:
+            break
+        found = changed if found.interrupted else further(changed, data, effects, limit, tell, each)
+        if len(found.accepted) > 1 or found.final is not changed.final:
+            known = rivals(found.final, data, found.accepted, effects, each, found.last)
+    found, known = in_order(found, known)
+    return with_told_contacts(found, data, each), known
 
 
 def _until_stopped(work: Callable[[], Found], nothing: Found) -> tuple[Found, bool]:

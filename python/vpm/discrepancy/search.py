@@ -61,14 +61,26 @@ def search(
     start: Judged, data: Data, effects: Sequence[str] | None, limit: int, tell: Tell, each: SideBySide
 ) -> Search:
     """Add effects one at a time, and drop earlier ones that later ones replace, until none is believed any more."""
-    stages = [Stage("recalibrated", "", "", start)]
-    accepted: list[Accepted] = []
-    ranking: list[RankedCandidate] = []
-    dropped: dict[Key, str] = {}
+    found = Search((Stage("recalibrated", "", "", start),), (), (), (), start.fit.interrupted)
+    return found if found.interrupted else further(found, data, effects, limit, tell, each)
+
+
+def further(
+    found: Search, data: Data, effects: Sequence[str] | None, limit: int, tell: Tell, each: SideBySide
+) -> Search:
+    """A search that goes on from where another one ended; what went out again does not come back.
+
+    An effect that took the place of another one leaves what the other one had covered, in which a second effect stands
+    clear that was refused before.
+    """
+    stages, accepted, ranking = list(found.stages), list(found.accepted), list(found.ranking)
+    gone = {(s.effect, s.site) for s in stages if s.change == "removed"} - {entry.key for entry in accepted}
+    dropped = {(r.name, r.site): r.reason for r in found.refused if (r.name, r.site) in gone}
     refused: dict[Key, str] = {}
     last: Tried | None = None
-    interrupted = start.fit.interrupted
-    for number in range(1, 0 if interrupted else 2 * limit + 2):
+    interrupted = False
+    first = 1 + max((candidate.round for candidate in ranking), default=0)
+    for number in range(first, 2 * limit + 2):
         outcome = Round(stages[-1].judged, data, number, tell, each)
         best, pair = None, None
         try:
