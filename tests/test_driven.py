@@ -13,8 +13,10 @@ from blind import Case, make_case
 from vpm.discrepancy.confirmation import Data, judge
 from vpm.discrepancy.driven import Verdict, compare_driven
 from vpm.discrepancy.motion_only import LATE
-from vpm.discrepancy.own_run import own_run, spectra, weighted
+from vpm.discrepancy.own_run import as_it_is, own_run, spectra, weighted
 from vpm.identify import InverseDynamicsProblem, OutputErrorProblem
+from vpm.model import Model
+from vpm.simulate import Setup
 
 
 def fitted_late(case: Case) -> tuple[Data, list[vpm.discrepancy.confirmation.Judged]]:
@@ -125,6 +127,24 @@ def test_a_delay_of_a_machine_that_sticks_is_named() -> None:
     assert [effect.name for effect in why.effects] == ["input_delay"]
     truth = case.truth.hidden[0].parameters["time"]
     assert why.effects[0].parameters[0].value == pytest.approx(truth, rel=0.1)
+
+
+def test_steps_of_a_run_beside_dry_friction_do_not_blur_what_parts_a_delay_from_a_lag() -> None:
+    # With three steps in the delay they are off by five times that, and speak for the lag.
+    case = make_case("axis_linear", "input_delay", 103)
+    time, record = case.truth.hidden[0].parameters["time"], case.train[0].split(0.3)[0]
+    sticks = Model.from_toml(case.true_text).with_parameters({"axis.friction.transition_velocity": 1e-5})
+    delay, lag = (
+        sticks.with_effect("input_delay", at="drive", time=time),
+        sticks.with_effect("actuator_lag", at="drive", time_constant=time),
+    )
+    ideal = [
+        OutputErrorProblem(model, [record], "closed_loop", setup=Setup(substeps=40)).evaluate(model, model.theta)[0]
+        for model in (delay, lag)
+    ]
+    name = delay.effect("input_delay", "drive").parameter_names["time"]
+    run = as_it_is(delay, (name,), [record], Setup())
+    assert np.linalg.norm(run.left - ideal[0]) < np.linalg.norm(ideal[1] - ideal[0])
 
 
 def test_one_noise_counts_once_however_many_readings_show_it() -> None:

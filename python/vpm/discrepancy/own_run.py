@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
+from vpm.discrepancy.motion_only import is_dry
 from vpm.errors import VpmError
 from vpm.experiment import Experiment
 from vpm.identify import OutputErrorProblem
@@ -28,9 +29,10 @@ from vpm.simulate import Setup
 Array = NDArray[np.float64]
 Spectra = list[NDArray[np.complex128]]
 
-#: Steps of the integration in one delay or lag, and most of them in one sampling interval: both times may be shorter
-#: than that, and an error of steps is as small a difference as theirs.
-STEPS, MOST_STEPS = 3, 10
+#: Steps of the integration in one delay or lag, those beside dry friction, of which a step blurs when it lets go, and
+#: most of them in one sampling interval: both times may be shorter than that, and an error of steps is as small a
+#: difference as theirs.
+STEPS, DRY_STEPS, MOST_STEPS = 3, 10, 10
 #: Tapered share of each record; frequencies left out at the low end, where a record is one slope.
 TAPERED, LOWEST = 0.1, 2
 #: The spectrum of noise is the mean over this share of the frequencies, and over so many at least.
@@ -219,8 +221,8 @@ def _fine(model: Model, free: Sequence[str], records: Sequence[Experiment], setu
     """Steps that are as short as the times of a model ask for."""
     times = [model.parameters[name] for name in free]
     shortest = min((time.value for time in times if time.unit == "s" and time.value > 0.0), default=np.inf)
-    interval = max(record.dt for record in records)
-    return replace(setup, substeps=max(setup.substeps, min(MOST_STEPS, ceil(STEPS * interval / shortest))))
+    interval, steps = max(record.dt for record in records), DRY_STEPS if is_dry(model) else STEPS
+    return replace(setup, substeps=max(setup.substeps, min(MOST_STEPS, ceil(steps * interval / shortest))))
 
 
 def _step(run: OwnRun, setup: Setup) -> OwnRun | None:
