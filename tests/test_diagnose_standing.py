@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from importlib import import_module
+from types import SimpleNamespace
 from typing import cast
 
 import numpy as np
@@ -12,9 +13,10 @@ import pytest
 import vpm
 from balances import balances
 from blind import make_case
+from vpm.discrepancy import standing
 from vpm.discrepancy.ambiguity import Rivals
 from vpm.discrepancy.candidates import candidates
-from vpm.discrepancy.confirmation import judge
+from vpm.discrepancy.confirmation import Data, judge
 from vpm.discrepancy.diagnosis import RefusedEffect
 from vpm.discrepancy.elimination import Stage
 from vpm.discrepancy.screening import Baseline, probe
@@ -102,6 +104,57 @@ def test_a_search_goes_on_beside_what_took_the_place_of_an_effect(monkeypatch: p
     assert {(one.effect, one.site) for one in known} == {entry.key for entry in found.accepted}
     assert ("bias_force", "axis") not in {(c.name, c.site) for c in found.ranking}
     assert [one.reason for one in found.refused if one.name == "bias_force"] == ["exchanged"]
+
+
+@dataclass(frozen=True)
+class _Named:
+    """A search in which effects are known by their keys alone."""
+
+    accepted: tuple[SimpleNamespace, ...]
+    last: SimpleNamespace | None = None
+
+
+@pytest.mark.parametrize(
+    ("last", "alone", "again"), [("ripple", False, True), ("delay", False, False), ("", True, False)]
+)
+def test_what_is_late_is_chosen_again_beside_effects_that_came_later(
+    monkeypatch: pytest.MonkeyPatch, last: str, alone: bool, again: bool
+) -> None:
+    """An encoder is late, and its drive was blamed while another effect was missing."""
+
+    def trial(name: str, site: str) -> SimpleNamespace:
+        candidate = SimpleNamespace(key=(name, site), effect=SimpleNamespace(name=name))
+        return SimpleNamespace(probe=SimpleNamespace(candidate=candidate))
+
+    def entry(name: str, site: str) -> SimpleNamespace:
+        return SimpleNamespace(key=(name, site), trial=trial(name, site))
+
+    delay, ripple = entry("input_delay", "first"), entry("torque_ripple", "elbow")
+    own, right, other = trial("input_delay", "first"), trial("sensor_delay", "encoder_1"), trial("spring", "elbow")
+    found = _Named((delay,) if alone else (delay, ripple), {"ripple": ripple, "delay": delay}.get(last))
+    without = SimpleNamespace(baseline=None)
+    known = [SimpleNamespace(without=without, tried=(right, other)) for _ in found.accepted]
+    data = SimpleNamespace(training=SimpleNamespace(motions=[SimpleNamespace(dt=1e-3)]))
+    asked = list[list[SimpleNamespace]]()
+
+    def choose(believed: list[SimpleNamespace], _: object) -> SimpleNamespace:
+        asked.append(believed)
+        return SimpleNamespace(trial=right)
+
+    for name, instead in {
+        "refuse_trial": lambda *_: "",
+        "probe": lambda *_: None,
+        "confirm": lambda *_: own,
+        "finished": lambda _, __, trial: trial,
+        "choose": choose,
+        "_exchanged": lambda *args: ("exchanged", args[3:]),
+    }.items():
+        monkeypatch.setattr(standing, name, instead)
+    changed: tuple[object, object] = standing.timed_again(
+        cast("Search", found), cast("list[Rivals]", known), cast("Data", data)
+    )
+    assert changed == (("exchanged", (0, right)) if again else (found, tuple(known)))
+    assert asked == ([[own, right]] if again else [])
 
 
 @dataclass

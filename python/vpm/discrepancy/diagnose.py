@@ -36,7 +36,7 @@ from vpm.discrepancy.floor import noise_floor
 from vpm.discrepancy.remainder import Remainder, remainder
 from vpm.discrepancy.search import Search, ambiguities, further, search
 from vpm.discrepancy.side_by_side import Progress, SideBySide
-from vpm.discrepancy.standing import in_order, replaced
+from vpm.discrepancy.standing import in_order, replaced, timed_again
 from vpm.discrepancy.structure import structure
 from vpm.discrepancy.telling_apart import experiments as experiments_for
 from vpm.discrepancy.timing import in_time
@@ -226,6 +226,8 @@ def _settled(
     known = rivals(found.final, data, found.accepted, effects, each, found.last)
     for _ in range(limit):
         changed, known = replaced(found, known, data)
+        if changed is found:
+            changed, known = timed_again(found, known, data)
         if changed is found:
             break
         found = changed if found.interrupted else further(changed, data, effects, limit, tell, each)

@@ -13,13 +13,14 @@ from dataclasses import replace
 import numpy as np
 
 from vpm.discrepancy.ambiguity import Rivals, as_good
-from vpm.discrepancy.choice import Accepted, alike, schwarz
-from vpm.discrepancy.confirmation import Data, Judged, Trial, finished, shrinkage
+from vpm.discrepancy.choice import Accepted, alike, choose, schwarz
+from vpm.discrepancy.confirmation import Data, Judged, Trial, confirm, finished, shrinkage
 from vpm.discrepancy.diagnosis import RefusedEffect
 from vpm.discrepancy.elimination import Stage
 from vpm.discrepancy.finer import contains
 from vpm.discrepancy.motion_only import LATE_OR_SLOW
 from vpm.discrepancy.refusal import LEAST_GAIN, NORMAL_95_ONE_SIDED, Thresholds, refuse_trial
+from vpm.discrepancy.screening import probe
 from vpm.discrepancy.search import Search
 from vpm.identify import Gain, gain, segments
 
@@ -37,7 +38,7 @@ def replaced(found: Search, known: Sequence[Rivals], data: Data) -> tuple[Search
     known : tuple of Rivals
         Those of the one that came in are complete, those of the others are as they were.
     """
-    thresholds = Thresholds(max(1, sum(len(r.tried) for r in known)), min(m.dt for m in data.training.motions))
+    thresholds = _thresholds(known, data)
     winners = [
         (score, place, trial)
         for place, entry in enumerate(found.accepted)
@@ -73,6 +74,38 @@ def _preferred(final: Judged, entry: Accepted, trial: Trial, data: Data, thresho
         if simulated.harm > NORMAL_95_ONE_SIDED and simulated.relative < -LEAST_GAIN:
             return 0.0
     return unseen.score
+
+
+def timed_again(found: Search, known: Sequence[Rivals], data: Data) -> tuple[Search, tuple[Rivals, ...]]:
+    """Let each late effect be chosen again among what comes late or slow, now that the others are known.
+
+    When it came in another effect was missing, and what that one left was blamed on the drive rather than on an
+    instrument, and was in the runs along the reference by which a delay is told from a lag. One that came in last was
+    chosen beside all the others already.
+    """
+    thresholds = _thresholds(known, data)
+    for place, entry in enumerate(found.accepted):
+        without = known[place].without
+        chosen_last = found.last is not None and found.last.key == entry.key
+        if entry.key[0] not in LATE_OR_SLOW or len(found.accepted) < 2 or chosen_last or without is None:
+            continue
+        others = [
+            t
+            for t in known[place].tried
+            if t.probe.candidate.effect.name in LATE_OR_SLOW and not refuse_trial(t, thresholds)
+        ]
+        if not others:
+            continue
+        own = confirm(without, data, probe(without.baseline, data.training, entry.trial.probe.candidate))
+        trial = choose([own, *others], data).trial
+        if trial is not own:
+            return _exchanged(found, known, data, place, finished(without, data, trial))
+    return found, tuple(known)
+
+
+def _thresholds(known: Sequence[Rivals], data: Data) -> Thresholds:
+    """What is asked of rivals when so many were tried."""
+    return Thresholds(max(1, sum(len(r.tried) for r in known)), min(m.dt for m in data.training.motions))
 
 
 def earned(fitted: Gain, more: int) -> bool:
