@@ -33,6 +33,7 @@ from vpm.discrepancy.empirical import beside
 from vpm.discrepancy.evidence import gather
 from vpm.discrepancy.filters import filters
 from vpm.discrepancy.floor import noise_floor
+from vpm.discrepancy.overlooked import overlooked
 from vpm.discrepancy.remainder import Remainder, remainder
 from vpm.discrepancy.search import Search, ambiguities, further, search
 from vpm.discrepancy.side_by_side import Progress, SideBySide
@@ -40,6 +41,7 @@ from vpm.discrepancy.standing import in_order, replaced, timed_again
 from vpm.discrepancy.structure import structure
 from vpm.discrepancy.telling_apart import experiments as experiments_for
 from vpm.discrepancy.timing import in_time
+from vpm.discrepancy.told_apart import told_apart
 from vpm.discrepancy.verdict import is_negligible, verdict
 from vpm.errors import DiagnosisError, DivergedError, near_match
 from vpm.experiment import Experiment
@@ -221,11 +223,16 @@ def _settled(
 ) -> tuple[Search, tuple[Rivals, ...]]:
     """Names and their order when each effect has been taken out again, with what would do in its place.
 
-    Where something takes the place of an effect, the search goes on beside it.
+    Where something takes the place of an effect, or comes in beside it as runs of the model ask for it, the search goes
+    on beside that.
     """
     known = rivals(found.final, data, found.accepted, effects, each, found.last)
     for _ in range(limit):
         changed, known = replaced(found, known, data)
+        if changed is found and not found.interrupted:
+            changed, known = told_apart(found, known, data, each)
+        if changed is found and not found.interrupted:
+            changed = overlooked(found, data, each)
         if changed is found:
             changed, known = timed_again(found, known, data)
         if changed is found:

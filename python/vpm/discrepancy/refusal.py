@@ -101,6 +101,11 @@ def refuse_trial(trial: Trial, thresholds: Thresholds) -> str:
     return next(filter(None, reasons), "")
 
 
+def impossible_trial(trial: Trial, interval: float) -> str:
+    """Reason for which an effect is none, whatever its gain, or ""."""
+    return _too_short(trial, interval) or _no_way(trial) or _trifling_size(trial)
+
+
 def refuse_ringing(share: float, trial: Trial) -> str:
     """Reason not to accept a candidate under which links ring less with the noise of the measured motion, or "".
 
@@ -203,17 +208,28 @@ def _trifling_gain(trial: Trial) -> str:
         return ""
     name, drop = trial.parameters[0], trial.unseen.relative
     value = trial.judged.model.parameters[name].value
-    if abs(value - 1.0) < NEGLIGIBLE:
-        return (
-            f"{name} comes out as {value:.4g}: less than {_percent(NEGLIGIBLE)} of the signal is no error "
-            "to be told from that of the model"
-        )
+    if reason := _trifling_size(trial):
+        return reason
     if trial.slow is None and 0.0 <= drop < MODEST_GAIN:
         return (
             f"{name} comes out as {value:.4g} and lowers the unseen error by only {_percent(drop)} of its mean square: "
             "an instrument is blamed where it explains more than an imitation would"
         )
     return ""
+
+
+def _trifling_size(trial: Trial) -> str:
+    """An instrument's gain that is none."""
+    if trial.probe.candidate.effect.name != "sensor_gain":
+        return ""
+    name = trial.parameters[0]
+    value = trial.judged.model.parameters[name].value
+    if abs(value - 1.0) >= NEGLIGIBLE:
+        return ""
+    return (
+        f"{name} comes out as {value:.4g}: less than {_percent(NEGLIGIBLE)} of the signal is no error "
+        "to be told from that of the model"
+    )
 
 
 def _only_training(trial: Trial) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 from vpm.discrepancy.candidates import Key
 from vpm.discrepancy.choice import Accepted
@@ -38,10 +38,19 @@ class Tried:
 
 
 @dataclass(frozen=True)
+class Over:
+    """What the last round screened and refitted in vain."""
+
+    probes: tuple[Probe, ...] = ()
+    trials: tuple[Trial, ...] = ()
+
+
+@dataclass(frozen=True)
 class Search:
     """Outcome of the whole search, or of what was done of it when Ctrl-C was pressed.
 
-    ``last`` is given if nothing has changed since the last effect came in.
+    ``last`` is given if nothing has changed since the last effect came in; ``over`` is the last round, if it accepted
+    nothing.
     """
 
     stages: tuple[Stage, ...]
@@ -50,6 +59,13 @@ class Search:
     ranking: tuple[RankedCandidate, ...]
     interrupted: bool = False
     last: Tried | None = None
+    over: Over = field(default_factory=Over)
+
+    @property
+    def gone(self) -> set[Key]:
+        """Effects that were taken out again, which do not come back."""
+        removed = {(stage.effect, stage.site) for stage in self.stages if stage.change == "removed"}
+        return removed - {entry.key for entry in self.accepted}
 
     @property
     def final(self) -> Judged:
@@ -74,10 +90,10 @@ def further(
     clear that was refused before.
     """
     stages, accepted, ranking = list(found.stages), list(found.accepted), list(found.ranking)
-    gone = {(s.effect, s.site) for s in stages if s.change == "removed"} - {entry.key for entry in accepted}
-    dropped = {(r.name, r.site): r.reason for r in found.refused if (r.name, r.site) in gone}
+    dropped = {(r.name, r.site): r.reason for r in found.refused if (r.name, r.site) in found.gone}
     refused: dict[Key, str] = {}
     last: Tried | None = None
+    over = Over()
     interrupted = False
     first = 1 + max((candidate.round for candidate in ranking), default=0)
     for number in range(first, 2 * limit + 2):
@@ -101,6 +117,7 @@ def further(
             ranking += outcome.ranked()
         refused = outcome.refused
         if best is None:
+            over = Over(tuple(outcome.probes), tuple(outcome.trials))
             break
         if has_tangent(best.trial.judged.model, data.training):
             best = settled(best, data)
@@ -120,11 +137,16 @@ def further(
             interrupted = True
             break
     if not interrupted:
-        loosened = replace(stages[-1], judged=without_tight_bounds(stages[-1].judged, data))
-        last = last if loosened.judged is stages[-1].judged and not dropped else None
-        stages[-1] = loosened
+        stages[-1], same = _loosened(stages[-1], data)
+        last = last if same and not dropped else None
     listed = _listed({**dropped, **refused})
-    return Search(tuple(stages), tuple(accepted), listed, tuple(ranking), interrupted, last)
+    return Search(tuple(stages), tuple(accepted), listed, tuple(ranking), interrupted, last, over)
+
+
+def _loosened(stage: Stage, data: Data) -> tuple[Stage, bool]:
+    """The last stage without bounds that cut its fit short, and whether it is the same."""
+    loosened = replace(stage, judged=without_tight_bounds(stage.judged, data))
+    return loosened, loosened.judged is stage.judged
 
 
 def _listed(refused: dict[Key, str]) -> tuple[RefusedEffect, ...]:

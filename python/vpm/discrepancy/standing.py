@@ -43,13 +43,15 @@ def replaced(found: Search, known: Sequence[Rivals], data: Data) -> tuple[Search
         (score, place, trial)
         for place, entry in enumerate(found.accepted)
         for trial in known[place].tried
-        if (score := _preferred(found.final, entry, trial, data, thresholds)) > 0.0
+        if trial.probe.candidate.key not in found.gone
+        and (score := _preferred(found.final, entry, trial, data, thresholds)) > 0.0
     ]
     for _, place, trial in sorted(winners, key=lambda w: -w[0]):
         without = known[place].without
         whole = trial if without is None else finished(without, data, trial)
         if _preferred(found.final, found.accepted[place], whole, data, thresholds) > 0.0:
-            return _exchanged(found, known, data, place, whole)
+            reason = "in its place predicts the unseen data better"
+            return exchanged(found, known, data, place, whole, reason)
     return found, tuple(known)
 
 
@@ -124,14 +126,14 @@ def earned(fitted: Gain, more: int) -> bool:
     return fitted.relative > 0.0 and schwarz(fitted, max(more, 0)) < 0.0
 
 
-def _exchanged(
-    found: Search, known: Sequence[Rivals], data: Data, place: int, trial: Trial
+def exchanged(
+    found: Search, known: Sequence[Rivals], data: Data, place: int, trial: Trial, why: str
 ) -> tuple[Search, tuple[Rivals, ...]]:
-    """The search with another effect at one place, and the rivals of that one."""
+    """The search with another effect at one place, and the rivals of that one; ``why`` it is there, in words."""
     entry, mine = found.accepted[place], known[place]
     new, old = trial.probe.candidate, entry.trial.probe.candidate
     incoming = Accepted(trial, ())
-    reason = f"beside the other effects {new.label} in its place predicts the unseen data better"
+    reason = f"beside the other effects {new.label} {why}"
     stages = (
         *found.stages,
         *(() if mine.without is None else (Stage("removed", *entry.key, mine.without),)),

@@ -138,7 +138,7 @@ def asked(before: OwnRun, trial: Trial, data: Data) -> Asked | None:
         pair = [as_it_is(run.model, run.free, data.unseen.experiments, setup) for run in (before, best)]
     except VpmError:
         return None
-    return Asked(_gain(before, best), _gain(*pair), best)
+    return Asked(gain_of_runs(before, best), gain_of_runs(*pair), best)
 
 
 def _told(current: Judged, trial: Trial, answer: Asked, data: Data) -> Trial:
@@ -194,7 +194,7 @@ def _own_names(site: str) -> tuple[str, str]:
     return f"{site}.friction.stribeck", f"{site}.friction.stribeck_velocity"
 
 
-def _gain(before: OwnRun, after: OwnRun) -> Gain:
+def gain_of_runs(before: OwnRun, after: OwnRun) -> Gain:
     """How much of the change between two runs of the same records what the first one leaves asks for."""
     apart, score = part(against(before, after))
     _, noise, _ = least(after.spectra())
