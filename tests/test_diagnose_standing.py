@@ -112,6 +112,7 @@ class _Named:
 
     accepted: tuple[SimpleNamespace, ...]
     last: SimpleNamespace | None = None
+    gone: frozenset[tuple[str, str]] = frozenset()
 
 
 @pytest.mark.parametrize(
@@ -147,7 +148,7 @@ def test_what_is_late_is_chosen_again_beside_effects_that_came_later(
         "confirm": lambda *_: own,
         "finished": lambda _, __, trial: trial,
         "choose": choose,
-        "_exchanged": lambda *args: ("exchanged", args[3:]),
+        "exchanged": lambda *args: ("exchanged", args[3:5]),
     }.items():
         monkeypatch.setattr(standing, name, instead)
     changed: tuple[object, object] = standing.timed_again(

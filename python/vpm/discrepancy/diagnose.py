@@ -229,12 +229,12 @@ def _settled(
     known = rivals(found.final, data, found.accepted, effects, each, found.last)
     for _ in range(limit):
         changed, known = replaced(found, known, data)
+        if changed is found:
+            changed, known = timed_again(found, known, data)
         if changed is found and not found.interrupted:
             changed, known = told_apart(found, known, data, each)
         if changed is found and not found.interrupted:
             changed = overlooked(found, data, each)
-        if changed is found:
-            changed, known = timed_again(found, known, data)
         if changed is found:
             break
         found = changed if found.interrupted else further(changed, data, effects, limit, tell, each)

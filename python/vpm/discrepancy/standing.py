@@ -94,14 +94,17 @@ def timed_again(found: Search, known: Sequence[Rivals], data: Data) -> tuple[Sea
         others = [
             t
             for t in known[place].tried
-            if t.probe.candidate.effect.name in LATE_OR_SLOW and not refuse_trial(t, thresholds)
+            if t.probe.candidate.effect.name in LATE_OR_SLOW
+            and t.probe.candidate.key not in found.gone
+            and not refuse_trial(t, thresholds)
         ]
         if not others:
             continue
         own = confirm(without, data, probe(without.baseline, data.training, entry.trial.probe.candidate))
         trial = choose([own, *others], data).trial
         if trial is not own:
-            return _exchanged(found, known, data, place, finished(without, data, trial))
+            reason = "in its place is what their runs along the reference say"
+            return exchanged(found, known, data, place, finished(without, data, trial), reason)
     return found, tuple(known)
 
 
