@@ -38,6 +38,7 @@ def trial(value: float) -> Trial:
             away=None,
             slow=None,
             clear=True,
+            gap=NEGLIGIBLE,
         ),
     )
 
@@ -51,6 +52,13 @@ def test_a_gain_that_no_instrument_keeps_is_no_finding(error: float) -> None:
 @pytest.mark.parametrize("error", [-1.2 * NEGLIGIBLE, 1.2 * NEGLIGIBLE])
 def test_a_gain_beyond_that_is_one(error: float) -> None:
     assert refuse_trial(trial(1.0 + error), Thresholds(30, 1e-3)) == ""
+
+
+@pytest.mark.parametrize(("gap", "after", "believed"), [(0.08, 0.3, True), (0.08, 0.9, False), (0.01, 0.3, False)])
+def test_a_gain_that_shows_magnified_in_a_balance_is_one(gap: float, after: float, believed: bool) -> None:
+    told = {"gap": gap, "unseen": Gain(before=1.0, after=after, weight=1.0, score=50.0, pieces=40)}
+    one = cast("Trial", SimpleNamespace(**{**vars(trial(1.0 + 0.8 * NEGLIGIBLE)), **told}))
+    assert (refuse_trial(one, Thresholds(30, 1e-3)) == "") == believed
 
 
 def test_a_gain_that_explains_as_little_as_an_imitation_blames_no_instrument() -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from vpm import Experiment, Model
 from vpm.catalogue import EFFECTS
-from vpm.discrepancy.candidates import Candidate
+from vpm.discrepancy.candidates import Candidate, candidates
 from vpm.discrepancy.screening import Baseline, probe
 from vpm.discrepancy.slow import AVERAGED, has_impacts, slow
 from vpm.identify import InverseDynamicsProblem
@@ -43,6 +43,30 @@ def problem() -> InverseDynamicsProblem:
     data = {"axis.position": path, "drive.command": -0.5 * acceleration}
     record = Experiment.from_arrays(time, data, units={"axis.position": "m", "drive.command": "N"}, name="log")
     return InverseDynamicsProblem(Model.from_toml(TEXT), [record])
+
+
+def test_asymmetric_friction_is_screened_with_a_change_of_direction_as_sharp_as_it_is(
+    problem: InverseDynamicsProblem,
+) -> None:
+    """A dry friction that is fitted wide without it makes up for some of it."""
+    (log,) = problem.experiments
+    motion = problem.motions[0]
+    command = 2.0 * motion.acceleration[:, 0] + np.where(motion.velocity[:, 0] > 0.0, 1.4, -0.6)
+    uneven = Experiment.from_arrays(
+        log.time,
+        {"axis.position": log["axis.position"], "drive.command": command},
+        units={"axis.position": "m", "drive.command": "N"},
+        name="uneven",
+    )
+    model = Model.from_toml(TEXT).with_effect("coulomb_friction", at="axis", coulomb=1.0, transition_velocity=0.2)
+    data = InverseDynamicsProblem(model, [uneven])
+    free = ("body.mass", "axis.friction.coulomb")
+    residual, jacobian = data.evaluate(model, model.theta, [model.index(name) for name in free])
+    (candidate,) = candidates(model, data, residual, ["asymmetric_friction"])
+    assert candidate.starts[0]["transition_velocity"] == 0.2
+    found = probe(Baseline(model, free, residual, jacobian), data, candidate)
+    assert found.model.parameters["axis.friction.asymmetric_transition_velocity"].value < 0.01
+    assert found.values["axis.friction.coulomb_difference"] == pytest.approx(0.8, rel=0.1)
 
 
 def test_what_is_slow_keeps_what_lasts_and_loses_what_is_over_soon(problem: InverseDynamicsProblem) -> None:

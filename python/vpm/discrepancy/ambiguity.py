@@ -20,8 +20,8 @@ from vpm.identify import gain, segments
 from vpm.identify.along import bends
 from vpm.model import Model
 
-#: Rivals that are refitted in the place of an effect.
-SHORT_LIST = 3
+#: Rivals that are refitted in the place of an effect, and how many of the others that may refine it.
+SHORT_LIST, FINER = 3, 2
 #: A rival that takes less than this share of what the effect takes from the training residual is none.
 LEAST_SHARE = 0.8
 #: A rival that leaves up to this share more of the unseen mean square predicts as well.
@@ -182,7 +182,7 @@ def _short_list(final: Judged, without: Judged | None, entry: Accepted, probes: 
     good.sort(key=lambda p: -p.score)
     own = entry.trial.probe.candidate
     finer = [p for p in good[SHORT_LIST:] if alike(p.candidate, own)]
-    return good[:SHORT_LIST] + sorted(finer, key=lambda p: -p.drop)[:1]
+    return good[:SHORT_LIST] + sorted(finer, key=lambda p: -p.drop)[:FINER]
 
 
 def _near(candidate: Candidate, entry: Accepted) -> bool:

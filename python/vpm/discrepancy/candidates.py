@@ -149,8 +149,10 @@ def _candidate(effect: EffectType, site: str, model: Model, data: InverseDynamic
     if effect.name == "coulomb_friction":
         return Candidate(effect, site, _grid("transition_velocity", TRANSITION_SHARES, seen.speed), _slow(seen))
     if effect.name == "asymmetric_friction":
-        velocity = _known_transition(model, site, seen)
-        return Candidate(effect, site, ({"transition_velocity": velocity},), fixed=("transition_velocity",))
+        # What was fitted of the dry friction without it may be far too wide: it makes up for what is missing.
+        velocities = {_known_transition(model, site, seen), TRANSITION_SHARES[0] * seen.speed}
+        starts = tuple({"transition_velocity": velocity} for velocity in sorted(velocities, reverse=True))
+        return Candidate(effect, site, starts, fixed=("transition_velocity",))
     if effect.name == "stribeck_friction":
         velocity = _known_transition(model, site, seen)
         starts = tuple({"stribeck_velocity": s * seen.speed, "transition_velocity": velocity} for s in STRIBECK_SHARES)

@@ -24,6 +24,7 @@ from vpm.identify import (
     Worth,
     estimate,
     gain,
+    gaps,
     segments,
 )
 from vpm.identify.along import bends
@@ -36,7 +37,6 @@ Array = NDArray[np.float64]
 
 #: A refit stops when the sum of squares changes by less than this share: far below what a verdict rests on.
 TOLERANCE = 1e-6
-
 #: So many ranges of what the data reach, a place is nowhere.
 FAR_AWAY = 1e3
 #: Evaluations for a spring more where links bend already: each is a simulation with a dozen derivatives, and one that
@@ -47,10 +47,8 @@ FEW_EVALUATIONS = 6
 SLOW_GAIN, SLOW_EVALUATIONS = 0.01, 10
 #: Of two candidates, one that leaves so many times what the other leaves is not the one that comes in.
 HOPELESS = 10.0
-#: Dotted name, behind the site, of the width of a play.
-PLAY = ".backlash.gap"
-#: A joint that winds up before it moves on looks like one that sticks.
-WOUND_UP = "joint_compliance"
+#: Dotted name, behind the site, of the width of a play; a joint that winds up first looks like one that sticks.
+PLAY, WOUND_UP = ".backlash.gap", "joint_compliance"
 
 
 @dataclass(frozen=True)
@@ -107,7 +105,7 @@ class Trial:
     training, unseen : Gain
         Against the model without the effect.
     simulated : Gain or None
-        The same by simulation of the unseen records; None where they were not simulated.
+        The same by simulation of the unseen records, if there is one.
     away : Gain or None
         The unseen gain away from reversals, for an effect of a drive or an instrument, or a joint that winds up, on a
         machine with dry friction.
@@ -118,7 +116,9 @@ class Trial:
     clear : bool
         Whether the effect's size differs from zero on the training data.
     alone : bool
-        Whether the gains are those of runs of the model itself, of what a balance of effort hardly sees.
+        Whether the gains are those of runs of the model itself, where a balance hardly sees them.
+    gap : float
+        Largest share of its signal that the model without the effect leaves of an unseen channel.
     """
 
     probe: Probe
@@ -133,6 +133,7 @@ class Trial:
     clear: bool
     slow: Gain | None = None
     alone: bool = False
+    gap: float = 0.0
 
     @property
     def score(self) -> float:
@@ -231,22 +232,20 @@ def _trial(
     diverged: str,
 ) -> Trial:
     """What a refit gains on all the data; of something late it counts what it gains in motion, if that was timed."""
+    fitted = judged.fit.residual * shrinkage(data.training, current, judged)
     return Trial(
         probe,
         judged,
         own,
         held,
-        gain(
-            current.fit.residual,
-            judged.fit.residual * shrinkage(data.training, current, judged),
-            segments(data.training),
-        ),
+        gain(current.fit.residual, fitted, segments(data.training)),
         gain(current.unseen, judged.unseen * shrinkage(data.unseen, current, judged), segments(data.unseen)),
         _simulated_gain(current, judged, data),
         timed.unseen if timed is not None else _away_gain(current, judged, data.unseen, probe),
         diverged,
         is_clear(judged, own),
         _slow_gain(current, judged, data.unseen),
+        gap=max(share for _, share, _ in gaps(data.unseen, current.unseen).values()),
     )
 
 

@@ -32,6 +32,8 @@ MOST_OF_IT = 0.5
 #: Neither a residual nor an error of an instrument's gain means anything below this share of the signal: links are
 #: cut into pieces and gauges calibrated to no better.
 NEGLIGIBLE = 0.005
+#: An error of an instrument shows so many times as large in a balance that it is more than an error of the model there.
+MAGNIFIED = 4.0
 #: One-sided 95 % quantile of the normal distribution: a simulation that is worse by less is worse by chance.
 NORMAL_95_ONE_SIDED = 1.6448536269514722
 #: Samples that what builds up over a way has to last, to be seen to build up.
@@ -219,12 +221,17 @@ def _trifling_gain(trial: Trial) -> str:
 
 
 def _trifling_size(trial: Trial) -> str:
-    """An instrument's gain that is none."""
+    """An instrument's gain that is none.
+
+    Where an effort is the small difference of large readings, as of the pressures on both sides of a piston, a gain
+    that is hardly wrong leaves a gap that is not small: one that explains most of such a gap is believed.
+    """
     if trial.probe.candidate.effect.name != "sensor_gain":
         return ""
     name = trial.parameters[0]
     value = trial.judged.model.parameters[name].value
-    if abs(value - 1.0) >= NEGLIGIBLE:
+    magnified = trial.unseen.relative >= CLEAR_GAIN and trial.gap > MAGNIFIED * abs(value - 1.0)
+    if abs(value - 1.0) >= NEGLIGIBLE or magnified:
         return ""
     return (
         f"{name} comes out as {value:.4g}: less than {_percent(NEGLIGIBLE)} of the signal is no error "
