@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from scipy.stats import t as student_t
 
 import vpm
 from blind import Case, make_case
 from vpm.discrepancy.confirmation import Data, judge
-from vpm.discrepancy.driven import Verdict, compare_driven
+from vpm.discrepancy.driven import Runs, Verdict, compare_driven
 from vpm.discrepancy.motion_only import LATE
 from vpm.discrepancy.own_run import as_it_is, own_run, spectra, weighted
 from vpm.identify import InverseDynamicsProblem, OutputErrorProblem
 from vpm.model import Model
 from vpm.simulate import Setup
+
+Array = NDArray[np.float64]
 
 
 def fitted_late(case: Case) -> tuple[Data, list[vpm.discrepancy.confirmation.Judged]]:
@@ -50,6 +54,31 @@ def test_a_long_lag_is_told_from_a_delay_and_a_short_delay_is_not_told_from_a_la
     assert told.apart < 1.0
     assert not told.prefers_first()
     assert compare_driven(lag, delay, replace(data, simulation=None)) is None
+
+
+def test_a_run_beside_another_shares_its_derivatives_and_is_worked_out_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    data, (lag, delay) = fitted_late(make_case("axis_linear", "input_delay", 5))
+    asked = list[int]()
+    evaluate = OutputErrorProblem.evaluate
+
+    def counted(problem: OutputErrorProblem, model: vpm.Model, theta: Array, columns: Sequence[int] = ()) -> object:
+        asked.append(len(columns))
+        return evaluate(problem, model, theta, columns)
+
+    monkeypatch.setattr(OutputErrorProblem, "evaluate", counted)
+    runs = Runs(data)
+    first = runs(lag)
+    assert asked[:2] == [0, len(lag.free)]
+    done = len(asked)
+    told = compare_driven(delay, lag, data, runs)
+    assert asked[done : done + 2] == [0, 1]
+    done = len(asked)
+    turned = compare_driven(lag, delay, data, runs)
+    assert len(asked) == done
+    assert runs(lag) is first
+    assert told is not None
+    assert turned is not None
+    assert (turned.first, turned.second) == (told.second, told.first)
 
 
 def test_fast_parts_of_a_run_tell_a_short_lag() -> None:

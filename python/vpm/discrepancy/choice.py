@@ -10,7 +10,7 @@ import numpy as np
 from vpm.catalogue import EFFECTS
 from vpm.discrepancy.candidates import Candidate, Key
 from vpm.discrepancy.confirmation import Data, Trial
-from vpm.discrepancy.driven import ODDS, compare_driven
+from vpm.discrepancy.driven import ODDS, Runs, compare_driven
 from vpm.discrepancy.motion_only import LATE_OR_SLOW
 from vpm.discrepancy.own_reading import read_by_itself
 from vpm.discrepancy.refusal import LEAST_GAIN
@@ -66,9 +66,9 @@ def _late_or_slow(chosen: Trial, believed: Sequence[Trial], data: Data) -> Trial
     slow = [(name,) for name in LATE_OR_SLOW if name not in DELAYS]
     kinds = [[t for t in alike if _name(t) in kind] for kind in (DELAYS, *slow)]
     rest = [min(kind, key=_evidence) for kind in kinds if kind]
-    best = rest.pop(0)
+    best, runs = rest.pop(0), Runs(data)
     for rival in rest:
-        told = compare_driven(rival.judged, best.judged, data)
+        told = compare_driven(rival.judged, best.judged, data, runs)
         if told is None:
             return chosen
         if told.prefers_first(ODDS if _name(best) in DELAYS else 1.0):

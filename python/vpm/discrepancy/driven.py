@@ -56,20 +56,45 @@ class Verdict:
         return self.evidence > float(np.log(odds))
 
 
-def compare_driven(first: Judged, second: Judged, data: Data) -> Verdict | None:
+class Runs:
+    """Models along their references, as well as each can, each worked out once; all but the first beside another."""
+
+    def __init__(self, data: Data) -> None:
+        self.data = data
+        self._known: list[tuple[Judged, OwnRun | None]] = []
+
+    def __call__(self, judged: Judged) -> OwnRun | None:
+        """The run of a model; None where it cannot follow its references."""
+        for known, run in self._known:
+            if known is judged:
+                return run
+        run = self._worked_out(judged)
+        self._known.append((judged, run))
+        return run
+
+    def _worked_out(self, judged: Judged) -> OwnRun | None:
+        simulation = self.data.simulation
+        if simulation is None or simulation.mode != "closed_loop":
+            return None
+        records = (*self.data.training.experiments, *self.data.unseen.experiments)
+        beside = next((run for _, run in reversed(self._known) if run is not None), None)
+        try:
+            return own_run(judged.model, judged.free, records, simulation.setup, beside)
+        except VpmError:
+            return None
+
+
+def compare_driven(first: Judged, second: Judged, data: Data, runs: Runs | None = None) -> Verdict | None:
     """Let two models run the records by themselves, as well as each can, and ask which of them did what was measured.
 
     Of what one model leaves, the part of the gap to its rival's run is estimated together with changes of its fitted
     parameters: 0 of a model that is right, 1 of one whose rival is. None where one of them cannot follow its
-    references.
+    references. With ``runs``, what was worked out for another comparison is known.
     """
-    if data.simulation is None or data.simulation.mode != "closed_loop":
-        return None
-    try:
-        records, setup = (*data.training.experiments, *data.unseen.experiments), data.simulation.setup
-        one = own_run(first.model, first.free, records, setup)
-        other = own_run(second.model, second.free, records, setup, one)
-    except VpmError:
+    runs = runs or Runs(data)
+    one = runs(first)
+    other = None if one is None else runs(second)
+    if one is None or other is None:
         return None
     views = [part(against(*pair)) for pair in ((one, other), (other, one))]
     return Verdict(min(views[0][0], views[1][0]), views[0][1], views[1][1])

@@ -92,14 +92,16 @@ def own_run(
 ) -> OwnRun:
     """The run of a model, its free parameters fitted to records; they begin at those of a run ``beside`` it.
 
-    Where links bend, which takes a hundred times as long, they stay those of the balance.
+    Where links bend, which takes a hundred times as long, they stay those of the balance. Derivatives by what both have
+    are those of the run ``beside`` until a step is made.
 
     Raises
     ------
     VpmError
         The model cannot follow the references.
     """
-    found = as_it_is(model if beside is None else _like(model, free, beside), tuple(free), records, setup)
+    start = model if beside is None else _like(model, free, beside)
+    found = as_it_is(start, tuple(free), records, setup, beside)
     for _ in range(0 if bends(model) else MOST_FITS):
         better = _step(found, setup)
         if better is None:
@@ -197,8 +199,10 @@ def _like(model: Model, free: Sequence[str], beside: OwnRun) -> Model:
     return model.with_parameters(values)
 
 
-def as_it_is(model: Model, free: tuple[str, ...], records: Sequence[Experiment], setup: Setup) -> OwnRun:
-    """The run of a model with the parameters that it has.
+def as_it_is(
+    model: Model, free: tuple[str, ...], records: Sequence[Experiment], setup: Setup, beside: OwnRun | None = None
+) -> OwnRun:
+    """The run of a model with the parameters that it has; see `own_run` for what is ``beside`` it.
 
     Raises
     ------
@@ -207,13 +211,29 @@ def as_it_is(model: Model, free: tuple[str, ...], records: Sequence[Experiment],
     """
     problem = OutputErrorProblem(model, records, "closed_loop", setup=_fine(model, free, records, setup))
     left, _ = problem.evaluate(model, model.theta)
-    return _with_slopes(model, free, problem, left, setup)
+    return _with_slopes(model, free, problem, left, setup, beside)
 
 
-def _with_slopes(model: Model, free: tuple[str, ...], problem: OutputErrorProblem, left: Array, setup: Setup) -> OwnRun:
-    """A run with its derivatives, which are worth few digits and so no finer steps."""
+def _with_slopes(
+    model: Model,
+    free: tuple[str, ...],
+    problem: OutputErrorProblem,
+    left: Array,
+    setup: Setup,
+    beside: OwnRun | None = None,
+) -> OwnRun:
+    """A run with its derivatives, which are worth few digits: no finer steps, and those that are known ``beside`` it.
+
+    Each takes as long as the run itself, and models of which one is a little later or slower share all but their own.
+    """
+    known = beside.free if beside is not None and len(beside.slopes) == len(left) else ()
     coarse = OutputErrorProblem(model, problem.experiments, "closed_loop", setup=setup)
-    _, slopes = coarse.evaluate(model, model.theta, [model.index(name) for name in free])
+    slopes = np.zeros((len(left), len(free)))
+    asked = [place for place, name in enumerate(free) if name not in known]
+    _, slopes[:, asked] = coarse.evaluate(model, model.theta, [model.index(free[place]) for place in asked])
+    for place, name in enumerate(free):
+        if beside is not None and name in known:
+            slopes[:, place] = beside.slopes[:, beside.free.index(name)]
     return OwnRun(model, free, problem, left, slopes)
 
 
