@@ -150,7 +150,7 @@ def _candidate(effect: EffectType, site: str, model: Model, data: InverseDynamic
         return Candidate(effect, site, _grid("transition_velocity", TRANSITION_SHARES, seen.speed), _slow(seen))
     if effect.name == "asymmetric_friction":
         # What was fitted of the dry friction without it may be far too wide: it makes up for what is missing.
-        velocities = {_known_transition(model, site, seen), TRANSITION_SHARES[0] * seen.speed}
+        velocities = {_known_transition(model, site, seen), slow_speeds(seen.speed)[0]}
         starts = tuple({"transition_velocity": velocity} for velocity in sorted(velocities, reverse=True))
         return Candidate(effect, site, starts, fixed=("transition_velocity",))
     if effect.name == "stribeck_friction":
