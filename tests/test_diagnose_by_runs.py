@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import pytest
 
 import vpm
 from blind import make_case
+from vpm.discrepancy.candidates import Key
+from vpm.discrepancy.round import Round
 
 
 def test_a_force_and_a_tilt_that_a_balance_takes_for_each_other_are_told_apart() -> None:
@@ -40,3 +44,16 @@ def test_runs_ask_for_nothing_where_nothing_is_missing() -> None:
     tried = ["torque_ripple", "dead_zone", "stribeck_friction"]
     why = vpm.diagnose(case.model(), case.train, case.validate, effects=tried, workers=1)
     assert not why.effects
+
+
+def test_what_runs_alone_ask_for_is_examined_as_any_other(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where nothing was accepted before there were no rivals to be asked of."""
+    refused = Round.light
+
+    def nothing(self: Round, effects: Sequence[str] | None, without: set[Key]) -> None:
+        refused(self, effects, without)
+
+    monkeypatch.setattr(Round, "light", nothing)
+    case = make_case("axis_rotary", "dead_zone", 100)
+    why = vpm.diagnose(case.model(), case.train, case.validate, effects=["dead_zone"], workers=1)
+    assert [effect.name for effect in why.effects] == ["dead_zone"]

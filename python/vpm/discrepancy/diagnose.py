@@ -238,7 +238,7 @@ def _settled(
         if changed is found:
             break
         found = changed if found.interrupted else further(changed, data, effects, limit, tell, each)
-        if len(found.accepted) > 1 or found.final is not changed.final:
+        if len(found.accepted) != 1 or len(known) != 1 or found.final is not changed.final:
             known = rivals(found.final, data, found.accepted, effects, each, found.last)
     found, known = in_order(found, known)
     return with_told_contacts(found, data, each), known
