@@ -119,6 +119,8 @@ class Trial:
         Whether the gains are those of runs of the model itself, where a balance hardly sees them.
     gap : float
         Largest share of its signal that the model without the effect leaves of an unseen channel.
+    asked : bool
+        Whether runs of the model itself ask for it too, so that little that is sure is enough.
     """
 
     probe: Probe
@@ -134,6 +136,7 @@ class Trial:
     slow: Gain | None = None
     alone: bool = False
     gap: float = 0.0
+    asked: bool = False
 
     @property
     def score(self) -> float:
@@ -390,10 +393,8 @@ def _out_of_reach(probe: Probe) -> set[str]:
 
 
 def _short_names(probe: Probe) -> dict[str, str]:
-    for effect in probe.model.effects:
-        if effect.name == probe.candidate.effect.name and effect.at == probe.candidate.site:
-            return dict(effect.parameter_names)
-    return {}
+    mine = (dict(e.parameter_names) for e in probe.model.effects if (e.name, e.at) == probe.candidate.key)
+    return next(mine, {})
 
 
 def _inside(probe: Probe, bounds: dict[str, tuple[float, float]]) -> dict[str, float]:

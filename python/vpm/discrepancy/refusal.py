@@ -61,9 +61,10 @@ class Thresholds:
         """Least standard deviations of unseen gain, by Student's t with one degree of freedom less than pieces."""
         return float(stdtrit(max(1, pieces - 1), 1.0 - FALSE_ALARM_LEVEL / max(1, self.candidates)))
 
-    def needed(self, unseen: Gain) -> float:
-        """Standard deviations that a gain has to have: more where most of the residual stays."""
-        return self.score(unseen.pieces) * (MODEST_FACTOR if unseen.relative < MODEST_GAIN else 1.0)
+    def needed(self, unseen: Gain, *, asked: bool = False) -> float:
+        """Standard deviations that a gain has to have: more where most of the residual stays and no run asks for it."""
+        modest = unseen.relative < MODEST_GAIN and not asked
+        return self.score(unseen.pieces) * (MODEST_FACTOR if modest else 1.0)
 
     def met(self, unseen: Gain) -> bool:
         """Whether a gain is worth a name, and sure."""
@@ -286,7 +287,7 @@ def _too_little(trial: Trial, thresholds: Thresholds) -> str:
             f"it lowers the unseen error by only {_percent(unseen.relative)} of its mean square "
             f"({_rms(unseen.before, unseen.after)})"
         )
-    needed = thresholds.needed(unseen)
+    needed = thresholds.needed(unseen, asked=trial.asked)
     if unseen.score < needed:
         return (
             f"its gain of {_percent(unseen.relative)} on unseen data is {unseen.score:.1f} standard deviations over "

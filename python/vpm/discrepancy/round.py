@@ -12,7 +12,8 @@ from vpm.discrepancy.candidates import Candidate, Key, candidates, left_out
 from vpm.discrepancy.choice import Accepted, choose
 from vpm.discrepancy.confirmation import Data, Judged, Trial, confirm, finished
 from vpm.discrepancy.diagnosis import RankedCandidate
-from vpm.discrepancy.motion_only import in_motion, is_late
+from vpm.discrepancy.motion_only import LATE_OR_SLOW, in_motion, is_late
+from vpm.discrepancy.own_run import OwnRun
 from vpm.discrepancy.play import is_read_off, only_winds_up
 from vpm.discrepancy.refusal import (
     CLEAR_GAIN,
@@ -29,7 +30,7 @@ from vpm.discrepancy.screening import Probe, prepare, probe, refit_effort, scree
 from vpm.discrepancy.short_list import SHORT_LIST, most_promising, same_models
 from vpm.discrepancy.side_by_side import Failure, SideBySide
 from vpm.discrepancy.slow import slow
-from vpm.discrepancy.sticking import asks_runs, run_without, told_by_runs
+from vpm.discrepancy.sticking import asks_for, asks_runs, run_without, told_by_runs
 from vpm.discrepancy.structure import structure
 from vpm.discrepancy.timing import InTime, in_time
 from vpm.identify import gain, segments
@@ -93,7 +94,7 @@ class Round:
     def alone(self, without: set[Key]) -> Accepted | None:
         """The best of what acts close to rest, which runs of the model itself show where the balance shows nothing."""
         asked = [p for p in self.probes if p.candidate.key not in without and asks_runs(self.current, self.data, p)]
-        before = run_without(self.current, self.data) if asked else None
+        before = self.alone_run if asked else None
         if before is None:
             return None
         self.tell(f"round {self.number}: running with {', '.join(p.candidate.label for p in asked)}")
@@ -181,6 +182,12 @@ class Round:
         believed = {trial.probe.candidate.key for trial in self._believed}
         again = [one for one in short_list if twins.get(one.candidate.key) in believed]
         self._refit(again)
+        if any(name in LATE_OR_SLOW for name, _ in believed):
+            # Which of them it is no promise tells, so that all of its kind compete with it.
+            kin = [one for one in self._promising if one.candidate.effect.name in LATE_OR_SLOW]
+            kin = [one for one in kin if one not in short_list]
+            self._refit(kin)
+            short_list = [*short_list, *kin]
         for one in short_list:
             key = one.candidate.key
             if key in twins and one not in again:
@@ -249,9 +256,27 @@ class Round:
         """Why a trial is not believed, or ""."""
         candidate = trial.probe.candidate
         reason = refuse_trial(trial, thresholds) or self._only_timing(trial, thresholds)
+        if reason and self._run_asks(trial, thresholds):
+            reason = ""
         if not reason and is_read_off(self.current.model, self.data.training, candidate):
             reason = only_winds_up(trial.judged.model, candidate.site, self.data.training)
         return reason or only_ringing(self.current, self.data, trial)
+
+    def _run_asks(self, trial: Trial, thresholds: Thresholds) -> bool:
+        """Whether something late gains little and surely, and runs of the model itself along unseen records ask for it.
+
+        What sticks is late in a balance of effort, and so imitates it, but not in a run; nor does a run know or mind to
+        which of two samples a command was logged.
+        """
+        late = is_late(trial.probe.candidate.effect.name, trial.judged.model) and not self._takes_long()
+        if not late or refuse_trial(replace(trial, asked=True), thresholds) or self.alone_run is None:
+            return False
+        return asks_for(self.alone_run, trial, self.data, thresholds)
+
+    @cached_property
+    def alone_run(self) -> OwnRun | None:
+        """The model at hand, run along the training records by itself."""
+        return run_without(self.current, self.data)
 
     def _only_timing(self, trial: Trial, thresholds: Thresholds) -> str:
         """Why a trial that would be believed does no more than a shift of the commands does, or ""."""

@@ -141,6 +141,35 @@ def asked(before: OwnRun, trial: Trial, data: Data) -> Asked | None:
     return Asked(gain_of_runs(before, best), gain_of_runs(*pair), best)
 
 
+def asks_for(before: OwnRun, trial: Trial, data: Data, thresholds: Thresholds) -> bool:
+    """Whether unseen records, which models run by themselves, ask for an effect of the size that a balance says.
+
+    The run along the training records is no witness of it: a friction that is not quite that of the machine has been
+    fitted to these, and may have taken a part of what is late.
+
+    Parameters
+    ----------
+    before : OwnRun
+        The model without the effect, run along the training records.
+    trial : Trial
+        Of the effect, in a balance of effort.
+    data : Data
+    thresholds : Thresholds
+    """
+    if data.simulation is None or data.simulation.mode != "closed_loop":
+        return False
+    candidate, fitted = trial.probe.candidate, trial.judged.model.parameters
+    after = before.model.with_effect(candidate.effect.name, at=candidate.site, **candidate.starts[0])
+    after = after.with_parameters({name: fitted[name].value for name in trial.parameters})
+    records, setup = data.unseen.experiments, data.simulation.setup
+    try:
+        free = (*before.free, *trial.parameters)
+        told = _gain(as_it_is(before.model, before.free, records, setup), as_it_is(after, free, records, setup))
+    except VpmError:
+        return False
+    return LEAST_ASKED <= told.weight <= 1.0 / LEAST_ASKED and told.score >= thresholds.score(told.pieces)
+
+
 def _told(current: Judged, trial: Trial, answer: Asked, data: Data) -> Trial:
     """The trial with the balance fitted near what the runs say, and with what they gain on the unseen records."""
     own = [name for name in answer.run.free if name not in current.free]
