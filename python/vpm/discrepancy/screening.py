@@ -18,6 +18,7 @@ from vpm.discrepancy.first_step import is_outside, linear_step, softened, step_w
 from vpm.discrepancy.place import free_place
 from vpm.discrepancy.play import believed, is_read_off, read_off
 from vpm.discrepancy.structural import LOSSES, in_series
+from vpm.discrepancy.winding import best_start, is_looked_for
 from vpm.identify import InverseDynamicsProblem
 from vpm.identify.along import bends
 from vpm.identify.identifiability import closest_column, is_alias
@@ -131,6 +132,8 @@ def probe(base: Baseline, data: InverseDynamicsProblem, candidate: Candidate, *,
         base = replace(base, model=believed(base.model, data.nominal, base.free))
         start = read_off(base.model, base.free, data, candidate, hard=hard)
         return _probe_start(base, data, start, still=True)
+    if (found := _looked_for(base, data, candidate)) is not None:
+        return found
     probes = [_probe_start(base, data, candidate, start) for start in candidate.starts]
     best = max(probes, key=lambda p: p.drop)
     possible = [p for p in probes if not impossible_values(p)]
@@ -139,6 +142,15 @@ def probe(base: Baseline, data: InverseDynamicsProblem, candidate: Candidate, *,
         if runner_up.drop >= 0.5 * best.drop:
             return runner_up
     return best
+
+
+def _looked_for(base: Baseline, data: InverseDynamicsProblem, candidate: Candidate) -> Probe | None:
+    """A drive that winds up, as it stands at the best of its starts; None where none of them leaves less."""
+    if not is_looked_for(base.model, data, candidate):
+        return None
+    start = best_start(base.model, base.jacobian, data, candidate)
+    found = None if start is None else _probe_start(base, data, candidate, start, still=True)
+    return found if found is not None and found.free and found.drop > 0.0 else None
 
 
 def screening_effort(candidate: Candidate) -> float:
