@@ -164,7 +164,7 @@ def asks_for(before: OwnRun, trial: Trial, data: Data, thresholds: Thresholds) -
     records, setup = data.unseen.experiments, data.simulation.setup
     try:
         free = (*before.free, *trial.parameters)
-        told = _gain(as_it_is(before.model, before.free, records, setup), as_it_is(after, free, records, setup))
+        told = gain_of_runs(as_it_is(before.model, before.free, records, setup), as_it_is(after, free, records, setup))
     except VpmError:
         return False
     return LEAST_ASKED <= told.weight <= 1.0 / LEAST_ASKED and told.score >= thresholds.score(told.pieces)
