@@ -13,9 +13,10 @@ from scipy.stats import t as student_t
 import vpm
 from blind import Case, make_case
 from vpm.discrepancy.confirmation import Data, judge
-from vpm.discrepancy.driven import Runs, Verdict, compare_driven
+from vpm.discrepancy.driven import Runs, Verdict, compare_driven, inexact, part
 from vpm.discrepancy.motion_only import LATE
 from vpm.discrepancy.own_run import as_it_is, own_run, spectra, weighted
+from vpm.discrepancy.refusal import NEGLIGIBLE
 from vpm.identify import InverseDynamicsProblem, OutputErrorProblem
 from vpm.model import Model
 from vpm.simulate import Setup
@@ -210,3 +211,30 @@ def test_readings_of_a_cylinder_go_with_its_joint_and_those_of_joints_alone() ->
     problem = OutputErrorProblem(leg.model(), leg.validate, "closed_loop")
     found = spectra(leg.model(), problem, np.zeros((problem.blocks[-1].samples.stop, 1)))
     assert [one.shape[1] for one in found] == [3, 3]
+
+
+def test_what_no_model_of_oil_is_exact_to_does_not_tell_late_from_slow() -> None:
+    # One slow sine whose reading is 0.2 % off looks sure of a lag against noise alone.
+    generator = np.random.default_rng(1)
+    noise = 1e-5 * (generator.standard_normal(400) + 1j * generator.standard_normal(400))
+    read = np.full(400, 1e-4, dtype=np.complex128)
+    read[8] = 1.0
+    gap = 1e-3j * read
+    left = noise + 2.0 * np.where(np.arange(400) == 8, gap, 0.0)
+    transforms = [np.stack([left, gap], axis=1)[:, None, :]]
+    _, alone = part(transforms)
+    apart, beside = part(transforms, [NEGLIGIBLE * read[:, None, None]])
+    assert alone > 5.0
+    assert abs(beside) < 1.0
+    assert apart < 1.0
+
+
+def test_readings_of_a_cylinder_are_what_a_model_of_oil_is_not_exact_to() -> None:
+    case = make_case("servo_cylinder", "none", 100, recalibrate=False)
+    record = case.train[0].split(0.1)[0]
+    run = as_it_is(case.model(), ("servo.valve.flow_gain",), [record], Setup())
+    floor = inexact(run)
+    assert floor is not None
+    read = np.stack([NEGLIGIBLE * block.weight * record[block.channel] for block in run.problem.blocks], axis=1)
+    assert [one.shape[1] for one in floor] == [3]
+    assert float(np.abs(floor[0]).max()) < float(np.abs(np.fft.rfft(read, axis=0)).max())

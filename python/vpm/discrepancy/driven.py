@@ -4,7 +4,8 @@ A delay and a lag of one time part in the second order only. That is less than w
 effort: the command answers to the disturbances that the balance leaves over, within the band of the filter. What the
 machine does by itself, along the reference and without any noise, has nothing to do with the disturbances. So both
 models run the records in closed loop with parameters that suit their runs best, and what parts their runs is looked for
-in what the runs leave of the log, beside what the parameters may change.
+in what the runs leave of the log, beside what the parameters may change. Of oil and valves a share of each reading,
+frequency by frequency, counts as noise: no model of them is exact to it.
 """
 
 from __future__ import annotations
@@ -15,7 +16,9 @@ import numpy as np
 
 from vpm.discrepancy.confirmation import Data, Judged
 from vpm.discrepancy.own_run import RANK, OwnRun, Spectra, least, own_run, spectra
+from vpm.discrepancy.refusal import NEGLIGIBLE
 from vpm.errors import VpmError
+from vpm.identify.along import has_own_drives
 from vpm.identify.identifiability import column_lengths
 
 #: What is late is twice as often late by a delay, which a drive or an instrument may have, as by a lag of the drive.
@@ -96,7 +99,7 @@ def compare_driven(first: Judged, second: Judged, data: Data, runs: Runs | None 
     other = None if one is None else runs(second)
     if one is None or other is None:
         return None
-    views = [part(against(*pair)) for pair in ((one, other), (other, one))]
+    views = [part(against(*pair), inexact(pair[0])) for pair in ((one, other), (other, one))]
     return Verdict(min(views[0][0], views[1][0]), views[0][1], views[1][1])
 
 
@@ -105,9 +108,29 @@ def against(mine: OwnRun, rival: OwnRun) -> Spectra:
     return spectra(mine.model, mine.problem, np.column_stack([mine.left, mine.left - rival.left, mine.slopes]))
 
 
-def part(transforms: Spectra) -> tuple[float, float]:
-    """Size of the rival's gap beside the parameters, and its part in what is left, both in standard deviations."""
-    _, _, rows = least(transforms)
+def inexact(run: OwnRun) -> Spectra | None:
+    """Transforms of the share of each reading that no model of oil is exact to; None of drives without states.
+
+    A motion of a few hertz towers above noise, and pressures answer to how a held command changes within a sample, to
+    how a valve shuts and what lines hold: that is more than what parts late from slow there.
+    """
+    if not has_own_drives(run.model):
+        return None
+    problem = run.problem
+    records = {record.name: record for record in problem.experiments}
+    read = np.zeros(run.left.size)
+    for block in problem.blocks:
+        reading = records[block.experiment][block.channel]
+        read[block.samples] = block.weight * (reading - np.mean(reading))[-block.time.size :]
+    return spectra(run.model, problem, NEGLIGIBLE * read[:, None])
+
+
+def part(transforms: Spectra, floor: Spectra | None = None) -> tuple[float, float]:
+    """Size of the rival's gap beside the parameters, and its part in what is left, both in standard deviations.
+
+    ``floor`` is what no model is exact to, see `inexact`.
+    """
+    _, _, rows = least(transforms, floor)
     left, gap, slopes = rows[:, 0], rows[:, 1], rows[:, 2:]
     slopes = slopes / column_lengths(slopes)
     beside = gap - slopes @ np.linalg.lstsq(slopes, gap, rcond=RANK)[0]

@@ -134,13 +134,17 @@ def _read_with(model: Model, channel: str) -> str:
     return owner if owner in model.joints else channel
 
 
-def weighted(spectrum: NDArray[np.complex128], left: NDArray[np.complex128]) -> Array:
+def weighted(
+    spectrum: NDArray[np.complex128], left: NDArray[np.complex128], inexact: NDArray[np.complex128] | None = None
+) -> Array:
     """Real and imaginary parts relative to the noise, whose spectrum is the mean of what is left near a frequency.
+
+    What no model is exact to, ``inexact``, adds to it where it is given, at the very frequency and to each reading.
 
     The noise of a drive shows in its pressures and in the motion at once: told apart, one noise would count as often as
     it is read. So the readings of one drive are weighed by the whole matrix of their spectra.
     """
-    scale, triangle = _noise(left)
+    scale, triangle = _noise(left, inexact)
     apart = np.linalg.solve(triangle, spectrum / scale[:, :, None]) * np.sqrt(2.0)
     rows = apart.reshape(-1, spectrum.shape[2])
     return np.asarray(np.vstack([rows.real, rows.imag]))
@@ -161,7 +165,9 @@ def misfit(run: OwnRun, left: Array | None = None) -> float:
     return total
 
 
-def _noise(left: NDArray[np.complex128]) -> tuple[Array, NDArray[np.complex128]]:
+def _noise(
+    left: NDArray[np.complex128], inexact: NDArray[np.complex128] | None = None
+) -> tuple[Array, NDArray[np.complex128]]:
     """Deviations (f, readings) of the noise at each frequency, and the triangle of what its readings share there."""
     readings = left.shape[1]
     power = left[:, :, None] * left[:, None, :].conj()
@@ -169,6 +175,8 @@ def _noise(left: NDArray[np.complex128]) -> tuple[Array, NDArray[np.complex128]]
     smooth = uniform_filter1d(power.real, length, axis=0, mode="reflect").astype(np.complex128)
     if readings > 1:
         smooth += 1j * uniform_filter1d(power.imag, length, axis=0, mode="reflect")
+    if inexact is not None:
+        smooth[:, range(readings), range(readings)] += np.abs(inexact) ** 2
     own = np.einsum("fii->fi", smooth).real
     own = np.maximum(own, 1e-12 * np.maximum(own.max(axis=0), 1e-300))
     scale = np.sqrt(own)
@@ -177,11 +185,15 @@ def _noise(left: NDArray[np.complex128]) -> tuple[Array, NDArray[np.complex128]]
     return scale, np.linalg.cholesky(alike)
 
 
-def least(transforms: Spectra) -> tuple[Array, Spectra, Array]:
-    """The change that makes the first column least by all others, the noise that is left then, and weighted rows."""
+def least(transforms: Spectra, inexact: Spectra | None = None) -> tuple[Array, Spectra, Array]:
+    """The change that makes the first column least by all others, the noise that is left then, and weighted rows.
+
+    ``inexact`` is what no model is exact to, see `weighted`.
+    """
     noise = [s[:, :, 0] for s in transforms]
+    floor = [None] * len(transforms) if inexact is None else [s[:, :, 0] for s in inexact]
     for _ in range(ROUNDS):
-        rows = np.vstack([weighted(s, one) for s, one in zip(transforms, noise, strict=True)])
+        rows = np.vstack([weighted(*each) for each in zip(transforms, noise, floor, strict=True)])
         lengths = column_lengths(rows[:, 1:])
         step = np.asarray(np.linalg.lstsq(rows[:, 1:] / lengths, -rows[:, 0], rcond=RANK)[0] / lengths)
         noise = [s[:, :, 0] + s[:, :, 1:] @ step for s in transforms]
