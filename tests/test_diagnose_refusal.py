@@ -9,7 +9,7 @@ import pytest
 
 from vpm.demo import MODEL
 from vpm.discrepancy.confirmation import Trial
-from vpm.discrepancy.refusal import NEGLIGIBLE, Thresholds, refuse_probe, refuse_trial
+from vpm.discrepancy.refusal import NEGLIGIBLE, Thresholds, refuse_probe, refuse_timing, refuse_trial
 from vpm.discrepancy.screening import Probe
 from vpm.identify import Gain
 from vpm.model import Model
@@ -68,9 +68,18 @@ def test_a_gain_that_explains_as_little_as_an_imitation_blames_no_instrument() -
 
 
 @pytest.mark.parametrize(
-    ("way", "std", "believed"), [(1.9e-4, 6e-5, False), (1.9e-4, 5e-5, True), (2.1e-4, 6e-5, True)]
+    ("way", "std", "dry", "believed"),
+    [
+        (1.9e-4, 6e-5, False, False),
+        (1.9e-4, 5e-5, False, True),
+        (2.1e-4, 6e-5, False, True),
+        (1.9e-4, 6e-5, True, True),
+        (1e-4, 6e-5, True, False),
+    ],
 )
-def test_a_hysteresis_within_two_samples_is_dry_friction(way: float, std: float, believed: bool) -> None:
+def test_a_hysteresis_within_two_samples_is_dry_friction_unless_that_is_fitted_beside_it(
+    way: float, std: float, dry: bool, believed: bool
+) -> None:
     model = Model.load(MODEL).with_effect("hysteresis", at="shoulder", force=0.1, displacement=way)
     name = "shoulder.hysteresis.displacement"
     one = trial(1.1)
@@ -79,7 +88,10 @@ def test_a_hysteresis_within_two_samples_is_dry_friction(way: float, std: float,
             candidate=SimpleNamespace(effect=SimpleNamespace(name="hysteresis", site="joint"), site="shoulder")
         ),
         "judged": SimpleNamespace(
-            model=model, bounds={name: (1e-4, 1.0)}, fit=SimpleNamespace(names=[name], std=[std])
+            model=model,
+            bounds={name: (1e-4, 1.0)},
+            fit=SimpleNamespace(names=[name], std=[std]),
+            free=("shoulder.friction.coulomb", name) if dry else (name,),
         ),
         "parameters": ("shoulder.hysteresis.force", name),
     }
@@ -112,3 +124,22 @@ def test_what_is_slow_shows_an_effect_that_impacts_cover_unless_it_speaks_alone(
 def test_what_screening_promises_nothing_of_is_told_in_words_that_fit(drop: float, words: str) -> None:
     promised = cast("Probe", SimpleNamespace(free=("axis.backlash.gap",), held=(), drop=drop))
     assert words in refuse_probe(promised)
+
+
+@pytest.mark.parametrize(
+    ("relative", "score", "beside", "believed"),
+    [
+        (0.5, 9.0, 0.3, True),
+        (0.15, 3.3, 0.3, False),
+        (0.15, 3.3, 0.0, True),
+        (0.15, 2.2, 0.0, False),
+        (0.01, 3.3, 0.0, False),
+    ],
+)
+def test_what_leaves_no_shift_of_the_commands_is_told_from_it_by_one_sure_question(
+    relative: float, score: float, beside: float, believed: bool
+) -> None:
+    told = Gain(before=1.0, after=(1.0 - relative) ** 0.5, weight=1.0, score=score, pieces=100)
+    reason = refuse_timing(told, 0.3, Thresholds(60, 4e-3), beside=beside)
+    assert (reason == "") == believed
+    assert believed or "beside a shift of the commands by 1.2 ms" in reason

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from scipy.special import stdtrit
 
@@ -133,9 +133,22 @@ def explains_most(trial: Trial) -> bool:
     return late and trial.unseen.relative >= MOST_OF_IT
 
 
-def refuse_timing(timed: Gain, shift: float, thresholds: Thresholds) -> str:
-    """Reason not to accept a candidate that does no more than a shift of the commands within the sampling interval."""
-    if thresholds.met(timed):
+def refuse_timing(timed: Gain, shift: float, thresholds: Thresholds, *, beside: float) -> str:
+    """Reason not to accept a candidate that does no more than a shift of the commands within the sampling interval.
+
+    Parameters
+    ----------
+    timed : Gain
+        Of the candidate, with a shift before and after.
+    shift : float
+        How much later commands hold without the candidate, in sampling intervals.
+    thresholds : Thresholds
+    beside : float
+        The same with it. Where beside the candidate no shift matters, and beside the shift the candidate does, the two
+        are one finding with two names: that is one question, and the data answer it if they are sure at all.
+    """
+    encompasses = beside == 0.0 and timed.relative >= LEAST_GAIN
+    if thresholds.met(timed) or (encompasses and timed.score >= replace(thresholds, candidates=1).score(timed.pieces)):
         return ""
     return (
         f"beside a shift of the commands by {1e3 * shift * thresholds.interval:.2g} ms, within the sampling interval, "
@@ -183,7 +196,9 @@ def has_peers(model: Model, site: str) -> bool:
 def _no_way(trial: Trial) -> str:
     """A hysteresis that turns round within the way of one sample is dry friction, as far as the data can see.
 
-    So is one within the way of two, unless its way is clearly longer than that of one.
+    So is one within the way of two, unless its way is clearly longer than that of one. Where the joint's dry friction
+    is fitted beside it and it explains most of what that leaves, the data have told the two apart: joints turn round
+    slowly, and take many samples for a way that they pass in one at full speed.
     """
     candidate, bounds = trial.probe.candidate, trial.judged.bounds
     if candidate.effect.name != "hysteresis":
@@ -194,7 +209,8 @@ def _no_way(trial: Trial) -> str:
     fit = trial.judged.fit
     std = float(fit.std[fit.names.index(name)]) if name in fit.names else 0.0
     clear = parameter.value - NORMAL_95_ONE_SIDED * std > 1.001 * least
-    if clear or parameter.value > SAMPLED * least:
+    beside_dry = f"{candidate.site}.friction.coulomb" in trial.judged.free and trial.unseen.relative >= CLEAR_GAIN
+    if clear or parameter.value > (1.001 if beside_dry else SAMPLED) * least:
         return ""
     return (
         f"{parameter_text(trial.judged.model, name, std)}, and the joint passes {least:.3g} "

@@ -282,15 +282,15 @@ class Round:
         """Why a trial that would be believed does no more than a shift of the commands does, or ""."""
         if self.timed.shift == 0.0 or explains_most(trial):
             return ""
-        unseen = in_time(trial.judged, self.data).unseen
-        before = self.timed.unseen
+        told = in_time(trial.judged, self.data)
+        before, unseen = self.timed.unseen, told.unseen
         if slow_shows_it(trial, thresholds):
             before, unseen = (slow(self.data.unseen, each) for each in (before, unseen))
         if is_late(trial.probe.candidate.effect.name, trial.judged.model):
             # What sticks is late by itself, with a shift as without: what is late is judged where nothing sticks.
             before, unseen = (in_motion(self.data.unseen) * each for each in (before, unseen))
         timed = gain(before, unseen, segments(self.data.unseen))
-        return refuse_timing(timed, self.timed.shift, thresholds)
+        return refuse_timing(timed, self.timed.shift, thresholds, beside=told.shift)
 
     def best(self) -> Accepted | None:
         """The one that comes in, if any is believed; fitted to the end it has to stand as it did before."""
