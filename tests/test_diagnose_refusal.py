@@ -39,6 +39,7 @@ def trial(value: float) -> Trial:
             slow=None,
             clear=True,
             gap=NEGLIGIBLE,
+            asked=False,
         ),
     )
 
