@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import pytest
 
 import vpm
 from blind import make_case
-from vpm.discrepancy.candidates import Key
-from vpm.discrepancy.round import Round
 
 
 def test_a_force_and_a_tilt_that_a_balance_takes_for_each_other_are_told_apart() -> None:
@@ -46,14 +42,11 @@ def test_runs_ask_for_nothing_where_nothing_is_missing() -> None:
     assert not why.effects
 
 
-def test_what_runs_alone_ask_for_is_examined_as_any_other(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Where nothing was accepted before there were no rivals to be asked of."""
-    refused = Round.light
-
-    def nothing(self: Round, effects: Sequence[str] | None, without: set[Key]) -> None:
-        refused(self, effects, without)
-
-    monkeypatch.setattr(Round, "light", nothing)
-    case = make_case("axis_rotary", "dead_zone", 100)
-    why = vpm.diagnose(case.model(), case.train, case.validate, effects=["dead_zone"], workers=1)
-    assert [effect.name for effect in why.effects] == ["dead_zone"]
+def test_a_spring_that_swings_above_the_band_of_a_balance_is_found_in_runs() -> None:
+    """Of the balance it takes nothing; nothing was accepted before it, and it is examined as any other."""
+    case = make_case("axis_rotary", "joint_compliance", 101)
+    why = vpm.diagnose(case.model(), case.train, case.validate, effects=["joint_compliance"], workers=1)
+    assert [effect.name for effect in why.effects] == ["joint_compliance"]
+    values = {p.name: p.value for p in why.effects[0].parameters}
+    assert values["stiffness"] == pytest.approx(case.truth.hidden[0].parameters["stiffness"], rel=0.1)
+    assert why.verdict == "effect_found"

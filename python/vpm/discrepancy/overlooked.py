@@ -7,28 +7,41 @@ at a reversal that outweighs all else, gets a run of its own beside that of the 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 
+from vpm.catalogue import EFFECTS
 from vpm.discrepancy.choice import Accepted
 from vpm.discrepancy.confirmation import Data, Trial, confirm, judge
 from vpm.discrepancy.elimination import Stage
 from vpm.discrepancy.motion_only import WITHIN
-from vpm.discrepancy.own_run import OwnRun
+from vpm.discrepancy.own_run import OwnRun, misfit
 from vpm.discrepancy.refusal import WORTH_A_NAME, Thresholds, impossible_trial
 from vpm.discrepancy.runs import WORTH_A_FIT, Told, compared, criterion, first_run, fitted_run
 from vpm.discrepancy.screening import Probe, impossible_values
 from vpm.discrepancy.search import Search
 from vpm.discrepancy.short_list import same_models
 from vpm.discrepancy.side_by_side import SideBySide
+from vpm.discrepancy.structural import in_series
 from vpm.errors import VpmError
 
 #: Effects that are asked for, of those that take most of the training residual.
 ASKED = 3
-#: Digits of the share that one takes.
-DIGITS = 4
+#: What falls into chaos in runs.
+PLAY = "backlash"
+#: So many of those that promise most in their runs are fitted.
+FITTED = 2
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """An effect with its run, and its trial where it was fitted to the balance."""
+
+    probe: Probe
+    trial: Trial | None
+    run: OwnRun
 
 
 def overlooked(found: Search, data: Data, each: SideBySide) -> Search:
@@ -37,40 +50,49 @@ def overlooked(found: Search, data: Data, each: SideBySide) -> Search:
     before = first_run(found.final, data) if promising else None
     if before is None:
         return found
-    asked = each("overlooked: running", partial(_run, found, data), promising, lambda p: p.candidate.label)
+    asked = each("overlooked: running", partial(_run, found, data, before), promising, lambda p: p.candidate.label)
     least = criterion(before) - WORTH_A_FIT
-    worth = [one for one in asked if isinstance(one, tuple) and criterion(one[1]) < least]
+    worth = [one for one in asked if isinstance(one, _Asked) and criterion(one.run) < least]
     first = fitted_run(before, data) if worth else None
     if first is None:
         return found
     thresholds = Thresholds(max(1, len(found.ranking)), min(m.dt for m in data.training.motions))
     told = []
-    for trial, run in sorted(worth, key=lambda one: criterion(one[1])):
-        second = fitted_run(run, data)
+    for one in sorted(worth, key=lambda one: criterion(one.run))[:FITTED]:
+        second = fitted_run(one.run, data)
         said = None if second is None else compared(first, second, data)
         if said is not None and said.sure(thresholds):
-            told.append((trial, said))
+            told.append((one, said))
     if not told:
         return found
-    trial, said = min(told, key=lambda one: criterion(one[1].run))
-    more = _accepted(data, trial, said)
+    best, said = min(told, key=lambda one: criterion(one[1].run))
+    more = _accepted(found, data, best, said)
     return found if more is None else _added(found, more)
 
 
 def _promising(found: Search) -> list[Probe]:
-    """What takes most of the training residual of that which was refused in the last round."""
+    """What takes most of the training residual of that which was refused in the last round, and springs in series.
+
+    A spring swings above the band of a balance, which may hardly show it.
+    """
     present = {entry.key for entry in found.accepted} | found.gone
-    refused = {p.candidate.key: p for p in found.over.probes if _possible(p) and p.candidate.key not in present}
-    shares = {key: _taken(p, found.over.trials) for key, p in refused.items()}
-    worth_it = [p for key, p in refused.items() if shares[key] >= WORTH_A_NAME]
-    # Of two names of one model the first in the catalogue is asked for.
-    best = sorted(worth_it, key=lambda p: -round(shares[p.candidate.key], DIGITS))[:ASKED]
-    twins = same_models(best)
-    return [p for p in best if p.candidate.key not in twins]
+    refused = [p for p in found.over.probes if p.candidate.key not in present]
+    springs = sorted((p for p in refused if _is_spring(p)), key=lambda p: list(EFFECTS).index(p.candidate.effect.name))
+    twins = same_models(springs)
+    springs = [p for p in springs if p.candidate.key not in twins]
+    shares = {p.candidate.key: _taken(p, found.over.trials) for p in refused}
+    rest = [p for p in refused if _possible(p) and shares[p.candidate.key] >= WORTH_A_NAME]
+    return [*sorted(rest, key=lambda p: -shares[p.candidate.key])[:ASKED], *springs]
 
 
 def _possible(probe: Probe) -> bool:
-    return bool(probe.free) and not impossible_values(probe) and probe.candidate.effect.name != "backlash"
+    elsewhere = _is_spring(probe) or probe.candidate.effect.name == PLAY
+    return bool(probe.free) and not impossible_values(probe) and not elsewhere
+
+
+def _is_spring(probe: Probe) -> bool:
+    name = probe.candidate.effect.name
+    return name != PLAY and bool(in_series(name))
 
 
 def _taken(probe: Probe, tried: Sequence[Trial]) -> float:
@@ -83,30 +105,56 @@ def _taken(probe: Probe, tried: Sequence[Trial]) -> float:
     return max([probe.drop, *mine])
 
 
-def _run(found: Search, data: Data, probe: Probe) -> tuple[Trial, OwnRun] | str:
-    """A model with an effect fitted to the balance, and its run; or why there is none."""
+def _run(found: Search, data: Data, before: OwnRun, probe: Probe) -> _Asked | str:
+    """The run of a model with one effect more, as it was fitted to the balance; or why there is none."""
+    if _is_spring(probe):
+        run = _sprung(found, data, before, probe)
+        return "no run with it does better" if run is None else _Asked(probe, None, run)
     known = (trial for trial in found.over.trials if trial.probe is probe)
     trial = next(known, None) or confirm(found.final, data, probe)
     if reason := impossible_trial(trial, min(m.dt for m in data.training.motions)):
         return reason
     run = first_run(trial.judged, data)
-    return "it cannot follow the references" if run is None else (trial, run)
+    return "it cannot follow the references" if run is None else _Asked(probe, trial, run)
 
 
-def _accepted(data: Data, trial: Trial, told: Told) -> Accepted | None:
+def _sprung(found: Search, data: Data, before: OwnRun, probe: Probe) -> OwnRun | None:
+    """The run of a model with a spring in series from the start that suits the records best; None if none does."""
+    candidate, starts = probe.candidate, []
+    for start in candidate.starts:
+        model = before.model.with_effect(candidate.effect.name, at=candidate.site, **start)
+        try:
+            left, _ = before.problem.evaluate(model, model.theta)
+        except VpmError:
+            continue
+        starts.append((misfit(before, left), model))
+    cost, model = min(starts, key=lambda one: one[0], default=(np.inf, before.model))
+    if cost >= misfit(before):
+        return None
+    names = model.effect(*candidate.key).parameter_names
+    free = (*before.free, *(dotted for short, dotted in names.items() if short not in candidate.fixed))
+    return first_run(replace(found.final, model=model, free=free), data)
+
+
+def _accepted(found: Search, data: Data, asked: _Asked, told: Told) -> Accepted | None:
     """The effect with the balance fitted near what the runs say of it, and with what these gain."""
-    bounds, values = dict(trial.judged.bounds), {}
-    for name in trial.parameters:
-        value, std = told.run.estimated(name)
-        parameter = trial.judged.model.parameters[name]
+    final, run = found.final, told.run
+    own = tuple(name for name in run.free if name not in final.free)
+    bounds, values = dict(final.bounds if asked.trial is None else asked.trial.judged.bounds), {}
+    for name in own:
+        value, std = run.estimated(name)
+        parameter = run.model.parameters[name]
         bounds[name] = max(parameter.minimum, value - WITHIN * std), min(parameter.maximum, value + WITHIN * std)
         values[name] = float(np.clip(value, *bounds[name]))
+    known = {name: final.model.parameters[name].value for name in final.free}
+    model = run.model.with_parameters(known) if asked.trial is None else asked.trial.judged.model
     try:
-        judged = judge(trial.judged.model.with_parameters(values), trial.judged.free, data, bounds)
+        trial = asked.trial or confirm(final, data, asked.probe)
+        judged = judge(model.with_parameters(values), (*final.free, *own), data, bounds)
     except VpmError:
         return None
     told_by_runs = replace(trial, judged=judged, training=told.training, unseen=told.unseen, simulated=None, away=None)
-    return Accepted(replace(told_by_runs, clear=True, alone=True), ())
+    return Accepted(replace(told_by_runs, parameters=own, held=(), clear=True, alone=True, diverged=""), ())
 
 
 def _added(found: Search, more: Accepted) -> Search:
