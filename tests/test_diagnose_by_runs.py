@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import cast
+
 import pytest
 
 import vpm
 from blind import make_case
+from vpm.discrepancy import overlooked
+from vpm.discrepancy.choice import Accepted
+from vpm.discrepancy.confirmation import Data
 from vpm.discrepancy.round import Round
 
 
@@ -52,3 +58,18 @@ def test_a_spring_that_swings_above_the_band_of_a_balance_is_found_in_runs(monke
     values = {p.name: p.value for p in why.effects[0].parameters}
     assert values["stiffness"] == pytest.approx(case.truth.hidden[0].parameters["stiffness"], rel=0.1)
     assert why.verdict == "effect_found"
+
+
+def test_what_runs_find_late_is_chosen_among_all_that_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of a delay and a lag the criterion of one run says little; their difference along the reference is asked."""
+
+    def entry(name: str) -> Accepted:
+        return cast("Accepted", SimpleNamespace(key=(name, "drive"), trial=name))
+
+    chosen = entry("input_delay")
+    monkeypatch.setattr(overlooked, "choose", lambda trials, _: chosen if "input_delay" in trials else None)
+    lag, delay, spring = (entry(name) for name in ("actuator_lag", "input_delay", "spring"))
+    data = cast("Data", None)
+    assert overlooked._best([lag, spring, delay], data) is chosen
+    assert overlooked._best([spring, lag, delay], data) is spring
+    assert overlooked._best([lag, spring], data) is lag

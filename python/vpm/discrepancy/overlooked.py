@@ -13,10 +13,10 @@ from functools import partial
 import numpy as np
 
 from vpm.catalogue import EFFECTS
-from vpm.discrepancy.choice import Accepted
+from vpm.discrepancy.choice import Accepted, choose
 from vpm.discrepancy.confirmation import Data, Trial, confirm, judge
 from vpm.discrepancy.elimination import Stage
-from vpm.discrepancy.motion_only import WITHIN
+from vpm.discrepancy.motion_only import LATE_OR_SLOW, WITHIN
 from vpm.discrepancy.own_run import OwnRun, misfit
 from vpm.discrepancy.refusal import WORTH_A_NAME, Thresholds, impossible_trial
 from vpm.discrepancy.runs import WORTH_A_FIT, Told, compared, criterion, first_run, fitted_run
@@ -63,11 +63,17 @@ def overlooked(found: Search, data: Data, each: SideBySide) -> Search:
         said = None if second is None else compared(first, second, data)
         if said is not None and said.sure(thresholds):
             told.append((one, said))
-    if not told:
-        return found
-    best, said = min(told, key=lambda one: criterion(one[1].run))
-    more = _accepted(found, data, best, said)
-    return found if more is None else _added(found, more)
+    told.sort(key=lambda one: criterion(one[1].run))
+    more = [entry for one, said in told if (entry := _accepted(found, data, one, said)) is not None]
+    return _added(found, _best(more, data)) if more else found
+
+
+def _best(more: Sequence[Accepted], data: Data) -> Accepted:
+    """The first, or the one of those that come late or slow as it does that is chosen among such."""
+    late = [entry for entry in more if entry.key[0] in LATE_OR_SLOW]
+    if len(late) < 2 or more[0] is not late[0]:
+        return more[0]
+    return choose([entry.trial for entry in late], data)
 
 
 def _promising(found: Search) -> list[Probe]:
