@@ -9,9 +9,9 @@ import pytest
 
 import vpm
 from blind import make_case
-from vpm.discrepancy import overlooked
+from vpm.discrepancy import overlooked, told_apart
 from vpm.discrepancy.choice import Accepted
-from vpm.discrepancy.confirmation import Data
+from vpm.discrepancy.confirmation import Data, Trial
 from vpm.discrepancy.round import Round
 
 
@@ -73,3 +73,11 @@ def test_what_runs_find_late_is_chosen_among_all_that_is(monkeypatch: pytest.Mon
     assert overlooked._best([lag, spring, delay], data) is chosen
     assert overlooked._best([spring, lag, delay], data) is spring
     assert overlooked._best([lag, spring], data) is lag
+
+
+def test_what_the_samples_cannot_show_takes_no_place_whatever_runs_say(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Runs of a real machine prefer whatever follows it more closely, be it dry friction under another name."""
+    monkeypatch.setattr(told_apart, "impossible_trial", lambda trial, _: "" if trial.parameters == ("force",) else "no")
+    fine, none = (SimpleNamespace(diverged="", parameters=(name,)) for name in ("force", "displacement"))
+    assert told_apart._possible(cast("Trial", fine), 1e-3)
+    assert not told_apart._possible(cast("Trial", none), 1e-3)

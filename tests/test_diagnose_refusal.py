@@ -9,8 +9,16 @@ import pytest
 
 from vpm.demo import MODEL
 from vpm.discrepancy.confirmation import Trial
-from vpm.discrepancy.refusal import NEGLIGIBLE, Thresholds, refuse_probe, refuse_timing, refuse_trial
+from vpm.discrepancy.refusal import (
+    NEGLIGIBLE,
+    Thresholds,
+    impossible_trial,
+    refuse_probe,
+    refuse_timing,
+    refuse_trial,
+)
 from vpm.discrepancy.screening import Probe
+from vpm.discrepancy.structural import moved
 from vpm.identify import Gain
 from vpm.model import Model
 
@@ -144,3 +152,22 @@ def test_what_leaves_no_shift_of_the_commands_is_told_from_it_by_one_sure_questi
     reason = refuse_timing(told, 0.3, Thresholds(60, 4e-3), beside=beside)
     assert (reason == "") == believed
     assert believed or "beside a shift of the commands by 1.2 ms" in reason
+
+
+@pytest.mark.parametrize(("ratio", "believed"), [(0.05, True), (2.0, True), (20.0, False)])
+def test_a_spring_that_its_damper_holds_back_winds_nothing_up(ratio: float, believed: bool) -> None:
+    """A stop or a stiffening spring outside of the catalogue is imitated by a joint that slips."""
+    stiffness = 300.0
+    plain = Model.load(MODEL)
+    damping = 2.0 * ratio * (stiffness * moved(plain, "shoulder")) ** 0.5
+    model = plain.with_effect("joint_compliance", at="shoulder", stiffness=stiffness, damping=damping)
+    candidate = SimpleNamespace(effect=SimpleNamespace(name="joint_compliance", site="joint"), site="shoulder")
+    told = {
+        "probe": SimpleNamespace(candidate=candidate),
+        "judged": SimpleNamespace(model=model, bounds={}),
+        "parameters": ("shoulder.compliance.stiffness", "shoulder.compliance.damping"),
+    }
+    one = cast("Trial", SimpleNamespace(**{**vars(trial(1.0)), **told}))
+    for reason in (refuse_trial(one, Thresholds(30, 1e-3)), impossible_trial(one, 1e-3)):
+        assert (reason == "") == believed
+        assert believed or "times the critical one" in reason

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 from scipy.special import stdtrit
@@ -9,7 +10,7 @@ from scipy.special import stdtrit
 from vpm.discrepancy.confirmation import Trial
 from vpm.discrepancy.motion_only import LATE_OR_SLOW
 from vpm.discrepancy.screening import Probe, impossible_values
-from vpm.discrepancy.structural import coupled
+from vpm.discrepancy.structural import coupled, moved
 from vpm.identify import Gain
 from vpm.identify.statistics import NORMAL_95
 from vpm.model import Model
@@ -36,6 +37,8 @@ NEGLIGIBLE = 0.005
 MAGNIFIED = 4.0
 #: One-sided 95 % quantile of the normal distribution: a simulation that is worse by less is worse by chance.
 NORMAL_95_ONE_SIDED = 1.6448536269514722
+#: A spring in series, and from which damping ratio on it is none.
+WINDS_UP, CREEPS = "joint_compliance", 5.0
 #: Samples that what builds up over a way has to last, to be seen to build up.
 SAMPLED = 2.0
 #: Drop of the training mean square below which a candidate is not refitted at all.
@@ -93,6 +96,7 @@ def refuse_trial(trial: Trial, thresholds: Thresholds) -> str:
     reasons = (
         _too_short(trial, thresholds.interval),
         _no_way(trial),
+        _creeps(trial),
         _trifling_gain(trial),
         _only_training(trial),
         _not_clear(trial),
@@ -106,7 +110,7 @@ def refuse_trial(trial: Trial, thresholds: Thresholds) -> str:
 
 def impossible_trial(trial: Trial, interval: float) -> str:
     """Reason for which an effect is none, whatever its gain, or ""."""
-    return _too_short(trial, interval) or _no_way(trial) or _trifling_size(trial)
+    return _too_short(trial, interval) or _no_way(trial) or _creeps(trial) or _trifling_size(trial)
 
 
 def refuse_ringing(share: float, trial: Trial) -> str:
@@ -215,6 +219,23 @@ def _no_way(trial: Trial) -> str:
     return (
         f"{parameter_text(trial.judged.model, name, std)}, and the joint passes {least:.3g} "
         f"{parameter.unit} between two samples: what builds up within two of them cannot be told from dry friction"
+    )
+
+
+def _creeps(trial: Trial) -> str:
+    """A spring in series that its damper holds back does not wind up: it slips as a fluid coupling does."""
+    candidate, model = trial.probe.candidate, trial.judged.model
+    if candidate.effect.name != WINDS_UP:
+        return ""
+    stiffness, damping = (
+        model.parameters[f"{candidate.site}.compliance.{name}"].value for name in ("stiffness", "damping")
+    )
+    ratio = damping / (2.0 * math.sqrt(max(stiffness, 1e-300) * moved(trial.judged.model, candidate.site)))
+    if ratio <= CREEPS:
+        return ""
+    return (
+        f"its damping is {ratio:.3g} times the critical one, and it needs {damping / stiffness:.3g} s to come back: "
+        "that is no spring that winds up"
     )
 
 

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from vpm.discrepancy.ambiguity import Rivals
 from vpm.discrepancy.confirmation import Data, Trial
 from vpm.discrepancy.own_run import OwnRun
-from vpm.discrepancy.refusal import Thresholds
+from vpm.discrepancy.refusal import Thresholds, impossible_trial
 from vpm.discrepancy.runs import WORTH_A_FIT, compared, criterion, first_run, fitted_run
 from vpm.discrepancy.search import Search
 from vpm.discrepancy.side_by_side import SideBySide
@@ -30,8 +30,11 @@ def told_apart(
     known : tuple of Rivals
     """
     tried = [(place, trial) for place, rivals in enumerate(known) for trial in rivals.tried]
+    interval = min(m.dt for m in data.training.motions)
     asked = [
-        (place, trial) for place, trial in tried if trial.probe.candidate.key not in found.gone and _possible(trial)
+        (place, trial)
+        for place, trial in tried
+        if trial.probe.candidate.key not in found.gone and _possible(trial, interval)
     ]
     before = first_run(found.final, data) if asked else None
     if before is None:
@@ -50,7 +53,7 @@ def told_apart(
     if not better:
         return found, tuple(known)
     first = fitted_run(before, data)
-    thresholds = Thresholds(len(asked), min(m.dt for m in data.training.motions))
+    thresholds = Thresholds(len(asked), interval)
     for _, place, trial, run in sorted(better, key=lambda one: one[0]):
         second = fitted_run(run, data)
         told = None if first is None or second is None else compared(first, second, data)
@@ -59,5 +62,5 @@ def told_apart(
     return found, tuple(known)
 
 
-def _possible(trial: Trial) -> bool:
-    return not trial.diverged and bool(trial.parameters)
+def _possible(trial: Trial, interval: float) -> bool:
+    return not trial.diverged and bool(trial.parameters) and not impossible_trial(trial, interval)
