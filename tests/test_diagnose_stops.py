@@ -7,7 +7,8 @@ import pytest
 
 import vpm
 from blind import make_case
-from vpm.discrepancy.structural import stop_starts
+from vpm.demo import MODEL
+from vpm.discrepancy.structural import ends_apart, stop_starts
 
 
 @pytest.mark.parametrize(("side", "end"), [(1.0, "high"), (-1.0, "low")])
@@ -40,3 +41,12 @@ def test_the_end_that_no_record_reached_stays_where_no_joint_comes() -> None:
     assert values["high"] == pytest.approx(hidden.parameters["high"], rel=2e-3)
     assert values["stiffness"] == pytest.approx(hidden.parameters["stiffness"], rel=0.02)
     assert values["damping"] == pytest.approx(hidden.parameters["damping"], rel=0.1)
+
+
+def test_ends_of_a_stop_do_not_pass_each_other_in_a_fit() -> None:
+    """Two soft ends in one way imitate what is outside of the catalogue; crossed, they are no model."""
+    model = vpm.Model.load(MODEL).with_effect("end_stop", at="shoulder", stiffness=10.0, low=-0.2, high=0.4)
+    low, high = "shoulder.end_stop.low", "shoulder.end_stop.high"
+    bounds = ends_apart(model, (low, high), {low: (-1.0, 1.0)})
+    assert bounds == {low: (-1.0, pytest.approx(0.1)), high: (pytest.approx(0.1), np.inf)}
+    assert ends_apart(model, (low,), {low: (-1.0, 1.0)}) == {low: (-1.0, 1.0)}

@@ -14,6 +14,7 @@ from vpm.discrepancy.own_run import OwnRun
 from vpm.discrepancy.screening import Alias, Baseline, Probe, size_is_clear
 from vpm.discrepancy.slow import has_impacts, slow
 from vpm.discrepancy.starting import nearer_start
+from vpm.discrepancy.structural import ends_apart
 from vpm.errors import DivergedError
 from vpm.identify import (
     Estimate,
@@ -162,6 +163,7 @@ def judge(
     DivergedError
         The fitted model cannot simulate the unseen records.
     """
+    bounds = ends_apart(model, free, bounds)
     if origin is None and has_tangent(model, data.training):
         origin = model.theta
     if origin is None:
@@ -173,10 +175,8 @@ def judge(
         fit = estimate_on_tangent(model, data.training, free, origin, bounds=bounds, tolerance=TOLERANCE, worth=worth)
     fitted = model.with_parameters(dict(zip(free, map(float, fit.values), strict=True)))
     unseen, _ = data.unseen.evaluate(fitted, fitted.theta)
-    simulated = None
-    if data.simulation is not None:
-        simulated, _ = data.simulation.evaluate(fitted, fitted.theta)
-    return Judged(fitted, free, fit, unseen, simulated, dict(bounds))
+    simulated = None if data.simulation is None else data.simulation.evaluate(fitted, fitted.theta)[0]
+    return Judged(fitted, free, fit, unseen, simulated, bounds)
 
 
 def confirm(current: Judged, data: Data, probe: Probe, rival: float = np.inf) -> Trial:

@@ -38,6 +38,8 @@ CONTACT_FREQUENCY = 50.0
 GAP_SHARES = (5e-4, 3e-3, 1.5e-2)
 #: Places of a stop, as shares of the half travel from its middle.
 STOP_SHARES = (0.6, 0.8, 0.95)
+#: Dotted names, behind the site, of the ends of a stop.
+END, OTHER_END = ".end_stop.low", ".end_stop.high"
 #: Places of a stop compared on either side, the largest share of the samples that may lie beyond one, and the fewest.
 STOP_PLACES, BEYOND_MOST, BEYOND_LEAST = 30, 0.3, 3
 
@@ -237,3 +239,21 @@ def moved(model: Model, site: str) -> float:
         if name in model.parameters
     )
     return max(whole - rotor, 1e-3 * whole)
+
+
+def ends_apart(
+    model: Model, free: Sequence[str], bounds: Mapping[str, tuple[float, float]]
+) -> dict[str, tuple[float, float]]:
+    """Bounds that keep both ends of a stop, where both are free, on their sides of its middle."""
+    apart = dict(bounds)
+    for low in (name for name in free if name.endswith(END)):
+        high = low.removesuffix(END) + OTHER_END
+        if high not in free:
+            continue
+        lower, upper = model.parameters[low], model.parameters[high]
+        middle = 0.5 * (lower.value + upper.value)
+        least, most = apart.get(low, (lower.minimum, lower.maximum))
+        apart[low] = least, min(most, middle)
+        least, most = apart.get(high, (upper.minimum, upper.maximum))
+        apart[high] = max(least, middle), most
+    return apart
