@@ -50,7 +50,7 @@ def overlooked(found: Search, data: Data, each: SideBySide) -> Search:
     before = first_run(found.final, data) if promising else None
     if before is None:
         return found
-    asked = each("overlooked: running", partial(_run, found, data, before), promising, lambda p: p.candidate.label)
+    asked = each("one effect more: running", partial(_run, found, data, before), promising, lambda p: p.candidate.label)
     least = criterion(before) - WORTH_A_FIT
     worth = [one for one in asked if isinstance(one, _Asked) and criterion(one.run) < least]
     first = fitted_run(before, data) if worth else None
