@@ -100,7 +100,7 @@ class Answer:
     @property
     def solvable(self) -> bool:
         """Whether each hidden effect stands clear of the noise."""
-        return bool(self.strengths) and min(self.strengths) > CLEAR
+        return bool(self.strengths) and all(strength > CLEAR for strength in self.strengths)
 
     def to_dict(self) -> dict[str, object]:
         """Plain data for JSON; what is not known is null."""

@@ -174,7 +174,7 @@ def make(batch: Sequence[Job]) -> list[Made]:
     """Cases of a batch with strengths of the hidden effects, those of each one alone, times that they took, errors."""
     began = time.process_time()
     made = try_cases(batch[0].machine, [(job.request, job.seed) for job in batch], batch[0].noise_level)
-    strengths = _strengths(batch, made)
+    strengths = list(_strengths(batch, made))
     each = (time.process_time() - began) / len(batch)
     result: list[Made] = []
     for job, case, (own, alone) in zip(batch, made, strengths, strict=True):

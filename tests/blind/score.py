@@ -185,7 +185,7 @@ def pairs(answers: Iterable[Answer]) -> list[Answer]:
 
 def pairs_alone(answers: Iterable[Answer]) -> list[Answer]:
     """Cases with two effects, each of which is solvable where the other one is not there."""
-    return [a for a in answers if a.kind == "pairs" and a.alone and min(a.alone) > CLEAR]
+    return [a for a in answers if a.kind == "pairs" and a.alone and all(s > CLEAR for s in a.alone)]
 
 
 def outside(answers: Iterable[Answer]) -> list[Answer]:
