@@ -15,11 +15,16 @@ use std::fmt::Debug;
 use std::iter::Sum;
 use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
 
+pub use crate::scalar::choice::Choice;
 pub use crate::scalar::dual::{Dual, seed};
 
+mod choice;
 mod dual;
 
-/// A real number, possibly carrying derivatives. Comparisons look at the value alone: control flow is that of `f64`.
+/// A real number, possibly carrying derivatives. Comparisons look at the value alone.
+///
+/// Laws choose by [`Scalar::if_less`] and its kin, never by `if` on [`Scalar::re`]: a number may stand for the operation that
+/// makes it, and a choice has to hold for every value that comes along.
 pub trait Scalar:
     Copy
     + Debug
@@ -45,8 +50,24 @@ pub trait Scalar:
     + Mul<f64, Output = Self>
     + Div<f64, Output = Self>
 {
-    /// The value without any derivative.
+    /// The value without any derivative. Where it decides what a law computes, ask by [`Scalar::if_less`] instead.
     fn re(&self) -> f64;
+    /// The value for a check that can only complain: nothing else may depend on it.
+    #[inline]
+    fn inspect(&self) -> f64 {
+        self.re()
+    }
+    /// Whether the number is less than `other`, if that is known already.
+    #[inline]
+    fn known_less(self, other: Self) -> Option<bool> {
+        Some(self.re() < other.re())
+    }
+    /// `yes` where the number is less than `other`, else `no`, with their derivatives. Both are worked out: prefer
+    /// [`Scalar::if_less`].
+    #[inline]
+    fn select_less(self, other: Self, yes: Self, no: Self) -> Self {
+        if self.re() < other.re() { yes } else { no }
+    }
     /// Whether the value and all derivatives are finite.
     fn is_finite(self) -> bool;
     /// Square root; its derivative is infinite at zero.
@@ -96,20 +117,40 @@ pub trait Scalar:
     fn recip(self) -> Self {
         Self::one() / self
     }
+    /// What `yes` gives where the number is less than `other`, else what `no` gives. A number that is not comparable (NaN)
+    /// gives `no`.
+    #[inline]
+    fn if_less<T: Choice<Self>>(self, other: Self, yes: impl FnOnce() -> T, no: impl FnOnce() -> T) -> T {
+        match self.known_less(other) {
+            Some(true) => yes(),
+            Some(false) => no(),
+            None => T::choose(&|yes, no| self.select_less(other, yes, no), yes(), no()),
+        }
+    }
+    /// As [`Scalar::if_less`] against zero.
+    #[inline]
+    fn if_negative<T: Choice<Self>>(self, yes: impl FnOnce() -> T, no: impl FnOnce() -> T) -> T {
+        self.if_less(Self::zero(), yes, no)
+    }
+    /// What `yes` gives where the number is above zero, else what `no` gives.
+    #[inline]
+    fn if_positive<T: Choice<Self>>(self, yes: impl FnOnce() -> T, no: impl FnOnce() -> T) -> T {
+        Self::zero().if_less(self, yes, no)
+    }
     /// |x|; at zero the derivative is that of +x.
     #[inline]
     fn abs(self) -> Self {
-        if self.re() < 0.0 { -self } else { self }
+        self.if_negative(|| -self, || self)
     }
     /// The larger of two numbers, with its derivatives; the first if they are equal.
     #[inline]
     fn max(self, other: Self) -> Self {
-        if other.re() > self.re() { other } else { self }
+        self.if_less(other, || other, || self)
     }
     /// The smaller of two numbers, with its derivatives; the first if they are equal.
     #[inline]
     fn min(self, other: Self) -> Self {
-        if other.re() < self.re() { other } else { self }
+        other.if_less(self, || other, || self)
     }
 }
 

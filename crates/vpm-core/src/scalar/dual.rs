@@ -84,6 +84,19 @@ impl<S: Scalar, const N: usize> Scalar for Dual<S, N> {
         self.value.re()
     }
     #[inline]
+    fn inspect(&self) -> f64 {
+        self.value.inspect()
+    }
+    #[inline]
+    fn known_less(self, other: Self) -> Option<bool> {
+        self.value.known_less(other.value)
+    }
+    #[inline]
+    fn select_less(self, other: Self, yes: Self, no: Self) -> Self {
+        let pick = |yes, no| self.value.select_less(other.value, yes, no);
+        yes.zip(no, pick(yes.value, no.value), pick)
+    }
+    #[inline]
     fn is_finite(self) -> bool {
         self.value.is_finite() && self.gradient.iter().all(|part| part.is_finite())
     }
