@@ -19,6 +19,7 @@ pub mod effect;
 pub mod error;
 pub mod evaluate;
 pub mod flight;
+pub mod graph;
 pub mod integrator;
 pub mod inverse;
 pub mod joint;

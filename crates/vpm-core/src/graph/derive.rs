@@ -1,0 +1,151 @@
+//! Exact derivatives of a graph, as more graph.
+
+use super::operation::{Function, Node, Operation};
+use super::record::Graph;
+
+/// The derivatives of some outputs by some inputs: only those that are not zero for every input.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Derivative {
+    /// Row (output) and column (place among the inputs asked for) of each entry, row by row.
+    pub places: Vec<(usize, usize)>,
+    /// The number of each entry in the graph.
+    pub entries: Vec<Node>,
+}
+
+/// Derivatives of one number: column and number, columns ascending.
+type Gradient = Vec<(u32, Node)>;
+
+impl Graph {
+    /// Appends the derivatives of `outputs` by the inputs with these numbers.
+    ///
+    /// Law: forward accumulation of sparse gradients, each partial derivative once (Griewank & Walther 2008, section 3.2 and
+    /// chapter 7). A choice differentiates the branch that holds.
+    pub fn derive(&mut self, outputs: &[Node], inputs: &[u32]) -> Derivative {
+        let count = outputs.iter().max().map_or(0, |&most| most as usize + 1);
+        let needed = self.needed(outputs, count);
+        let mut gradients: Vec<Gradient> = Vec::with_capacity(count);
+        for node in 0..count {
+            let gradient = if needed[node] { self.gradient(node as Node, &gradients, inputs) } else { Gradient::new() };
+            gradients.push(gradient);
+        }
+        let mut derivative = Derivative { places: Vec::new(), entries: Vec::new() };
+        for (row, &output) in outputs.iter().enumerate() {
+            for &(column, entry) in &gradients[output as usize] {
+                if self.known_value(entry) != Some(0.0) {
+                    derivative.places.push((row, column as usize));
+                    derivative.entries.push(entry);
+                }
+            }
+        }
+        derivative
+    }
+
+    fn needed(&self, outputs: &[Node], count: usize) -> Vec<bool> {
+        let mut needed = vec![false; count];
+        outputs.iter().for_each(|&output| needed[output as usize] = true);
+        for node in (0..count).rev() {
+            if needed[node] {
+                self.operations()[node].arguments(|argument| needed[argument as usize] = true);
+            }
+        }
+        needed
+    }
+
+    fn gradient(&mut self, node: Node, known: &[Gradient], inputs: &[u32]) -> Gradient {
+        let of = |argument: Node| known[argument as usize].as_slice();
+        match self.operations()[node as usize] {
+            Operation::Constant(_) => Gradient::new(),
+            Operation::Input(number) => {
+                let place = inputs.iter().position(|&input| input == number);
+                place.map(|place| (place as u32, self.constant(1.0))).into_iter().collect()
+            }
+            Operation::Add(a, b) => join(of(a), of(b), |da, db| match (da, db) {
+                (Some(da), Some(db)) => self.add(da, db),
+                (one, other) => one.or(other).unwrap_or_default(),
+            }),
+            Operation::Subtract(a, b) => join(of(a), of(b), |da, db| match (da, db) {
+                (Some(da), Some(db)) => self.subtract(da, db),
+                (None, Some(db)) => self.negative(db),
+                (da, None) => da.unwrap_or_default(),
+            }),
+            Operation::Multiply(a, b) => join(of(a), of(b), |da, db| {
+                let left = da.map(|da| self.multiply(da, b));
+                let right = db.map(|db| self.multiply(a, db));
+                match (left, right) {
+                    (Some(left), Some(right)) => self.add(left, right),
+                    (one, other) => one.or(other).unwrap_or_default(),
+                }
+            }),
+            Operation::Divide(a, b) => {
+                let one = self.constant(1.0);
+                let inverse = self.divide(one, b);
+                join(of(a), of(b), |da, db| {
+                    let carried = db.map(|db| self.multiply(node, db));
+                    let change = match (da, carried) {
+                        (Some(da), Some(carried)) => self.subtract(da, carried),
+                        (None, Some(carried)) => self.negative(carried),
+                        (da, None) => da.unwrap_or_default(),
+                    };
+                    self.multiply(change, inverse)
+                })
+            }
+            Operation::Apply(function, a) => {
+                if of(a).is_empty() {
+                    return Gradient::new();
+                }
+                let slope = self.slope(function, a, node);
+                of(a).iter().map(|&(column, entry)| (column, self.multiply(entry, slope))).collect()
+            }
+            Operation::Select([a, b, yes, no]) => join(of(yes), of(no), |yes, no| {
+                let zero = self.constant(0.0);
+                self.select([a, b, yes.unwrap_or(zero), no.unwrap_or(zero)])
+            }),
+        }
+    }
+
+    /// f'(a), where f(a) is number `value`.
+    fn slope(&mut self, function: Function, a: Node, value: Node) -> Node {
+        let one = self.constant(1.0);
+        match function {
+            Function::Negative => self.constant(-1.0),
+            Function::Root => {
+                let half = self.constant(0.5);
+                self.divide(half, value)
+            }
+            Function::Exp => value,
+            Function::ExpM1 => self.add(value, one),
+            Function::Ln => self.divide(one, a),
+            Function::Sine => self.apply(Function::Cosine, a),
+            Function::Cosine => {
+                let sine = self.apply(Function::Sine, a);
+                self.negative(sine)
+            }
+            Function::Tanh => {
+                let square = self.multiply(value, value);
+                self.subtract(one, square)
+            }
+            Function::Atan => {
+                let square = self.multiply(a, a);
+                let sum = self.add(one, square);
+                self.divide(one, sum)
+            }
+        }
+    }
+}
+
+/// Two gradients, column by column: each column that either has.
+fn join(
+    left: &[(u32, Node)],
+    right: &[(u32, Node)],
+    mut combine: impl FnMut(Option<Node>, Option<Node>) -> Node,
+) -> Gradient {
+    let (mut left, mut right) = (left.iter().copied().peekable(), right.iter().copied().peekable());
+    let mut joined = Gradient::new();
+    loop {
+        let (own, other) = (left.peek().map(|entry| entry.0), right.peek().map(|entry| entry.0));
+        let Some(column) = own.into_iter().chain(other).min() else { return joined };
+        let one = left.next_if(|entry| entry.0 == column).map(|entry| entry.1);
+        let two = right.next_if(|entry| entry.0 == column).map(|entry| entry.1);
+        joined.push((column, combine(one, two)));
+    }
+}

@@ -1,0 +1,116 @@
+//! The part of a graph that some outputs need, ready to be worked out in order.
+
+use super::operation::{Node, Operation};
+use super::record::Graph;
+
+/// Operations in order, arguments first, and the numbers that come out.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Program {
+    operations: Vec<Operation>,
+    outputs: Vec<Node>,
+    inputs: usize,
+}
+
+/// A program cut in two by how often its inputs change.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Stages {
+    /// Works out, from the inputs that change seldom, what of them the rest needs.
+    pub seldom: Program,
+    /// The rest: its inputs are those of the whole, then the outputs of `seldom`.
+    pub often: Program,
+}
+
+impl Program {
+    /// What `outputs` need of `graph`, as a function of `inputs` numbers.
+    ///
+    /// Numbers are worked out as late as the order of the recording lets them, so that few stay alive at a time.
+    pub fn new(graph: &Graph, outputs: &[Node], inputs: usize) -> Self {
+        Self::of(graph.operations(), outputs, inputs)
+    }
+
+    fn of(operations: &[Operation], outputs: &[Node], inputs: usize) -> Self {
+        const UNUSED: Node = Node::MAX;
+        let mut places = vec![UNUSED; operations.len()];
+        let mut program = Self { operations: Vec::new(), outputs: Vec::with_capacity(outputs.len()), inputs };
+        let mut open = Vec::new();
+        for &output in outputs {
+            open.push(output);
+            // Depth first: a number is appended once all its arguments stand.
+            while let Some(&node) = open.last() {
+                if places[node as usize] != UNUSED {
+                    open.pop();
+                    continue;
+                }
+                let before = open.len();
+                operations[node as usize].arguments(|argument| {
+                    if places[argument as usize] == UNUSED {
+                        open.push(argument);
+                    }
+                });
+                if open.len() == before {
+                    open.pop();
+                    places[node as usize] = program.operations.len() as Node;
+                    program.operations.push(operations[node as usize].renamed(|argument| places[argument as usize]));
+                }
+            }
+            program.outputs.push(places[output as usize]);
+        }
+        program
+    }
+
+    /// The operations.
+    pub fn operations(&self) -> &[Operation] {
+        &self.operations
+    }
+
+    /// Which numbers come out.
+    pub fn outputs(&self) -> &[Node] {
+        &self.outputs
+    }
+
+    /// How many numbers go in.
+    pub fn n_inputs(&self) -> usize {
+        self.inputs
+    }
+
+    /// How many operations there are, constants and inputs not counted.
+    pub fn size(&self) -> usize {
+        self.operations
+            .iter()
+            .filter(|operation| !matches!(operation, Operation::Constant(_) | Operation::Input(_)))
+            .count()
+    }
+
+    /// Cut by how often inputs change: `seldom` tells of an input whether it changes seldom.
+    pub fn split(&self, seldom: impl Fn(usize) -> bool) -> Stages {
+        let mut early = Vec::with_capacity(self.operations.len());
+        for operation in &self.operations {
+            let mut fixed = !matches!(operation, Operation::Input(number) if !seldom(*number as usize));
+            operation.arguments(|argument| fixed &= early[argument as usize]);
+            early.push(fixed);
+        }
+        let passed = self.passed(&early);
+        let mut rest = self.operations.clone();
+        for (place, &node) in passed.iter().enumerate() {
+            rest[node as usize] = Operation::Input((self.inputs + place) as u32);
+        }
+        Stages {
+            seldom: Self::of(&self.operations, &passed, self.inputs),
+            often: Self::of(&rest, &self.outputs, self.inputs + passed.len()),
+        }
+    }
+
+    /// The numbers that the late operations, or the outputs, need of the early ones: neither constants nor inputs.
+    fn passed(&self, early: &[bool]) -> Vec<Node> {
+        let mut wanted = vec![false; self.operations.len()];
+        for (operation, _) in self.operations.iter().zip(early).filter(|&(_, &early)| !early) {
+            operation.arguments(|argument| wanted[argument as usize] = true);
+        }
+        self.outputs.iter().for_each(|&output| wanted[output as usize] = true);
+        let made = |node: usize| !matches!(self.operations[node], Operation::Constant(_) | Operation::Input(_));
+        (0..self.operations.len())
+            .filter(|&node| wanted[node] && early[node] && made(node))
+            .map(|node| node as Node)
+            .collect()
+    }
+}

@@ -1,0 +1,388 @@
+//! The number that records what is done with it.
+
+use std::cell::RefCell;
+use std::cmp::Ordering;
+use std::collections::HashMap;
+use std::iter::Sum;
+use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
+use std::panic::Location;
+
+use super::operation::{Function, Node, Operation};
+use crate::scalar::Scalar;
+
+/// Operations in the order in which they were recorded, each once: equal operations are merged, constants folded.
+///
+/// Beside each operation stands its value at the inputs' reference values, for what a law asks of numbers while a machine is built.
+#[derive(Clone, Debug)]
+pub struct Graph {
+    operations: Vec<Operation>,
+    values: Vec<f64>,
+    known: HashMap<Operation, Node>,
+    /// Whether each number follows from parameters alone, which are the inputs from here on.
+    of_parameters: Vec<bool>,
+    first_parameter: u32,
+    decisions: Vec<Decision>,
+}
+
+/// A place where a law decided by the value of a number instead of by [`Scalar::if_less`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Decision {
+    /// Where in the source.
+    pub location: &'static Location<'static>,
+    /// Whether the number follows from parameters alone: then the graph holds for these parameters, otherwise for one state only.
+    pub of_parameters: bool,
+}
+
+impl Default for Graph {
+    fn default() -> Self {
+        Self::new(0)
+    }
+}
+
+impl Graph {
+    /// An empty graph whose inputs from `first_parameter` on are parameters.
+    pub fn new(first_parameter: u32) -> Self {
+        let mut graph = Self {
+            operations: Vec::new(),
+            values: Vec::new(),
+            known: HashMap::new(),
+            of_parameters: Vec::new(),
+            first_parameter,
+            decisions: Vec::new(),
+        };
+        // Zero is number 0, the default of a recorded number.
+        graph.constant(0.0);
+        graph
+    }
+
+    /// All operations; arguments stand before what is made of them.
+    pub fn operations(&self) -> &[Operation] {
+        &self.operations
+    }
+
+    /// Where values decided, each place once.
+    pub fn decisions(&self) -> &[Decision] {
+        &self.decisions
+    }
+
+    /// The value of a constant.
+    pub fn known_value(&self, node: Node) -> Option<f64> {
+        match self.operations[node as usize] {
+            Operation::Constant(bits) => Some(f64::from_bits(bits)),
+            _ => None,
+        }
+    }
+
+    /// A constant.
+    pub fn constant(&mut self, value: f64) -> Node {
+        // Both zeros are one number.
+        let value = if value == 0.0 { 0.0 } else { value };
+        self.push(Operation::Constant(value.to_bits()), || value)
+    }
+
+    /// Input `number`, at its reference `value`.
+    pub fn input(&mut self, number: u32, value: f64) -> Node {
+        self.push(Operation::Input(number), || value)
+    }
+
+    fn push(&mut self, operation: Operation, value: impl FnOnce() -> f64) -> Node {
+        if let Some(&node) = self.known.get(&operation) {
+            return node;
+        }
+        let node = self.operations.len() as Node;
+        let mut of_parameters = !matches!(operation, Operation::Input(number) if number < self.first_parameter);
+        operation.arguments(|argument| of_parameters &= self.of_parameters[argument as usize]);
+        self.operations.push(operation);
+        self.values.push(value());
+        self.of_parameters.push(of_parameters);
+        self.known.insert(operation, node);
+        node
+    }
+
+    fn make(&mut self, operation: Operation) -> Node {
+        if let Some(&node) = self.known.get(&operation) {
+            return node;
+        }
+        let values = &self.values;
+        let value = operation.value(|node| values[node as usize], |_| f64::NAN);
+        self.push(operation, || value)
+    }
+
+    /// a + b.
+    pub fn add(&mut self, a: Node, b: Node) -> Node {
+        match (self.known_value(a), self.known_value(b)) {
+            (Some(x), Some(y)) => return self.constant(x + y),
+            (Some(0.0), None) => return b,
+            (None, Some(0.0)) => return a,
+            _ => {}
+        }
+        match (self.operations[a as usize], self.operations[b as usize]) {
+            (_, Operation::Apply(Function::Negative, b)) => self.subtract(a, b),
+            (Operation::Apply(Function::Negative, a), _) => self.subtract(b, a),
+            _ => self.make(Operation::Add(a.min(b), a.max(b))),
+        }
+    }
+
+    /// a - b.
+    pub fn subtract(&mut self, a: Node, b: Node) -> Node {
+        if a == b {
+            return self.constant(0.0);
+        }
+        match (self.known_value(a), self.known_value(b)) {
+            (Some(x), Some(y)) => return self.constant(x - y),
+            (Some(0.0), None) => return self.negative(b),
+            (None, Some(0.0)) => return a,
+            _ => {}
+        }
+        match self.operations[b as usize] {
+            Operation::Apply(Function::Negative, b) => self.add(a, b),
+            _ => self.make(Operation::Subtract(a, b)),
+        }
+    }
+
+    /// -a.
+    pub fn negative(&mut self, a: Node) -> Node {
+        match self.operations[a as usize] {
+            Operation::Constant(bits) => self.constant(-f64::from_bits(bits)),
+            Operation::Apply(Function::Negative, b) => b,
+            Operation::Subtract(b, c) => self.make(Operation::Subtract(c, b)),
+            _ => self.make(Operation::Apply(Function::Negative, a)),
+        }
+    }
+
+    /// a b.
+    pub fn multiply(&mut self, a: Node, b: Node) -> Node {
+        match (self.known_value(a), self.known_value(b)) {
+            (Some(x), Some(y)) => return self.constant(x * y),
+            (Some(x), None) => return self.scale(x, a, b),
+            (None, Some(y)) => return self.scale(y, b, a),
+            (None, None) => {}
+        }
+        let (left, left_turned) = self.without_sign(a);
+        let (right, right_turned) = self.without_sign(b);
+        let product = self.make(Operation::Multiply(left.min(right), left.max(right)));
+        if left_turned == right_turned { product } else { self.negative(product) }
+    }
+
+    /// The product with the constant `factor`, which is number `constant`.
+    fn scale(&mut self, factor: f64, constant: Node, b: Node) -> Node {
+        if factor == 0.0 {
+            return self.constant(0.0);
+        }
+        if factor == 1.0 {
+            return b;
+        }
+        if factor == -1.0 {
+            return self.negative(b);
+        }
+        let (b, turned) = self.without_sign(b);
+        let constant = if turned { self.constant(-factor) } else { constant };
+        self.make(Operation::Multiply(constant.min(b), constant.max(b)))
+    }
+
+    fn without_sign(&self, a: Node) -> (Node, bool) {
+        match self.operations[a as usize] {
+            Operation::Apply(Function::Negative, b) => (b, true),
+            _ => (a, false),
+        }
+    }
+
+    /// a / b; by a constant as a product with its inverse.
+    pub fn divide(&mut self, a: Node, b: Node) -> Node {
+        match (self.known_value(a), self.known_value(b)) {
+            (Some(x), Some(y)) => self.constant(x / y),
+            (Some(0.0), None) => a,
+            (None, Some(y)) => {
+                let inverse = self.constant(y.recip());
+                self.multiply(a, inverse)
+            }
+            _ => self.make(Operation::Divide(a, b)),
+        }
+    }
+
+    /// A function of a number.
+    pub fn apply(&mut self, function: Function, a: Node) -> Node {
+        match (function, self.known_value(a)) {
+            (Function::Negative, _) => self.negative(a),
+            (_, Some(x)) => self.constant(function.value(x)),
+            _ => self.make(Operation::Apply(function, a)),
+        }
+    }
+
+    /// `yes` where a < b, else `no`.
+    pub fn select(&mut self, [a, b, yes, no]: [Node; 4]) -> Node {
+        if yes == no {
+            return yes;
+        }
+        match (self.known_value(a), self.known_value(b)) {
+            (Some(x), Some(y)) => {
+                if x < y {
+                    yes
+                } else {
+                    no
+                }
+            }
+            _ => self.make(Operation::Select([a, b, yes, no])),
+        }
+    }
+
+    /// The value of a number at the reference inputs, for a law that decides by it.
+    fn decide(&mut self, node: Node, location: &'static Location<'static>) -> f64 {
+        if self.known_value(node).is_none() {
+            let decision = Decision { location, of_parameters: self.of_parameters[node as usize] };
+            if !self.decisions.contains(&decision) {
+                self.decisions.push(decision);
+            }
+        }
+        self.values[node as usize]
+    }
+}
+
+thread_local! {
+    static GRAPH: RefCell<Graph> = RefCell::new(Graph::default());
+}
+
+/// Runs `work` over numbers that record what is done with them; gives what it returns, and the graph. The inputs from
+/// `first_parameter` on are parameters.
+///
+/// One recording at a time on each thread: numbers of one recording mean nothing in another.
+pub fn record<R>(first_parameter: u32, work: impl FnOnce() -> R) -> (R, Graph) {
+    GRAPH.with(|graph| graph.replace(Graph::new(first_parameter)));
+    let result = work();
+    (result, GRAPH.with(RefCell::take))
+}
+
+/// Input `number` of the recording under way, at its reference `value`.
+pub fn input(number: usize, value: f64) -> Recorded {
+    Recorded(on(|graph| graph.input(number as u32, value)))
+}
+
+fn on<R>(work: impl FnOnce(&mut Graph) -> R) -> R {
+    GRAPH.with(|graph| work(&mut graph.borrow_mut()))
+}
+
+/// A number that stands for the operation that makes it.
+///
+/// Two are equal if they are the same operation of the same numbers. The order asks the reference values, and the recording
+/// remembers that it was asked.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Recorded(Node);
+
+impl Recorded {
+    /// Its place in the graph.
+    pub fn node(self) -> Node {
+        self.0
+    }
+
+    fn apply(self, function: Function) -> Self {
+        Self(on(|graph| graph.apply(function, self.0)))
+    }
+}
+
+impl From<f64> for Recorded {
+    fn from(value: f64) -> Self {
+        Self(on(|graph| graph.constant(value)))
+    }
+}
+
+impl PartialOrd for Recorded {
+    #[track_caller]
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        let location = Location::caller();
+        on(|graph| graph.decide(self.0, location).partial_cmp(&graph.decide(other.0, location)))
+    }
+}
+
+impl Sum for Recorded {
+    fn sum<I: Iterator<Item = Self>>(numbers: I) -> Self {
+        numbers.fold(Self::default(), |sum, number| sum + number)
+    }
+}
+
+impl Neg for Recorded {
+    type Output = Self;
+    fn neg(self) -> Self {
+        Self(on(|graph| graph.negative(self.0)))
+    }
+}
+
+macro_rules! binary {
+    ($operator:ident, $method:ident, $assign:ident, $assigned:ident, $make:ident) => {
+        impl $operator for Recorded {
+            type Output = Self;
+            fn $method(self, other: Self) -> Self {
+                Self(on(|graph| graph.$make(self.0, other.0)))
+            }
+        }
+        impl $operator<f64> for Recorded {
+            type Output = Self;
+            fn $method(self, other: f64) -> Self {
+                Self(on(|graph| {
+                    let other = graph.constant(other);
+                    graph.$make(self.0, other)
+                }))
+            }
+        }
+        impl $assign for Recorded {
+            fn $assigned(&mut self, other: Self) {
+                self.0 = on(|graph| graph.$make(self.0, other.0));
+            }
+        }
+    };
+}
+binary!(Add, add, AddAssign, add_assign, add);
+binary!(Sub, sub, SubAssign, sub_assign, subtract);
+binary!(Mul, mul, MulAssign, mul_assign, multiply);
+binary!(Div, div, DivAssign, div_assign, divide);
+
+impl Scalar for Recorded {
+    #[track_caller]
+    fn re(&self) -> f64 {
+        let location = Location::caller();
+        on(|graph| graph.decide(self.0, location))
+    }
+    fn inspect(&self) -> f64 {
+        on(|graph| graph.values[self.0 as usize])
+    }
+    fn known_less(self, other: Self) -> Option<bool> {
+        on(|graph| Some(graph.known_value(self.0)? < graph.known_value(other.0)?))
+    }
+    fn select_less(self, other: Self, yes: Self, no: Self) -> Self {
+        Self(on(|graph| graph.select([self.0, other.0, yes.0, no.0])))
+    }
+    fn is_finite(self) -> bool {
+        self.inspect().is_finite()
+    }
+    fn sqrt(self) -> Self {
+        self.apply(Function::Root)
+    }
+    fn exp(self) -> Self {
+        self.apply(Function::Exp)
+    }
+    fn exp_m1(self) -> Self {
+        self.apply(Function::ExpM1)
+    }
+    fn ln(self) -> Self {
+        self.apply(Function::Ln)
+    }
+    fn sin_cos(self) -> (Self, Self) {
+        (self.apply(Function::Sine), self.apply(Function::Cosine))
+    }
+    fn tanh(self) -> Self {
+        self.apply(Function::Tanh)
+    }
+    fn atan(self) -> Self {
+        self.apply(Function::Atan)
+    }
+    fn powi(self, exponent: i32) -> Self {
+        let (mut power, mut base, mut left) = (Self::one(), self, exponent.unsigned_abs());
+        while left > 0 {
+            if left % 2 == 1 {
+                power *= base;
+            }
+            base *= base;
+            left /= 2;
+        }
+        if exponent < 0 { power.recip() } else { power }
+    }
+}
