@@ -10,6 +10,8 @@ mod entry;
 mod sampled;
 mod tree_effects;
 
+use std::sync::Arc;
+
 use serde::Deserialize;
 
 pub use connections::LoadCell;
@@ -32,7 +34,7 @@ use crate::model::{Model, Omissions, Parts};
 use crate::mount::{Gauge, Marker};
 use crate::scalar::Scalar;
 use crate::sensor::{Layout, Sensor};
-use crate::system::{Build, Dynamics, System};
+use crate::system::{Build, Cache, Dynamics, Natives, System};
 
 /// The parts of a machine. Every `usize` in a law is a place in [`Description::parameters`]; all numbers are SI.
 #[derive(Clone, Debug, Deserialize)]
@@ -94,6 +96,9 @@ pub struct Description {
     /// Number of elastic coordinates of each beam, known once the beams are built.
     #[serde(skip)]
     elastic: Vec<usize>,
+    /// Machine code of the machine.
+    #[serde(skip)]
+    code: Cache,
 }
 
 impl Description {
@@ -211,6 +216,11 @@ impl Description {
         let values: Vec<f64> = theta.iter().map(Scalar::inspect).collect();
         self.check_values(&values)?;
         System::new(theta, self)
+    }
+
+    /// Machine code of the machine that is right for `theta`, made at the first call; or why there is none.
+    pub fn natives(&self, theta: &[f64]) -> std::result::Result<Arc<Natives>, String> {
+        self.code.natives(self, theta)
     }
 
     /// The sensors over the number type of `theta`.

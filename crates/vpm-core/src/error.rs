@@ -310,6 +310,14 @@ pub enum Error {
     /// A computation left the finite numbers.
     #[error("{0}")]
     Diverged(Box<Diverged>),
+    /// A law decides by the value of a state, so that its operations are not the same in every state.
+    #[error(
+        "the law at {law} decides by the value of a state, so the machine cannot be recorded; it is evaluated directly"
+    )]
+    Unrecordable {
+        /// Where in the core.
+        law: String,
+    },
     /// The caller asked to stop.
     #[error("the computation was interrupted; start it again to get its result")]
     Interrupted,

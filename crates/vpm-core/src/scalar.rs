@@ -87,6 +87,17 @@ pub trait Scalar:
     /// x^n for an integer exponent.
     fn powi(self, exponent: i32) -> Self;
 
+    /// The numbers themselves, where they are plain values.
+    #[inline]
+    fn plain(_numbers: &[Self]) -> Option<&[f64]> {
+        None
+    }
+    /// As [`Scalar::plain`], to be written.
+    #[inline]
+    fn plain_mut(_numbers: &mut [Self]) -> Option<&mut [f64]> {
+        None
+    }
+
     /// A constant: all derivatives zero.
     #[inline]
     fn from_f64(value: f64) -> Self {
@@ -155,6 +166,14 @@ pub trait Scalar:
 }
 
 impl Scalar for f64 {
+    #[inline]
+    fn plain(numbers: &[Self]) -> Option<&[f64]> {
+        Some(numbers)
+    }
+    #[inline]
+    fn plain_mut(numbers: &mut [Self]) -> Option<&mut [f64]> {
+        Some(numbers)
+    }
     #[inline]
     fn re(&self) -> f64 {
         *self

@@ -6,9 +6,11 @@ mod counted;
 mod driven;
 mod drives;
 mod memory;
+mod native;
 mod observe;
 mod ode;
 mod places;
+mod recorded;
 mod settle;
 mod slopes;
 mod stages;
@@ -18,7 +20,10 @@ mod tangent;
 pub use connections::Connections;
 pub(crate) use counted::{Calls, Counted, Matrix};
 pub use memory::Memories;
+pub(crate) use native::Fast;
+pub use native::{Cache, Natives};
 pub use ode::System;
+pub use recorded::{Kind, Placed, Places, Recording};
 
 use crate::actuator::hydraulic::Supply;
 use crate::actuator::{Actuator, Target};
@@ -169,6 +174,20 @@ impl<S: Scalar> Dynamics<S> {
     /// Mass matrix and bias at (q, v), left in the data, by the algorithm for trees of every kind.
     pub(crate) fn terms(&mut self, q: &[S], v: &[S]) {
         flexible::terms(&self.model, &mut self.data, q, v);
+    }
+
+    /// Resistances of the effects on the joints at (q, v), under the efforts of the actuators in the last state evaluated.
+    fn write_resistances(&self, q: &[S], v: &[S], resistances: &mut [S]) {
+        resistances.fill(S::zero());
+        for (joint, effect) in &self.effects {
+            let (q, v, load) = (q[*joint], v[*joint], self.efforts[*joint].abs());
+            resistances[*joint] += effect.resistance(q, v) + effect.resistance_per_load(v) * load;
+        }
+    }
+
+    /// Whether beams are all that is stiff in it.
+    fn is_stiff_by_beams_alone(&self) -> bool {
+        self.model.n_elastic() > 0 && self.ideal && self.connections.is_free()
     }
 
     /// dx/dt at x.

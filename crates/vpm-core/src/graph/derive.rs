@@ -54,7 +54,7 @@ impl Graph {
     fn gradient(&mut self, node: Node, known: &[Gradient], inputs: &[u32]) -> Gradient {
         let of = |argument: Node| known[argument as usize].as_slice();
         match self.operations()[node as usize] {
-            Operation::Constant(_) => Gradient::new(),
+            Operation::Constant(_) | Operation::Apply(Function::Frozen, _) => Gradient::new(),
             Operation::Input(number) => {
                 let place = inputs.iter().position(|&input| input == number);
                 place.map(|place| (place as u32, self.constant(1.0))).into_iter().collect()
@@ -107,6 +107,7 @@ impl Graph {
     fn slope(&mut self, function: Function, a: Node, value: Node) -> Node {
         let one = self.constant(1.0);
         match function {
+            Function::Frozen => self.constant(0.0),
             Function::Negative => self.constant(-1.0),
             Function::Root => {
                 let half = self.constant(0.5);

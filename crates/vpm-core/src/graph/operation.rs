@@ -24,6 +24,8 @@ pub enum Function {
     Tanh,
     /// Arc tangent.
     Atan,
+    /// x itself, which derivatives take for a constant. No program contains it.
+    Frozen,
 }
 
 /// What makes a number.
@@ -61,6 +63,7 @@ impl Function {
             Self::Cosine => x.cos(),
             Self::Tanh => x.tanh(),
             Self::Atan => x.atan(),
+            Self::Frozen => x,
         }
     }
 }

@@ -1,6 +1,6 @@
 //! The part of a graph that some outputs need, ready to be worked out in order.
 
-use super::operation::{Node, Operation};
+use super::operation::{Function, Node, Operation};
 use super::record::Graph;
 
 /// Operations in order, arguments first, and the numbers that come out.
@@ -47,11 +47,17 @@ impl Program {
                         open.push(argument);
                     }
                 });
-                if open.len() == before {
-                    open.pop();
-                    places[node as usize] = program.operations.len() as Node;
-                    program.operations.push(operations[node as usize].renamed(|argument| places[argument as usize]));
+                if open.len() > before {
+                    continue;
                 }
+                open.pop();
+                places[node as usize] = match operations[node as usize] {
+                    Operation::Apply(Function::Frozen, argument) => places[argument as usize],
+                    operation => {
+                        program.operations.push(operation.renamed(|argument| places[argument as usize]));
+                        program.operations.len() as Node - 1
+                    }
+                };
             }
             program.outputs.push(places[output as usize]);
         }

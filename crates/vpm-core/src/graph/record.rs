@@ -274,6 +274,12 @@ impl Recorded {
         self.0
     }
 
+    /// The same number, which derivatives take for a constant.
+    #[must_use]
+    pub fn frozen(self) -> Self {
+        self.apply(Function::Frozen)
+    }
+
     fn apply(self, function: Function) -> Self {
         Self(on(|graph| graph.apply(function, self.0)))
     }

@@ -66,6 +66,16 @@ impl Method {
         Self::Guarded,
     ];
 
+    /// Evaluations of the rates in a step, at least.
+    pub fn stages(self) -> usize {
+        match self {
+            Self::SemiImplicit => 1,
+            Self::LinearlyImplicit => 2,
+            Self::Rk4 => 4,
+            Self::Rosenbrock | Self::Adaptive { .. } | Self::Guarded => 6,
+        }
+    }
+
     /// Its name in options, without a tolerance.
     pub fn name(self) -> &'static str {
         match self {

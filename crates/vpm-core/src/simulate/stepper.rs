@@ -11,7 +11,7 @@ use crate::ode::Ode;
 use crate::scalar::Scalar;
 use crate::sensitivity::{Interrupt, Pair};
 use crate::sensor::Sensor;
-use crate::system::{Calls, Counted, Matrix, System};
+use crate::system::{Calls, Counted, Fast, Matrix, System};
 use crate::table::Table;
 
 /// Where the commands come from.
@@ -63,7 +63,7 @@ pub(crate) struct Stepper<'a, S> {
 impl<'a, S: Scalar> Stepper<'a, S> {
     pub(crate) fn new(setting: &Setting<'a>, plan: &Plan<'a>, theta: &[S]) -> Result<Self> {
         let description = setting.description;
-        let system = description.system(theta)?;
+        let system = description.system(theta)?.with_code(code(setting, plan, theta));
         let (dim, rows, zero) = (system.dim(), plan.horizon, S::zero());
         // A closed loop begins with its disturbances, to which the controllers add.
         let (given, control) = match plan.drive {
@@ -153,12 +153,14 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         self.states[row * dim..(row + 1) * dim].copy_from_slice(&self.state);
         let stands = self.control(row, start);
         self.hold(row, start).map_err(|astray| strayed(self, astray, (row, start)))?;
-        if stands {
-            self.system.dynamics().rhs_here(&self.state, &mut self.rate);
-        } else {
-            self.system.rhs(&self.state, &mut self.rate);
+        if !self.sample_by_code(row, start) {
+            if stands {
+                self.system.dynamics().rhs_here(&self.state, &mut self.rate);
+            } else {
+                self.system.rhs(&self.state, &mut self.rate);
+            }
+            self.record_efforts(row, start);
         }
-        self.record_efforts(row, start);
         self.system.depart(&self.rate);
         self.read(row);
         let width = self.description.n_outputs();
@@ -204,13 +206,17 @@ impl<'a, S: Scalar> Stepper<'a, S> {
     /// the state then.
     fn control(&mut self, row: usize, start: usize) -> bool {
         let feels = self.control.as_ref().is_some_and(|control| control.feels(row));
-        let stands = feels && self.system.dynamics().stands();
+        let stands = feels && self.system.stands();
         if feels {
             // Forces under the commands that are still held.
-            self.system.rhs(&self.state, &mut self.rate);
-            self.record_efforts(row, start);
+            if !self.sample_by_code(row, start) {
+                self.system.rhs(&self.state, &mut self.rate);
+                self.record_efforts(row, start);
+            }
         }
-        self.record_motion(row, stands);
+        if self.control.is_some() || !self.sampled.is_empty() || !self.system.has_code() {
+            self.record_motion(row, stands);
+        }
         let Drive::Loop { references, .. } = self.plan.drive else { return false };
         // What sensors show need not be where the machine is.
         let stands = stands && self.sensors.is_empty();
@@ -237,10 +243,27 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         Ok(())
     }
 
+    /// Records everything that happens at the sample by machine code; false if there is none.
+    fn sample_by_code(&mut self, row: usize, start: usize) -> bool {
+        let width = self.description.n_outputs();
+        let truth = &mut self.truth[row * width..(row + 1) * width];
+        let done = self.system.sample(&self.state, &mut self.rate, truth);
+        if done {
+            self.record_commands(row, start);
+        }
+        done
+    }
+
     fn record_efforts(&mut self, row: usize, start: usize) {
+        let width = self.description.n_outputs();
+        let truth = &mut self.truth[row * width..(row + 1) * width];
+        self.system.dynamics().observe_efforts(&self.state, &self.rate, truth);
+        self.record_commands(row, start);
+    }
+
+    fn record_commands(&mut self, row: usize, start: usize) {
         let (layout, inputs) = (self.description.layout(), self.description.n_inputs());
         let truth = &mut self.truth[row * layout.count()..(row + 1) * layout.count()];
-        self.system.dynamics().observe_efforts(&self.state, &self.rate, truth);
         let commands = &self.commands[(row + start) * inputs..];
         for (channels, &command) in truth[layout.actuators()..].chunks_exact_mut(2).zip(commands).take(layout.actuators)
         {
@@ -300,6 +323,13 @@ impl Stepper<'_, f64> {
         seconds.push(("sensors", system.dynamics().observing(state, &mut seen)));
         seconds
     }
+}
+
+/// Machine code for the run, where it pays and there is any.
+fn code<S: Scalar>(setting: &Setting<'_>, plan: &Plan<'_>, theta: &[S]) -> Option<Fast> {
+    let Stepping { substeps, method, .. } = setting.stepping;
+    let steps = plan.starts.len() * plan.horizon * substeps;
+    Fast::for_run(setting.description, S::plain(theta)?, (method, steps * method.stages()))
 }
 
 /// The quantity itself, or only its derivative with respect to a parameter.

@@ -1,7 +1,7 @@
 //! A machine for the integrators: its rates, and the matrices that implicit steps ask for.
 
 use super::tangent::Tangent;
-use super::{Build, Dynamics, stiff};
+use super::{Build, Dynamics, Fast, Kind, stiff};
 use crate::contact::ContactFriction;
 use crate::effect::JointEffect;
 use crate::ode::Ode;
@@ -21,6 +21,8 @@ pub struct System<S> {
     rates: Vec<S>,
     /// Whether these are the rates where the next step begins.
     ready: bool,
+    /// Machine code of its functions, of plain numbers where it pays.
+    fast: Option<Fast>,
 }
 
 impl<S: Scalar> System<S> {
@@ -33,7 +35,39 @@ impl<S: Scalar> System<S> {
         let seals = vec![None; dynamics.actuators.len()];
         let rates = vec![S::zero(); dynamics.dim()];
         let fadings = vec![None; dynamics.memories.len()];
-        Ok(Self { dynamics, tangent, resistances, seals, fadings, column, rates, ready: false })
+        Ok(Self { dynamics, tangent, resistances, seals, fadings, column, rates, ready: false, fast: None })
+    }
+
+    /// The same machine, whose functions run as machine code.
+    #[must_use]
+    pub(crate) fn with_code(self, fast: Option<Fast>) -> Self {
+        Self { fast, ..self }
+    }
+
+    /// Whether its functions run as machine code.
+    pub(crate) fn has_code(&self) -> bool {
+        self.fast.is_some()
+    }
+
+    /// Whether all frames, lines and the mass matrix are those of the state of the last [`Ode::rhs`].
+    pub(crate) fn stands(&self) -> bool {
+        self.fast.is_none() && self.dynamics.stands()
+    }
+
+    /// dx/dt and all true outputs at `x` by machine code; false if there is none.
+    pub(crate) fn sample(&mut self, x: &[S], dxdt: &mut [S], outputs: &mut [S]) -> bool {
+        self.ready = false;
+        let plain = (S::plain(x), S::plain_mut(dxdt), S::plain_mut(outputs));
+        let (Some(fast), (Some(x), Some(dxdt), Some(outputs))) = (&mut self.fast, plain) else { return false };
+        fast.sample(x, dxdt, outputs);
+        true
+    }
+
+    /// The rates and a matrix at `x` by machine code; false if there is none.
+    fn by_code(&mut self, kind: Kind, x: &[S], matrix: &mut [S], dxdt: &mut [S]) -> bool {
+        let plain = (S::plain(x), S::plain_mut(matrix), S::plain_mut(dxdt));
+        let (Some(fast), (Some(x), Some(matrix), Some(dxdt))) = (&mut self.fast, plain) else { return false };
+        fast.matrix(kind, x, matrix, dxdt)
     }
 
     /// The right-hand side.
@@ -50,6 +84,9 @@ impl<S: Scalar> System<S> {
         self.ready = false;
         self.dynamics.hold(number, input);
         self.tangent.hold(number, input);
+        if let (Some(fast), Some([input])) = (&mut self.fast, S::plain(&[input])) {
+            fast.hold(number, *input);
+        }
     }
 }
 
@@ -68,7 +105,8 @@ impl<S: Scalar> System<S> {
 
     /// Rates at `x`: those at hand if a step begins there.
     fn begin(&mut self, x: &[S], rates: &mut [S]) {
-        if std::mem::take(&mut self.ready) {
+        // Machine code leaves nothing in the direct evaluation on which its matrices could lean.
+        if std::mem::take(&mut self.ready) && self.fast.is_none() {
             rates.copy_from_slice(&self.rates);
         } else {
             self.dynamics.rhs(x, rates);
@@ -97,27 +135,17 @@ impl<S: Scalar> System<S> {
     /// Writes [`Ode::iteration_matrix`], after the rates at `x` if the tangent leans on them.
     fn matrix(&mut self, x: &[S], matrix: &mut [S]) {
         let n = self.coordinates();
-        self.resistances.fill(S::zero());
-        for (joint, effect) in &self.dynamics.effects {
-            let (q, v, load) = (x[*joint], x[n + joint], self.dynamics.efforts[*joint].abs());
-            self.resistances[*joint] += effect.resistance(q, v) + effect.resistance_per_load(v) * load;
-        }
-        let (v, first) = (&x[n..2 * n], self.dynamics.first_memory());
+        let (q, v) = x[..2 * n].split_at(n);
+        self.dynamics.write_resistances(q, v, &mut self.resistances);
+        let first = self.dynamics.first_memory();
         self.dynamics.memories.fadings(&x[first..], v, &mut self.fadings);
-        if self.is_stiff_alone() {
+        if self.dynamics.is_stiff_by_beams_alone() {
             let laws = (&*self.resistances, &*self.fadings);
             stiff::iteration_matrix(&mut self.dynamics, x, matrix, laws, &mut self.column);
             return;
         }
-        let (q, v) = x[..2 * n].split_at(n);
         self.dynamics.seal_chords(q, v, &mut self.seals);
         self.tangent.chords(&mut self.dynamics, x, matrix, (&self.resistances, &self.seals, &self.fadings));
-    }
-
-    /// Whether beams are all that is stiff in it.
-    fn is_stiff_alone(&self) -> bool {
-        let Dynamics { model, ideal, connections, .. } = &self.dynamics;
-        model.n_elastic() > 0 && *ideal && connections.is_free()
     }
 }
 
@@ -135,7 +163,10 @@ impl<S: Scalar> Ode<S> for System<S> {
     #[inline]
     fn rhs(&mut self, x: &[S], dxdt: &mut [S]) {
         self.ready = false;
-        self.dynamics.rhs(x, dxdt);
+        match (&mut self.fast, S::plain(x), S::plain_mut(dxdt)) {
+            (Some(fast), Some(x), Some(dxdt)) => fast.rates(x, dxdt),
+            _ => self.dynamics.rhs(x, dxdt),
+        }
     }
 
     /// Columns by forward accumulation; exact also where S itself carries derivatives.
@@ -148,11 +179,17 @@ impl<S: Scalar> Ode<S> for System<S> {
     }
 
     fn linearise(&mut self, x: &[S], jacobian: &mut [S], rates: &mut [S]) {
+        if self.by_code(Kind::Linearised, x, jacobian, rates) {
+            return;
+        }
         self.begin(x, rates);
         self.tangent.jacobian(&mut self.dynamics, x, jacobian);
     }
 
     fn prepare(&mut self, x: &[S], matrix: &mut [S], rates: &mut [S]) {
+        if self.by_code(Kind::Prepared, x, matrix, rates) {
+            return;
+        }
         self.begin(x, rates);
         self.matrix(x, matrix);
     }

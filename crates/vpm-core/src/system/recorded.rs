@@ -1,0 +1,213 @@
+//! A whole machine as a graph of operations.
+
+use super::{Build, Dynamics, stiff};
+use crate::contact::ContactFriction;
+use crate::description::Description;
+use crate::effect::JointEffect;
+use crate::error::{Error, Result};
+use crate::graph::{Decision, Graph, Node, Program, Recorded, input, record};
+
+/// Where the inputs of a recorded machine's programs stand: state, inputs of drives and supplies, parameters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Places {
+    /// Length of the state, which comes first.
+    pub states: usize,
+    /// Number of inputs, see [`Dynamics::input`].
+    pub inputs: usize,
+    /// Number of parameters.
+    pub parameters: usize,
+}
+
+impl Places {
+    /// Of the machine of a description.
+    pub fn new(description: &Description) -> Self {
+        Self { states: description.n_states(), inputs: description.n_inputs(), parameters: description.n_parameters() }
+    }
+
+    /// The first parameter.
+    pub fn first_parameter(&self) -> usize {
+        self.states + self.inputs
+    }
+
+    /// How many numbers go into a program.
+    pub fn count(&self) -> usize {
+        self.first_parameter() + self.parameters
+    }
+}
+
+/// What a program of a machine gives.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// dx/dt.
+    Rates,
+    /// dx/dt, then all true outputs in the order of [`crate::sensor::Layout`]; the command of an actuator is what enters its lag.
+    Sample,
+    /// dx/dt, then the entries of its derivatives by the states.
+    Linearised,
+    /// dx/dt, then the entries of the matrix that an implicit step puts in the place of the derivatives, see
+    /// [`crate::ode::Ode::iteration_matrix`].
+    Prepared,
+}
+
+impl Kind {
+    /// All of them.
+    pub const ALL: [Self; 4] = [Self::Rates, Self::Sample, Self::Linearised, Self::Prepared];
+}
+
+/// The functions of a machine, recorded: programs over state, inputs and parameters.
+///
+/// Checked: all programs against the direct evaluation of the same laws, derivatives against dual numbers.
+#[derive(Clone, Debug)]
+pub struct Recording {
+    graph: Graph,
+    places: Places,
+    functions: Functions,
+}
+
+/// What of a machine comes out of its graph.
+#[derive(Clone, Debug)]
+struct Functions {
+    rates: Vec<Node>,
+    outputs: Vec<Node>,
+    /// Rates whose derivatives are an iteration matrix, or that matrix.
+    stiff: Stiff,
+}
+
+#[derive(Clone, Debug)]
+enum Stiff {
+    /// Rates with chords in the place of friction laws.
+    Chords(Vec<Node>),
+    /// The matrix of a machine of which beams are all that is stiff, row by row.
+    Beams(Vec<Node>),
+}
+
+/// A program, and where in a matrix its last outputs stand.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Placed {
+    /// The program.
+    pub program: Program,
+    /// Row and column of each entry of the matrix that is not zero everywhere.
+    pub entries: Vec<(usize, usize)>,
+}
+
+impl Recording {
+    /// Records the machine of `description`; `theta` are the parameters for which its parts are built.
+    ///
+    /// # Errors
+    /// [`Error::Unrecordable`] where a law decides by the value of a state: the graph would hold for that state alone.
+    pub fn new(description: &Description, theta: &[f64]) -> Result<Self> {
+        description.check_values(theta)?;
+        let places = Places::new(description);
+        let (functions, graph) = record(places.first_parameter() as u32, || functions(description, places, theta));
+        let recording = Self { graph, places, functions: functions? };
+        match recording.graph.decisions().iter().find(|decision| !decision.of_parameters) {
+            Some(decision) => Err(unrecordable(decision)),
+            None => Ok(recording),
+        }
+    }
+
+    /// Whether the graph holds for the parameters of the recording only: then a part was built by their values.
+    pub fn is_of_values(&self) -> bool {
+        !self.graph.decisions().is_empty()
+    }
+
+    /// Where the inputs of programs stand.
+    pub fn places(&self) -> Places {
+        self.places
+    }
+
+    /// The program of that kind.
+    pub fn program(&mut self, kind: Kind) -> Placed {
+        let Functions { rates, outputs, stiff } = &self.functions;
+        let (dim, states) = (self.places.states, 0..self.places.states as u32);
+        let mut entries = Vec::new();
+        let mut nodes = rates.clone();
+        match (kind, stiff) {
+            (Kind::Rates, _) => {}
+            (Kind::Sample, _) => nodes.extend(outputs),
+            (Kind::Prepared, Stiff::Beams(matrix)) => {
+                for (place, &entry) in matrix.iter().enumerate() {
+                    if self.graph.known_value(entry) != Some(0.0) {
+                        entries.push((place / dim, place % dim));
+                        nodes.push(entry);
+                    }
+                }
+            }
+            (Kind::Linearised, _) | (Kind::Prepared, Stiff::Chords(_)) => {
+                let differentiated = match stiff {
+                    Stiff::Chords(chords) if kind == Kind::Prepared => chords,
+                    _ => rates,
+                };
+                let derivative = self.graph.derive(differentiated, &states.collect::<Vec<_>>());
+                entries = derivative.places;
+                nodes.extend(derivative.entries);
+            }
+        }
+        Placed { program: Program::new(&self.graph, &nodes, self.places.count()), entries }
+    }
+}
+
+fn functions(description: &Description, places: Places, theta: &[f64]) -> Result<Functions> {
+    let first = places.first_parameter();
+    let theta: Vec<Recorded> = theta.iter().enumerate().map(|(k, &value)| input(first + k, value)).collect();
+    let mut dynamics: Dynamics<Recorded> = Build::dynamics(&description, &theta)?;
+    let zeros = |count: usize| vec![Recorded::default(); count];
+    let x: Vec<Recorded> = (0..places.states).map(|k| input(k, 0.0)).collect();
+    for number in 0..places.inputs {
+        dynamics.hold(number, input(places.states + number, 0.0));
+    }
+    let (mut rates, mut outputs) = (zeros(places.states), zeros(description.n_outputs()));
+    dynamics.rhs(&x, &mut rates);
+    dynamics.observe(&x, &rates, &mut outputs);
+    let stiff = dynamics.stiff(&x);
+    Ok(Functions { rates: nodes(&rates), outputs: nodes(&outputs), stiff })
+}
+
+impl Dynamics<Recorded> {
+    /// What of the machine an iteration matrix is made of, at the state of the last [`Dynamics::rhs`].
+    fn stiff(&mut self, x: &[Recorded]) -> Stiff {
+        let (n, dim) = (self.coordinates(), x.len());
+        let (q, v) = x[..2 * n].split_at(n);
+        let mut fadings = vec![None; self.memories.len()];
+        self.memories.fadings(&x[self.first_memory()..], v, &mut fadings);
+        let mut resistances = vec![Recorded::default(); self.joints()];
+        self.write_resistances(q, v, &mut resistances);
+        if self.is_stiff_by_beams_alone() {
+            let (mut matrix, mut column) = (vec![Recorded::default(); dim * dim], vec![Recorded::default(); n]);
+            stiff::iteration_matrix(self, x, &mut matrix, (&resistances, &fadings), &mut column);
+            return Stiff::Beams(nodes(&matrix));
+        }
+        let mut seals = vec![None; self.seals.len()];
+        self.seal_chords(q, v, &mut seals);
+        self.seals = seals.into_iter().map(|seal| seal.map(Recorded::frozen)).collect();
+        self.memories.replace(fadings.into_iter().map(|fading| fading.map(Recorded::frozen)));
+        let resistances: Vec<_> = resistances.into_iter().map(Recorded::frozen).collect();
+        let chords =
+            |effects: &[(usize, JointEffect<Recorded>)], [q, v, _]: [&[Recorded]; 3], total: &mut [Recorded]| {
+                for (joint, effect) in effects {
+                    total[*joint] += effect.effort_at_rest(q[*joint]);
+                }
+                for ((total, &v), &resistance) in total.iter_mut().zip(v).zip(&resistances) {
+                    *total -= resistance * v;
+                }
+            };
+        let resistance =
+            |law: &ContactFriction<Recorded>, square: Recorded, normal| law.chord(square.frozen()).frozen() * normal;
+        let mut rates = vec![Recorded::default(); dim];
+        self.rhs_with(x, &mut rates, (chords, resistance));
+        self.seals.fill(None);
+        self.memories.replace(std::iter::repeat(None));
+        Stiff::Chords(nodes(&rates))
+    }
+}
+
+fn nodes(numbers: &[Recorded]) -> Vec<Node> {
+    numbers.iter().map(|number| number.node()).collect()
+}
+
+fn unrecordable(decision: &Decision) -> Error {
+    let location = decision.location;
+    // From the folder of the sources on.
+    let file = location.file().rsplit_once("src/").map_or(location.file(), |(_, file)| file);
+    Error::Unrecordable { law: format!("{file}, line {}", location.line()) }
+}
