@@ -2,8 +2,18 @@
 
 use std::process::ExitCode;
 
-#[path = "../tests/rows/mod.rs"]
+#[path = "../tests/all/validation/rows/mod.rs"]
 mod rows;
+
+/// What the rows are made with, as in the program of the tests.
+#[path = "../tests/all/common"]
+mod common {
+    pub mod entries;
+    pub mod places;
+    pub mod sums;
+    pub mod trees;
+    pub mod two_link;
+}
 
 fn main() -> ExitCode {
     for (group, make) in rows::GROUPS {
