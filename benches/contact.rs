@@ -16,8 +16,10 @@ use vpm_core::ode::Ode;
 use vpm_core::system::System;
 
 #[path = "../crates/vpm-core/tests/all/common/connections.rs"]
+#[expect(dead_code, reason = "the tests use more of it")]
 mod connections;
 #[path = "../crates/vpm-core/tests/all/common/trees.rs"]
+#[expect(dead_code, reason = "the tests use more of it")]
 mod trees;
 use connections::{bushing, chain, contact, load_cell};
 #[path = "common/share.rs"]

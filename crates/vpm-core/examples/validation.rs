@@ -1,5 +1,7 @@
 //! What only the core can show, as one JSON object for each row of the validation table.
 
+#![expect(dead_code, reason = "it prints what the tests check")]
+
 use std::process::ExitCode;
 
 #[path = "../tests/all/validation/rows/mod.rs"]

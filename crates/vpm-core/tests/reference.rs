@@ -13,6 +13,7 @@ use vpm_core::samples::double_pendulum;
 
 #[cfg(test)]
 #[path = "all/common/mod.rs"]
+#[expect(dead_code, reason = "it needs some of them")]
 mod common;
 use common::beams::{along_x, body, fields, pin};
 use common::{Machine, close};

@@ -128,6 +128,7 @@ pub fn everything(seed: u64) -> Parts<f64> {
 }
 
 /// The description of some parts, every number a parameter of its own; `change` may add to it.
+#[cfg(test)]
 pub fn description(parts: &Parts<f64>, change: impl FnOnce(&mut Value)) -> Description {
     try_description(parts, change).unwrap()
 }
@@ -162,6 +163,7 @@ pub fn try_description(parts: &Parts<f64>, change: impl FnOnce(&mut Value)) -> R
 }
 
 /// Adds a parameter to a description and returns its place.
+#[cfg(test)]
 pub fn parameter(content: &mut Value, name: &str, value: f64) -> usize {
     content["parameter_names"].as_array_mut().unwrap().push(json!(name));
     let values = content["parameters"].as_array_mut().unwrap();
@@ -170,6 +172,7 @@ pub fn parameter(content: &mut Value, name: &str, value: f64) -> usize {
 }
 
 /// Adds a part to a list of a description.
+#[cfg(test)]
 pub fn push(content: &mut Value, list: &str, part: Value) {
     if content[list].is_null() {
         content[list] = json!([]);
