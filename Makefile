@@ -22,7 +22,7 @@ BIN := $(VENV)/bin
 export PYO3_PYTHON = $(CURDIR)/$(BIN)/python
 
 RUST_SOURCES := Cargo.toml $(wildcard Cargo.lock) \
-	$(shell find crates -name '*.rs' -o -name 'Cargo.toml')
+	$(shell find crates -path '*/src/*' -name '*.rs' -o -name 'Cargo.toml')
 
 help: ## this list
 	@echo 'vpm: the commands (each does all of its own set-up)'

@@ -7,7 +7,8 @@ use criterion::Criterion;
 use vpm_core::beam::{Beam, Component, Level};
 use vpm_core::{Dual, Result, Scalar};
 
-#[path = "../crates/vpm-core/tests/common/entries.rs"]
+#[path = "../crates/vpm-core/tests/all/common/entries.rs"]
+#[expect(dead_code, reason = "the tests use more of it")]
 mod entries;
 use entries::{entry, lift};
 

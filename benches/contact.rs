@@ -15,9 +15,11 @@ use vpm_core::mount::Mount;
 use vpm_core::ode::Ode;
 use vpm_core::system::System;
 
-#[path = "../crates/vpm-core/tests/common/connections.rs"]
+#[path = "../crates/vpm-core/tests/all/common/connections.rs"]
+#[expect(dead_code, reason = "the tests use more of it")]
 mod connections;
-#[path = "../crates/vpm-core/tests/common/flexible.rs"]
+#[path = "../crates/vpm-core/tests/all/common/trees.rs"]
+#[expect(dead_code, reason = "the tests use more of it")]
 mod trees;
 use connections::{bushing, chain, contact, load_cell};
 #[path = "common/share.rs"]

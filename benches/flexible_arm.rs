@@ -8,7 +8,7 @@ use vpm_core::Result;
 use vpm_core::beam::planar::{Order, State};
 use vpm_core::error::Error;
 
-#[path = "../crates/vpm-core/tests/common/flexible_arm.rs"]
+#[path = "../crates/vpm-core/tests/all/common/flexible_arm.rs"]
 mod flexible_arm;
 use flexible_arm::{Case, Errors, arm};
 #[path = "common/share.rs"]

@@ -11,7 +11,7 @@ use vpm_core::ode::Ode;
 
 #[path = "common/share.rs"]
 mod share;
-#[path = "../crates/vpm-core/tests/common/two_link.rs"]
+#[path = "../crates/vpm-core/tests/all/common/two_link.rs"]
 mod two_link;
 
 fn main() -> Result<()> {

@@ -16,7 +16,7 @@ use vpm_core::evaluate::internal_state;
 use vpm_core::integrator::{Adaptive, Integrator, Method};
 use vpm_core::ode::Ode;
 
-#[path = "../crates/vpm-core/tests/common/hydraulics.rs"]
+#[path = "../crates/vpm-core/tests/all/common/hydraulics.rs"]
 mod hydraulics;
 use hydraulics::{Chirp, Chirped, nominal};
 #[path = "common/share.rs"]

@@ -51,7 +51,7 @@ PARTS: dict[str, Callable[[], list[Row]]] = {
 _HEAD = """# Validation
 
 What vpm computes beside numbers that it did not make: closed forms, published values, converged solutions of other
-codes. Every row is a test (`tests/test_validation.py`, those of the last part `crates/vpm-core/tests/validation.rs`);
+codes. Every row is a test (`tests/test_validation.py`, those of the last part `crates/vpm-core/tests/all/validation`);
 `make validation` computes all of them anew and writes this page. A row that stands for several numbers shows the one
 that comes nearest to its tolerance.
 """

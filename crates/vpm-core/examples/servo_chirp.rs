@@ -9,7 +9,7 @@ use std::time::Instant;
 use vpm_core::error::{Error, Result};
 use vpm_core::integrator::{Integrator, Method};
 
-#[path = "../tests/common/hydraulics.rs"]
+#[path = "../tests/all/common/hydraulics.rs"]
 mod hydraulics;
 use hydraulics::{Chirp, Chirped, nominal};
 

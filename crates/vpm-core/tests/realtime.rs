@@ -1,4 +1,6 @@
 //! A loop at a fixed rate keeps its rate, counts what it misses, and allocates nothing.
+//!
+//! A program of its own: the memory that it locks is that of the whole process, and its deadlines pass while other tests compute.
 
 use std::cell::Cell;
 

@@ -11,11 +11,11 @@ use vpm_core::integrator::{Integrator, Method};
 use vpm_core::ode::Ode;
 use vpm_core::samples::double_pendulum;
 
-#[path = "common/beams.rs"]
-mod beams;
 #[cfg(test)]
+#[path = "all/common/mod.rs"]
+#[expect(dead_code, reason = "it needs some of them")]
 mod common;
-use beams::{along_x, body, fields, pin};
+use common::beams::{along_x, body, fields, pin};
 use common::{Machine, close};
 
 const TIGHT: Tolerance = Tolerance { relative: 1e-10, absolute: 1e-11 };

@@ -1,0 +1,8 @@
+//! The C library, as C sees it.
+
+#![cfg(test)]
+
+mod calls;
+mod example;
+mod header;
+mod support;

@@ -1,0 +1,121 @@
+//! Empirical forces in machines: exact state Jacobians, where the load comes from a command or from oil, and chords.
+
+use vpm_core::effect::{EmpiricalForce, JointEffect};
+use vpm_core::ode::Ode;
+use vpm_core::samples::slider;
+
+use crate::common::hydraulics::nominal;
+use crate::common::servo_machine::{On, machine, rest};
+use crate::common::{Machine, close};
+
+const NUMBERS: [(&str, f64); 13] = [
+    ("middle", 0.1),
+    ("reach", 0.5),
+    ("speed", 2.0),
+    ("transition_velocity", 0.5),
+    ("period", 0.3),
+    ("position_3", 0.7),
+    ("drag", 0.4),
+    ("speed_2", -0.2),
+    ("viscous_position", 0.3),
+    ("dry_position", 0.6),
+    ("dry_sine", -0.5),
+    ("load_dry", 0.2),
+    ("load_cosine", 0.1),
+];
+
+/// The Jacobian at `x` against differences of fourth order, column by column relative to its largest entry.
+fn check_jacobian(machine: &Machine, x: &[f64], input: f64) {
+    let (mut system, dim) = (machine.system(), x.len());
+    system.hold(0, input);
+    let (mut exact, mut sizes) = (vec![0.0; dim * dim], vec![0.0; dim]);
+    system.jacobian(x, &mut exact);
+    system.scales(&mut sizes);
+    for column in 0..dim {
+        let step = 1e-4 * sizes[column];
+        let mut at = |side: f64| {
+            let (mut moved, mut rates) = (x.to_vec(), vec![0.0; dim]);
+            moved[column] += side * step;
+            system.rhs(&moved, &mut rates);
+            rates
+        };
+        let [near, far] = [1.0, 2.0].map(|side| {
+            let (ahead, behind) = (at(side), at(-side));
+            ahead.iter().zip(&behind).map(|(a, b)| (a - b) / (2.0 * side * step)).collect::<Vec<_>>()
+        });
+        let size = |row: usize| sizes[column] / sizes[row];
+        let largest = (0..dim).map(|row| (exact[row * dim + column] * size(row)).abs()).fold(0.0, f64::max);
+        for row in 0..dim {
+            let difference = (4.0 * near[row] - far[row]) / 3.0;
+            let gap = (difference - exact[row * dim + column]).abs() * size(row);
+            assert!(gap < 1e-6 * largest.max(1e-3), "{row} {column}: {} {difference}", exact[row * dim + column]);
+        }
+    }
+}
+
+#[test]
+fn state_jacobian_is_that_of_differences_under_a_command() {
+    let mut machine = Machine::new(&slider(2.0));
+    machine.effect("empirical_force", 0, &NUMBERS).actuator(0, &[("gain", 3.0), ("lag", 0.1)]);
+    check_jacobian(&machine, &[0.23, 0.7, 0.4], 1.3);
+    check_jacobian(&machine, &[-0.31, -0.4, -0.8], 1.3);
+    // Outside of the range that was seen.
+    check_jacobian(&machine, &[1.7, 3.1, 0.4], -0.2);
+}
+
+#[test]
+fn state_jacobian_is_that_of_differences_under_oil_pressure() {
+    let mut machine = machine(&nominal(), On::Joint);
+    let mut x = rest(&machine);
+    machine.effect("empirical_force", 0, &NUMBERS);
+    let dim = x.len();
+    // The valve away from its corner at zero.
+    (x[0], x[1], x[2], x[3]) = (x[0] + 0.003, 0.2, 1e-3, 2e-3);
+    // Chambers are the last two: a pressure difference that pushes.
+    (x[dim - 2], x[dim - 1]) = (x[dim - 2] + 2e6, x[dim - 1] - 1e6);
+    check_jacobian(&machine, &x, 1e-3);
+    (x[dim - 2], x[dim - 1]) = (x[dim - 2] - 5e6, x[dim - 1] + 3e6);
+    check_jacobian(&machine, &x, 1e-3);
+}
+
+#[test]
+fn it_never_takes_more_than_its_share_of_the_load_and_stays_finite() {
+    let law = EmpiricalForce {
+        middle: 0.0,
+        reach: 0.5,
+        speed: 2.0,
+        transition_velocity: 1e-9,
+        period: None,
+        constant: Some(1.0),
+        position: None,
+        position_2: None,
+        position_3: Some(2.0),
+        cosine: None,
+        sine: None,
+        viscous: None,
+        speed_2: None,
+        drag: Some(3.0),
+        speed_3: None,
+        viscous_position: None,
+        viscous_position_2: None,
+        dry: Some(4.0),
+        dry_position: None,
+        dry_position_2: None,
+        dry_cosine: None,
+        dry_sine: None,
+        load_dry: Some(7.0),
+        load_cosine: None,
+        load_sine: None,
+    };
+    close(law.share_of_load(0.1, 1.0), 0.95, 0.0);
+    close(law.share_of_load(0.1, -1.0), -0.95, 0.0);
+    close(law.effort(1e9, 1e9), -10.0, 1e-12);
+    close(law.effort(1e9, -1e9), 4.0, 1e-12);
+    // In one piece: at the edge and just beyond, the efforts agree.
+    close(law.effort(0.5, 2.0), law.effort(0.5 + 1e-12, 2.0 + 1e-12), 1e-9);
+    let effect = JointEffect::EmpiricalForce(law);
+    for v in [0.0, 1e-7, -0.3, 2.0, -2.5, 1e12] {
+        close(effect.effort_at_rest(0.2) - effect.resistance(0.2, v) * v, effect.effort(0.2, v), 1e-12);
+        assert!(effect.resistance(0.2, v).is_finite());
+    }
+}

@@ -1,0 +1,5 @@
+//! Sampled controllers in their loops.
+
+mod computed_torque;
+mod loops;
+mod sampled;

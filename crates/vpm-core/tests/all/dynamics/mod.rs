@@ -1,0 +1,13 @@
+//! The algorithms: number types, spatial algebra, dynamics of rigid and flexible trees.
+
+mod algebra;
+mod closed_form;
+mod conservation;
+mod cross_check;
+mod dual;
+mod flexible_tree;
+mod no_alloc;
+mod omissions;
+mod spatial;
+mod velocity_terms;
+mod virtual_work;

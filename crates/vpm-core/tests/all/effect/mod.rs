@@ -1,0 +1,4 @@
+//! Effects on joints.
+
+mod hysteresis;
+mod laws;

@@ -1,0 +1,8 @@
+//! Machines from descriptions: parts, reactions, single evaluations, linear models.
+
+mod flexible;
+mod linearize;
+mod load_cells;
+mod parts;
+mod passive_joints;
+mod prepared;

@@ -1,0 +1,130 @@
+//! Motion prescribed at some joints only: the others rest in their springs and plays, then move freely.
+
+use serde_json::json;
+use vpm_core::Result;
+use vpm_core::beam::{Component, Level};
+use vpm_core::description::Description;
+use vpm_core::integrator::Method;
+use vpm_core::joint::JointKind;
+use vpm_core::model::Parts;
+use vpm_core::motion::JointMotion;
+use vpm_core::mount::{Gauge, Mount};
+use vpm_core::samples::Random;
+use vpm_core::simulate::{Run, Setting, Stepping, free_run, prescribed};
+use vpm_core::table::Table;
+
+use crate::common::trees::{beam, body, description, parameter, push, section};
+
+const PLAY: usize = 1;
+
+/// A driven joint, a joint that is the play of its gear, a beam, and a hand that a spring holds.
+fn geared(gap: f64) -> Description {
+    let random = &mut Random::new(5);
+    let mut parts: Parts<f64> = Parts { gravity: [0.0, 0.0, -9.81], ..Parts::default() };
+    for (name, on) in [("gear", Mount::World), ("hub", Mount::Body(0))] {
+        parts.bodies.push(body(random, name, on, JointKind::Revolute));
+    }
+    parts.beams.push(beam(
+        random,
+        "link",
+        Mount::Body(1),
+        Level::Strain(2),
+        &[Component::BendingX, Component::BendingY],
+    ));
+    let tip = section(&parts, 0, 1.0);
+    parts.bodies.push(body(random, "hand", tip, JointKind::Revolute));
+    parts.gauges.push(Gauge { name: "strip".into(), beam: 0, at: 0.1, x: 0.003, y: 0.005 });
+    description(&parts, |content| {
+        let [gap, stiffness, damping, impact, width] =
+            [("gap", gap), ("contact", 3e4), ("grease", 0.5), ("impact", 1.0), ("width", 1e-3)]
+                .map(|(name, value)| parameter(content, name, value));
+        let entry = json!({"type": "backlash", "joint": PLAY, "gap": gap, "stiffness": stiffness, "damping": damping,
+            "contact_damping": impact, "width": width});
+        push(content, "effects", entry);
+        let [stiffness, rest] = [("spring", 30.0), ("rest", 0.1)].map(|(name, value)| parameter(content, name, value));
+        push(content, "effects", json!({"type": "spring", "joint": 2, "stiffness": stiffness, "rest": rest}));
+    })
+}
+
+/// Position, velocity and acceleration of all joints, row by row.
+fn guided(d: &Description, stepping: Stepping, motion: &[Vec<f64>; 3], passive: &[usize], by: &[usize]) -> Result<Run> {
+    let (joints, rows) = (d.n_joints(), motion[0].len() / d.n_joints());
+    let table = |k: usize| Table::new("motion", &motion[k], rows, joints);
+    let setting = Setting { description: d, theta: &d.parameters, stepping, sensitivities: by, interrupt: &|| false };
+    prescribed(setting, JointMotion { position: table(0)?, velocity: table(1)?, acceleration: table(2)? }, passive)
+}
+
+/// The first joint turns, the columns of the others are rubbish that nobody may read.
+fn turning(rows: u32, step: f64) -> [Vec<f64>; 3] {
+    let of =
+        |f: &dyn Fn(f64) -> f64| -> Vec<f64> { (0..rows).flat_map(|k| [f(step * f64::from(k)), 7.0, -3.0]).collect() };
+    [of(&|t| 0.4 + (5.0 * t).sin()), of(&|t| 5.0 * (5.0 * t).cos()), of(&|t| -25.0 * (5.0 * t).sin())]
+}
+
+#[test]
+fn passive_joints_move_as_in_the_free_machine() -> Result<()> {
+    // Rest, from a motion that stands still; then the machine falls freely, and following one joint gives back the others.
+    let d = geared(0.02);
+    let stepping = Stepping::new(0.002, 4, Method::Rosenbrock)?;
+    let still = [vec![0.3, 0.0, 0.0], vec![0.0; 3], vec![0.0; 3]];
+    let rest = guided(&d, stepping, &still, &[PLAY, 2], &[])?;
+    let efforts: Vec<f64> = rest.outputs[..12].chunks(4).map(|channels| channels[3]).collect();
+    assert!(efforts[0].abs() > 0.1 && efforts[1].abs() < 1e-8 && efforts[2].abs() < 1e-8, "{efforts:?}");
+    assert!(rest.states[PLAY].abs() > 0.005, "gravity lays the play to one side: {} rad", rest.states[PLAY]);
+    let setting = Setting { description: &d, theta: &d.parameters, stepping, sensitivities: &[], interrupt: &|| false };
+    let mut start = rest.states;
+    start[d.n_coordinates()] = 4.0;
+    let run = free_run(setting, &start, Table::new("inputs", &[], 601, 0)?)?;
+    let column = |offset: usize| -> Vec<f64> {
+        run.outputs.chunks(d.n_outputs()).flat_map(|row| [row[offset], 7.0, -3.0]).collect()
+    };
+    let followed = guided(&d, stepping, &[column(0), column(1), column(2)], &[2, PLAY], &[])?;
+    let state = followed.states.iter().zip(&run.states).fold(0.0_f64, |most, (a, b)| most.max((a - b).abs()));
+    let effort = followed.outputs.chunks(d.n_outputs()).fold(0.0_f64, |most, row| most.max(row[3].abs()));
+    assert!(state < 2e-3 && effort < 2e-2, "state {state}, effort {effort} N m");
+    let play: Vec<f64> = run.states.chunks(d.n_states()).map(|state| state[PLAY]).collect();
+    let span = play.iter().fold(0.0_f64, |most, q| most.max((q - play[0]).abs()));
+    assert!(span > 0.01, "the play must be crossed: {span} rad");
+    Ok(())
+}
+
+#[test]
+fn sensitivities_of_partly_prescribed_motion_are_slopes() -> Result<()> {
+    let d = geared(0.01);
+    let stepping = Stepping::new(0.005, 8, Method::LinearlyImplicit)?;
+    let motion = turning(30, 0.005);
+    let names = ["gap", "contact", "grease", "spring", "rest"];
+    let named = (0..d.n_parameters()).filter(|&k| names.contains(&d.parameter_names[k].as_str()));
+    let by: Vec<usize> = named.chain([d.beams[0].material.young]).collect();
+    assert!(by.len() > names.len());
+    let run = guided(&d, stepping, &motion, &[PLAY, 2], &by)?;
+    let moved = |place: usize, sign: f64| {
+        let mut other = d.clone();
+        other.parameters[place] *= 1.0 + sign * 1e-6;
+        guided(&other, stepping, &motion, &[PLAY, 2], &[])
+    };
+    for (lane, &place) in by.iter().enumerate() {
+        let (up, down) = (moved(place, 1.0)?, moved(place, -1.0)?);
+        let mut largest = 0.0_f64;
+        for (output, (up, down)) in up.outputs.iter().zip(&down.outputs).enumerate() {
+            let (expected, found) = ((up - down) / 2e-6, run.jacobian[output * by.len() + lane] * d.parameters[place]);
+            assert!((found - expected).abs() < 1e-4 * (1.0 + expected.abs()), "{place} {output}: {found} {expected}");
+            largest = largest.max(found.abs());
+        }
+        assert!(largest > 1e-4, "{} must matter: {largest}", d.parameter_names[place]);
+    }
+    Ok(())
+}
+
+#[test]
+fn joints_that_nothing_holds_are_refused_by_name() -> Result<()> {
+    let mut d = geared(0.01);
+    d.gravity = [0.0; 3];
+    d.effects.clear();
+    let stepping = Stepping::new(0.005, 1, Method::LinearlyImplicit)?;
+    let message = guided(&d, stepping, &turning(3, 0.005), &[PLAY, 2], &[]).map_err(|error| error.to_string()).err();
+    assert!(message.as_ref().is_some_and(|text| text.contains("hub") && text.contains("spring")), "{message:?}");
+    let message = guided(&d, stepping, &turning(3, 0.005), &[9], &[]).map_err(|error| error.to_string()).err();
+    assert!(message.is_some_and(|text| text.contains("passive")));
+    Ok(())
+}

@@ -1,0 +1,4 @@
+//! NARX models.
+
+mod maxwell;
+mod polynomial;

@@ -1,0 +1,7 @@
+//! Whole records: simulation, sensitivities, timing.
+
+mod live;
+mod no_alloc;
+mod records;
+mod sensitivities;
+mod timing;
