@@ -21,10 +21,10 @@ pub use crate::scalar::dual::{Dual, seed};
 mod choice;
 mod dual;
 
-/// A real number, possibly carrying derivatives. Comparisons look at the value alone.
+/// A real number, possibly carrying derivatives.
 ///
 /// Laws choose by [`Scalar::if_less`] and its kin, never by `if` on [`Scalar::re`]: a number may stand for the operation that
-/// makes it, and a choice has to hold for every value that comes along.
+/// makes it, and a choice has to hold for every value that comes along. So there is no `<` and no `==` between such numbers.
 pub trait Scalar:
     Copy
     + Debug
@@ -33,8 +33,6 @@ pub trait Scalar:
     + Sync
     + 'static
     + From<f64>
-    + PartialEq
-    + PartialOrd
     + Sum
     + Neg<Output = Self>
     + Add<Output = Self>

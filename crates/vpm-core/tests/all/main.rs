@@ -18,5 +18,6 @@ mod layers;
 mod linkage;
 mod machine;
 mod narx;
+mod recording;
 mod simulate;
 mod validation;

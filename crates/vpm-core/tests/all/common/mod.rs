@@ -1,6 +1,7 @@
 //! Machines for the tests: built part by part, with every number a named parameter.
 
 pub mod beams;
+pub mod both;
 pub mod connections;
 pub mod derivatives;
 pub mod entries;

@@ -7,9 +7,7 @@ use vpm_core::ode::Ode;
 use vpm_core::samples::Random;
 use vpm_core::system::Recording;
 
-#[cfg(test)]
-#[path = "common/flexible.rs"]
-mod trees;
+use crate::common::trees;
 use trees::{description, everything};
 
 /// The largest difference relative to the largest number.

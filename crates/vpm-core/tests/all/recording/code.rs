@@ -7,9 +7,7 @@ use vpm_core::samples::Random;
 use vpm_core::simulate::{Run, Setting, Stepping, free_run};
 use vpm_core::table::Table;
 
-#[cfg(test)]
-#[path = "common/flexible.rs"]
-mod trees;
+use crate::common::trees;
 use trees::{description, everything};
 
 /// A run of `rows` samples, simulated whole or in the first `begin` samples only.
