@@ -1,5 +1,6 @@
 //! A machine for the integrators: its rates, and the matrices that implicit steps ask for.
 
+use super::additive::{Split, Stage};
 use super::tangent::Tangent;
 use super::{Build, Dynamics, stiff};
 use crate::contact::ContactFriction;
@@ -12,6 +13,7 @@ use crate::scalar::Scalar;
 pub struct System<S> {
     dynamics: Dynamics<S>,
     tangent: Tangent<S>,
+    split: Split<S>,
     resistances: Vec<S>,
     seals: Vec<Option<S>>,
     fadings: Vec<Option<S>>,
@@ -33,7 +35,8 @@ impl<S: Scalar> System<S> {
         let seals = vec![None; dynamics.actuators.len()];
         let rates = vec![S::zero(); dynamics.dim()];
         let fadings = vec![None; dynamics.memories.len()];
-        Ok(Self { dynamics, tangent, resistances, seals, fadings, column, rates, ready: false })
+        let split = Split::new(&dynamics);
+        Ok(Self { dynamics, tangent, split, resistances, seals, fadings, column, rates, ready: false })
     }
 
     /// The right-hand side.
@@ -168,6 +171,19 @@ impl<S: Scalar> Ode<S> for System<S> {
             self.dynamics.rhs(x, &mut self.rates);
         }
         self.matrix(x, matrix);
+    }
+
+    /// Beams, springs and linear damping of joints, friction of joints, memories and lags of ideal drives are taken implicitly; springs that
+    /// are not linear by their slope where the stage has come to.
+    fn additive_rates(&mut self, explicit: &[S], implicit: &[S], reach: f64, rates: &mut [S]) -> bool {
+        if reach == 0.0 {
+            self.begin(explicit, rates);
+            return true;
+        }
+        self.ready = false;
+        let stage = Stage { explicit, implicit, reach };
+        self.dynamics.additive_rates(stage, rates, &mut self.split);
+        true
     }
 
     /// A hundredth for coordinates, 1 for rates, of the drives what is natural for each.
