@@ -7,6 +7,7 @@ mod linearly_implicit;
 mod lu;
 #[cfg(feature = "reference")]
 pub mod reference;
+pub mod resolution;
 mod rk4;
 mod rosenbrock;
 mod semi_implicit;

@@ -80,16 +80,31 @@ impl<S: Scalar> System<S> {
 
     /// As df/dx, without the friction of joints and seals, row by row.
     pub(crate) fn without_friction(&mut self, x: &[S], matrix: &mut [S]) {
+        self.with_resistance(|_| S::zero(), x, matrix);
+    }
+
+    /// As df/dx, without friction of joints and seals that is not linear.
+    pub(crate) fn without_dry_friction(&mut self, x: &[S], matrix: &mut [S]) {
+        self.with_resistance(JointEffect::damping, x, matrix);
+    }
+
+    /// As df/dx, with this resistance of each effect in the place of friction.
+    fn with_resistance(&mut self, resistance: impl Fn(&JointEffect<S>) -> S, x: &[S], matrix: &mut [S]) {
         self.ready = false;
         self.resistances.fill(S::zero());
+        for (joint, effect) in &self.dynamics.effects {
+            self.resistances[*joint] += resistance(effect);
+        }
         self.seals.fill(Some(S::zero()));
         if self.tangent.leans() {
             self.dynamics.seals.copy_from_slice(&self.seals);
-            let at_rest = |effects: &[(usize, JointEffect<S>)], [q, _, _]: [&[S]; 3], total: &mut [S]| {
-                effects.iter().for_each(|(joint, effect)| total[*joint] += effect.effort_at_rest(q[*joint]));
+            let linear = |effects: &[(usize, JointEffect<S>)], [q, v, _]: [&[S]; 3], total: &mut [S]| {
+                effects.iter().for_each(|(joint, effect)| {
+                    total[*joint] += effect.effort_at_rest(q[*joint]) - resistance(effect) * v[*joint];
+                });
             };
             let chord = |law: &ContactFriction<S>, square, normal| law.chord(square) * normal;
-            self.dynamics.rhs_with(x, &mut self.rates, (at_rest, chord));
+            self.dynamics.rhs_with(x, &mut self.rates, (linear, chord));
             self.dynamics.seals.fill(None);
         }
         self.fadings.fill(Some(S::zero()));
