@@ -244,6 +244,25 @@ class System:
         Diverged
             The state is no longer finite.
         """
+    def resolution(
+        self,
+        theta: ArrayLike,
+        state: ArrayLike,
+        time_step: float,
+        substeps: int,
+        integrator: str,
+        duration: float,
+    ) -> tuple[float, NDArray[np.float64]]:
+        """What steps damp because they do not resolve it, in a run of ``duration`` (s) about ``state``.
+
+        Returns
+        -------
+        limit : float
+            Frequency above which an undamped vibration loses more than a tenth of its amplitude, Hz; infinite if none.
+        damped : ndarray, shape (m, 4)
+            Each mode of a damping ratio below 0.1 that does: frequency (Hz), damping ratio, time (s; that of the run,
+            or in which the mode falls to 1/e by itself if that is shorter), share that the method leaves in that time.
+        """
     def simulate_closed_loop(
         self,
         theta: ArrayLike,

@@ -231,7 +231,7 @@ pub enum Error {
     },
     /// No integrator has this name.
     #[error(
-        "there is no integrator `{name}`; use semi_implicit, rk4, linearly_implicit, rosenbrock, guarded, adaptive or, with a \
+        "there is no integrator `{name}`; use semi_implicit, rk4, linearly_implicit, rosenbrock, additive, guarded, adaptive or, with a \
          tolerance, adaptive(1e-8)"
     )]
     Integrator {

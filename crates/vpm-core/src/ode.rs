@@ -39,6 +39,19 @@ pub trait Ode<S> {
         false
     }
 
+    /// Writes what an additive step takes for the rates where its stage has come to `explicit` by one table and will be at
+    /// `implicit` and `reach` (s) times these rates by the other; tells whether anything is taken implicitly by that.
+    ///
+    /// Law: `f(explicit, implicit + reach rates)` of a split right-hand side with `f(x, x) = f(x)`: whatever is stiff is taken from the
+    /// second argument, everything else from the first. Of a machine with coordinates q, rates v and other states s, E and I the two,
+    /// `(M(q_E) + reach (D + R) + reach^2 K) a = f(x_E) - bias(q_E, v_E) - K (q_I + reach v_I) - (D + R) v_I`, f all other forces,
+    /// `dq/dt = v_I + reach a`, `dv/dt = a`; R is the resistance of friction, K and D are linear stiffness and damping.
+    /// Without a reach the two states are the same.
+    fn additive_rates(&mut self, explicit: &[S], _implicit: &[S], _reach: f64, rates: &mut [S]) -> bool {
+        self.rhs(explicit, rates);
+        false
+    }
+
     /// Puts into `rates`, for states that follow the path of coordinates, their mean rates over a `step` along which the coordinates
     /// move at the rates in `x`. A semi-implicit step asks for it when it knows the new rates of the coordinates.
     fn along_path(&mut self, _x: &[S], _step: f64, _rates: &mut [S]) {}

@@ -7,6 +7,7 @@ mod names;
 mod observer;
 mod prescribed;
 mod quintic;
+mod resolution;
 mod sampled;
 mod stability;
 mod start;
@@ -15,6 +16,7 @@ mod stepper;
 pub use along::{Along, drives_along};
 pub(crate) use names::state_name;
 pub use prescribed::{observed, prescribed};
+pub use resolution::resolution;
 pub(crate) use sampled::SampledDrives;
 pub(crate) use stability::{check_step, check_structure};
 pub(crate) use start::check_pistons;
@@ -259,7 +261,7 @@ fn repair(method: Method) -> &'static str {
         Method::LinearlyImplicit | Method::Rosenbrock => {
             "use more substeps or the integrator adaptive, or check the signs and sizes of the parameters"
         }
-        Method::Rk4 | Method::SemiImplicit => "use more substeps or the integrator linearly_implicit",
+        Method::Rk4 | Method::SemiImplicit | Method::Additive => "use more substeps or the integrator linearly_implicit",
         Method::Guarded => {
             "use more substeps or the integrator adaptive, or check the signs and sizes of the parameters"
         }

@@ -1,5 +1,6 @@
 //! A whole machine as one ordinary differential equation: tree, effects and actuators.
 
+mod additive;
 mod answers;
 mod connections;
 mod counted;

@@ -12,6 +12,13 @@ from vpm.model.check import Checked
 from vpm.model.drive_components import DriveComponents
 from vpm.model.schema import ChannelEntry
 
+#: Drives whose effort follows from the command alone.
+DIRECT = frozenset({"ideal", "narx", "maxwell_narx"})
+#: Effects that are linear springs.
+SPRINGS = frozenset({"spring", "joint_compliance", "link_flexibility"})
+#: Effects with springs that take hold at once.
+IMPACTS = frozenset({"backlash", "end_stop"})
+
 
 class Components(DriveComponents):
     """The part of a model that answers by name; it relies on the checked document and changes nothing."""
@@ -107,6 +114,19 @@ class Components(DriveComponents):
         """Level of detail of each beam, as `at` takes it; a rigid one that an effect bends has a level that bends."""
         beams = self._checked.structure.document.beams
         return MappingProxyType({name: str(beams[name].detail) for name in self.beams})
+
+    @cached_property
+    def is_linearly_stiff(self) -> bool:
+        """Whether linear springs are all that is stiff in it: those of flexible links and joints, no hard contact.
+
+        The states and forces of drives other than ideal and sampled ones, bushings, ends of ways and play are stiff
+        in ways of their own.
+        """
+        document = self._checked.document
+        effects = {effect.type for effect in document.effects}
+        elastic = any(level != "rigid" for level in self.levels.values()) or bool(effects & SPRINGS)
+        direct = all(entry.type in DIRECT for entry in document.actuators.values())
+        return elastic and direct and not document.contacts and not document.bushings and not effects & IMPACTS
 
     @property
     def first_order_beams(self) -> frozenset[str]:

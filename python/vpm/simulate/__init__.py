@@ -2,6 +2,7 @@
 
 from vpm.simulate.inputs import restart_grid, simulation_inputs
 from vpm.simulate.modes import MODES, check_balance, judging_mode, simulate, simulate_arrays, simulated_rows
+from vpm.simulate.resolution import Resolution
 from vpm.simulate.run import Run, SimulatedArrays, copied_channels, judged
 from vpm.simulate.setup import AUTOMATIC, FIXED_STEP, INTEGRATORS, Setup
 
@@ -10,6 +11,7 @@ __all__ = [
     "FIXED_STEP",
     "INTEGRATORS",
     "MODES",
+    "Resolution",
     "Run",
     "Setup",
     "SimulatedArrays",

@@ -16,6 +16,7 @@ prescribed_motion    Given the measured motion of the joints, how do the flexibl
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +27,7 @@ from vpm.initial import initial_state as start
 from vpm.initial import joint_motion, measured_states, whole_motion
 from vpm.model import Model
 from vpm.simulate.inputs import check_controllers, held_inputs, references_of, restart_grid, uncontrolled
+from vpm.simulate.resolution import resolution
 from vpm.simulate.run import Run, SimulatedArrays, judged, run_of
 from vpm.simulate.setup import AUTOMATIC, Setup
 
@@ -83,7 +85,13 @@ def simulate(
     setup = Setup(integrator, substeps, horizon)
     arrays = simulate_arrays(model, experiment, mode, setup=setup, cutoff=cutoff, initial_state=initial_state)
     run = run_of(model, experiment, mode, arrays, setup)
-    return run if arrays.states is None else judged(model, run, arrays.states)
+    if arrays.states is None:
+        return run
+    run = judged(model, run, arrays.states)
+    if mode == "prescribed_motion" or len(arrays.states) == 0:
+        return run
+    duration = len(arrays.states) * experiment.dt
+    return replace(run, resolution=resolution(model, arrays.states[0], experiment.dt, setup, duration))
 
 
 def simulate_arrays(
@@ -189,7 +197,7 @@ def _prescribed(model: Model, m: Motion, theta: Array, columns: list[int], setup
         motion[order][:, followed] = values[m.kept]
     q, v, a = motion
     outputs, states, jacobian = model.core.simulate_prescribed(
-        theta, q, v, a, m.dt, setup.substeps, setup.method(model), columns, passive
+        theta, q, v, a, m.dt, setup.substeps, setup.method(model, guided=True), columns, passive
     )
     rows = np.arange(len(m.time))[m.kept]
     return SimulatedArrays(outputs, jacobian, rows, np.zeros(1, dtype=np.int64), states)

@@ -16,6 +16,7 @@ from vpm.initial import passive_joints
 from vpm.model import Model
 from vpm.results import Result
 from vpm.simulate.inputs import uncontrolled
+from vpm.simulate.resolution import Resolution
 from vpm.simulate.setup import Setup
 
 if TYPE_CHECKING:
@@ -44,6 +45,9 @@ class Run(Result):
         Integrator, substeps, horizon, cut-off.
     notes : tuple of str
         What to know before the numbers are trusted: one sentence each, none as a rule.
+    resolution : Resolution or None
+        What the steps damp because they do not resolve it; None where nobody asked (restarts, inverse dynamics,
+        prescribed motion).
     """
 
     model_name: str
@@ -57,6 +61,7 @@ class Run(Result):
     starts: NDArray[np.int64] = field(default_factory=lambda: np.zeros(1, dtype=np.int64))
     settings: dict[str, float | int | str] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    resolution: Resolution | None = None
 
     def __getitem__(self, channel: str) -> Array:
         """Simulated values of one channel, shape (N,)."""
@@ -71,6 +76,7 @@ class Run(Result):
             "mode": self.mode,
             "samples": self.time.size,
             "channels": ", ".join(self.channels),
+            **({} if self.resolution is None else {"steps": str(self.resolution)}),
         }
 
     def _html_rows(self) -> Mapping[str, object]:
@@ -130,7 +136,10 @@ def run_of(model: Model, experiment: Experiment, mode: str, arrays: SimulatedArr
         if channel in experiment:
             measured[:, column] = experiment[channel][arrays.rows]
     length = len(arrays.rows) // len(arrays.starts) if arrays.starts.size else 0
-    settings: dict[str, float | int | str] = {"integrator": setup.method(model), "substeps": setup.substeps}
+    settings: dict[str, float | int | str] = {
+        "integrator": setup.method(model, guided=guided),
+        "substeps": setup.substeps,
+    }
     if mode == "restarts":
         settings["horizon"] = setup.horizon
     return Run(

@@ -9,7 +9,7 @@ from vpm.model import Model
 from vpm.results import Storable
 
 #: Integrators of fixed steps, whose work is bounded.
-FIXED_STEP = ("linearly_implicit", "rosenbrock", "rk4", "semi_implicit")
+FIXED_STEP = ("linearly_implicit", "additive", "rosenbrock", "rk4", "semi_implicit")
 #: Chooses by what a machine contains.
 AUTOMATIC = "auto"
 INTEGRATORS = (AUTOMATIC, *FIXED_STEP, "guarded", "adaptive")
@@ -21,12 +21,15 @@ class Setup(Storable):
 
     Attributes
     ----------
-    integrator : {"auto", "linearly_implicit", "rosenbrock", "rk4", "semi_implicit", "guarded", "adaptive"}
+    integrator : {"auto", "linearly_implicit", "additive", "rosenbrock", "rk4", "semi_implicit", "guarded", "adaptive"}
         Or, with a tolerance, ``"adaptive(1e-8)"``.
-        ``auto`` is ``adaptive`` for machines with contacts or hydraulic drives, which impacts and oil make abrupt, and
-        ``linearly_implicit`` for all others. The next two are stable whatever is stiff, of order 2 and 4; the first of
-        them also stops on dry friction far sharper than a step. Then come two that are explicit, but for the constant
-        stiffness of flexible links in the second.
+        ``auto`` is ``adaptive`` for machines with contacts or hydraulic drives, which impacts and oil make abrupt,
+        ``additive`` for machines whose stiff forces are linear (flexible links, springs and compliant joints, with
+        ideal drives), and ``linearly_implicit`` for all others and where joints follow a measured motion.
+        ``linearly_implicit`` and ``rosenbrock`` are stable whatever is stiff, of order 2 and 4; the first of them also
+        stops on dry friction far sharper than a step. ``additive`` has order 4 as well, without a Jacobian: stable
+        however stiff links, springs and friction of joints are, explicit in all else. ``rk4`` and ``semi_implicit``
+        are explicit, but for the constant stiffness of flexible links in the second.
         ``adaptive`` takes as many steps of ``rosenbrock`` as keep the error of each within a tolerance, 1e-6 or the
         one in brackets, relative to each state and its natural size: for impacts, oil and other things that change
         between microseconds and seconds. Its time is not bounded. ``guarded`` is its counterpart for real time: one
@@ -56,7 +59,7 @@ class Setup(Storable):
         if not self.settling >= 0.0:
             raise SimulationError(f"settling is {self.settling} s; give a time that is not negative")
 
-    def method(self, model: Model, *, bounded: bool = False) -> str:
+    def method(self, model: Model, *, bounded: bool = False, guided: bool = False) -> str:
         """Integrator for a model, as the core names it.
 
         Parameters
@@ -64,12 +67,14 @@ class Setup(Storable):
         model : Model
         bounded : bool
             Where ``auto`` would step adaptively, take ``guarded``, whose time has a bound.
+        guided : bool
+            Whether the joints follow a measured motion, so that no step has their equations to solve.
         """
         if self.integrator != AUTOMATIC:
             return self.integrator
-        if not model.is_abrupt:
-            return "linearly_implicit"
-        return "guarded" if bounded else "adaptive"
+        if model.is_abrupt:
+            return "guarded" if bounded else "adaptive"
+        return "additive" if model.is_linearly_stiff and not guided else "linearly_implicit"
 
 
 def _check_integrator(name: str) -> None:

@@ -195,6 +195,21 @@ pub(crate) fn subtract_elastic<S: Scalar>(model: &Model<S>, q: &[S], v: &[S], lo
     }
 }
 
+/// Adds `reach D + reach^2 K` of the beams to the mass matrix, as a step does that takes their elasticity implicitly.
+pub(crate) fn stiffen<S: Scalar>(model: &Model<S>, reach: S, mass: &mut [S]) {
+    let n = model.n_coordinates();
+    for Elastic { beam, coordinate, .. } in model.beams() {
+        let len = beam.len();
+        let rows = beam.stiffness().chunks_exact(len.max(1)).zip(beam.damping().chunks_exact(len.max(1)));
+        for (row, (stiffness, damping)) in (*coordinate..).zip(rows) {
+            let entries = &mut mass[row * n + coordinate..][..len];
+            for (entry, (&stiffness, &damping)) in entries.iter_mut().zip(stiffness.iter().zip(damping)) {
+                *entry += (stiffness * reach + damping) * reach;
+            }
+        }
+    }
+}
+
 /// Kinetic energy, and potential energy in gravity and in the beams, in J, at coordinates `q` and rates `v`.
 ///
 /// Checked: free motion conserves their sum.

@@ -153,6 +153,31 @@ impl<S: Scalar> JointEffect<S> {
         }
     }
 
+    /// The part of the resistance that is the same everywhere, N s/m or N m s/rad.
+    #[inline]
+    pub fn damping(&self) -> S {
+        match self {
+            Self::ViscousFriction(law) => law.resistance(),
+            Self::JointCompliance(law) => law.resistance(),
+            Self::LinkFlexibility(law) => law.resistance(),
+            _ => S::zero(),
+        }
+    }
+
+    /// Whether the resistance is the same everywhere, so that it is all [`JointEffect::damping`].
+    #[inline]
+    pub fn is_damped_linearly(&self) -> bool {
+        matches!(
+            self,
+            Self::ViscousFriction(_)
+                | Self::JointCompliance(_)
+                | Self::LinkFlexibility(_)
+                | Self::BiasForce(_)
+                | Self::Spring(_)
+                | Self::TorqueRipple(_)
+        )
+    }
+
     /// Effort at rest, N or N m, at coordinate `q`.
     #[inline]
     pub fn effort_at_rest(&self, q: S) -> S {

@@ -32,9 +32,31 @@ pub fn check_rates(method: Method, step: f64, system: &Rates<'_>) -> Result<()> 
     let scaled = Scaled::new(system);
     let worst = match method {
         Method::Rk4 => scaled.rk4()?,
-        Method::SemiImplicit => scaled.semi_implicit(step)?,
+        Method::SemiImplicit => scaled.stepped(step, |step| scaled.turn(step))?,
         _ => None,
     };
+    judge(method, step, system, worst)
+}
+
+/// As [`check_rates`], for any method of fixed steps; `derivative` is that of the state after a step (s) by the state before, row by row.
+///
+/// Checked: against the stability functions of the methods.
+pub fn check_steps(
+    method: Method,
+    step: f64,
+    system: &Rates<'_>,
+    mut derivative: impl FnMut(f64) -> Vec<f64>,
+) -> Result<()> {
+    let (scaled, sizes) = (Scaled::new(system), system.sizes);
+    let size = |i: usize, j: usize| sizes[j] / sizes[i];
+    let turn = |step: f64| {
+        let entries = derivative(step);
+        DMatrix::from_fn(sizes.len(), sizes.len(), |i, j| entries[i * sizes.len() + j] * size(i, j))
+    };
+    judge(method, step, system, scaled.stepped(step, turn)?)
+}
+
+fn judge(method: Method, step: f64, system: &Rates<'_>, worst: Option<Worst>) -> Result<()> {
     match worst {
         Some(Worst { place, frequency, limit }) if step > limit => {
             let (coordinate, frequency) = (system.names[place].clone(), frequency / std::f64::consts::TAU);
@@ -83,12 +105,18 @@ impl Scaled {
         }))
     }
 
-    fn semi_implicit(&self, step: f64) -> Result<Option<Worst>> {
+    /// The mode that a step grows most, which makes `turn` of the state for a step, if that is more than it grows by itself.
+    fn stepped(&self, step: f64, mut turn: impl FnMut(f64) -> DMatrix<f64>) -> Result<Option<Worst>> {
         // A system that grows by itself is not the fault of the step.
         let own = eigenvalues(self.matrix.clone())?;
         let natural = own.iter().map(|value| value.re).fold(0.0, f64::max);
-        let largest = |step: f64| -> Result<Option<Complex<f64>>> {
-            let factors = eigenvalues(self.turn(step))?;
+        let mut largest = |step: f64| -> Result<Option<Complex<f64>>> {
+            let matrix = turn(step);
+            // Numbers that are none have outgrown all others.
+            if matrix.iter().any(|entry| !entry.is_finite()) {
+                return Ok(Some(Complex::from(f64::INFINITY)));
+            }
+            let factors = eigenvalues(matrix)?;
             let most = factors.into_iter().max_by(|a, b| a.norm().total_cmp(&b.norm())).unwrap_or_default();
             Ok(Some(most).filter(|factor| factor.norm() > (step * natural).exp() * (1.0 + SLACK)))
         };
@@ -101,7 +129,9 @@ impl Scaled {
                 None => low = middle,
             }
         }
-        let place = self.largest_part(&self.turn(high), factor);
+        let matrix = turn(high);
+        let finite = matrix.iter().all(|entry| entry.is_finite());
+        let place = if finite { self.largest_part(&matrix, factor) } else { 0 };
         // What grows is the fastest of its modes, or one much like it.
         let frequency = own.iter().map(|value| value.norm()).fold(0.0, f64::max);
         Ok(Some(Worst { place, frequency, limit: low }))

@@ -80,14 +80,14 @@ impl<S: Scalar> Lu<S> {
         }
     }
 
-    /// Brings the row with the largest pivot up.
+    /// Brings the row with the largest pivot up; numbers that do not tell how they compare stay where they are.
     fn exchange(&mut self, column: usize) {
         let n = self.dim;
-        let size = |row: usize| self.factors[row * n + column].re().abs();
+        let size = |row: usize| self.factors[row * n + column].abs();
         let (mut best, mut largest) = (column, size(column));
         for row in column + 1..n {
             let found = size(row);
-            if found > largest {
+            if largest.known_less(found) == Some(true) {
                 (best, largest) = (row, found);
             }
         }

@@ -1,11 +1,13 @@
 //! Time integration without allocation: fixed steps in bounded work, and steps of controlled error. It knows a system only as an [`Ode`].
 
 mod adaptive;
+pub(crate) mod additive;
 pub mod growth;
 mod linearly_implicit;
 mod lu;
 #[cfg(feature = "reference")]
 pub mod reference;
+pub mod resolution;
 mod rk4;
 mod rosenbrock;
 mod semi_implicit;
@@ -13,6 +15,7 @@ pub mod stability;
 mod stage;
 
 pub use adaptive::{Adaptive, Halt, MOST_STEPS, Steps, Stuck};
+pub use additive::Additive;
 pub use linearly_implicit::LinearlyImplicit;
 pub use lu::Lu;
 pub use rk4::Rk4;
@@ -44,24 +47,28 @@ pub enum Method {
     LinearlyImplicit,
     /// Rosenbrock, order 4, L-stable.
     Rosenbrock,
-    /// The same with steps of controlled error, as many as it takes.
+    /// Additive Runge-Kutta, order 4: L-stable for linear stiffness, damping and friction, explicit in all else.
+    Additive,
+    /// The Rosenbrock method of order 4 with steps of controlled error, as many as it takes.
     Adaptive {
         /// Error of a step relative to each state and its scale.
         tolerance: f64,
     },
-    /// The same in bounded work: one step, or up to 16 where its error tells of an impact or a jump.
+    /// That in bounded work: one step, or up to 16 where its error tells of an impact or a jump.
     Guarded,
 }
 
 impl Method {
     /// Those of fixed steps.
-    pub const FIXED: [Self; 4] = [Self::SemiImplicit, Self::Rk4, Self::LinearlyImplicit, Self::Rosenbrock];
+    pub const FIXED: [Self; 5] =
+        [Self::SemiImplicit, Self::Rk4, Self::LinearlyImplicit, Self::Rosenbrock, Self::Additive];
     /// All of them.
-    pub const ALL: [Self; 6] = [
+    pub const ALL: [Self; 7] = [
         Self::SemiImplicit,
         Self::Rk4,
         Self::LinearlyImplicit,
         Self::Rosenbrock,
+        Self::Additive,
         Self::Adaptive { tolerance: TOLERANCE },
         Self::Guarded,
     ];
@@ -72,7 +79,7 @@ impl Method {
             Self::SemiImplicit => 1,
             Self::LinearlyImplicit => 2,
             Self::Rk4 => 4,
-            Self::Rosenbrock | Self::Adaptive { .. } | Self::Guarded => 6,
+            Self::Rosenbrock | Self::Additive | Self::Adaptive { .. } | Self::Guarded => 6,
         }
     }
 
@@ -83,6 +90,7 @@ impl Method {
             Self::Rk4 => "rk4",
             Self::LinearlyImplicit => "linearly_implicit",
             Self::Rosenbrock => "rosenbrock",
+            Self::Additive => "additive",
             Self::Adaptive { .. } => "adaptive",
             Self::Guarded => "guarded",
         }
@@ -130,6 +138,7 @@ enum Scheme<S> {
     Rk4(Rk4<S>),
     LinearlyImplicit(LinearlyImplicit<S>),
     Rosenbrock(Rosenbrock<S>),
+    Additive(Additive<S>),
     Adaptive(Adaptive<S>),
 }
 
@@ -141,6 +150,7 @@ impl<S: Scalar> Integrator<S> {
             Method::Rk4 => Scheme::Rk4(Rk4::new(dim)),
             Method::LinearlyImplicit => Scheme::LinearlyImplicit(LinearlyImplicit::new(dim)),
             Method::Rosenbrock => Scheme::Rosenbrock(Rosenbrock::new(dim)),
+            Method::Additive => Scheme::Additive(Additive::new(dim)),
             Method::Adaptive { tolerance } => Scheme::Adaptive(Adaptive::unchecked(tolerance, dim)),
             Method::Guarded => Scheme::Adaptive(Adaptive::guarded(dim)),
         };
@@ -155,6 +165,7 @@ impl<S: Scalar> Integrator<S> {
             Scheme::Rk4(method) => method.step(ode, x, step),
             Scheme::LinearlyImplicit(method) => method.step(ode, x, step),
             Scheme::Rosenbrock(method) => method.step(ode, x, step),
+            Scheme::Additive(method) => method.step(ode, x, step),
             Scheme::Adaptive(method) => {
                 if let Err(Halt::Stuck(stuck)) = method.advance(ode, x, step, &|| false) {
                     x[stuck.state] = S::from_f64(f64::NAN);

@@ -1,13 +1,15 @@
-//! Whether the steps of an explicit method are short enough for the flexible links, drives, contacts and bushings of a machine.
+//! Whether the steps of a method that is explicit in part are short enough for the links, drives, contacts and bushings of a machine.
 
 use super::Stepping;
 use super::names::{coordinate, state_name};
 use crate::description::Description;
 use crate::error::Result;
-use crate::integrator::Method;
-use crate::integrator::growth::{Rates, check_rates};
+use crate::integrator::growth::{Rates, check_rates, check_steps};
+use crate::integrator::{Integrator, Method};
 use crate::integrator::stability::{LinearSystem, check};
 use crate::ode::Ode;
+use crate::scalar::Dual;
+use crate::sensitivity::LANES;
 use crate::system::System;
 
 /// Complains, with the mode and the largest stable step, if flexible links, drives, contacts and bushings cannot be stepped so from `state`.
@@ -15,6 +17,9 @@ use crate::system::System;
 /// Judged with the drives where they stand in that state; what friction, end stops, opening valves and contacts that
 /// are open add later is left to the run.
 pub(crate) fn check_step(description: &Description, theta: &[f64], stepping: Stepping, state: &[f64]) -> Result<()> {
+    if stepping.method == Method::Additive {
+        return check_additive(description, theta, stepping, state);
+    }
     if description.actuators.iter().all(|actuator| actuator.drive.is_direct()) {
         return check_structure(description, theta, stepping, state, &[]);
     }
@@ -31,6 +36,45 @@ pub(crate) fn check_step(description: &Description, theta: &[f64], stepping: Ste
     let names: Vec<String> = (0..dim).map(|place| state_name(description, place)).collect();
     let rates = Rates { jacobian: &jacobian, coordinates: n, elasticity, sizes: &sizes, names: &names };
     check_rates(stepping.method, stepping.step(), &rates)
+}
+
+/// As [`check_step`] for additive steps, by the derivative of the step itself: contacts, bushings and drives are explicit in them.
+fn check_additive(description: &Description, theta: &[f64], stepping: Stepping, state: &[f64]) -> Result<()> {
+    let direct = description.actuators.iter().all(|actuator| actuator.drive.is_direct());
+    let free = description.contacts.is_empty() && description.bushings.is_empty();
+    if direct && free || state.iter().any(|number| !number.is_finite()) {
+        return Ok(());
+    }
+    let mut system: System<f64> = description.system(theta)?;
+    let dim = description.n_states();
+    let (mut jacobian, mut sizes) = (vec![0.0; dim * dim], vec![0.0; dim]);
+    system.jacobian(state, &mut jacobian);
+    system.scales(&mut sizes);
+    let lifted: Vec<Dual<f64, LANES>> = theta.iter().map(|&value| Dual::constant(value)).collect();
+    let mut duals: System<Dual<f64, LANES>> = description.system(&lifted)?;
+    let mut integrator = Integrator::new(stepping.method, dim);
+    let derivative = |step: f64| {
+        let mut matrix = vec![0.0; dim * dim];
+        for first in (0..dim).step_by(LANES) {
+            // A column before `first` wraps around to a lane that does not exist, which gives a constant.
+            let seed = |(column, &value): (usize, &f64)| Dual::variable(value, column.wrapping_sub(first));
+            let mut x: Vec<_> = state.iter().enumerate().map(seed).collect();
+            integrator.step(&mut duals, &mut x, step);
+            for (row, x) in matrix.chunks_exact_mut(dim).zip(&x) {
+                row[first..].iter_mut().zip(&x.gradient).for_each(|(entry, &slope)| *entry = slope);
+            }
+        }
+        matrix
+    };
+    let names: Vec<String> = (0..dim).map(|place| state_name(description, place)).collect();
+    let rates = Rates {
+        jacobian: &jacobian,
+        coordinates: description.n_coordinates(),
+        elasticity: None,
+        sizes: &sizes,
+        names: &names,
+    };
+    check_steps(stepping.method, stepping.step(), &rates, derivative)
 }
 
 /// Complains, with the mode and the largest stable step, if the flexible links, contacts and bushings cannot be stepped so from `state`;

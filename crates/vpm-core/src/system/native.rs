@@ -116,7 +116,7 @@ impl Call {
 pub(crate) struct Fast {
     rates: Call,
     sample: Call,
-    matrices: Vec<(Kind, Call)>,
+    others: Vec<(Kind, Call)>,
 }
 
 impl Fast {
@@ -136,18 +136,19 @@ impl Fast {
         let call = |kind| natives.function(kind).ok().map(|function| Call::new(function, theta));
         let kind = match method {
             Method::SemiImplicit | Method::Rk4 => None,
+            Method::Additive => Some(Kind::Additive),
             Method::LinearlyImplicit => Some(Kind::Prepared),
             Method::Rosenbrock | Method::Adaptive { .. } | Method::Guarded => Some(Kind::Linearised),
         };
-        let matrices = kind.and_then(|kind| Some((kind, call(kind)?))).into_iter().collect();
-        Some(Self { rates: call(Kind::Rates)?, sample: call(Kind::Sample)?, matrices })
+        let others = kind.and_then(|kind| Some((kind, call(kind)?))).into_iter().collect();
+        Some(Self { rates: call(Kind::Rates)?, sample: call(Kind::Sample)?, others })
     }
 
     /// Holds input `number`, see [`super::Dynamics::input`].
     #[inline]
     pub(crate) fn hold(&mut self, number: usize, input: f64) {
         for call in
-            [&mut self.rates, &mut self.sample].into_iter().chain(self.matrices.iter_mut().map(|(_, call)| call))
+            [&mut self.rates, &mut self.sample].into_iter().chain(self.others.iter_mut().map(|(_, call)| call))
         {
             call.inputs[call.function.places.states + number] = input;
         }
@@ -167,10 +168,21 @@ impl Fast {
         outputs.copy_from_slice(seen);
     }
 
+    /// Rates of a stage of an additive step at its explicit and implicit state; false if there is no code for it.
+    #[inline]
+    pub(crate) fn additive(&mut self, [explicit, implicit]: [&[f64]; 2], reach: f64, rates: &mut [f64]) -> bool {
+        let Some((_, call)) = self.others.iter_mut().find(|(own, _)| *own == Kind::Additive) else { return false };
+        let places = call.function.places;
+        call.inputs[places.implicit()..places.reach()].copy_from_slice(implicit);
+        call.inputs[places.reach()] = reach;
+        rates.copy_from_slice(call.at(explicit));
+        true
+    }
+
     /// dx/dt and a matrix at `x`, row by row; false if there is no code for it.
     #[inline]
     pub(crate) fn matrix(&mut self, kind: Kind, x: &[f64], matrix: &mut [f64], dxdt: &mut [f64]) -> bool {
-        let Some((_, call)) = self.matrices.iter_mut().find(|(own, _)| *own == kind) else { return false };
+        let Some((_, call)) = self.others.iter_mut().find(|(own, _)| *own == kind) else { return false };
         call.at(x);
         let dim = x.len();
         dxdt.copy_from_slice(&call.outputs[..dim]);

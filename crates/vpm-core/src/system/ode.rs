@@ -1,5 +1,6 @@
 //! A machine for the integrators: its rates, and the matrices that implicit steps ask for.
 
+use super::additive::{Split, Stage};
 use super::tangent::Tangent;
 use super::{Build, Dynamics, Fast, Kind, stiff};
 use crate::contact::ContactFriction;
@@ -12,6 +13,7 @@ use crate::scalar::Scalar;
 pub struct System<S> {
     dynamics: Dynamics<S>,
     tangent: Tangent<S>,
+    split: Split<S>,
     resistances: Vec<S>,
     seals: Vec<Option<S>>,
     fadings: Vec<Option<S>>,
@@ -35,7 +37,9 @@ impl<S: Scalar> System<S> {
         let seals = vec![None; dynamics.actuators.len()];
         let rates = vec![S::zero(); dynamics.dim()];
         let fadings = vec![None; dynamics.memories.len()];
-        Ok(Self { dynamics, tangent, resistances, seals, fadings, column, rates, ready: false, fast: None })
+        let split = Split::new(&dynamics);
+        let (ready, fast) = (false, None);
+        Ok(Self { dynamics, tangent, split, resistances, seals, fadings, column, rates, ready, fast })
     }
 
     /// The same machine, whose functions run as machine code.
@@ -105,26 +109,50 @@ impl<S: Scalar> System<S> {
 
     /// Rates at `x`: those at hand if a step begins there.
     fn begin(&mut self, x: &[S], rates: &mut [S]) {
-        // Machine code leaves nothing in the direct evaluation on which its matrices could lean.
-        if std::mem::take(&mut self.ready) && self.fast.is_none() {
+        if std::mem::take(&mut self.ready) {
             rates.copy_from_slice(&self.rates);
         } else {
+            self.rhs(x, rates);
+        }
+    }
+
+    /// Rates at `x`, with the direct evaluation left there, on which matrices lean.
+    fn begin_directly(&mut self, x: &[S], rates: &mut [S]) {
+        if self.fast.is_some() {
+            self.ready = false;
             self.dynamics.rhs(x, rates);
+        } else {
+            self.begin(x, rates);
         }
     }
 
     /// As df/dx, without the friction of joints and seals, row by row.
     pub(crate) fn without_friction(&mut self, x: &[S], matrix: &mut [S]) {
+        self.with_resistance(|_| S::zero(), x, matrix);
+    }
+
+    /// As df/dx, without friction of joints and seals that is not linear.
+    pub(crate) fn without_dry_friction(&mut self, x: &[S], matrix: &mut [S]) {
+        self.with_resistance(JointEffect::damping, x, matrix);
+    }
+
+    /// As df/dx, with this resistance of each effect in the place of friction.
+    fn with_resistance(&mut self, resistance: impl Fn(&JointEffect<S>) -> S, x: &[S], matrix: &mut [S]) {
         self.ready = false;
         self.resistances.fill(S::zero());
+        for (joint, effect) in &self.dynamics.effects {
+            self.resistances[*joint] += resistance(effect);
+        }
         self.seals.fill(Some(S::zero()));
         if self.tangent.leans() {
             self.dynamics.seals.copy_from_slice(&self.seals);
-            let at_rest = |effects: &[(usize, JointEffect<S>)], [q, _, _]: [&[S]; 3], total: &mut [S]| {
-                effects.iter().for_each(|(joint, effect)| total[*joint] += effect.effort_at_rest(q[*joint]));
+            let linear = |effects: &[(usize, JointEffect<S>)], [q, v, _]: [&[S]; 3], total: &mut [S]| {
+                effects.iter().for_each(|(joint, effect)| {
+                    total[*joint] += effect.effort_at_rest(q[*joint]) - resistance(effect) * v[*joint];
+                });
             };
             let chord = |law: &ContactFriction<S>, square, normal| law.chord(square) * normal;
-            self.dynamics.rhs_with(x, &mut self.rates, (at_rest, chord));
+            self.dynamics.rhs_with(x, &mut self.rates, (linear, chord));
             self.dynamics.seals.fill(None);
         }
         self.fadings.fill(Some(S::zero()));
@@ -182,7 +210,7 @@ impl<S: Scalar> Ode<S> for System<S> {
         if self.by_code(Kind::Linearised, x, jacobian, rates) {
             return;
         }
-        self.begin(x, rates);
+        self.begin_directly(x, rates);
         self.tangent.jacobian(&mut self.dynamics, x, jacobian);
     }
 
@@ -190,7 +218,7 @@ impl<S: Scalar> Ode<S> for System<S> {
         if self.by_code(Kind::Prepared, x, matrix, rates) {
             return;
         }
-        self.begin(x, rates);
+        self.begin_directly(x, rates);
         self.matrix(x, matrix);
     }
 
@@ -205,6 +233,25 @@ impl<S: Scalar> Ode<S> for System<S> {
             self.dynamics.rhs(x, &mut self.rates);
         }
         self.matrix(x, matrix);
+    }
+
+    /// Beams, springs and linear damping of joints, friction of joints, memories and lags of ideal drives are taken implicitly; springs that
+    /// are not linear by their slope where the stage has come to.
+    fn additive_rates(&mut self, explicit: &[S], implicit: &[S], reach: f64, rates: &mut [S]) -> bool {
+        if reach == 0.0 {
+            self.begin(explicit, rates);
+            return true;
+        }
+        self.ready = false;
+        let plain = (S::plain(explicit), S::plain(implicit), S::plain_mut(rates));
+        if let (Some(fast), (Some(explicit), Some(implicit), Some(rates))) = (&mut self.fast, plain)
+            && fast.additive([explicit, implicit], reach, rates)
+        {
+            return true;
+        }
+        let stage = Stage { explicit, implicit, reach: S::from_f64(reach) };
+        self.dynamics.additive_rates(stage, rates, &mut self.split);
+        true
     }
 
     /// A hundredth for coordinates, 1 for rates, of the drives what is natural for each.

@@ -1,5 +1,6 @@
 //! A whole machine as a graph of operations.
 
+use super::additive::{Split, Stage};
 use super::{Build, Dynamics, stiff};
 use crate::contact::ContactFriction;
 use crate::description::Description;
@@ -7,7 +8,8 @@ use crate::effect::JointEffect;
 use crate::error::{Error, Result};
 use crate::graph::{Decision, Graph, Node, Program, Recorded, input, record};
 
-/// Where the inputs of a recorded machine's programs stand: state, inputs of drives and supplies, parameters.
+/// Where the inputs of a recorded machine's programs stand: state, inputs of drives and supplies, the implicit state and the reach of an
+/// additive step, parameters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Places {
     /// Length of the state, which comes first.
@@ -24,9 +26,19 @@ impl Places {
         Self { states: description.n_states(), inputs: description.n_inputs(), parameters: description.n_parameters() }
     }
 
+    /// The implicit state of an additive step.
+    pub fn implicit(&self) -> usize {
+        self.states + self.inputs
+    }
+
+    /// The reach of an additive step, s.
+    pub fn reach(&self) -> usize {
+        self.implicit() + self.states
+    }
+
     /// The first parameter.
     pub fn first_parameter(&self) -> usize {
-        self.states + self.inputs
+        self.reach() + 1
     }
 
     /// How many numbers go into a program.
@@ -47,11 +59,13 @@ pub enum Kind {
     /// dx/dt, then the entries of the matrix that an implicit step puts in the place of the derivatives, see
     /// [`crate::ode::Ode::iteration_matrix`].
     Prepared,
+    /// The rates of a stage of an additive step, see [`crate::ode::Ode::additive_rates`].
+    Additive,
 }
 
 impl Kind {
     /// All of them.
-    pub const ALL: [Self; 4] = [Self::Rates, Self::Sample, Self::Linearised, Self::Prepared];
+    pub const ALL: [Self; 5] = [Self::Rates, Self::Sample, Self::Linearised, Self::Prepared, Self::Additive];
 }
 
 /// The functions of a machine, recorded: programs over state, inputs and parameters.
@@ -71,6 +85,8 @@ struct Functions {
     outputs: Vec<Node>,
     /// Rates whose derivatives are an iteration matrix, or that matrix.
     stiff: Stiff,
+    /// Rates of a stage of an additive step.
+    additive: Vec<Node>,
 }
 
 #[derive(Clone, Debug)]
@@ -118,13 +134,14 @@ impl Recording {
 
     /// The program of that kind.
     pub fn program(&mut self, kind: Kind) -> Placed {
-        let Functions { rates, outputs, stiff } = &self.functions;
+        let Functions { rates, outputs, stiff, additive } = &self.functions;
         let (dim, states) = (self.places.states, 0..self.places.states as u32);
         let mut entries = Vec::new();
         let mut nodes = rates.clone();
         match (kind, stiff) {
             (Kind::Rates, _) => {}
             (Kind::Sample, _) => nodes.extend(outputs),
+            (Kind::Additive, _) => nodes.clone_from(additive),
             (Kind::Prepared, Stiff::Beams(matrix)) => {
                 for (place, &entry) in matrix.iter().enumerate() {
                     if self.graph.known_value(entry) != Some(0.0) {
@@ -160,10 +177,21 @@ fn functions(description: &Description, places: Places, theta: &[f64]) -> Result
     dynamics.rhs(&x, &mut rates);
     dynamics.observe(&x, &rates, &mut outputs);
     let stiff = dynamics.stiff(&x);
-    Ok(Functions { rates: nodes(&rates), outputs: nodes(&outputs), stiff })
+    let additive = dynamics.additive(&x, places);
+    Ok(Functions { rates: nodes(&rates), outputs: nodes(&outputs), stiff, additive })
 }
 
 impl Dynamics<Recorded> {
+    /// The rates of a stage of an additive step whose explicit state is `x`.
+    fn additive(&mut self, x: &[Recorded], places: Places) -> Vec<Node> {
+        let implicit: Vec<Recorded> = (0..x.len()).map(|k| input(places.implicit() + k, 0.0)).collect();
+        let reach = input(places.reach(), 0.0);
+        let mut rates = vec![Recorded::default(); x.len()];
+        let mut split = Split::new(self);
+        self.additive_rates(Stage { explicit: x, implicit: &implicit, reach }, &mut rates, &mut split);
+        nodes(&rates)
+    }
+
     /// What of the machine an iteration matrix is made of, at the state of the last [`Dynamics::rhs`].
     fn stiff(&mut self, x: &[Recorded]) -> Stiff {
         let (n, dim) = (self.coordinates(), x.len());

@@ -5,7 +5,7 @@ use pyo3::prelude::*;
 use vpm_core::description::Description;
 use vpm_core::motion::{JointMotion, StrainRates};
 use vpm_core::sensitivity::Interrupt;
-use vpm_core::simulate::{Run, Setting, Stepping, closed_loop, drives_along, free_run, observed, restarts};
+use vpm_core::simulate::{Run, Setting, Stepping, closed_loop, drives_along, free_run, observed, resolution, restarts};
 
 use super::System;
 use crate::arrays::{self, Numbers, cube, matrix, places};
@@ -77,6 +77,29 @@ impl System {
             free_run(request.setting(&self.description, interrupt), initial.values(), inputs.as_table()?)
         })?;
         self.run(py, run, sensitivities.len())
+    }
+
+    /// What steps damp because they do not resolve it, in a run of `duration` (s) about `state`: the frequency above which vibrations lose
+    /// more than a tenth (Hz), and for each lightly damped mode that does (m, 4): frequency, damping ratio, time, share that is left.
+    #[expect(clippy::too_many_arguments, reason = "the arguments of the Python function")]
+    fn resolution<'py>(
+        &self,
+        py: Python<'py>,
+        theta: &Any<'py>,
+        state: &Any<'py>,
+        time_step: f64,
+        substeps: i64,
+        integrator: &str,
+        duration: f64,
+    ) -> PyResult<(f64, Table<'py>)> {
+        let request = Request::new(self, theta, (time_step, substeps, integrator), &[])?;
+        let state = Numbers::vector("state", state)?;
+        let found = self.compute(py, |interrupt| {
+            let Setting { description, theta, stepping, .. } = request.setting(&self.description, interrupt);
+            resolution(description, theta, state.values(), stepping, duration)
+        })?;
+        let rows = found.damped.iter().flat_map(|mode| [mode.frequency, mode.ratio, mode.time, mode.left]).collect();
+        Ok((found.limit, matrix(py, rows, [found.damped.len(), 4])?))
     }
 
     /// Closed loop on references, with disturbances added to the commands: as `simulate`.

@@ -3,63 +3,8 @@
 use super::cholesky::Cholesky;
 use super::dynamics::Motion;
 use super::rosenbrock::Mechanism;
+use crate::integrator::additive::{EXPLICIT, GAMMA, IMPLICIT, PLACES, STAGES};
 use crate::scalar::Scalar;
-
-const STAGES: usize = 6;
-
-/// The diagonal coefficient of the implicit table, after its explicit first stage.
-const GAMMA: f64 = 0.25;
-
-/// Times of the stages.
-const PLACES: [f64; STAGES] = [0.0, 0.5, 83.0 / 250.0, 31.0 / 50.0, 17.0 / 20.0, 1.0];
-
-/// What the mass matrix and the velocity terms see.
-const EXPLICIT: [[f64; STAGES]; STAGES] = [
-    [0.0; STAGES],
-    [0.5, 0.0, 0.0, 0.0, 0.0, 0.0],
-    [13861.0 / 62500.0, 6889.0 / 62500.0, 0.0, 0.0, 0.0, 0.0],
-    [
-        -116923316275.0 / 2393684061468.0,
-        -2731218467317.0 / 15368042101831.0,
-        9408046702089.0 / 11113171139209.0,
-        0.0,
-        0.0,
-        0.0,
-    ],
-    [
-        -451086348788.0 / 2902428689909.0,
-        -2682348792572.0 / 7519795681897.0,
-        12662868775082.0 / 11960479115383.0,
-        3355817975965.0 / 11060851509271.0,
-        0.0,
-        0.0,
-    ],
-    [
-        647845179188.0 / 3216320057751.0,
-        73281519250.0 / 8382639484533.0,
-        552539513391.0 / 3454668386233.0,
-        3354512671639.0 / 8306763924573.0,
-        4040.0 / 17871.0,
-        0.0,
-    ],
-];
-
-/// What the stiff forces see; the last row is the step itself.
-const IMPLICIT: [[f64; STAGES]; STAGES] = [
-    [0.0; STAGES],
-    [0.25, GAMMA, 0.0, 0.0, 0.0, 0.0],
-    [8611.0 / 62500.0, -1743.0 / 31250.0, GAMMA, 0.0, 0.0, 0.0],
-    [5012029.0 / 34652500.0, -654441.0 / 2922500.0, 174375.0 / 388108.0, GAMMA, 0.0, 0.0],
-    [
-        15267082809.0 / 155376265600.0,
-        -71443401.0 / 120774400.0,
-        730878875.0 / 902184768.0,
-        2285395.0 / 8070912.0,
-        GAMMA,
-        0.0,
-    ],
-    [82889.0 / 524892.0, 0.0, 15625.0 / 83664.0, 69875.0 / 102672.0, -2260.0 / 8211.0, GAMMA],
-];
 
 /// Fourth order in fixed steps on second-order equations; L-stable for the linear forces, explicit in all others.
 ///

@@ -13,6 +13,7 @@ pub mod places;
 pub mod servo_machine;
 pub mod sums;
 pub mod trees;
+pub mod two_beams;
 pub mod two_link;
 pub mod values;
 

@@ -1,8 +1,10 @@
 //! How time steps are taken.
 
 mod adaptive;
+mod additive;
 mod convergence;
 mod convergence_flexible;
+mod resolution;
 mod rosenbrock;
 mod semi_implicit;
 mod stability;

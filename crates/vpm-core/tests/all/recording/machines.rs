@@ -42,7 +42,7 @@ fn check(d: &Description, seed: u64) -> Result<()> {
         for (number, &input) in u.iter().enumerate() {
             direct.hold(number, input);
         }
-        let inputs = [x.clone(), u, theta.clone()].concat();
+        let inputs = [x.clone(), u, vec![0.0; dim + 1], theta.clone()].concat();
         let (mut rates, mut outputs) = (vec![0.0; dim], vec![0.0; d.n_outputs()]);
         let mut found = vec![0.0; sample.n_outputs()];
         sample.run(&inputs, &mut found);

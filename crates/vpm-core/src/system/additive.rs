@@ -1,0 +1,193 @@
+//! The rates of an additive step: linear stiffness, damping and friction where the stage will be, everything else where it has come to.
+
+use super::Dynamics;
+use crate::contact::ContactFriction;
+use crate::dynamics::{flexible, poses};
+use crate::integrator::Lu;
+use crate::scalar::Scalar;
+
+/// How often the resistances of friction are taken anew, at the velocity that the last ones led to.
+///
+/// Each time gains an order, so that four keep that of the step. The others serve friction far sharper than the step: chords from
+/// rest lower the dissipated power with every turn, however far they are from it (majorisation: the potential of friction that
+/// saturates is a concave function of the square of the velocity).
+const TURNS: usize = 8;
+
+/// Working memory of additive steps.
+#[derive(Clone, Debug)]
+pub(super) struct Split<S> {
+    /// Where the coordinates would be without acceleration.
+    coasting: Vec<S>,
+    /// Joints with friction that is not linear, or with a memory.
+    joints: Vec<usize>,
+    /// Acceleration of all coordinates per effort on each of these joints.
+    columns: Vec<S>,
+    /// Velocity of these joints: with no friction, and at the end of the stage.
+    free: Vec<S>,
+    velocity: Vec<S>,
+    /// Resistance of each, and what acts on it at rest.
+    resistance: Vec<S>,
+    rest: Vec<S>,
+    lu: Lu<S>,
+}
+
+/// The states of a stage of an additive step, explicit and implicit, and the time by which its own rates move the latter on, s.
+#[derive(Clone, Copy)]
+pub(super) struct Stage<'a, S> {
+    pub(super) explicit: &'a [S],
+    pub(super) implicit: &'a [S],
+    pub(super) reach: S,
+}
+
+impl<S: Scalar> Split<S> {
+    /// For the machine `dynamics`.
+    pub(super) fn new(dynamics: &Dynamics<S>) -> Self {
+        let laws = dynamics.effects.iter().filter(|(_, effect)| !effect.is_damped_linearly());
+        let mut joints: Vec<usize> = laws.map(|(joint, _)| *joint).collect();
+        joints.extend(dynamics.memories.iter().map(|(joint, ..)| joint));
+        joints.sort_unstable();
+        joints.dedup();
+        let (n, count) = (dynamics.coordinates(), joints.len());
+        let [free, velocity, resistance, rest] = [0; 4].map(|_| vec![S::zero(); count]);
+        let (coasting, columns) = (vec![S::zero(); n], vec![S::zero(); n * count]);
+        Self { coasting, joints, columns, free, velocity, resistance, rest, lu: Lu::new(count) }
+    }
+
+    /// Writes the accelerations of a stage into `rates`.
+    ///
+    /// Law: with a without friction from `M + reach D + reach^2 K` and the columns Y of its inverse, the joints of the friction move at
+    /// `(1 + reach Y R) w = v_I + reach (a + Y f)`, R and f taken where they are at w; then `a += Y (f - R w)`.
+    pub(super) fn accelerate(&mut self, dynamics: &mut Dynamics<S>, stage: Stage<'_, S>, rates: &mut [S]) {
+        let (n, count, reach) = (dynamics.coordinates(), self.joints.len(), stage.reach);
+        let v = &stage.implicit[n..2 * n];
+        self.coasting.copy_from_slice(&stage.implicit[..n]);
+        self.coasting.iter_mut().zip(v).for_each(|(q, &v)| *q += v * reach);
+        dynamics.push_apart(stage, &self.coasting);
+        dynamics.data.factorise();
+        let acceleration = &mut rates[n..2 * n];
+        acceleration.copy_from_slice(&dynamics.loads);
+        dynamics.data.solve(acceleration);
+        for (k, (column, &joint)) in self.columns.chunks_exact_mut(n.max(1)).zip(&self.joints).enumerate() {
+            column.fill(S::zero());
+            column[joint] = S::one();
+            dynamics.data.solve(column);
+            self.free[k] = v[joint] + acceleration[joint] * reach;
+            self.velocity[k] = v[joint];
+        }
+        for _ in 0..if count == 0 { 0 } else { TURNS } {
+            self.rub(dynamics, stage);
+            self.turn(n, reach);
+        }
+        let ends = self.rest.iter().zip(&self.resistance).zip(&self.velocity);
+        for (column, ((&rest, &resistance), &w)) in self.columns.chunks_exact(n.max(1)).zip(ends) {
+            let effort = rest - resistance * w;
+            acceleration.iter_mut().zip(column).for_each(|(a, &entry)| *a += entry * effort);
+        }
+        for (k, &v) in v.iter().enumerate() {
+            rates[k] = v + rates[n + k] * reach;
+        }
+    }
+
+    /// Resistances at the velocities that are known, and what acts on the joints beside them.
+    fn rub(&mut self, dynamics: &Dynamics<S>, Stage { explicit, implicit, reach }: Stage<'_, S>) {
+        for (k, &joint) in self.joints.iter().enumerate() {
+            let (q, w, load) = (explicit[joint], self.velocity[k], dynamics.efforts[joint].abs());
+            let (mut resistance, mut rest) = (S::zero(), S::zero());
+            for (_, effect) in dynamics.effects.iter().filter(|(place, _)| *place == joint) {
+                let per_load = effect.resistance_per_load(w);
+                resistance += effect.resistance(q, w) - effect.damping() + per_load * load;
+                rest -= (effect.share_of_load(q, w) - per_load * w) * load;
+            }
+            let memories = implicit[dynamics.first_memory()..].iter().zip(dynamics.memories.iter());
+            for (&z, (_, law, _)) in memories.filter(|(_, (place, ..))| *place == joint) {
+                let fading = law.fading(w, z);
+                let kept = (fading * reach + 1.0).recip();
+                resistance -= law.effort(kept / law.displacement * reach);
+                rest += law.effort(z * kept);
+            }
+            // What drives instead of resisting would take the inverse apart.
+            let driving = resistance.min(S::zero());
+            (self.resistance[k], self.rest[k]) = (resistance - driving, rest - driving * w);
+        }
+    }
+
+    /// Velocities that these resistances lead to.
+    fn turn(&mut self, n: usize, reach: S) {
+        let count = self.joints.len();
+        self.velocity.copy_from_slice(&self.free);
+        for (k, &joint) in self.joints.iter().enumerate() {
+            let row = &mut self.lu.matrix()[k * count..(k + 1) * count];
+            for (other, (entry, column)) in row.iter_mut().zip(self.columns.chunks_exact(n)).enumerate() {
+                let moved = column[joint] * reach;
+                self.velocity[k] += moved * self.rest[other];
+                *entry = moved * self.resistance[other];
+            }
+            row[k] = row[k] + 1.0;
+        }
+        self.lu.factorise();
+        self.lu.solve(&mut self.velocity);
+    }
+}
+
+impl<S: Scalar> Dynamics<S> {
+    /// Writes the rates of an additive step; see [`crate::ode::Ode::additive_rates`]. Lags of ideal drives and memories are taken
+    /// implicitly too, whose laws are linear in their own states.
+    pub(super) fn additive_rates(&mut self, stage: Stage<'_, S>, rates: &mut [S], split: &mut Split<S>) {
+        let (n, first) = (self.coordinates(), self.first_memory());
+        let (q, v) = stage.explicit[..2 * n].split_at(n);
+        self.terms(q, v);
+        if !self.connections.is_free() {
+            poses(&self.model, &mut self.data);
+        }
+        self.actuate(stage.explicit, rates);
+        self.lag_behind(stage, rates);
+        split.accelerate(self, stage, rates);
+        let (motion, memories) = rates.split_at_mut(first);
+        for ((rate, &z), (joint, law, _)) in memories.iter_mut().zip(&stage.implicit[first..]).zip(self.memories.iter()) {
+            let w = motion[joint];
+            // At the velocity by which its effort was reckoned the fading is that of the turn before, to the error of the turns.
+            let fading = law.fading(w, z);
+            *rate = (w / law.displacement - fading * z) / (fading * stage.reach + 1.0);
+        }
+    }
+
+    /// Turns the rates of lags at the explicit states into those at the end of the stage.
+    fn lag_behind(&self, Stage { explicit, implicit, reach }: Stage<'_, S>, rates: &mut [S]) {
+        let mut place = 2 * self.coordinates();
+        for actuator in &self.actuators {
+            if let Some(lag) = &actuator.lag {
+                let slope = lag.rate(S::one(), S::zero());
+                let moved = rates[place] + slope * (implicit[place] - explicit[place]);
+                rates[place] = moved / (S::one() - slope * reach);
+            }
+            place += actuator.n_states();
+        }
+    }
+
+    /// All loads of a stage but for friction that is not linear, and `M + reach D + reach^2 K` in the place of the mass matrix.
+    fn push_apart(&mut self, Stage { explicit, implicit, reach }: Stage<'_, S>, coasting: &[S]) {
+        let Self { model, data, loads, tensions, connections, efforts, effects, .. } = self;
+        let (n, joints) = (model.n_coordinates(), efforts.len());
+        let v = &implicit[n..2 * n];
+        loads[..joints].copy_from_slice(efforts);
+        loads[joints..].fill(S::zero());
+        if self.pulls {
+            flexible::add_line_forces(data, tensions, loads);
+        }
+        if !connections.is_free() {
+            connections.add_loads(model, data, ContactFriction::resistance, loads);
+        }
+        loads.iter_mut().zip(&data.composite.bias).for_each(|(load, &bias)| *load -= bias);
+        flexible::subtract_elastic(model, coasting, v, loads);
+        flexible::stiffen(model, reach, &mut data.mass_matrix);
+        for (joint, effect) in effects {
+            let (joint, q) = (*joint, explicit[*joint]);
+            // A spring that pushes away is left explicit.
+            let stiffness = -effect.slope_at_rest(q).min(S::zero());
+            let damping = effect.damping();
+            loads[joint] += effect.effort_at_rest(q) + stiffness * (q - coasting[joint]) - damping * v[joint];
+            let diagonal = &mut data.mass_matrix[joint * n + joint];
+            *diagonal = *diagonal + (damping + stiffness * reach) * reach;
+        }
+    }
+}
