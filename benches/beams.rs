@@ -28,7 +28,9 @@ fn main() -> Result<()> {
         .measurement_time(Duration::from_secs(1))
         .sample_size(30)
         .configure_from_args();
-    for level in [Level::Strain(3), Level::Bezier(4), Level::Hermite(4), Level::Modal(2), Level::Lumped(6)] {
+    for level in
+        [Level::Strain(3), Level::Bezier(4), Level::Deflection(4), Level::Hermite(4), Level::Modal(2), Level::Lumped(6)]
+    {
         for (name, deforms) in [("plane", &[BendingX][..]), ("space", &[BendingX, BendingY, Torsion])] {
             let (mut values, mut derivatives) =
                 (motion::<f64>(level, deforms)?, motion::<Dual<f64, 8>>(level, deforms)?);

@@ -19,9 +19,12 @@ fn main() -> Result<()> {
         .warm_up_time(Duration::from_millis(500))
         .measurement_time(Duration::from_secs(2))
         .configure_from_args();
-    for (name, level) in
-        [("strain3", json!({"strain": 3})), ("bezier4", json!({"bezier": 4})), ("modal3", json!({"modal": 3}))]
-    {
+    for (name, level) in [
+        ("strain3", json!({"strain": 3})),
+        ("bezier4", json!({"bezier": 4})),
+        ("deflection4", json!({"deflection": 4})),
+        ("modal3", json!({"modal": 3})),
+    ] {
         let description = two_link::arm(&level)?;
         let mut system = description.system::<f64>(&description.parameters)?;
         let start: Vec<f64> = (0..system.dim()).map(|k| 0.01 * (1.0 + k as f64).sin()).collect();

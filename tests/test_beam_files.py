@@ -198,6 +198,7 @@ def test_a_beam_may_be_the_whole_machine() -> None:
         ("lumped(4)", 4, 4),
         ("modal(3)", 3, 3),
         ("bezier(4)", 3, 4),
+        ("deflection(4)", 3, 4),
         ("hermite(2)", 4, 2),
         ("strain(3)", 3, 3),
         ("elements(3)", 4, 4),
@@ -274,7 +275,7 @@ RECTANGLE = '{ shape = "rectangle", width = { value = 15.0, unit = "mm" }, heigh
 WRONG = [
     # form
     ("length = 0.44\n", "", "beams.upper.length", "length = 0.5"),
-    ('level = "strain(3)"\n', "", "beams.upper.level", 'level = "strain(3)"'),
+    ('level = "strain(3)"\n', "", "beams.upper.level", 'level = "bezier(4)"'),
     ('"strain(3)"', '"strain"', "beams.upper.level", "needs a number"),
     ('"bending_x", "torsion"', '"bending_x", "bending_z"', "beams.upper.deforms[1]", 'or "bending_x"'),
     ('"bending_x", "torsion"', '"torsion", "torsion"', "beams.upper.deforms", "has torsion twice"),

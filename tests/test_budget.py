@@ -50,7 +50,7 @@ def test_a_rate_that_no_machine_has_does_not_hold_and_the_stage_is_named() -> No
 def test_a_model_made_too_slow_fails_and_names_what_made_it_slow(tmp_path: Path) -> None:
     # Twenty elements in each link: what takes the time is their mass matrix and what an implicit step makes of it.
     path = tmp_path / "slow.toml"
-    path.write_text(TUDOR.read_text(encoding="utf-8").replace("strain(4)", "elements(20)"), encoding="utf-8")
+    path.write_text(TUDOR.read_text(encoding="utf-8").replace("bezier(5)", "elements(20)"), encoding="utf-8")
     fast, slow = (budget(Model.load(file), steps=1000, share=1.0) for file in (TUDOR, path))
     assert slow.quantiles["p50"] > 5.0 * fast.quantiles["p50"]
     slow = replace(slow, share=0.5 * slow.quantiles["p50"] * slow.rate)

@@ -30,7 +30,7 @@ def test_the_exact_level_is_the_elastica(drawn: SimpleNamespace) -> None:
         np.testing.assert_allclose(place, (1.0 - shortening, -down), atol=2e-6)
 
 
-@pytest.mark.parametrize("level", ["bezier(4)", "hermite(2)", "modal(3)"])
+@pytest.mark.parametrize("level", ["deflection(4)", "hermite(2)", "modal(3)"])
 @pytest.mark.parametrize("case", ["force at the tip", "own weight"])
 def test_loads_at_rest_stay_within_a_percent_up_to_the_limit(drawn: SimpleNamespace, level: str, case: str) -> None:
     limit = drawn.cantilever(drawn.EXACT).core.slope_limit
@@ -47,7 +47,7 @@ def test_loads_at_rest_stay_within_a_percent_up_to_the_limit(drawn: SimpleNamesp
 
 
 def test_a_quick_turn_reaches_a_percent_at_a_slope_of_a_tenth(drawn: SimpleNamespace) -> None:
-    (slope, error), *_ = drawn.validity("bezier(4)", drawn.spun, np.array([4.5]))
+    (slope, error), *_ = drawn.validity("deflection(4)", drawn.spun, np.array([4.5]))
     assert slope == pytest.approx(0.10, abs=0.005)
     assert error == pytest.approx(0.0105, abs=0.002)
 

@@ -123,7 +123,7 @@ def test_a_diverging_simulation_hands_over_what_it_had() -> None:
 
 
 def test_leaving_the_range_of_a_level_warns_wherever_it_happens(tmp_path: Path) -> None:
-    arm = Model.from_toml(ARM).at("bezier(4)")
+    arm = Model.from_toml(ARM).at("deflection(4)")
     runs = []
     asked: tuple[Callable[[], Run], ...] = (
         lambda: simulate(arm, push(20.0)),
@@ -131,7 +131,7 @@ def test_leaving_the_range_of_a_level_warns_wherever_it_happens(tmp_path: Path) 
         lambda: Simulation(arm, 1e-3).run(lambda _: [20.0], 0.3),
     )
     for ask in asked:
-        with pytest.warns(ValidityWarning, match=r"upper bends by .* rad at t = .* s.*strain\(3\)"):
+        with pytest.warns(ValidityWarning, match=r"upper bends by .* rad at t = .* s.*bezier\(4\)"):
             runs.append(ask())
     for run in runs:
         assert len(run.notes) == 1
@@ -142,12 +142,12 @@ def test_leaving_the_range_of_a_level_warns_wherever_it_happens(tmp_path: Path) 
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert simulate(arm, push(0.5)).notes == ()
-        assert Simulation(arm.at("strain(3)"), 1e-3).run(np.full((300, 1), 20.0)).notes == ()
+        assert Simulation(arm.at("bezier(4)"), 1e-3).run(np.full((300, 1), 20.0)).notes == ()
 
 
 def test_the_command_line_warns_lists_and_plots(tmp_path: Path) -> None:
     model, log, picture = tmp_path / "arm.toml", tmp_path / "log.csv", tmp_path / "run.png"
-    model.write_text(ARM.replace("strain(3)", "bezier(4)") + CHANNELS, encoding="utf-8")
+    model.write_text(ARM.replace("strain(3)", "deflection(4)") + CHANNELS, encoding="utf-8")
     rows = "".join(f"{1e-3 * k:.3f},20.0\n" for k in range(300))
     log.write_text("t,i\n" + rows, encoding="utf-8")
     done = CliRunner().invoke(app, ["simulate", str(model), str(log), "--plot", str(picture)])
@@ -156,10 +156,10 @@ def test_the_command_line_warns_lists_and_plots(tmp_path: Path) -> None:
         assert words in done.output
     assert picture.stat().st_size > 5000
     done = CliRunner().invoke(app, ["info", str(model)])
-    assert "beam upper: level bezier(4), 3 elastic coordinates (bending_y)" in done.output
+    assert "beam upper: level deflection(4), 3 elastic coordinates (bending_y)" in done.output
     assert "natural frequencies with all joints locked at zero: 13.2" in done.output
     assert "warning" not in done.output
-    soft = ARM.replace("strain(3)", "bezier(4)").replace("value = 206.0", "value = 2.0")
+    soft = ARM.replace("strain(3)", "deflection(4)").replace("value = 206.0", "value = 2.0")
     model.write_text(soft, encoding="utf-8")
     done = CliRunner().invoke(app, ["info", str(model)])
     assert "warning: upper sags by" in done.output

@@ -187,7 +187,7 @@ def test_a_payload_on_a_fixed_body_sits_in_its_frame() -> None:
 LENGTH, WIDTH, HEIGHT, YOUNG, DENSITY, LOAD = 0.5, 0.004, 0.015, 206e9, 7850.0, 0.05
 STIFFNESS = YOUNG * HEIGHT * WIDTH**3 / 12.0
 LINE_DENSITY = DENSITY * WIDTH * HEIGHT
-LEVELS = ("lumped(40)", "modal(4)", "bezier(5)", "hermite(2)", "strain(3)", "elements(6)")
+LEVELS = ("lumped(40)", "modal(4)", "bezier(5)", "deflection(5)", "hermite(2)", "strain(3)", "elements(6)")
 
 
 def cantilever(level: str, *, load: float, gravity: float = G) -> Model:
@@ -255,6 +255,7 @@ def test_every_level_is_a_system_with_these_coordinates(level: str) -> None:
         ("lumped(40)", 2e-3),
         ("modal(4)", 1e-3),
         ("bezier(5)", 2e-5),
+        ("deflection(5)", 2e-5),
         ("hermite(2)", 2e-5),
         ("strain(3)", 2e-5),
         ("elements(6)", 2e-3),

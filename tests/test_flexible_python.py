@@ -68,7 +68,7 @@ at = "shoulder"
 viscous = 0.05
 """
 
-LEVELS = ("strain(3)", "elements(2)", "bezier(4)", "hermite(2)", "modal(2)", "lumped(6)")
+LEVELS = ("strain(3)", "elements(2)", "bezier(4)", "deflection(4)", "hermite(2)", "modal(2)", "lumped(6)")
 
 
 @pytest.fixture(scope="module")
@@ -109,7 +109,7 @@ def test_inverse_and_forward_dynamics_undo_each_other(arm: Model, level: str) ->
     assert model.energy(q, v)[0] == pytest.approx(0.5 * v @ mass @ v, rel=1e-9)
 
 
-@pytest.mark.parametrize("level", ["strain(3)", "bezier(3)"])
+@pytest.mark.parametrize("level", ["strain(3)", "bezier(3)", "deflection(3)"])
 def test_the_jacobian_of_a_marker_is_the_slope_of_its_place(arm: Model, level: str) -> None:
     model, random = arm.at(level), np.random.default_rng(5)
     n = len(model.coordinates)
@@ -228,8 +228,8 @@ def test_inverse_dynamics_names_the_mode_that_works(arm: Model) -> None:
 
 
 def test_bending_beyond_the_kinematics_warns_once_and_stays_in_the_run(arm: Model, tmp_path: Path) -> None:
-    soft = arm.at("bezier(3)").with_parameters({"upper.young": 4e9})
-    with pytest.warns(ValidityWarning, match=r"strain\(3\)") as seen:
+    soft = arm.at("deflection(3)").with_parameters({"upper.young": 4e9})
+    with pytest.warns(ValidityWarning, match=r"bezier\(4\)") as seen:
         run = simulate(soft, swing(), "prescribed_motion", cutoff=25.0)
     assert len(seen) == 1
     warning = seen[0].message
@@ -242,7 +242,7 @@ def test_bending_beyond_the_kinematics_warns_once_and_stays_in_the_run(arm: Mode
     assert Run.load(run.save(tmp_path / "run.npz")) == run
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        assert simulate(soft.at("strain(3)"), swing(), "prescribed_motion", cutoff=25.0).notes == ()
+        assert simulate(soft.at("bezier(4)"), swing(), "prescribed_motion", cutoff=25.0).notes == ()
 
 
 def test_explicit_steps_that_are_too_long_name_the_mode_and_the_step(arm: Model) -> None:

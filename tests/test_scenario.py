@@ -252,9 +252,9 @@ def test_logged_supplies_have_the_pressure_that_is_given_or_that_of_the_model(fo
 
 def test_flexible_links_begin_in_their_equilibrium() -> None:
     made = Scenario.load(ROOT / "examples" / "flexible_pendulum" / "release.toml")
-    model = made.models["strain(6)"]
+    model = made.models["bezier(7)"]
     place = math.radians(30.0)
-    assert made.initial_state("strain(6)")[: len(model.coordinates)] == pytest.approx(model.equilibrium([place])[0])
+    assert made.initial_state("bezier(7)")[: len(model.coordinates)] == pytest.approx(model.equilibrium([place])[0])
     assert made.models["rigid"].coordinates == ("pivot",)
 
 

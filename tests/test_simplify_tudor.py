@@ -75,7 +75,7 @@ def test_the_coarsest_come_first_and_what_is_dear_is_not_fitted(ladder: Ladder, 
     assert ladder.cut > 0
     # Four-stage steps of a model that is as good as the full one take several times as long as its linear ones.
     stepped = {
-        rung.integrator for rung in ladder.rungs if rung.removed == ("strip_1 as strain(2)", "strip_2 as strain(2)")
+        rung.integrator for rung in ladder.rungs if rung.removed == ("strip_1 as bezier(3)", "strip_2 as bezier(3)")
     }
     assert "linearly_implicit" in stepped
     assert "rosenbrock" not in stepped

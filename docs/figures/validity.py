@@ -22,7 +22,7 @@ HERE = Path(__file__).resolve().parent
 Array = NDArray[np.float64]
 
 #: Levels that interpolate the deflection, and the one that is exact to 1e-6 of the length (docs/validation.md).
-INTERPOLATED, EXACT = ("bezier(4)", "hermite(2)", "modal(3)"), "strain(9)"
+INTERPOLATED, EXACT = ("deflection(4)", "hermite(2)", "modal(3)"), "strain(9)"
 
 #: Counts per level, for the picture of frequencies.
 COUNTS = {

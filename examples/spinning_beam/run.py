@@ -58,7 +58,7 @@ def main(folder: Path) -> None:
     figure = Figure(figsize=(8.0, 4.0), layout="constrained")
     axis = figure.subplots()
     print(f"{'level':22s} {'largest':>9s} {'at the end':>11s}   deflection of the tip, m")
-    for level, line in (("strain(6)", "-"), ("bezier(6)", "--")):
+    for level, line in (("bezier(7)", "-"), ("deflection(6)", "--")):
         when, seen = deflection(model.at(level))
         axis.plot(when, seen, line, label=level)
         print(f"{level:22s} {np.abs(seen).max():9.4f} {seen[-1]:11.4f}")

@@ -170,7 +170,7 @@ class ValidityWarning(UserWarning):
     ) -> None:
         exact = (
             "use a level that is exact at any deflection: "
-            f'level = "strain(3)" in the model file, or model.at({{"{beam}": "strain(3)"}})'
+            f'level = "bezier(4)" in the model file, or model.at({{"{beam}": "bezier(4)"}})'
         )
         what, repair = (
             (f"its level {level}", exact)

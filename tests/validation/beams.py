@@ -25,6 +25,7 @@ def frequencies() -> list[Row]:
     for level, count, tolerance in (
         ("strain(12)", 5, 1e-6),
         ("bezier(12)", 4, 1e-6),
+        ("deflection(12)", 4, 1e-6),
         ("modal(3)", 3, 1e-6),
         ("hermite(40)", 3, 1e-5),
         ("elements(40)", 3, 1e-5),
@@ -56,7 +57,7 @@ def timoshenko() -> list[Row]:
 def turning() -> list[Row]:
     """Beams on a turning hub: the pull of the centrifugal force makes them stiffer."""
     rows = []
-    for level in ("strain(11)", "bezier(12)"):
+    for level in ("strain(11)", "bezier(12)", "deflection(12)"):
         found: dict[str, list[Array]] = {"flap": [], "lag": []}
         wanted: dict[str, list[Array]] = {"flap": [], "lag": []}
         for name, case in values("beams")["rotating_cantilever_frequencies"]["values"].items():
@@ -87,7 +88,7 @@ def statics() -> list[Row]:
     cases, curves = values("beams"), accepted("curves")
     loads = np.array(cases["tip_loaded_cantilever_elastica"]["rows"])
     rows = []
-    for level, tolerance in (("strain(9)", 1e-6), ("elements(20)", 1e-6)):
+    for level, tolerance in (("strain(9)", 1e-6), ("bezier(10)", 1e-6), ("elements(20)", 1e-6)):
         tips = []
         for load, *_ in loads:
             seen = at_rest(cantilever(level, 1.0, strip(line=1e-12), tip=load, gravity=1.0))

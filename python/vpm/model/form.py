@@ -39,7 +39,7 @@ _EXAMPLES: Mapping[str, str] = {
     "column": 'column = "q_m"',
     "unit": 'unit = "m"',
     "length": "length = 0.5",
-    "level": 'level = "strain(3)"',
+    "level": 'level = "bezier(4)"',
     "material": "material = { young = 206e9, poisson = 0.3, density = 7850 }",
     "young": 'young = { value = 206, unit = "GPa" }',
     "density": "density = 7850",

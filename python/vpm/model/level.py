@@ -17,7 +17,7 @@ COMPONENTS: tuple[Component, ...] = get_args(Component)
 #: What a link deforms in unless its model says otherwise.
 USUAL: tuple[Component, ...] = ("bending_x", "bending_y", "torsion")
 
-LevelName = Literal["rigid", "lumped", "modal", "bezier", "hermite", "strain", "elements"]
+LevelName = Literal["rigid", "lumped", "modal", "bezier", "deflection", "hermite", "strain", "elements"]
 
 _WRITTEN = re.compile(r"\s*(?P<name>[A-Za-z_]+)\s*(?:\(\s*(?P<number>[+-]?\d+)\s*\)\s*)?")
 
@@ -36,6 +36,7 @@ FORMS: Mapping[str, _Form] = {
     "lumped": _Form("the number of rigid segments", 1, 200),
     "modal": _Form("the number of modes per component", 1, 8),
     "bezier": _Form("the degree of the curve", 2, 12),
+    "deflection": _Form("the degree of the deflection", 2, 12),
     "hermite": _Form("the number of cubic elements", 1, 100),
     "strain": _Form("the number of polynomials per component", 1, 12),
     "elements": _Form("the number of elements", 1, 100),
@@ -49,7 +50,7 @@ class Level:
 
     Attributes
     ----------
-    name : {"rigid", "lumped", "modal", "bezier", "hermite", "strain", "elements"}
+    name : {"rigid", "lumped", "modal", "bezier", "deflection", "hermite", "strain", "elements"}
     number : int
         Of segments, modes, elements or polynomials, or the degree of the curve; 0 for a rigid beam.
     """
@@ -75,7 +76,7 @@ class Level:
         match self.name:
             case "rigid":
                 return 0
-            case "bezier":
+            case "bezier" | "deflection":
                 return self.number - 1 if bends else self.number
             case "hermite":
                 return 2 * self.number if bends else self.number

@@ -18,10 +18,9 @@ from vpm.simplify.hydraulics import hydraulic_drives, possible_changes, simpler
 from vpm.simplify.terms import MACHINE, removable, terms_site, without_terms
 
 #: Levels that a flexible link is offered, where they have fewer coordinates than its own; docs/beams.md compares them.
+#: Polynomials of the strain are not among them: they bend as Bezier curves of one degree more do.
 OFFERED = (
     "elements(8)",
-    "strain(3)",
-    "strain(2)",
     "bezier(4)",
     "bezier(3)",
     "bezier(2)",

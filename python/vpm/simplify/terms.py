@@ -16,7 +16,7 @@ from vpm.model.level import size_of
 #: What all of it is called in the place of single parts.
 MACHINE = "the machine"
 #: Levels that have terms of second order apart from the others: hinges between rigid segments have not.
-CURVED = ("modal", "bezier", "hermite", "strain", "elements")
+CURVED = ("modal", "bezier", "deflection", "hermite", "strain", "elements")
 
 
 def removable(model: Model) -> Iterator[tuple[str, str]]:

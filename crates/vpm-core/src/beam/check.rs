@@ -13,6 +13,7 @@ impl Level {
             Self::Lumped(n) => Some((n, 1, 200, "lie between 1 and 200 for rigid segments")),
             Self::Modal(k) => Some((k, 1, 8, "lie between 1 and 8 for modes of a component")),
             Self::Bezier(n) => Some((n, 2, 12, "lie between 2 and 12 for the degree of a Bezier centreline")),
+            Self::Deflection(n) => Some((n, 2, 12, "lie between 2 and 12 for the degree of the deflection")),
             Self::Hermite(n) => Some((n, 1, 100, "lie between 1 and 100 for cubic elements")),
             Self::Strain(n) => Some((n, 1, 12, "lie between 1 and 12 for Legendre coefficients of strain")),
             Self::Elements(n) => Some((n, 1, 100, "lie between 1 and 100 for elements of linear strain")),

@@ -1,5 +1,6 @@
 //! From the entry of a beam to its map, its stations and its constant matrices.
 
+use super::Basis;
 use super::damping::damping;
 use super::deflection::{DeflectionAxis, LinearAxis, modal};
 use super::entry::{BeamEntry, Component, Level};
@@ -22,6 +23,11 @@ const ELEMENT_STATIONS: usize = 3;
 enum Order {
     First,
     Second,
+}
+
+/// Whether the poses of the sections are integrated from the strain, exact at any deflection; elsewhere they are right to second order.
+fn integrated(level: Level) -> bool {
+    matches!(level, Level::Strain(_) | Level::Elements(_) | Level::Bezier(_))
 }
 
 /// A section that carries inertia, something else, or both.
@@ -67,24 +73,26 @@ impl<S: Scalar> Beam<S> {
     fn smooth(entry: &BeamEntry<S>, profile: &Profile<S>, marks: &[f64], order: Order) -> Result<Self> {
         let field = |&component| Ok(Field { component, basis: basis(entry.level, component, entry.length)? });
         let mut list = entry.deforms.iter().map(field).collect::<Result<Vec<_>>>()?;
+        let most = |count: fn(&Basis) -> usize| list.iter().map(|field| count(&field.basis)).max().unwrap_or(1);
         let (interpolated, points) = match entry.level {
             Level::Strain(n) => (Interpolated::Strain, n + STRAIN_STATIONS),
+            Level::Bezier(_) => (Interpolated::Deflection, most(Basis::len) + STRAIN_STATIONS),
             Level::Elements(_) => (Interpolated::Strain, ELEMENT_STATIONS),
             Level::Hermite(_) => (Interpolated::Deflection, ELEMENT_STATIONS),
             Level::Modal(count) => {
                 list = modal(profile, list, count)?;
                 (Interpolated::Deflection, 2 * count + STRAIN_STATIONS)
             }
-            _ => (Interpolated::Deflection, list.iter().map(|field| field.basis.points()).max().unwrap_or(1)),
+            _ => (Interpolated::Deflection, most(Basis::points)),
         };
         let fields = Fields::new(interpolated, list);
         let rule = profile.rule(points, &fields.breaks());
         let (places, marks) = merged(rule.iter().map(|at| Place { at: at.place, weight: at.weight }).collect(), marks);
         let at: Vec<f64> = places.iter().map(|place| place.at).collect();
-        let axis = match interpolated {
-            _ if order == Order::First => Axis::Linear(LinearAxis::new(&fields, &at)),
-            Interpolated::Deflection => Axis::Deflection(DeflectionAxis::new(&fields, &at)),
-            Interpolated::Strain => {
+        let axis = match order {
+            Order::First => Axis::Linear(LinearAxis::new(&fields, &at)),
+            Order::Second if !integrated(entry.level) => Axis::Deflection(DeflectionAxis::new(&fields, &at)),
+            Order::Second => {
                 PlaneAxis::new(&fields, &at).map_or_else(|| Axis::Space(SpaceAxis::new(&fields, &at)), Axis::Plane)
             }
         };

@@ -42,8 +42,10 @@ pub enum Level {
     Lumped(usize),
     /// The slowest clamped modes of each component, displacement kinematics.
     Modal(usize),
-    /// A Bezier centreline of that degree, displacement kinematics.
+    /// A Bezier centreline of that degree: the control points of the deflection give the strain, exact geometry.
     Bezier(usize),
+    /// The same control points, displacement kinematics: right up to second order in the deflection.
+    Deflection(usize),
     /// That many cubic elements, displacement kinematics.
     Hermite(usize),
     /// That many Legendre coefficients of strain for each component: exact geometry.

@@ -5,7 +5,8 @@
 //! `K = diag(EJx, EJy, GJ, ax GA, ay GA, EA)`, its inertia per length `rho diag(Jx, Jy, J, A, A, A)`.
 //!
 //! [`Beam`] is the beam of a machine, over the number type of its parameters: the same sums for every level, only the map from
-//! coordinates to sections differs (interpolated strain, interpolated deflection, rigid segments with springs).
+//! coordinates to sections differs: strain integrated along the axis, of Bezier control points or strain coordinates; interpolated
+//! deflection; rigid segments with springs.
 //! [`linear`] interpolates the deflection: constant matrices, small deflection, stiffening by the second-order shortening.
 //! [`strain`] interpolates the strain and integrates the pose along the axis: exact at any deflection, in space, in a tree.
 //! [`planar`] is the same for chains of inextensible links that move in one plane, in fixed sizes, made for real time.

@@ -1,4 +1,4 @@
-//! Beams whose deflection is interpolated: cheap, and right up to second order in the deflection.
+//! Beams whose deflection is interpolated (levels `deflection`, `hermite`, `modal`): right up to second order in the deflection.
 //!
 //! The linear fields are `s = Phi q`; the rotation vector of a section is `w = Phi_w q + 1/2 q^T W q`, its place
 //! `v = Phi_v q + 1/2 q^T V q` with constant matrices, and its axes are `exp([w]x)`: a proper rotation that takes z to the tangent by the

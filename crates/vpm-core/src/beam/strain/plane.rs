@@ -140,7 +140,7 @@ impl PlaneAxis {
 fn turned(fields: &Fields, angle: &[f64], begin: f64, to: f64) -> Vec<f64> {
     let mut turned = angle.to_vec();
     for point in composite(fields.points(), &[begin, to]) {
-        for (sum, entry) in turned.iter_mut().zip(fields.row(point.place, |_| 0)) {
+        for (sum, entry) in turned.iter_mut().zip(fields.strain_row(point.place)) {
             *sum += point.weight * entry;
         }
     }

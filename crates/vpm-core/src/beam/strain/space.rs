@@ -146,7 +146,7 @@ fn moments(fields: &Fields, begin: f64, end: f64) -> [Vec<f64>; 2] {
     let mut sums = [vec![0.0; fields.len()], vec![0.0; fields.len()]];
     let (middle, size) = (0.5 * (begin + end), end - begin);
     for at in gauss(fields.points() + 1, -0.5, 0.5) {
-        for (k, entry) in fields.row(middle + size * at.place, |_| 0).into_iter().enumerate() {
+        for (k, entry) in fields.strain_row(middle + size * at.place).into_iter().enumerate() {
             sums[0][k] += at.weight * size * entry;
             sums[1][k] += at.weight * size * at.place * entry;
         }

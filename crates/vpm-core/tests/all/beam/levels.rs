@@ -219,7 +219,7 @@ const VALIDITY: [[f64; 2]; 8] = [
 fn interpolated_deflection_is_good_up_to_its_limit() -> Result<()> {
     // A force across the tip is the hardest of the usual loads.
     let error = |force: f64| -> Result<[f64; 2]> {
-        let (bent, exact) = (unit(Level::Bezier(4), &[BendingY]), unit(Level::Strain(6), &[BendingY]));
+        let (bent, exact) = (unit(Level::Deflection(4), &[BendingY]), unit(Level::Strain(6), &[BendingY]));
         let (load, root) = (Load { force: [force, 0.0, 0.0], ..Load::default() }, Root::resting([0.0; 3]));
         let (q, truth) = (equilibrium(&bent, &load, &root, 1)?, tip(&exact, &equilibrium(&exact, &load, &root, 1)?)?);
         let found = tip(&bent, &q)?;

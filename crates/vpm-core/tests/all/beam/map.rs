@@ -9,7 +9,14 @@ use crate::common::entries::{entry, lift, mixes};
 
 /// Beams of all levels, with all that they can do.
 fn levels() -> Vec<BeamEntry<f64>> {
-    let bending = [Level::Strain(3), Level::Elements(2), Level::Bezier(3), Level::Hermite(2), Level::Modal(2)];
+    let bending = [
+        Level::Strain(3),
+        Level::Elements(2),
+        Level::Bezier(3),
+        Level::Deflection(3),
+        Level::Hermite(2),
+        Level::Modal(2),
+    ];
     let mut all = mixes(&[&bending[..], &[Level::Lumped(3)]].concat());
     all.push(entry(Level::Rigid, &[], 0.8, [0.02, 0.01]));
     all

@@ -157,7 +157,7 @@ fn apart(one: &[Twist<f64>], two: &[Twist<f64>]) -> f64 {
 fn interpolated_deflection_is_the_second_order_of_exact_geometry() -> Result<()> {
     let (length, marks) = (0.8, [0.3, 0.8]);
     for deforms in [&[BendingY][..], &[BendingX, BendingY], &[BendingX, BendingY, Torsion], &ALL] {
-        let bent = Beam::new(&entry(Level::Bezier(4), deforms, length, [0.02, 0.01]), &marks)?;
+        let bent = Beam::new(&entry(Level::Deflection(4), deforms, length, [0.02, 0.01]), &marks)?;
         let exact = Beam::new(&entry(Level::Strain(5), &ALL, length, [0.02, 0.01]), &marks)?;
         let (n, m) = (bent.len(), exact.len());
         let direction = Random::new(5).numbers(n, 1.0);
@@ -196,14 +196,14 @@ fn bases_of_one_kinematics_agree() -> Result<()> {
         tip(&beam, &equilibrium(&beam, &load, &Root::resting(GRAVITY), 1)?)
     };
     let moment = [3.0, 2.0, 9.0];
-    let exact = sag(Level::Bezier(8), &deforms, moment)?;
-    for (level, tolerance) in [(Level::Bezier(5), 1e-9), (Level::Hermite(8), 1e-6), (Level::Hermite(16), 2e-7)] {
+    let exact = sag(Level::Deflection(8), &deforms, moment)?;
+    for (level, tolerance) in [(Level::Deflection(5), 1e-9), (Level::Hermite(8), 1e-6), (Level::Hermite(16), 2e-7)] {
         let found = sag(level, &deforms, moment)?;
         let error = (0..3).fold(0.0_f64, |most, k| most.max((found[k] - exact[k]).abs()));
         assert!(error < tolerance, "{level:?}: {error:e}");
     }
     // What modes leave out of the sag under a force goes with the third power of their number.
-    let shear_rigid = sag(Level::Bezier(8), &[BendingX, BendingY, Torsion], [0.0; 3])?;
+    let shear_rigid = sag(Level::Deflection(8), &[BendingX, BendingY, Torsion], [0.0; 3])?;
     let error = |count| -> Result<f64> {
         let found = sag(Level::Modal(count), &[BendingX, BendingY, Torsion], [0.0; 3])?;
         Ok((0..3).fold(0.0_f64, |most, k| most.max((found[k] - shear_rigid[k]).abs())))

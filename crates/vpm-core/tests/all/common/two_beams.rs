@@ -13,7 +13,7 @@ use vpm_core::joint::{Joint, JointKind};
 use vpm_core::model::Parts;
 use vpm_core::mount::Mount;
 
-use crate::trees::{UPRIGHT, description, parameter, push};
+use crate::common::trees::{UPRIGHT, description, parameter, push};
 
 /// Lengths of the links in m.
 pub const LENGTHS: [f64; 2] = [0.44, 0.41];

@@ -1,7 +1,6 @@
 //! What a method says it damps is what its runs damp.
 
-#[cfg(test)]
-mod common;
+use crate::common;
 
 use common::{Bench, Machine, close};
 use proptest::prelude::*;

@@ -229,7 +229,7 @@ fn a_heavy_strip_hangs_as_the_elastica_does() -> Result<()> {
 
 #[test]
 fn slopes_are_those_of_beams_with_interpolated_deflection() -> Result<()> {
-    let d = description(&strip(Level::Bezier(3)), |_| ());
+    let d = description(&strip(Level::Deflection(3)), |_| ());
     let mut x = vec![0.0; d.n_states()];
     assert_eq!(evaluate::slopes(&d, &d.parameters, Table::new("states", &x, 1, x.len())?)?, [0.0]);
     x[1] = 0.1;

@@ -17,7 +17,9 @@ const STEP: f64 = 1e-4;
 
 /// Energy under gravity, energy and momentum of a floating machine.
 pub fn rows() -> Result<Vec<Row>> {
-    let mut rows = vec![falling(Level::Strain(2), "strain(2)")?, falling(Level::Bezier(3), "bezier(3)")?];
+    let levels =
+        [(Level::Strain(2), "strain(2)"), (Level::Bezier(3), "bezier(3)"), (Level::Deflection(3), "deflection(3)")];
+    let mut rows = levels.into_iter().map(|(level, name)| falling(level, name)).collect::<Result<Vec<_>>>()?;
     rows.extend(floating()?);
     Ok(rows)
 }

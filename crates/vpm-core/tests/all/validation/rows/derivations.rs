@@ -25,11 +25,12 @@ const TREES: [u64; 2] = [5, 2];
 const SOURCE: &str = "Lagrange's equations of the energy by dual numbers";
 
 /// Levels of the beams; every one has its coordinates in space.
-const LEVELS: [Level; 7] = [
+const LEVELS: [Level; 8] = [
     Level::Rigid,
     Level::Lumped(2),
     Level::Modal(2),
     Level::Bezier(3),
+    Level::Deflection(3),
     Level::Hermite(1),
     Level::Strain(2),
     Level::Elements(1),
@@ -118,6 +119,7 @@ pub fn name(level: Level) -> String {
         Level::Lumped(n) => ["lumped".to_owned(), n.to_string()],
         Level::Modal(n) => ["modal".to_owned(), n.to_string()],
         Level::Bezier(n) => ["bezier".to_owned(), n.to_string()],
+        Level::Deflection(n) => ["deflection".to_owned(), n.to_string()],
         Level::Hermite(n) => ["hermite".to_owned(), n.to_string()],
         Level::Strain(n) => ["strain".to_owned(), n.to_string()],
         Level::Elements(n) => ["elements".to_owned(), n.to_string()],
