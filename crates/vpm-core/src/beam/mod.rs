@@ -32,6 +32,7 @@ pub mod planar;
 mod profile;
 pub mod quadrature;
 pub mod section;
+mod segment;
 pub mod shape;
 pub mod strain;
 pub mod two_node;
@@ -42,6 +43,7 @@ pub use flexible::Beam;
 pub use gauge::Gauge;
 pub use motion::{SectionMotion, Sections};
 pub use section::{Material, Section};
+pub(crate) use segment::Segment;
 pub use shape::{Properties, Shape};
 
 use crate::error::{Error, Result};

@@ -10,6 +10,7 @@
 //! [`Model::is_recursive`]: crate::model::Model::is_recursive
 
 mod aba;
+pub mod articulated;
 mod crba;
 mod energy;
 pub mod flexible;
