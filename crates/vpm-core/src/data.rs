@@ -6,9 +6,9 @@ use crate::algebra::BlockCholesky;
 use crate::beam::Sections;
 use crate::model::Model;
 use crate::scalar::Scalar;
+use crate::spatial::{ArticulatedInertia, Pose, SpatialInertia, Twist, Vector3, Wrench};
 pub(crate) use segment::SegmentSlot;
 use segment::segments;
-use crate::spatial::{ArticulatedInertia, Pose, SpatialInertia, Twist, Vector3, Wrench};
 
 /// Working memory of the algorithms in [`crate::dynamics`], which leave their results here.
 ///

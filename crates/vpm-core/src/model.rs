@@ -41,6 +41,7 @@ pub struct Model<S> {
     n_frames: usize,
     recursive: bool,
     segmented: bool,
+    articulated: bool,
     /// Whether anything with coordinates hangs on each frame.
     carriers: Vec<bool>,
     drops_velocity_terms: bool,
@@ -168,6 +169,12 @@ impl<S: Scalar> Model<S> {
     #[inline]
     pub fn is_segmented(&self) -> bool {
         self.segmented
+    }
+
+    /// Whether that recursion is the fastest way to accelerations: it applies, beams fall into segments, and there are coordinates enough.
+    #[inline]
+    pub fn is_articulated(&self) -> bool {
+        self.articulated
     }
 
     /// Whether anything with coordinates hangs on a frame.

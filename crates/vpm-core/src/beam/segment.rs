@@ -4,13 +4,13 @@ use std::ops::Range;
 
 use nalgebra::DMatrix;
 
+use super::Basis;
 use super::entry::{BeamEntry, Component};
 use super::fields::{Field, Fields, Interpolated};
 use super::flexible::Axis;
 use super::lumped::LumpedAxis;
 use super::motion::Sections;
 use super::strain::{PlaneAxis, SpaceAxis};
-use super::Basis;
 use crate::error::Result;
 use crate::scalar::Scalar;
 

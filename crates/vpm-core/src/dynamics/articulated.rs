@@ -113,7 +113,9 @@ fn inward<S: Scalar>(model: &Model<S>, data: &mut Data<S>, tau: &[S], shift: Opt
                 let damped = shift.and_then(|shift| Some(*shift.resistances.get(*number)? * shift.reach));
                 let rotor = damped.map_or(link.rotor, |damped| link.rotor + damped);
                 free_joint(&mut frames[number + 1], link.kind, rotor, tau[*number]);
-                if let (true, Ok([slot, carrier])) = (link.parent != 0, frames.get_disjoint_mut([number + 1, link.parent])) {
+                if let (true, Ok([slot, carrier])) =
+                    (link.parent != 0, frames.get_disjoint_mut([number + 1, link.parent]))
+                {
                     hand_on(slot, carrier);
                 }
             }
