@@ -1,14 +1,19 @@
 //! Every buffer the recursions need, allocated once per model.
 
+mod segment;
+
 use crate::algebra::BlockCholesky;
 use crate::beam::Sections;
 use crate::model::Model;
 use crate::scalar::Scalar;
 use crate::spatial::{ArticulatedInertia, Pose, SpatialInertia, Twist, Vector3, Wrench};
+pub(crate) use segment::SegmentSlot;
+use segment::segments;
 
 /// Working memory of the algorithms in [`crate::dynamics`], which leave their results here.
 ///
-/// Buffers per body have one slot more than there are bodies: slot 0 is the world, slot k + 1 is body k.
+/// Buffers per body have one slot more than there are bodies: slot 0 is the world, slot k + 1 is body k. Those of articulated bodies have
+/// one for each frame of the model, stations of beams included.
 #[derive(Clone, Debug)]
 pub struct Data<S> {
     pub(crate) kinematics: Vec<KinematicsSlot<S>>,
@@ -21,6 +26,8 @@ pub struct Data<S> {
     /// Acceleration of frames by products of rates alone, where some parts of the model do without them.
     pub(crate) drifts: Vec<Twist<S>>,
     pub(crate) composite: Composite<S>,
+    /// Segments of each beam, where the recursion over them applies.
+    pub(crate) segments: Vec<Vec<SegmentSlot<S>>>,
 }
 
 /// Composite bodies over rigid bodies and beams: everything in the axes of its own frame.
@@ -102,7 +109,9 @@ pub(crate) struct CrbaSlot<S> {
     pub(crate) composite: SpatialInertia<S>,
 }
 
-/// Articulated body: the quantities of Featherstone 2008, table 7.1, by their names there.
+/// A frame on an articulated body: the quantities of Featherstone 2008, table 7.1, by their names there.
+///
+/// The pose of a station of a beam is that in its segment's begin, its inertia and wrench those of what it carries beside its own.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct AbaSlot<S> {
     pub(crate) pose: Pose<S>,
@@ -131,12 +140,13 @@ impl<S: Scalar> Data<S> {
             kinematics: vec![world; n + 1],
             rnea: vec![RneaSlot::default(); n + 1],
             crba: vec![CrbaSlot::default(); n + 1],
-            aba: vec![AbaSlot::default(); n + 1],
+            aba: vec![AbaSlot::default(); model.n_frames()],
             effort: vec![S::zero(); n],
             acceleration: vec![S::zero(); count],
             mass_matrix: vec![S::zero(); count * count],
             drifts: vec![Twist::zero(); model.n_frames()],
             composite: Composite::new(model),
+            segments: segments(model),
         }
     }
 

@@ -40,6 +40,10 @@ pub struct Model<S> {
     n_coordinates: usize,
     n_frames: usize,
     recursive: bool,
+    segmented: bool,
+    articulated: bool,
+    /// Whether anything with coordinates hangs on each frame.
+    carriers: Vec<bool>,
     drops_velocity_terms: bool,
     /// Which products of rates count, frame by frame.
     products: Vec<Products>,
@@ -160,6 +164,25 @@ impl<S: Scalar> Model<S> {
     #[inline]
     pub fn is_recursive(&self) -> bool {
         self.recursive
+    }
+
+    /// Whether the recursion over bodies and segments of beams applies: no lines with mass, a mass matrix in one piece, products of rates
+    /// counted everywhere or nowhere.
+    #[inline]
+    pub fn is_segmented(&self) -> bool {
+        self.segmented
+    }
+
+    /// Whether that recursion is the fastest way to accelerations: it applies, beams fall into segments, and there are coordinates enough.
+    #[inline]
+    pub fn is_articulated(&self) -> bool {
+        self.articulated
+    }
+
+    /// Whether anything with coordinates hangs on a frame.
+    #[inline]
+    pub(crate) fn is_carrier(&self, frame: usize) -> bool {
+        self.carriers[frame]
     }
 
     /// Whether products of rates count: Coriolis, centrifugal and gyroscopic terms. Without them `h(q, v) = h(q, 0)`.

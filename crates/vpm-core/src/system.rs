@@ -30,7 +30,8 @@ use crate::actuator::hydraulic::Supply;
 use crate::actuator::{Actuator, Target};
 use crate::contact::ContactFriction;
 use crate::data::Data;
-use crate::dynamics::{aba, flexible, lines, motion, poses};
+use crate::dynamics::articulated::articulated;
+use crate::dynamics::{aba, flexible, frames, lines, motion, poses};
 use crate::effect::{Hysteresis, JointEffect};
 use crate::model::Model;
 use crate::scalar::Scalar;
@@ -220,7 +221,13 @@ impl<S: Scalar> Dynamics<S> {
     /// Whether all frames and lines, and the mass matrix, are those of the state after [`Dynamics::rhs`].
     #[inline]
     pub(crate) fn stands(&self) -> bool {
-        !self.model.is_recursive() && !self.model.lines().is_empty()
+        self.has_mass_matrix() && !self.model.lines().is_empty()
+    }
+
+    /// Whether the right-hand side leaves a mass matrix and its factors: where no recursion does without.
+    #[inline]
+    fn has_mass_matrix(&self) -> bool {
+        !self.model.is_recursive() && !self.model.is_articulated()
     }
 
     /// dx/dt at x, after [`Dynamics::locate`].
@@ -244,14 +251,20 @@ impl<S: Scalar> Dynamics<S> {
     /// Moves lines and frames to (q, v), as far as anything acts on them, and of a machine that is no rigid tree all that its dynamics need.
     #[inline]
     fn locate(&mut self, q: &[S], v: &[S]) {
+        let (full, pulls) = (self.has_mass_matrix(), self.pulls || !self.connections.is_free());
         let Self { model, data, .. } = self;
-        if !model.is_recursive() {
+        if full {
             flexible::terms(model, data, q, v);
             if !self.connections.is_free() {
                 poses(model, data);
             }
-        } else if self.pulls || !self.connections.is_free() {
-            motion(model, data, q, v);
+        } else if pulls {
+            if model.is_recursive() {
+                motion(model, data, q, v);
+            } else {
+                frames(model, data, q, v);
+                poses(model, data);
+            }
             lines(model, data);
         }
     }
@@ -284,6 +297,9 @@ impl<S: Scalar> Dynamics<S> {
         }
         if model.is_recursive() {
             aba(model, data, q, v, loads);
+        } else if model.is_articulated() {
+            flexible::subtract_elastic(model, q, v, loads);
+            articulated(model, data, q, v, loads);
         } else {
             flexible::solve(model, data, q, v, loads);
         }

@@ -1,5 +1,7 @@
 //! From the entry of a beam to its map, its stations and its constant matrices.
 
+use std::ops::Range;
+
 use super::Basis;
 use super::damping::damping;
 use super::deflection::{DeflectionAxis, LinearAxis, modal};
@@ -8,6 +10,7 @@ use super::fields::{Field, Fields, Interpolated, basis};
 use super::flexible::{Axis, Beam, Map};
 use super::lumped::LumpedAxis;
 use super::profile::Profile;
+use super::segment::{Segment, damps_locally};
 use super::strain::{PlaneAxis, SpaceAxis};
 use crate::error::Result;
 use crate::scalar::Scalar;
@@ -101,9 +104,16 @@ impl<S: Scalar> Beam<S> {
         let groups = groups(|component| {
             (0..fields.len()).filter(|&k| fields.components[k] == component as usize).collect::<Vec<_>>()
         });
+        let segments = match entry.level {
+            Level::Elements(n) if order == Order::Second && damps_locally(entry) => {
+                Segment::elements(&entry.deforms, entry.length, n, &at)?
+            }
+            _ => Segment::whole(&axis, fields.len(), at.len()),
+        };
         let heavy = places.iter().map(Place::is_heavy).collect();
-        let (map, damping) = (Map::Fields(fields), Vec::new());
-        Self { axis, map, inertia, heavy, marks, stiffness, damping, damped: false }.damped(entry, &groups)
+        let (map, damping, couplings) = (Map::Fields(fields), Vec::new(), Vec::new());
+        let beam = Self { axis, map, inertia, heavy, marks, stiffness, damping, damped: false, couplings, segments };
+        beam.damped(entry, &groups)
     }
 
     /// A beam of rigid segments, or a rigid one.
@@ -125,18 +135,38 @@ impl<S: Scalar> Beam<S> {
         let (stiffness, each) = (axis.stiffness(profile)?, components.len());
         let groups =
             groups(|component| (0..axis.len()).filter(|&k| components[k % each] == component).collect::<Vec<_>>());
-        let map = Map::Springs(axis.clone());
+        let (map, coordinates) = (Map::Springs(axis.clone()), axis.len());
         let heavy = places.iter().map(Place::is_heavy).collect();
-        let (axis, damping) = (Axis::Lumped(axis), Vec::new());
-        Self { axis, map, inertia, heavy, marks, stiffness, damping, damped: false }.damped(entry, &groups)
+        let axis = Axis::Lumped(axis);
+        let segments = if !components.is_empty() && damps_locally(entry) {
+            Segment::hinged(components, entry.length, segments, &at)
+        } else {
+            Segment::whole(&axis, coordinates, at.len())
+        };
+        let (damping, couplings) = (Vec::new(), Vec::new());
+        let beam = Self { axis, map, inertia, heavy, marks, stiffness, damping, damped: false, couplings, segments };
+        beam.damped(entry, &groups)
     }
 
     fn damped(mut self, entry: &BeamEntry<S>, groups: &[Vec<usize>]) -> Result<Self> {
         self.damping = damping(entry, &self.stiffness, || self.mass(), groups)?;
         let law = &entry.damping;
         self.damped = law.stiffness.is_some() || law.mass.is_some() || !law.ratios.is_empty();
+        let n = self.len();
+        self.couplings = match damps_locally(entry) {
+            true => self.stiffness.chunks_exact(n.max(1)).map(filled).collect(),
+            false => vec![0..n; n],
+        };
         Ok(self)
     }
+}
+
+/// From the first entry of a row that is not zero to behind the last one.
+fn filled<S: Scalar>(row: &[S]) -> Range<usize> {
+    // Moduli are positive, so that only shapes which do not overlap give zeros.
+    let filled = |entry: &S| entry.inspect() != 0.0;
+    let first = row.iter().position(filled).unwrap_or(0);
+    first..row.iter().rposition(filled).map_or(first, |last| last + 1)
 }
 
 /// Coordinates that couple in a straight beam at rest: each bending with the shear of its plane.

@@ -1,5 +1,7 @@
 //! One flexible beam, at any level, over the number type of its parameters.
 
+use std::ops::Range;
+
 use nalgebra::DMatrix;
 
 use super::deflection::{DeflectionAxis, LinearAxis};
@@ -8,6 +10,7 @@ use super::fields::Fields;
 use super::gauge::Gauge;
 use super::lumped::LumpedAxis;
 use super::motion::Sections;
+use super::segment::Segment;
 use super::strain::{PlaneAxis, SpaceAxis};
 use crate::error::Result;
 use crate::scalar::Scalar;
@@ -30,6 +33,9 @@ pub struct Beam<S> {
     pub(super) damping: Vec<S>,
     /// Whether it is described with any damping.
     pub(super) damped: bool,
+    /// In each row of stiffness and damping, where there may be entries.
+    pub(super) couplings: Vec<Range<usize>>,
+    pub(super) segments: Vec<Segment>,
 }
 
 /// The map from coordinates to sections.
@@ -47,6 +53,29 @@ pub(super) enum Axis {
 pub(super) enum Map {
     Fields(Fields),
     Springs(LumpedAxis),
+}
+
+impl Axis {
+    /// Numbers of partial sums that a motion needs.
+    pub(super) fn scratch(&self) -> usize {
+        match self {
+            Self::Plane(axis) => axis.scratch(),
+            Self::Deflection(axis) => axis.scratch(),
+            Self::Linear(_) | Self::Space(_) | Self::Lumped(_) => 0,
+        }
+    }
+
+    /// Poses, twists and columns of all sections; their accelerations too if these are asked for, else they mean nothing.
+    #[inline]
+    pub(super) fn sweep<S: Scalar>(&self, q: &[S], v: &[S], out: &mut Sections<S>, accelerates: bool) {
+        match self {
+            Self::Plane(axis) => axis.motion(q, v, out),
+            Self::Space(axis) => axis.motion(q, v, out, accelerates),
+            Self::Deflection(axis) => axis.motion(q, v, out, accelerates),
+            Self::Linear(axis) => axis.motion(q, v, out, accelerates),
+            Self::Lumped(axis) => axis.motion(q, v, out),
+        }
+    }
 }
 
 impl<S: Scalar> Beam<S> {
@@ -85,12 +114,7 @@ impl<S: Scalar> Beam<S> {
 
     /// Buffers for [`Beam::motion`], of any number type that the beam's can be lifted to.
     pub fn sections(&self) -> Sections<S> {
-        let scratch = match &self.axis {
-            Axis::Plane(axis) => axis.scratch(),
-            Axis::Deflection(axis) => axis.scratch(),
-            Axis::Linear(_) | Axis::Space(_) | Axis::Lumped(_) => 0,
-        };
-        Sections::new(self.stations(), self.len(), scratch)
+        Sections::new(self.stations(), self.len(), self.axis.scratch())
     }
 
     /// Poses, twists, accelerations and Jacobian columns of all sections at coordinates `q` and rates `v`; allocates nothing.
@@ -101,13 +125,18 @@ impl<S: Scalar> Beam<S> {
     /// As [`Beam::motion`], but the accelerations only if they are asked for; else they mean nothing.
     pub(crate) fn sweep(&self, q: &[S], v: &[S], out: &mut Sections<S>, accelerates: bool) {
         debug_assert!(q.len() == self.len() && v.len() == self.len() && out.at.len() == self.stations());
-        match &self.axis {
-            Axis::Plane(axis) => axis.motion(q, v, out),
-            Axis::Space(axis) => axis.motion(q, v, out, accelerates),
-            Axis::Deflection(axis) => axis.motion(q, v, out, accelerates),
-            Axis::Linear(axis) => axis.motion(q, v, out, accelerates),
-            Axis::Lumped(axis) => axis.motion(q, v, out),
-        }
+        self.axis.sweep(q, v, out, accelerates);
+    }
+
+    /// Its parts, root to tip, in which some of its coordinates act alone.
+    pub(crate) fn segments(&self) -> &[Segment] {
+        &self.segments
+    }
+
+    /// In row `row` of stiffness and damping, the columns between which there may be entries.
+    #[inline]
+    pub(crate) fn couplings(&self, row: usize) -> Range<usize> {
+        self.couplings[row].clone()
     }
 
     /// Elastic stiffness, row by row.

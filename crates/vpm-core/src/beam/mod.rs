@@ -33,6 +33,7 @@ pub mod planar;
 mod profile;
 pub mod quadrature;
 pub mod section;
+mod segment;
 pub mod shape;
 pub mod strain;
 pub mod two_node;
@@ -43,6 +44,7 @@ pub use flexible::Beam;
 pub use gauge::Gauge;
 pub use motion::{SectionMotion, Sections};
 pub use section::{Material, Section};
+pub(crate) use segment::Segment;
 pub use shape::{Properties, Shape};
 
 use crate::error::{Error, Result};

@@ -1,8 +1,8 @@
 //! Forward dynamics by the articulated body algorithm.
 
-use crate::data::Data;
+use crate::data::{AbaSlot, Data};
 use crate::joint::JointKind;
-use crate::model::{Model, Products};
+use crate::model::{Link, Model, Products};
 use crate::scalar::Scalar;
 use crate::spatial::{ArticulatedInertia, Symmetric3, Twist, Vector3, Wrench};
 
@@ -50,28 +50,38 @@ fn velocities<S: Scalar>(model: &Model<S>, data: &mut Data<S>, q: &[S], v: &[S])
     slots[0].velocity = Twist::zero();
     for (k, ((link, &q), &v)) in model.links().iter().zip(q).zip(v).enumerate() {
         let (before, rest) = slots.split_at_mut(k + 1);
-        let (parent, slot) = (&before[link.parent], &mut rest[0]);
-        slot.pose = link.pose(q);
-        slot.inertia = link.inertia.into();
-        // All that this algorithm asks of velocities are their products.
-        (slot.bias_acceleration, slot.bias_wrench) = (Twist::zero(), Wrench::zero());
-        let products = model.products()[k + 1];
-        let moves = match products {
-            Products::Kept => true,
-            Products::Dropped => continue,
-            Products::Mixed(mixed) => mixed.moves,
-        };
-        if moves {
-            slot.velocity = slot.pose.inverse_twist(parent.velocity);
-            link.kind.add_rate(&mut slot.velocity, v);
-            slot.bias_acceleration = link.kind.rate_cross(&slot.velocity, v);
-        }
-        if let Products::Mixed(mixed) = products {
-            slot.bias_acceleration = mixed.step(&slot.pose, slot.bias_acceleration, drifts, (link.parent, k + 1));
-        }
-        if products.own() {
-            slot.bias_wrench = slot.velocity.cross_wrench(link.inertia.apply(slot.velocity));
-        }
+        move_body(&mut rest[0], link, &before[link.parent].velocity, (q, v), (model.products()[k + 1], k + 1, drifts));
+    }
+}
+
+/// Outward over one joint: pose, V, bias acceleration and bias force of the body numbered `frame`, on a carrier that moves with `carrier`.
+#[inline]
+pub(super) fn move_body<S: Scalar>(
+    slot: &mut AbaSlot<S>,
+    link: &Link<S>,
+    carrier: &Twist<S>,
+    (q, v): (S, S),
+    (products, frame, drifts): (Products, usize, &mut [Twist<S>]),
+) {
+    slot.pose = link.pose(q);
+    slot.inertia = link.inertia.into();
+    // All that this algorithm asks of velocities are their products.
+    (slot.bias_acceleration, slot.bias_wrench) = (Twist::zero(), Wrench::zero());
+    let moves = match products {
+        Products::Kept => true,
+        Products::Dropped => return,
+        Products::Mixed(mixed) => mixed.moves,
+    };
+    if moves {
+        slot.velocity = slot.pose.inverse_twist(*carrier);
+        link.kind.add_rate(&mut slot.velocity, v);
+        slot.bias_acceleration = link.kind.rate_cross(&slot.velocity, v);
+    }
+    if let Products::Mixed(mixed) = products {
+        slot.bias_acceleration = mixed.step(&slot.pose, slot.bias_acceleration, drifts, (link.parent, frame));
+    }
+    if products.own() {
+        slot.bias_wrench = slot.velocity.cross_wrench(link.inertia.apply(slot.velocity));
     }
 }
 
@@ -80,19 +90,28 @@ fn inertias<S: Scalar>(model: &Model<S>, data: &mut Data<S>, tau: &[S]) {
     for (k, (link, &tau)) in model.links().iter().zip(tau).enumerate().rev() {
         let (before, rest) = slots.split_at_mut(k + 1);
         let slot = &mut rest[0];
-        slot.unit_wrench = unit_wrench(link.kind, &slot.inertia);
-        slot.inverse = (link.kind.effort(&slot.unit_wrench) + link.rotor).recip();
-        slot.effort = tau - link.kind.effort(&slot.bias_wrench);
+        free_joint(slot, link.kind, link.rotor, tau);
         if link.parent != 0 {
-            // What the parent feels when this joint is free: I^a = I^A - U U^T / D, p^a = p^A + I^a c + U u / D.
-            let felt = slot.inertia.deflated(slot.unit_wrench, slot.inverse);
-            let bias =
-                slot.bias_wrench + felt.apply(slot.bias_acceleration) + slot.unit_wrench * (slot.effort * slot.inverse);
-            let parent = &mut before[link.parent];
-            parent.inertia += slot.pose.articulated_inertia(felt);
-            parent.bias_wrench += slot.pose.wrench(bias);
+            hand_on(slot, &mut before[link.parent]);
         }
     }
+}
+
+/// Inward at one joint: U, 1/D with an inertia `rotor` that feels the joint's acceleration alone, and u.
+#[inline]
+pub(super) fn free_joint<S: Scalar>(slot: &mut AbaSlot<S>, kind: JointKind, rotor: S, tau: S) {
+    slot.unit_wrench = unit_wrench(kind, &slot.inertia);
+    slot.inverse = (kind.effort(&slot.unit_wrench) + rotor).recip();
+    slot.effort = tau - kind.effort(&slot.bias_wrench);
+}
+
+/// What the parent feels when this joint is free: I^a = I^A - U U^T / D, p^a = p^A + I^a c + U u / D.
+#[inline]
+pub(super) fn hand_on<S: Scalar>(slot: &AbaSlot<S>, parent: &mut AbaSlot<S>) {
+    let felt = slot.inertia.deflated(slot.unit_wrench, slot.inverse);
+    let bias = slot.bias_wrench + felt.apply(slot.bias_acceleration) + slot.unit_wrench * (slot.effort * slot.inverse);
+    parent.inertia += slot.pose.articulated_inertia(felt);
+    parent.bias_wrench += slot.pose.wrench(bias);
 }
 
 fn accelerations<S: Scalar>(model: &Model<S>, data: &mut Data<S>) {
@@ -100,11 +119,17 @@ fn accelerations<S: Scalar>(model: &Model<S>, data: &mut Data<S>) {
     slots[0].acceleration = Twist::new(Vector3::zero(), -model.gravity());
     for (k, (link, result)) in model.links().iter().zip(&mut data.acceleration).enumerate() {
         let (before, rest) = slots.split_at_mut(k + 1);
-        let (parent, slot) = (&before[link.parent], &mut rest[0]);
-        slot.acceleration = slot.pose.inverse_twist(parent.acceleration) + slot.bias_acceleration;
-        *result = (slot.effort - slot.acceleration.power(slot.unit_wrench)) * slot.inverse;
-        link.kind.add_rate(&mut slot.acceleration, *result);
+        *result = accelerate_body(&mut rest[0], link.kind, &before[link.parent].acceleration);
     }
+}
+
+/// Outward over one joint: its acceleration, and A of its body on a carrier that accelerates with `carrier`.
+#[inline]
+pub(super) fn accelerate_body<S: Scalar>(slot: &mut AbaSlot<S>, kind: JointKind, carrier: &Twist<S>) -> S {
+    slot.acceleration = slot.pose.inverse_twist(*carrier) + slot.bias_acceleration;
+    let result = (slot.effort - slot.acceleration.power(slot.unit_wrench)) * slot.inverse;
+    kind.add_rate(&mut slot.acceleration, result);
+    result
 }
 
 /// U = I^A S for a joint axis along z: one column of the 6 x 6 inertia, or a sum of two.

@@ -185,12 +185,11 @@ pub(crate) fn subtract_elastic<S: Scalar>(model: &Model<S>, q: &[S], v: &[S], lo
         let len = beam.len();
         let own = *coordinate..coordinate + len;
         let (q, v) = (&q[own.clone()], &v[own.clone()]);
-        for ((load, stiffness), damping) in loads[own]
-            .iter_mut()
-            .zip(beam.stiffness().chunks_exact(len.max(1)))
-            .zip(beam.damping().chunks_exact(len.max(1)))
-        {
-            *load -= product(stiffness, q) + product(damping, v);
+        for (row, load) in loads[own].iter_mut().enumerate() {
+            let filled = beam.couplings(row);
+            let entries = row * len + filled.start..row * len + filled.end;
+            let (stiffness, damping) = (&beam.stiffness()[entries.clone()], &beam.damping()[entries]);
+            *load -= product(stiffness, &q[filled.clone()]) + product(damping, &v[filled]);
         }
     }
 }

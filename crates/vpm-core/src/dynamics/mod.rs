@@ -1,15 +1,17 @@
 //! Tree dynamics `M(q) a + h(q, v) = tau`, by algorithms that know nothing of each other and so check each other.
 //!
-//! [`rnea`], [`crba`], [`aba`], [`energy()`] and [`kinematics()`] are for rigid trees ([`Model::is_recursive`]), [`flexible`] for all,
-//! [`virtual_work`] for the Jacobians of single bodies, closed linkages included, in arrays. All others take the
-//! coordinates `q`, rates `v` and so on as slices of length `n_coordinates`, leave their results in [`Data`] and, but for
-//! [`check_regular`], allocate nothing. Lengths are the caller's business: a wrong one is a bug in the caller, not an
-//! input error.
+//! [`rnea`], [`crba`], [`aba`], [`energy()`] and [`kinematics()`] are for rigid trees ([`Model::is_recursive`]), [`articulated`] for
+//! trees without lines that weigh something or couplings left out ([`Model::is_segmented`]), [`flexible`] for all, [`virtual_work`] for
+//! the Jacobians of single bodies, closed linkages included, in arrays. All others take the coordinates `q`, rates `v` and so on as slices
+//! of length `n_coordinates`, leave their results in [`Data`] and, but for [`check_regular`], allocate nothing. Lengths are the caller's
+//! business: a wrong one is a bug in the caller, not an input error. Only [`articulated`] goes on with the steps of another, [`aba`].
 //!
 //! [`Data`]: crate::data::Data
 //! [`Model::is_recursive`]: crate::model::Model::is_recursive
+//! [`Model::is_segmented`]: crate::model::Model::is_segmented
 
 mod aba;
+pub mod articulated;
 mod crba;
 mod energy;
 pub mod flexible;

@@ -143,7 +143,8 @@ impl<S: Scalar> Dynamics<S> {
         self.lag_behind(stage, rates);
         split.accelerate(self, stage, rates);
         let (motion, memories) = rates.split_at_mut(first);
-        for ((rate, &z), (joint, law, _)) in memories.iter_mut().zip(&stage.implicit[first..]).zip(self.memories.iter()) {
+        for ((rate, &z), (joint, law, _)) in memories.iter_mut().zip(&stage.implicit[first..]).zip(self.memories.iter())
+        {
             let w = motion[joint];
             // At the velocity by which its effort was reckoned the fading is that of the turn before, to the error of the turns.
             let fading = law.fading(w, z);

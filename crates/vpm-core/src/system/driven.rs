@@ -63,7 +63,7 @@ impl<S: Scalar> Driven<S> {
         laws: &impl Laws<Number<S>>,
     ) {
         let (n, dim) = (machine.coordinates(), x.len());
-        if machine.model.is_recursive() {
+        if !machine.has_mass_matrix() {
             machine.terms(&x[..n], &x[n..2 * n]);
             machine.data.factorise();
         }

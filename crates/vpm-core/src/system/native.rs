@@ -147,8 +147,7 @@ impl Fast {
     /// Holds input `number`, see [`super::Dynamics::input`].
     #[inline]
     pub(crate) fn hold(&mut self, number: usize, input: f64) {
-        for call in
-            [&mut self.rates, &mut self.sample].into_iter().chain(self.others.iter_mut().map(|(_, call)| call))
+        for call in [&mut self.rates, &mut self.sample].into_iter().chain(self.others.iter_mut().map(|(_, call)| call))
         {
             call.inputs[call.function.places.states + number] = input;
         }

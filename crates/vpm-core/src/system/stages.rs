@@ -5,6 +5,7 @@ use std::time::Instant;
 
 use super::{Dynamics, Matrix, System, add_effects};
 use crate::contact::ContactFriction;
+use crate::dynamics::articulated::articulated;
 use crate::dynamics::{aba, flexible, frames, lines, motion, poses};
 use crate::ode::Ode;
 
@@ -20,7 +21,7 @@ pub(crate) struct Parts {
     pub(crate) kinematics: f64,
     /// Sections of the beams along their centrelines.
     pub(crate) beams: f64,
-    /// Mass matrix and bias; none in a rigid tree, whose articulated bodies are part of the solution.
+    /// Mass matrix and bias; none where articulated bodies take their place, which are part of the solution.
     pub(crate) mass_matrix: f64,
     /// Drives and supplies.
     pub(crate) actuators: f64,
@@ -78,6 +79,19 @@ impl Dynamics<f64> {
                     lines(model, data);
                 });
             }
+        } else if model.is_articulated() {
+            if moves || touches {
+                parts.kinematics = seconds(|| {
+                    frames(model, data, black_box(q), v);
+                    poses(model, data);
+                    lines(model, data);
+                });
+            }
+            let segments = model.beams().iter().map(|elastic| elastic.beam.segments()).zip(&mut data.segments);
+            for (segment, slot) in segments.flat_map(|(segments, slots)| segments.iter().zip(slots)) {
+                let (q, v, keeps) = (&slot.coordinates, &slot.rates, model.keeps_velocity_terms());
+                parts.beams += seconds(|| segment.motion(black_box(q), v, &mut slot.sections, keeps));
+            }
         } else {
             let outward = seconds(|| frames(model, data, black_box(q), v));
             for (number, (elastic, sections)) in model.beams().iter().zip(&mut data.composite.sections).enumerate() {
@@ -104,6 +118,11 @@ impl Dynamics<f64> {
             seconds(|| {
                 aba(model, data, black_box(q), v, loads);
             })
+        } else if model.is_articulated() {
+            let whole = seconds(|| {
+                articulated(model, data, black_box(q), v, loads);
+            });
+            (whole - parts.beams).max(0.0)
         } else {
             seconds(|| {
                 flexible::solve(model, data, black_box(q), v, loads);

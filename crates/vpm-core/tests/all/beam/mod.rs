@@ -1,6 +1,8 @@
 //! Flexible links.
 
 mod arm;
+mod bezier_basis;
+mod bezier_large;
 mod first_order;
 mod levels;
 mod linear;

@@ -4,6 +4,7 @@ pub mod beams;
 pub mod both;
 pub mod connections;
 pub mod derivatives;
+pub mod element_arm;
 pub mod entries;
 pub mod flexible_arm;
 pub mod free_leg;

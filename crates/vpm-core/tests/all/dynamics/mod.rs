@@ -1,6 +1,8 @@
 //! The algorithms: number types, spatial algebra, dynamics of rigid and flexible trees.
 
 mod algebra;
+mod articulated;
+mod articulated_cost;
 mod closed_form;
 mod conservation;
 mod cross_check;

@@ -194,9 +194,7 @@ fn stability(z: nalgebra::Complex<f64>) -> nalgebra::Complex<f64> {
         ],
         B,
     ];
-    let left = nalgebra::Matrix6::from_fn(|i, j| {
-        nalgebra::Complex::from(if i == j { 1.0 } else { 0.0 }) - z * A[i][j]
-    });
+    let left = nalgebra::Matrix6::from_fn(|i, j| nalgebra::Complex::from(if i == j { 1.0 } else { 0.0 }) - z * A[i][j]);
     let stages = left.lu().solve(&nalgebra::Vector6::from_element(1.0.into())).unwrap();
     let sum: nalgebra::Complex<f64> = stages.iter().zip(B).map(|(stage, b)| stage * b).sum();
     nalgebra::Complex::from(1.0) + z * sum

@@ -14,12 +14,9 @@ use vpm_core::ode::Ode;
 use vpm_core::samples::Random;
 use vpm_core::{Result, evaluate};
 
-#[path = "common/entries.rs"]
-mod entries;
-#[path = "common/sums.rs"]
-mod sums;
-#[path = "common/flexible.rs"]
-mod trees;
+use crate::common::entries;
+use crate::common::sums;
+use crate::common::trees;
 use entries::entry;
 use sums::{Load, Root, equilibrium, tip};
 

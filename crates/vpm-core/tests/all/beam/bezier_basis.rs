@@ -8,10 +8,8 @@ use vpm_core::beam::{Basis, Beam, Component, Level, Section, Shape};
 use vpm_core::samples::Random;
 use vpm_core::{Error, Result};
 
-#[path = "common/entries.rs"]
-mod entries;
-#[path = "common/sums.rs"]
-mod sums;
+use crate::common::entries;
+use crate::common::sums;
 use entries::{ALL, entry};
 use sums::{Load, Root, bias, mass};
 
