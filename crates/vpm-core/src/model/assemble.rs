@@ -293,12 +293,12 @@ impl<'a, S: Scalar> Assembly<'a, S> {
     fn check_bodies(&self) -> Result<()> {
         for point in &self.parts.point_masses {
             let (name, frame) = (self.parts.site_name(point.on), self.site(point.on)?.frame);
-            let total = self.inertias[frame].inspect();
+            let total = self.inertias[frame].value();
             let [xx, yy, zz, ..] = total.rotational.to_array();
             check_physical(name, total.mass, total.central(), 1e-12 * (xx + yy + zz))?;
         }
         for (number, body) in self.parts.bodies.iter().enumerate() {
-            let heavy = self.inertias[number + 1].inspect().mass != 0.0;
+            let heavy = self.inertias[number + 1].value().mass != 0.0;
             if !heavy && !self.carries(Mount::Body(number)) {
                 return Err(Error::Carrier { body: body.name.clone() });
             }

@@ -50,7 +50,7 @@ impl<S: Scalar> SpatialInertia<S> {
     }
 
     /// The same inertia in plain numbers, for checks.
-    pub fn inspect(self) -> SpatialInertia<f64> {
+    pub fn value(self) -> SpatialInertia<f64> {
         let first_moment = Vector3::from(self.first_moment.to_array().map(|entry| entry.inspect()));
         let rotational = Symmetric3::from_array(self.rotational.to_array().map(|entry| entry.inspect()));
         SpatialInertia { mass: self.mass.inspect(), first_moment, rotational }
