@@ -100,7 +100,7 @@ impl<'a, S: Scalar> Places<'a, S> {
         }
         for (number, Placed { beam, .. }) in self.beams.iter().enumerate() {
             for (station, pose) in self.stations(q, number).into_iter().enumerate() {
-                all.push(Heavy::Body(pose, beam.inertia(station).inspect()));
+                all.push(Heavy::Body(pose, beam.inertia(station).value()));
             }
         }
         for point in &self.parts.point_masses {

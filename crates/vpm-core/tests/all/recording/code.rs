@@ -7,8 +7,7 @@ use vpm_core::samples::Random;
 use vpm_core::simulate::{Run, Setting, Stepping, free_run};
 use vpm_core::table::Table;
 
-use crate::common::trees;
-use trees::{description, everything};
+use crate::common::two_beams;
 
 /// A run of `rows` samples, simulated whole or in the first `begin` samples only.
 fn run(d: &Description, method: Method, rows: usize) -> Result<Run> {
@@ -24,9 +23,9 @@ fn run(d: &Description, method: Method, rows: usize) -> Result<Run> {
 
 #[test]
 fn a_long_run_begins_as_a_short_one() -> Result<()> {
-    let d = description(&everything(4), |_| ());
-    for method in [Method::Additive, Method::Rk4] {
-        let (short, long) = (run(&d, method, 50)?, run(&d, method, 20_000)?);
+    let d = two_beams::machine(1, two_beams::hold);
+    for method in [Method::Additive, Method::LinearlyImplicit, Method::Rosenbrock] {
+        let (short, long) = (run(&d, method, 50)?, run(&d, method, 8_000)?);
         let (states, outputs) = (&long.states[..short.states.len()], &long.outputs[..short.outputs.len()]);
         for (found, expected) in [(states, &short.states), (outputs, &short.outputs)] {
             let size = expected.iter().fold(0.0_f64, |most, entry| most.max(entry.abs()));
