@@ -174,7 +174,7 @@ struct Simulation<'a> {
 
 impl Job for Simulation<'_> {
     fn run<S: Scalar>(&self, theta: &[S]) -> Result<Pair<S>> {
-        Stepper::new(&self.setting, &self.plan, theta)?.run(self.setting.interrupt)
+        Stepper::new(&self.setting, &self.plan, theta)?.by_code(theta).run(self.setting.interrupt)
     }
 }
 

@@ -63,7 +63,7 @@ pub(crate) struct Stepper<'a, S> {
 impl<'a, S: Scalar> Stepper<'a, S> {
     pub(crate) fn new(setting: &Setting<'a>, plan: &Plan<'a>, theta: &[S]) -> Result<Self> {
         let description = setting.description;
-        let system = description.system(theta)?.with_code(code(setting, plan, theta));
+        let system = description.system(theta)?;
         let (dim, rows, zero) = (system.dim(), plan.horizon, S::zero());
         // A closed loop begins with its disturbances, to which the controllers add.
         let (given, control) = match plan.drive {
@@ -90,6 +90,15 @@ impl<'a, S: Scalar> Stepper<'a, S> {
             states: vec![zero; rows * dim],
             outputs: vec![zero; rows * description.n_outputs()],
         })
+    }
+
+    /// The same, by machine code where a run of the whole plan is long enough and the machine has any.
+    pub(crate) fn by_code(mut self, theta: &[S]) -> Self {
+        let Stepping { substeps, method, .. } = self.stepping;
+        let evaluations = self.plan.starts.len() * self.plan.horizon * substeps * method.stages();
+        let fast = S::plain(theta).and_then(|theta| Fast::for_run(self.description, theta, (method, evaluations)));
+        self.system = self.system.with_code(fast);
+        self
     }
 
     pub(crate) fn description(&self) -> &'a Description {
@@ -323,13 +332,6 @@ impl Stepper<'_, f64> {
         seconds.push(("sensors", system.dynamics().observing(state, &mut seen)));
         seconds
     }
-}
-
-/// Machine code for the run, where it pays and there is any.
-fn code<S: Scalar>(setting: &Setting<'_>, plan: &Plan<'_>, theta: &[S]) -> Option<Fast> {
-    let Stepping { substeps, method, .. } = setting.stepping;
-    let steps = plan.starts.len() * plan.horizon * substeps;
-    Fast::for_run(setting.description, S::plain(theta)?, (method, steps * method.stages()))
 }
 
 /// The quantity itself, or only its derivative with respect to a parameter.
