@@ -173,7 +173,7 @@ impl<S: Scalar> Model<S> {
         self.segmented
     }
 
-    /// Whether that recursion is the fastest way to accelerations: it applies, beams fall into segments, and there are coordinates enough.
+    /// Whether that recursion is the fastest way to accelerations: it applies, and there are coordinates enough.
     #[inline]
     pub fn is_articulated(&self) -> bool {
         self.articulated

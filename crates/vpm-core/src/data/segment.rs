@@ -1,7 +1,7 @@
 //! Buffers of the articulated bodies along beams.
 
 use crate::beam::{Sections, Segment};
-use crate::model::Model;
+use crate::model::{Elastic, Model};
 use crate::scalar::Scalar;
 use crate::spatial::{ArticulatedInertia, Twist, Wrench};
 
@@ -59,7 +59,7 @@ impl<S: Scalar> SegmentSlot<S> {
 
 /// Buffers for the segments of all beams that bend.
 pub(super) fn segments<S: Scalar>(model: &Model<S>) -> Vec<Vec<SegmentSlot<S>>> {
-    let of = |elastic: &crate::model::Elastic<S>| match elastic.frame {
+    let of = |elastic: &Elastic<S>| match elastic.frame {
         Some(_) if model.is_segmented() => elastic.beam.segments().iter().map(SegmentSlot::new).collect(),
         _ => Vec::new(),
     };

@@ -11,9 +11,11 @@ use crate::mount::{Gauge, Marker, placed};
 use crate::scalar::Scalar;
 use crate::spatial::{Matrix3, Pose, Vector3};
 
-/// Coordinates from which on articulated bodies are faster than a mass matrix, where beams fall into segments: on arms of two links it
-/// takes the same time at 8 coordinates and three quarters of it at 14.
+/// Coordinates from which on articulated bodies are faster than a mass matrix where beams fall into segments: on arms of two links both take
+/// the same time at 8 coordinates, articulated bodies three quarters of it at 14, a quarter at 44.
 const MANY: usize = 10;
+/// The same where each beam is one segment, whose own coordinates cost as much either way: nine tenths at 20 coordinates.
+const MANY_UNCUT: usize = 20;
 
 impl<S: Scalar> Assembly<'_, S> {
     /// The tree.
@@ -62,13 +64,14 @@ impl<S: Scalar> Assembly<'_, S> {
         let segmented = couples && uniform && !massive;
         let cut = self.beams.iter().any(|elastic| elastic.beam.segments().len() > 1);
         let rigid = n_coordinates == n_joints && self.beams.iter().all(|elastic| elastic.frame.is_none());
+        let recursive = sorted && rigid && couples && !massive;
         Ok(Model {
             gravity: Vector3::from(self.parts.gravity),
             order,
             n_frames,
-            recursive: sorted && rigid && couples && !massive,
+            recursive,
             segmented,
-            articulated: segmented && cut && n_coordinates >= MANY,
+            articulated: segmented && !recursive && n_coordinates >= if cut { MANY } else { MANY_UNCUT },
             carriers,
             drops_velocity_terms: self.parts.drop_velocity_terms,
             products,

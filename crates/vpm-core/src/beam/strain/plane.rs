@@ -82,7 +82,7 @@ impl PlaneAxis {
             (change[0], change[1]) = (change[0] - sin * square, change[1] - cos * square);
             for (sums, &entry) in out.scratch.chunks_exact_mut(2).zip(row) {
                 sums[0] += cos * entry;
-                sums[1] += -(sin * entry);
+                sums[1] -= sin * entry;
             }
         }
     }

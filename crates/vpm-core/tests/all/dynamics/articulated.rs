@@ -266,15 +266,16 @@ fn the_energy_of_a_swing_is_conserved() -> Result<()> {
             if count % 20 == 0 {
                 let now = flexible::energy(&tree, &mut data, &x[..n], &x[n..]);
                 kinetic = kinetic.max(now.kinetic);
-                worst = worst.max((now.kinetic + now.potential - begin.kinetic - begin.potential).abs());
+                // Not by `max`, which would lose what is not a number.
+                let change = (now.kinetic + now.potential - begin.kinetic - begin.potential).abs();
+                worst = if change <= worst { worst } else { change };
             }
         }
         worst / kinetic
     };
-    let [coarse, fine] = [1.6e-5, 8e-6].map(&mut drift);
-    println!("{coarse} {fine}");
-    assert!(fine < 1e-9, "the energy changes by {fine} of the largest kinetic energy");
-    assert!(coarse / fine > 10.0, "from {coarse} to {fine} at half the step: not of fourth order");
+    let [coarse, fine] = [1e-5, 5e-6].map(&mut drift);
+    assert!(coarse < 1e-9, "the energy changes by {coarse} of the largest kinetic energy");
+    assert!(fine < 0.5 * coarse, "from {coarse} to {fine} at half the step: not an error of the steps");
     Ok(())
 }
 
