@@ -14,6 +14,8 @@ from typing import NamedTuple
 
 import pytest
 
+import vpm
+
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGE = ROOT / "python" / "vpm"
 
@@ -21,7 +23,7 @@ OPTIONAL = {"control", "h5py", "jinja2", "matplotlib", "pandas", "pyarrow", "ros
 """Libraries of the extras: a plain install has none of them."""
 
 SLOW = OPTIONAL | {"rich", "scipy.signal", "scipy.stats", "typer"}
-"""What ``import vpm`` must not load."""
+"""What no name of ``vpm`` may load before it is called."""
 
 
 class Import(NamedTuple):
@@ -107,10 +109,45 @@ def test_demo_log_is_made_without_vpm() -> None:
     assert [target for target in used if target.startswith("vpm") and not target.startswith(among)] == []
 
 
-def test_import_vpm_is_light() -> None:
-    program = "import sys, vpm; print('\\n'.join(sys.modules))"
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
-    assert SLOW & set(done.stdout.split()) == set()
+def loaded_by(program: str) -> set[str]:
+    """Names of the modules that are there after a program, in an interpreter of its own."""
+    program += "\nimport sys; print('\\n'.join(sys.modules))"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return set(done.stdout.split())
+
+
+def test_import_vpm_loads_nothing_but_what_python_has() -> None:
+    # Besides the standard library, what the interpreter of an editable installation loads by itself.
+    added = loaded_by("import vpm") - loaded_by("pass")
+    assert {name.split(".")[0] for name in added} - sys.stdlib_module_names == {"vpm"}
+
+
+def test_a_simulation_needs_no_scipy() -> None:
+    added = loaded_by("from vpm import Experiment, Model, Scenario, compare, simulate")
+    assert {"vpm._core", "vpm.simulate.run"} <= added
+    assert not any(name.split(".")[0] == "scipy" for name in added)
+
+
+def test_names_of_vpm_are_light() -> None:
+    added = loaded_by("from vpm import *")
+    assert "vpm.discrepancy" in added
+    assert SLOW & added == set()
+
+
+def test_names_of_vpm_are_those_that_type_checkers_see() -> None:
+    body = ast.parse((PACKAGE / "__init__.py").read_text(encoding="utf-8")).body
+    (block,) = (node for node in body if is_type_checking(node) and isinstance(node, ast.If) and not node.orelse)
+    seen = {alias.name: n.module for n in block.body if isinstance(n, ast.ImportFrom) for alias in n.names}
+    homes = {name: vpm._HOMES.get(name, "vpm") for name in vpm.__all__}
+    assert homes == {**seen, "__version__": "vpm"}
+    assert vpm._HOMES.keys() <= homes.keys() <= set(dir(vpm))
+
+
+def test_names_that_vpm_has_not() -> None:
+    with pytest.raises(AttributeError, match="module 'vpm' has no attribute 'simulation'"):
+        vpm.simulation  # type: ignore[attr-defined] # noqa: B018
+    assert not hasattr(vpm, "__wrapped__")
 
 
 @pytest.mark.parametrize(

@@ -7,38 +7,43 @@ One way through the package::
 Each arrow is a function of this module, each result one frozen object.
 """
 
-from importlib.metadata import version
+import sys
+from importlib import import_module
+from importlib.util import find_spec
+from types import ModuleType
+from typing import TYPE_CHECKING
 
-from vpm import impedance, linkages, narx, realtime
-from vpm.batch import Trial, simulate_batch
-from vpm.budget import BudgetReport, budget
-from vpm.catalogue import EFFECTS
-from vpm.climb import Climb, climb
-from vpm.compare import Comparison, compare
-from vpm.discrepancy import Diagnosis, diagnose
-from vpm.errors import VpmError
-from vpm.experiment import Campaign, Experiment
-from vpm.identify import (
-    CylinderGeometry,
-    Fit,
-    Fitting,
-    InertialFit,
-    InertialRegression,
-    OilFit,
-    identify,
-    identify_inertial,
-    identify_oil,
-)
-from vpm.linear import LinearModel
-from vpm.model import Dynamics, Model
-from vpm.planar import PlanarArm
-from vpm.report import Report, report, write_report
-from vpm.scenario import Scenario, ScenarioRun
-from vpm.simplify import Ladder, simplify
-from vpm.simulate import Run, Setup, simulate
-from vpm.stepping import Simulation
+if TYPE_CHECKING:
+    from vpm import impedance, linkages, narx, realtime
+    from vpm.batch import Trial, simulate_batch
+    from vpm.budget import BudgetReport, budget
+    from vpm.catalogue import EFFECTS
+    from vpm.climb import Climb, climb
+    from vpm.compare import Comparison, compare
+    from vpm.discrepancy import Diagnosis, diagnose
+    from vpm.errors import VpmError
+    from vpm.experiment import Campaign, Experiment
+    from vpm.identify import (
+        CylinderGeometry,
+        Fit,
+        Fitting,
+        InertialFit,
+        InertialRegression,
+        OilFit,
+        identify,
+        identify_inertial,
+        identify_oil,
+    )
+    from vpm.linear import LinearModel
+    from vpm.model import Dynamics, Model
+    from vpm.planar import PlanarArm
+    from vpm.report import Report, report, write_report
+    from vpm.scenario import Scenario, ScenarioRun
+    from vpm.simplify import Ladder, simplify
+    from vpm.simulate import Run, Setup, simulate
+    from vpm.stepping import Simulation
 
-__version__ = version("vpm-dynamics")
+    __version__: str
 
 __all__ = [
     "EFFECTS",
@@ -85,3 +90,76 @@ __all__ = [
     "simulate_batch",
     "write_report",
 ]
+
+_HOMES = {
+    "Trial": "vpm.batch",
+    "simulate_batch": "vpm.batch",
+    "BudgetReport": "vpm.budget",
+    "budget": "vpm.budget",
+    "EFFECTS": "vpm.catalogue",
+    "Climb": "vpm.climb",
+    "climb": "vpm.climb",
+    "Comparison": "vpm.compare",
+    "compare": "vpm.compare",
+    "Diagnosis": "vpm.discrepancy",
+    "diagnose": "vpm.discrepancy",
+    "VpmError": "vpm.errors",
+    "Campaign": "vpm.experiment",
+    "Experiment": "vpm.experiment",
+    "CylinderGeometry": "vpm.identify",
+    "Fit": "vpm.identify",
+    "Fitting": "vpm.identify",
+    "InertialFit": "vpm.identify",
+    "InertialRegression": "vpm.identify",
+    "OilFit": "vpm.identify",
+    "identify": "vpm.identify",
+    "identify_inertial": "vpm.identify",
+    "identify_oil": "vpm.identify",
+    "LinearModel": "vpm.linear",
+    "Dynamics": "vpm.model",
+    "Model": "vpm.model",
+    "PlanarArm": "vpm.planar",
+    "Report": "vpm.report",
+    "report": "vpm.report",
+    "write_report": "vpm.report",
+    "Scenario": "vpm.scenario",
+    "ScenarioRun": "vpm.scenario",
+    "Ladder": "vpm.simplify",
+    "simplify": "vpm.simplify",
+    "Run": "vpm.simulate",
+    "Setup": "vpm.simulate",
+    "simulate": "vpm.simulate",
+    "Simulation": "vpm.stepping",
+}
+"""The module that each name comes from, once it is asked for: a program loads what it uses."""
+
+
+class _Package(ModuleType):
+    """A package whose functions keep their names beside modules of the same name, such as `compare`."""
+
+    def __setattr__(self, name: str, value: object) -> None:
+        """Bind a name, but not that of a function to the module that Python has just loaded."""
+        if not (name in _HOMES and value is sys.modules.get(f"vpm.{name}")):
+            super().__setattr__(name, value)
+
+
+sys.modules[__name__].__class__ = _Package
+
+# Behind the condition, so that type checkers know the names above and no other.
+if not TYPE_CHECKING:
+
+    def __getattr__(name: str) -> object:
+        """Load a name at its first use."""
+        if name == "__version__":
+            value = import_module("importlib.metadata").version("vpm-dynamics")
+        elif name in _HOMES:
+            value = getattr(import_module(_HOMES[name]), name)
+        elif name.startswith("__") or find_spec(f"vpm.{name}") is None:
+            raise AttributeError(f"module 'vpm' has no attribute {name!r}", name=name, obj=sys.modules[__name__])
+        else:
+            return import_module(f"vpm.{name}")
+        globals()[name] = value
+        return value
+
+    def __dir__() -> list[str]:
+        return sorted({*globals(), *__all__})

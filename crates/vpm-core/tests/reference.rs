@@ -16,13 +16,9 @@ use vpm_core::samples::double_pendulum;
 #[expect(dead_code, reason = "it needs some of them")]
 mod common;
 use common::beams::{along_x, body, fields, pin};
-use common::{Machine, close};
+use common::{Machine, close, distance};
 
 const TIGHT: Tolerance = Tolerance { relative: 1e-10, absolute: 1e-11 };
-
-fn distance(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum::<f64>().sqrt()
-}
 
 fn fixed(ode: &mut impl Ode<f64>, start: &[f64], method: Method, end: f64, steps: usize) -> Vec<f64> {
     let (mut x, mut integrator) = (start.to_vec(), Integrator::new(method, start.len()));

@@ -4,6 +4,8 @@ use proptest::prelude::*;
 use vpm_core::Dual;
 use vpm_core::actuator::DcMotor;
 
+use crate::common::close;
+
 /// A motor of some 100 W behind a gear of 50.
 fn motor() -> DcMotor<f64> {
     DcMotor {
@@ -16,10 +18,6 @@ fn motor() -> DcMotor<f64> {
         transition_velocity: 0.02,
         rotor_inertia: Some(1e-5),
     }
-}
-
-fn close(found: f64, expected: f64, tolerance: f64) {
-    assert!((found - expected).abs() <= tolerance, "{found} instead of {expected}");
 }
 
 /// One step of the classical fourth-order rule for `x' = f(x)`.

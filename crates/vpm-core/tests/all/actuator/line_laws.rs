@@ -4,12 +4,10 @@ use proptest::prelude::*;
 use vpm_core::Dual;
 use vpm_core::actuator::{Maxwell, SpringDamper};
 
+use crate::common::close;
+
 fn element() -> Maxwell<f64> {
     Maxwell { stiffness: 8e4, free_length: 0.3, fast_stiffness: 5e4, relaxation_time: 4e-3 }
-}
-
-fn close(found: f64, expected: f64, tolerance: f64) {
-    assert!((found - expected).abs() <= tolerance, "{found} instead of {expected}");
 }
 
 proptest! {

@@ -7,6 +7,7 @@ use vpm_core::beam::{Beam, BeamEntry, Component, Level, Material, Properties, Se
 
 use Component::{BendingX, BendingY, Extension, ShearX, ShearY, Torsion};
 
+use super::ROOTS;
 use crate::common::entries;
 use crate::common::entries::entry;
 use crate::common::sums::{Load, Root, equilibrium, linearised, tip};
@@ -35,8 +36,6 @@ fn close(found: &[f64], expected: &[f64], relative: f64, what: &str) {
         assert!((found - expected).abs() <= relative * expected.abs(), "{what}: {found} is not {expected}");
     }
 }
-
-const ROOTS: [f64; 4] = [1.875_104_068_711_961_1, 4.694_091_132_974_175, 7.854_757_438_237_613, 10.995_540_734_875_467];
 
 #[test]
 fn clamped_frequencies_converge_to_euler_bernoulli() -> Result<()> {

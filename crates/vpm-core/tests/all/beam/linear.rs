@@ -9,6 +9,8 @@ use vpm_core::beam::eigen::modes;
 use vpm_core::beam::linear::{LinearBeam, Plane, Theory, TipBody};
 use vpm_core::beam::{Basis, Material, Section, Shape};
 
+use super::ROOTS;
+
 /// A beam of length 1, `EJ = 1` and `rhoA = 1`.
 fn unit(basis: Basis, tip: TipBody) -> Result<LinearBeam> {
     let section = Section::given([1.0, 1.0, 1.0, 1e6, 1e6, 1e6], [0.0, 0.0, 0.0, 1.0, 1.0, 1.0])?;
@@ -24,8 +26,6 @@ fn close(found: &[f64], expected: &[f64], relative: f64) {
         assert!((found - expected).abs() <= relative * expected.abs(), "{found} is not {expected}");
     }
 }
-
-const ROOTS: [f64; 4] = [1.875_104_068_711_961_1, 4.694_091_132_974_175, 7.854_757_438_237_613, 10.995_540_734_875_467];
 
 #[test]
 fn a_cantilever_vibrates_at_the_roots_of_its_equation() -> Result<()> {

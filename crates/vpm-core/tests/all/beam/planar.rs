@@ -11,6 +11,8 @@ use vpm_core::beam::planar::{Arm, Hub, LinkParameters, Load, Motion, PlanarChain
 use vpm_core::samples::Random;
 use vpm_core::{Dual, Result, Scalar};
 
+use crate::common::beams::near;
+
 const UNIT: LinkParameters = LinkParameters {
     bending: 1.0,
     line: 1.0,
@@ -23,12 +25,6 @@ const UNIT: LinkParameters = LinkParameters {
 /// One link of length 1 with `EACH - 1` Legendre curvatures.
 fn cantilever<const EACH: usize>(gravity: f64) -> Result<PlanarChain<1, EACH, EACH>> {
     PlanarChain::new([(UNIT, Basis::legendre(1.0, EACH - 1)?)], [0.0, -gravity], 16)
-}
-
-fn near(found: &[f64], expected: &[f64], tolerance: f64) {
-    for (found, expected) in found.iter().zip(expected) {
-        assert!((found - expected).abs() <= tolerance, "{found} is not {expected}");
-    }
 }
 
 #[test]

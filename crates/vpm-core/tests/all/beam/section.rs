@@ -7,7 +7,7 @@ use vpm_core::Result;
 use vpm_core::beam::quadrature::gauss;
 use vpm_core::beam::{Basis, Material, Properties, Section, Shape};
 
-const STEEL: Material = Material { young: 210e9, poisson: 0.3, density: 7850.0 };
+use crate::common::entries::STEEL;
 
 fn close(found: f64, expected: f64, relative: f64) {
     assert!((found - expected).abs() <= relative * expected.abs(), "{found} is not {expected}");

@@ -5,27 +5,7 @@ use vpm_core::body::{Body, Inertia};
 use vpm_core::joint::{Joint, JointKind};
 use vpm_core::mount::Mount;
 
-/// No rotation.
-const UPRIGHT: [f64; 9] = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
-
-/// A new parameter, by its place.
-fn parameter(content: &mut Value, name: String, value: f64) -> usize {
-    if let Some(names) = content["parameter_names"].as_array_mut() {
-        names.push(json!(name));
-    }
-    let Some(values) = content["parameters"].as_array_mut() else { return 0 };
-    values.push(json!(value));
-    values.len() - 1
-}
-
-fn push(content: &mut Value, list: &str, part: Value) {
-    if content[list].is_null() {
-        content[list] = json!([]);
-    }
-    if let Some(parts) = content[list].as_array_mut() {
-        parts.push(part);
-    }
-}
+use super::trees::{UPRIGHT, parameter, push};
 
 /// A contact: stiffness, exponent, damping and its depth; friction by its coefficients and velocities.
 pub fn contact(
@@ -38,7 +18,7 @@ pub fn contact(
     let mut table = |keys: [&str; 4], numbers: [f64; 4]| -> Value {
         let places = keys.iter().zip(numbers);
         places
-            .map(|(key, value)| (key.to_string(), json!(parameter(content, format!("{name}.{key}"), value))))
+            .map(|(key, value)| (key.to_string(), json!(parameter(content, &format!("{name}.{key}"), value))))
             .collect()
     };
     let normal = table(["stiffness", "exponent", "damping", "damping_depth"], normal);
@@ -59,7 +39,7 @@ pub fn bushing(
     preload: [f64; 6],
 ) {
     let mut full = |key: &str, diagonal: [f64; 6]| -> Vec<Vec<Option<usize>>> {
-        let place = |i: usize| parameter(content, format!("{name}.{key}.{i}"), diagonal[i]);
+        let place = |i: usize| parameter(content, &format!("{name}.{key}.{i}"), diagonal[i]);
         let places: Vec<usize> = (0..6).map(place).collect();
         (0..6).map(|i| (0..6).map(|j| (i == j).then_some(places[i])).collect()).collect()
     };
@@ -67,7 +47,7 @@ pub fn bushing(
     let preload: Vec<usize> = preload
         .iter()
         .enumerate()
-        .map(|(i, &value)| parameter(content, format!("{name}.preload.{i}"), value))
+        .map(|(i, &value)| parameter(content, &format!("{name}.preload.{i}"), value))
         .collect();
     let [a, b] = ends.map(|(on, translation)| json!({"on": on, "translation": translation, "rotation": UPRIGHT}));
     let part = json!({"name": name, "a": a, "b": b, "stiffness": stiffness, "damping": damping, "preload": preload});

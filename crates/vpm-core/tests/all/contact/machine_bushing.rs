@@ -12,31 +12,15 @@ use vpm_core::model::Parts;
 use vpm_core::mount::{Marker, Mount};
 use vpm_core::prepared::Prepared;
 use vpm_core::samples::{Random, random_tree};
-use vpm_core::simulate::{Run, Setting, Stepping, free_run};
+use vpm_core::simulate::Run;
 use vpm_core::spatial::{Matrix3, Vector3};
 use vpm_core::table::Table;
 
+use super::{G, run};
+use crate::common::close;
 use crate::common::connections::{FREE, bushing, chain};
 use crate::common::trees;
 use crate::common::trees::{UPRIGHT, description, everything, section};
-
-const G: f64 = 9.81;
-
-fn run(
-    d: &Description,
-    state: &[f64],
-    (step, substeps, rows): (f64, usize, usize),
-    method: Method,
-    by: &[usize],
-) -> Result<Run> {
-    let stepping = Stepping::new(step, substeps, method)?;
-    let setting = Setting { description: d, theta: &d.parameters, stepping, sensitivities: by, interrupt: &|| false };
-    free_run(setting, state, Table::new("inputs", &[], rows, 0)?)
-}
-
-fn close(found: f64, expected: f64, tolerance: f64) {
-    assert!((found - expected).abs() <= tolerance, "{found} is not {expected} within {tolerance}");
-}
 
 fn tree(seed: u64) -> Parts<f64> {
     let sample = random_tree(seed, 5);

@@ -17,14 +17,15 @@ use vpm_core::live::Live;
 use vpm_core::model::Parts;
 use vpm_core::motion::JointMotion;
 use vpm_core::mount::Mount;
-use vpm_core::simulate::{Run, Setting, Stepping, free_run, prescribed};
+use vpm_core::simulate::{Run, Setting, Stepping, prescribed};
 use vpm_core::table::Table;
 
+use super::{G, run};
+use crate::common::close;
 use crate::common::connections::{chain, contact};
 use crate::common::trees;
 use crate::common::trees::{UPRIGHT, description};
 
-const G: f64 = 9.81;
 const Z: [f64; 3] = [0.0, 0.0, 1.0];
 const GROUND: [[f64; 3]; 2] = [[0.0; 3], Z];
 const FRICTION: [f64; 4] = [0.7, 0.1, 0.55, 1.0];
@@ -42,25 +43,9 @@ fn block(normal: [f64; 4], friction: Option<[f64; 4]>, plane: [[f64; 3]; 2]) -> 
     description(&parts, |content| contact(content, ("foot", Mount::Body(1), [0.0; 3]), plane, normal, friction))
 }
 
-fn run(
-    d: &Description,
-    state: &[f64],
-    (step, substeps, rows): (f64, usize, usize),
-    method: Method,
-    by: &[usize],
-) -> Result<Run> {
-    let stepping = Stepping::new(step, substeps, method)?;
-    let setting = Setting { description: d, theta: &d.parameters, stepping, sensitivities: by, interrupt: &|| false };
-    free_run(setting, state, Table::new("inputs", &[], rows, 0)?)
-}
-
 /// A column of a table over time.
 fn column(numbers: &[f64], width: usize, place: usize) -> Vec<f64> {
     numbers.iter().skip(place).step_by(width).copied().collect()
-}
-
-fn close(found: f64, expected: f64, tolerance: f64) {
-    assert!((found - expected).abs() <= tolerance, "{found} is not {expected} within {tolerance}");
 }
 
 /// Where a falling function changes its sign.

@@ -6,6 +6,8 @@ use vpm_core::samples::Random;
 use vpm_core::spatial::{Matrix3, Vector2, Vector3};
 use vpm_core::{Dual, Scalar};
 
+use crate::common::close;
+
 const GRAVITY: f64 = 9.81;
 
 /// The foot of the leg in SI.
@@ -15,10 +17,6 @@ fn foot() -> NormalContact<f64> {
 
 fn rubber() -> ContactFriction<f64> {
     ContactFriction { static_coefficient: 0.7, static_velocity: 0.1, dynamic_coefficient: 0.55, dynamic_velocity: 1.0 }
-}
-
-fn close(found: f64, expected: f64, tolerance: f64) {
-    assert!((found - expected).abs() <= tolerance, "{found} instead of {expected}");
 }
 
 /// One step of the classical Runge-Kutta method for a point mass on its height (m) and its speed upward (m/s).

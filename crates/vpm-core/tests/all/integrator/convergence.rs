@@ -9,6 +9,7 @@ use vpm_core::samples::{Random, arm7, double_pendulum, pendulum, slider};
 use vpm_core::simulate::restarts;
 use vpm_core::table::Table;
 
+use crate::common::distance;
 use crate::common::{Bench, Machine, close};
 
 /// A swinging double pendulum with friction of every kind, a spring, and a drive with lag.
@@ -29,10 +30,6 @@ fn final_state(method: Method, steps: usize) -> Vec<f64> {
     let bench = Bench::new(&smooth(), 0.8, steps, method);
     let run = bench.free(&[0.6, -0.4, 0.5, 0.2, 0.0], &[2.0, 2.0]);
     run.states[5..].to_vec()
-}
-
-fn distance(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum::<f64>().sqrt()
 }
 
 #[test]

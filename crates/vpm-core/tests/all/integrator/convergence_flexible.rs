@@ -8,10 +8,7 @@ use vpm_core::ode::Ode;
 use vpm_core::{Result, Scalar};
 
 use crate::common::beams::{along_x, body, fields, pin};
-
-fn distance(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum::<f64>().sqrt()
-}
+use crate::common::distance;
 
 /// State of an undamped elastic pendulum of two links in space after 0.1 s from a fall out of the horizontal.
 fn flexible_state(method: Method, steps: usize) -> Result<Vec<f64>> {

@@ -20,16 +20,13 @@ use vpm_core::simulate::{Setting, Stepping, free_run, prescribed};
 use vpm_core::spatial::{Matrix3, Vector3};
 use vpm_core::table::Table;
 
+use crate::common::close;
 use crate::common::connections::{FREE, bushing, chain, contact, load_cell};
 use crate::common::trees;
 use crate::common::trees::{UPRIGHT, description, everything, parameter, push, section};
 
 const G: f64 = 9.81;
 const SHOULDER: usize = 1;
-
-fn close(found: f64, expected: f64, tolerance: f64) {
-    assert!((found - expected).abs() <= tolerance, "{found} is not {expected} within {tolerance}");
-}
 
 /// What acts besides: a contact at the tip, a bushing across, an actuator on a massive line.
 fn act(content: &mut Value, parts: &Parts<f64>) {
