@@ -12,9 +12,11 @@ mod evaluate;
 mod operation;
 mod program;
 mod record;
+mod source;
 
 pub use derive::Derivative;
 pub use evaluate::{Evaluator, LANES};
 pub use operation::{Function, Node, Operation};
 pub use program::{Program, Stages};
 pub use record::{Decision, Graph, Recorded, input, record};
+pub use source::{Block, Source, literal};
