@@ -125,7 +125,12 @@ impl<S: Scalar> Inertia<S> {
     /// inequalities for physically consistent inertial parameter identification"). Zero moments pass: a point mass.
     pub fn checked(&self, name: &str) -> Result<SpatialInertia<S>> {
         self.check_finite(name)?;
-        check_physical(name, self.mass.re(), Symmetric3::from_array(self.moments.map(|entry| entry.re())), 0.0)?;
+        check_physical(
+            name,
+            self.mass.inspect(),
+            Symmetric3::from_array(self.moments.map(|entry| entry.inspect())),
+            0.0,
+        )?;
         Ok(self.spatial())
     }
 
@@ -137,7 +142,7 @@ impl<S: Scalar> Inertia<S> {
             .chain(INERTIA.into_iter().zip(self.moments));
         for (parameter, number) in named {
             if !number.is_finite() {
-                return Err(Error::NonFinite { path: format!("{name}.{parameter}"), value: number.re() });
+                return Err(Error::NonFinite { path: format!("{name}.{parameter}"), value: number.inspect() });
             }
         }
         Ok(())
@@ -155,10 +160,10 @@ impl<S: Scalar> Body<S> {
         let rotor = self.rotor_inertia.unwrap_or(S::zero());
         let path = || format!("{}.rotor_inertia", self.joint.name);
         if !rotor.is_finite() {
-            return Err(Error::NonFinite { path: path(), value: rotor.re() });
+            return Err(Error::NonFinite { path: path(), value: rotor.inspect() });
         }
-        if rotor.re() < 0.0 {
-            return Err(Error::Domain { path: path(), condition: "be zero or positive", value: rotor.re() });
+        if rotor.inspect() < 0.0 {
+            return Err(Error::Domain { path: path(), condition: "be zero or positive", value: rotor.inspect() });
         }
         Ok(rotor)
     }

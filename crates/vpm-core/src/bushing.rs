@@ -123,7 +123,7 @@ fn product<S: Scalar>(row: &[S; 6], column: &[S; 6]) -> S {
 #[inline]
 fn inverse_tangent<S: Scalar>(phi: Vector3<S>, half: f64, w: Vector3<S>) -> Vector3<S> {
     let square = phi.dot(phi);
-    let factor = if square.re() < 0.1 { series(square) } else { closed(square) };
+    let factor = square.if_less(S::from_f64(0.1), || series(square), || closed(square));
     let skew = Matrix3::skew(phi);
     let once = skew * w;
     w + once * S::from_f64(half) + skew * once * factor

@@ -208,7 +208,7 @@ impl Description {
 
     /// The machine with the parameters `theta`, after [`Description::check_values`].
     pub fn system<S: Scalar>(&self, theta: &[S]) -> Result<System<S>> {
-        let values: Vec<f64> = theta.iter().map(Scalar::re).collect();
+        let values: Vec<f64> = theta.iter().map(Scalar::inspect).collect();
         self.check_values(&values)?;
         System::new(theta, self)
     }

@@ -200,7 +200,7 @@ struct Required<'a> {
 
 impl Job for Required<'_> {
     fn run<S: Scalar>(&self, theta: &[S]) -> Result<Pair<S>> {
-        let values: Vec<f64> = theta.iter().map(Scalar::re).collect();
+        let values: Vec<f64> = theta.iter().map(Scalar::inspect).collect();
         self.description.check_values(&values)?;
         let mut dynamics = Build::dynamics(&self.description, theta)?;
         if self.part == Part::WithoutEffects {
@@ -221,7 +221,7 @@ struct Delivered<'a> {
 
 impl Job for Delivered<'_> {
     fn run<S: Scalar>(&self, theta: &[S]) -> Result<Pair<S>> {
-        let values: Vec<f64> = theta.iter().map(Scalar::re).collect();
+        let values: Vec<f64> = theta.iter().map(Scalar::inspect).collect();
         self.description.check_values(&values)?;
         let dynamics = Build::dynamics(&self.description, theta)?;
         Ok(Pair { first: applied(&dynamics, self.inputs, self.time_step, &[]), second: Vec::new() })
@@ -236,7 +236,7 @@ struct Inverse<'a> {
 
 impl Job for Inverse<'_> {
     fn run<S: Scalar>(&self, theta: &[S]) -> Result<Pair<S>> {
-        let values: Vec<f64> = theta.iter().map(Scalar::re).collect();
+        let values: Vec<f64> = theta.iter().map(Scalar::inspect).collect();
         self.description.check_values(&values)?;
         let mut dynamics = Build::dynamics(&self.description, theta)?;
         let sensors = position_sensors(self.description, theta);

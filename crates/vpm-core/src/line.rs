@@ -77,7 +77,7 @@ impl<S: Scalar> Line<S> {
             for (quantity, number, signed) in
                 [("mass", mass, false), ("center", center, true), ("inertia", inertia, false)]
             {
-                let (path, value) = (format!("{}.{which}.{quantity}", self.name), number.re());
+                let (path, value) = (format!("{}.{which}.{quantity}", self.name), number.inspect());
                 if !number.is_finite() {
                     return Err(Error::NonFinite { path, value });
                 }

@@ -116,6 +116,8 @@ pub(crate) struct Elastic<S> {
     pub(crate) frame: Option<usize>,
     /// Inertia at each station, with all that is welded to it.
     pub(crate) inertias: Vec<SpatialInertia<S>>,
+    /// Whether a station has inertia or carries something that may, of whatever size.
+    pub(crate) heavy: Vec<bool>,
 }
 
 /// A line in its place.

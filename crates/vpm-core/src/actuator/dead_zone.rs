@@ -27,12 +27,7 @@ impl<S: Scalar> DeadZone<S> {
     /// What is left of a command.
     #[inline]
     pub fn apply(&self, command: S) -> S {
-        if command > self.width {
-            command - self.width
-        } else if command < -self.width {
-            command + self.width
-        } else {
-            S::zero()
-        }
+        let below = || command.if_less(-self.width, || command + self.width, S::zero);
+        self.width.if_less(command, || command - self.width, below)
     }
 }

@@ -46,7 +46,7 @@ impl<S: Scalar> Ideal<S> {
     /// Change of the effort per change of `x`: nothing beyond the limit.
     #[inline]
     pub fn slope(&self, x: S) -> S {
-        let cut = self.limit.is_some_and(|limit| (self.gain * x).abs() > limit.limit);
-        if cut { S::zero() } else { self.gain }
+        let Some(limit) = self.limit else { return self.gain };
+        limit.limit.if_less((self.gain * x).abs(), S::zero, || self.gain)
     }
 }

@@ -26,12 +26,7 @@ impl<S: Scalar> Saturation<S> {
     /// The command within its limits.
     #[inline]
     pub fn apply(&self, command: S) -> S {
-        if command > self.limit {
-            self.limit
-        } else if command < -self.limit {
-            -self.limit
-        } else {
-            command
-        }
+        let below = || command.if_less(-self.limit, || -self.limit, || command);
+        self.limit.if_less(command, || self.limit, below)
     }
 }

@@ -89,16 +89,26 @@ impl TableDrive {
     /// Effort (N or N m) under a `command` at a `velocity` (m/s or rad/s).
     #[inline]
     pub fn effort<S: Scalar>(&self, command: S, velocity: S) -> S {
-        let ((row, u), (column, v)) = (place(&self.commands, command), place(&self.velocities, velocity));
+        let patch = |row, column| self.patch((row, command), (column, velocity));
+        within(&self.commands, command, &|row| within(&self.velocities, velocity, &|column| patch(row, column)))
+    }
+
+    /// Effort by the corners of one pair of intervals, which command and velocity lie in or, at the ends of the table, beyond.
+    #[inline]
+    fn patch<S: Scalar>(&self, (row, command): (usize, S), (column, velocity): (usize, S)) -> S {
         let columns = self.velocities.len();
         let (du, dv) =
             (self.commands[row + 1] - self.commands[row], self.velocities[column + 1] - self.velocities[column]);
-        let (over_u, mut over_v) = (hermite(u), hermite(v));
-        let [least, most] = [self.velocities[0], self.velocities[self.velocities.len() - 1]];
-        if velocity.re() >= most {
-            over_v[1][1] = (velocity - most) * (1.0 / dv);
-        } else if velocity.re() <= least {
-            over_v[0][1] = (velocity - least) * (1.0 / dv);
+        let over_u = hermite(share(&self.commands, row, command));
+        let mut over_v = hermite(share(&self.velocities, column, velocity));
+        let [least, most] = [self.velocities[0], self.velocities[columns - 1]];
+        if column + 2 == columns {
+            let beyond = || (velocity - most) * (1.0 / dv);
+            over_v[1][1] = velocity.if_less(S::from_f64(most), || over_v[1][1], beyond);
+        }
+        if column == 0 {
+            let beyond = || (velocity - least) * (1.0 / dv);
+            over_v[0][1] = S::from_f64(least).if_less(velocity, || over_v[0][1], beyond);
         }
         let mut effort = S::zero();
         for (i, [by_value, by_slope]) in over_u.into_iter().enumerate() {
@@ -135,18 +145,24 @@ impl TableDrive {
     }
 }
 
-/// Interval of an axis where a number is, held at its ends, and the share of it that lies below.
+/// What `of` gives for the interval of an axis where a number is, the nearest one beyond its ends.
 #[inline]
-fn place<S: Scalar>(axis: &[f64], number: S) -> (usize, S) {
-    let (first, last) = (axis[0], axis[axis.len() - 1]);
-    if number.re() >= last {
-        return (axis.len() - 2, S::one());
+fn within<S: Scalar>(axis: &[f64], number: S, of: &impl Fn(usize) -> S) -> S {
+    let last = axis.len() - 2;
+    if number.known_less(S::zero()).is_none() {
+        return (1..=last).fold(of(0), |found, at| number.if_less(S::from_f64(axis[at]), || found, || of(at)));
     }
-    if number.re() <= first || number.re().is_nan() {
-        return (0, S::zero());
-    }
-    let at = axis.partition_point(|&node| node <= number.re()) - 1;
-    (at, (number - axis[at]) * (1.0 / (axis[at + 1] - axis[at])))
+    let number = number.re();
+    of(axis.partition_point(|&node| node <= number).saturating_sub(1).min(last))
+}
+
+/// Share of interval `at` of an axis that lies below a number, held at both ends of the axis.
+#[inline]
+fn share<S: Scalar>(axis: &[f64], at: usize, number: S) -> S {
+    let [low, high] = [axis[at], axis[at + 1]];
+    let inside = || (number - low) * (1.0 / (high - low));
+    let below = || if at + 2 == axis.len() { number.if_less(S::from_f64(high), inside, S::one) } else { inside() };
+    if at == 0 { S::from_f64(low).if_less(number, below, S::zero) } else { below() }
 }
 
 /// What value and slope of both ends of an interval count at a share of it.

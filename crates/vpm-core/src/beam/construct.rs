@@ -32,6 +32,12 @@ struct Place {
     weight: f64,
 }
 
+impl Place {
+    fn is_heavy(&self) -> bool {
+        self.weight != 0.0
+    }
+}
+
 impl<S: Scalar> Beam<S> {
     /// The beam of an entry with additional stations at the arc lengths `marks` (m). Checked: as by [`BeamEntry::check`], marks on the beam.
     pub fn new(entry: &BeamEntry<S>, marks: &[f64]) -> Result<Self> {
@@ -87,8 +93,9 @@ impl<S: Scalar> Beam<S> {
         let groups = groups(|component| {
             (0..fields.len()).filter(|&k| fields.components[k] == component as usize).collect::<Vec<_>>()
         });
-        let beam = Self { axis, map: Map::Fields(fields), inertia, marks, stiffness, damping: Vec::new() };
-        beam.damped(entry, &groups)
+        let heavy = places.iter().map(Place::is_heavy).collect();
+        let (map, damping) = (Map::Fields(fields), Vec::new());
+        Self { axis, map, inertia, heavy, marks, stiffness, damping, damped: false }.damped(entry, &groups)
     }
 
     /// A beam of rigid segments, or a rigid one.
@@ -111,12 +118,15 @@ impl<S: Scalar> Beam<S> {
         let groups =
             groups(|component| (0..axis.len()).filter(|&k| components[k % each] == component).collect::<Vec<_>>());
         let map = Map::Springs(axis.clone());
-        let beam = Self { axis: Axis::Lumped(axis), map, inertia, marks, stiffness, damping: Vec::new() };
-        beam.damped(entry, &groups)
+        let heavy = places.iter().map(Place::is_heavy).collect();
+        let (axis, damping) = (Axis::Lumped(axis), Vec::new());
+        Self { axis, map, inertia, heavy, marks, stiffness, damping, damped: false }.damped(entry, &groups)
     }
 
     fn damped(mut self, entry: &BeamEntry<S>, groups: &[Vec<usize>]) -> Result<Self> {
         self.damping = damping(entry, &self.stiffness, || self.mass(), groups)?;
+        let law = &entry.damping;
+        self.damped = law.stiffness.is_some() || law.mass.is_some() || !law.ratios.is_empty();
         Ok(self)
     }
 }

@@ -23,9 +23,13 @@ pub struct Beam<S> {
     pub(super) axis: Axis,
     pub(super) map: Map,
     pub(super) inertia: Vec<SpatialInertia<S>>,
+    /// Whether inertia is lumped at a station, or it only carries something.
+    pub(super) heavy: Vec<bool>,
     pub(super) marks: Vec<usize>,
     pub(super) stiffness: Vec<S>,
     pub(super) damping: Vec<S>,
+    /// Whether it is described with any damping.
+    pub(super) damped: bool,
 }
 
 /// The map from coordinates to sections.
@@ -74,6 +78,11 @@ impl<S: Scalar> Beam<S> {
         self.inertia[station]
     }
 
+    /// Whether inertia is lumped at a station, of whatever size.
+    pub(crate) fn is_heavy(&self, station: usize) -> bool {
+        self.heavy[station]
+    }
+
     /// Buffers for [`Beam::motion`], of any number type that the beam's can be lifted to.
     pub fn sections(&self) -> Sections<S> {
         let scratch = match &self.axis {
@@ -109,6 +118,11 @@ impl<S: Scalar> Beam<S> {
     /// Damping, row by row.
     pub fn damping(&self) -> &[S] {
         &self.damping
+    }
+
+    /// Whether it is described with any damping, of whatever size.
+    pub(crate) fn is_damped(&self) -> bool {
+        self.damped
     }
 
     /// The strain at `mu` (m), prepared: the map is made once, outside of hot paths.

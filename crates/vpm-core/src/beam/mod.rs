@@ -49,22 +49,22 @@ use crate::scalar::Scalar;
 
 /// Checks that a number of the beam's description is positive and finite.
 pub(crate) fn positive<S: Scalar>(path: &str, value: S) -> Result<S> {
-    if !value.re().is_finite() {
-        return Err(Error::NonFinite { path: path.to_owned(), value: value.re() });
+    if !value.inspect().is_finite() {
+        return Err(Error::NonFinite { path: path.to_owned(), value: value.inspect() });
     }
-    if value.re() <= 0.0 {
-        return Err(Error::Domain { path: path.to_owned(), condition: "be positive", value: value.re() });
+    if value.inspect() <= 0.0 {
+        return Err(Error::Domain { path: path.to_owned(), condition: "be positive", value: value.inspect() });
     }
     Ok(value)
 }
 
 /// Checks that a number of the beam's description is finite and not negative.
 pub(crate) fn not_negative<S: Scalar>(path: &str, value: S) -> Result<S> {
-    if !value.re().is_finite() {
-        return Err(Error::NonFinite { path: path.to_owned(), value: value.re() });
+    if !value.inspect().is_finite() {
+        return Err(Error::NonFinite { path: path.to_owned(), value: value.inspect() });
     }
-    if value.re() < 0.0 {
-        return Err(Error::Domain { path: path.to_owned(), condition: "be zero or positive", value: value.re() });
+    if value.inspect() < 0.0 {
+        return Err(Error::Domain { path: path.to_owned(), condition: "be zero or positive", value: value.inspect() });
     }
     Ok(value)
 }

@@ -35,7 +35,7 @@ impl<S: Scalar> Material<S> {
     fn check(&self) -> Result<()> {
         positive("material.young", self.young)?;
         positive("material.density", self.density)?;
-        let poisson = self.poisson.re();
+        let poisson = self.poisson.inspect();
         if poisson > -1.0 && poisson <= 0.5 {
             return Ok(());
         }
@@ -82,9 +82,9 @@ impl<S: Scalar> Section<S> {
         }
         for &value in &inertia[3..] {
             positive("section.inertia", value)?;
-            if value != inertia[3] {
+            if value.inspect() != inertia[3].inspect() {
                 let condition = "be the same mass per length in all three directions";
-                return Err(Error::Domain { path: "section.inertia".to_owned(), condition, value: value.re() });
+                return Err(Error::Domain { path: "section.inertia".to_owned(), condition, value: value.inspect() });
             }
         }
         Ok(Self { stiffness, inertia })

@@ -136,11 +136,11 @@ impl<S: Scalar> Properties<S> {
 }
 
 fn smaller<S: Scalar>(path: &str, value: S, limit: S) -> Result<()> {
-    if value < limit {
+    if value.inspect() < limit.inspect() {
         return Ok(());
     }
     let condition = "be smaller than the size of the section around it";
-    Err(Error::Domain { path: path.to_owned(), condition, value: value.re() })
+    Err(Error::Domain { path: path.to_owned(), condition, value: value.inspect() })
 }
 
 fn rectangle<S: Scalar>(width: S, height: S, poisson: S) -> Result<Properties<S>> {

@@ -56,24 +56,23 @@ impl<S: Scalar> ContactFriction<S> {
     /// mu at a sliding speed of 0 or more (m/s). Without a way from v_s to v_d, mu falls at v_s at once.
     #[inline]
     pub fn coefficient(&self, speed: S) -> S {
-        if speed.re() <= self.static_velocity.re() {
-            return self.static_coefficient * step(speed / self.static_velocity);
-        }
-        if speed.re() >= self.dynamic_velocity.re() {
-            return self.dynamic_coefficient;
-        }
-        let fallen = step((speed - self.static_velocity) / (self.dynamic_velocity - self.static_velocity));
-        self.static_coefficient + (self.dynamic_coefficient - self.static_coefficient) * fallen
+        let rising = || self.static_coefficient * step(speed / self.static_velocity);
+        let falling = || {
+            let fallen = step((speed - self.static_velocity) / (self.dynamic_velocity - self.static_velocity));
+            self.static_coefficient + (self.dynamic_coefficient - self.static_coefficient) * fallen
+        };
+        let beyond = || speed.if_less(self.dynamic_velocity, falling, || self.dynamic_coefficient);
+        self.static_velocity.if_less(speed, beyond, rising)
     }
 
     /// Resistance r in N s/m under the normal force (N) at a sliding speed whose square is `square` (m^2/s^2): `F_t = -r v`, zero at rest.
     #[inline]
     pub fn resistance(&self, square: S, normal: S) -> S {
-        if square.re() <= 0.0 {
-            return S::zero();
-        }
-        let speed = square.sqrt();
-        self.coefficient(speed) * normal / speed
+        let moving = || {
+            let speed = square.sqrt();
+            self.coefficient(speed) * normal / speed
+        };
+        square.if_positive(moving, S::zero)
     }
 
     /// The resistance per normal force that an implicit step needs at a sliding speed whose square is `square` (m^2/s^2), in s/m: the
@@ -83,16 +82,14 @@ impl<S: Scalar> ContactFriction<S> {
     /// around.
     #[inline]
     pub fn chord(&self, square: S) -> S {
-        if square.re() <= 0.0 {
-            return S::zero();
-        }
-        let speed = square.sqrt();
-        let chord = self.coefficient(speed) / speed;
-        if speed.re() >= self.static_velocity.re() {
-            return chord;
-        }
-        let t = speed / self.static_velocity;
-        chord.max(self.static_coefficient * t * (-t + 1.0) * 6.0 / self.static_velocity)
+        let moving = || {
+            let speed = square.sqrt();
+            let chord = self.coefficient(speed) / speed;
+            let t = speed / self.static_velocity;
+            let tangent = || self.static_coefficient * t * (-t + 1.0) * 6.0 / self.static_velocity;
+            speed.if_less(self.static_velocity, || chord.max(tangent()), || chord)
+        };
+        square.if_positive(moving, S::zero)
     }
 
     /// Friction in N, in the plane, at the sliding velocity `v` (m/s) under the normal force (N).

@@ -33,11 +33,6 @@ use crate::scalar::Scalar;
 /// The cubic step from 0 at t = 0 to 1 at t = 1, level outside: `3 t^2 - 2 t^3`. Its slope is continuous.
 #[inline]
 fn step<S: Scalar>(t: S) -> S {
-    if t.re() <= 0.0 {
-        return S::zero();
-    }
-    if t.re() >= 1.0 {
-        return S::one();
-    }
-    t * t * (-(t * 2.0) + 3.0)
+    let rising = || S::one().if_less(t, S::one, || t * t * (-(t * 2.0) + 3.0));
+    t.if_negative(S::zero, rising)
 }

@@ -4,7 +4,7 @@ use serde::Deserialize;
 
 use super::step;
 use crate::effect::Domain;
-use crate::scalar::Scalar;
+use crate::scalar::{Choice, Scalar};
 
 /// Normal force of a contact: a hardening spring with a damper that fades in with the depth.
 ///
@@ -56,31 +56,26 @@ impl<S: Scalar> NormalContact<S> {
     /// Force in N that pushes the bodies apart, at depth `d` (m) and its rate (m/s).
     #[inline]
     pub fn force(&self, d: S, rate: S) -> S {
-        if apart(d) {
-            return S::zero();
-        }
-        let force = self.spring(d) + self.damping * step(d / self.damping_depth) * rate;
-        if force.re() < 0.0 { S::zero() } else { force }
+        let push = || (self.spring(d) + self.damping * step(d / self.damping_depth) * rate).max(S::zero());
+        touching(d, S::zero(), push)
     }
 
     /// The spring's part of the force in N.
     #[inline]
     pub fn spring(&self, d: S) -> S {
-        if apart(d) { S::zero() } else { self.stiffness * (self.exponent * d.ln()).exp() }
+        touching(d, S::zero(), || self.stiffness * (self.exponent * d.ln()).exp())
     }
 
     /// Slope of the spring in N/m, and resistance of the damper in N s/m, at depth `d` (m).
     pub fn slopes(&self, d: S) -> [S; 2] {
-        if apart(d) {
-            return [S::zero(); 2];
-        }
-        [self.exponent * self.spring(d) / d, self.damping * step(d / self.damping_depth)]
+        let slopes = || [self.exponent * self.spring(d) / d, self.damping * step(d / self.damping_depth)];
+        touching(d, [S::zero(); 2], slopes)
     }
 
     /// Energy in the spring in J: `k d^(n+1) / (n + 1)`.
     #[inline]
     pub fn potential(&self, d: S) -> S {
-        if apart(d) { S::zero() } else { self.spring(d) * d / (self.exponent + 1.0) }
+        touching(d, S::zero(), || self.spring(d) * d / (self.exponent + 1.0))
     }
 
     /// Power in W that is lost, `(F - k d^n) d'`: never negative, whether the damper acts or the pull is cut off.
@@ -90,8 +85,8 @@ impl<S: Scalar> NormalContact<S> {
     }
 }
 
-/// Whether there is no contact; a depth that has no finite inverse counts as none, so that derivatives stay finite.
+/// What holds in contact, else `apart`; a depth that has no finite inverse counts as none, so that derivatives stay finite.
 #[inline]
-fn apart<S: Scalar>(d: S) -> bool {
-    d.re() < f64::MIN_POSITIVE
+fn touching<S: Scalar, T: Choice<S>>(d: S, apart: T, contact: impl FnOnce() -> T) -> T {
+    d.if_less(S::from_f64(f64::MIN_POSITIVE), || apart, contact)
 }

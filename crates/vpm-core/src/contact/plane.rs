@@ -19,13 +19,13 @@ impl<S: Scalar> Plane<S> {
     /// The plane through `point` (m) with a normal of any length but zero, both in world axes.
     pub fn new(point: Vector3<S>, normal: Vector3<S>) -> Result<Self> {
         if let Some(entry) = normal.to_array().into_iter().find(|entry| !entry.is_finite()) {
-            return Err(Error::NonFinite { path: "plane.normal".to_owned(), value: entry.re() });
+            return Err(Error::NonFinite { path: "plane.normal".to_owned(), value: entry.inspect() });
         }
         // Scaled by the largest entry first, so that the square neither overflows nor vanishes.
         let largest = normal.to_array().map(S::abs).into_iter().fold(S::zero(), S::max);
-        if largest.re() < f64::MIN_POSITIVE {
+        if largest.inspect() < f64::MIN_POSITIVE {
             let (path, condition) = ("plane.normal".to_owned(), "have a length, such as [0, 0, 1]");
-            return Err(Error::Domain { path, condition, value: largest.re() });
+            return Err(Error::Domain { path, condition, value: largest.inspect() });
         }
         let scaled = normal * largest.recip();
         Ok(Self { point, normal: scaled * scaled.dot(scaled).sqrt().recip() })

@@ -64,11 +64,10 @@ impl<S: Scalar> Pid<S> {
             memory.integral = integral;
             return command;
         };
-        let limited = limit.apply(command);
-        let winds_up = limited.re() != command.re() && (command * self.integral * error).re() > 0.0;
-        if winds_up {
-            return limit.apply(fast + self.integral * memory.integral);
-        }
+        let free = || (limit.apply(command), integral);
+        let held = || (limit.apply(fast + self.integral * memory.integral), memory.integral);
+        let at_limit = || (command * self.integral * error).if_positive(held, free);
+        let (limited, integral) = limit.limit.if_less(command.abs(), at_limit, free);
         memory.integral = integral;
         limited
     }

@@ -32,7 +32,7 @@ impl Description {
         if self.contacts.is_empty() && self.bushings.is_empty() && self.load_cells.is_empty() {
             return Ok(Connections::default());
         }
-        let values: Vec<f64> = theta.iter().map(Scalar::re).collect();
+        let values: Vec<f64> = theta.iter().map(Scalar::inspect).collect();
         self.contacts.iter().try_for_each(|contact| contact.check(&values))?;
         self.bushings.iter().try_for_each(|bushing| bushing.check(&values))?;
         let number = &mut |&index: &usize| theta[index];

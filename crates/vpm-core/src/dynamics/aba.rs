@@ -34,8 +34,8 @@ pub(super) fn singular_joint<S: Scalar>(
     // Outermost first: a singular joint spoils the inertias that the joints before it feel.
     let slots = model.links().iter().zip(data.aba.iter().skip(1)).enumerate().rev();
     slots.into_iter().find_map(|(number, (link, slot))| {
-        let inertia = (link.kind.effort(&slot.unit_wrench) + link.rotor).re();
-        let size = |block: Symmetric3<S>| (block.xx + block.yy + block.zz).re();
+        let inertia = (link.kind.effort(&slot.unit_wrench) + link.rotor).inspect();
+        let size = |block: Symmetric3<S>| (block.xx + block.yy + block.zz).inspect();
         let scale = match link.kind {
             JointKind::Prismatic => size(slot.inertia.linear),
             JointKind::Revolute => size(slot.inertia.angular),

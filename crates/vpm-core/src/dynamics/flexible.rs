@@ -76,17 +76,17 @@ fn beam<S: Scalar>(
     data: &mut Composite<S>,
     mass: &mut [S],
 ) {
-    let Elastic { beam, root, coordinate, frame, .. } = elastic;
+    let Elastic { beam, root, coordinate, frame, heavy, .. } = elastic;
     let (len, first, frame) = (beam.len(), *coordinate, frame.unwrap_or(0));
     let Composite { frames, sections, columns, bias, .. } = data;
     let n = bias.len();
     let jacobian = |station: usize| &sections[number].columns[station * len..(station + 1) * len];
     columns[first..first + len].fill(Wrench::zero());
     for station in 0..beam.stations() {
-        let FrameSlot { across, inertia, wrench, .. } = frames[frame + station];
-        if inertia == SpatialInertia::zero() {
+        if !heavy[station] {
             continue;
         }
+        let FrameSlot { across, inertia, wrench, .. } = frames[frame + station];
         for (i, column) in jacobian(station).iter().enumerate() {
             let momentum = inertia.apply(*column);
             bias[first + i] += column.power(wrench);

@@ -37,7 +37,8 @@ fn singular_pivot<S: Scalar>(model: &Model<S>, data: &mut Data<S>, q: &[S], rest
     data.factorise();
     let n = model.n_coordinates();
     (0..model.n_joints()).find_map(|joint| {
-        let (pivot, scale) = (data.composite.factors.pivot(joint).re(), data.mass_matrix[joint * n + joint].re());
+        let (pivot, scale) =
+            (data.composite.factors.pivot(joint).inspect(), data.mass_matrix[joint * n + joint].inspect());
         (pivot.is_nan() || pivot <= SINGULAR * scale.abs()).then_some((joint, pivot))
     })
 }

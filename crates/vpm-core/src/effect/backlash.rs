@@ -98,6 +98,6 @@ impl<S: Scalar> Backlash<S> {
     fn area(&self, way: S) -> S {
         let (size, distance) = (way.abs(), self.distance(way));
         let area = (size * distance + self.width * self.width * ((size + distance) / self.width).ln()) * 0.5;
-        if way.re() < 0.0 { -area } else { area }
+        way.if_negative(|| -area, || area)
     }
 }

@@ -186,7 +186,7 @@ impl<S: Scalar> EmpiricalForce<S> {
     pub fn resistance(&self, q: S, v: S) -> S {
         let (x, y) = (self.place(q), held(v / self.speed));
         // y/v: beyond the largest speed the effort stays what it is there.
-        let per_velocity = if v.re().abs() <= self.speed.re() { self.speed.recip() } else { v.abs().recip() };
+        let per_velocity = self.speed.if_less(v.abs(), || v.abs().recip(), || self.speed.recip());
         let viscous = times(self.viscous, S::one())
             + times(self.speed_2, y)
             + times(self.drag, y.abs())

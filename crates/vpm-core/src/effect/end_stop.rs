@@ -82,15 +82,14 @@ impl<S: Scalar> EndStop<S> {
     #[inline]
     fn depth(&self, way: S) -> S {
         let (square, distance) = (self.width * self.width, self.distance(way));
-        let twice = if way.re() < 0.0 { square / (distance - way) } else { way + distance };
-        twice * 0.5
+        way.if_negative(|| square / (distance - way), || way + distance) * 0.5
     }
 
     /// Integral of the depth.
     #[inline]
     fn area(&self, way: S) -> S {
         let size = ((way.abs() + self.distance(way)) / self.width).ln();
-        let signed = if way.re() < 0.0 { -size } else { size };
+        let signed = way.if_negative(|| -size, || size);
         (way * self.depth(way) * 2.0 + self.width * self.width * signed) * 0.25
     }
 

@@ -172,11 +172,12 @@ impl<S: Scalar> Formula<S> {
 
     /// Resistance to the velocity.
     pub fn resistance(&self, q: S, v: S) -> S {
-        if v.re().abs() > SLOW {
-            return (self.effort_at_rest(q) - self.effort(q, v)) / v;
-        }
-        let law = self.map(&mut |&parameter| Dual::<S, 1>::constant(parameter));
-        -law.effort(Dual::constant(q), Dual::variable(v, 0)).gradient[0]
+        let slope = || {
+            let law = self.map(&mut |&parameter| Dual::<S, 1>::constant(parameter));
+            -law.effort(Dual::constant(q), Dual::variable(v, 0)).gradient[0]
+        };
+        let chord = || (self.effort_at_rest(q) - self.effort(q, v)) / v;
+        S::from_f64(SLOW).if_less(v.abs(), chord, slope)
     }
 }
 

@@ -58,7 +58,7 @@ impl<S: Scalar> Hysteresis<S> {
     #[inline]
     pub fn fading(&self, v: S, z: S) -> S {
         let loading = v.abs() / self.displacement;
-        if v.re() * z.re() < 0.0 { loading * self.shape } else { loading }
+        (v * z).if_negative(|| loading * self.shape, || loading)
     }
 
     /// The memory after a way `way` (m or rad) in one direction, from `z`: the exact solution.
@@ -67,21 +67,19 @@ impl<S: Scalar> Hysteresis<S> {
     /// shape, until y = 0 at `u = ln(1 - b y)/b`; from there `1 - y` falls by `e^(-u)`.
     #[inline]
     pub fn advance(&self, z: S, way: S) -> S {
-        let backward = way.re() < 0.0;
-        let mut left = way.abs() / self.displacement;
-        let mut along = if backward { -z } else { z };
-        if along.re() < 0.0 {
+        let along = way.if_negative(|| -z, || z);
+        let left = way.abs() / self.displacement;
+        let load = |along: S, left: S| along - (along - 1.0) * -(-left).exp_m1();
+        let unload = || {
             let to_zero = logarithm(self.shape, -along);
-            if left.re() <= to_zero.re() {
+            let rise = || {
                 let rise = saturation(self.shape, left);
-                along = along + rise - along * self.shape * rise;
-                return if backward { -along } else { along };
-            }
-            left -= to_zero;
-            along = S::zero();
-        }
-        along -= (along - 1.0) * -(-left).exp_m1();
-        if backward { -along } else { along }
+                along + rise - along * self.shape * rise
+            };
+            to_zero.if_less(left, || load(S::zero(), left - to_zero), rise)
+        };
+        let moved = along.if_negative(unload, || load(along, left));
+        way.if_negative(|| -moved, || moved)
     }
 
     /// Energy in J that unloading gives back.
@@ -89,11 +87,8 @@ impl<S: Scalar> Hysteresis<S> {
     pub fn stored(&self, z: S) -> S {
         let (size, b) = (z.abs(), self.shape);
         // s/(1 + b s) integrates to (s - ln(1 + b s)/b)/b.
-        let share = if (b * size).re() < SMALL {
-            size * size * 0.5 - b * size * size * size * (1.0 / 3.0)
-        } else {
-            (size - logarithm(b, size)) / b
-        };
+        let series = || size * size * 0.5 - b * size * size * size * (1.0 / 3.0);
+        let share = (b * size).if_less(S::from_f64(SMALL), series, || (size - logarithm(b, size)) / b);
         self.force * self.displacement * share
     }
 }
@@ -105,18 +100,12 @@ const SMALL: f64 = 1e-5;
 #[inline]
 fn saturation<S: Scalar>(b: S, u: S) -> S {
     let x = b * u;
-    if x.re() < SMALL {
-        return u * (x * (x * (1.0 / 6.0) - 0.5) + 1.0);
-    }
-    -(-x).exp_m1() / b
+    x.if_less(S::from_f64(SMALL), || u * (x * (x * (1.0 / 6.0) - 0.5) + 1.0), || -(-x).exp_m1() / b)
 }
 
 /// ln(1 + b y)/b, y where b vanishes.
 #[inline]
 fn logarithm<S: Scalar>(b: S, y: S) -> S {
     let x = b * y;
-    if x.re() < SMALL {
-        return y * (x * (x * (1.0 / 3.0) - 0.5) + 1.0);
-    }
-    (x + 1.0).ln() / b
+    x.if_less(S::from_f64(SMALL), || y * (x * (x * (1.0 / 3.0) - 0.5) + 1.0), || (x + 1.0).ln() / b)
 }

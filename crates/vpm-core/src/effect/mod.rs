@@ -222,9 +222,6 @@ impl<S: Scalar> JointEffect<S> {
 /// tanh(x)/x, smooth through x = 0.
 #[inline]
 fn tanh_ratio<S: Scalar>(x: S) -> S {
-    if x.re().abs() < 1e-4 {
-        // The series 1 - x^2/3 + 2 x^4/15 ...: what is left out is below rounding.
-        return -(x * x / 3.0) + 1.0;
-    }
-    x.tanh() / x
+    // The series 1 - x^2/3 + 2 x^4/15 ...: what is left out is below rounding.
+    x.abs().if_less(S::from_f64(1e-4), || -(x * x / 3.0) + 1.0, || x.tanh() / x)
 }

@@ -47,6 +47,8 @@ pub(super) struct Assembly<'a, S> {
     pub(super) beams: Vec<Elastic<S>>,
     /// Inertia on each frame; that of a body in its own frame.
     pub(super) inertias: Vec<SpatialInertia<S>>,
+    /// Whether anything with inertia is fixed to each frame, of whatever size.
+    pub(super) heavy: Vec<bool>,
 }
 
 impl<S: Scalar> Model<S> {
@@ -180,9 +182,17 @@ impl<'a, S: Scalar> Assembly<'a, S> {
             let of_first_station = (!rigid).then_some(frame);
             (coordinate, frame) = (coordinate + beam.len(), frame + if rigid { 0 } else { beam.stations() });
             let root = Place::world();
-            beams.push(Elastic { beam, root, coordinate: first, frame: of_first_station, inertias: Vec::new() });
+            beams.push(Elastic {
+                beam,
+                root,
+                coordinate: first,
+                frame: of_first_station,
+                inertias: Vec::new(),
+                heavy: Vec::new(),
+            });
         }
-        Ok(Self { parts, joints, marks, beams, inertias: vec![SpatialInertia::zero(); frame] })
+        let (inertias, heavy) = (vec![SpatialInertia::zero(); frame], vec![false; frame]);
+        Ok(Self { parts, joints, marks, beams, inertias, heavy })
     }
 
     fn place_beams(&mut self, order: &[Part]) -> Result<()> {
@@ -262,6 +272,7 @@ impl<'a, S: Scalar> Assembly<'a, S> {
         if let Some(first) = *frame {
             for station in 0..beam.stations() {
                 self.inertias[first + station] += beam.inertia(station);
+                self.heavy[first + station] |= beam.is_heavy(station);
             }
             return;
         }
@@ -275,18 +286,19 @@ impl<'a, S: Scalar> Assembly<'a, S> {
 
     fn add(&mut self, place: Place, inertia: SpatialInertia<S>) {
         self.inertias[place.frame] += Pose::from_f64(place.pose).inertia(inertia);
+        self.heavy[place.frame] = true;
     }
 
     /// What bodies have with all that is fixed to them is physical, and nothing hangs in the air.
     fn check_bodies(&self) -> Result<()> {
         for point in &self.parts.point_masses {
             let (name, frame) = (self.parts.site_name(point.on), self.site(point.on)?.frame);
-            let total = self.inertias[frame].value();
+            let total = self.inertias[frame].inspect();
             let [xx, yy, zz, ..] = total.rotational.to_array();
             check_physical(name, total.mass, total.central(), 1e-12 * (xx + yy + zz))?;
         }
         for (number, body) in self.parts.bodies.iter().enumerate() {
-            let heavy = self.inertias[number + 1].value().mass != 0.0;
+            let heavy = self.inertias[number + 1].inspect().mass != 0.0;
             if !heavy && !self.carries(Mount::Body(number)) {
                 return Err(Error::Carrier { body: body.name.clone() });
             }
@@ -307,7 +319,7 @@ impl<'a, S: Scalar> Assembly<'a, S> {
 fn check_gravity<S: Scalar>(gravity: [S; 3]) -> Result<()> {
     for (axis, value) in ["x", "y", "z"].into_iter().zip(gravity) {
         if !value.is_finite() {
-            return Err(Error::NonFinite { path: format!("gravity.{axis}"), value: value.re() });
+            return Err(Error::NonFinite { path: format!("gravity.{axis}"), value: value.inspect() });
         }
     }
     Ok(())
@@ -317,7 +329,7 @@ fn check_point_mass<S: Scalar>(name: &str, point: &PointMass<S>) -> Result<()> {
     let [x, y, z] = point.position;
     for (parameter, number) in [("mass", point.mass), ("x", x), ("y", y), ("z", z)] {
         if !number.is_finite() {
-            return Err(Error::NonFinite { path: format!("{name}.payload.{parameter}"), value: number.re() });
+            return Err(Error::NonFinite { path: format!("{name}.payload.{parameter}"), value: number.inspect() });
         }
     }
     Ok(())

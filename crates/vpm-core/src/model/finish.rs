@@ -29,11 +29,14 @@ impl<S: Scalar> Assembly<'_, S> {
         };
         let markers = self.parts.markers.iter().map(marker).collect::<Result<_>>()?;
         let attachments = self.parts.attachments.iter().map(marker).collect::<Result<_>>()?;
+        let carrying = links.iter().map(|link| link.parent).chain(self.beams.iter().map(|beam| beam.root.frame));
+        carrying.for_each(|frame| self.heavy[frame] = true);
         for number in 0..self.beams.len() {
             self.beams[number].root = self.aligned(self.beams[number].root);
             if let Some(first) = self.beams[number].frame {
-                let stations = self.beams[number].beam.stations();
-                self.beams[number].inertias = self.inertias[first..first + stations].to_vec();
+                let own = first..first + self.beams[number].beam.stations();
+                self.beams[number].inertias = self.inertias[own.clone()].to_vec();
+                self.beams[number].heavy = self.heavy[own].to_vec();
             }
         }
         let sorted = links.iter().enumerate().all(|(number, link)| link.parent <= number);

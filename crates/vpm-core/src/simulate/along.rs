@@ -94,7 +94,7 @@ struct Driven<'a> {
 
 impl Job for Driven<'_> {
     fn run<S: Scalar>(&self, theta: &[S]) -> Result<Pair<S>> {
-        let values: Vec<f64> = theta.iter().map(Scalar::re).collect();
+        let values: Vec<f64> = theta.iter().map(Scalar::inspect).collect();
         self.setting.description.check_values(&values)?;
         if self.internal.len() < FEW {
             Way::<S, FEW>::new(self, theta)?.run(self.setting.interrupt)

@@ -85,7 +85,7 @@ struct Guided<'a> {
 
 impl Job for Guided<'_> {
     fn run<S: Scalar>(&self, theta: &[S]) -> Result<Pair<S>> {
-        let values: Vec<f64> = theta.iter().map(Scalar::re).collect();
+        let values: Vec<f64> = theta.iter().map(Scalar::inspect).collect();
         self.setting.description.check_values(&values)?;
         Guide::new(self, theta)?.run(self.setting.interrupt)
     }

@@ -304,7 +304,7 @@ impl Stepper<'_, f64> {
 
 /// The quantity itself, or only its derivative with respect to a parameter.
 fn of_what<S: Scalar>(name: &str, number: S) -> String {
-    if number.re().is_finite() && !number.is_finite() {
+    if number.inspect().is_finite() && !number.is_finite() {
         return format!("the derivative of the {name} with respect to a parameter");
     }
     format!("the {name}")

@@ -49,11 +49,11 @@ impl<S: Scalar> SpatialInertia<S> {
         self.rotational - steiner
     }
 
-    /// The same inertia without derivatives.
-    pub fn value(self) -> SpatialInertia<f64> {
-        let first_moment = Vector3::from(self.first_moment.to_array().map(|entry| entry.re()));
-        let rotational = Symmetric3::from_array(self.rotational.to_array().map(|entry| entry.re()));
-        SpatialInertia { mass: self.mass.re(), first_moment, rotational }
+    /// The same inertia in plain numbers, for checks.
+    pub fn inspect(self) -> SpatialInertia<f64> {
+        let first_moment = Vector3::from(self.first_moment.to_array().map(|entry| entry.inspect()));
+        let rotational = Symmetric3::from_array(self.rotational.to_array().map(|entry| entry.inspect()));
+        SpatialInertia { mass: self.mass.inspect(), first_moment, rotational }
     }
 
     /// Momentum of the body moving with `v`, as a wrench about the frame origin.

@@ -49,7 +49,7 @@ impl<S: Scalar> Dynamics<S> {
         for (joint, effect) in &self.effects {
             let JointEffect::EmpiricalForce(law) = effect else { continue };
             let (share, arriving) = (law.share_of_load(q[*joint], v[*joint]), efforts[*joint]);
-            let taken = if arriving.re() < 0.0 { -share } else { share };
+            let taken = arriving.if_negative(|| -share, || share);
             efforts[*joint] = arriving / (S::one() - taken);
         }
     }
@@ -59,7 +59,7 @@ impl<S: Scalar> Dynamics<S> {
         let (q, v, u) = (x[joint], x[self.coordinates() + joint], self.efforts[joint]);
         let own = self.effects.iter().filter(|(place, _)| *place == joint);
         let share: S = own.map(|(_, effect)| effect.share_of_load(q, v)).sum();
-        S::one() - if u.re() < 0.0 { -share } else { share }
+        S::one() - u.if_negative(|| -share, || share)
     }
 
     /// Efforts that arrive: those of the tree less those of the effects, whatever follows the load left out.

@@ -189,7 +189,7 @@ impl<S: Scalar> Connections<S> {
 }
 
 impl<S: Scalar> PlacedContact<S> {
-    /// Where the point is, how it moves and what acts on it; none in the open.
+    /// Where the point is, how it moves and what acts on it; none where it is known to be in the open.
     #[inline]
     pub(crate) fn touch(
         &self,
@@ -198,7 +198,7 @@ impl<S: Scalar> PlacedContact<S> {
     ) -> Option<Touch<S>> {
         let FrameSlot { pose, velocity, .. } = slot;
         let place = pose.point(self.point);
-        if self.plane.depth(place).re() <= 0.0 {
+        if self.plane.depth(place).known_less(S::zero()) == Some(true) {
             return None;
         }
         let velocity = pose.rotation * (velocity.linear + velocity.angular.cross(self.point));

@@ -50,9 +50,9 @@ impl<S: Scalar> Dynamics<S> {
         let found = self.actuators.iter().enumerate().find_map(|(number, actuator)| {
             let Drive::Hydraulic(law) = &actuator.drive else { return None };
             let [length, _] = motion(actuator.on, q, &rest, lines);
-            let (place, reach) = (law.piston(length).re(), 0.5 * law.cylinder.stroke.re());
-            let push = self.supplies[law.supply].pressure.re() * law.cylinder.areas().a.re();
-            let give = (0.04 * reach).max(1e-3) + 2.0 * push / law.cylinder.stop.stiffness.re();
+            let (place, reach) = (law.piston(length).inspect(), 0.5 * law.cylinder.stroke.inspect());
+            let push = self.supplies[law.supply].pressure.inspect() * law.cylinder.areas().a.inspect();
+            let give = (0.04 * reach).max(1e-3) + 2.0 * push / law.cylinder.stop.stiffness.inspect();
             (place.abs() > reach + give).then_some((number, place, reach))
         });
         self.loads = rest;
@@ -84,7 +84,7 @@ impl<S: Scalar> Dynamics<S> {
         let mut next = |value: f64| scales.next().into_iter().for_each(|scale| *scale = value);
         for actuator in &self.actuators {
             if actuator.lag.is_some() {
-                next(actuator.saturation.map_or(1.0, |saturation| saturation.limit.re()));
+                next(actuator.saturation.map_or(1.0, |saturation| saturation.limit.inspect()));
             }
             match &actuator.drive {
                 Drive::Ideal(_) | Drive::SpringDamper(_) | Drive::Table(_) | Drive::Narx(_) | Drive::MaxwellNarx(_) => {
@@ -92,8 +92,8 @@ impl<S: Scalar> Dynamics<S> {
                 Drive::DcMotor(_) => next(1.0),
                 Drive::Maxwell(_) => next(STRETCH),
                 Drive::Hydraulic(law) => {
-                    let stroke = law.valve.stroke.re();
-                    let rate = law.valve.own_frequency().map_or(1.0, |frequency| stroke * frequency.re());
+                    let stroke = law.valve.stroke.inspect();
+                    let rate = law.valve.own_frequency().map_or(1.0, |frequency| stroke * frequency.inspect());
                     let size = |state: &&str| match *state {
                         "spool" => stroke,
                         "spool_rate" => rate,

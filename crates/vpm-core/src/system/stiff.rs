@@ -28,15 +28,16 @@ pub(super) fn iteration_matrix<S: Scalar>(
     elasticity(dynamics, lower, dim, column);
     let Dynamics { data, effects, actuators, .. } = dynamics;
     for (joint, &resistance) in resistances.iter().enumerate() {
-        let own = effects.iter().filter(|(place, _)| *place == joint);
-        let slope: S = own.map(|(_, effect)| effect.slope_at_rest(q[joint])).sum();
+        let own = || effects.iter().filter(|(place, _)| *place == joint);
+        if own().next().is_none() {
+            continue;
+        }
+        let slope: S = own().map(|(_, effect)| effect.slope_at_rest(q[joint])).sum();
         for (entry, place) in [(slope, joint), (-resistance, n + joint)] {
-            if entry != S::zero() {
-                column.fill(S::zero());
-                column[joint] = entry;
-                data.solve(column);
-                add_column(lower, dim, place, column);
-            }
+            column.fill(S::zero());
+            column[joint] = entry;
+            data.solve(column);
+            add_column(lower, dim, place, column);
         }
     }
     let lagging = actuators.iter().filter_map(|actuator| actuator.lag.as_ref().map(|lag| (actuator, lag)));
@@ -74,10 +75,8 @@ pub(super) fn elasticity<S: Scalar>(dynamics: &Dynamics<S>, rows: &mut [S], widt
     let n = dynamics.coordinates();
     for elastic in dynamics.model.beams() {
         let (first, len) = (elastic.coordinate, elastic.beam.len());
-        for (block, stiff) in [(0, elastic.beam.stiffness()), (n, elastic.beam.damping())] {
-            if stiff.iter().all(|&entry| entry == S::zero()) {
-                continue;
-            }
+        let damped = elastic.beam.is_damped().then(|| (n, elastic.beam.damping()));
+        for (block, stiff) in [(0, elastic.beam.stiffness())].into_iter().chain(damped) {
             for k in 0..len {
                 column.fill(S::zero());
                 for (entry, row) in column[first..first + len].iter_mut().zip(stiff.chunks_exact(len)) {

@@ -110,10 +110,7 @@ impl<S: Scalar> Cylinder<S> {
     #[inline]
     pub fn volume_rates(&self, x: S, v: S) -> Chambers<S> {
         let (areas, half) = (self.areas(), self.stroke * 0.5);
-        Chambers {
-            a: if x < -half { S::zero() } else { areas.a * v },
-            b: if x > half { S::zero() } else { -(areas.b * v) },
-        }
+        Chambers { a: x.if_less(-half, S::zero, || areas.a * v), b: half.if_less(x, S::zero, || -(areas.b * v)) }
     }
 
     /// Force of the oil on the piston in N under `pressures` (Pa).

@@ -97,15 +97,18 @@ impl<S: Scalar> Fluid<S> {
     /// Effective bulk modulus in Pa of a chamber in a `state` (Pa).
     #[inline]
     pub fn effective_bulk_modulus(&self, state: S) -> S {
-        if (self.air.is_none() && self.more_air.is_none()) || state < self.vapour_pressure {
+        if self.air.is_none() && self.more_air.is_none() {
             return self.bulk_modulus;
         }
-        let (mut share, mut softness) = (S::zero(), S::zero());
-        for air in self.air.iter().chain(&self.more_air) {
-            let own = air.share(state);
-            share += own;
-            softness += own / (air.exponent * state);
-        }
-        self.bulk_modulus * (share + 1.0) / (softness * self.bulk_modulus + 1.0)
+        let with_air = || {
+            let (mut share, mut softness) = (S::zero(), S::zero());
+            for air in self.air.iter().chain(&self.more_air) {
+                let own = air.share(state);
+                share += own;
+                softness += own / (air.exponent * state);
+            }
+            self.bulk_modulus * (share + 1.0) / (softness * self.bulk_modulus + 1.0)
+        };
+        state.if_less(self.vapour_pressure, || self.bulk_modulus, with_air)
     }
 }

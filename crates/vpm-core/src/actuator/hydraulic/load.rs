@@ -30,14 +30,18 @@ pub enum Pressures {
 #[inline]
 pub fn chambers_under_load<S: Scalar>(load: S, opening: S, [supply, tank]: [S; 2], alpha: S) -> Chambers<S> {
     let (square, share) = (alpha * alpha, (alpha * alpha * alpha + 1.0).recip());
-    if opening.re() > 0.0 {
+    let forward = || {
         let drop = (supply - alpha * tank - load) * share;
-        return Chambers { a: supply - drop, b: tank + square * drop };
-    }
-    if opening.re() < 0.0 {
+        [supply - drop, tank + square * drop]
+    };
+    let backward = || {
         let drop = (load - tank + alpha * supply) * share;
-        return Chambers { a: tank + drop, b: supply - square * drop };
-    }
-    let b = (supply + tank - load) / (alpha + 1.0);
-    Chambers { a: supply + tank - b, b }
+        [tank + drop, supply - square * drop]
+    };
+    let shut = || {
+        let b = (supply + tank - load) / (alpha + 1.0);
+        [supply + tank - b, b]
+    };
+    let [a, b] = opening.if_positive(forward, || opening.if_negative(backward, shut));
+    Chambers { a, b }
 }

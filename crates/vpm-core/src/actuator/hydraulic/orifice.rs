@@ -54,24 +54,25 @@ impl<S: Scalar> Orifice<S> {
     #[inline]
     pub fn conductance(&self, opening: S, drop: S) -> S {
         let size = drop.abs();
-        let slope = if size < self.transition_pressure {
+        let laminar = || {
             let share = size / self.transition_pressure;
             (-share * 2.0 + 3.0) * 0.5 / self.transition_pressure.sqrt()
-        } else {
-            (size.sqrt() * 2.0).recip()
         };
-        self.gain * opening * slope
+        self.gain * opening * size.if_less(self.transition_pressure, laminar, || (size.sqrt() * 2.0).recip())
     }
 
     /// The signed root of a pressure drop, in sqrt(Pa).
     #[inline]
     fn root(&self, drop: S) -> S {
         let size = drop.abs();
-        if size < self.transition_pressure {
+        let laminar = || {
             let share = drop / self.transition_pressure;
-            return self.transition_pressure.sqrt() * share * (-share.abs() + 3.0) * 0.5;
-        }
-        let root = size.sqrt();
-        if drop.re() < 0.0 { -root } else { root }
+            self.transition_pressure.sqrt() * share * (-share.abs() + 3.0) * 0.5
+        };
+        let turbulent = || {
+            let root = size.sqrt();
+            drop.if_negative(|| -root, || root)
+        };
+        size.if_less(self.transition_pressure, laminar, turbulent)
     }
 }

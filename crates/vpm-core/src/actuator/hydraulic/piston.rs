@@ -26,13 +26,8 @@ impl<S: Scalar> EndStop<S> {
     /// Force at `x` from the middle of a stroke of half length `reach`, moving with `v`.
     #[inline]
     pub fn force(&self, x: S, v: S, reach: S) -> S {
-        if x > reach {
-            -self.push(x - reach, v)
-        } else if x < -reach {
-            self.push(-x - reach, -v)
-        } else {
-            S::zero()
-        }
+        let below = || x.if_less(-reach, || self.push(-x - reach, -v), S::zero);
+        reach.if_less(x, || -self.push(x - reach, v), below)
     }
 
     #[inline]

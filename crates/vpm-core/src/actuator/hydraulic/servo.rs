@@ -156,7 +156,7 @@ impl<S: Scalar> ServoRig<S> {
     /// The rig without current and force, if its parameters have a meaning.
     pub fn new(servo: ServoCylinder<S>) -> Result<Self> {
         for (name, parameter, domain) in servo.domains() {
-            let value = parameter.re();
+            let value = parameter.inspect();
             if !domain.contains(value) {
                 return Err(Error::Domain { path: name.to_owned(), condition: domain.condition(), value });
             }
@@ -166,10 +166,10 @@ impl<S: Scalar> ServoRig<S> {
             return Err(Error::Setting { setting: "the spool of a rig", condition, value: 0.0, repair });
         }
         if let PistonSize::Diameters { bore, rod } = servo.cylinder.size
-            && rod.re() >= bore.re()
+            && rod.inspect() >= bore.inspect()
         {
-            let condition = format!("be below the bore, {} m", bore.re());
-            let (value, repair) = (rod.re(), "give both as diameters in m");
+            let condition = format!("be below the bore, {} m", bore.inspect());
+            let (value, repair) = (rod.inspect(), "give both as diameters in m");
             return Err(Error::Setting { setting: "the diameter of a cylinder's rod", condition, value, repair });
         }
         let lifted = servo.map(&mut |&parameter| Dual::constant(parameter));
@@ -213,7 +213,8 @@ impl<S: Scalar> Ode<S> for ServoRig<S> {
 
     /// Position 1 cm, velocity 1 m/s, the stroke of the spool and its rate at the natural frequency, pressures 1 bar.
     fn scales(&self, scales: &mut [f64]) {
-        let (spool, frequency) = (self.servo.valve.stroke.re(), self.servo.valve.frequency.map_or(1.0, |own| own.re()));
+        let (spool, frequency) =
+            (self.servo.valve.stroke.inspect(), self.servo.valve.frequency.map_or(1.0, |own| own.inspect()));
         scales.copy_from_slice(&[1e-2, spool, 1.0, spool * frequency, 1e5, 1e5]);
     }
 }

@@ -126,12 +126,12 @@ impl<S: Scalar> Valve<S> {
             Some(clearance) => {
                 // In the very middle a dead zone, be it of no width, has no slope.
                 let within = Saturation { limit: self.stroke }.apply(place);
-                let opening = if self.overlap.width.re() == 0.0 { within } else { self.overlap.apply(within) };
+                let opening = self.overlap.width.if_positive(|| self.overlap.apply(within), || within);
                 let (root, square) = ((opening * opening + clearance * clearance).sqrt(), clearance * clearance);
                 // The smaller one as a quotient, so that nothing is lost where the valve is wide open.
                 let wide = (root + opening.abs()) * 0.5;
                 let narrow = square * 0.25 / wide;
-                if opening.re() < 0.0 { [narrow, wide] } else { [wide, narrow] }
+                opening.if_negative(|| [narrow, wide], || [wide, narrow])
             }
             None => {
                 let opening = self.opening(place);
@@ -155,11 +155,12 @@ impl<S: Scalar> Valve<S> {
             };
         }
         let opening = self.opening(place);
-        if opening.re() > 0.0 {
-            let (into_a, out_of_b) = (self.orifice.flow(opening, supply - a), self.orifice.flow(opening, b - tank));
-            return Flows { into_a, out_of_b, supply: into_a, tank: out_of_b };
-        }
-        let (out_of_a, into_b) = (self.orifice.flow(-opening, a - tank), self.orifice.flow(-opening, supply - b));
-        Flows { into_a: -out_of_a, out_of_b: -into_b, supply: into_b, tank: out_of_a }
+        // The edges that are open, the one at a first, with their drops.
+        let [size, at_a, at_b] =
+            opening.if_positive(|| [opening, supply - a, b - tank], || [-opening, a - tank, supply - b]);
+        let [at_a, at_b] = [at_a, at_b].map(|drop| self.orifice.flow(size, drop));
+        let [into_a, out_of_b, supply, tank] =
+            opening.if_positive(|| [at_a, at_b, at_a, at_b], || [-at_a, -at_b, at_b, at_a]);
+        Flows { into_a, out_of_b, supply, tank }
     }
 }

@@ -135,7 +135,7 @@ fn largest_slope<S: Scalar>(components: &[Component], rows: &[[f64; 2]], q: &[S]
         most = most.max(slope[0] * slope[0] + slope[1] * slope[1]);
     }
     // The root of zero has no derivative; there the slope is at its least.
-    if most.re() > 0.0 { most.sqrt() } else { S::zero() }
+    most.if_positive(|| most.sqrt(), S::zero)
 }
 
 /// The rows of the first-order fields (rotation vector, displacement) per unit of a coordinate.

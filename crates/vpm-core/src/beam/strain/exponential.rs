@@ -28,12 +28,12 @@ const TURN: [[f64; TERMS]; 3] = [series_of(1, 1.0, 0.0), series_of(2, 1.0, 0.0),
 const TANGENT: [[f64; TERMS]; 4] =
     [series_of(2, 1.0, 0.0), series_of(3, 1.0, 0.0), series_of(4, -1.0, -1.0), series_of(5, -1.0, -1.0)];
 
-/// Power series at `x`, up to about 40; few terms do for the small turns of a piece of a beam.
+/// Power series at `x`, from 0 to about 40; few terms do for the small turns of a piece of a beam, all where x is not known.
 fn powers<S: Scalar, const N: usize>(series: &[[f64; TERMS]; N], x: S) -> [S; N] {
-    let size = x.re().abs();
-    let terms = if size < 0.1 {
+    let below = |size: f64| x.known_less(S::from_f64(size)) == Some(true);
+    let terms = if below(0.1) {
         7
-    } else if size < 1.0 {
+    } else if below(1.0) {
         12
     } else {
         TERMS
