@@ -372,6 +372,16 @@ class System:
         """Mass matrix over all coordinates, payloads included."""
     def energy(self, theta: ArrayLike, position: ArrayLike, velocity: ArrayLike) -> tuple[float, float]:
         """Kinetic and potential energy in J: of bodies in gravity, and of effects that have a potential."""
+    def c_source(
+        self,
+        theta: ArrayLike,
+        name: str,
+        states: Sequence[str],
+        inputs: Sequence[str],
+        outputs: Sequence[str],
+        free: Sequence[int] = [],
+    ) -> tuple[str, str]:
+        """The texts of ``NAME.h`` and ``NAME.c``; parameters numbered ``free`` are arguments, others constants."""
     def linearize(
         self, theta: ArrayLike, state: ArrayLike, inputs: ArrayLike
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:

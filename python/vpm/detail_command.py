@@ -167,10 +167,24 @@ def compile_(
     out: Annotated[Path, typer.Option(help="Write the compiled model to this file.")] = Path("compiled.json"),
     integrator: Integrator = "auto",
     substeps: Annotated[int, typer.Option(help="Integration steps in a period.")] = 1,
+    c: Annotated[
+        Path | None, typer.Option("--c", help="Write the equations as C99 into this folder instead, for any rate.")
+    ] = None,
+    name: Annotated[str | None, typer.Option(help="With --c: what every name in C begins with.")] = None,
+    parameter: Annotated[
+        list[str] | None, typer.Option(help="With --c: parameter that stays an argument, as *.mass; repeatable.")
+    ] = None,
 ) -> None:
-    """Compile a model into one file with all that a step needs, for controllers in C and C++."""
-    from vpm.realtime import compile_model
+    """Compile a model into one file with all that a step needs, for controllers in C and C++; or into C99."""
+    from vpm.realtime import c_source, compile_model
 
+    if c is not None:
+        written = c_source(load_model(model), name=name, parameters=parameter or ())
+        header, source = written.save(c)
+        console.print(
+            f"wrote {header} and {source}: free are {', '.join(written.parameters) or 'no parameters'}", markup=False
+        )
+        return
     compiled = compile_model(load_model(model), rate, integrator=integrator, substeps=substeps)
     compiled.save(out)
     console.print(f"wrote {out}: takes {', '.join(compiled.inputs)}; shows {', '.join(compiled.outputs)}", markup=False)

@@ -310,13 +310,21 @@ pub enum Error {
     /// A computation left the finite numbers.
     #[error("{0}")]
     Diverged(Box<Diverged>),
-    /// A law decides by the value of a state, so that its operations are not the same in every state.
-    #[error(
-        "the law at {law} decides by the value of a state, so the machine cannot be recorded; it is evaluated directly"
-    )]
-    Unrecordable {
+    /// A law that decides by the value of a number, where equations for all values are asked for.
+    #[error("the machine has no equations that can be written out: {place} decides by the value of {what}")]
+    Unrecorded {
         /// Where in the core.
-        law: String,
+        place: String,
+        /// What it looks at, and what can be done.
+        what: String,
+    },
+    /// A name that C does not take.
+    #[error(
+        "`{name}` is no name for functions of C; give one of letters, digits and underscores that begins with a letter"
+    )]
+    SourceName {
+        /// The name given.
+        name: String,
     },
     /// The caller asked to stop.
     #[error("the computation was interrupted; start it again to get its result")]

@@ -8,6 +8,7 @@ pub mod algebra;
 pub mod beam;
 pub mod body;
 pub mod bushing;
+pub mod c_source;
 pub mod compiled;
 pub mod contact;
 pub mod controller;

@@ -1,6 +1,7 @@
-"""Models in the loop: a runner at a fixed rate, and compiled models for controllers in C and C++."""
+"""Models in the loop: a runner at a fixed rate, compiled models for controllers in C and C++, models as C99."""
 
 from vpm.realtime.compiled import CompiledModel, compile_model
 from vpm.realtime.loop import QUANTILES, Loop, LoopReport, Tick
+from vpm.realtime.source import CSource, c_source
 
-__all__ = ["QUANTILES", "CompiledModel", "Loop", "LoopReport", "Tick", "compile_model"]
+__all__ = ["QUANTILES", "CSource", "CompiledModel", "Loop", "LoopReport", "Tick", "c_source", "compile_model"]

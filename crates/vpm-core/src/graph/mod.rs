@@ -13,6 +13,7 @@ mod native;
 mod operation;
 mod program;
 mod record;
+mod source;
 
 pub use derive::Derivative;
 pub use evaluate::{Evaluator, LANES};
@@ -20,3 +21,4 @@ pub use native::{LARGEST, Native, Unavailable, Work};
 pub use operation::{Function, Node, Operation};
 pub use program::{Program, Stages};
 pub use record::{Decision, Graph, Recorded, input, record};
+pub use source::{Block, Source, literal};

@@ -64,6 +64,13 @@ impl Program {
         program
     }
 
+    /// What some of its outputs, by their places, need: a program of the same inputs.
+    #[must_use]
+    pub fn part(&self, outputs: impl IntoIterator<Item = usize>) -> Self {
+        let outputs: Vec<_> = outputs.into_iter().map(|place| self.outputs[place]).collect();
+        Self::of(&self.operations, &outputs, self.inputs)
+    }
+
     /// The operations.
     pub fn operations(&self) -> &[Operation] {
         &self.operations

@@ -33,6 +33,14 @@ pub struct Decision {
     pub of_parameters: bool,
 }
 
+impl Decision {
+    /// File, from the folder of the sources on, and line.
+    pub fn place(&self) -> String {
+        let file = self.location.file();
+        format!("{}, line {}", file.rsplit_once("src/").map_or(file, |(_, file)| file), self.location.line())
+    }
+}
+
 impl Default for Graph {
     fn default() -> Self {
         Self::new(0)

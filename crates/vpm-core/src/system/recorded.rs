@@ -110,7 +110,7 @@ impl Recording {
     /// Records the machine of `description`; `theta` are the parameters for which its parts are built.
     ///
     /// # Errors
-    /// [`Error::Unrecordable`] where a law decides by the value of a state: the graph would hold for that state alone.
+    /// [`Error::Unrecorded`] where a law decides by the value of a state: the graph would hold for that state alone.
     pub fn new(description: &Description, theta: &[f64]) -> Result<Self> {
         description.check_values(theta)?;
         let places = Places::new(description);
@@ -234,8 +234,6 @@ fn nodes(numbers: &[Recorded]) -> Vec<Node> {
 }
 
 fn unrecordable(decision: &Decision) -> Error {
-    let location = decision.location;
-    // From the folder of the sources on.
-    let file = location.file().rsplit_once("src/").map_or(location.file(), |(_, file)| file);
-    Error::Unrecordable { law: format!("{file}, line {}", location.line()) }
+    let what = "a state or an input, so that no formula holds everywhere".to_owned();
+    Error::Unrecorded { place: decision.place(), what }
 }

@@ -24,12 +24,13 @@ const TREE: [&str; 16] = [
     "linkage",
 ];
 /// Parts that stand alone, each a rig of its own, and all that they may import besides themselves.
-const ALONE: [(&str, &[&str]); 14] = [
+const ALONE: [(&str, &[&str]); 15] = [
     ("error", &[]),
     ("scalar", &[]),
     ("table", &["error"]),
     ("narx", &["error"]),
     ("realtime", &["error"]),
+    ("graph", &["error", "scalar"]),
     ("delay", &["error", "scalar"]),
     ("ode", &["error", "scalar"]),
     ("integrator", &["error", "scalar", "ode"]),
@@ -53,7 +54,7 @@ const ALONE: [(&str, &[&str]); 14] = [
     ("controller", &["error", "scalar", "effect::Domain", "actuator::Saturation"]),
 ];
 /// What puts the parts together, lowest first: each may import any part, any tree module and any before it.
-const WHOLE: [&str; 14] = [
+const WHOLE: [&str; 15] = [
     "sensitivity",
     "system",
     "description",
@@ -63,6 +64,7 @@ const WHOLE: [&str; 14] = [
     "inverse",
     "evaluate",
     "linearize",
+    "c_source",
     "live",
     "compiled",
     "prepared",

@@ -2,6 +2,7 @@
 
 mod evaluation;
 mod simulation;
+mod source;
 mod timing;
 
 use std::sync::Arc;

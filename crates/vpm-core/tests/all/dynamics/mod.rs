@@ -3,6 +3,7 @@
 mod algebra;
 mod articulated;
 mod articulated_cost;
+mod articulated_machine;
 mod closed_form;
 mod conservation;
 mod cross_check;

@@ -196,8 +196,8 @@ fn simpler_drives_agree_or_say_which_law_decides() -> Result<()> {
         let d = machine.build();
         if name.contains("quasi") {
             let error = Recording::new(&d, &d.parameters).unwrap_err();
-            let Error::Unrecordable { law } = &error else { panic!("{error}") };
-            assert!(law.contains("balance.rs"), "{law}");
+            let Error::Unrecorded { place, .. } = &error else { panic!("{error}") };
+            assert!(place.contains("balance.rs"), "{place}");
             continue;
         }
         let rest = crate::common::servo_machine::rest(&machine);

@@ -1,5 +1,6 @@
 //! Machines recorded as graphs of operations, and choices by value.
 
+mod c_source;
 mod choices;
 mod code;
 mod machines;

@@ -8,12 +8,8 @@ use vpm_core::ode::Ode;
 use vpm_core::samples::Random;
 use vpm_core::{Error, Result};
 
-#[cfg(test)]
-#[path = "common/connections.rs"]
-mod connections;
-#[cfg(test)]
-#[path = "common/flexible.rs"]
-mod trees;
+use crate::common::connections;
+use crate::common::trees;
 use connections::{bushing, contact};
 use trees::{description, everything, model, parameter, push};
 

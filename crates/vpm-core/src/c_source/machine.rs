@@ -1,0 +1,103 @@
+//! What the source of a machine is made of: programs for its functions, patterns of its derivatives, prepared constants.
+
+use super::recording::Recording;
+use crate::description::Description;
+use crate::error::Result;
+use crate::graph::{Block, Evaluator, Graph, Node, Program, Source};
+
+/// Rows, columns and places of the entries of a matrix, column by column.
+pub(super) struct Pattern {
+    pub(super) rows: usize,
+    pub(super) columns: usize,
+    pub(super) places: Vec<(usize, usize)>,
+}
+
+/// The derivatives of rates or outputs by states, inputs and parameters.
+pub(super) struct Derivatives {
+    pub(super) patterns: [Pattern; 3],
+    entries: Vec<Node>,
+}
+
+/// A machine's functions in C, with what belongs to them.
+pub(super) struct Machine {
+    pub(super) nx: usize,
+    pub(super) nu: usize,
+    pub(super) ny: usize,
+    pub(super) np: usize,
+    /// Prepared constants at the default parameters: the parameters themselves, then what follows from them.
+    pub(super) constants: Vec<f64>,
+    pub(super) rates: Derivatives,
+    pub(super) outputs: Derivatives,
+    /// Prepares, then gives rates, outputs, rates with their derivatives, outputs with theirs.
+    pub(super) functions: [Source; 5],
+}
+
+impl Pattern {
+    /// How many entries.
+    pub(super) fn len(&self) -> usize {
+        self.places.len()
+    }
+}
+
+impl Derivatives {
+    fn new(graph: &mut Graph, numbers: &[Node], widths: [usize; 3]) -> Self {
+        let inputs: Vec<u32> = (0..widths.iter().sum::<usize>() as u32).collect();
+        let derivative = graph.derive(numbers, &inputs);
+        let mut order: Vec<_> = (0..derivative.entries.len()).collect();
+        order.sort_by_key(|&entry| (derivative.places[entry].1, derivative.places[entry].0));
+        let mut first = 0;
+        let patterns = widths.map(|columns| {
+            let range = first..first + columns;
+            let own = order.iter().map(|&entry| derivative.places[entry]).filter(|(_, column)| range.contains(column));
+            let places = own.map(|(row, column)| (row, column - first)).collect();
+            first += columns;
+            Pattern { rows: numbers.len(), columns, places }
+        });
+        Self { patterns, entries: order.iter().map(|&entry| derivative.entries[entry]).collect() }
+    }
+
+    fn blocks<'a>(&self, names: [&'a str; 3]) -> [Block<'a>; 3] {
+        let [x, u, p] = &self.patterns;
+        [(names[0], x.len()), (names[1], u.len()), (names[2], p.len())]
+    }
+}
+
+impl Machine {
+    pub(super) fn new(description: &Description, theta: &[f64], free: &[usize], name: &str) -> Result<Self> {
+        let Recording { mut graph, rates, outputs } = Recording::new(description, theta, free)?;
+        let [nx, nu, np] = [description.n_states(), description.n_inputs(), free.len()];
+        let of_rates = Derivatives::new(&mut graph, &rates, [nx, nu, np]);
+        let of_outputs = Derivatives::new(&mut graph, &outputs, [nx, nu, np]);
+        let all: Vec<Node> =
+            [&rates, &outputs, &of_rates.entries, &of_outputs.entries].into_iter().flatten().copied().collect();
+        let stages = Program::new(&graph, &all, nx + nu + np).split(|input| input >= nx + nu);
+        let mut point = vec![0.0; nx + nu];
+        point.extend(free.iter().map(|&place| theta[place]));
+        let passed = stages.seldom.outputs().len();
+        let mut constants = vec![0.0; passed];
+        Evaluator::new(&stages.seldom).run(&point, &mut constants);
+        constants.splice(0..0, point.drain(nx + nu..));
+        let (ny, entries) = (outputs.len(), of_rates.entries.len());
+        let arguments = [("x", nx), ("u", nu), ("c", np + passed)];
+        let often = |what: &str, numbers: Vec<usize>, blocks: &[Block<'_>]| {
+            stages.often.part(numbers).to_c(&format!("{name}_run_{what}"), &arguments, blocks)
+        };
+        let (dx, y) = (("dx", nx), ("y", ny));
+        let [dx_x, dx_u, dx_p] = of_rates.blocks(["dx_x", "dx_u", "dx_p"]);
+        let [y_x, y_u, y_p] = of_outputs.blocks(["y_x", "y_u", "y_p"]);
+        let first = nx + ny;
+        let functions = [
+            stages.seldom.to_c(&format!("{name}_run_prepare"), &[("", nx + nu), ("p", np)], &[("c", passed)]),
+            often("rates", (0..nx).collect(), &[dx]),
+            often("outputs", (nx..first).collect(), &[y]),
+            often("rates_jacobian", (0..nx).chain(first..first + entries).collect(), &[dx, dx_x, dx_u, dx_p]),
+            often("outputs_jacobian", (nx..first).chain(first + entries..all.len()).collect(), &[y, y_x, y_u, y_p]),
+        ];
+        Ok(Self { nx, nu, ny, np, constants, rates: of_rates, outputs: of_outputs, functions })
+    }
+
+    /// How many numbers the functions need to hand on.
+    pub(super) fn work(&self) -> usize {
+        self.functions.iter().map(|function| function.work).max().unwrap_or(0)
+    }
+}

@@ -1,0 +1,82 @@
+"""Models as C99: rates, outputs, exact derivatives and steps, for controllers, CasADi and acados."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fnmatch import filter as matching
+from os import PathLike
+from pathlib import Path
+
+from vpm.errors import SimulationError, near_match
+from vpm.model import Model
+
+
+@dataclass(frozen=True)
+class CSource:
+    """A model in C: one header, one source, nothing but ``math.h``.
+
+    Attributes
+    ----------
+    name : str
+        Begins every name in C.
+    header, source : str
+        The texts of ``NAME.h`` and ``NAME.c``.
+    parameters : tuple of str
+        Those that are arguments of the functions, in order.
+    """
+
+    name: str
+    header: str
+    source: str
+    parameters: tuple[str, ...]
+
+    def save(self, folder: str | PathLike[str]) -> tuple[Path, Path]:
+        """Write ``NAME.h`` and ``NAME.c`` into a folder, which is made if it is not there."""
+        target = Path(folder)
+        target.mkdir(parents=True, exist_ok=True)
+        header, source = target / f"{self.name}.h", target / f"{self.name}.c"
+        header.write_text(self.header, encoding="utf-8")
+        source.write_text(self.source, encoding="utf-8")
+        return header, source
+
+
+def c_source(model: Model, *, name: str | None = None, parameters: Sequence[str] = ()) -> CSource:
+    """Write a model's equations out in C99.
+
+    Delays pass their signals unchanged, as in :meth:`vpm.Model.linearize`; outputs are what sensors show.
+
+    Parameters
+    ----------
+    model : Model
+    name : str, optional
+        Begins every name in C; made of the model's name by default.
+    parameters : sequence of str
+        Names of parameters, or patterns such as ``"*.mass"``, that stay arguments of the functions. All others become
+        constants: the fewer stay, the less there is to compute.
+
+    Returns
+    -------
+    CSource
+
+    Raises
+    ------
+    SimulationError
+        A parameter is unknown, the name is none of C, or the equations of the model cannot be written out.
+    """
+    known = list(model.parameters)
+    free: list[str] = []
+    for pattern in parameters:
+        found = matching(known, pattern)
+        if not found:
+            raise SimulationError(f"the model has no parameter `{pattern}`; {near_match(pattern, known)}")
+        free.extend(one for one in found if one not in free)
+    free.sort(key=model.index)
+    identifier = re.sub(r"\W", "_", model.name, flags=re.ASCII) if name is None else name
+    names = (list(model.state_names), list(model.inputs), list(model.output_channels))
+    try:
+        header, source = model.core.c_source(model.theta, identifier, *names, [model.index(one) for one in free])
+    except ValueError as error:
+        raise SimulationError(str(error)) from error
+    return CSource(identifier, header, source, tuple(free))
