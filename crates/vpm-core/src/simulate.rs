@@ -261,7 +261,9 @@ fn repair(method: Method) -> &'static str {
         Method::LinearlyImplicit | Method::Rosenbrock => {
             "use more substeps or the integrator adaptive, or check the signs and sizes of the parameters"
         }
-        Method::Rk4 | Method::SemiImplicit | Method::Additive => "use more substeps or the integrator linearly_implicit",
+        Method::Rk4 | Method::SemiImplicit | Method::Additive => {
+            "use more substeps or the integrator linearly_implicit"
+        }
         Method::Guarded => {
             "use more substeps or the integrator adaptive, or check the signs and sizes of the parameters"
         }

@@ -69,7 +69,13 @@ pub fn machine(count: usize, change: impl FnOnce(&mut Value)) -> Description {
         });
         let [mass, inertia] = TIPS[number];
         let on = Mount::Section { beam: number, at: length };
-        let weld = Weld { name: format!("tip{number}"), on, translation: [0.0; 3], rotation: UPRIGHT, inertia: ball(mass, inertia) };
+        let weld = Weld {
+            name: format!("tip{number}"),
+            on,
+            translation: [0.0; 3],
+            rotation: UPRIGHT,
+            inertia: ball(mass, inertia),
+        };
         parts.welds.push(weld);
     }
     description(&parts, change)
