@@ -46,7 +46,7 @@ pub trait Ode<S> {
     /// second argument, everything else from the first. Of a machine with coordinates q, rates v and other states s, E and I the two,
     /// `(M(q_E) + reach (D + R) + reach^2 K) a = f(x_E) - bias(q_E, v_E) - K (q_I + reach v_I) - (D + R) v_I`, f all other forces,
     /// `dq/dt = v_I + reach a`, `dv/dt = a`; R is the resistance of friction, K and D are linear stiffness and damping.
-    /// Without a reach the two states are the same.
+    /// The stages of a step come in their order; at the first, where there is no reach, the two states are the same.
     fn additive_rates(&mut self, explicit: &[S], _implicit: &[S], _reach: f64, rates: &mut [S]) -> bool {
         self.rhs(explicit, rates);
         false

@@ -8,21 +8,23 @@ use crate::scalar::Scalar;
 
 /// How often the resistances of friction are taken anew, at the velocity that the last ones led to.
 ///
-/// Each time gains an order, so that four keep that of the step. The others serve friction far sharper than the step: chords from
-/// rest lower the dissipated power with every turn, however far they are from it (majorisation: the potential of friction that
-/// saturates is a concave function of the square of the velocity).
+/// They begin at the velocity where the stage before ended, and each time gains an order, so that four keep that of the step. The
+/// others serve friction far sharper than the step, where chords from rest get closer with every turn, from however far
+/// (majorisation: the potential of friction that saturates is a concave function of the square of the velocity).
 const TURNS: usize = 8;
 
 /// Working memory of additive steps.
 #[derive(Clone, Debug)]
 pub(super) struct Split<S> {
+    /// The explicit state with the lags where the stage ends.
+    state: Vec<S>,
     /// Where the coordinates would be without acceleration.
     coasting: Vec<S>,
     /// Joints with friction that is not linear, or with a memory.
     joints: Vec<usize>,
     /// Acceleration of all coordinates per effort on each of these joints.
     columns: Vec<S>,
-    /// Velocity of these joints: with no friction, and at the end of the stage.
+    /// Velocity of these joints at the end of the stage: with no friction, and as the last turn has it.
     free: Vec<S>,
     velocity: Vec<S>,
     /// Resistance of each, and what acts on it at rest.
@@ -50,7 +52,15 @@ impl<S: Scalar> Split<S> {
         let (n, count) = (dynamics.coordinates(), joints.len());
         let [free, velocity, resistance, rest] = [0; 4].map(|_| vec![S::zero(); count]);
         let (coasting, columns) = (vec![S::zero(); n], vec![S::zero(); n * count]);
-        Self { coasting, joints, columns, free, velocity, resistance, rest, lu: Lu::new(count) }
+        let state = vec![S::zero(); dynamics.dim()];
+        Self { state, coasting, joints, columns, free, velocity, resistance, rest, lu: Lu::new(count) }
+    }
+
+    /// Begins a step at the rates `v` of all coordinates.
+    pub(super) fn depart(&mut self, v: &[S]) {
+        for (velocity, &joint) in self.velocity.iter_mut().zip(&self.joints) {
+            *velocity = v[joint];
+        }
     }
 
     /// Writes the accelerations of a stage into `rates`.
@@ -72,7 +82,6 @@ impl<S: Scalar> Split<S> {
             column[joint] = S::one();
             dynamics.data.solve(column);
             self.free[k] = v[joint] + acceleration[joint] * reach;
-            self.velocity[k] = v[joint];
         }
         for _ in 0..if count == 0 { 0 } else { TURNS } {
             self.rub(dynamics, stage);
@@ -139,8 +148,9 @@ impl<S: Scalar> Dynamics<S> {
         if !self.connections.is_free() {
             poses(&self.model, &mut self.data);
         }
-        self.actuate(stage.explicit, rates);
-        self.lag_behind(stage, rates);
+        split.state.copy_from_slice(stage.explicit);
+        self.settle_lags(stage, &mut split.state);
+        self.actuate(&split.state, rates);
         split.accelerate(self, stage, rates);
         let (motion, memories) = rates.split_at_mut(first);
         for ((rate, &z), (joint, law, _)) in memories.iter_mut().zip(&stage.implicit[first..]).zip(self.memories.iter())
@@ -152,14 +162,13 @@ impl<S: Scalar> Dynamics<S> {
         }
     }
 
-    /// Turns the rates of lags at the explicit states into those at the end of the stage.
-    fn lag_behind(&self, Stage { explicit, implicit, reach }: Stage<'_, S>, rates: &mut [S]) {
+    /// Puts the lags to the end of the stage.
+    fn settle_lags(&self, Stage { implicit, reach, .. }: Stage<'_, S>, state: &mut [S]) {
         let mut place = 2 * self.coordinates();
-        for actuator in &self.actuators {
+        for (actuator, &input) in self.actuators.iter().zip(&self.inputs) {
             if let Some(lag) = &actuator.lag {
                 let slope = lag.rate(S::one(), S::zero());
-                let moved = rates[place] + slope * (implicit[place] - explicit[place]);
-                rates[place] = moved / (S::one() - slope * reach);
+                state[place] = implicit[place] + lag.rate(implicit[place], input) * reach / (S::one() - slope * reach);
             }
             place += actuator.n_states();
         }

@@ -239,6 +239,8 @@ impl<S: Scalar> Ode<S> for System<S> {
     /// are not linear by their slope where the stage has come to.
     fn additive_rates(&mut self, explicit: &[S], implicit: &[S], reach: f64, rates: &mut [S]) -> bool {
         if reach == 0.0 {
+            let n = self.coordinates();
+            self.split.depart(&explicit[n..2 * n]);
             self.begin(explicit, rates);
             return true;
         }

@@ -32,7 +32,7 @@ fn decay(machine: &Machine, frequency: f64, method: Method) -> f64 {
 fn a_fast_spring_is_told_to_die() {
     let machine = oscillator(312.0, 0.0);
     let d = machine.build();
-    for (method, left) in [(Method::LinearlyImplicit, 7e-7), (Method::Additive, 0.8), (Method::Rosenbrock, 0.7)] {
+    for (method, left) in [(Method::LinearlyImplicit, 1.3e-7), (Method::Additive, 0.82)] {
         let stepping = Stepping::new(1e-3, 1, method).unwrap();
         let found = resolution(&d, &machine.values, &[1.0, 0.0], stepping, 0.5).unwrap();
         let [mode] = found.damped[..] else { panic!("{}: {found:?}", method.name()) };
@@ -41,7 +41,7 @@ fn a_fast_spring_is_told_to_die() {
         close(mode.time, 0.5, 0.0);
         // The first and the last amplitude are not taken at the same phase of the numerical vibration: a few percent.
         assert!((mode.left / seen).ln().abs() < 0.1, "{}: {} against {seen}", method.name(), mode.left);
-        assert!((mode.left / left).ln().abs() < 0.8, "{}: {}", method.name(), mode.left);
+        assert!((mode.left / left).ln().abs() < 0.05, "{}: {}", method.name(), mode.left);
         assert!(found.limit < 312.0 && found.limit > 10.0);
     }
     for method in [Method::Adaptive { tolerance: 1e-6 }, Method::SemiImplicit] {
