@@ -146,6 +146,14 @@ class Simulation:
         substeps: int,
         integrator: str,
     ) -> Simulation: ...
+    def compile(self) -> str | None:
+        """Go on by machine code from now on.
+
+        Returns
+        -------
+        str or None
+            Why there is no machine code; then the simulation goes on by direct evaluation.
+        """
     @property
     def time(self) -> float:
         """Time since the beginning, s."""

@@ -40,6 +40,10 @@ class Simulation:
         See :class:`vpm.simulate.Setup`.
     state : mapping of str to float, or array_like of shape (nx,), optional
         As ``model.state`` takes it, for example ``{"axis.position": 0.1}``; what is not named is zero.
+    compiled : bool
+        Make machine code of the model now, up to some tenths of a second for links with many coordinates, and step by
+        it: worth while from some ten thousand steps on. The code is kept with the model. A machine that has none is
+        evaluated directly; `not_compiled` then says why.
 
     Raises
     ------
@@ -61,6 +65,7 @@ class Simulation:
         integrator: str = AUTOMATIC,
         substeps: int = 1,
         state: Mapping[str, float] | ArrayLike | None = None,
+        compiled: bool = False,
     ) -> None:
         from vpm._core import Simulation as Core
 
@@ -72,6 +77,7 @@ class Simulation:
             self._core = Core(model.core, model.theta, self._start, float(time_step), substeps, setup.integrator)
         except ValueError as error:
             raise SimulationError(str(error)) from error
+        self._not_compiled = self._core.compile() if compiled else None
         self._outputs = self._core.outputs
         # States that a run passed, for links whose kinematics hold up to a slope only; empty where there are none.
         self._passed: list[Array] = []
@@ -88,6 +94,11 @@ class Simulation:
     def time_step(self) -> float:
         """Time between samples, s."""
         return self._time_step
+
+    @property
+    def not_compiled(self) -> str | None:
+        """Why machine code was asked for and there is none; ``None`` otherwise."""
+        return self._not_compiled
 
     @property
     def inputs(self) -> tuple[str, ...]:

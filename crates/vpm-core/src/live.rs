@@ -8,7 +8,7 @@ use crate::integrator::Integrator;
 use crate::ode::Ode;
 use crate::sensor::Sensor;
 use crate::simulate::{SampledDrives, Stepping, check_pistons, check_state, check_step, halted, state_name};
-use crate::system::System;
+use crate::system::{Fast, System};
 use crate::table::Table;
 
 /// What an input stands for.
@@ -66,6 +66,22 @@ impl Live {
         };
         live.reset(state)?;
         Ok(live)
+    }
+
+    /// Goes on by machine code, made here if the description has none yet: takes up to some tenths of a second now, and none later.
+    ///
+    /// # Errors
+    /// Why there is no machine code, in one sentence; then the simulation goes on by direct evaluation.
+    pub fn compile(&mut self) -> std::result::Result<(), String> {
+        let natives = self.description.natives(&self.theta)?;
+        self.system.run_by(Fast::new(&natives, &self.theta, self.stepping.method)?);
+        self.rest();
+        Ok(())
+    }
+
+    /// Whether it goes on by machine code.
+    pub fn is_compiled(&self) -> bool {
+        self.system.has_code()
     }
 
     /// The machine.
@@ -183,10 +199,13 @@ impl Live {
         if let Some(place) = self.state.iter().position(|state| !state.is_finite()) {
             return Err(self.diverged(place));
         }
-        self.system.rhs(&self.state, &mut self.rate);
         let (layout, width) = (self.description.layout(), self.outputs.len());
         let row = self.sample % self.depth * width;
-        self.system.dynamics().observe(&self.state, &self.rate, &mut self.truth[row..row + width]);
+        let truth = &mut self.truth[row..row + width];
+        if !self.system.sample(&self.state, &mut self.rate, truth) {
+            self.system.rhs(&self.state, &mut self.rate);
+            self.system.dynamics().observe(&self.state, &self.rate, truth);
+        }
         // The command that is still held at the end of its interval; none before the first.
         let held = self.sample.saturating_sub(1) % self.depth * self.description.n_inputs();
         let channels = self.truth[row + layout.actuators()..row + layout.lines()].chunks_exact_mut(2);

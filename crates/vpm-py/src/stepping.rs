@@ -102,6 +102,17 @@ impl Simulation {
         Ok(Self { live: Mutex::new(system.checked(py, live)?) })
     }
 
+    /// Go on by machine code from now on.
+    ///
+    /// Returns
+    /// -------
+    /// str or None
+    ///     Why there is no machine code; then the simulation goes on by direct evaluation.
+    fn compile(&self) -> PyResult<Option<String>> {
+        let mut live = self.live()?;
+        unbroken(|| live.compile().err())
+    }
+
     /// Time since the beginning, s.
     #[getter]
     fn time(&self) -> PyResult<f64> {

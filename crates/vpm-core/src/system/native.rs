@@ -129,19 +129,20 @@ impl Fast {
         if evaluations < PAYS {
             return None;
         }
-        Self::new(&*description.natives(theta).ok()?, theta, method)
+        Self::new(&*description.natives(theta).ok()?, theta, method).ok()
     }
 
-    fn new(natives: &Natives, theta: &[f64], method: Method) -> Option<Self> {
-        let call = |kind| natives.function(kind).ok().map(|function| Call::new(function, theta));
+    /// For steps by `method`; or why there is no code. A matrix alone that has none is worked out directly.
+    pub(crate) fn new(natives: &Natives, theta: &[f64], method: Method) -> std::result::Result<Self, String> {
+        let call = |kind| natives.function(kind).map(|function| Call::new(function, theta));
         let kind = match method {
             Method::SemiImplicit | Method::Rk4 => None,
             Method::Additive => Some(Kind::Additive),
             Method::LinearlyImplicit => Some(Kind::Prepared),
             Method::Rosenbrock | Method::Adaptive { .. } | Method::Guarded => Some(Kind::Linearised),
         };
-        let others = kind.and_then(|kind| Some((kind, call(kind)?))).into_iter().collect();
-        Some(Self { rates: call(Kind::Rates)?, sample: call(Kind::Sample)?, others })
+        let others = kind.and_then(|kind| Some((kind, call(kind).ok()?))).into_iter().collect();
+        Ok(Self { rates: call(Kind::Rates)?, sample: call(Kind::Sample)?, others })
     }
 
     /// Holds input `number`, see [`super::Dynamics::input`].

@@ -48,6 +48,11 @@ impl<S: Scalar> System<S> {
         Self { fast, ..self }
     }
 
+    /// Runs its functions as machine code from now on. Inputs have to be held anew.
+    pub(crate) fn run_by(&mut self, fast: Fast) {
+        (self.fast, self.ready) = (Some(fast), false);
+    }
+
     /// Whether its functions run as machine code.
     pub(crate) fn has_code(&self) -> bool {
         self.fast.is_some()
