@@ -36,7 +36,7 @@ impl Program {
     /// The blocks of `inputs` are the program's inputs in order, those of `outputs` its outputs; a block without a name is none of the
     /// arguments, and nothing may need it. Arrays must not overlap. Constants have as many digits as it takes to read them back exactly.
     pub fn to_c(&self, name: &str, inputs: &[Block<'_>], outputs: &[Block<'_>]) -> Source {
-        let mut writer = Writer::new(self, inputs, outputs);
+        let writer = Writer::new(self, inputs, outputs);
         let mut text = String::new();
         let pieces = writer.pieces();
         let alone = pieces.len() == 1;
