@@ -9,12 +9,14 @@
 
 mod derive;
 mod evaluate;
+mod native;
 mod operation;
 mod program;
 mod record;
 
 pub use derive::Derivative;
 pub use evaluate::{Evaluator, LANES};
+pub use native::{LARGEST, Native, Unavailable, Work};
 pub use operation::{Function, Node, Operation};
 pub use program::{Program, Stages};
 pub use record::{Decision, Graph, Recorded, input, record};

@@ -1,0 +1,151 @@
+//! The steps of one piece as instructions for the code generator.
+
+use std::collections::HashMap;
+
+use cranelift_codegen::cursor::FuncCursor;
+use cranelift_codegen::ir::condcodes::FloatCC;
+use cranelift_codegen::ir::{FuncRef, InstBuilder, MemFlagsData, Type, Value, types};
+
+use super::super::operation::Function;
+use super::plan::{Place, Step};
+use super::task::{Kind, NONE};
+
+/// The constants of a program, each once.
+#[derive(Debug, Default)]
+pub(super) struct Pool {
+    places: HashMap<u64, u32>,
+    pub values: Vec<f64>,
+}
+
+impl Pool {
+    fn place(&mut self, value: f64) -> u32 {
+        *self.places.entry(value.to_bits()).or_insert_with(|| {
+            self.values.push(value);
+            self.values.len() as u32 - 1
+        })
+    }
+}
+
+/// The four arrays that a piece is called with.
+#[derive(Clone, Copy)]
+pub(super) struct Arrays {
+    pub inputs: Value,
+    pub outputs: Value,
+    pub work: Value,
+    pub constants: Value,
+}
+
+/// What the instructions of one piece are made with.
+pub(super) struct Emitter<'a> {
+    pub code: FuncCursor<'a>,
+    pub arrays: Arrays,
+    pub pool: &'a mut Pool,
+    /// The register of each number of the program.
+    pub registers: &'a mut [Option<Value>],
+    /// The functions that are called, in the order of [`CALLED`](super::code::CALLED).
+    pub called: &'a [FuncRef],
+}
+
+impl Emitter<'_> {
+    /// Appends one step; `None` if the plan is not sound.
+    pub fn step(&mut self, step: &Step) -> Option<()> {
+        match *step {
+            Step::Store { from, to } => {
+                let value = self.read(from)?;
+                let (array, place) = match to {
+                    Place::Output(place) => (self.arrays.outputs, place),
+                    Place::Work(place) => (self.arrays.work, place),
+                    _ => return None,
+                };
+                self.code.ins().store(MemFlagsData::trusted(), value, array, offset(place)?);
+            }
+            Step::Do { task, arguments } => {
+                let mut values = [Value::from_u32(0); 4];
+                for ((value, place), _) in values.iter_mut().zip(arguments).zip(task.arguments()) {
+                    *value = self.read(place)?;
+                }
+                let made = self.compute(task.kind, values)?;
+                for (node, value) in task.results().into_iter().zip(made).filter(|&(node, _)| node != NONE) {
+                    *self.registers.get_mut(node as usize)? = Some(value);
+                }
+            }
+        }
+        Some(())
+    }
+
+    /// A number; one in memory is loaded for this use only, so that it becomes an operand of the instruction.
+    fn read(&mut self, place: Place) -> Option<Value> {
+        let (array, place) = match place {
+            Place::Register(node) => return *self.registers.get(node as usize)?,
+            Place::Constant(value) => return self.constant(value),
+            Place::Input(place) => (self.arrays.inputs, place),
+            Place::Output(place) => (self.arrays.outputs, place),
+            Place::Work(place) => (self.arrays.work, place),
+        };
+        Some(self.code.ins().load(types::F64, MemFlagsData::trusted(), array, offset(place)?))
+    }
+
+    /// A constant, from memory: cheaper than to make it from its bits.
+    pub fn constant(&mut self, value: f64) -> Option<Value> {
+        let place = self.pool.place(value);
+        Some(self.code.ins().load(types::F64, MemFlagsData::trusted(), self.arrays.constants, offset(place)?))
+    }
+
+    fn compute(&mut self, kind: Kind, [a, b, c, d]: [Value; 4]) -> Option<[Value; 2]> {
+        let value = match kind {
+            Kind::Add => self.code.ins().fadd(a, b),
+            Kind::Subtract => self.code.ins().fsub(a, b),
+            Kind::Multiply => self.code.ins().fmul(a, b),
+            Kind::Divide => self.code.ins().fdiv(a, b),
+            Kind::ProductPlus => self.code.ins().fma(a, b, c),
+            Kind::ProductMinus => {
+                let c = self.code.ins().fneg(c);
+                self.code.ins().fma(a, b, c)
+            }
+            Kind::MinusProduct => {
+                let a = self.code.ins().fneg(a);
+                self.code.ins().fma(a, b, c)
+            }
+            Kind::Negative => self.code.ins().fneg(a),
+            Kind::Root => self.code.ins().sqrt(a),
+            Kind::SineCosine => return self.sine_cosine(a),
+            Kind::Call(function) => self.call(function, a)?,
+            Kind::Select => self.select([a, b, c, d]),
+        };
+        Some([value, value])
+    }
+
+    fn call(&mut self, function: Function, argument: Value) -> Option<Value> {
+        let place = super::code::CALLED.iter().position(|&(known, _)| known == function)?;
+        let call = self.code.ins().call(*self.called.get(place)?, &[argument]);
+        self.code.func.dfg.inst_results(call).first().copied()
+    }
+
+    /// a < b ? yes : no, without a branch: the comparison makes a mask.
+    fn select(&mut self, [a, b, yes, no]: [Value; 4]) -> Value {
+        let [a, b, yes, no] = [a, b, yes, no].map(|value| self.wide(value));
+        let mask = self.code.ins().fcmp(FloatCC::LessThan, a, b);
+        let mask = self.seen_as(types::F64X2, mask);
+        let chosen = self.code.ins().bitselect(mask, yes, no);
+        self.narrow(chosen)
+    }
+
+    /// A number in the first lane of a vector.
+    pub fn wide(&mut self, value: Value) -> Value {
+        self.code.ins().scalar_to_vector(types::F64X2, value)
+    }
+
+    /// The first lane of a vector of numbers.
+    pub fn narrow(&mut self, value: Value) -> Value {
+        self.code.ins().extractlane(value, 0)
+    }
+
+    /// The same bits as another type.
+    pub fn seen_as(&mut self, to: Type, value: Value) -> Value {
+        self.code.ins().bitcast(to, MemFlagsData::new(), value)
+    }
+}
+
+fn offset(place: u32) -> Option<i32> {
+    i32::try_from(place).ok()?.checked_mul(8)
+}
