@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use cranelift_codegen::cursor::{Cursor, FuncCursor};
+use cranelift_codegen::cursor::FuncCursor;
 use cranelift_codegen::ir::condcodes::FloatCC;
 use cranelift_codegen::ir::{FuncRef, InstBuilder, MemFlagsData, Type, Value, types};
 
@@ -87,9 +87,6 @@ impl Emitter<'_> {
 
     /// A constant, from memory: cheaper than to make it from its bits.
     pub fn constant(&mut self, value: f64) -> Option<Value> {
-        if super::knob("CONST", 0) == 1 {
-            return Some(self.code.ins().f64const(value));
-        }
         let place = self.pool.place(value);
         Some(self.code.ins().load(types::F64, MemFlagsData::trusted(), self.arrays.constants, offset(place)?))
     }
@@ -126,10 +123,6 @@ impl Emitter<'_> {
 
     /// a < b ? yes : no, without a branch: the comparison makes a mask.
     fn select(&mut self, [a, b, yes, no]: [Value; 4]) -> Value {
-        if super::knob("SELECT", 0) == 1 {
-            let c = self.code.ins().fcmp(FloatCC::LessThan, a, b);
-            return self.code.ins().select(c, yes, no);
-        }
         let [a, b, yes, no] = [a, b, yes, no].map(|value| self.wide(value));
         let mask = self.code.ins().fcmp(FloatCC::LessThan, a, b);
         let mask = self.seen_as(types::F64X2, mask);

@@ -15,15 +15,11 @@ use crate::error::{Error, Result};
 use code::Code;
 use plan::Plan;
 
-/// temporary
-pub fn knob(name: &str, default: usize) -> usize {
-    std::env::var(name).ok().and_then(|v| v.parse().ok()).unwrap_or(default)
-}
-
-/// The largest program that is compiled, in operations.
-pub const LARGEST: usize = 200_000;
-/// Operations in one function.
-const PIECE: usize = 2_000;
+/// The largest program that is compiled, in operations: an operation takes about 10 us to compile, however large the program is, so
+/// that no program takes more than about 0.3 s.
+pub const LARGEST: usize = 30_000;
+/// Operations in one function. Longer functions take more time to compile for each operation and run no faster.
+const PIECE: usize = 1_000;
 
 /// Why a program has no machine code: it can be worked out by the [`Evaluator`](super::Evaluator) all the same.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -75,7 +71,7 @@ impl Native {
         if !program.operations().iter().all(known) {
             return Err(Unavailable::Failed { message: "the program asks for an input that it has not".into() });
         }
-        let plan = Plan::new(program, knob("PIECE", PIECE));
+        let plan = Plan::new(program, PIECE);
         let lengths = [program.n_inputs(), program.outputs().len()];
         Ok(Self { code: Code::new(&plan, program.operations().len(), lengths)? })
     }

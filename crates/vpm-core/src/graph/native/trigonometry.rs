@@ -4,7 +4,7 @@
 //! for the Elementary Functions", chapter 8; with fused products after Boldo, Daumas & Li 2009, IEEE Trans. Computers 58); the
 //! polynomials of `__kernel_sin` and `__kernel_cos` (FDLIBM 5.3, Sun Microsystems 1993), summed in pairs (Estrin 1960).
 
-use std::f64::consts::FRAC_2_PI;
+use std::f64::consts::{FRAC_2_PI, FRAC_PI_2};
 
 use cranelift_codegen::ir::condcodes::IntCC;
 use cranelift_codegen::ir::{InstBuilder, Value, types};
@@ -12,28 +12,28 @@ use cranelift_codegen::ir::{InstBuilder, Value, types};
 use super::emit::Emitter;
 
 /// pi/2 in three parts, each the rounded rest; together right to 2^-161.
-const QUARTER: [f64; 3] = [1.5707963267948966, 6.123233995736766e-17, -1.4973849048591698e-33];
+const QUARTER: [f64; 3] = [FRAC_PI_2, 6.123233995736766e-17, -1.4973849048591698e-33];
 /// 1.5 times 2^52: the sum with it keeps the nearest integer in its last bits.
 const TO_INTEGER: f64 = 6755399441055744.0;
 /// 2^974: makes infinity of 2^50 and beyond.
 const TO_INFINITY: f64 = f64::from_bits((974 + 1023) << 52);
 /// sin r = r + r^3 (S1 + S2 r^2 + ..), |r| <= pi/4, to 2^-58.
 const SINE: [f64; 6] = [
-    -1.66666666666666324348e-01,
-    8.33333333332248946124e-03,
-    -1.98412698298579493134e-04,
-    2.75573137070700676789e-06,
-    -2.50507602534068634195e-08,
-    1.58969099521155010221e-10,
+    -0.16666666666666632,
+    0.00833333333332249,
+    -0.0001984126982985795,
+    2.7557313707070068e-06,
+    -2.5050760253406863e-08,
+    1.58969099521155e-10,
 ];
 /// cos r = 1 - r^2/2 + r^4 (C1 + C2 r^2 + ..), likewise.
 const COSINE: [f64; 6] = [
-    4.16666666666666019037e-02,
-    -1.38888888888741095749e-03,
-    2.48015872894767294178e-05,
-    -2.75573143513906633035e-07,
-    2.08757232129817482790e-09,
-    -1.13596475577881948265e-11,
+    0.0416666666666666,
+    -0.001388888888887411,
+    2.480158728947673e-05,
+    -2.7557314351390663e-07,
+    2.087572321298175e-09,
+    -1.1359647557788195e-11,
 ];
 
 impl Emitter<'_> {
@@ -103,7 +103,7 @@ impl Emitter<'_> {
         // The sine turns its sign where the second bit of k is one, the cosine where that of k + 1 is.
         let sign = self.mask(1 << 63);
         let mut signed = |value: Value, k: Value| {
-            let shifted = self.code.ins().ishl_imm(k, 62);
+            let shifted = self.code.ins().ishl_imm_u(k, 62);
             let bit = self.code.ins().band(shifted, sign);
             let value = self.code.ins().bxor(value, bit);
             let value = self.seen_as(types::F64X2, value);

@@ -1,7 +1,6 @@
 //! The additive integrator on whole machines: order, agreement with other ways to the same step, stability, derivatives.
 
 use crate::common;
-use crate::common::trees;
 use crate::common::two_beams;
 
 use common::{Bench, Machine, close};

@@ -228,7 +228,7 @@ fn agrees(name: &str, description: &Description, free: &[usize]) {
         for (column, &place) in free.iter().enumerate() {
             // The rates' Taylor error of third order and their rounding over the step.
             let step = 1e-5 * theta[place].abs().max(1.0);
-            let mut at = |sign: f64| {
+            let at = |sign: f64| {
                 let mut theta = theta.clone();
                 theta[place] += sign * step;
                 linearize(description, &theta, &x, &u).unwrap().rate

@@ -4,4 +4,5 @@ mod c_source;
 mod choices;
 mod code;
 mod machines;
+mod native;
 mod zero_parameters;
