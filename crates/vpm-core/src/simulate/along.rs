@@ -13,9 +13,8 @@ use crate::sensor::Sensor;
 use crate::system::{Build, Dynamics};
 use crate::table::Table;
 
-/// Derivatives by states taken in one sweep: those of one cylinder behind its valve and of time; those of two, and of time.
-const FEW: usize = 5;
-const LANES: usize = 9;
+/// Derivatives by states taken in one sweep: those of one cylinder behind its valve, and of time; two cylinders take two.
+const LANES: usize = 5;
 
 /// What a sampled drive takes away.
 const NO_STATES: &str = "its effort cannot be worked out along a given motion";
@@ -76,8 +75,7 @@ pub fn drives_along(
     let job = Driven { setting, motion, inputs, internal, places, seen };
     // Most questions are for a few parameters: lanes that nobody needs would be most of the work.
     let (pair, jacobian) = match setting.sensitivities.len() {
-        1 => differentiate_by::<_, 1>(&job, theta, setting.sensitivities, |pass, place| pass.first[place])?,
-        2 => differentiate_by::<_, 2>(&job, theta, setting.sensitivities, |pass, place| pass.first[place])?,
+        1 | 2 => differentiate_by::<_, 2>(&job, theta, setting.sensitivities, |pass, place| pass.first[place])?,
         _ => differentiate(&job, theta, setting.sensitivities, |pass, place| pass.first[place])?,
     };
     Ok(Along { outputs: pair.first, states: pair.second, jacobian })
@@ -96,16 +94,12 @@ impl Job for Driven<'_> {
     fn run<S: Scalar>(&self, theta: &[S]) -> Result<Pair<S>> {
         let values: Vec<f64> = theta.iter().map(Scalar::inspect).collect();
         self.setting.description.check_values(&values)?;
-        if self.internal.len() < FEW {
-            Way::<S, FEW>::new(self, theta)?.run(self.setting.interrupt)
-        } else {
-            Way::<S, LANES>::new(self, theta)?.run(self.setting.interrupt)
-        }
+        Way::<S>::new(self, theta)?.run(self.setting.interrupt)
     }
 }
 
 /// Drives on their way along a motion.
-struct Way<'a, S, const N: usize> {
+struct Way<'a, S> {
     description: &'a Description,
     motion: JointMotion<'a>,
     inputs: Table<'a>,
@@ -116,7 +110,7 @@ struct Way<'a, S, const N: usize> {
     sensors: Vec<Sensor<S>>,
     of_joints: Vec<Option<Sensor<S>>>,
     of_states: Vec<Option<Sensor<S>>>,
-    ode: Answer<S, N>,
+    ode: Answer<S>,
     integrator: Integrator<S>,
     /// States of drives and supplies, time since the last sample.
     state: Vec<S>,
@@ -125,7 +119,7 @@ struct Way<'a, S, const N: usize> {
     states: Vec<S>,
 }
 
-impl<'a, S: Scalar, const N: usize> Way<'a, S, N> {
+impl<'a, S: Scalar> Way<'a, S> {
     fn new(job: &Driven<'a>, theta: &[S]) -> Result<Self> {
         let Driven { setting, motion, inputs, internal, places, seen } = *job;
         let description = setting.description;
@@ -287,14 +281,14 @@ impl<'a, S: Scalar, const N: usize> Way<'a, S, N> {
 }
 
 /// Drives and supplies of a machine whose joints follow a motion, with time as the last state.
-struct Answer<S, const N: usize> {
+struct Answer<S> {
     values: Buffers<S>,
-    duals: Buffers<Dual<S, N>>,
+    duals: Buffers<Dual<S, LANES>>,
     /// Motion of each joint at the sample before and after.
     ends: Vec<[State<S>; 2]>,
     /// The same, and a state, in dual numbers.
-    lifted: Vec<[State<Dual<S, N>>; 2]>,
-    seeds: Vec<Dual<S, N>>,
+    lifted: Vec<[State<Dual<S, LANES>>; 2]>,
+    seeds: Vec<Dual<S, LANES>>,
     /// Time between samples, s.
     interval: f64,
 }
@@ -325,7 +319,7 @@ impl<S: Scalar> Buffers<S> {
     }
 }
 
-impl<S: Scalar, const N: usize> Ode<S> for Answer<S, N> {
+impl<S: Scalar> Ode<S> for Answer<S> {
     fn dim(&self) -> usize {
         self.values.x.len() - 2 * self.ends.len() + 1
     }
@@ -348,7 +342,7 @@ impl<S: Scalar, const N: usize> Ode<S> for Answer<S, N> {
         for (lifted, ends) in self.lifted.iter_mut().zip(&self.ends) {
             *lifted = ends.map(|end| end.map(Dual::constant));
         }
-        for first in (0..dim).step_by(N) {
+        for first in (0..dim).step_by(LANES) {
             for (column, (state, &value)) in self.seeds.iter_mut().zip(s).enumerate() {
                 // A column before `first` wraps around to a lane that does not exist, which gives a constant.
                 *state = Dual::variable(value, column.wrapping_sub(first));
