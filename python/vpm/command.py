@@ -48,7 +48,9 @@ Mode = Annotated[
 ]
 Integrator = Annotated[
     str,
-    typer.Option(help="auto, linearly_implicit, additive, rosenbrock, rk4, semi_implicit, guarded, adaptive, adaptive(1e-8)."),
+    typer.Option(
+        help="auto, linearly_implicit, additive, rosenbrock, rk4, semi_implicit, guarded, adaptive, adaptive(1e-8)."
+    ),
 ]
 Plot = Annotated[Path | None, typer.Option(help="Write the plot to this file (PNG, SVG or PDF).")]
 
