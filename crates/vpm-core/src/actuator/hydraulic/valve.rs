@@ -155,12 +155,15 @@ impl<S: Scalar> Valve<S> {
             };
         }
         let opening = self.opening(place);
-        // The edges that are open, the one at a first, with their drops.
-        let [size, at_a, at_b] =
-            opening.if_positive(|| [opening, supply - a, b - tank], || [-opening, a - tank, supply - b]);
-        let [at_a, at_b] = [at_a, at_b].map(|drop| self.orifice.flow(size, drop));
-        let [into_a, out_of_b, supply, tank] =
-            opening.if_positive(|| [at_a, at_b, at_a, at_b], || [-at_a, -at_b, at_b, at_a]);
+        let forward = || {
+            let [at_a, at_b] = [supply - a, b - tank].map(|drop| self.orifice.flow(opening, drop));
+            [at_a, at_b, at_a, at_b]
+        };
+        let backward = || {
+            let [at_a, at_b] = [a - tank, supply - b].map(|drop| self.orifice.flow(-opening, drop));
+            [-at_a, -at_b, at_b, at_a]
+        };
+        let [into_a, out_of_b, supply, tank] = opening.if_positive(forward, backward);
         Flows { into_a, out_of_b, supply, tank }
     }
 }
