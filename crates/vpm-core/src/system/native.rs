@@ -168,6 +168,15 @@ impl Fast {
         outputs.copy_from_slice(seen);
     }
 
+    /// Begins an additive step at the rates `v` of all coordinates.
+    #[inline]
+    pub(crate) fn depart(&mut self, v: &[f64]) {
+        if let Some((_, call)) = self.others.iter_mut().find(|(own, _)| *own == Kind::Additive) {
+            let before = call.function.places.before();
+            call.inputs[before..before + v.len()].copy_from_slice(v);
+        }
+    }
+
     /// Rates of a stage of an additive step at its explicit and implicit state; false if there is no code for it.
     #[inline]
     pub(crate) fn additive(&mut self, [explicit, implicit]: [&[f64]; 2], reach: f64, rates: &mut [f64]) -> bool {
@@ -176,6 +185,9 @@ impl Fast {
         call.inputs[places.implicit()..places.reach()].copy_from_slice(implicit);
         call.inputs[places.reach()] = reach;
         rates.copy_from_slice(call.at(explicit));
+        // The next stage begins its turns of friction where this one ends.
+        let before = places.before();
+        call.inputs[before..before + places.coordinates].copy_from_slice(&rates[..places.coordinates]);
         true
     }
 

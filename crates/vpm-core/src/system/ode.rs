@@ -245,7 +245,11 @@ impl<S: Scalar> Ode<S> for System<S> {
     fn additive_rates(&mut self, explicit: &[S], implicit: &[S], reach: f64, rates: &mut [S]) -> bool {
         if reach == 0.0 {
             let n = self.coordinates();
-            self.split.depart(&explicit[n..2 * n]);
+            let v = &explicit[n..2 * n];
+            self.split.depart(v);
+            if let (Some(fast), Some(v)) = (&mut self.fast, S::plain(v)) {
+                fast.depart(v);
+            }
             self.begin(explicit, rates);
             return true;
         }

@@ -9,9 +9,11 @@ use crate::error::{Error, Result};
 use crate::graph::{Decision, Graph, Node, Program, Recorded, input, record};
 
 /// Where the inputs of a recorded machine's programs stand: state, inputs of drives and supplies, the implicit state and the reach of an
-/// additive step, parameters.
+/// additive step with the rates where the stage before ended, parameters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Places {
+    /// Number of coordinates.
+    pub coordinates: usize,
     /// Length of the state, which comes first.
     pub states: usize,
     /// Number of inputs, see [`Dynamics::input`].
@@ -23,7 +25,12 @@ pub struct Places {
 impl Places {
     /// Of the machine of a description.
     pub fn new(description: &Description) -> Self {
-        Self { states: description.n_states(), inputs: description.n_inputs(), parameters: description.n_parameters() }
+        Self {
+            coordinates: description.n_coordinates(),
+            states: description.n_states(),
+            inputs: description.n_inputs(),
+            parameters: description.n_parameters(),
+        }
     }
 
     /// The implicit state of an additive step.
@@ -36,9 +43,14 @@ impl Places {
         self.implicit() + self.states
     }
 
+    /// The rates of the coordinates where the stage before ended.
+    pub fn before(&self) -> usize {
+        self.reach() + 1
+    }
+
     /// The first parameter.
     pub fn first_parameter(&self) -> usize {
-        self.reach() + 1
+        self.before() + self.coordinates
     }
 
     /// How many numbers go into a program.
@@ -187,7 +199,9 @@ impl Dynamics<Recorded> {
         let implicit: Vec<Recorded> = (0..x.len()).map(|k| input(places.implicit() + k, 0.0)).collect();
         let reach = input(places.reach(), 0.0);
         let mut rates = vec![Recorded::default(); x.len()];
+        let before: Vec<Recorded> = (0..places.coordinates).map(|k| input(places.before() + k, 0.0)).collect();
         let mut split = Split::new(self);
+        split.depart(&before);
         self.additive_rates(Stage { explicit: x, implicit: &implicit, reach }, &mut rates, &mut split);
         nodes(&rates)
     }

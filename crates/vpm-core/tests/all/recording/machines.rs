@@ -3,7 +3,7 @@
 use serde_json::{Value, json};
 use vpm_core::beam::{Component, Level};
 use vpm_core::description::Description;
-use vpm_core::graph::{Evaluator, Native};
+use vpm_core::graph::{Evaluator, LARGEST, Native};
 use vpm_core::joint::JointKind;
 use vpm_core::model::Parts;
 use vpm_core::mount::{Gauge, Mount};
@@ -39,10 +39,11 @@ impl Witness {
         Ok(Self { recording, direct, theta, n_outputs: d.n_outputs() })
     }
 
-    /// What a program gives, in lanes and as machine code, and where it belongs in a matrix.
-    fn run(&mut self, kind: Kind, [x, implicit, u]: [&[f64]; 3]) -> [Vec<f64>; 2] {
+    /// What a program gives, in lanes and as machine code if it is not too large, and where it belongs in a matrix.
+    fn run(&mut self, kind: Kind, [x, implicit, u]: [&[f64]; 3]) -> Vec<Vec<f64>> {
         let Placed { program, entries } = self.recording.program(kind);
-        let inputs = [x, u, implicit, &[0.25 * STEP], &self.theta].concat();
+        let n = self.recording.places().coordinates;
+        let inputs = [x, u, implicit, &[0.25 * STEP], &x[n..2 * n], &self.theta].concat();
         let numbers = |found: Vec<f64>| {
             if entries.is_empty() {
                 return found;
@@ -56,10 +57,13 @@ impl Witness {
         };
         let mut found = vec![0.0; program.outputs().len()];
         Evaluator::new(&program).run(&inputs, &mut found);
+        if program.size() > LARGEST {
+            return vec![numbers(found)];
+        }
         let native = Native::compile(&program).unwrap();
         let mut code = vec![0.0; found.len()];
         native.call(&inputs, &mut code, &mut native.work()).unwrap();
-        [numbers(found), numbers(code)]
+        vec![numbers(found), numbers(code)]
     }
 
     /// The same by direct evaluation.
@@ -85,6 +89,7 @@ impl Witness {
                 [rates, matrix].concat()
             }
             Kind::Additive => {
+                self.direct.additive_rates(x, x, 0.0, &mut rates);
                 self.direct.additive_rates(x, implicit, 0.25 * STEP, &mut rates);
                 rates
             }
