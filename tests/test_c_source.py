@@ -29,7 +29,6 @@ MACHINES = {
     "flexible": "flexible_pendulum/flexible_pendulum.toml",
     "cylinder": "servo_cylinder/rig.toml",
     "crane": "crane/crane.toml",
-    "tudor": "tudor/tudor.toml",
 }
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-O1")
 WITHOUT_COMPILER = pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler `cc` here")
