@@ -2,6 +2,7 @@
 
 use super::Dynamics;
 use crate::contact::ContactFriction;
+use crate::dynamics::articulated::{Shift, shifted};
 use crate::dynamics::{flexible, poses};
 use crate::integrator::Lu;
 use crate::scalar::Scalar;
@@ -24,6 +25,8 @@ pub(super) struct Split<S> {
     joints: Vec<usize>,
     /// Acceleration of all coordinates per effort on each of these joints.
     columns: Vec<S>,
+    /// Linear damping of each joint, and what its springs do as such over the reach of a stage.
+    damping: Vec<S>,
     /// Velocity of these joints at the end of the stage: with no friction, and as the last turn has it.
     free: Vec<S>,
     velocity: Vec<S>,
@@ -53,7 +56,8 @@ impl<S: Scalar> Split<S> {
         let [free, velocity, resistance, rest] = [0; 4].map(|_| vec![S::zero(); count]);
         let (coasting, columns) = (vec![S::zero(); n], vec![S::zero(); n * count]);
         let state = vec![S::zero(); dynamics.dim()];
-        Self { state, coasting, joints, columns, free, velocity, resistance, rest, lu: Lu::new(count) }
+        let damping = vec![S::zero(); dynamics.joints()];
+        Self { state, coasting, joints, columns, damping, free, velocity, resistance, rest, lu: Lu::new(count) }
     }
 
     /// Begins a step at the rates `v` of all coordinates.
@@ -72,16 +76,11 @@ impl<S: Scalar> Split<S> {
         let v = &stage.implicit[n..2 * n];
         self.coasting.copy_from_slice(&stage.implicit[..n]);
         self.coasting.iter_mut().zip(v).for_each(|(q, &v)| *q += v * reach);
-        dynamics.push_apart(stage, &self.coasting);
-        dynamics.data.factorise();
+        dynamics.push_apart(stage, &self.coasting, &mut self.damping);
         let acceleration = &mut rates[n..2 * n];
-        acceleration.copy_from_slice(&dynamics.loads);
-        dynamics.data.solve(acceleration);
-        for (k, (column, &joint)) in self.columns.chunks_exact_mut(n.max(1)).zip(&self.joints).enumerate() {
-            column.fill(S::zero());
-            column[joint] = S::one();
-            dynamics.data.solve(column);
-            self.free[k] = v[joint] + acceleration[joint] * reach;
+        dynamics.solve_apart(stage, &self.damping, acceleration, (&self.joints, &mut self.columns));
+        for (free, &joint) in self.free.iter_mut().zip(&self.joints) {
+            *free = v[joint] + acceleration[joint] * reach;
         }
         for _ in 0..if count == 0 { 0 } else { TURNS } {
             self.rub(dynamics, stage);
@@ -144,9 +143,13 @@ impl<S: Scalar> Dynamics<S> {
     pub(super) fn additive_rates(&mut self, stage: Stage<'_, S>, rates: &mut [S], split: &mut Split<S>) {
         let (n, first) = (self.coordinates(), self.first_memory());
         let (q, v) = stage.explicit[..2 * n].split_at(n);
-        self.terms(q, v);
-        if !self.connections.is_free() {
-            poses(&self.model, &mut self.data);
+        if self.model.is_articulated() {
+            self.locate(q, v);
+        } else {
+            self.terms(q, v);
+            if !self.connections.is_free() {
+                poses(&self.model, &mut self.data);
+            }
         }
         split.state.copy_from_slice(stage.explicit);
         self.settle_lags(stage, &mut split.state);
@@ -174,8 +177,8 @@ impl<S: Scalar> Dynamics<S> {
         }
     }
 
-    /// All loads of a stage but for friction that is not linear, and `M + reach D + reach^2 K` in the place of the mass matrix.
-    fn push_apart(&mut self, Stage { explicit, implicit, reach }: Stage<'_, S>, coasting: &[S]) {
+    /// All loads of a stage but for friction that is not linear, and the `damping` of joints that their implicit part amounts to.
+    fn push_apart(&mut self, Stage { explicit, implicit, reach }: Stage<'_, S>, coasting: &[S], damping: &mut [S]) {
         let Self { model, data, loads, tensions, connections, efforts, effects, .. } = self;
         let (n, joints) = (model.n_coordinates(), efforts.len());
         let v = &implicit[n..2 * n];
@@ -187,17 +190,57 @@ impl<S: Scalar> Dynamics<S> {
         if !connections.is_free() {
             connections.add_loads(model, data, ContactFriction::resistance, loads);
         }
-        loads.iter_mut().zip(&data.composite.bias).for_each(|(load, &bias)| *load -= bias);
         flexible::subtract_elastic(model, coasting, v, loads);
-        flexible::stiffen(model, reach, &mut data.mass_matrix);
+        damping.fill(S::zero());
         for (joint, effect) in effects {
             let (joint, q) = (*joint, explicit[*joint]);
             // A spring that pushes away is left explicit.
             let stiffness = -effect.slope_at_rest(q).min(S::zero());
-            let damping = effect.damping();
-            loads[joint] += effect.effort_at_rest(q) + stiffness * (q - coasting[joint]) - damping * v[joint];
-            let diagonal = &mut data.mass_matrix[joint * n + joint];
-            *diagonal = *diagonal + (damping + stiffness * reach) * reach;
+            let linear = effect.damping();
+            loads[joint] += effect.effort_at_rest(q) + stiffness * (q - coasting[joint]) - linear * v[joint];
+            damping[joint] += linear + stiffness * reach;
+        }
+    }
+
+    /// Writes the accelerations under these loads with `M + reach D + reach^2 K` in the place of the mass matrix, and those that a unit of
+    /// effort on each of the `joints` adds.
+    fn solve_apart(
+        &mut self,
+        stage: Stage<'_, S>,
+        damping: &[S],
+        acceleration: &mut [S],
+        (joints, columns): (&[usize], &mut [S]),
+    ) {
+        let n = self.coordinates();
+        let columns = columns.chunks_exact_mut(n.max(1)).zip(joints);
+        let Self { model, data, loads, .. } = self;
+        if model.is_articulated() {
+            let (q, v) = stage.explicit[..2 * n].split_at(n);
+            let shift = Shift { reach: stage.reach, resistances: damping };
+            acceleration.copy_from_slice(shifted(model, data, (q, v), loads, shift));
+            for (column, &joint) in columns {
+                // The recursion is linear in the efforts.
+                let own = loads[joint];
+                loads[joint] = own + 1.0;
+                column.copy_from_slice(shifted(model, data, (q, v), loads, shift));
+                loads[joint] = own;
+                column.iter_mut().zip(&*acceleration).for_each(|(entry, &a)| *entry -= a);
+            }
+            return;
+        }
+        flexible::stiffen(model, stage.reach, &mut data.mass_matrix);
+        for (joint, &damping) in damping.iter().enumerate() {
+            data.mass_matrix[joint * n + joint] += damping * stage.reach;
+        }
+        data.factorise();
+        for ((acceleration, &load), &bias) in acceleration.iter_mut().zip(&*loads).zip(&data.composite.bias) {
+            *acceleration = load - bias;
+        }
+        data.solve(acceleration);
+        for (column, &joint) in columns {
+            column.fill(S::zero());
+            column[joint] = S::one();
+            data.solve(column);
         }
     }
 }

@@ -11,6 +11,7 @@ pub mod free_leg;
 pub mod hydraulics;
 pub mod parts;
 pub mod places;
+pub mod random_machine;
 pub mod servo_machine;
 pub mod sums;
 pub mod trees;

@@ -203,7 +203,7 @@ fn operations_grow_with_the_number_of_elements() -> Result<()> {
             println!("{elements} elements of {}: {plain}, implicit {implicit}, dense {dense}", deforms.len());
             all.push([plain, implicit]);
         }
-        for kind in 0..2 {
+        for kind in [0, 1] {
             let each = (all[5][kind] - all[4][kind]) / 20.0;
             // The elements at root and tip differ from the others, all others are alike.
             assert_eq!(all[4][kind] - all[3][kind], 10.0 * each);
