@@ -14,8 +14,6 @@ from vpm.model.schema import ChannelEntry
 
 #: Drives whose effort follows from the command alone.
 DIRECT = frozenset({"ideal", "narx", "maxwell_narx"})
-#: Effects that are linear springs.
-SPRINGS = frozenset({"spring", "joint_compliance", "link_flexibility"})
 #: Effects with springs that take hold at once.
 IMPACTS = frozenset({"backlash", "end_stop"})
 
@@ -117,14 +115,14 @@ class Components(DriveComponents):
 
     @cached_property
     def is_linearly_stiff(self) -> bool:
-        """Whether linear springs are all that is stiff in it: those of flexible links and joints, no hard contact.
+        """Whether it has flexible links, and nothing beside them that is stiff in ways of its own.
 
-        The states and forces of drives other than ideal and sampled ones, bushings, ends of ways and play are stiff
-        in ways of their own.
+        Stiff in ways of their own are contacts, bushings, ends of ways, backlash, and drives other than ideal and
+        sampled ones.
         """
         document = self._checked.document
         effects = {effect.type for effect in document.effects}
-        elastic = any(level != "rigid" for level in self.levels.values()) or bool(effects & SPRINGS)
+        elastic = any(level != "rigid" for level in self.levels.values())
         direct = all(entry.type in DIRECT for entry in document.actuators.values())
         return elastic and direct and not document.contacts and not document.bushings and not effects & IMPACTS
 

@@ -24,8 +24,8 @@ class Setup(Storable):
     integrator : {"auto", "linearly_implicit", "additive", "rosenbrock", "rk4", "semi_implicit", "guarded", "adaptive"}
         Or, with a tolerance, ``"adaptive(1e-8)"``.
         ``auto`` is ``adaptive`` for machines with contacts or hydraulic drives, which impacts and oil make abrupt,
-        ``additive`` for machines whose stiff forces are linear (flexible links, springs and compliant joints, with
-        ideal drives), and ``linearly_implicit`` for all others and where joints follow a measured motion.
+        ``additive`` for machines with flexible links and nothing else that is stiff (ideal drives, no contacts), and
+        ``linearly_implicit`` for all others and where joints follow a measured motion.
         ``linearly_implicit`` and ``rosenbrock`` are stable whatever is stiff, of order 2 and 4; the first of them also
         stops on dry friction far sharper than a step. ``additive`` has order 4 as well, without a Jacobian: stable
         however stiff links, springs and friction of joints are, explicit in all else. ``rk4`` and ``semi_implicit``
