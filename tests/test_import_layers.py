@@ -125,7 +125,7 @@ def test_import_vpm_loads_nothing_but_what_python_has() -> None:
 
 def test_a_simulation_needs_no_scipy() -> None:
     added = loaded_by("from vpm import Experiment, Model, Scenario, compare, simulate")
-    assert {"vpm._core", "vpm.simulate.run"} <= added
+    assert "vpm.simulate.run" in added
     assert not any(name.split(".")[0] == "scipy" for name in added)
 
 

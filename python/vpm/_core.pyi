@@ -387,7 +387,7 @@ class System:
         states: Sequence[str],
         inputs: Sequence[str],
         outputs: Sequence[str],
-        free: Sequence[int] = [],
+        free: Sequence[int] = ...,
     ) -> tuple[str, str]:
         """The texts of ``NAME.h`` and ``NAME.c``; parameters numbered ``free`` are arguments, others constants."""
     def linearize(

@@ -34,7 +34,7 @@ use crate::model::{Model, Omissions, Parts};
 use crate::mount::{Gauge, Marker};
 use crate::scalar::Scalar;
 use crate::sensor::{Layout, Sensor};
-use crate::system::{Build, Cache, Dynamics, Natives, System};
+use crate::system::{Build, Cache, Dynamics, Natives, Places, Recording, System};
 
 /// The parts of a machine. Every `usize` in a law is a place in [`Description::parameters`]; all numbers are SI.
 #[derive(Clone, Debug, Deserialize)]
@@ -220,7 +220,26 @@ impl Description {
 
     /// Machine code of the machine that is right for `theta`, made at the first call; or why there is none.
     pub fn natives(&self, theta: &[f64]) -> std::result::Result<Arc<Natives>, String> {
-        self.code.natives(self, theta)
+        self.check_values(theta).map_err(|error| error.to_string())?;
+        self.code.natives(self, self.places(), theta)
+    }
+
+    /// The machine as a graph of operations, its parts built for the parameters `theta`.
+    ///
+    /// # Errors
+    /// As [`Description::check_values`], and [`Error::Unrecorded`] where a law decides by the value of a state.
+    pub fn recording(&self, theta: &[f64]) -> Result<Recording> {
+        self.check_values(theta)?;
+        Recording::new(self, self.places(), theta)
+    }
+
+    fn places(&self) -> Places {
+        Places {
+            coordinates: self.n_coordinates(),
+            states: self.n_states(),
+            inputs: self.n_inputs(),
+            parameters: self.n_parameters(),
+        }
     }
 
     /// The sensors over the number type of `theta`.

@@ -96,7 +96,9 @@ impl<'a, S: Scalar> Stepper<'a, S> {
     pub(crate) fn by_code(mut self, theta: &[S]) -> Self {
         let Stepping { substeps, method, .. } = self.stepping;
         let evaluations = self.plan.starts.len() * self.plan.horizon * substeps * method.stages();
-        let fast = S::plain(theta).and_then(|theta| Fast::for_run(self.description, theta, (method, evaluations)));
+        let theta = S::plain(theta).filter(|_| Fast::pays(evaluations));
+        let natives = theta.and_then(|theta| Some((self.description.natives(theta).ok()?, theta)));
+        let fast = natives.and_then(|(natives, theta)| Fast::new(&natives, theta, method).ok());
         self.system = self.system.with_code(fast);
         self
     }

@@ -2,9 +2,9 @@
 
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
+use super::Build;
 use super::recorded::{Kind, Placed, Places, Recording};
-use crate::description::Description;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::graph::{Evaluator, Native, Program, Work};
 use crate::integrator::Method;
 
@@ -41,23 +41,28 @@ impl Clone for Cache {
 }
 
 impl Cache {
-    /// The code of the machine of `description` that is right for `theta`, or why there is none.
-    pub fn natives(&self, description: &Description, theta: &[f64]) -> std::result::Result<Arc<Natives>, String> {
+    /// The code of the machine that `build` makes, right for the checked parameters `theta`; or why there is none.
+    pub fn natives(
+        &self,
+        build: impl Build<Error = Error>,
+        places: Places,
+        theta: &[f64],
+    ) -> std::result::Result<Arc<Natives>, String> {
         let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         match &*kept {
             Some(Ok(natives)) if natives.holds(theta) => return Ok(natives.clone()),
             Some(Err(reason)) => return Err(reason.clone()),
             _ => {}
         }
-        let made = Natives::new(description, theta).map(Arc::new).map_err(|error| error.to_string());
+        let made = Natives::new(build, places, theta).map(Arc::new).map_err(|error| error.to_string());
         *kept = Some(made.clone());
         made
     }
 }
 
 impl Natives {
-    fn new(description: &Description, theta: &[f64]) -> Result<Self> {
-        let recording = Recording::new(description, theta)?;
+    fn new(build: impl Build<Error = Error>, places: Places, theta: &[f64]) -> Result<Self> {
+        let recording = Recording::new(build, places, theta)?;
         let theta = recording.is_of_values().then(|| theta.to_vec());
         Ok(Self { recording: Mutex::new(recording), functions: Default::default(), theta })
     }
@@ -120,16 +125,9 @@ pub(crate) struct Fast {
 }
 
 impl Fast {
-    /// For a run of so many `evaluations` by `method`, where it pays and the machine has code.
-    pub(crate) fn for_run(
-        description: &Description,
-        theta: &[f64],
-        (method, evaluations): (Method, usize),
-    ) -> Option<Self> {
-        if evaluations < PAYS {
-            return None;
-        }
-        Self::new(&*description.natives(theta).ok()?, theta, method).ok()
+    /// Whether machine code pays in a run of so many evaluations of the rates.
+    pub(crate) fn pays(evaluations: usize) -> bool {
+        evaluations >= PAYS
     }
 
     /// For steps by `method`; or why there is no code. A matrix alone that has none is worked out directly.

@@ -3,7 +3,6 @@
 use super::additive::{Split, Stage};
 use super::{Build, Dynamics, stiff};
 use crate::contact::ContactFriction;
-use crate::description::Description;
 use crate::effect::JointEffect;
 use crate::error::{Error, Result};
 use crate::graph::{Decision, Graph, Node, Program, Recorded, input, record};
@@ -23,16 +22,6 @@ pub struct Places {
 }
 
 impl Places {
-    /// Of the machine of a description.
-    pub fn new(description: &Description) -> Self {
-        Self {
-            coordinates: description.n_coordinates(),
-            states: description.n_states(),
-            inputs: description.n_inputs(),
-            parameters: description.n_parameters(),
-        }
-    }
-
     /// The implicit state of an additive step.
     pub fn implicit(&self) -> usize {
         self.states + self.inputs
@@ -119,14 +108,12 @@ pub struct Placed {
 }
 
 impl Recording {
-    /// Records the machine of `description`; `theta` are the parameters for which its parts are built.
+    /// Records the machine that `build` makes; `theta` are the parameters, checked, for which its parts are built.
     ///
     /// # Errors
     /// [`Error::Unrecorded`] where a law decides by the value of a state: the graph would hold for that state alone.
-    pub fn new(description: &Description, theta: &[f64]) -> Result<Self> {
-        description.check_values(theta)?;
-        let places = Places::new(description);
-        let (functions, graph) = record(places.first_parameter() as u32, || functions(description, places, theta));
+    pub fn new(build: impl Build<Error = Error>, places: Places, theta: &[f64]) -> Result<Self> {
+        let (functions, graph) = record(places.first_parameter() as u32, || functions(build, places, theta));
         let recording = Self { graph, places, functions: functions? };
         match recording.graph.decisions().iter().find(|decision| !decision.of_parameters) {
             Some(decision) => Err(unrecordable(decision)),
@@ -176,16 +163,16 @@ impl Recording {
     }
 }
 
-fn functions(description: &Description, places: Places, theta: &[f64]) -> Result<Functions> {
+fn functions(build: impl Build<Error = Error>, places: Places, theta: &[f64]) -> Result<Functions> {
     let first = places.first_parameter();
     let theta: Vec<Recorded> = theta.iter().enumerate().map(|(k, &value)| input(first + k, value)).collect();
-    let mut dynamics: Dynamics<Recorded> = Build::dynamics(&description, &theta)?;
+    let mut dynamics: Dynamics<Recorded> = build.dynamics(&theta)?;
     let zeros = |count: usize| vec![Recorded::default(); count];
     let x: Vec<Recorded> = (0..places.states).map(|k| input(k, 0.0)).collect();
     for number in 0..places.inputs {
         dynamics.hold(number, input(places.states + number, 0.0));
     }
-    let (mut rates, mut outputs) = (zeros(places.states), zeros(description.n_outputs()));
+    let (mut rates, mut outputs) = (zeros(places.states), zeros(dynamics.layout().count()));
     dynamics.rhs(&x, &mut rates);
     dynamics.observe(&x, &rates, &mut outputs);
     let stiff = dynamics.stiff(&x);

@@ -95,7 +95,7 @@ pub fn everything(seed: u64) -> Parts<f64> {
     let random = &mut Random::new(seed);
     let mut parts = Parts { gravity: [0.4, -9.0, 2.0], ..Parts::default() };
     parts.beams.push(beam(random, "upper", Mount::Body(1), Level::Strain(1), &[BendingX, BendingY, Torsion]));
-    parts.beams.push(beam(random, "lower", Mount::Body(0), Level::Bezier(3), &[BendingX, Extension]));
+    parts.beams.push(beam(random, "lower", Mount::Body(0), Level::Deflection(3), &[BendingX, Extension]));
     parts.beams.push(beam(random, "stiff", Mount::World, Level::Rigid, &[BendingX]));
     parts.beams[2].on = section(&parts, 0, 0.25);
     let (tip, middle, of_rigid) = (section(&parts, 0, 1.0), section(&parts, 1, 0.6), section(&parts, 2, 0.7));

@@ -35,7 +35,7 @@ struct Witness {
 
 impl Witness {
     fn new(d: &Description, theta: Vec<f64>) -> Result<Self> {
-        let (recording, direct) = (Recording::new(d, &d.parameters)?, d.system::<f64>(&theta)?);
+        let (recording, direct) = (d.recording(&d.parameters)?, d.system::<f64>(&theta)?);
         Ok(Self { recording, direct, theta, n_outputs: d.n_outputs() })
     }
 
@@ -116,7 +116,7 @@ fn state(d: &Description, random: &mut Random, rest: &[f64]) -> Vec<f64> {
 /// Parameters beside those of the recording, with which the machine exists; the same where it holds for those alone.
 fn others(d: &Description, random: &mut Random) -> Result<Vec<f64>> {
     let mut theta = d.parameters.clone();
-    if !Recording::new(d, &theta)?.is_of_values() {
+    if !d.recording(&theta)?.is_of_values() {
         for place in 0..theta.len() {
             theta[place] *= 1.0 + 0.02 * random.symmetric();
             if d.check_values(&theta).is_err() {
@@ -200,7 +200,7 @@ fn simpler_drives_agree_or_say_which_law_decides() -> Result<()> {
     for (name, machine) in simpler_drives(&hydraulics::nominal()) {
         let d = machine.build();
         if name.contains("quasi") {
-            let error = Recording::new(&d, &d.parameters).unwrap_err();
+            let error = d.recording(&d.parameters).unwrap_err();
             let Error::Unrecorded { place, .. } = &error else { panic!("{error}") };
             assert!(place.contains("balance.rs"), "{place}");
             continue;
@@ -238,7 +238,7 @@ fn beams_of_all_levels_agree() -> Result<()> {
     ];
     for level in levels {
         let (d, of_values) = (description(&arm(level), |_| ()), matches!(level, Level::Modal(_)));
-        assert_eq!(Recording::new(&d, &d.parameters)?.is_of_values(), of_values, "{level:?}");
+        assert_eq!(d.recording(&d.parameters)?.is_of_values(), of_values, "{level:?}");
         check(&format!("{level:?}"), &d, &WITHOUT_DERIVATIVES, &[])?;
     }
     Ok(())

@@ -21,7 +21,7 @@ const SOURCE: &str = "central differences of fourth order";
 /// State Jacobians and sensitivities of an arm with a beam of two levels.
 pub fn rows() -> Result<Vec<Row>> {
     let mut rows = Vec::new();
-    for level in [Level::Strain(2), Level::Bezier(3)] {
+    for level in [Level::Strain(2), Level::Deflection(3)] {
         let d = trees::try_description(&arm(level), |_| ())?;
         rows.push(jacobian(&d, level)?);
         rows.push(sensitivities(&d, level)?);
