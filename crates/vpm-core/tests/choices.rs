@@ -1,6 +1,7 @@
 //! Laws over a number that does not tell how it compares: both ways of every choice can be worked out, and what is selected, with its
 //! derivatives, is what plain numbers give.
 
+#[cfg(test)]
 #[path = "common/both.rs"]
 mod both;
 #[cfg(test)]
@@ -48,6 +49,7 @@ fn same(laws: &impl Laws, x: [f64; WIDTH]) {
     }
 }
 
+#[cfg(test)]
 fn read<T: serde::de::DeserializeOwned>(value: Value) -> T {
     serde_json::from_value(value).unwrap()
 }
@@ -226,6 +228,7 @@ fn machine() -> Description {
 }
 
 /// Rates, all outputs, and efforts that a motion needs.
+#[cfg(test)]
 fn seen<S: Scalar>(d: &Description, x: &[f64]) -> Vec<S> {
     let lift = |numbers: &[f64]| -> Vec<S> { numbers.iter().map(|&number| S::from_f64(number)).collect() };
     let mut dynamics = Build::dynamics(&d, &lift(&d.parameters)).unwrap();
