@@ -102,13 +102,14 @@ impl TableDrive {
         let over_u = hermite(share(&self.commands, row, command));
         let mut over_v = hermite(share(&self.velocities, column, velocity));
         let [least, most] = [self.velocities[0], self.velocities[columns - 1]];
+        // The ends themselves count as beyond, for the slope's sake, but what is no number does not.
         if column + 2 == columns {
             let beyond = || (velocity - most) * (1.0 / dv);
-            over_v[1][1] = velocity.if_less(S::from_f64(most), || over_v[1][1], beyond);
+            over_v[1][1] = S::from_f64(most.next_down()).if_less(velocity, beyond, || over_v[1][1]);
         }
         if column == 0 {
             let beyond = || (velocity - least) * (1.0 / dv);
-            over_v[0][1] = S::from_f64(least).if_less(velocity, || over_v[0][1], beyond);
+            over_v[0][1] = velocity.if_less(S::from_f64(least.next_up()), beyond, || over_v[0][1]);
         }
         let mut effort = S::zero();
         for (i, [by_value, by_slope]) in over_u.into_iter().enumerate() {
