@@ -129,7 +129,7 @@ fn frequencies_of_low_degrees_are_those_of_the_polynomial() -> Result<()> {
         let ritz = LinearBeam::new(&section, Plane::Y, basis, Theory::Rayleigh, TipBody::default())?.modes(None)?;
         assert_eq!(found.len(), degree - 1);
         for (found, expected) in found.iter().zip(&ritz.frequencies) {
-            let tolerance = if degree > 6 { 1e-7 } else { 1e-9 };
+            let tolerance = if degree > 6 { 1e-5 } else { 1e-9 };
             assert!((found / expected - 1.0).abs() < tolerance, "degree {degree}: {found} {expected}");
         }
     }
