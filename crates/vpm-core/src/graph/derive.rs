@@ -24,8 +24,8 @@ impl Graph {
         let count = outputs.iter().max().map_or(0, |&most| most as usize + 1);
         let needed = self.needed(outputs, count);
         let mut gradients: Vec<Gradient> = Vec::with_capacity(count);
-        for node in 0..count {
-            let gradient = if needed[node] { self.gradient(node as Node, &gradients, inputs) } else { Gradient::new() };
+        for (node, needed) in (0..).zip(needed) {
+            let gradient = if needed { self.gradient(node, &gradients, inputs) } else { Gradient::new() };
             gradients.push(gradient);
         }
         let mut derivative = Derivative { places: Vec::new(), entries: Vec::new() };

@@ -33,7 +33,7 @@ fn graph(seeds: &[Seed], functions: usize) -> (Graph, Vec<Node>) {
     let mut made: Vec<Node> = (0..INPUTS).map(|k| graph.input(k as u32, 0.0)).collect();
     for &(kind, back, value) in seeds {
         // Near and far arguments: the far ones have to wait in memory, some over the end of a function.
-        let reach = |back: u16| if back % 3 == 0 { made.len() } else { made.len().min(24) };
+        let reach = |back: u16| if back.is_multiple_of(3) { made.len() } else { made.len().min(24) };
         let [a, b, c, d] = back.map(|back| made[made.len() - 1 - usize::from(back / 3) % reach(back)]);
         made.push(match kind % 16 {
             0 => graph.constant(value),
