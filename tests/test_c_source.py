@@ -199,7 +199,8 @@ def test_the_loop_of_the_examples_ends_where_a_simulation_does(emps: Model, tmp_
 
 @pytest.fixture
 def casadi() -> ModuleType:
-    return pytest.importorskip("casadi", reason="CasADi is not installed (pip install casadi)")
+    module: ModuleType = pytest.importorskip("casadi", reason="CasADi is not installed (pip install casadi)")
+    return module
 
 
 @WITHOUT_COMPILER
@@ -284,7 +285,8 @@ def test_acados_finds_its_functions(tmp_path: Path) -> None:
     nx, nu = linear.B.shape
     Sx, Su, adjoint = rng.normal(size=(nx, nx)), rng.normal(size=(nx, nu)), rng.normal(size=nx)
     x, u = linear.state, linear.command
-    given = [x, u, x, Sx.T.ravel(), Su.T.ravel(), u, x, adjoint, u]
+    parts = (x, u, x, Sx.T, Su.T, u, x, adjoint, u)
+    given: list[Array] = [np.asarray(part, dtype=float).ravel() for part in parts]
     text = "\n".join(float(value).hex() for value in np.concatenate(given))
     done = subprocess.run([tmp_path / "acados"], input=text, capture_output=True, text=True, check=True)
     found = np.array([float(line) for line in done.stdout.split()])
