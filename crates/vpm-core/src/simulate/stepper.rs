@@ -98,8 +98,9 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         let evaluations = self.plan.starts.len() * self.plan.horizon * substeps * method.stages();
         let theta = S::plain(theta).filter(|_| Fast::pays(evaluations));
         let natives = theta.and_then(|theta| Some((self.description.natives(theta).ok()?, theta)));
-        let fast = natives.and_then(|(natives, theta)| Fast::new(&natives, theta, method).ok());
-        self.system = self.system.with_code(fast);
+        if let Some(fast) = natives.and_then(|(natives, theta)| Fast::new(&natives, theta, method).ok()) {
+            self.system.run_by(fast);
+        }
         self
     }
 

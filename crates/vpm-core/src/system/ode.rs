@@ -42,12 +42,6 @@ impl<S: Scalar> System<S> {
         Ok(Self { dynamics, tangent, split, resistances, seals, fadings, column, rates, ready, fast })
     }
 
-    /// The same machine, whose functions run as machine code.
-    #[must_use]
-    pub(crate) fn with_code(self, fast: Option<Fast>) -> Self {
-        Self { fast, ..self }
-    }
-
     /// Runs its functions as machine code from now on. Inputs have to be held anew.
     pub(crate) fn run_by(&mut self, fast: Fast) {
         (self.fast, self.ready) = (Some(fast), false);
