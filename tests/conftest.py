@@ -1,6 +1,7 @@
 """What several test files share."""
 
 import os
+import signal
 from pathlib import Path
 
 import pytest
@@ -13,6 +14,11 @@ from vpm.model import Model
 # everywhere else every run draws new ones.
 settings.register_profile("vpm", deadline=None, print_blob=True, derandomize="CI" in os.environ)
 settings.load_profile("vpm")
+
+# A shell without job control starts background work (`make test &`, `nohup`) deaf to Ctrl-C, and every child would
+# inherit that, the programs that tests interrupt among them.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 ROOT = Path(__file__).resolve().parent.parent
 

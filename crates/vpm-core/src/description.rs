@@ -34,7 +34,7 @@ use crate::model::{Model, Omissions, Parts};
 use crate::mount::{Gauge, Marker};
 use crate::scalar::Scalar;
 use crate::sensor::{Layout, Sensor};
-use crate::system::{Build, Cache, Dynamics, Natives, Places, Recording, System};
+use crate::system::{Build, Cache, Dynamics, Functions, Kind, Machine, Memories, Placed, Places, Recorder, System};
 
 /// The parts of a machine. Every `usize` in a law is a place in [`Description::parameters`]; all numbers are SI.
 #[derive(Clone, Debug, Deserialize)]
@@ -96,9 +96,9 @@ pub struct Description {
     /// Number of elastic coordinates of each beam, known once the beams are built.
     #[serde(skip)]
     elastic: Vec<usize>,
-    /// Machine code of the machine.
+    /// What of the machine was recorded.
     #[serde(skip)]
-    code: Cache,
+    recorded: Cache,
 }
 
 impl Description {
@@ -215,25 +215,39 @@ impl Description {
     pub fn system<S: Scalar>(&self, theta: &[S]) -> Result<System<S>> {
         let values: Vec<f64> = theta.iter().map(Scalar::inspect).collect();
         self.check_values(&values)?;
-        System::new(theta, self)
+        System::new(self.machine(theta)?)
     }
 
-    /// Machine code of the machine that is right for `theta`, made at the first call; or why there is none.
-    pub fn natives(&self, theta: &[f64]) -> std::result::Result<Arc<Natives>, String> {
-        self.check_values(theta).map_err(|error| error.to_string())?;
-        self.code.natives(self, self.places(), theta)
+    /// What somebody needs who runs the machine with the checked parameters `theta`.
+    pub(crate) fn machine<'a, S: Scalar>(&self, theta: &'a [S]) -> Result<Machine<'a, S>> {
+        let values: Vec<f64> = theta.iter().map(Scalar::inspect).collect();
+        let supplies = self.supplies.iter().filter(|supply| supply.is_logged());
+        let commands = self.actuators.iter().map(|_| S::zero());
+        Ok(Machine {
+            dynamics: Build::dynamics(&self, &values)?,
+            functions: self.functions(),
+            theta,
+            inputs: commands.chain(supplies.map(|supply| theta[supply.pressure])).collect(),
+            actuators: self.actuators_of(theta),
+            memories: self.memories_of(theta),
+        })
     }
 
-    /// The machine as a graph of operations, its parts built for the parameters `theta`.
+    /// The functions of the machine, recorded as they are asked for.
+    pub(crate) fn functions(&self) -> Arc<Functions> {
+        self.recorded.functions(|| Box::new(self.clone()))
+    }
+
+    /// A function of the machine as a program of operations, its parts built for the checked parameters `theta`.
     ///
     /// # Errors
-    /// As [`Description::check_values`], and [`Error::Unrecorded`] where a law decides by the value of a state.
-    pub fn recording(&self, theta: &[f64]) -> Result<Recording> {
-        self.check_values(theta)?;
-        Recording::new(self, self.places(), theta)
+    /// [`Error::Unrecorded`] where a law decides by the value of a state.
+    pub fn program(&self, kind: &Kind, theta: &[f64]) -> Result<Placed> {
+        Placed::new(self, self.places(), theta, kind)
     }
 
-    fn places(&self) -> Places {
+    /// Where the inputs of its functions stand.
+    pub(crate) fn places(&self) -> Places {
         Places {
             coordinates: self.n_coordinates(),
             states: self.n_states(),
@@ -245,6 +259,16 @@ impl Description {
     /// The sensors over the number type of `theta`.
     pub(crate) fn sensors<S: Scalar>(&self, theta: &[S]) -> Vec<Sensor<S>> {
         self.sensors.iter().map(|sensor| sensor.map(&mut |&index| theta[index])).collect()
+    }
+
+    /// The actuators over the number type of `theta`.
+    pub(crate) fn actuators_of<S: Scalar>(&self, theta: &[S]) -> Vec<Actuator<S>> {
+        self.actuators.iter().map(|actuator| actuator.map(&mut |&index| theta[index])).collect()
+    }
+
+    /// Effects that remember, relaxed, over the number type of `theta`.
+    pub(crate) fn memories_of<S: Scalar>(&self, theta: &[S]) -> Memories<S> {
+        Memories::new(self.effects.iter().filter_map(|entry| entry.with_memory(theta)).collect())
     }
 
     fn model<S: Scalar>(&self, theta: &[S]) -> Result<Model<S>> {
@@ -278,17 +302,23 @@ impl Description {
     }
 }
 
+impl Recorder for Description {
+    fn record(&self, kind: &Kind, theta: &[f64]) -> Result<Placed> {
+        self.program(kind, theta)
+    }
+}
+
 impl Build for &Description {
     type Error = Error;
 
     fn dynamics<S: Scalar>(&self, theta: &[S]) -> Result<Dynamics<S>> {
         let effects = self.effects.iter().filter_map(|entry| entry.on_joint(theta)).collect();
-        let actuators = self.actuators.iter().map(|actuator| actuator.map(&mut |&index| theta[index])).collect();
+        let actuators = self.actuators_of(theta);
         let supplies = self.supplies.iter().map(|supply| supply.map(&mut |&index| theta[index])).collect();
         let model = self.model(theta)?;
         let connections = self.connections(theta, &model)?;
-        let memories = self.effects.iter().filter_map(|entry| entry.with_memory(theta)).collect();
-        Ok(Dynamics::new(model, effects, actuators, supplies).connected(connections).remembering(memories))
+        let machine = Dynamics::new(model, effects, actuators, supplies).connected(connections);
+        Ok(machine.remembering(self.memories_of(theta)))
     }
 }
 

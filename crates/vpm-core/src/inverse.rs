@@ -1,18 +1,19 @@
 //! Inverse dynamics of a whole record: the effort that the motion needs against the effort that the actuators deliver.
 
-use crate::actuator::{Drive, Target};
-use crate::description::{Description, EffectEntry};
-use crate::error::{DriveError, Error, Result};
-use crate::motion::{JointMotion, position_sensors};
-use crate::scalar::Scalar;
-use crate::sensitivity::{Interrupt, Job, Pair, differentiate};
-use crate::sensor::Sensor;
-use crate::simulate::check_time_step;
-use crate::system::{Build, Dynamics};
-use crate::table::Table;
+mod course;
+mod record;
+mod sample_by_sample;
 
-/// Samples between two questions whether to stop.
-const PATIENCE: usize = 256;
+use crate::actuator::{Drive, Target};
+use crate::description::Description;
+use crate::error::{DriveError, Error, Result};
+use crate::motion::JointMotion;
+use crate::sensitivity::{Interrupt, check_variables};
+use crate::simulate::check_time_step;
+use crate::system::Kind;
+use crate::table::Table;
+use course::{Course, Delivered, OfEffect};
+use record::{Along, Numbers, Record};
 
 /// A measured motion with its commands.
 #[derive(Clone, Copy)]
@@ -69,10 +70,21 @@ pub fn inverse_dynamics(
     motion.acceleration.expect("acceleration", rows, joints)?;
     motion.inputs.expect("inputs", rows, description.n_inputs())?;
     check_time_step(motion.time_step)?;
-    let job = Inverse { description, motion, interrupt };
-    let residual = |pass: &Pair<_>, place: usize| pass.first[place] - pass.second[place];
-    let (pair, jacobian) = differentiate(&job, theta, sensitivities, residual)?;
-    Ok(Efforts { required: pair.first, applied: pair.second, jacobian })
+    check_parameters(description, theta, sensitivities)?;
+    let Motion { position, velocity, acceleration, inputs, time_step } = motion;
+    let motion = JointMotion { position, velocity, acceleration };
+    let along = Along::new(Record { description, motion, time_step, interrupt }, theta, sensitivities)?;
+    let Numbers { values: required, mut jacobian } = along.follow(Kind::Required, joints)?;
+    let pulls = description.actuators.iter().any(|actuator| matches!(actuator.on, Target::Line(_)));
+    let levers = if pulls { Some(along.follow(Kind::Levers, description.lines.len() * joints)?) } else { None };
+    let mut applied = vec![0.0; required.len()];
+    for drive in drives(description, inputs, time_step) {
+        let course = Course::new(&drive, theta, sensitivities, &drive.parameters())?;
+        let total =
+            Total { joints, count: sensitivities.len(), values: &mut applied, jacobian: &mut jacobian, sign: -1.0 };
+        total.add(&course, drive.actuator.on, levers.as_ref());
+    }
+    Ok(Efforts { required, applied, jacobian })
 }
 
 /// Efforts of ideal drives on the joints as in [`inverse_dynamics`], N x joints, and their derivatives; of a machine of which not every
@@ -95,9 +107,16 @@ pub fn delivered(
     }
     inputs.expect("inputs", inputs.rows(), description.n_inputs())?;
     check_time_step(time_step)?;
-    let job = Delivered { description, inputs, time_step };
-    let (pair, jacobian) = differentiate(&job, theta, sensitivities, |pass: &Pair<_>, place| pass.first[place])?;
-    Ok((pair.first, jacobian))
+    check_parameters(description, theta, sensitivities)?;
+    let joints = description.n_joints();
+    let (mut values, count) = (vec![0.0; inputs.rows() * joints], sensitivities.len());
+    let mut jacobian = vec![0.0; values.len() * count];
+    for drive in drives(description, inputs, time_step) {
+        let course = Course::new(&drive, theta, sensitivities, &drive.parameters())?;
+        let total = Total { joints, count, values: &mut values, jacobian: &mut jacobian, sign: 1.0 };
+        total.add(&course, drive.actuator.on, None);
+    }
+    Ok((values, jacobian))
 }
 
 /// Efforts that a measured motion needs as in [`inverse_dynamics`], N x joints, and their derivatives; of a machine with any drives, for
@@ -115,9 +134,14 @@ pub fn required(
     }
     check_motion(description, motion)?;
     check_time_step(time_step)?;
-    let job = Required { description, motion, time_step, part, interrupt };
-    let (pair, jacobian) = differentiate(&job, theta, sensitivities, |pass: &Pair<_>, place| pass.first[place])?;
-    Ok((pair.first, jacobian))
+    check_parameters(description, theta, sensitivities)?;
+    let along = Along::new(Record { description, motion, time_step, interrupt }, theta, sensitivities)?;
+    let kind = match part {
+        Part::Whole => Kind::Required,
+        Part::WithoutEffects => Kind::RequiredWithoutEffects,
+    };
+    let Numbers { values, jacobian } = along.follow(kind, description.n_joints())?;
+    Ok((values, jacobian))
 }
 
 /// Efforts that the effect with the given number puts on its joint along a measured motion, one per sample, and their derivatives: what
@@ -139,9 +163,12 @@ pub fn effort_of_effect(
         Error::Reference { what, target: "effect on a joint", index: effect, count: description.effects.len() }
     };
     let entry = description.effects.get(effect).filter(|entry| entry.joint().is_some()).ok_or_else(law)?;
-    let job = OfEffect { description, motion, time_step, entry };
-    let (pair, jacobian) = differentiate(&job, theta, sensitivities, |pass: &Pair<_>, place| pass.first[place])?;
-    Ok((pair.first, jacobian))
+    check_variables(theta, sensitivities)?;
+    let record = Record { description, motion, time_step, interrupt: &|| false };
+    let own = OfEffect::parameters(record, entry);
+    let course = Course::new(&OfEffect { record, entry }, theta, sensitivities, &own)?;
+    let jacobian = course.jacobian(sensitivities.len());
+    Ok((course.values, jacobian))
 }
 
 fn check_motion(description: &Description, motion: JointMotion<'_>) -> Result<()> {
@@ -149,36 +176,6 @@ fn check_motion(description: &Description, motion: JointMotion<'_>) -> Result<()
     motion.position.expect("position", rows, joints)?;
     motion.velocity.expect("velocity", rows, joints)?;
     motion.acceleration.expect("acceleration", rows, joints)
-}
-
-struct OfEffect<'a> {
-    description: &'a Description,
-    motion: JointMotion<'a>,
-    time_step: f64,
-    entry: &'a EffectEntry,
-}
-
-impl Job for OfEffect<'_> {
-    fn run<S: Scalar>(&self, theta: &[S]) -> Result<Pair<S>> {
-        let Some(joint) = self.entry.joint() else { return Ok(Pair { first: Vec::new(), second: Vec::new() }) };
-        let sensors = position_sensors(self.description, theta);
-        let behind = |k| self.motion.behind(self.time_step, k, joint, sensors[joint].as_ref());
-        let rows = 0..self.motion.position.rows();
-        let first = match (self.entry.on_joint(theta), self.entry.with_memory(theta)) {
-            (Some((_, law)), _) => rows.map(&behind).map(|[q, v, _]| law.effort(q, v)).collect(),
-            (None, Some((_, law))) => {
-                let (mut memory, mut before) = (S::zero(), None);
-                let next = |[q, _, _]: [S; 3]| {
-                    memory = before.map_or(memory, |before| law.advance(memory, q - before));
-                    before = Some(q);
-                    law.effort(memory)
-                };
-                rows.map(behind).map(next).collect()
-            }
-            (None, None) => Vec::new(),
-        };
-        Ok(Pair { first, second: Vec::new() })
-    }
 }
 
 /// Which part of what a motion needs.
@@ -190,131 +187,51 @@ pub enum Part {
     WithoutEffects,
 }
 
-struct Required<'a> {
-    description: &'a Description,
-    motion: JointMotion<'a>,
-    time_step: f64,
-    part: Part,
-    interrupt: Interrupt<'a>,
+/// Whether the machine exists with these parameters, and the parameters that are asked for.
+fn check_parameters(description: &Description, theta: &[f64], sensitivities: &[usize]) -> Result<()> {
+    check_variables(theta, sensitivities)?;
+    description.check_values(theta)
 }
 
-impl Job for Required<'_> {
-    fn run<S: Scalar>(&self, theta: &[S]) -> Result<Pair<S>> {
-        let values: Vec<f64> = theta.iter().map(Scalar::inspect).collect();
-        self.description.check_values(&values)?;
-        let mut dynamics = Build::dynamics(&self.description, theta)?;
-        if self.part == Part::WithoutEffects {
-            dynamics.leave_effects();
-        }
-        let sensors = position_sensors(self.description, theta);
-        let Self { motion, time_step, interrupt, .. } = *self;
-        let (first, _) = efforts_of_motion(&mut dynamics, &sensors, motion, time_step, interrupt)?;
-        Ok(Pair { first, second: Vec::new() })
-    }
+/// The drives of a machine with their inputs.
+fn drives<'a>(description: &'a Description, inputs: Table<'a>, time_step: f64) -> impl Iterator<Item = Delivered<'a>> {
+    let one = move |(number, actuator)| Delivered { actuator, number, inputs, time_step };
+    description.actuators.iter().enumerate().map(one)
 }
 
-struct Delivered<'a> {
-    description: &'a Description,
-    inputs: Table<'a>,
-    time_step: f64,
+/// Efforts on all joints along a record, and `sign` times their derivatives by `count` parameters.
+struct Total<'a> {
+    joints: usize,
+    count: usize,
+    values: &'a mut [f64],
+    jacobian: &'a mut [f64],
+    sign: f64,
 }
 
-impl Job for Delivered<'_> {
-    fn run<S: Scalar>(&self, theta: &[S]) -> Result<Pair<S>> {
-        let values: Vec<f64> = theta.iter().map(Scalar::inspect).collect();
-        self.description.check_values(&values)?;
-        let dynamics = Build::dynamics(&self.description, theta)?;
-        Ok(Pair { first: applied(&dynamics, self.inputs, self.time_step, &[]), second: Vec::new() })
-    }
-}
-
-struct Inverse<'a> {
-    description: &'a Description,
-    motion: Motion<'a>,
-    interrupt: Interrupt<'a>,
-}
-
-impl Job for Inverse<'_> {
-    fn run<S: Scalar>(&self, theta: &[S]) -> Result<Pair<S>> {
-        let values: Vec<f64> = theta.iter().map(Scalar::inspect).collect();
-        self.description.check_values(&values)?;
-        let mut dynamics = Build::dynamics(&self.description, theta)?;
-        let sensors = position_sensors(self.description, theta);
-        let Motion { position, velocity, acceleration, time_step, .. } = self.motion;
-        let motion = JointMotion { position, velocity, acceleration };
-        let (required, levers) = efforts_of_motion(&mut dynamics, &sensors, motion, time_step, self.interrupt)?;
-        let applied = applied(&dynamics, self.motion.inputs, time_step, &levers);
-        Ok(Pair { first: required, second: applied })
-    }
-}
-
-/// Efforts that a motion needs, and the lever arms of the lines if actuators act on any: by sample, line and joint.
-fn efforts_of_motion<S: Scalar>(
-    dynamics: &mut Dynamics<S>,
-    sensors: &[Option<Sensor<S>>],
-    motion: JointMotion<'_>,
-    time_step: f64,
-    interrupt: Interrupt<'_>,
-) -> Result<(Vec<S>, Vec<S>)> {
-    let joints = sensors.len();
-    let mut moving = [0; 3].map(|_| vec![S::zero(); joints]);
-    let (mut required, mut before) = (vec![S::zero(); motion.position.numbers().len()], vec![S::zero(); joints]);
-    let (mut levers, mut row_levers) = (Vec::new(), vec![S::zero(); dynamics.layout().lines * joints]);
-    for (k, row) in required.chunks_exact_mut(joints).enumerate() {
-        if k.is_multiple_of(PATIENCE) && interrupt() {
-            return Err(Error::Interrupted);
-        }
-        for (joint, sensor) in sensors.iter().enumerate() {
-            let state = motion.behind(time_step, k, joint, sensor.as_ref());
-            for (numbers, number) in moving.iter_mut().zip(state) {
-                numbers[joint] = number;
-            }
-        }
-        let [q, v, a] = &moving;
-        if k > 0 {
-            dynamics.memories.travel(|joint| q[joint] - before[joint]);
-        }
-        before.copy_from_slice(q);
-        dynamics.inverse_dynamics(q, v, a, row);
-        if dynamics.pulls() {
-            dynamics.levers(q, &mut row_levers);
-            levers.extend_from_slice(&row_levers);
-        }
-    }
-    Ok((required, levers))
-}
-
-/// Efforts of ideal drives on the joints, sample by sample, with the `levers` of lines where any acts on one.
-fn applied<S: Scalar>(dynamics: &Dynamics<S>, inputs: Table<'_>, time_step: f64, levers: &[S]) -> Vec<S> {
-    let (joints, lines) = (dynamics.joints(), dynamics.layout().lines);
-    let mut applied = vec![S::zero(); inputs.rows() * joints];
-    for (number, actuator) in dynamics.actuators.iter().enumerate() {
-        let Drive::Ideal(drive) = &actuator.drive else { continue };
-        let command = |sample: usize| S::from_f64(inputs.at(sample, number));
-        let (mut state, mut before) = (None, None);
-        for (k, row) in applied.chunks_exact_mut(joints).enumerate() {
-            let input = actuator.input(k, time_step, command);
-            let mean = match &actuator.lag {
-                Some(lag) => {
-                    let (next, mean) = lag.interval(state.unwrap_or(input), input, time_step);
-                    state = Some(next);
-                    mean
+impl Total<'_> {
+    /// Adds the efforts of a drive, by the levers if it acts on a line.
+    fn add(self, efforts: &Course, on: Target, levers: Option<&Numbers>) {
+        let Self { joints, count, values, jacobian, sign } = self;
+        let lines = levers.map_or(0, |levers| levers.values.len() / values.len().max(1));
+        for (k, &effort) in efforts.values.iter().enumerate() {
+            match (on, levers) {
+                (Target::Joint(joint), _) => {
+                    let place = k * joints + joint;
+                    values[place] += effort;
+                    efforts.add_slopes(k, sign, &mut jacobian[place * count..][..count]);
                 }
-                None => input,
-            };
-            let effort = drive.effort(mean);
-            let delivered = (before.unwrap_or(effort) + effort) * 0.5;
-            match actuator.on {
-                Target::Joint(joint) => row[joint] += delivered,
-                Target::Line(line) => {
-                    let arms = &levers[(k * lines + line) * joints..];
-                    for (entry, &arm) in row.iter_mut().zip(arms) {
-                        *entry += arm * delivered;
+                (Target::Line(line), Some(levers)) => {
+                    for joint in 0..joints {
+                        let (place, arm) = (k * joints + joint, (k * lines + line) * joints + joint);
+                        let (length, turned) = (levers.values[arm], &levers.jacobian[arm * count..][..count]);
+                        let slopes = &mut jacobian[place * count..][..count];
+                        values[place] += length * effort;
+                        efforts.add_slopes(k, sign * length, slopes);
+                        slopes.iter_mut().zip(turned).for_each(|(slope, &turn)| *slope += sign * effort * turn);
                     }
                 }
+                (Target::Line(_), None) => {}
             }
-            before = Some(effort);
         }
     }
-    applied
 }

@@ -2,7 +2,7 @@
 
 use crate::description::Description;
 use crate::error::{Error, Result};
-use crate::ode::Ode;
+use crate::integrator::Method;
 use crate::scalar::Dual;
 use crate::sensor::Sensor;
 use crate::simulate::check_state;
@@ -78,8 +78,11 @@ impl Tangent {
     fn new(description: &Description, theta: &[f64]) -> Result<Self> {
         let theta: Vec<Number> = theta.iter().map(|&value| Dual::constant(value)).collect();
         let zeros = |length: usize| vec![Number::default(); length];
+        let mut system: System<Number> = description.system(&theta)?;
+        // Samples are all that is asked for: no step is made.
+        system.make_for(Method::Rk4)?;
         Ok(Self {
-            system: description.system(&theta)?,
+            system,
             sensors: description.sensors(&theta),
             state: zeros(description.n_states()),
             commands: zeros(description.n_inputs()),
@@ -99,18 +102,16 @@ impl Tangent {
             *number = lift((state.len() + place, &value));
         }
         for (number, &command) in self.commands.iter().enumerate() {
-            let input = self.system.dynamics().input(number, 0, 1.0, |_| command);
+            let input = self.system.input(number, 0, 1.0, |_| command);
             self.system.hold(number, input);
         }
-        self.system.rhs(&self.state, &mut self.rate);
+        self.system.sample(&self.state, &mut self.rate, &mut self.reading);
         self.observe();
     }
 
     /// The outputs as the sensors show them.
     fn observe(&mut self) {
-        let dynamics = self.system.dynamics();
-        let layout = dynamics.layout();
-        dynamics.observe(&self.state, &self.rate, &mut self.reading);
+        let layout = self.system.dynamics().layout();
         let channels = self.reading[layout.actuators()..layout.lines()].chunks_exact_mut(2);
         for (channels, &command) in channels.zip(&self.commands) {
             channels[0] = command;

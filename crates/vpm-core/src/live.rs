@@ -8,7 +8,7 @@ use crate::integrator::Integrator;
 use crate::ode::Ode;
 use crate::sensor::Sensor;
 use crate::simulate::{SampledDrives, Stepping, check_pistons, check_state, check_step, halted, state_name};
-use crate::system::{Fast, System};
+use crate::system::System;
 use crate::table::Table;
 
 /// What an input stands for.
@@ -44,7 +44,8 @@ impl Live {
     pub fn new(description: Arc<Description>, theta: &[f64], state: &[f64], stepping: Stepping) -> Result<Self> {
         check_state("state", &description, state)?;
         check_step(&description, theta, stepping, state)?;
-        let system: System<f64> = description.system(theta)?;
+        let mut system: System<f64> = description.system(theta)?;
+        system.make_for(stepping.method)?;
         let (dim, sensors) = (system.dim(), description.sensors(theta));
         let depth = depth(&description, theta, stepping.time_step)?;
         let (outputs, inputs) = (description.n_outputs(), description.n_inputs());
@@ -73,14 +74,13 @@ impl Live {
     /// # Errors
     /// Why there is no machine code, in one sentence; then the simulation goes on by direct evaluation.
     pub fn compile(&mut self) -> std::result::Result<(), String> {
-        let natives = self.description.natives(&self.theta)?;
-        self.system.run_by(Fast::new(&natives, &self.theta, self.stepping.method)?);
+        self.system.compile(self.stepping.method)?;
         self.rest();
         Ok(())
     }
 
     /// Whether it goes on by machine code.
-    pub fn is_compiled(&self) -> bool {
+    pub fn is_compiled(&mut self) -> bool {
         self.system.has_code()
     }
 
@@ -178,7 +178,7 @@ impl Live {
     fn rest(&mut self) {
         if !self.sampled.is_empty() && self.state.iter().all(|number| number.is_finite()) {
             let (state, width) = (&self.state, self.outputs.len());
-            self.system.dynamics().observe_motion(state, &mut self.truth[..width]);
+            self.system.observe_motion(state, &mut self.truth[..width]);
         }
         for number in 0..self.description.n_inputs() {
             let input = self.arrived(number);
@@ -188,11 +188,11 @@ impl Live {
     }
 
     /// What input `number` amounts to over the coming interval.
-    fn arrived(&mut self, number: usize) -> f64 {
+    fn arrived(&self, number: usize) -> f64 {
         let Self { system, commands, depth, sample, description, .. } = self;
         let inputs = description.n_inputs();
         let command = |sample: usize| commands[(sample % *depth) * inputs + number];
-        system.dynamics().input(number, *sample, self.stepping.time_step, command)
+        system.input(number, *sample, self.stepping.time_step, command)
     }
 
     fn observe(&mut self) -> Result<()> {
@@ -202,10 +202,7 @@ impl Live {
         let (layout, width) = (self.description.layout(), self.outputs.len());
         let row = self.sample % self.depth * width;
         let truth = &mut self.truth[row..row + width];
-        if !self.system.sample(&self.state, &mut self.rate, truth) {
-            self.system.rhs(&self.state, &mut self.rate);
-            self.system.dynamics().observe(&self.state, &self.rate, truth);
-        }
+        self.system.sample(&self.state, &mut self.rate, truth);
         // The command that is still held at the end of its interval; none before the first.
         let held = self.sample.saturating_sub(1) % self.depth * self.description.n_inputs();
         let channels = self.truth[row + layout.actuators()..row + layout.lines()].chunks_exact_mut(2);

@@ -2,6 +2,7 @@
 
 use crate::actuator::Drive;
 use crate::description::Description;
+use crate::error::Result;
 use crate::scalar::Scalar;
 use crate::sensor::{Channel, HydraulicQuantity, Sensor};
 use crate::table::Table;
@@ -85,6 +86,13 @@ fn state_channels(description: &Description) -> Vec<Option<Channel>> {
 }
 
 impl JointMotion<'_> {
+    /// Checks that all three tables are of the same rows and so many joints.
+    pub(crate) fn expect(&self, joints: usize) -> Result<()> {
+        let rows = self.position.rows();
+        let tables = [("position", self.position), ("velocity", self.velocity), ("acceleration", self.acceleration)];
+        tables.iter().try_for_each(|(name, table)| table.expect(name, rows, joints))
+    }
+
     /// Position, velocity and acceleration of a joint behind what was measured at sample `k`, `time_step` (s) after the one before.
     #[inline]
     pub(crate) fn behind<S: Scalar>(

@@ -17,14 +17,17 @@ use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssi
 
 pub use crate::scalar::choice::Choice;
 pub use crate::scalar::dual::{Dual, seed};
+pub use crate::scalar::search::{ARGUMENTS, Search};
 
 mod choice;
 mod dual;
+mod search;
 
 /// A real number, possibly carrying derivatives.
 ///
 /// Laws choose by [`Scalar::if_less`] and its kin, never by `if` on [`Scalar::re`]: a number may stand for the operation that
 /// makes it, and a choice has to hold for every value that comes along. So there is no `<` and no `==` between such numbers.
+/// Steps whose number depends on values stand in a [`Search`].
 pub trait Scalar:
     Copy
     + Debug
@@ -84,7 +87,18 @@ pub trait Scalar:
     fn atan(self) -> Self;
     /// x^n for an integer exponent.
     fn powi(self, exponent: i32) -> Self;
+    /// What a search in plain numbers finds with the values of these arguments: a constant, whatever they carry.
+    #[inline]
+    fn search(search: &'static Search, arguments: impl Iterator<Item = Self>) -> Self {
+        Self::from_f64(search.value(arguments.map(|argument| argument.re())))
+    }
 
+    /// The same number without the derivatives of the outermost kind: what a chord takes for a constant.
+    #[inline]
+    #[must_use]
+    fn frozen(self) -> Self {
+        self
+    }
     /// The numbers themselves, where they are plain values.
     #[inline]
     fn plain(_numbers: &[Self]) -> Option<&[f64]> {

@@ -76,7 +76,8 @@ fn interleave<const N: usize>(
     jacobian
 }
 
-fn check_variables(theta: &[f64], variables: &[usize]) -> Result<()> {
+/// Whether all that is asked for are parameters.
+pub(crate) fn check_variables(theta: &[f64], variables: &[usize]) -> Result<()> {
     for &index in variables {
         if index >= theta.len() {
             let what = "the list of sensitivities".to_owned();

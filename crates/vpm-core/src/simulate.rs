@@ -1,12 +1,10 @@
 //! Simulation of a whole record: free run on commands, closed loop on references, restarts from many samples.
 
 mod along;
-mod buffers;
 mod control;
+mod guide;
 mod names;
-mod observer;
 mod prescribed;
-mod quintic;
 mod resolution;
 mod sampled;
 mod stability;
@@ -174,7 +172,7 @@ struct Simulation<'a> {
 
 impl Job for Simulation<'_> {
     fn run<S: Scalar>(&self, theta: &[S]) -> Result<Pair<S>> {
-        Stepper::new(&self.setting, &self.plan, theta)?.by_code(theta).run(self.setting.interrupt)
+        Stepper::new(&self.setting, &self.plan, theta)?.by_code().run(self.setting.interrupt)
     }
 }
 
@@ -225,23 +223,24 @@ pub(crate) fn strayed<S: Scalar>(stepper: &Stepper<'_, S>, astray: Astray, (row,
 /// What stopped being finite, in the words of the model.
 pub(crate) fn diverged<S: Scalar>(stepper: &Stepper<'_, S>, what: String, row: usize, start: usize) -> Error {
     let (event, repair) = (Diverged::NOT_FINITE.to_owned(), repair(stepper.stepping().method));
-    lost(stepper, what, (event, repair), (row, start))
+    lost(stepper.stepping(), what, (event, repair), (row, start), stepper.before(row))
 }
 
 /// A piston that steps of a fixed length carried `beyond` (m) the end of its stroke, as no stop lets it: the steps leapt over the impact.
 pub(crate) fn leapt<S: Scalar>(stepper: &Stepper<'_, S>, what: String, beyond: f64, at: (usize, usize)) -> Error {
     let event = format!("is {beyond:.6} m beyond the end of its stroke, where these steps leapt over its stop,");
-    lost(stepper, what, (event, "use the integrator adaptive, or guarded where the time of a step has a bound"), at)
+    let repair = "use the integrator adaptive, or guarded where the time of a step has a bound";
+    lost(stepper.stepping(), what, (event, repair), at, stepper.before(at.0))
 }
 
-fn lost<S: Scalar>(
-    stepper: &Stepper<'_, S>,
+/// What went astray at sample `row` of a piece that begins at `start`; `tables` are the outputs and states of its samples until then.
+fn lost(
+    stepping: Stepping,
     what: String,
     (event, repair): (String, &'static str),
     (row, start): (usize, usize),
+    (outputs, states): (Vec<f64>, Vec<f64>),
 ) -> Error {
-    let stepping = stepper.stepping();
-    let (outputs, states) = stepper.before(row);
     Error::Diverged(Box::new(Diverged {
         what,
         event,

@@ -4,13 +4,10 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::beam::eigen;
 use crate::description::Description;
-use crate::dynamics::flexible;
 use crate::error::{Error, Result};
-use crate::scalar::{Dual, Scalar, seed};
-use crate::system::{Build, Dynamics};
+use crate::scalar::Scalar;
+use crate::system::{Build, Dynamics, Kind, Routine};
 
-/// Derivatives taken in one sweep.
-const LANES: usize = 8;
 /// Newton steps before the search counts as lost.
 const STEPS: usize = 60;
 /// Into how many stages the weight is cut, until the way from the straight beams to rest is smooth.
@@ -26,7 +23,8 @@ const WAYS: [f64; 2] = [1e-6, 10.0];
 /// A machine whose joints are held, but for passive ones.
 pub(crate) struct Statics {
     plain: Dynamics<f64>,
-    dual: Dynamics<Dual<f64, LANES>>,
+    /// What the coordinates miss, with its derivatives; nothing where no coordinate is free.
+    unbalance: Option<Routine<f64>>,
     /// The coordinates that find their rest themselves: passive joints, then elastic coordinates.
     free: Vec<usize>,
     passive: Vec<String>,
@@ -53,17 +51,17 @@ enum Newton {
 impl Statics {
     /// With the joints `passive` free, beside the beams.
     pub(crate) fn new(description: &Description, theta: &[f64], passive: &[usize]) -> Result<Self> {
-        let lifted: Vec<_> = theta.iter().map(|&value| Dual::constant(value)).collect();
-        let (plain, dual) = (description.dynamics(theta)?, description.dynamics(&lifted)?);
-        let free = free_coordinates(&plain, passive);
-        let names = passive.iter().map(|&joint| description.bodies[joint].joint.name.clone()).collect();
-        Ok(Self { plain, dual, free, passive: names })
+        let plain: Dynamics<f64> = description.dynamics(theta)?;
+        let free: Vec<usize> = passive.iter().copied().chain(plain.joints()..plain.coordinates()).collect();
+        let unbalance = if free.is_empty() { None } else { Some(unbalance(description, theta)?) };
+        let passive = passive.iter().map(|&joint| description.bodies[joint].joint.name.clone()).collect();
+        Ok(Self { plain, unbalance, free, passive })
     }
 
     /// The free coordinates at rest under gravity with the other joints held at `joints`; passive ones are sought from there.
     ///
     /// Law: `bias(q, 0) + K q = effects(q, 0)` on the free coordinates, by Newton's method from the straight beams with exact
-    /// derivatives (dual numbers). Where that goes astray the weight is put on in stages, so that of several places at rest it is the
+    /// derivatives (of the recorded load). Where that goes astray the weight is put on in stages, so that of several places at rest it is the
     /// one that the beams sag to. Passive joints are first moved to where their own load changes its sign: from the flat middle of a
     /// play Newton's first step would lead anywhere. Checked: converged to rounding.
     pub(crate) fn settle(&mut self, joints: &[f64]) -> Result<Rest> {
@@ -147,7 +145,7 @@ impl Statics {
         let start = coordinates[joint];
         let mut load = |way: f64| {
             coordinates[joint] = start + way;
-            unbalance(&mut self.plain, coordinates, 1.0)[joint]
+            self.plain.unbalance(coordinates, 1.0)[joint]
         };
         let first = load(0.0);
         let (mut near, mut far) = (0.0, -WAYS[0] * first.signum());
@@ -166,23 +164,19 @@ impl Statics {
     }
 
     fn residual(&mut self, q: &[f64], weight: f64) -> DVector<f64> {
-        let load = unbalance(&mut self.plain, q, weight);
+        let load = self.plain.unbalance(q, weight);
         DVector::from_iterator(self.free.len(), self.free.iter().map(|&place| load[place]))
     }
 
     /// The derivative of the residual.
     fn tangent(&mut self, q: &[f64], weight: f64) -> DMatrix<f64> {
-        let count = self.free.len();
-        let mut tangent = DMatrix::zeros(count, count);
-        for (sweep, lanes) in self.free.chunks(LANES).enumerate() {
-            let load = unbalance(&mut self.dual, &seed(q, lanes), weight);
-            for (row, &place) in self.free.iter().enumerate() {
-                for (lane, &slope) in load[place].gradient[..lanes.len()].iter().enumerate() {
-                    tangent[(row, sweep * LANES + lane)] = slope;
-                }
-            }
+        let (n, free) = (q.len(), &self.free);
+        let (mut matrix, mut load) = (vec![0.0; n * n], vec![0.0; n]);
+        if let Some(routine) = &mut self.unbalance {
+            routine.hold(0, weight);
+            routine.matrix(q, &mut matrix, n, &mut load);
         }
-        tangent
+        DMatrix::from_fn(free.len(), free.len(), |row, column| matrix[free[row] * n + free[column]])
     }
 
     /// Efforts that hold the joints at rest, with those of the effects taken off.
@@ -210,32 +204,18 @@ impl Statics {
     }
 }
 
-/// Passive joints, then elastic coordinates.
-pub(crate) fn free_coordinates<S: Scalar>(dynamics: &Dynamics<S>, passive: &[usize]) -> Vec<usize> {
-    passive.iter().copied().chain(dynamics.joints()..dynamics.coordinates()).collect()
-}
-
-/// What the coordinates miss at rest under a share of the weight: `weight bias(q, 0) + K q - effects(q, 0)`.
-fn unbalance<S: Scalar>(dynamics: &mut Dynamics<S>, q: &[S], weight: f64) -> Vec<S> {
-    let zero = vec![S::zero(); q.len()];
-    dynamics.terms(q, &zero);
-    let mut load = zero.clone();
-    flexible::required(&dynamics.model, &dynamics.data, (q, &zero), &zero, &mut load);
-    for (load, &bias) in load.iter_mut().zip(&dynamics.data.composite.bias) {
-        *load -= bias * (1.0 - weight);
-    }
-    for (joint, effect) in &dynamics.effects {
-        load[*joint] -= effect.effort_at_rest(q[*joint]);
-    }
-    dynamics.subtract_connections(&mut load);
-    load
+/// What the coordinates miss at rest under a share of the weight, for the checked parameters `theta`; first under all of it.
+fn unbalance<S: Scalar>(description: &Description, theta: &[S]) -> Result<Routine<S>> {
+    let values: Vec<f64> = theta.iter().map(Scalar::inspect).collect();
+    let mut routine = Routine::new(description.functions().function(&Kind::Unbalance, &values)?, theta);
+    routine.hold(0, S::one());
+    Ok(routine)
 }
 
 /// All coordinates at rest with the joints held at `joints` but for `passive` ones, with exact derivatives: one Newton step over the
 /// number type from the solution in plain numbers (the implicit function theorem).
 pub(crate) fn settled<S: Scalar>(
     description: &Description,
-    dynamics: &mut Dynamics<S>,
     theta: &[S],
     joints: &[S],
     passive: &[usize],
@@ -249,7 +229,10 @@ pub(crate) fn settled<S: Scalar>(
         q[joint] = S::from_f64(coordinates[joint]);
     }
     let Some(inverse) = tangent.try_inverse() else { return Ok(q) };
-    let missing = unbalance(dynamics, &q, 1.0);
+    let missing = match S::plain(&q) {
+        Some(plain) => statics.plain.unbalance(plain, 1.0).into_iter().map(S::from_f64).collect(),
+        None => unbalance(description, theta)?.at(&q).to_vec(),
+    };
     for (row, &place) in inverse.row_iter().zip(&statics.free) {
         let step: S = row.iter().zip(&statics.free).map(|(&entry, &column)| missing[column] * entry).sum();
         q[place] -= step;

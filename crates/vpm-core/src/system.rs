@@ -4,27 +4,34 @@ mod additive;
 mod answers;
 mod connections;
 mod counted;
-mod driven;
 mod drives;
+mod following;
+mod functions;
+mod guided;
 mod memory;
-mod native;
 mod observe;
 mod ode;
-mod places;
+mod quintic;
 mod recorded;
+mod routine;
 mod settle;
 mod slopes;
 mod stages;
 mod stiff;
-mod tangent;
 
 pub use connections::Connections;
 pub(crate) use counted::{Calls, Counted, Matrix};
+pub(crate) use following::Following;
+pub(crate) use functions::Function as RecordedFunction;
+pub(crate) use functions::Recorder;
+pub use functions::{Cache, Functions};
+pub use guided::{Guidance, Part};
 pub use memory::Memories;
-pub(crate) use native::Fast;
-pub use native::{Cache, Natives};
 pub use ode::System;
-pub use recorded::{Kind, Placed, Places, Recording};
+pub use recorded::{Kind, Placed, Places};
+pub(crate) use routine::{Routine, code_pays};
+
+use std::sync::Arc;
 
 use crate::actuator::hydraulic::Supply;
 use crate::actuator::{Actuator, Target};
@@ -32,7 +39,7 @@ use crate::contact::ContactFriction;
 use crate::data::Data;
 use crate::dynamics::articulated::articulated;
 use crate::dynamics::{aba, flexible, frames, lines, motion, poses};
-use crate::effect::{Hysteresis, JointEffect};
+use crate::effect::JointEffect;
 use crate::model::Model;
 use crate::scalar::Scalar;
 use drives::Shown;
@@ -116,10 +123,10 @@ impl<S: Scalar> Dynamics<S> {
         Self { connections, ..self }
     }
 
-    /// With hystereses, each with the number of its joint, relaxed.
+    /// With effects that remember.
     #[must_use]
-    pub fn remembering(self, laws: Vec<(usize, Hysteresis<S>)>) -> Self {
-        Self { memories: Memories::new(laws), ..self }
+    pub(crate) fn remembering(self, memories: Memories<S>) -> Self {
+        Self { memories, ..self }
     }
 
     /// Leaves out all effects on joints; those of the tree stay.
@@ -209,43 +216,18 @@ impl<S: Scalar> Dynamics<S> {
         let n = self.coordinates();
         let (q, v) = x[..2 * n].split_at(n);
         self.locate(q, v);
-        self.push(x, dxdt, laws);
-    }
-
-    /// dx/dt at the `x` of the last [`Dynamics::rhs`] under other inputs, where the machine [`Dynamics::stands`].
-    #[inline]
-    pub(crate) fn rhs_here(&mut self, x: &[S], dxdt: &mut [S]) {
-        self.push(x, dxdt, (add_effects, ContactFriction::resistance));
-    }
-
-    /// Whether all frames and lines, and the mass matrix, are those of the state after [`Dynamics::rhs`].
-    #[inline]
-    pub(crate) fn stands(&self) -> bool {
-        self.has_mass_matrix() && !self.model.lines().is_empty()
-    }
-
-    /// Whether the right-hand side leaves a mass matrix and its factors: where no recursion does without.
-    #[inline]
-    fn has_mass_matrix(&self) -> bool {
-        !self.model.is_recursive() && !self.model.is_articulated()
-    }
-
-    /// dx/dt at x, after [`Dynamics::locate`].
-    #[inline]
-    fn push(
-        &mut self,
-        x: &[S],
-        dxdt: &mut [S],
-        laws: (impl FnOnce(&[(usize, JointEffect<S>)], [&[S]; 3], &mut [S]), impl Fn(&ContactFriction<S>, S, S) -> S),
-    ) {
-        let n = self.coordinates();
-        let (q, v) = x[..2 * n].split_at(n);
         self.actuate(x, dxdt);
         dxdt[..n].copy_from_slice(v);
         let first = self.first_memory();
         self.memories.rates(&x[first..], v, &mut dxdt[first..]);
         self.accelerate(q, v, laws, &[]);
         dxdt[n..2 * n].copy_from_slice(&self.data.acceleration);
+    }
+
+    /// Whether the right-hand side leaves a mass matrix and its factors: where no recursion does without.
+    #[inline]
+    fn has_mass_matrix(&self) -> bool {
+        !self.model.is_recursive() && !self.model.is_articulated()
     }
 
     /// Moves lines and frames to (q, v), as far as anything acts on them, and of a machine that is no rigid tree all that its dynamics need.
@@ -316,6 +298,22 @@ pub(crate) fn add_effects<S: Scalar>(effects: &[(usize, JointEffect<S>)], [q, v,
             total[*joint] -= law.share_of_load(q, v) * u[*joint].abs();
         }
     }
+}
+
+/// A machine as its description hands it to somebody who runs it in numbers `S`.
+pub(crate) struct Machine<'a, S> {
+    /// The laws in plain numbers.
+    pub(crate) dynamics: Dynamics<f64>,
+    /// What is recorded of it.
+    pub(crate) functions: Arc<Functions>,
+    /// Its parameters.
+    pub(crate) theta: &'a [S],
+    /// What its inputs hold at first.
+    pub(crate) inputs: Vec<S>,
+    /// Its actuators.
+    pub(crate) actuators: Vec<Actuator<S>>,
+    /// Its effects that remember, relaxed.
+    pub(crate) memories: Memories<S>,
 }
 
 /// Makes the right-hand side of one machine over any number type.

@@ -68,6 +68,13 @@ pub fn files(description: &Description, theta: &[f64], free: &[usize], names: &N
     table(&mut source, &format!("double {name}_constants"), &numbers(&machine.constants), "0.0");
     patterns(&mut source, &format!("{name}_rates"), &machine.rates);
     patterns(&mut source, &format!("{name}_outputs"), &machine.outputs);
+    let mut called: Vec<&str> = Vec::new();
+    for &text in machine.functions.iter().flat_map(|function| &function.called) {
+        if !called.contains(&text) {
+            called.push(text);
+            source.push_str(text);
+        }
+    }
     machine.functions.iter().for_each(|function| source.push_str(&function.text));
     source.push_str(&of(&functions(machine.np > 0)));
     source.push('\n');

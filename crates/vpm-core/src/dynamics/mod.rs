@@ -29,7 +29,7 @@ pub use energy::{Energy, energy};
 pub use frames::frames;
 pub(crate) use frames::{for_each_column, lines, motion, poses};
 pub use kinematics::kinematics;
-pub(crate) use reaction::{Motion, in_axes, project, reach, reactions, take_off, weigh};
+pub(crate) use reaction::{Motion, in_axes, reactions, take_off};
 pub use regular::check_regular;
 pub use rnea::rnea;
 pub use virtual_work::{Carried, Rate, Terms, effort_of_wrench, virtual_work};

@@ -2,7 +2,7 @@
 
 use super::flexible::weigh_frames;
 use super::frames::{bare_lines, frames, poses};
-use crate::data::{Composite, Data, LineSlot, PointSlot};
+use crate::data::{Data, LineSlot, PointSlot};
 use crate::model::{Elastic, Model, Node, Wire};
 use crate::scalar::Scalar;
 use crate::spatial::{Pose, Twist, Vector3, Wrench};
@@ -23,25 +23,11 @@ pub(crate) fn reactions<S: Scalar>(
     tensions: &[S],
     applied: impl FnOnce(&mut Data<S>),
 ) {
-    reach(model, data, motion, extra);
-    weigh(model, data, tensions, applied);
-}
-
-/// The first half of [`reactions`]: all frames and lines in the motion, but for the columns of the lines.
-pub(crate) fn reach<S: Scalar>(model: &Model<S>, data: &mut Data<S>, [q, v, a]: Motion<'_, S>, extra: &mut [Twist<S>]) {
+    let [q, v, a] = motion;
     frames(model, data, q, v);
     accelerate(model, data, a, extra);
     poses(model, data);
     bare_lines(model, data);
-}
-
-/// The second half of [`reactions`]: what the frames carry, after [`reach`].
-pub(crate) fn weigh<S: Scalar>(
-    model: &Model<S>,
-    data: &mut Data<S>,
-    tensions: &[S],
-    applied: impl FnOnce(&mut Data<S>),
-) {
     weigh_frames(model, &mut data.composite.frames);
     for (number, wire) in model.lines().iter().enumerate() {
         let tension = tensions.get(number).copied().unwrap_or(S::zero());
@@ -49,24 +35,6 @@ pub(crate) fn weigh<S: Scalar>(
     }
     applied(data);
     inward(model, data);
-}
-
-/// Efforts on all coordinates that give the wrenches of the last [`weigh`]: all but what rotors, stiffness and damping of beams need.
-pub(crate) fn project<S: Scalar>(model: &Model<S>, data: &Data<S>, efforts: &mut [S]) {
-    let Composite { frames, sections, .. } = &data.composite;
-    for ((effort, link), slot) in efforts.iter_mut().zip(model.links()).zip(&frames[1..]) {
-        *effort = link.kind.effort(&slot.wrench);
-    }
-    for (Elastic { beam, coordinate, frame, .. }, sections) in model.beams().iter().zip(sections) {
-        let (len, first) = (beam.len(), frame.unwrap_or(0));
-        let efforts = &mut efforts[*coordinate..coordinate + len];
-        efforts.fill(S::zero());
-        for (slot, columns) in frames[first..].iter().zip(sections.columns.chunks_exact(len.max(1))) {
-            for (effort, column) in efforts.iter_mut().zip(columns) {
-                *effort += column.power(slot.wrench);
-            }
-        }
-    }
 }
 
 /// Takes a wrench that acts on a frame, about its origin and in its axes, off what that has to be given otherwise.

@@ -4,7 +4,7 @@ use super::operation::{Function, Node, Operation};
 use super::record::Graph;
 
 /// The derivatives of some outputs by some inputs: only those that are not zero for every input.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Derivative {
     /// Row (output) and column (place among the inputs asked for) of each entry, row by row.
     pub places: Vec<(usize, usize)>,
@@ -21,14 +21,22 @@ impl Graph {
     /// Law: forward accumulation of sparse gradients, each partial derivative once (Griewank & Walther 2008, section 3.2 and
     /// chapter 7). A choice differentiates the branch that holds.
     pub fn derive(&mut self, outputs: &[Node], inputs: &[u32]) -> Derivative {
+        self.derive_within(outputs, inputs, usize::MAX).unwrap_or_default()
+    }
+
+    /// As [`Graph::derive`]; none as soon as the graph has more than `most` operations.
+    pub fn derive_within(&mut self, outputs: &[Node], inputs: &[u32], most: usize) -> Option<Derivative> {
         let count = outputs.iter().max().map_or(0, |&most| most as usize + 1);
         let needed = self.needed(outputs, count);
         let mut gradients: Vec<Gradient> = Vec::with_capacity(count);
         for (node, needed) in (0..).zip(needed) {
             let gradient = if needed { self.gradient(node, &gradients, inputs) } else { Gradient::new() };
             gradients.push(gradient);
+            if self.operations().len() > most {
+                return None;
+            }
         }
-        let mut derivative = Derivative { places: Vec::new(), entries: Vec::new() };
+        let mut derivative = Derivative::default();
         for (row, &output) in outputs.iter().enumerate() {
             for &(column, entry) in &gradients[output as usize] {
                 if self.known_value(entry) != Some(0.0) {
@@ -37,7 +45,7 @@ impl Graph {
                 }
             }
         }
-        derivative
+        Some(derivative)
     }
 
     fn needed(&self, outputs: &[Node], count: usize) -> Vec<bool> {
@@ -45,7 +53,7 @@ impl Graph {
         outputs.iter().for_each(|&output| needed[output as usize] = true);
         for node in (0..count).rev() {
             if needed[node] {
-                self.operations()[node].arguments(|argument| needed[argument as usize] = true);
+                self.operations()[node].arguments(self.calls(), |argument| needed[argument as usize] = true);
             }
         }
         needed
@@ -54,7 +62,8 @@ impl Graph {
     fn gradient(&mut self, node: Node, known: &[Gradient], inputs: &[u32]) -> Gradient {
         let of = |argument: Node| known[argument as usize].as_slice();
         match self.operations()[node as usize] {
-            Operation::Constant(_) | Operation::Apply(Function::Frozen, _) => Gradient::new(),
+            // What a search finds is a constant to what refines it.
+            Operation::Constant(_) | Operation::Apply(Function::Frozen, _) | Operation::Search(_) => Gradient::new(),
             Operation::Input(number) => {
                 let place = inputs.iter().position(|&input| input == number);
                 place.map(|place| (place as u32, self.constant(1.0))).into_iter().collect()

@@ -1,12 +1,117 @@
-//! Programs worked out for many inputs at once, without compilation.
+//! Programs worked out operation by operation, without compilation: in numbers of any type, or for many inputs at once.
 
-use super::operation::{Function, Node, Operation};
+use super::operation::{Call, Function, Node, Operation};
 use super::program::Program;
+use crate::scalar::Scalar;
 
-/// How many inputs are taken at once.
+/// How many inputs a block takes at once.
 pub const LANES: usize = 8;
 
-type Lanes = [f64; LANES];
+/// What a program can be worked out in.
+pub trait Number: Copy {
+    /// A constant.
+    fn constant(value: f64) -> Self;
+    /// a + b.
+    fn plus(self, other: Self) -> Self;
+    /// a - b.
+    fn minus(self, other: Self) -> Self;
+    /// a b.
+    fn times(self, other: Self) -> Self;
+    /// a / b.
+    fn over(self, other: Self) -> Self;
+    /// A function of the number.
+    fn apply(self, function: Function) -> Self;
+    /// `yes` where the number is less than `other`, else `no`.
+    fn choose(self, other: Self, yes: Self, no: Self) -> Self;
+    /// What the search of a call finds, where `at` tells its arguments.
+    fn found(call: &Call, at: impl Fn(Node) -> Self) -> Self;
+}
+
+impl<S: Scalar> Number for S {
+    #[inline]
+    fn constant(value: f64) -> Self {
+        Self::from_f64(value)
+    }
+    #[inline]
+    fn plus(self, other: Self) -> Self {
+        self + other
+    }
+    #[inline]
+    fn minus(self, other: Self) -> Self {
+        self - other
+    }
+    #[inline]
+    fn times(self, other: Self) -> Self {
+        self * other
+    }
+    #[inline]
+    fn over(self, other: Self) -> Self {
+        self / other
+    }
+    #[inline]
+    fn apply(self, function: Function) -> Self {
+        function.of(self)
+    }
+    #[inline]
+    fn choose(self, other: Self, yes: Self, no: Self) -> Self {
+        self.select_less(other, yes, no)
+    }
+    #[inline]
+    fn found(call: &Call, at: impl Fn(Node) -> Self) -> Self {
+        Self::from_f64(call.value(|place| at(place).re()))
+    }
+}
+
+/// Numbers of [`LANES`] samples, states or candidates.
+#[derive(Clone, Copy, Debug)]
+pub struct Lanes([f64; LANES]);
+
+impl Lanes {
+    #[inline]
+    fn both(self, other: Self, combine: impl Fn(f64, f64) -> f64) -> Self {
+        Self(std::array::from_fn(|lane| combine(self.0[lane], other.0[lane])))
+    }
+}
+
+impl Number for Lanes {
+    #[inline]
+    fn constant(value: f64) -> Self {
+        Self([value; LANES])
+    }
+    #[inline]
+    fn plus(self, other: Self) -> Self {
+        self.both(other, |a, b| a + b)
+    }
+    #[inline]
+    fn minus(self, other: Self) -> Self {
+        self.both(other, |a, b| a - b)
+    }
+    #[inline]
+    fn times(self, other: Self) -> Self {
+        self.both(other, |a, b| a * b)
+    }
+    #[inline]
+    fn over(self, other: Self) -> Self {
+        self.both(other, |a, b| a / b)
+    }
+    #[inline]
+    fn apply(self, function: Function) -> Self {
+        match function {
+            // These two the compiler turns into vector instructions.
+            Function::Negative => Self(self.0.map(|x| -x)),
+            Function::Root => Self(self.0.map(f64::sqrt)),
+            _ => Self(self.0.map(|x| function.of(x))),
+        }
+    }
+    #[inline]
+    fn choose(self, other: Self, yes: Self, no: Self) -> Self {
+        Self(std::array::from_fn(|lane| if self.0[lane] < other.0[lane] { yes.0[lane] } else { no.0[lane] }))
+    }
+    #[inline]
+    fn found(call: &Call, at: impl Fn(Node) -> Self) -> Self {
+        Self(std::array::from_fn(|lane| call.value(|place| at(place).0[lane])))
+    }
+}
 
 /// One operation with the places of its numbers in the working memory.
 #[derive(Clone, Copy, Debug)]
@@ -15,28 +120,28 @@ struct Step {
     to: u32,
 }
 
-/// A program with the working memory to run it over [`LANES`] samples, states or candidates in each pass.
+/// A program with the working memory to run it in numbers `T`.
 ///
 /// A number's place is used again once nothing needs it any more, so that the memory stays in the cache.
 #[derive(Clone, Debug)]
-pub struct Evaluator {
+pub struct Evaluator<T> {
     steps: Vec<Step>,
-    constants: Vec<(u32, f64)>,
+    calls: Vec<Call>,
     inputs: Vec<(u32, u32)>,
     outputs: Vec<u32>,
     n_inputs: usize,
-    memory: Vec<Lanes>,
+    memory: Vec<T>,
 }
 
-impl Evaluator {
+impl<T: Number> Evaluator<T> {
     /// Prepares `program`.
     pub fn new(program: &Program) -> Self {
         let operations = program.operations();
         let last = last_uses(program);
-        let (mut places, mut free, mut count) = (vec![0_u32; operations.len()], Vec::new(), 0);
+        let (mut places, mut free) = (vec![0_u32; operations.len()], Vec::new());
         let mut evaluator = Self {
             steps: Vec::new(),
-            constants: Vec::new(),
+            calls: Vec::new(),
             inputs: Vec::new(),
             outputs: Vec::new(),
             n_inputs: program.n_inputs(),
@@ -47,20 +152,21 @@ impl Evaluator {
             let made = !matches!(operation, Operation::Constant(_) | Operation::Input(_));
             let place = if made { free.pop() } else { None };
             let place = place.unwrap_or_else(|| {
-                count += 1;
-                count - 1
+                evaluator.memory.push(T::constant(0.0));
+                evaluator.memory.len() as u32 - 1
             });
             places[node] = place;
             match *operation {
-                Operation::Constant(bits) => evaluator.constants.push((place, f64::from_bits(bits))),
+                Operation::Constant(bits) => evaluator.memory[place as usize] = T::constant(f64::from_bits(bits)),
                 Operation::Input(number) => evaluator.inputs.push((place, number)),
                 _ => {
-                    let operation = operation.renamed(|argument| places[argument as usize]);
+                    let beside = (program.calls(), &mut evaluator.calls);
+                    let operation = operation.renamed(beside, |argument| places[argument as usize]);
                     evaluator.steps.push(Step { operation, to: place });
                 }
             }
             let mut ended = Vec::new();
-            operation.arguments(|argument| {
+            operation.arguments(program.calls(), |argument| {
                 let fixed = matches!(operations[argument as usize], Operation::Constant(_) | Operation::Input(_));
                 if last[argument as usize] == node && !fixed && !ended.contains(&argument) {
                     ended.push(argument);
@@ -69,10 +175,6 @@ impl Evaluator {
             free.extend(ended.into_iter().map(|argument| places[argument as usize]));
         }
         evaluator.outputs = program.outputs().iter().map(|&output| places[output as usize]).collect();
-        evaluator.memory = vec![[0.0; LANES]; count as usize];
-        for &(place, value) in &evaluator.constants {
-            evaluator.memory[place as usize] = [value; LANES];
-        }
         evaluator
     }
 
@@ -81,13 +183,58 @@ impl Evaluator {
         self.outputs.len()
     }
 
+    /// All outputs at `inputs`.
+    pub fn evaluate(&mut self, inputs: &[T], outputs: &mut [T]) {
+        for &(place, number) in &self.inputs {
+            self.memory[place as usize] = inputs[number as usize];
+        }
+        self.pass();
+        for (output, &place) in outputs.iter_mut().zip(&self.outputs) {
+            *output = self.memory[place as usize];
+        }
+    }
+
+    fn pass(&mut self) {
+        let (memory, calls) = (&mut self.memory, &self.calls);
+        for step in &self.steps {
+            let (at, to) = (|place: Node| memory[place as usize], step.to as usize);
+            // Each kind writes by itself: a common place for what they make would be one more way through memory.
+            match step.operation {
+                Operation::Add(a, b) => memory[to] = at(a).plus(at(b)),
+                Operation::Subtract(a, b) => memory[to] = at(a).minus(at(b)),
+                Operation::Multiply(a, b) => memory[to] = at(a).times(at(b)),
+                Operation::Divide(a, b) => memory[to] = at(a).over(at(b)),
+                Operation::Apply(function, a) => memory[to] = at(a).apply(function),
+                Operation::Select([a, b, yes, no]) => memory[to] = at(a).choose(at(b), at(yes), at(no)),
+                Operation::Search(call) => memory[to] = T::found(&calls[call as usize], at),
+                // These stand in the memory already.
+                Operation::Constant(_) | Operation::Input(_) => {}
+            }
+        }
+    }
+}
+
+impl Evaluator<Lanes> {
+    /// Inputs from place `first` on keep these values from now on: rows of inputs end before them.
+    pub fn hold(&mut self, first: usize, values: &[f64]) {
+        let Self { inputs, memory, .. } = self;
+        inputs.retain(|&(place, number)| match (number as usize).checked_sub(first) {
+            Some(held) => {
+                memory[place as usize] = Lanes::constant(values[held]);
+                false
+            }
+            None => true,
+        });
+        self.n_inputs = first;
+    }
+
     /// Outputs (row by row, one row for each sample) at `inputs` (likewise). Rows that are not full on either side are left out.
     pub fn run(&mut self, inputs: &[f64], outputs: &mut [f64]) {
         let (wide, out) = (self.n_inputs.max(1), self.n_outputs().max(1));
         for (inputs, outputs) in inputs.chunks(wide * LANES).zip(outputs.chunks_mut(out * LANES)) {
             let rows = inputs.len() / wide;
             for &(place, number) in &self.inputs {
-                let lanes = &mut self.memory[place as usize];
+                let Lanes(lanes) = &mut self.memory[place as usize];
                 for (lane, value) in lanes.iter_mut().enumerate() {
                     // Lanes beyond the last row repeat it.
                     *value = inputs[lane.min(rows.saturating_sub(1)) * wide + number as usize];
@@ -96,39 +243,11 @@ impl Evaluator {
             self.pass();
             for (lane, row) in outputs.chunks_exact_mut(out).enumerate().take(rows) {
                 for (value, &place) in row.iter_mut().zip(&self.outputs) {
-                    *value = self.memory[place as usize][lane];
+                    *value = self.memory[place as usize].0[lane];
                 }
             }
         }
     }
-
-    fn pass(&mut self) {
-        let memory = &mut self.memory;
-        for step in &self.steps {
-            let at = |place: Node| memory[place as usize];
-            let value = match step.operation {
-                Operation::Add(a, b) => both(at(a), at(b), |a, b| a + b),
-                Operation::Subtract(a, b) => both(at(a), at(b), |a, b| a - b),
-                Operation::Multiply(a, b) => both(at(a), at(b), |a, b| a * b),
-                Operation::Divide(a, b) => both(at(a), at(b), |a, b| a / b),
-                Operation::Apply(Function::Negative, a) => at(a).map(|x| -x),
-                Operation::Apply(Function::Root, a) => at(a).map(f64::sqrt),
-                Operation::Apply(function, a) => at(a).map(|x| function.value(x)),
-                Operation::Select([a, b, yes, no]) => {
-                    let (a, b, yes, no) = (at(a), at(b), at(yes), at(no));
-                    std::array::from_fn(|lane| if a[lane] < b[lane] { yes[lane] } else { no[lane] })
-                }
-                // These stand in the memory already.
-                Operation::Constant(_) | Operation::Input(_) => continue,
-            };
-            memory[step.to as usize] = value;
-        }
-    }
-}
-
-#[inline]
-fn both(a: Lanes, b: Lanes, combine: impl Fn(f64, f64) -> f64) -> Lanes {
-    std::array::from_fn(|lane| combine(a[lane], b[lane]))
 }
 
 /// The operation that needs each number last; those that come out are needed to the end.
@@ -136,7 +255,7 @@ fn last_uses(program: &Program) -> Vec<usize> {
     let operations = program.operations();
     let mut last = vec![0; operations.len()];
     for (node, operation) in operations.iter().enumerate() {
-        operation.arguments(|argument| last[argument as usize] = node);
+        operation.arguments(program.calls(), |argument| last[argument as usize] = node);
     }
     program.outputs().iter().for_each(|&output| last[output as usize] = usize::MAX);
     last

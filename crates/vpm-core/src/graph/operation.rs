@@ -1,5 +1,7 @@
 //! One operation of a graph.
 
+use crate::scalar::{Scalar, Search};
+
 /// Place of a number in a graph or a program.
 pub type Node = u32;
 
@@ -24,7 +26,7 @@ pub enum Function {
     Tanh,
     /// Arc tangent.
     Atan,
-    /// x itself, which derivatives take for a constant. No program contains it.
+    /// x itself, which derivatives take for a constant.
     Frozen,
 }
 
@@ -47,12 +49,31 @@ pub enum Operation {
     Apply(Function, Node),
     /// `[a, b, yes, no]`: yes where a < b, else no.
     Select([Node; 4]),
+    /// What the search of a call finds, by its place among the calls that stand beside the operations.
+    Search(u32),
+}
+
+/// A search with the numbers that it is called with.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub struct Call {
+    /// What is looked for.
+    pub search: &'static Search,
+    /// With which numbers, in its order.
+    pub arguments: Box<[Node]>,
+}
+
+impl Call {
+    /// What it finds, where `value` tells the values of its arguments.
+    #[inline]
+    pub fn value(&self, value: impl Fn(Node) -> f64) -> f64 {
+        self.search.value(self.arguments.iter().map(|&argument| value(argument)))
+    }
 }
 
 impl Function {
     /// Its value.
     #[inline]
-    pub fn value(self, x: f64) -> f64 {
+    pub fn of<S: Scalar>(self, x: S) -> S {
         match self {
             Self::Negative => -x,
             Self::Root => x.sqrt(),
@@ -63,15 +84,15 @@ impl Function {
             Self::Cosine => x.cos(),
             Self::Tanh => x.tanh(),
             Self::Atan => x.atan(),
-            Self::Frozen => x,
+            Self::Frozen => x.frozen(),
         }
     }
 }
 
 impl Operation {
-    /// Calls `visit` with each number that it is made of.
+    /// Calls `visit` with each number that it is made of; `calls` are those beside it.
     #[inline]
-    pub fn arguments(&self, mut visit: impl FnMut(Node)) {
+    pub fn arguments(&self, calls: &[Call], mut visit: impl FnMut(Node)) {
         match *self {
             Self::Constant(_) | Self::Input(_) => {}
             Self::Apply(_, a) => visit(a),
@@ -80,13 +101,14 @@ impl Operation {
                 visit(b);
             }
             Self::Select(nodes) => nodes.into_iter().for_each(visit),
+            Self::Search(call) => calls[call as usize].arguments.iter().copied().for_each(visit),
         }
     }
 
-    /// The same operation with its arguments renamed.
+    /// The same operation with its arguments renamed; its call, one of `calls`, is appended to those beside the new one.
     #[inline]
     #[must_use]
-    pub fn renamed(self, mut name: impl FnMut(Node) -> Node) -> Self {
+    pub fn renamed(self, (calls, beside): (&[Call], &mut Vec<Call>), mut name: impl FnMut(Node) -> Node) -> Self {
         match self {
             Self::Constant(_) | Self::Input(_) => self,
             Self::Apply(function, a) => Self::Apply(function, name(a)),
@@ -95,12 +117,17 @@ impl Operation {
             Self::Multiply(a, b) => Self::Multiply(name(a), name(b)),
             Self::Divide(a, b) => Self::Divide(name(a), name(b)),
             Self::Select(nodes) => Self::Select(nodes.map(name)),
+            Self::Search(call) => {
+                let Call { search, arguments } = &calls[call as usize];
+                beside.push(Call { search, arguments: arguments.iter().map(|&argument| name(argument)).collect() });
+                Self::Search(beside.len() as u32 - 1)
+            }
         }
     }
 
-    /// Its value, where `value` tells those of its arguments and `input` those of inputs.
+    /// Its value, where `value` tells those of its arguments and `input` those of inputs; `calls` are those beside it.
     #[inline]
-    pub fn value(&self, value: impl Fn(Node) -> f64, input: impl Fn(u32) -> f64) -> f64 {
+    pub fn value(&self, calls: &[Call], value: impl Fn(Node) -> f64, input: impl Fn(u32) -> f64) -> f64 {
         match *self {
             Self::Constant(bits) => f64::from_bits(bits),
             Self::Input(number) => input(number),
@@ -108,8 +135,9 @@ impl Operation {
             Self::Subtract(a, b) => value(a) - value(b),
             Self::Multiply(a, b) => value(a) * value(b),
             Self::Divide(a, b) => value(a) / value(b),
-            Self::Apply(function, a) => function.value(value(a)),
+            Self::Apply(function, a) => function.of(value(a)),
             Self::Select([a, b, yes, no]) => value(if value(a) < value(b) { yes } else { no }),
+            Self::Search(call) => calls[call as usize].value(value),
         }
     }
 }

@@ -1,12 +1,13 @@
 //! The part of a graph that some outputs need, ready to be worked out in order.
 
-use super::operation::{Function, Node, Operation};
+use super::operation::{Call, Function, Node, Operation};
 use super::record::Graph;
 
 /// Operations in order, arguments first, and the numbers that come out.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Program {
     operations: Vec<Operation>,
+    calls: Vec<Call>,
     outputs: Vec<Node>,
     inputs: usize,
 }
@@ -20,18 +21,33 @@ pub struct Stages {
     pub often: Program,
 }
 
+/// What becomes of numbers that derivatives take for constants.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Frozen {
+    /// They stay marked.
+    Kept,
+    /// They are what they are.
+    Left,
+}
+
 impl Program {
     /// What `outputs` need of `graph`, as a function of `inputs` numbers.
     ///
     /// Numbers are worked out as late as the order of the recording lets them, so that few stay alive at a time.
     pub fn new(graph: &Graph, outputs: &[Node], inputs: usize) -> Self {
-        Self::of(graph.operations(), outputs, inputs)
+        Self::of((graph.operations(), graph.calls()), outputs, inputs, Frozen::Left)
     }
 
-    fn of(operations: &[Operation], outputs: &[Node], inputs: usize) -> Self {
+    /// As [`Program::new`], for numbers that carry derivatives along directions, to which what is frozen is constant.
+    pub fn of_directions(graph: &Graph, outputs: &[Node], inputs: usize) -> Self {
+        Self::of((graph.operations(), graph.calls()), outputs, inputs, Frozen::Kept)
+    }
+
+    fn of((operations, calls): (&[Operation], &[Call]), outputs: &[Node], inputs: usize, frozen: Frozen) -> Self {
         const UNUSED: Node = Node::MAX;
         let mut places = vec![UNUSED; operations.len()];
-        let mut program = Self { operations: Vec::new(), outputs: Vec::with_capacity(outputs.len()), inputs };
+        let mut program =
+            Self { operations: Vec::new(), calls: Vec::new(), outputs: Vec::with_capacity(outputs.len()), inputs };
         let mut open = Vec::new();
         for &output in outputs {
             open.push(output);
@@ -42,7 +58,7 @@ impl Program {
                     continue;
                 }
                 let before = open.len();
-                operations[node as usize].arguments(|argument| {
+                operations[node as usize].arguments(calls, |argument| {
                     if places[argument as usize] == UNUSED {
                         open.push(argument);
                     }
@@ -52,9 +68,10 @@ impl Program {
                 }
                 open.pop();
                 places[node as usize] = match operations[node as usize] {
-                    Operation::Apply(Function::Frozen, argument) => places[argument as usize],
+                    Operation::Apply(Function::Frozen, argument) if frozen == Frozen::Left => places[argument as usize],
                     operation => {
-                        program.operations.push(operation.renamed(|argument| places[argument as usize]));
+                        let beside = (calls, &mut program.calls);
+                        program.operations.push(operation.renamed(beside, |argument| places[argument as usize]));
                         program.operations.len() as Node - 1
                     }
                 };
@@ -68,12 +85,17 @@ impl Program {
     #[must_use]
     pub fn part(&self, outputs: impl IntoIterator<Item = usize>) -> Self {
         let outputs: Vec<_> = outputs.into_iter().map(|place| self.outputs[place]).collect();
-        Self::of(&self.operations, &outputs, self.inputs)
+        Self::of((&self.operations, &self.calls), &outputs, self.inputs, Frozen::Kept)
     }
 
     /// The operations.
     pub fn operations(&self) -> &[Operation] {
         &self.operations
+    }
+
+    /// The calls that operations refer to.
+    pub fn calls(&self) -> &[Call] {
+        &self.calls
     }
 
     /// Which numbers come out.
@@ -99,7 +121,7 @@ impl Program {
         let mut early = Vec::with_capacity(self.operations.len());
         for operation in &self.operations {
             let mut fixed = !matches!(operation, Operation::Input(number) if !seldom(*number as usize));
-            operation.arguments(|argument| fixed &= early[argument as usize]);
+            operation.arguments(&self.calls, |argument| fixed &= early[argument as usize]);
             early.push(fixed);
         }
         let passed = self.passed(&early);
@@ -108,8 +130,8 @@ impl Program {
             rest[node as usize] = Operation::Input((self.inputs + place) as u32);
         }
         Stages {
-            seldom: Self::of(&self.operations, &passed, self.inputs),
-            often: Self::of(&rest, &self.outputs, self.inputs + passed.len()),
+            seldom: Self::of((&self.operations, &self.calls), &passed, self.inputs, Frozen::Kept),
+            often: Self::of((&rest, &self.calls), &self.outputs, self.inputs + passed.len(), Frozen::Kept),
         }
     }
 
@@ -117,7 +139,7 @@ impl Program {
     fn passed(&self, early: &[bool]) -> Vec<Node> {
         let mut wanted = vec![false; self.operations.len()];
         for (operation, _) in self.operations.iter().zip(early).filter(|&(_, &early)| !early) {
-            operation.arguments(|argument| wanted[argument as usize] = true);
+            operation.arguments(&self.calls, |argument| wanted[argument as usize] = true);
         }
         self.outputs.iter().for_each(|&output| wanted[output as usize] = true);
         let made = |node: usize| !matches!(self.operations[node], Operation::Constant(_) | Operation::Input(_));

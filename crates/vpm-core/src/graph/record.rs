@@ -2,13 +2,13 @@
 
 use std::cell::RefCell;
 use std::cmp::Ordering;
-use std::collections::HashMap;
 use std::iter::Sum;
 use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
 use std::panic::Location;
 
-use super::operation::{Function, Node, Operation};
-use crate::scalar::Scalar;
+use super::known::Known;
+use super::operation::{Call, Function, Node, Operation};
+use crate::scalar::{Scalar, Search};
 
 /// Operations in the order in which they were recorded, each once: equal operations are merged, constants folded.
 ///
@@ -16,8 +16,9 @@ use crate::scalar::Scalar;
 #[derive(Clone, Debug)]
 pub struct Graph {
     operations: Vec<Operation>,
+    calls: Vec<Call>,
     values: Vec<f64>,
-    known: HashMap<Operation, Node>,
+    known: Known,
     /// Whether each number follows from parameters alone, which are the inputs from here on.
     of_parameters: Vec<bool>,
     first_parameter: u32,
@@ -52,8 +53,9 @@ impl Graph {
     pub fn new(first_parameter: u32) -> Self {
         let mut graph = Self {
             operations: Vec::new(),
+            calls: Vec::new(),
             values: Vec::new(),
-            known: HashMap::new(),
+            known: Known::default(),
             of_parameters: Vec::new(),
             first_parameter,
             decisions: Vec::new(),
@@ -66,6 +68,11 @@ impl Graph {
     /// All operations; arguments stand before what is made of them.
     pub fn operations(&self) -> &[Operation] {
         &self.operations
+    }
+
+    /// The calls that operations refer to, each once.
+    pub fn calls(&self) -> &[Call] {
+        &self.calls
     }
 
     /// Where values decided, each place once.
@@ -85,35 +92,31 @@ impl Graph {
     pub fn constant(&mut self, value: f64) -> Node {
         // Both zeros are one number.
         let value = if value == 0.0 { 0.0 } else { value };
-        self.push(Operation::Constant(value.to_bits()), || value)
+        self.make(Operation::Constant(value.to_bits()))
     }
 
     /// Input `number`, at its reference `value`.
     pub fn input(&mut self, number: u32, value: f64) -> Node {
-        self.push(Operation::Input(number), || value)
+        self.push(Operation::Input(number), value)
     }
 
-    fn push(&mut self, operation: Operation, value: impl FnOnce() -> f64) -> Node {
-        if let Some(&node) = self.known.get(&operation) {
+    /// The number of `operation`, appended if it is new; an input has the value `input`.
+    fn push(&mut self, operation: Operation, input: f64) -> Node {
+        let node = self.known.place(&operation, &self.operations);
+        if (node as usize) < self.operations.len() {
             return node;
         }
-        let node = self.operations.len() as Node;
         let mut of_parameters = !matches!(operation, Operation::Input(number) if number < self.first_parameter);
-        operation.arguments(|argument| of_parameters &= self.of_parameters[argument as usize]);
+        operation.arguments(&self.calls, |argument| of_parameters &= self.of_parameters[argument as usize]);
+        let value = operation.value(&self.calls, |node| self.values[node as usize], |_| input);
         self.operations.push(operation);
-        self.values.push(value());
+        self.values.push(value);
         self.of_parameters.push(of_parameters);
-        self.known.insert(operation, node);
         node
     }
 
     fn make(&mut self, operation: Operation) -> Node {
-        if let Some(&node) = self.known.get(&operation) {
-            return node;
-        }
-        let values = &self.values;
-        let value = operation.value(|node| values[node as usize], |_| f64::NAN);
-        self.push(operation, || value)
+        self.push(operation, f64::NAN)
     }
 
     /// a + b.
@@ -212,7 +215,7 @@ impl Graph {
     pub fn apply(&mut self, function: Function, a: Node) -> Node {
         match (function, self.known_value(a)) {
             (Function::Negative, _) => self.negative(a),
-            (_, Some(x)) => self.constant(function.value(x)),
+            (_, Some(x)) => self.constant(function.of(x)),
             _ => self.make(Operation::Apply(function, a)),
         }
     }
@@ -232,6 +235,20 @@ impl Graph {
             }
             _ => self.make(Operation::Select([a, b, yes, no])),
         }
+    }
+
+    /// What a search finds with the numbers of the call.
+    pub fn search(&mut self, call: Call) -> Node {
+        if call.arguments.iter().all(|&argument| self.known_value(argument).is_some()) {
+            let found = call.value(|node| self.values[node as usize]);
+            return self.constant(found);
+        }
+        // A machine has a few of them.
+        let place = self.calls.iter().position(|known| *known == call).unwrap_or_else(|| {
+            self.calls.push(call);
+            self.calls.len() - 1
+        });
+        self.make(Operation::Search(place as u32))
     }
 
     /// The value of a number at the reference inputs, for a law that decides by it.
@@ -280,12 +297,6 @@ impl Recorded {
     /// Its place in the graph.
     pub fn node(self) -> Node {
         self.0
-    }
-
-    /// The same number, which derivatives take for a constant.
-    #[must_use]
-    pub fn frozen(self) -> Self {
-        self.apply(Function::Frozen)
     }
 
     fn apply(self, function: Function) -> Self {
@@ -364,6 +375,9 @@ impl Scalar for Recorded {
     fn select_less(self, other: Self, yes: Self, no: Self) -> Self {
         Self(on(|graph| graph.select([self.0, other.0, yes.0, no.0])))
     }
+    fn frozen(self) -> Self {
+        self.apply(Function::Frozen)
+    }
     fn is_finite(self) -> bool {
         self.inspect().is_finite()
     }
@@ -398,5 +412,10 @@ impl Scalar for Recorded {
             left /= 2;
         }
         if exponent < 0 { power.recip() } else { power }
+    }
+    fn search(search: &'static Search, arguments: impl Iterator<Item = Self>) -> Self {
+        // They stand before the graph is asked, which they may ask themselves.
+        let arguments = arguments.map(Self::node).collect();
+        Self(on(|graph| graph.search(Call { search, arguments })))
     }
 }

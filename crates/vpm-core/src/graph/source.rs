@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
-use super::operation::{Function, Node, Operation};
+use super::operation::{Call, Function, Node, Operation};
 use super::program::Program;
 
 /// Statements of one function: the time that compilers take grows faster than the length of functions.
@@ -19,6 +19,8 @@ pub struct Source {
     pub text: String,
     /// How many numbers the functions hand on to each other.
     pub work: usize,
+    /// Functions that these call, each after those that it needs; the text of a file says each once, before it.
+    pub called: Vec<&'static str>,
 }
 
 /// Where a number is to be found, once it stands.
@@ -35,6 +37,7 @@ impl Program {
     ///
     /// The blocks of `inputs` are the program's inputs in order, those of `outputs` its outputs; a block without a name is none of the
     /// arguments, and nothing may need it. Arrays must not overlap. Constants have as many digits as it takes to read them back exactly.
+    /// What it calls beside `math.h` stands in [`Source::called`].
     pub fn to_c(&self, name: &str, inputs: &[Block<'_>], outputs: &[Block<'_>]) -> Source {
         let writer = Writer::new(self, inputs, outputs);
         let mut text = String::new();
@@ -50,7 +53,7 @@ impl Program {
                 .collect();
             let _ = write!(text, "{}{{\n{calls}}}\n\n", writer.signature(name));
         }
-        Source { text, work: writer.work }
+        Source { text, work: writer.work, called: called(self.calls()) }
     }
 }
 
@@ -111,7 +114,8 @@ impl<'a> Writer<'a> {
         for (number, piece) in pieces.iter().enumerate() {
             for &node in piece {
                 piece_of[node as usize] = number;
-                self.program.operations()[node as usize].arguments(|argument| last[argument as usize] = number);
+                self.program.operations()[node as usize]
+                    .arguments(self.program.calls(), |argument| last[argument as usize] = number);
             }
         }
         let mut free = Vec::new();
@@ -157,7 +161,8 @@ impl<'a> Writer<'a> {
             let operation = self.program.operations()[node as usize];
             let term = |argument: Node| self.term(argument, local(argument));
             if self.made(node as usize) {
-                let _ = writeln!(body, "    const double a{node} = {};", expression(operation, term));
+                let _ =
+                    writeln!(body, "    const double a{node} = {};", expression(operation, self.program.calls(), term));
                 if let Place::Handed(place) = self.places[node as usize] {
                     let _ = writeln!(body, "    w[{place}] = a{node};");
                 }
@@ -193,7 +198,7 @@ fn entry(blocks: &[Block<'_>], mut place: usize) -> String {
     "NAN".to_owned()
 }
 
-fn expression(operation: Operation, term: impl Fn(Node) -> String) -> String {
+fn expression(operation: Operation, calls: &[Call], term: impl Fn(Node) -> String) -> String {
     match operation {
         Operation::Constant(bits) => literal(f64::from_bits(bits)),
         Operation::Input(_) => "NAN".to_owned(),
@@ -206,7 +211,23 @@ fn expression(operation: Operation, term: impl Fn(Node) -> String) -> String {
         Operation::Select([a, b, yes, no]) => {
             format!("{} < {} ? {} : {}", term(a), term(b), term(yes), term(no))
         }
+        Operation::Search(call) => {
+            let Call { search, arguments } = &calls[call as usize];
+            let arguments: Vec<_> = arguments.iter().map(|&argument| term(argument)).collect();
+            format!("{}({})", search.name, arguments.join(", "))
+        }
     }
+}
+
+/// The functions behind searches, each once.
+fn called(calls: &[Call]) -> Vec<&'static str> {
+    let mut texts = Vec::new();
+    for &text in calls.iter().flat_map(|call| call.search.source) {
+        if !texts.contains(&text) {
+            texts.push(text);
+        }
+    }
+    texts
 }
 
 /// The name of a function in `math.h`; a sign has none.

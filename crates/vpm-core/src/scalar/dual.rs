@@ -4,7 +4,7 @@ use std::cmp::Ordering;
 use std::iter::Sum;
 use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
 
-use super::Scalar;
+use super::{Scalar, Search};
 
 /// `value + gradient . (e1 .. eN)` with `ei ej = 0`: a number and its derivatives with respect to `N` variables.
 #[derive(Clone, Copy, Debug)]
@@ -97,6 +97,10 @@ impl<S: Scalar, const N: usize> Scalar for Dual<S, N> {
         yes.zip(no, pick(yes.value, no.value), pick)
     }
     #[inline]
+    fn frozen(self) -> Self {
+        Self::constant(self.value)
+    }
+    #[inline]
     fn is_finite(self) -> bool {
         self.value.is_finite() && self.gradient.iter().all(|part| part.is_finite())
     }
@@ -140,6 +144,10 @@ impl<S: Scalar, const N: usize> Scalar for Dual<S, N> {
         }
         let slope = self.value.powi(exponent - 1) * f64::from(exponent);
         self.chain(self.value.powi(exponent), slope)
+    }
+    #[inline]
+    fn search(search: &'static Search, arguments: impl Iterator<Item = Self>) -> Self {
+        Self::constant(S::search(search, arguments.map(|argument| argument.value)))
     }
 }
 

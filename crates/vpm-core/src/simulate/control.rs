@@ -8,7 +8,7 @@ use crate::description::{ControllerEntry, Description};
 use crate::error::Result;
 use crate::scalar::Scalar;
 use crate::sensor::{Channel, Sensor};
-use crate::system::Dynamics;
+use crate::system::System;
 use crate::table::Table;
 
 /// The controllers of a machine, with all that they remember.
@@ -48,8 +48,8 @@ struct Port {
 
 /// The machine as the controllers see it.
 struct Machine<S> {
-    position: Vec<S>,
-    rate: Vec<S>,
+    /// Coordinates, then their rates.
+    state: Vec<S>,
     acceleration: Vec<S>,
     efforts: Vec<S>,
     /// Lever arms of the lines, line by line.
@@ -64,8 +64,7 @@ impl<S: Scalar> Control<S> {
         let loops = entries.iter().map(|entry| Loop::new(entry, description, theta, setting.stepping.time_step));
         let (n, zeros) = (description.n_coordinates(), |count: usize| vec![S::zero(); count]);
         let machine = Machine {
-            position: zeros(n),
-            rate: zeros(n),
+            state: zeros(2 * n),
             acceleration: zeros(n),
             efforts: zeros(n),
             levers: zeros(description.lines.len() * n),
@@ -86,32 +85,29 @@ impl<S: Scalar> Control<S> {
         self.loops.iter().any(|control| control.due(row) && matches!(control.law, ControlLaw::ForceLoop(_)))
     }
 
-    /// Lets the controllers that are due at sample `row` command, and the others hold; `state` gives what no sensor is made for. Goes by
-    /// the machine as it stands if it does at what the sensors show, and tells whether it still does.
+    /// Lets the controllers that are due at sample `row` command, and the others hold; `state` gives what no sensor is made for.
     pub(super) fn sample(
         &mut self,
         row: usize,
         references: Table<'_>,
-        (dynamics, state, stands): (&mut Dynamics<S>, &[S], bool),
+        (system, state): (&mut System<S>, &[S]),
         see: impl Fn(usize) -> S,
-    ) -> bool {
+    ) {
         let Self { loops, drafts, inputs, machine } = self;
         let (past, now) = drafts.split_at_mut(row * *inputs);
         let held = &past[past.len().saturating_sub(*inputs)..];
-        let stands = stands && !loops.iter().any(|control| matches!(control.law, ControlLaw::ComputedTorque(_)));
         if loops.iter().any(|control| control.due(row) && control.needs_machine()) {
-            machine.look((state, stands), dynamics, &see);
+            machine.look(state, system, &see);
         }
         for control in loops {
             if control.due(row) {
-                control.command(references.row(row), dynamics, machine, &see, now);
+                control.command(references.row(row), system, machine, &see, now);
             } else {
                 for port in &control.ports {
                     now[port.actuator] = held[port.actuator];
                 }
             }
         }
-        stands
     }
 
     /// Calls `put` with each actuator and the command that arrives there at sample `row`.
@@ -157,7 +153,7 @@ impl<S: Scalar> Loop<S> {
     fn command(
         &mut self,
         references: &[f64],
-        dynamics: &mut Dynamics<S>,
+        system: &mut System<S>,
         machine: &mut Machine<S>,
         see: &impl Fn(usize) -> S,
         commands: &mut [S],
@@ -166,13 +162,14 @@ impl<S: Scalar> Loop<S> {
         if let ControlLaw::ComputedTorque(law) = law {
             for (place, (port, differences)) in ports.iter().zip(differences).enumerate() {
                 let reference = differences.next(S::from_f64(references[port.actuator]), *period);
-                let Machine { position, rate, acceleration, .. } = &mut *machine;
+                let Machine { state, acceleration, .. } = &mut *machine;
+                let (position, rate) = state.split_at(acceleration.len());
                 acceleration[port.joint] = law.acceleration(place, reference, position[port.joint], rate[port.joint]);
             }
-            machine.invert(dynamics);
+            machine.invert(system);
             for (place, port) in ports.iter().enumerate() {
                 // The checks let drives of no other kind come here.
-                let Drive::Ideal(drive) = &dynamics.actuators[port.actuator].drive else { continue };
+                let Drive::Ideal(drive) = &system.actuators()[port.actuator].drive else { continue };
                 commands[port.actuator] = law.limited(place, machine.efforts[port.joint] / drive.gain);
             }
             return;
@@ -221,30 +218,29 @@ impl Port {
 
 impl<S: Scalar> Machine<S> {
     /// Reads the joints; elastic coordinates have no sensor and count as they are.
-    fn look(&mut self, (state, stands): (&[S], bool), dynamics: &mut Dynamics<S>, see: &impl Fn(usize) -> S) {
-        let (n, layout) = (self.position.len(), dynamics.layout());
-        self.position.copy_from_slice(&state[..n]);
-        self.rate.copy_from_slice(&state[n..2 * n]);
-        for (joint, (position, rate)) in self.position.iter_mut().zip(&mut self.rate).take(layout.joints).enumerate() {
+    fn look(&mut self, state: &[S], system: &mut System<S>, see: &impl Fn(usize) -> S) {
+        let layout = system.dynamics().layout();
+        let motion = self.state.len();
+        self.state.copy_from_slice(&state[..motion]);
+        let (position, rate) = self.state.split_at_mut(motion / 2);
+        for (joint, (position, rate)) in position.iter_mut().zip(&mut *rate).take(layout.joints).enumerate() {
             *position = see(Channel::Position { joint }.column(layout));
             *rate = see(Channel::Velocity { joint }.column(layout));
         }
-        if stands {
-            dynamics.levers_here(&mut self.levers);
-        } else if dynamics.pulls() {
-            dynamics.levers(&self.position, &mut self.levers);
+        if system.dynamics().pulls() {
+            system.levers(position, &mut self.levers);
         }
     }
 
     /// Efforts for the accelerations that were asked for; those that nobody asked for are zero, for the next controller too.
-    fn invert(&mut self, dynamics: &mut Dynamics<S>) {
-        dynamics.inverse_dynamics_of_tree(&self.position, &self.rate, &self.acceleration, &mut self.efforts);
+    fn invert(&mut self, system: &mut System<S>) {
+        system.required_of_tree(&self.state, &self.acceleration, &mut self.efforts);
         self.acceleration.fill(S::zero());
     }
 
     /// Growth of an actuator's length per motion of the joint that is measured with it.
     fn arm(&self, port: &Port) -> S {
-        let coordinates = self.position.len();
+        let coordinates = self.acceleration.len();
         port.line.map_or(S::one(), |line| self.levers[line * coordinates + port.joint])
     }
 }

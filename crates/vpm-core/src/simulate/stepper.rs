@@ -11,7 +11,7 @@ use crate::ode::Ode;
 use crate::scalar::Scalar;
 use crate::sensitivity::{Interrupt, Pair};
 use crate::sensor::Sensor;
-use crate::system::{Calls, Counted, Fast, Matrix, System};
+use crate::system::{Calls, Counted, Matrix, System, code_pays};
 use crate::table::Table;
 
 /// Where the commands come from.
@@ -49,6 +49,8 @@ pub(crate) struct Stepper<'a, S> {
     control: Option<Control<S>>,
     sampled: SampledDrives,
     state: Vec<S>,
+    /// Coordinates in plain numbers.
+    place: Vec<f64>,
     rate: Vec<S>,
     /// Inputs of the whole record, row by row; given ones from the beginning, a controller's as time goes by.
     commands: Vec<S>,
@@ -63,7 +65,8 @@ pub(crate) struct Stepper<'a, S> {
 impl<'a, S: Scalar> Stepper<'a, S> {
     pub(crate) fn new(setting: &Setting<'a>, plan: &Plan<'a>, theta: &[S]) -> Result<Self> {
         let description = setting.description;
-        let system = description.system(theta)?;
+        let mut system = description.system(theta)?;
+        system.make_for(setting.stepping.method)?;
         let (dim, rows, zero) = (system.dim(), plan.horizon, S::zero());
         // A closed loop begins with its disturbances, to which the controllers add.
         let (given, control) = match plan.drive {
@@ -84,6 +87,7 @@ impl<'a, S: Scalar> Stepper<'a, S> {
             sampled: SampledDrives::new(description, setting.stepping.time_step)?,
             system,
             state: vec![zero; dim],
+            place: vec![0.0; description.n_coordinates()],
             rate: vec![zero; dim],
             commands: given.numbers().iter().map(|&command| S::from_f64(command)).collect(),
             truth: vec![zero; rows * description.n_outputs()],
@@ -93,13 +97,12 @@ impl<'a, S: Scalar> Stepper<'a, S> {
     }
 
     /// The same, by machine code where a run of the whole plan is long enough and the machine has any.
-    pub(crate) fn by_code(mut self, theta: &[S]) -> Self {
+    pub(crate) fn by_code(mut self) -> Self {
         let Stepping { substeps, method, .. } = self.stepping;
         let evaluations = self.plan.starts.len() * self.plan.horizon * substeps * method.stages();
-        let theta = S::plain(theta).filter(|_| Fast::pays(evaluations));
-        let natives = theta.and_then(|theta| Some((self.description.natives(theta).ok()?, theta)));
-        if let Some(fast) = natives.and_then(|(natives, theta)| Fast::new(&natives, theta, method).ok()) {
-            self.system.run_by(fast);
+        if S::plain(&[]).is_some() && code_pays(evaluations) {
+            // What has no code runs as it is.
+            let _ = self.system.compile(method);
         }
         self
     }
@@ -163,16 +166,9 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         }
         self.check_stops(row, start)?;
         self.states[row * dim..(row + 1) * dim].copy_from_slice(&self.state);
-        let stands = self.control(row, start);
+        self.control(row, start);
         self.hold(row, start).map_err(|astray| strayed(self, astray, (row, start)))?;
-        if !self.sample_by_code(row, start) {
-            if stands {
-                self.system.dynamics().rhs_here(&self.state, &mut self.rate);
-            } else {
-                self.system.rhs(&self.state, &mut self.rate);
-            }
-            self.record_efforts(row, start);
-        }
+        self.record(row, start);
         self.system.depart(&self.rate);
         self.read(row);
         let width = self.description.n_outputs();
@@ -196,49 +192,29 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         if matches!(self.stepping.method, Method::Adaptive { .. } | Method::Guarded) {
             return Ok(());
         }
-        let n = self.description.n_coordinates();
-        let Some((number, place, reach)) = self.system.dynamics().piston_outside(&self.state[..n]) else {
+        self.place.iter_mut().zip(&self.state).for_each(|(value, state)| *value = state.re());
+        let Some((number, place, reach)) = self.system.dynamics().piston_outside(&self.place) else {
             return Ok(());
         };
         let what = format!("the piston of actuator `{}`", self.description.actuators[number].name);
         Err(leapt(self, what, place.abs() - reach, (row, start)))
     }
 
-    fn record_motion(&mut self, row: usize, stands: bool) {
-        let width = self.description.n_outputs();
-        let (dynamics, truth) = (self.system.dynamics(), &mut self.truth[row * width..(row + 1) * width]);
-        if stands {
-            dynamics.observe_here(&self.state, truth);
-        } else {
-            dynamics.observe_motion(&self.state, truth);
-        }
-    }
-
-    /// Records the motion and lets the controllers command, if there is a loop to close; tells whether the machine stands evaluated at
-    /// the state then.
-    fn control(&mut self, row: usize, start: usize) -> bool {
-        let feels = self.control.as_ref().is_some_and(|control| control.feels(row));
-        let stands = feels && self.system.stands();
-        if feels {
+    /// Records what controllers see and lets them command, if there is a loop to close.
+    fn control(&mut self, row: usize, start: usize) {
+        if self.control.as_ref().is_some_and(|control| control.feels(row)) {
             // Forces under the commands that are still held.
-            if !self.sample_by_code(row, start) {
-                self.system.rhs(&self.state, &mut self.rate);
-                self.record_efforts(row, start);
-            }
+            self.record(row, start);
+        } else if self.control.is_some() || !self.sampled.is_empty() {
+            let width = self.description.n_outputs();
+            self.system.observe_motion(&self.state, &mut self.truth[row * width..(row + 1) * width]);
         }
-        if self.control.is_some() || !self.sampled.is_empty() || !self.system.has_code() {
-            self.record_motion(row, stands);
-        }
-        let Drive::Loop { references, .. } = self.plan.drive else { return false };
-        // What sensors show need not be where the machine is.
-        let stands = stands && self.sensors.is_empty();
-        let Self { control: Some(control), system, state, sensors, truth, commands, .. } = self else { return false };
+        let Drive::Loop { references, .. } = self.plan.drive else { return };
+        let Self { control: Some(control), system, state, sensors, truth, commands, .. } = self else { return };
         let (at, outputs) = ((row, self.stepping.time_step), (truth.as_slice(), self.description.n_outputs()));
-        let see = |column| reading(sensors, outputs, at, column);
-        let stands = control.sample(row, references, (system.dynamics(), state, stands), see);
+        control.sample(row, references, (system, state), |column| reading(sensors, outputs, at, column));
         let first = row * references.columns();
         control.arrive(row, |actuator, command| commands[first + actuator] += command);
-        stands
     }
 
     /// Holds what every input amounts to over the interval that begins at sample `row` of the piece; of a sampled drive its effort.
@@ -248,28 +224,17 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         let truth = &truth[row * description.n_outputs()..];
         for number in 0..inputs {
             let command = |sample: usize| commands[sample * inputs + number];
-            let input = system.dynamics().input(number, k, stepping.time_step, command);
+            let input = system.input(number, k, stepping.time_step, command);
             let effort = sampled.sample(number, row, input.re(), |column| truth[column].re())?;
             system.hold(number, effort.map_or(input, S::from_f64));
         }
         Ok(())
     }
 
-    /// Records everything that happens at the sample by machine code; false if there is none.
-    fn sample_by_code(&mut self, row: usize, start: usize) -> bool {
+    /// Evaluates the machine at the sample and records all that happens there.
+    fn record(&mut self, row: usize, start: usize) {
         let width = self.description.n_outputs();
-        let truth = &mut self.truth[row * width..(row + 1) * width];
-        let done = self.system.sample(&self.state, &mut self.rate, truth);
-        if done {
-            self.record_commands(row, start);
-        }
-        done
-    }
-
-    fn record_efforts(&mut self, row: usize, start: usize) {
-        let width = self.description.n_outputs();
-        let truth = &mut self.truth[row * width..(row + 1) * width];
-        self.system.dynamics().observe_efforts(&self.state, &self.rate, truth);
+        self.system.sample(&self.state, &mut self.rate, &mut self.truth[row * width..(row + 1) * width]);
         self.record_commands(row, start);
     }
 

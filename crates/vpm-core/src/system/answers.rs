@@ -54,14 +54,6 @@ impl<S: Scalar> Dynamics<S> {
         }
     }
 
-    /// What of a change of the actuators' effort on a joint arrives at state `x`: one, but for effects that follow the load.
-    pub(crate) fn push_through(&self, joint: usize, x: &[S]) -> S {
-        let (q, v, u) = (x[joint], x[self.coordinates() + joint], self.efforts[joint]);
-        let own = self.effects.iter().filter(|(place, _)| *place == joint);
-        let share: S = own.map(|(_, effect)| effect.share_of_load(q, v)).sum();
-        S::one() - u.if_negative(|| -share, || share)
-    }
-
     /// Efforts that arrive: those of the tree less those of the effects, whatever follows the load left out.
     fn balance(&mut self, q: &[S], v: &[S], a: &[S], efforts: &mut [S]) {
         let Self { model, data, loads, .. } = self;
@@ -110,6 +102,22 @@ impl<S: Scalar> Dynamics<S> {
         total
     }
 
+    /// What the coordinates miss at rest under a share of the weight: `weight bias(q, 0) + K q - effects(q, 0)`.
+    pub(crate) fn unbalance(&mut self, q: &[S], weight: S) -> Vec<S> {
+        let zero = vec![S::zero(); q.len()];
+        self.terms(q, &zero);
+        let mut loads = zero.clone();
+        flexible::required(&self.model, &self.data, (q, &zero), &zero, &mut loads);
+        for (load, &bias) in loads.iter_mut().zip(&self.data.composite.bias) {
+            *load -= bias * (S::one() - weight);
+        }
+        for (joint, effect) in &self.effects {
+            loads[*joint] -= effect.effort_at_rest(q[*joint]);
+        }
+        self.subtract_connections(&mut loads);
+        loads
+    }
+
     /// Takes off `loads` what contacts and bushings do, after [`Dynamics::terms`] at the same coordinates and rates.
     pub(crate) fn subtract_connections(&mut self, loads: &mut [S]) {
         let Self { model, data, loads: own, connections, .. } = self;
@@ -152,11 +160,6 @@ impl<S: Scalar> Dynamics<S> {
         frames(model, data, q, loads);
         poses(model, data);
         lines(model, data);
-        self.levers_here(levers);
-    }
-
-    /// As [`Dynamics::levers`], where the lines are.
-    pub(crate) fn levers_here(&self, levers: &mut [S]) {
         let (n, data) = (self.coordinates(), &self.data);
         levers.fill(S::zero());
         for (line, row) in levers.chunks_exact_mut(n.max(1)).enumerate() {

@@ -71,10 +71,10 @@ impl Counted<'_> {
         self.calls.matrices[kind as usize] += 1;
     }
 
-    /// A matrix with the rates at the same state, which may be at hand.
+    /// A matrix with the rates at the same state, which may be at hand or come with it.
     fn with_rates(&mut self, kind: Matrix) {
         self.matrix(kind);
-        self.calls.rates += u64::from(!self.system.is_ready());
+        self.calls.rates += u64::from(!self.system.is_ready() && !self.system.has_rates_in(kind));
     }
 }
 

@@ -69,7 +69,7 @@ impl<S: Scalar> Dynamics<S> {
     }
 
     /// Holds what input `number` amounts to, see [`Dynamics::input`].
-    pub(crate) fn hold(&mut self, number: usize, input: S) {
+    pub fn hold(&mut self, number: usize, input: S) {
         self.inputs[number] = input;
     }
 

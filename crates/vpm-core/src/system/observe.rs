@@ -39,7 +39,7 @@ impl<S: Scalar> Dynamics<S> {
     }
 
     /// The outputs that the state alone decides: positions and velocities, lines, strains, markers.
-    pub(crate) fn observe_motion(&mut self, x: &[S], outputs: &mut [S]) {
+    pub fn observe_motion(&mut self, x: &[S], outputs: &mut [S]) {
         let (n, layout) = (self.coordinates(), self.layout());
         if layout.lines + layout.gauges + layout.markers > 0 || !self.connections.is_free() {
             let (q, v) = x[..2 * n].split_at(n);
@@ -48,12 +48,6 @@ impl<S: Scalar> Dynamics<S> {
             poses(model, data);
             lines(model, data);
         }
-        self.observe_here(x, outputs);
-    }
-
-    /// As [`Dynamics::observe_motion`], with all frames and lines where they are in the state.
-    pub(crate) fn observe_here(&mut self, x: &[S], outputs: &mut [S]) {
-        let (n, layout) = (self.coordinates(), self.layout());
         let (q, v) = x[..2 * n].split_at(n);
         for ((channels, &q), &v) in outputs[..layout.actuators()].chunks_exact_mut(4).zip(q).zip(v) {
             channels[0] = q;

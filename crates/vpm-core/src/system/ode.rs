@@ -1,83 +1,131 @@
 //! A machine for the integrators: its rates, and the matrices that implicit steps ask for.
 
 use super::additive::{Split, Stage};
-use super::tangent::Tangent;
-use super::{Build, Dynamics, Fast, Kind, stiff};
-use crate::contact::ContactFriction;
-use crate::effect::JointEffect;
+use super::memory::Memories;
+use super::recorded::Kind;
+use super::routine::{Routines, kind_of};
+use super::{Dynamics, Machine, Matrix, stiff};
+use crate::actuator::Actuator;
+use crate::error::Result;
+use crate::integrator::Method;
 use crate::ode::Ode;
 use crate::scalar::Scalar;
 
-/// The machine as an [`Ode`]: the right-hand side in `S`, and a copy of it in dual numbers over `S` for the exact state Jacobian.
+/// The machine as an [`Ode`] in numbers `S`.
+///
+/// Plain numbers go through the laws themselves, or through machine code where it pays. Numbers with derivatives, and exact derivatives of
+/// the rates, go through the recorded functions.
 #[derive(Clone, Debug)]
 pub struct System<S> {
-    dynamics: Dynamics<S>,
-    tangent: Tangent<S>,
-    split: Split<S>,
-    resistances: Vec<S>,
-    seals: Vec<Option<S>>,
-    fadings: Vec<Option<S>>,
+    /// The machine in plain numbers.
+    dynamics: Dynamics<f64>,
+    routines: Routines<S>,
+    actuators: Vec<Actuator<S>>,
+    memories: Memories<S>,
+    split: Split<f64>,
+    resistances: Vec<f64>,
+    fadings: Vec<Option<f64>>,
     /// A column of an iteration matrix on its way.
-    column: Vec<S>,
+    column: Vec<f64>,
     /// Rates at a state whose matrix is asked for alone.
     rates: Vec<S>,
     /// Whether these are the rates where the next step begins.
     ready: bool,
-    /// Machine code of its functions, of plain numbers where it pays.
-    fast: Option<Fast>,
 }
 
 impl<S: Scalar> System<S> {
-    /// From the same machine in several number types; `build` makes it from numbers.
-    pub fn new<E>(theta: &[S], build: impl Build<Error = E>) -> Result<Self, E> {
-        let dynamics = build.dynamics(theta)?;
-        let tangent = Tangent::new(theta, build, &dynamics)?;
-        let resistances = vec![S::zero(); dynamics.joints()];
-        let column = vec![S::zero(); dynamics.coordinates()];
-        let seals = vec![None; dynamics.actuators.len()];
-        let rates = vec![S::zero(); dynamics.dim()];
-        let fadings = vec![None; dynamics.memories.len()];
-        let split = Split::new(&dynamics);
-        let (ready, fast) = (false, None);
-        Ok(Self { dynamics, tangent, split, resistances, seals, fadings, column, rates, ready, fast })
+    /// The system of a `machine`.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Unrecorded`] where a law decides by the value of a state, in numbers with derivatives.
+    pub(crate) fn new(machine: Machine<'_, S>) -> Result<Self> {
+        let Machine { dynamics, functions, theta, inputs, actuators, memories } = machine;
+        let mut system = Self {
+            routines: Routines::new(functions, theta, inputs),
+            actuators,
+            memories,
+            split: Split::new(&dynamics),
+            resistances: vec![0.0; dynamics.joints()],
+            fadings: vec![None; dynamics.memories.len()],
+            column: vec![0.0; dynamics.coordinates()],
+            rates: vec![S::zero(); dynamics.dim()],
+            ready: false,
+            dynamics,
+        };
+        if !Self::is_plain() {
+            system.routines.make(&Kind::Rates)?;
+        }
+        Ok(system)
     }
 
-    /// Runs its functions as machine code from now on. Inputs have to be held anew.
-    pub(crate) fn run_by(&mut self, fast: Fast) {
-        (self.fast, self.ready) = (Some(fast), false);
+    /// Whether it runs in plain numbers.
+    fn is_plain() -> bool {
+        S::plain(&[]).is_some()
+    }
+
+    /// Makes all that samples and steps by `method` need.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Unrecorded`] where a law decides by the value of a state.
+    pub fn make_for(&mut self, method: Method) -> Result<()> {
+        let kinds = [Some(Kind::Sample), kind_of(method)].into_iter().flatten();
+        for kind in kinds.filter(|kind| !self.is_direct(kind)).collect::<Vec<_>>() {
+            self.routines.make(&kind)?;
+        }
+        Ok(())
+    }
+
+    /// Whether a function is worked out by the laws themselves.
+    fn is_direct(&self, kind: &Kind) -> bool {
+        Self::is_plain()
+            && match kind {
+                Kind::Linearised | Kind::Frictionless | Kind::LinearFriction => false,
+                Kind::Prepared => self.dynamics.is_stiff_by_beams_alone(),
+                _ => true,
+            }
+    }
+
+    /// Runs samples and steps by `method` as machine code from now on, where they can; or says why they cannot.
+    pub fn compile(&mut self, method: Method) -> std::result::Result<(), String> {
+        self.ready = false;
+        for kind in [Kind::Rates, Kind::Sample] {
+            if let Err(reason) = self.routines.compile(&kind) {
+                [Kind::Rates, Kind::Sample].iter().for_each(|kind| self.routines.forget(kind));
+                return Err(reason);
+            }
+        }
+        // A matrix alone that has no code is worked out as before.
+        let kind = kind_of(method).filter(|kind| *kind != Kind::Elasticity);
+        if let Some(kind) = kind.filter(|kind| self.routines.compile(kind).is_err() && self.is_direct(kind)) {
+            self.routines.forget(&kind);
+        }
+        Ok(())
     }
 
     /// Whether its functions run as machine code.
-    pub(crate) fn has_code(&self) -> bool {
-        self.fast.is_some()
+    pub fn has_code(&mut self) -> bool {
+        Self::is_plain() && self.routines.get(&Kind::Rates).is_some()
     }
 
-    /// Whether all frames, lines and the mass matrix are those of the state of the last [`Ode::rhs`].
-    pub(crate) fn stands(&self) -> bool {
-        self.fast.is_none() && self.dynamics.stands()
-    }
-
-    /// dx/dt and all true outputs at `x` by machine code; false if there is none.
-    pub(crate) fn sample(&mut self, x: &[S], dxdt: &mut [S], outputs: &mut [S]) -> bool {
-        self.ready = false;
-        let plain = (S::plain(x), S::plain_mut(dxdt), S::plain_mut(outputs));
-        let (Some(fast), (Some(x), Some(dxdt), Some(outputs))) = (&mut self.fast, plain) else { return false };
-        fast.sample(x, dxdt, outputs);
-        true
-    }
-
-    /// The rates and a matrix at `x` by machine code; false if there is none.
-    fn by_code(&mut self, kind: Kind, x: &[S], matrix: &mut [S], dxdt: &mut [S]) -> bool {
-        let plain = (S::plain(x), S::plain_mut(matrix), S::plain_mut(dxdt));
-        let (Some(fast), (Some(x), Some(matrix), Some(dxdt))) = (&mut self.fast, plain) else { return false };
-        fast.matrix(kind, x, matrix, dxdt)
-    }
-
-    /// The right-hand side.
+    /// The machine in plain numbers.
     #[inline]
-    pub fn dynamics(&mut self) -> &mut Dynamics<S> {
+    pub fn dynamics(&mut self) -> &mut Dynamics<f64> {
         self.ready = false;
         &mut self.dynamics
+    }
+
+    /// The actuators.
+    pub(crate) fn actuators(&self) -> &[Actuator<S>] {
+        &self.actuators
+    }
+
+    /// What input `number` amounts to over the interval that begins at sample `k`, see [`Dynamics::input`].
+    #[inline]
+    pub(crate) fn input(&self, number: usize, k: usize, time_step: f64, command: impl Fn(usize) -> S) -> S {
+        match self.actuators.get(number) {
+            Some(actuator) => actuator.input(k, time_step, command),
+            None => command(k),
+        }
     }
 
     /// Holds what input `number` amounts to, see [`Dynamics::input`], from now on: one for each actuator, then the pressures of logged
@@ -85,15 +133,73 @@ impl<S: Scalar> System<S> {
     #[inline]
     pub fn hold(&mut self, number: usize, input: S) {
         self.ready = false;
-        self.dynamics.hold(number, input);
-        self.tangent.hold(number, input);
-        if let (Some(fast), Some([input])) = (&mut self.fast, S::plain(&[input])) {
-            fast.hold(number, *input);
+        self.dynamics.hold(number, input.re());
+        self.routines.hold(number, input);
+    }
+
+    /// dx/dt and all true outputs at `x`.
+    pub fn sample(&mut self, x: &[S], dxdt: &mut [S], outputs: &mut [S]) {
+        self.ready = false;
+        let plain = (S::plain(x), S::plain_mut(dxdt), S::plain_mut(outputs));
+        if let Some(routine) = self.routines.get(&Kind::Sample) {
+            let (rates, seen) = routine.at(x).split_at(x.len());
+            dxdt.copy_from_slice(rates);
+            outputs.copy_from_slice(seen);
+        } else if let (Some(x), Some(dxdt), Some(outputs)) = plain {
+            self.dynamics.rhs(x, dxdt);
+            self.dynamics.observe(x, dxdt, outputs);
+        } else {
+            self.missing(&Kind::Sample, outputs);
         }
     }
-}
 
-impl<S: Scalar> System<S> {
+    /// The outputs that the state alone decides; others stay or become zero.
+    pub(crate) fn observe_motion(&mut self, x: &[S], outputs: &mut [S]) {
+        if let (Some(x), Some(outputs)) = (S::plain(x), S::plain_mut(outputs)) {
+            self.ready = false;
+            self.dynamics.observe_motion(x, outputs);
+        } else {
+            self.copy(&Kind::Motion, x, &[], outputs);
+        }
+    }
+
+    /// Length of each line per unit of each coordinate at `q`: the lever arms of its force, lines x n.
+    pub(crate) fn levers(&mut self, q: &[S], levers: &mut [S]) {
+        if let (Some(q), Some(levers)) = (S::plain(q), S::plain_mut(levers)) {
+            self.dynamics().levers(q, levers);
+        } else {
+            self.copy(&Kind::Levers, q, &[], levers);
+        }
+    }
+
+    /// Efforts that accelerations `a` need at `state` (coordinates, then rates), but for what contacts and bushings do.
+    pub(crate) fn required_of_tree(&mut self, state: &[S], a: &[S], efforts: &mut [S]) {
+        if let (Some(state), Some(a), Some(efforts)) = (S::plain(state), S::plain(a), S::plain_mut(efforts)) {
+            let (q, v) = state.split_at(a.len());
+            self.dynamics().inverse_dynamics_of_tree(q, v, a, efforts);
+        } else {
+            self.copy(&Kind::RequiredOfTree, state, a, efforts);
+        }
+    }
+
+    /// Copies all outputs of a recorded function that is asked for seldom, at the states that stand first and accelerations `a`.
+    fn copy(&mut self, kind: &Kind, x: &[S], a: &[S], outputs: &mut [S]) {
+        match self.routines.make(kind).ok().and_then(|()| self.routines.get(kind)) {
+            Some(routine) => {
+                routine.put_accelerations(a);
+                outputs.copy_from_slice(routine.at(x));
+            }
+            None => outputs.fill(S::from_f64(f64::NAN)),
+        }
+    }
+
+    /// Makes a function that nobody asked for in time; what has none is no number.
+    #[cold]
+    fn missing(&mut self, kind: &Kind, numbers: &mut [S]) {
+        debug_assert!(false, "{kind:?} is asked for before it is made");
+        numbers.fill(S::from_f64(f64::NAN));
+    }
+
     /// Takes note that the machine, last evaluated with these `rates`, makes its next step from that very state. What is asked of the
     /// system before makes it forget.
     pub(crate) fn depart(&mut self, rates: &[S]) {
@@ -115,64 +221,68 @@ impl<S: Scalar> System<S> {
         }
     }
 
-    /// Rates at `x`, with the direct evaluation left there, on which matrices lean.
-    fn begin_directly(&mut self, x: &[S], rates: &mut [S]) {
-        if self.fast.is_some() {
-            self.ready = false;
+    /// The same, with the efforts of the drives left there by the laws: friction may follow them.
+    fn begin_by_laws(&mut self, x: &[S], rates: &mut [S]) {
+        if self.routines.get(&Kind::Rates).is_none() {
+            return self.begin(x, rates);
+        }
+        self.ready = false;
+        if let (Some(x), Some(rates)) = (S::plain(x), S::plain_mut(rates)) {
             self.dynamics.rhs(x, rates);
-        } else {
-            self.begin(x, rates);
         }
     }
 
     /// As df/dx, without the friction of joints and seals, row by row.
     pub(crate) fn without_friction(&mut self, x: &[S], matrix: &mut [S]) {
-        self.with_resistance(|_| S::zero(), x, matrix);
+        self.matrix_alone(&Kind::Frictionless, x, matrix);
     }
 
     /// As df/dx, without friction of joints and seals that is not linear.
     pub(crate) fn without_dry_friction(&mut self, x: &[S], matrix: &mut [S]) {
-        self.with_resistance(JointEffect::damping, x, matrix);
+        self.matrix_alone(&Kind::LinearFriction, x, matrix);
     }
 
-    /// As df/dx, with this resistance of each effect in the place of friction.
-    fn with_resistance(&mut self, resistance: impl Fn(&JointEffect<S>) -> S, x: &[S], matrix: &mut [S]) {
+    /// A recorded matrix at `x` and what the function gives beside it.
+    fn matrix(&mut self, kind: &Kind, x: &[S], matrix: &mut [S], width: usize, values: &mut [S]) {
+        match self.routines.make(kind).ok().and_then(|()| self.routines.get(kind)) {
+            Some(routine) => routine.matrix(x, matrix, width, values),
+            None => matrix.fill(S::from_f64(f64::NAN)),
+        }
+    }
+
+    fn matrix_alone(&mut self, kind: &Kind, x: &[S], matrix: &mut [S]) {
         self.ready = false;
-        self.resistances.fill(S::zero());
-        for (joint, effect) in &self.dynamics.effects {
-            self.resistances[*joint] += resistance(effect);
-        }
-        self.seals.fill(Some(S::zero()));
-        if self.tangent.leans() {
-            self.dynamics.seals.copy_from_slice(&self.seals);
-            let linear = |effects: &[(usize, JointEffect<S>)], [q, v, _]: [&[S]; 3], total: &mut [S]| {
-                effects.iter().for_each(|(joint, effect)| {
-                    total[*joint] += effect.effort_at_rest(q[*joint]) - resistance(effect) * v[*joint];
-                });
-            };
-            let chord = |law: &ContactFriction<S>, square, normal| law.chord(square) * normal;
-            self.dynamics.rhs_with(x, &mut self.rates, (linear, chord));
-            self.dynamics.seals.fill(None);
-        }
-        self.fadings.fill(Some(S::zero()));
-        self.tangent.chords(&mut self.dynamics, x, matrix, (&self.resistances, &self.seals, &self.fadings));
-        self.seals.fill(None);
+        let mut values = std::mem::take(&mut self.rates);
+        self.matrix(kind, x, matrix, x.len(), &mut values);
+        self.rates = values;
     }
 
-    /// Writes [`Ode::iteration_matrix`], after the rates at `x` if the tangent leans on them.
-    fn matrix(&mut self, x: &[S], matrix: &mut [S]) {
-        let n = self.coordinates();
+    /// Writes [`Ode::iteration_matrix`] of a machine of which beams are all that is stiff, by its laws; false if they have to be recorded.
+    fn prepare_directly(&mut self, x: &[S], matrix: &mut [S]) -> bool {
+        let plain = (S::plain(x), S::plain_mut(matrix));
+        let (true, (Some(x), Some(matrix))) = (self.by_laws(&Kind::Prepared), plain) else { return false };
+        let n = self.dynamics.coordinates();
         let (q, v) = x[..2 * n].split_at(n);
         self.dynamics.write_resistances(q, v, &mut self.resistances);
         let first = self.dynamics.first_memory();
         self.dynamics.memories.fadings(&x[first..], v, &mut self.fadings);
-        if self.dynamics.is_stiff_by_beams_alone() {
-            let laws = (&*self.resistances, &*self.fadings);
-            stiff::iteration_matrix(&mut self.dynamics, x, matrix, laws, &mut self.column);
-            return;
+        let laws = (&*self.resistances, &*self.fadings);
+        stiff::iteration_matrix(&mut self.dynamics, x, matrix, laws, &mut self.column);
+        true
+    }
+
+    /// Whether a matrix is part of a recorded function that works the rates out too.
+    pub(crate) fn has_rates_in(&mut self, matrix: Matrix) -> bool {
+        match matrix {
+            Matrix::Jacobian => true,
+            Matrix::Iteration => !self.by_laws(&Kind::Prepared),
+            Matrix::Elasticity => false,
         }
-        self.dynamics.seal_chords(q, v, &mut self.seals);
-        self.tangent.chords(&mut self.dynamics, x, matrix, (&self.resistances, &self.seals, &self.fadings));
+    }
+
+    /// Whether a function is worked out by the laws now.
+    fn by_laws(&mut self, kind: &Kind) -> bool {
+        self.is_direct(kind) && self.routines.get(kind).is_none()
     }
 }
 
@@ -190,35 +300,30 @@ impl<S: Scalar> Ode<S> for System<S> {
     #[inline]
     fn rhs(&mut self, x: &[S], dxdt: &mut [S]) {
         self.ready = false;
-        match (&mut self.fast, S::plain(x), S::plain_mut(dxdt)) {
-            (Some(fast), Some(x), Some(dxdt)) => fast.rates(x, dxdt),
-            _ => self.dynamics.rhs(x, dxdt),
+        if let Some(routine) = self.routines.get(&Kind::Rates) {
+            dxdt.copy_from_slice(routine.at(x));
+        } else if let (Some(x), Some(dxdt)) = (S::plain(x), S::plain_mut(dxdt)) {
+            self.dynamics.rhs(x, dxdt);
         }
     }
 
-    /// Columns by forward accumulation; exact also where S itself carries derivatives.
     fn jacobian(&mut self, x: &[S], jacobian: &mut [S]) {
-        self.ready = false;
-        if self.tangent.leans() {
-            self.dynamics.rhs(x, &mut self.rates);
-        }
-        self.tangent.jacobian(&mut self.dynamics, x, jacobian);
+        self.matrix_alone(&Kind::Linearised, x, jacobian);
     }
 
     fn linearise(&mut self, x: &[S], jacobian: &mut [S], rates: &mut [S]) {
-        if self.by_code(Kind::Linearised, x, jacobian, rates) {
-            return;
-        }
-        self.begin_directly(x, rates);
-        self.tangent.jacobian(&mut self.dynamics, x, jacobian);
+        self.ready = false;
+        self.matrix(&Kind::Linearised, x, jacobian, x.len(), rates);
     }
 
     fn prepare(&mut self, x: &[S], matrix: &mut [S], rates: &mut [S]) {
-        if self.by_code(Kind::Prepared, x, matrix, rates) {
+        if self.by_laws(&Kind::Prepared) {
+            self.begin_by_laws(x, rates);
+            self.prepare_directly(x, matrix);
             return;
         }
-        self.begin_directly(x, rates);
-        self.matrix(x, matrix);
+        self.ready = false;
+        self.matrix(&Kind::Prepared, x, matrix, x.len(), rates);
     }
 
     /// As df/dx, but with chords from rest in the place of the tangents of friction laws; of a machine with elastic beams and ideal drives,
@@ -228,35 +333,41 @@ impl<S: Scalar> Ode<S> for System<S> {
     /// turn around, and could keep a joint creeping for ever; the chord sees it. At rest, and for viscous friction, they are the same.
     fn iteration_matrix(&mut self, x: &[S], matrix: &mut [S]) {
         self.ready = false;
-        if self.tangent.leans() {
-            self.dynamics.rhs(x, &mut self.rates);
-        }
-        self.matrix(x, matrix);
+        let mut rates = std::mem::take(&mut self.rates);
+        self.prepare(x, matrix, &mut rates);
+        self.rates = rates;
     }
 
     /// Beams, springs and linear damping of joints, friction of joints, memories and lags of ideal drives are taken implicitly; springs that
     /// are not linear by their slope where the stage has come to.
     fn additive_rates(&mut self, explicit: &[S], implicit: &[S], reach: f64, rates: &mut [S]) -> bool {
+        let n = self.coordinates();
         if reach == 0.0 {
-            let n = self.coordinates();
             let v = &explicit[n..2 * n];
-            self.split.depart(v);
-            if let (Some(fast), Some(v)) = (&mut self.fast, S::plain(v)) {
-                fast.depart(v);
+            if let Some(v) = S::plain(v) {
+                self.split.depart(v);
+            }
+            if let Some(routine) = self.routines.get(&Kind::Additive) {
+                routine.depart(v);
             }
             self.begin(explicit, rates);
             return true;
         }
         self.ready = false;
-        let plain = (S::plain(explicit), S::plain(implicit), S::plain_mut(rates));
-        if let (Some(fast), (Some(explicit), Some(implicit), Some(rates))) = (&mut self.fast, plain)
-            && fast.additive([explicit, implicit], reach, rates)
-        {
+        if let Some(routine) = self.routines.get(&Kind::Additive) {
+            routine.additive([explicit, implicit], S::from_f64(reach), rates);
             return true;
         }
-        let stage = Stage { explicit, implicit, reach: S::from_f64(reach) };
-        self.dynamics.additive_rates(stage, rates, &mut self.split);
-        true
+        let plain = (S::plain(explicit), S::plain(implicit), S::plain_mut(rates));
+        if let (Some(explicit), Some(implicit), Some(rates)) = plain {
+            let stage = Stage { explicit, implicit, reach };
+            self.dynamics.additive_rates(stage, rates, &mut self.split);
+            return true;
+        }
+        match self.routines.make(&Kind::Additive) {
+            Ok(()) => self.additive_rates(explicit, implicit, reach, rates),
+            Err(_) => false,
+        }
     }
 
     /// A hundredth for coordinates, 1 for rates, of the drives what is natural for each.
@@ -271,21 +382,27 @@ impl<S: Scalar> Ode<S> for System<S> {
     /// Memories move on exactly along the way of their joints.
     fn along_path(&mut self, x: &[S], step: f64, rates: &mut [S]) {
         let (n, first) = (self.coordinates(), self.dynamics.first_memory());
-        self.dynamics.memories.mean_rates(&x[first..], &x[n..2 * n], step, &mut rates[first..]);
+        self.memories.mean_rates(&x[first..], &x[n..2 * n], step, &mut rates[first..]);
     }
 
     /// Stiffness and damping of the beams.
     fn elasticity(&mut self, x: &[S], block: &mut [S]) -> bool {
-        self.ready = false;
         let n = self.coordinates();
         if self.dynamics.model.n_elastic() == 0 {
             return false;
         }
-        let (q, v) = x[..2 * n].split_at(n);
-        self.dynamics.terms(q, v);
-        self.dynamics.data.factorise();
-        block.fill(S::zero());
-        stiff::elasticity(&self.dynamics, block, 2 * n, &mut self.column);
+        self.ready = false;
+        if let (Some(x), Some(block)) = (S::plain(x), S::plain_mut(block)) {
+            let (q, v) = x[..2 * n].split_at(n);
+            self.dynamics.terms(q, v);
+            self.dynamics.data.factorise();
+            block.fill(0.0);
+            stiff::elasticity(&self.dynamics, block, 2 * n, &mut self.column);
+            return true;
+        }
+        let mut values = std::mem::take(&mut self.rates);
+        self.matrix(&Kind::Elasticity, x, block, 2 * n, &mut values);
+        self.rates = values;
         true
     }
 }

@@ -1,11 +1,18 @@
-//! A whole machine as a graph of operations.
+//! A machine's functions as graphs of operations.
+
+use std::sync::Arc;
 
 use super::additive::{Split, Stage};
+use super::guided::{Guidance, Guided, Part};
 use super::{Build, Dynamics, stiff};
 use crate::contact::ContactFriction;
 use crate::effect::JointEffect;
 use crate::error::{Error, Result};
-use crate::graph::{Decision, Graph, Node, Program, Recorded, input, record};
+use crate::graph::{Decision, Node, Program, Recorded, input, record};
+use crate::scalar::Scalar;
+
+/// Operations from which on a matrix is worked out along directions instead of entry by entry.
+const MOST: usize = 200_000;
 
 /// Where the inputs of a recorded machine's programs stand: state, inputs of drives and supplies, the implicit state and the reach of an
 /// additive step with the rates where the stage before ended, parameters.
@@ -25,6 +32,11 @@ impl Places {
     /// The implicit state of an additive step.
     pub fn implicit(&self) -> usize {
         self.states + self.inputs
+    }
+
+    /// Accelerations of all coordinates, where a motion is given; they share their room with the implicit state.
+    pub fn accelerations(&self) -> usize {
+        self.implicit()
     }
 
     /// The reach of an additive step, s.
@@ -49,140 +61,239 @@ impl Places {
 }
 
 /// What a program of a machine gives.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub enum Kind {
     /// dx/dt.
     Rates,
     /// dx/dt, then all true outputs in the order of [`crate::sensor::Layout`]; the command of an actuator is what enters its lag.
     Sample,
+    /// All outputs of which those stand that the state alone decides, see [`Kind::Sample`].
+    Motion,
     /// dx/dt, then the entries of its derivatives by the states.
     Linearised,
     /// dx/dt, then the entries of the matrix that an implicit step puts in the place of the derivatives, see
     /// [`crate::ode::Ode::iteration_matrix`].
     Prepared,
+    /// As [`Kind::Linearised`], without the friction of joints and seals.
+    Frictionless,
+    /// As [`Kind::Linearised`], without friction of joints and seals that is not linear.
+    LinearFriction,
+    /// What constant stiffness and damping of beams do, see [`crate::ode::Ode::elasticity`].
+    Elasticity,
     /// The rates of a stage of an additive step, see [`crate::ode::Ode::additive_rates`].
     Additive,
+    /// Lever arms of all lines, line by line.
+    Levers,
+    /// Efforts that the accelerations need, those of the effects taken off.
+    Required,
+    /// The same without any effect on a joint.
+    RequiredWithoutEffects,
+    /// The same as [`Kind::Required`], but without what contacts and bushings do.
+    RequiredOfTree,
+    /// What the coordinates miss at rest, then the entries of its derivatives by them; the only input is the share of the weight.
+    Unbalance,
+    /// A function of a machine some of whose joints follow a motion, of the state of what answers to it.
+    Guided(Arc<Guidance>, Part),
+    /// What another kind gives first, then the entries of its derivatives by the inputs at these places, each named once.
+    Derived(Box<Self>, Vec<u32>),
 }
 
 impl Kind {
-    /// All of them.
-    pub const ALL: [Self; 5] = [Self::Rates, Self::Sample, Self::Linearised, Self::Prepared, Self::Additive];
+    /// All of a free machine that are no derivatives of others.
+    pub const ALL: [Self; 13] = [
+        Self::Rates,
+        Self::Sample,
+        Self::Motion,
+        Self::Linearised,
+        Self::Prepared,
+        Self::Frictionless,
+        Self::LinearFriction,
+        Self::Elasticity,
+        Self::Additive,
+        Self::Levers,
+        Self::Required,
+        Self::RequiredWithoutEffects,
+        Self::RequiredOfTree,
+    ];
+
+    /// Where the inputs of such a program stand, if those of a free machine stand at `places`.
+    fn places(&self, places: Places) -> Places {
+        match self {
+            Self::Unbalance => Places { states: places.coordinates, inputs: 1, ..places },
+            Self::Guided(guidance, _) => guidance.places(places),
+            _ => places,
+        }
+    }
 }
 
-/// The functions of a machine, recorded: programs over state, inputs and parameters.
-///
-/// Checked: all programs against the direct evaluation of the same laws, derivatives against dual numbers.
-#[derive(Clone, Debug)]
-pub struct Recording {
-    graph: Graph,
-    places: Places,
-    functions: Functions,
-}
-
-/// What of a machine comes out of its graph.
-#[derive(Clone, Debug)]
-struct Functions {
-    rates: Vec<Node>,
-    outputs: Vec<Node>,
-    /// Rates whose derivatives are an iteration matrix, or that matrix.
-    stiff: Stiff,
-    /// Rates of a stage of an additive step.
-    additive: Vec<Node>,
-}
-
-#[derive(Clone, Debug)]
-enum Stiff {
-    /// Rates with chords in the place of friction laws.
-    Chords(Vec<Node>),
-    /// The matrix of a machine of which beams are all that is stiff, row by row.
-    Beams(Vec<Node>),
-}
-
-/// A program, and where in a matrix its last outputs stand.
+/// A program of a machine.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Placed {
     /// The program.
     pub program: Program,
-    /// Row and column of each entry of the matrix that is not zero everywhere.
+    /// Where its inputs stand.
+    pub places: Places,
+    /// Row and column of each of its last outputs, if they are the entries of a matrix, those that are not zero everywhere.
     pub entries: Vec<(usize, usize)>,
+    /// Instead of the entries what is to be differentiated, where these would be too many operations.
+    pub directions: Option<Program>,
+    /// Whether it holds for the parameters of the recording only: then a part was built by their values.
+    pub of_values: bool,
 }
 
-impl Recording {
-    /// Records the machine that `build` makes; `theta` are the parameters, checked, for which its parts are built.
+/// Numbers of a graph that are a function of a machine.
+struct Outputs {
+    values: Vec<Recorded>,
+    matrix: Option<Matrix>,
+}
+
+/// A matrix of a machine.
+pub(super) enum Matrix {
+    /// The derivative of these numbers by the inputs at these places.
+    Of(Vec<Recorded>, Vec<u32>),
+    /// These numbers, row by row, of so many columns.
+    Entries(Vec<Recorded>, usize),
+}
+
+impl Matrix {
+    /// The derivative of `numbers` by the states, of which there are `dim`.
+    pub(super) fn by_states(numbers: Vec<Recorded>, dim: usize) -> Self {
+        Self::Of(numbers, (0..dim as u32).collect())
+    }
+}
+
+impl Placed {
+    /// Records a function of the machine that `build` makes; `theta` are the parameters, checked, for which its parts are built.
+    ///
+    /// Checked: all programs against the direct evaluation of the same laws, derivatives against dual numbers.
     ///
     /// # Errors
     /// [`Error::Unrecorded`] where a law decides by the value of a state: the graph would hold for that state alone.
-    pub fn new(build: impl Build<Error = Error>, places: Places, theta: &[f64]) -> Result<Self> {
-        let (functions, graph) = record(places.first_parameter() as u32, || functions(build, places, theta));
-        let recording = Self { graph, places, functions: functions? };
-        match recording.graph.decisions().iter().find(|decision| !decision.of_parameters) {
-            Some(decision) => Err(unrecordable(decision)),
-            None => Ok(recording),
+    pub fn new(build: impl Build<Error = Error>, places: Places, theta: &[f64], kind: &Kind) -> Result<Self> {
+        let places = kind.places(places);
+        let (outputs, mut graph) = record(places.first_parameter() as u32, || outputs(build, places, theta, kind));
+        let Outputs { values, matrix } = outputs?;
+        if let Some(decision) = graph.decisions().iter().find(|decision| !decision.of_parameters) {
+            return Err(unrecordable(decision));
         }
-    }
-
-    /// Whether the graph holds for the parameters of the recording only: then a part was built by their values.
-    pub fn is_of_values(&self) -> bool {
-        !self.graph.decisions().is_empty()
-    }
-
-    /// Where the inputs of programs stand.
-    pub fn places(&self) -> Places {
-        self.places
-    }
-
-    /// The program of that kind.
-    pub fn program(&mut self, kind: Kind) -> Placed {
-        let Functions { rates, outputs, stiff, additive } = &self.functions;
-        let (dim, states) = (self.places.states, 0..self.places.states as u32);
-        let mut entries = Vec::new();
-        let mut nodes = rates.clone();
-        match (kind, stiff) {
-            (Kind::Rates, _) => {}
-            (Kind::Sample, _) => nodes.extend(outputs),
-            (Kind::Additive, _) => nodes.clone_from(additive),
-            (Kind::Prepared, Stiff::Beams(matrix)) => {
-                for (place, &entry) in matrix.iter().enumerate() {
-                    if self.graph.known_value(entry) != Some(0.0) {
-                        entries.push((place / dim, place % dim));
-                        nodes.push(entry);
-                    }
+        let (mut nodes, mut entries, mut directions) = (nodes(&values), Vec::new(), None);
+        match matrix {
+            None => {}
+            Some(Matrix::Entries(numbers, columns)) => {
+                let known =
+                    numbers.iter().enumerate().filter(|(_, entry)| graph.known_value(entry.node()) != Some(0.0));
+                for (place, entry) in known {
+                    entries.push((place / columns, place % columns));
+                    nodes.push(entry.node());
                 }
             }
-            (Kind::Linearised, _) | (Kind::Prepared, Stiff::Chords(_)) => {
-                let differentiated = match stiff {
-                    Stiff::Chords(chords) if kind == Kind::Prepared => chords,
-                    _ => rates,
-                };
-                let derivative = self.graph.derive(differentiated, &states.collect::<Vec<_>>());
-                entries = derivative.places;
-                nodes.extend(derivative.entries);
+            Some(Matrix::Of(numbers, by)) => {
+                let numbers = self::nodes(&numbers);
+                match graph.derive_within(&numbers, &by, MOST) {
+                    Some(derivative) => {
+                        entries = derivative.places;
+                        nodes.extend(derivative.entries);
+                    }
+                    None => directions = Some(Program::of_directions(&graph, &numbers, places.count())),
+                }
             }
         }
-        Placed { program: Program::new(&self.graph, &nodes, self.places.count()), entries }
+        let program = Program::new(&graph, &nodes, places.count());
+        Ok(Self { program, places, entries, directions, of_values: !graph.decisions().is_empty() })
     }
 }
 
-fn functions(build: impl Build<Error = Error>, places: Places, theta: &[f64]) -> Result<Functions> {
+fn outputs(build: impl Build<Error = Error>, places: Places, theta: &[f64], kind: &Kind) -> Result<Outputs> {
+    let inputs = |first: usize, count: usize| (first..first + count).map(|place| input(place, 0.0)).collect::<Vec<_>>();
     let first = places.first_parameter();
-    let theta: Vec<Recorded> = theta.iter().enumerate().map(|(k, &value)| input(first + k, value)).collect();
-    let mut dynamics: Dynamics<Recorded> = build.dynamics(&theta)?;
-    let zeros = |count: usize| vec![Recorded::default(); count];
-    let x: Vec<Recorded> = (0..places.states).map(|k| input(k, 0.0)).collect();
-    for number in 0..places.inputs {
+    let parameters: Vec<Recorded> = theta.iter().enumerate().map(|(k, &value)| input(first + k, value)).collect();
+    let mut dynamics: Dynamics<Recorded> = build.dynamics(&parameters)?;
+    let x = inputs(0, places.states);
+    for number in 0..places.inputs.min(dynamics.inputs.len()) {
         dynamics.hold(number, input(places.states + number, 0.0));
     }
-    let (mut rates, mut outputs) = (zeros(places.states), zeros(dynamics.layout().count()));
-    dynamics.rhs(&x, &mut rates);
-    dynamics.observe(&x, &rates, &mut outputs);
-    let stiff = dynamics.stiff(&x);
-    let additive = dynamics.additive(&x, places);
-    Ok(Functions { rates: nodes(&rates), outputs: nodes(&outputs), stiff, additive })
+    let zeros = |count: usize| vec![Recorded::default(); count];
+    let (n, dim) = (places.coordinates, places.states);
+    let motion = (&x[..n], &x[n..dim.min(2 * n)]);
+    let mut rates = zeros(dim);
+    let required = |dynamics: &mut Dynamics<Recorded>, invert: Invert| {
+        let (a, first, mut efforts) = (inputs(places.accelerations(), n), dynamics.first_memory(), zeros(n));
+        dynamics.memories.hold(&x[first..]);
+        invert(dynamics, motion.0, motion.1, &a, &mut efforts);
+        efforts
+    };
+    let (values, matrix) = match kind {
+        Kind::Rates => {
+            dynamics.rhs(&x, &mut rates);
+            (rates, None)
+        }
+        Kind::Sample => {
+            let mut seen = zeros(dynamics.layout().count());
+            dynamics.rhs(&x, &mut rates);
+            dynamics.observe(&x, &rates, &mut seen);
+            rates.extend(seen);
+            (rates, None)
+        }
+        Kind::Motion => {
+            let mut seen = zeros(dynamics.layout().count());
+            dynamics.observe_motion(&x, &mut seen);
+            (seen, None)
+        }
+        Kind::Linearised => {
+            dynamics.rhs(&x, &mut rates);
+            (rates.clone(), Some(Matrix::by_states(rates, dim)))
+        }
+        Kind::Prepared => {
+            dynamics.rhs(&x, &mut rates);
+            let matrix = dynamics.prepared(&x);
+            (rates, Some(matrix))
+        }
+        Kind::Frictionless => (rates, Some(dynamics.resisted(&x, |_| Recorded::default()))),
+        Kind::LinearFriction => (rates, Some(dynamics.resisted(&x, JointEffect::damping))),
+        Kind::Elasticity => {
+            let (mut block, mut column) = (zeros(2 * n * n), zeros(n));
+            dynamics.terms(motion.0, motion.1);
+            dynamics.data.factorise();
+            stiff::elasticity(&dynamics, &mut block, 2 * n, &mut column);
+            (rates, Some(Matrix::Entries(block, 2 * n)))
+        }
+        Kind::Additive => (dynamics.additive(&x, places), None),
+        Kind::Derived(kind, by) => {
+            let values = outputs(build, places, theta, kind)?.values;
+            (values.clone(), Some(Matrix::Of(values, by.clone())))
+        }
+        Kind::Levers => {
+            let mut levers = zeros(dynamics.layout().lines * n);
+            dynamics.levers(motion.0, &mut levers);
+            (levers, None)
+        }
+        Kind::Required => (required(&mut dynamics, Dynamics::inverse_dynamics), None),
+        Kind::RequiredOfTree => (required(&mut dynamics, Dynamics::inverse_dynamics_of_tree), None),
+        Kind::RequiredWithoutEffects => {
+            dynamics.leave_effects();
+            let (a, mut efforts) = (inputs(places.accelerations(), n), zeros(n));
+            dynamics.inverse_dynamics(motion.0, motion.1, &a, &mut efforts);
+            (efforts, None)
+        }
+        Kind::Unbalance => {
+            let loads = dynamics.unbalance(&x, input(places.states, 0.0));
+            (loads.clone(), Some(Matrix::by_states(loads, dim)))
+        }
+        Kind::Guided(guidance, part) => {
+            let mut guided = Guided::new(dynamics, guidance);
+            (0..places.inputs).for_each(|number| guided.hold(number, input(dim + number, 0.0)));
+            guided.recorded(*part, &x)
+        }
+    };
+    Ok(Outputs { values, matrix })
 }
+
+/// Inverse dynamics of one kind or another.
+type Invert = fn(&mut Dynamics<Recorded>, &[Recorded], &[Recorded], &[Recorded], &mut [Recorded]);
 
 impl Dynamics<Recorded> {
     /// The rates of a stage of an additive step whose explicit state is `x`.
-    fn additive(&mut self, x: &[Recorded], places: Places) -> Vec<Node> {
+    fn additive(&mut self, x: &[Recorded], places: Places) -> Vec<Recorded> {
         let implicit: Vec<Recorded> = (0..x.len()).map(|k| input(places.implicit() + k, 0.0)).collect();
         let reach = input(places.reach(), 0.0);
         let mut rates = vec![Recorded::default(); x.len()];
@@ -190,11 +301,12 @@ impl Dynamics<Recorded> {
         let mut split = Split::new(self);
         split.depart(&before);
         self.additive_rates(Stage { explicit: x, implicit: &implicit, reach }, &mut rates, &mut split);
-        nodes(&rates)
+        rates
     }
 
-    /// What of the machine an iteration matrix is made of, at the state of the last [`Dynamics::rhs`].
-    fn stiff(&mut self, x: &[Recorded]) -> Stiff {
+    /// What an iteration matrix is, at the state of the last [`Dynamics::rhs`]: with chords in the place of friction laws; of a machine of
+    /// which beams are all that is stiff, the matrix itself.
+    fn prepared(&mut self, x: &[Recorded]) -> Matrix {
         let (n, dim) = (self.coordinates(), x.len());
         let (q, v) = x[..2 * n].split_at(n);
         let mut fadings = vec![None; self.memories.len()];
@@ -204,13 +316,36 @@ impl Dynamics<Recorded> {
         if self.is_stiff_by_beams_alone() {
             let (mut matrix, mut column) = (vec![Recorded::default(); dim * dim], vec![Recorded::default(); n]);
             stiff::iteration_matrix(self, x, &mut matrix, (&resistances, &fadings), &mut column);
-            return Stiff::Beams(nodes(&matrix));
+            return Matrix::Entries(matrix, dim);
         }
         let mut seals = vec![None; self.seals.len()];
         self.seal_chords(q, v, &mut seals);
-        self.seals = seals.into_iter().map(|seal| seal.map(Recorded::frozen)).collect();
-        self.memories.replace(fadings.into_iter().map(|fading| fading.map(Recorded::frozen)));
-        let resistances: Vec<_> = resistances.into_iter().map(Recorded::frozen).collect();
+        self.chords(x, &resistances, &seals, &fadings)
+    }
+
+    /// The derivative of the rates at `x` with this resistance of each effect in the place of friction.
+    fn resisted(&mut self, x: &[Recorded], resistance: impl Fn(&JointEffect<Recorded>) -> Recorded) -> Matrix {
+        let zero = Recorded::default();
+        let mut resistances = vec![zero; self.joints()];
+        for (joint, effect) in &self.effects {
+            resistances[*joint] += resistance(effect);
+        }
+        let (seals, fadings) = (vec![Some(zero); self.seals.len()], vec![Some(zero); self.memories.len()]);
+        self.chords(x, &resistances, &seals, &fadings)
+    }
+
+    /// The derivative of the rates at `x` with these constants in the place of the resistance of joints and `seals` and of the fading of
+    /// memories, and with the chords of contacts.
+    fn chords(
+        &mut self,
+        x: &[Recorded],
+        resistances: &[Recorded],
+        seals: &[Option<Recorded>],
+        fadings: &[Option<Recorded>],
+    ) -> Matrix {
+        self.seals = seals.iter().map(|seal| seal.map(Recorded::frozen)).collect();
+        self.memories.replace(fadings.iter().map(|fading| fading.map(Recorded::frozen)));
+        let resistances: Vec<_> = resistances.iter().map(|resistance| resistance.frozen()).collect();
         let chords =
             |effects: &[(usize, JointEffect<Recorded>)], [q, v, _]: [&[Recorded]; 3], total: &mut [Recorded]| {
                 for (joint, effect) in effects {
@@ -222,11 +357,9 @@ impl Dynamics<Recorded> {
             };
         let resistance =
             |law: &ContactFriction<Recorded>, square: Recorded, normal| law.chord(square.frozen()).frozen() * normal;
-        let mut rates = vec![Recorded::default(); dim];
+        let mut rates = vec![Recorded::default(); x.len()];
         self.rhs_with(x, &mut rates, (chords, resistance));
-        self.seals.fill(None);
-        self.memories.replace(std::iter::repeat(None));
-        Stiff::Chords(nodes(&rates))
+        Matrix::by_states(rates, x.len())
     }
 }
 

@@ -1,11 +1,10 @@
 //! Quasi-static pressures: both chambers without a state, from what flows in and out of them.
 
+mod search;
+
 use super::{Chambers, Cylinder, Fluid, Valve};
 use crate::scalar::Scalar;
-
-/// Most steps of one search for a pressure, and how near its end has to be in shares of the supply's pressure.
-const STEPS: usize = 40;
-const NEAR: f64 = 1e-5;
+use search::{DIFFERENCE, PRESSURE};
 
 /// Flows of a cylinder's chambers behind a valve that stands still, with oil that does not give way.
 ///
@@ -31,20 +30,6 @@ pub struct Balance<'a, S> {
     tank: S,
 }
 
-/// A chamber with its two edges in plain numbers.
-struct Side {
-    /// Flow per root of pressure through the edges to the supply and to the tank, m^3/(s sqrt(Pa)).
-    open: [f64; 2],
-    /// Laminar leakage to the tank, m^3/(s Pa).
-    external: f64,
-    /// Flow that the piston takes, m^3/s.
-    swept: f64,
-    supply: f64,
-    tank: f64,
-    vapour: f64,
-    transition: f64,
-}
-
 impl<'a, S: Scalar> Balance<'a, S> {
     /// The balance with the spool at `place` (spool unit) between the pressures of `[supply, tank]` (Pa).
     #[inline]
@@ -61,10 +46,11 @@ impl<'a, S: Scalar> Balance<'a, S> {
     /// Pressures (Pa) with the piston moving at `v` (m/s).
     #[inline]
     pub fn chambers(&self, v: S) -> Chambers<S> {
-        let Chambers { a, b } = self.search(v.re());
-        let mut found = [S::from_f64(a), S::from_f64(b)];
+        let areas = self.cylinder.areas();
+        let swept = [areas.a * v, -(areas.b * v)];
+        let mut found = self.search(swept);
         for _ in 0..2 {
-            found = self.refined(found, v);
+            found = self.refined(found, swept);
         }
         Chambers { a: found[0], b: found[1] }
     }
@@ -75,149 +61,43 @@ impl<'a, S: Scalar> Balance<'a, S> {
         self.cylinder.worn_leakage.map_or(self.cylinder.internal_leakage, |worn| self.cylinder.internal_leakage + worn)
     }
 
-    /// Both pressures to within [`NEAR`].
-    fn search(&self, v: f64) -> Chambers<f64> {
-        let areas = self.cylinder.areas();
-        let (a, b) =
-            (self.side(self.edges, areas.a.re() * v), self.side([self.edges[1], self.edges[0]], -areas.b.re() * v));
-        let leakage = self.internal().re();
-        let alone = [a.pressure(0.0).0, b.pressure(0.0).0];
-        let most = alone[0] - alone[1];
-        if leakage == 0.0 || most == 0.0 {
-            return Chambers { a: alone[0], b: alone[1] };
-        }
-        let gap = |difference: f64| {
-            let ((a, by_a), (b, by_b)) = (a.pressure(leakage * difference), b.pressure(-leakage * difference));
-            (a - b - difference, leakage * (by_a + by_b) - 1.0)
-        };
-        let near = NEAR * self.supply.re();
-        let difference = falling_zero(most, [most.min(0.0), most.max(0.0)], near, gap);
-        Chambers { a: a.pressure(leakage * difference).0, b: b.pressure(-leakage * difference).0 }
-    }
-
-    fn side(&self, edges: [S; 2], swept: f64) -> Side {
-        let orifice = &self.valve.orifice;
-        Side {
-            open: edges.map(|opening| orifice.gain.re() * opening.re()),
-            external: self.cylinder.external_leakage.re(),
-            swept,
-            supply: self.supply.re(),
-            tank: self.tank.re(),
-            vapour: self.vapour.re(),
-            transition: orifice.transition_pressure.re(),
-        }
+    /// Both pressures nearly, without derivatives; the piston takes the flows `swept` (m^3/s) from the chambers.
+    fn search(&self, [swept_a, swept_b]: [S; 2]) -> [S; 2] {
+        let [forward, backward] = self.edges.map(|opening| self.valve.orifice.gain * opening);
+        let (internal, external) = (self.internal(), self.cylinder.external_leakage);
+        let shared = [self.supply, self.tank, self.vapour, self.valve.orifice.transition_pressure];
+        let own = [forward, backward, swept_a, swept_b, internal, external];
+        let leak = internal * S::search(&DIFFERENCE, own.into_iter().chain(shared));
+        [[forward, backward, swept_a + leak, external], [backward, forward, swept_b - leak, external]]
+            .map(|own| S::search(&PRESSURE, own.into_iter().chain(shared)))
     }
 
     /// One step of Newton's method on both balances; a chamber at the vapour pressure stays there.
-    fn refined(&self, [a, b]: [S; 2], v: S) -> [S; 2] {
-        let (areas, internal, external) = (self.cylinder.areas(), self.internal(), self.cylinder.external_leakage);
+    fn refined(&self, [a, b]: [S; 2], [swept_a, swept_b]: [S; 2]) -> [S; 2] {
+        let internal = self.internal();
         let [forward, backward] = self.edges;
-        let orifice = &self.valve.orifice;
-        let side = |p: S, [filling, emptying]: [S; 2], swept: S| {
-            let (in_drop, out_drop) = (self.supply - p, p - self.tank);
-            let flow = orifice.flow(filling, in_drop) - orifice.flow(emptying, out_drop) - external * out_drop - swept;
-            (flow, orifice.conductance(filling, in_drop) + orifice.conductance(emptying, out_drop) + external)
-        };
-        let ((net_a, slope_a), (net_b, slope_b)) =
-            (side(a, [forward, backward], areas.a * v), side(b, [backward, forward], -(areas.b * v)));
         let leak = internal * (a - b);
-        let (net_a, net_b) = (net_a - leak, net_b + leak);
-        match [a, b].map(|p| p.re() <= self.vapour.re()) {
-            [true, true] => [self.vapour, self.vapour],
-            [true, false] => {
-                let shift = (net_b + internal * (self.vapour - a)) / (slope_b + internal);
-                [self.vapour, (b + shift).max(self.vapour)]
-            }
-            [false, true] => {
-                let shift = (net_a + internal * (self.vapour - b)) / (slope_a + internal);
-                [(a + shift).max(self.vapour), self.vapour]
-            }
-            [false, false] => {
-                let (own_a, own_b) = (slope_a + internal, slope_b + internal);
-                let determinant = own_a * own_b - internal * internal;
-                let shift_a = (own_b * net_a + internal * net_b) / determinant;
-                let shift_b = (internal * net_a + own_a * net_b) / determinant;
-                [(a + shift_a).max(self.vapour), (b + shift_b).max(self.vapour)]
-            }
-        }
-    }
-}
-
-impl Side {
-    /// Pressure (Pa) with a `leak` (m^3/s) that leaves the chamber beside that to the tank, and how it changes with that.
-    fn pressure(&self, leak: f64) -> (f64, f64) {
-        let taken = self.swept + leak;
-        let net = |p: f64| {
-            let (to_supply, to_tank) = (self.root(self.supply - p), self.root(p - self.tank));
-            let [filling, emptying] = self.open;
-            let flow = filling * to_supply.0 - emptying * to_tank.0 - self.external * (p - self.tank) - taken;
-            (flow, -(filling * to_supply.1 + emptying * to_tank.1 + self.external))
+        // Net flow, its slope by the chamber's own pressure and by the other: instead, at the vapour pressure, the way to that.
+        let row = |p: S, edges: [S; 2], taken: S| {
+            let held = || [self.vapour - p, S::one(), S::zero()];
+            let free = || {
+                let [net, slope] = self.net(p, edges, taken);
+                [net, slope + internal, internal]
+            };
+            self.vapour.if_less(p, free, held)
         };
-        if net(self.vapour).0 <= 0.0 {
-            return (self.vapour, 0.0);
-        }
-        let wide = self.open[0].max(self.open[1]);
-        let most = self.supply + self.transition + (taken / wide).powi(2);
-        let found = falling_zero(self.turbulent(taken), [self.vapour, most], NEAR * self.supply, net);
-        (found, 1.0 / net(found).1)
+        let [net_a, own_a, cross_a] = row(a, [forward, backward], swept_a + leak);
+        let [net_b, own_b, cross_b] = row(b, [backward, forward], swept_b - leak);
+        let determinant = own_a * own_b - cross_a * cross_b;
+        let shifts = [(own_b * net_a + cross_a * net_b) / determinant, (cross_b * net_a + own_a * net_b) / determinant];
+        [(a + shifts[0]).max(self.vapour), (b + shifts[1]).max(self.vapour)]
     }
 
-    /// Signed root of a drop and its slope, see [`super::Orifice`].
-    fn root(&self, drop: f64) -> (f64, f64) {
-        let size = drop.abs();
-        if size < self.transition {
-            let (share, root) = (drop / self.transition, self.transition.sqrt());
-            return (root * share * (3.0 - share.abs()) * 0.5, (1.5 - share.abs()) / root);
-        }
-        let root = size.sqrt();
-        (root.copysign(drop), 0.5 / root)
+    /// What flows into a chamber at pressure `p`, less what is `taken` from it (m^3/s), and how much that falls with the pressure.
+    fn net(&self, p: S, [filling, emptying]: [S; 2], taken: S) -> [S; 2] {
+        let (orifice, external) = (&self.valve.orifice, self.cylinder.external_leakage);
+        let (in_drop, out_drop) = (self.supply - p, p - self.tank);
+        let flow = orifice.flow(filling, in_drop) - orifice.flow(emptying, out_drop) - external * out_drop - taken;
+        [flow, orifice.conductance(filling, in_drop) + orifice.conductance(emptying, out_drop) + external]
     }
-
-    /// Pressure that lets `taken` (m^3/s) pass in closed form, without leakage and with turbulent edges.
-    ///
-    /// Law: `f sqrt(ps - p) - e sqrt(p - pt) = taken` with f and e of both edges. Between the two pressures `p = pt + (ps - pt) s^2` gives
-    /// `f sqrt(1 - s^2) = c + e s`, `c = taken / sqrt(ps - pt)`; beyond, both edges flow the same way.
-    fn turbulent(&self, taken: f64) -> f64 {
-        let ([filling, emptying], range) = (self.open, self.supply - self.tank);
-        let share = taken / range.sqrt();
-        let beyond = |near: f64, far: f64| {
-            let root = (share * share - far * far)
-                / (share.abs() * near + far * (share * share + (near * near - far * far)).max(0.0).sqrt());
-            range * root * root
-        };
-        if share > filling {
-            return self.tank - beyond(emptying, filling);
-        }
-        if share < -emptying {
-            return self.supply + beyond(filling, emptying);
-        }
-        let square = filling * filling + emptying * emptying;
-        let s = (filling * (square - share * share).max(0.0).sqrt() - emptying * share) / square;
-        self.tank + range * s * s
-    }
-}
-
-/// Zero of a falling function between `low` and `high`, from `start`: Newton's steps, and halves of the bracket where those leave it or do
-/// not shrink, as around the root of a root, which they would jump across for ever (Press et al. 2007, "Numerical Recipes", section 9.4).
-fn falling_zero(start: f64, [mut low, mut high]: [f64; 2], near: f64, f: impl Fn(f64) -> (f64, f64)) -> f64 {
-    let mut at = if start >= low && start <= high { start } else { 0.5 * (low + high) };
-    let mut before = high - low;
-    for _ in 0..STEPS {
-        let (value, slope) = f(at);
-        if value > 0.0 {
-            low = at;
-        } else {
-            high = at;
-        }
-        let mut next = at - value / slope;
-        if (next - at).abs() <= near {
-            return next;
-        }
-        if !(next > low && next < high && (next - at).abs() <= 0.5 * before) {
-            next = 0.5 * (low + high);
-        }
-        before = (next - at).abs();
-        at = next;
-    }
-    at
 }

@@ -15,6 +15,7 @@ use super::super::operation::Function;
 use super::Unavailable;
 use super::emit::{Arrays, Emitter, Pool};
 use super::plan::Plan;
+use crate::scalar::{ARGUMENTS, Search};
 
 type Called = extern "C" fn(f64) -> f64;
 
@@ -42,6 +43,12 @@ extern "C" fn tanh(x: f64) -> f64 {
 extern "C" fn atan(x: f64) -> f64 {
     x.atan()
 }
+
+/// What a search finds with the arguments that the code has put first into the work array.
+extern "C" fn search(search: &'static Search, arguments: &[f64; ARGUMENTS]) -> f64 {
+    search.value(arguments.iter().copied().take(search.arguments))
+}
+const SEARCH: &str = "vpm_search";
 
 /// One piece: inputs, outputs, work, constants.
 type Piece = unsafe extern "C" fn(*const f64, *mut f64, *mut f64, *const f64);
@@ -71,15 +78,16 @@ impl Code {
         let slot = self.module.get_mut().unwrap_or_else(PoisonError::into_inner);
         let Some(module) = slot else { return Ok(()) };
         let (mut pool, mut registers) = (Pool::default(), vec![None; numbers]);
-        let called = declare(module)?;
+        let (called, search) = declare(module)?;
         let mut context = module.make_context();
         let mut pieces = Vec::with_capacity(plan.pieces.len());
         for steps in &plan.pieces {
             context.func.signature = signature(module, 4, types::I64, None);
             let calls: Vec<_> = called.iter().map(|&id| module.declare_func_in_func(id, &mut context.func)).collect();
+            let search = module.declare_func_in_func(search, &mut context.func);
             emit(&mut context, |code, arrays| {
                 let registers = &mut registers;
-                let mut emitter = Emitter { code, arrays, pool: &mut pool, registers, called: &calls };
+                let mut emitter = Emitter { code, arrays, pool: &mut pool, registers, called: &calls, search };
                 let sound = steps.iter().all(|step| emitter.step(step).is_some());
                 emitter.code.ins().return_(&[]);
                 sound
@@ -107,7 +115,8 @@ impl Code {
         for piece in &self.pieces {
             // SAFETY: the code reads inputs below `self.inputs` and constants below their length, reads and writes outputs below
             // `self.outputs` and work below `self.work`: so `Plan` made it from a checked program, and these are the lengths of
-            // the arrays. The borrows keep the arrays apart and alive. The code calls functions that cannot unwind only.
+            // the arrays. The borrows keep the arrays apart and alive. The code calls functions that cannot unwind only; `search` it
+            // hands the address of a static and the work array, which `Plan` begins with the arguments of a search, if there is one.
             unsafe { piece(inputs.as_ptr(), outputs.as_mut_ptr(), work.as_mut_ptr(), self.constants.as_ptr()) };
         }
         true
@@ -129,6 +138,7 @@ fn module() -> Result<JITModule, Unavailable> {
         for (function, pointer) in CALLED {
             builder.symbol(name(function), pointer as *const u8);
         }
+        builder.symbol(SEARCH, search as *const u8);
         builder
     }))
 }
@@ -159,13 +169,16 @@ fn flags() -> Result<settings::Flags, SetError> {
     Ok(settings::Flags::new(flags))
 }
 
-fn declare(module: &mut JITModule) -> Result<Vec<FuncId>, Unavailable> {
+/// The functions of [`CALLED`], and the one that calls a search.
+fn declare(module: &mut JITModule) -> Result<(Vec<FuncId>, FuncId), Unavailable> {
+    let of_search = signature(module, 2, types::I64, Some(types::F64));
     let signature = signature(module, 1, types::F64, Some(types::F64));
     let mut ids = Vec::with_capacity(CALLED.len());
     for (function, _) in CALLED {
         ids.push(module.declare_function(name(function), Linkage::Import, &signature).map_err(failed)?);
     }
-    Ok(ids)
+    let search = module.declare_function(SEARCH, Linkage::Import, &of_search).map_err(failed)?;
+    Ok((ids, search))
 }
 
 fn failed(error: ModuleError) -> Unavailable {

@@ -9,6 +9,7 @@ use cranelift_codegen::ir::{FuncRef, InstBuilder, MemFlagsData, Type, Value, typ
 use super::super::operation::Function;
 use super::plan::{Place, Step};
 use super::task::{Kind, NONE};
+use crate::scalar::Search;
 
 /// The constants of a program, each once.
 #[derive(Debug, Default)]
@@ -44,6 +45,8 @@ pub(super) struct Emitter<'a> {
     pub registers: &'a mut [Option<Value>],
     /// The functions that are called, in the order of [`CALLED`](super::code::CALLED).
     pub called: &'a [FuncRef],
+    /// The function that calls a search.
+    pub search: FuncRef,
 }
 
 impl Emitter<'_> {
@@ -111,6 +114,11 @@ impl Emitter<'_> {
             Kind::SineCosine => return self.sine_cosine(a),
             Kind::Call(function) => self.call(function, a)?,
             Kind::Select => self.select([a, b, c, d]),
+            Kind::Argument(place) => {
+                self.code.ins().store(MemFlagsData::trusted(), a, self.arrays.work, offset(place)?);
+                a
+            }
+            Kind::Search(search) => self.search(search)?,
         };
         Some([value, value])
     }
@@ -118,6 +126,13 @@ impl Emitter<'_> {
     fn call(&mut self, function: Function, argument: Value) -> Option<Value> {
         let place = super::code::CALLED.iter().position(|&(known, _)| known == function)?;
         let call = self.code.ins().call(*self.called.get(place)?, &[argument]);
+        self.code.func.dfg.inst_results(call).first().copied()
+    }
+
+    fn search(&mut self, search: &'static Search) -> Option<Value> {
+        let address = std::ptr::from_ref(search).expose_provenance();
+        let address = self.code.ins().iconst(types::I64, i64::try_from(address).ok()?);
+        let call = self.code.ins().call(self.search, &[address, self.arrays.work]);
         self.code.func.dfg.inst_results(call).first().copied()
     }
 

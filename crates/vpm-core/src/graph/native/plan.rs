@@ -7,6 +7,7 @@
 use super::super::operation::{Node, Operation};
 use super::super::program::Program;
 use super::task::{Kind, Task, tasks};
+use crate::scalar::ARGUMENTS;
 
 /// Numbers kept in registers: of the sixteen of x86-64, those that stay free serve the arguments that come from memory.
 const REGISTERS: usize = 13;
@@ -41,7 +42,7 @@ pub(super) enum Step {
 #[derive(Debug, Default)]
 pub(super) struct Plan {
     pub pieces: Vec<Vec<Step>>,
-    /// Length of the work array.
+    /// Length of the work array; the first [`ARGUMENTS`] of it are for calls of searches, if there are any.
     pub work: usize,
 }
 
@@ -96,7 +97,9 @@ impl Planner {
                 _ => None,
             };
         }
-        Self { plan: Plan::default(), steps: Vec::new(), fates, registers: Vec::new(), free: Vec::new() }
+        // The arguments of a search stand first, in the order that it takes them in.
+        let plan = Plan { work: if program.calls().is_empty() { 0 } else { ARGUMENTS }, ..Plan::default() };
+        Self { plan, steps: Vec::new(), fates, registers: Vec::new(), free: Vec::new() }
     }
 
     fn take(&mut self, number: usize, task: &Task) {
@@ -110,7 +113,7 @@ impl Planner {
         let fates = &self.fates;
         self.registers.retain(|&node| !fates[node as usize].uses.is_empty());
         self.leave(match task.kind {
-            Kind::Call(_) => 0,
+            Kind::Call(_) | Kind::Search(_) => 0,
             Kind::SineCosine => REGISTERS - WITHIN_SINE,
             _ => REGISTERS - 1,
         });

@@ -1,9 +1,11 @@
-//! What the processor is to do: a program's operations with products fused into sums and sines paired with cosines.
+//! What the processor is to do: a program's operations with products fused into sums, sines paired with cosines, and searches after
+//! their arguments.
 
 use std::collections::HashMap;
 
-use super::super::operation::{Function, Node, Operation};
+use super::super::operation::{Call, Function, Node, Operation};
 use super::super::program::Program;
+use crate::scalar::{ARGUMENTS, Search};
 
 /// No number.
 pub(super) const NONE: Node = Node::MAX;
@@ -29,6 +31,10 @@ pub(super) enum Kind {
     Call(Function),
     /// a < b ? c : d.
     Select,
+    /// To the place of this argument of the search that comes next; makes no number.
+    Argument(u32),
+    /// A search that is called with the arguments before it.
+    Search(&'static Search),
 }
 
 /// One task: its results are numbers of the program.
@@ -70,7 +76,7 @@ pub(super) fn tasks(program: &Program) -> Vec<Task> {
     for (node, operation) in operations.iter().enumerate() {
         let result = node as Node;
         let task = |kind, arguments: &[Node]| Task::new(kind, arguments, result);
-        tasks.push(match *operation {
+        let made = match *operation {
             Operation::Constant(_) | Operation::Input(_) => continue,
             Operation::Multiply(..) if fused[node].absorbed => continue,
             Operation::Multiply(a, b) => task(Kind::Multiply, &[a, b]),
@@ -96,7 +102,14 @@ pub(super) fn tasks(program: &Program) -> Vec<Task> {
             }
             Operation::Apply(function, a) => task(Kind::Call(function), &[a]),
             Operation::Select(nodes) => task(Kind::Select, &nodes),
-        });
+            Operation::Search(call) => {
+                let Call { search, arguments } = &program.calls()[call as usize];
+                let arguments = arguments.iter().take(ARGUMENTS).zip(0..);
+                tasks.extend(arguments.map(|(&from, place)| Task::new(Kind::Argument(place), &[from], NONE)));
+                task(Kind::Search(search), &[])
+            }
+        };
+        tasks.push(made);
     }
     tasks
 }
@@ -114,7 +127,8 @@ struct Fusing {
 fn fused(program: &Program) -> Vec<Fusing> {
     let operations = program.operations();
     let mut uses = vec![0_u32; operations.len()];
-    operations.iter().for_each(|operation| operation.arguments(|argument| uses[argument as usize] += 1));
+    let calls = program.calls();
+    operations.iter().for_each(|operation| operation.arguments(calls, |argument| uses[argument as usize] += 1));
     program.outputs().iter().for_each(|&output| uses[output as usize] += 1);
     let mut fused = vec![Fusing { product: NONE, absorbed: false }; operations.len()];
     for (node, operation) in operations.iter().enumerate() {

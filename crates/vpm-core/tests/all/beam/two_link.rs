@@ -50,13 +50,13 @@ fn steps_allocate_nothing<S: Scalar>(lift: impl Fn(f64) -> S) -> Result<()> {
     let theta: Vec<S> = d.parameters.iter().map(|&value| lift(value)).collect();
     let mut system = d.system::<S>(&theta)?;
     for method in Method::ALL {
+        system.make_for(method)?;
         let mut integrator = Integrator::new(method, system.dim());
         let (mut x, mut outputs) = (vec![S::zero(); system.dim()], vec![S::zero(); d.n_outputs()]);
         let mut rate = x.clone();
         let counted = measure(|| {
             integrator.step(&mut system, &mut x, 1e-5);
-            system.rhs(&x, &mut rate);
-            system.dynamics().observe(&x, &rate, &mut outputs);
+            system.sample(&x, &mut rate, &mut outputs);
         });
         assert_eq!(counted.count_total, 0, "{}", method.name());
     }

@@ -4,6 +4,7 @@ use std::iter::Sum;
 use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
 
 use vpm_core::Scalar;
+use vpm_core::scalar::Search;
 
 /// A plain number whose comparisons are not known before both ways are worked out, and whose value no law may ask for.
 #[derive(Clone, Copy, Debug, Default)]
@@ -49,6 +50,9 @@ impl Scalar for Both {
     }
     fn powi(self, exponent: i32) -> Self {
         Self(self.0.powi(exponent))
+    }
+    fn search(search: &'static Search, arguments: impl Iterator<Item = Self>) -> Self {
+        Self(search.value(arguments.map(|argument| argument.0)))
     }
 }
 

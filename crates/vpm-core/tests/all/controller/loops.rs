@@ -89,6 +89,8 @@ fn controllers_allocate_nothing() {
         let count = |rows: usize| {
             measure(|| drop(bench.closed(&START, &references[..4 * rows], &zeros[..4 * rows]))).count_total
         };
+        // What is recorded in the first run is kept.
+        count(20);
         let (short, long) = (count(20), count(200));
         assert_eq!(short, long);
         assert!(short > 0, "the counter sees nothing");

@@ -31,13 +31,21 @@ fn state(tree: &Model<f64>, seed: u64) -> [Vec<f64>; 3] {
 ///
 /// Numbers of very different size stand side by side, so that the natural measure is the kinetic energy of the error.
 fn error(matrix: &[f64], found: &[f64], expected: &[f64]) -> f64 {
-    let n = found.len();
-    let square = |x: &[f64]| -> f64 {
-        (0..n).map(|i| x[i] * (0..n).map(|j| matrix[i * n + j] * x[j]).sum::<f64>()).sum::<f64>().max(0.0)
-    };
-    let difference: Vec<f64> = found.iter().zip(expected).map(|(found, expected)| found - expected).collect();
     // Both vanish where nothing pushes at anything.
-    (square(&difference) / square(expected).max(f64::MIN_POSITIVE)).sqrt()
+    distance(matrix, found, expected) / size(matrix, expected).max(f64::MIN_POSITIVE.sqrt())
+}
+
+/// The norm of the difference of two vectors by which kinetic energy is reckoned.
+fn distance(matrix: &[f64], found: &[f64], expected: &[f64]) -> f64 {
+    let difference: Vec<f64> = found.iter().zip(expected).map(|(found, expected)| found - expected).collect();
+    size(matrix, &difference)
+}
+
+/// The norm by which kinetic energy is reckoned.
+fn size(matrix: &[f64], x: &[f64]) -> f64 {
+    let n = x.len();
+    let row = |i: usize| x[i] * (0..n).map(|j| matrix[i * n + j] * x[j]).sum::<f64>();
+    (0..n).map(row).sum::<f64>().max(0.0).sqrt()
 }
 
 /// `g D + g^2 K` of the beams and `g R` of the joints, added to a matrix.
@@ -136,11 +144,12 @@ proptest! {
             articulated(&plain, &mut data, &go(&q), &go(&v), &tau).to_vec()
         };
         // Four points: the error goes with the fourth power of the step.
-        let h = 1e-3;
+        let h = 2e-4;
         let [a, b, c, d] = [-2.0 * h, -h, h, 2.0 * h].map(&mut at);
         let expected: Vec<f64> = (0..n).map(|k| (a[k] - d[k] + 8.0 * (c[k] - b[k])) / (12.0 * h)).collect();
         let (matrix, _) = dense(&plain, &[q, v, tau]);
-        let error = error(&matrix, &found, &expected);
+        // Where nothing depends on the state, slopes are the rounding of the accelerations.
+        let error = error(&matrix, &found, &expected).min(1e6 * distance(&matrix, &found, &expected) / size(&matrix, &b));
         prop_assert!(error < 1e-4, "error {error}");
     }
 }

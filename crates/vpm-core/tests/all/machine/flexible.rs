@@ -13,6 +13,7 @@ use vpm_core::mount::{Gauge, Marker, Mount};
 use vpm_core::ode::Ode;
 use vpm_core::samples::Random;
 use vpm_core::simulate::{Run, Setting, Stepping, free_run, prescribed};
+use vpm_core::system::Build;
 use vpm_core::table::Table;
 use vpm_core::{Dual, Error, Result};
 
@@ -109,13 +110,13 @@ fn markers_move_as_their_jacobian_says() -> Result<()> {
     let d = description(&everything(8), |_| ());
     const N: usize = 13;
     let theta: Vec<_> = d.parameters.iter().map(|&value| Dual::<f64, N>::constant(value)).collect();
-    let mut dynamics = d.system::<Dual<f64, N>>(&theta)?;
+    let mut dynamics = Build::dynamics(&&d, &theta)?;
     let q = Random::new(4).numbers(N, 0.3);
     let mut x: Vec<Dual<f64, N>> = (0..N).map(|k| Dual::variable(q[k], k)).collect();
     x.resize(2 * N, Dual::constant(0.0));
     let (mut rate, mut outputs) = (x.clone(), vec![Dual::constant(0.0); d.n_outputs()]);
     dynamics.rhs(&x, &mut rate);
-    dynamics.dynamics().observe(&x, &rate, &mut outputs);
+    dynamics.observe(&x, &rate, &mut outputs);
     for marker in 0..3 {
         let jacobian = evaluate::marker_jacobian(&d, &d.parameters, &q, marker)?;
         let first = d.layout().markers() + 6 * marker;

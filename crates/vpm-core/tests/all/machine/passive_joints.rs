@@ -1,5 +1,6 @@
 //! Motion prescribed at some joints only: the others rest in their springs and plays, then move freely.
 
+use allocation_counter::measure;
 use serde_json::json;
 use vpm_core::Result;
 use vpm_core::beam::{Component, Level};
@@ -7,10 +8,10 @@ use vpm_core::description::Description;
 use vpm_core::integrator::Method;
 use vpm_core::joint::JointKind;
 use vpm_core::model::Parts;
-use vpm_core::motion::JointMotion;
+use vpm_core::motion::{JointMotion, StrainRates};
 use vpm_core::mount::{Gauge, Mount};
 use vpm_core::samples::Random;
-use vpm_core::simulate::{Run, Setting, Stepping, free_run, prescribed};
+use vpm_core::simulate::{Run, Setting, Stepping, free_run, observed, prescribed};
 use vpm_core::table::Table;
 
 use crate::common::trees::{beam, body, description, parameter, push, section};
@@ -112,6 +113,51 @@ fn sensitivities_of_partly_prescribed_motion_are_slopes() -> Result<()> {
             largest = largest.max(found.abs());
         }
         assert!(largest > 1e-4, "{} must matter: {largest}", d.parameter_names[place]);
+    }
+    Ok(())
+}
+
+#[test]
+fn gauges_that_hold_agree_with_and_without_derivatives() -> Result<()> {
+    let (d, rows) = (geared(0.01), 12);
+    let motion = turning(rows as u32, 0.005);
+    let rate: Vec<f64> = (0..rows).map(|k| 2e-3 * (k as f64).sin()).collect();
+    for method in [Method::LinearlyImplicit, Method::Rosenbrock] {
+        let run = |by: &[usize], gain: f64, substeps: usize| -> Result<Run> {
+            let table = |k: usize| Table::new("motion", &motion[k], rows, 3);
+            let stepping = Stepping::new(0.005, substeps, method)?;
+            let setting =
+                Setting { description: &d, theta: &d.parameters, stepping, sensitivities: by, interrupt: &|| false };
+            let moving = JointMotion { position: table(0)?, velocity: table(1)?, acceleration: table(2)? };
+            let strains = StrainRates { rate: Table::new("rate", &rate, rows, 1)?, gain: &[gain] };
+            observed(setting, moving, &[PLAY, 2], Some(strains))
+        };
+        let (plain, lifted) = (run(&[], 50.0, 20)?, run(&[d.beams[0].material.young], 50.0, 20)?);
+        let apart =
+            |a: &Run, b: &Run| a.outputs.iter().zip(&b.outputs).fold(0.0_f64, |most, (a, b)| most.max((a - b).abs()));
+        let (rounding, fine, free) =
+            (apart(&plain, &lifted), apart(&plain, &run(&[], 50.0, 40)?), apart(&plain, &run(&[], 0.0, 20)?));
+        assert!(rounding < 1e-6 && fine < 0.1 * free, "{method}: {rounding}, finer {fine}, without gauges {free}");
+    }
+    Ok(())
+}
+
+#[test]
+fn steps_along_a_motion_allocate_nothing() -> Result<()> {
+    let d = geared(0.01);
+    let (motion, young) = (turning(3, 0.005), [d.beams[0].material.young]);
+    for method in [Method::LinearlyImplicit, Method::Rosenbrock] {
+        for by in [&[][..], &young] {
+            let allocations = |substeps: usize| -> Result<u64> {
+                let stepping = Stepping::new(0.005, substeps, method)?;
+                let mut run = Ok(());
+                let counted = measure(|| run = guided(&d, stepping, &motion, &[PLAY, 2], by).map(|_| ()));
+                run.map(|()| counted.count_total)
+            };
+            // The first run records what all share.
+            allocations(4)?;
+            assert_eq!(allocations(4)?, allocations(12)?, "{method}, {} derivatives", by.len());
+        }
     }
     Ok(())
 }

@@ -8,14 +8,16 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-use common::Machine;
+use common::servo_machine::{MIDDLE, with_pressures};
+use common::{Machine, hydraulics};
 use serde_json::json;
 use vpm_core::c_source::{Files, Names, files};
 use vpm_core::description::Description;
-use vpm_core::graph::{Evaluator, Function, Graph, Node, Program, literal};
+use vpm_core::graph::{Call, Evaluator, Function, Graph, Node, Program, literal};
 use vpm_core::integrator::{Rk4, Rosenbrock};
 use vpm_core::linearize::linearize;
 use vpm_core::samples::{Random, arm7, pendulum};
+use vpm_core::scalar::Search;
 
 const STRICT: [&str; 5] = ["-Wall", "-Wextra", "-Werror", "-pedantic", "-O1"];
 
@@ -61,6 +63,17 @@ fn same(found: &[f64], expected: &[f64], tolerance: f64, what: &str) {
     }
 }
 
+/// The larger of two numbers, by another function.
+static LARGER: Search = Search {
+    name: "larger",
+    arguments: 2,
+    run: |&[a, b, ..]| if a < b { b } else { a },
+    source: &[
+        "static int less(double a, double b) { return a < b; }\n",
+        "static double larger(double a, double b) { return less(a, b) ? b : a; }\n",
+    ],
+};
+
 /// A graph of `count` operations of all kinds over `inputs`, whose numbers stay of moderate size.
 #[cfg(test)]
 fn random_graph(random: &mut Random, inputs: u32, count: usize) -> (Graph, Vec<Node>) {
@@ -80,12 +93,13 @@ fn random_graph(random: &mut Random, inputs: u32, count: usize) -> (Graph, Vec<N
         let mut pick = |among: usize| ((random.symmetric().abs() * among as f64) as usize).min(among - 1);
         let [a, b, c, d] = [(); 4].map(|()| nodes[nodes.len() - 1 - pick(nodes.len().min(2500))]);
         let kind = pick(functions.len());
-        let node = match number % 6 {
+        let node = match number % 7 {
             0 => graph.add(a, b),
             1 => graph.subtract(a, b),
             2 => graph.multiply(a, b),
             3 => graph.select([a, b, c, d]),
             4 => graph.apply(functions[kind], a),
+            5 => graph.search(Call { search: &LARGER, arguments: [a, b].into() }),
             _ => {
                 let square = graph.multiply(b, b);
                 let one = graph.constant(1.0 + 1.0 / (1.0 + number as f64));
@@ -115,9 +129,10 @@ fn programs_of_any_length_say_the_same_in_c() {
         let source = program.to_c("f", &[("x", 3), ("u", 1)], &[("y", 5), ("z", 2)]);
         assert_eq!(source.text.matches("static void").count() > 1, program.size() > 1000);
         let main = format!(
-            "#include <math.h>\n#include <stdio.h>\n{}int main(void)\n{{\n    double x[4], y[7], w[{}];\n    int k;\n    \
+            "#include <math.h>\n#include <stdio.h>\n{}{}int main(void)\n{{\n    double x[4], y[7], w[{}];\n    int k;\n    \
              for (k = 0; k < 4; ++k) if (scanf(\"%lf\", x + k) != 1) return 1;\n    f(x, x + 3, w, y, y + 5);\n    \
              for (k = 0; k < 7; ++k) printf(\"%.17g\\n\", y[k]);\n    return 0;\n}}\n",
+            source.called.concat(),
             source.text,
             source.work + 1
         );
@@ -195,6 +210,15 @@ fn write(description: &Description, free: &[usize], folder: &Path) -> Files {
 /// Rates, outputs, all derivatives and steps at random places, with the free parameters at `theta`, another machine than the one written.
 #[cfg(test)]
 fn agrees(name: &str, description: &Description, free: &[usize]) {
+    agrees_at(name, description, free, |random| {
+        let mut numbers = |count: usize, size: f64| (0..count).map(|_| size * random.symmetric()).collect();
+        [numbers(description.n_states(), 0.5), numbers(description.n_inputs(), 1.0)]
+    });
+}
+
+/// The same at states and inputs of a choice.
+#[cfg(test)]
+fn agrees_at(name: &str, description: &Description, free: &[usize], place: impl Fn(&mut Random) -> [Vec<f64>; 2]) {
     let Some(folder) = folder(name) else { return };
     write(description, free, &folder);
     compile(&folder, &["main.c", "m.c"], "machine", &["-std=c99"]);
@@ -206,8 +230,7 @@ fn agrees(name: &str, description: &Description, free: &[usize]) {
     for _ in 0..4 {
         let mut theta = description.parameters.clone();
         free.iter().for_each(|&place| theta[place] *= 1.0 + 0.2 * random.symmetric());
-        let x: Vec<f64> = (0..nx).map(|_| 0.5 * random.symmetric()).collect();
-        let u: Vec<f64> = (0..nu).map(|_| random.symmetric()).collect();
+        let [x, u] = place(&mut random);
         let h = 1e-3;
         let mut given = [x.as_slice(), &u].concat();
         given.extend(free.iter().map(|&place| theta[place]));
@@ -281,6 +304,21 @@ fn an_arm_of_seven_joints_says_the_same_in_c() {
     agrees("arm", &description, &[]);
     let stiffness = description.parameter_names.iter().position(|name| name == "spring.stiffness").unwrap();
     agrees("free_arm", &description, &[stiffness]);
+}
+
+#[test]
+fn pressures_that_are_searched_for_say_the_same_in_c() {
+    for leakage in [0.0, 2e-12] {
+        let mut servo = hydraulics::nominal();
+        (servo.valve.frequency, servo.valve.damping, servo.valve.clearance) = (None, None, Some(2e-4));
+        (servo.cylinder.internal_leakage, servo.cylinder.external_leakage) = (leakage, leakage);
+        let description = with_pressures(&servo, "quasi_static", json!("constant")).build();
+        let viscous = description.parameter_names.iter().position(|name| name == "viscous_friction.viscous").unwrap();
+        agrees_at(&format!("quasi_static_{leakage}"), &description, &[viscous], |random| {
+            let [place, speed, current] = [0.01, 0.1, 4e-3].map(|size| size * random.symmetric());
+            [vec![MIDDLE + place, speed], vec![current]]
+        });
+    }
 }
 
 #[test]

@@ -9,7 +9,7 @@ use crate::common::trees;
 use both::Both;
 use proptest::prelude::*;
 use serde_json::{Value, json};
-use vpm_core::actuator::hydraulic::{EntrainedAir, ServoState, chambers_under_load};
+use vpm_core::actuator::hydraulic::{Balance, EntrainedAir, ServoState, chambers_under_load};
 use vpm_core::actuator::{DeadZone, Ideal, Saturation, TableDrive};
 use vpm_core::bushing::Bushing;
 use vpm_core::contact::{ContactFriction, NormalContact};
@@ -121,6 +121,10 @@ impl Laws for Cylinders {
             found.extend([flows.into_a, flows.out_of_b, flows.supply, flows.tank]);
             let ends = [servo.supply_pressure, servo.tank_pressure];
             let under = chambers_under_load(load * 1e6, servo.valve.opening(spool), ends, S::from_f64(0.6));
+            if clearance.is_some() {
+                let balance = Balance::new(&servo.valve, &servo.cylinder, &servo.fluid, spool, ends).chambers(v);
+                found.extend([balance.a, balance.b]);
+            }
             found.extend([under.a, under.b, servo.valve.orifice.conductance(spool, a - b)]);
         }
         found

@@ -33,6 +33,7 @@ fn a_long_run_begins_as_a_short_one() -> Result<()> {
             assert!(apart < 1e-9 * size, "{method}: {apart} of {size}");
         }
     }
-    assert!(d.natives(&d.parameters).is_ok());
+    let mut system = d.system::<f64>(&d.parameters)?;
+    assert!(system.compile(Method::Additive).is_ok() && system.has_code());
     Ok(())
 }

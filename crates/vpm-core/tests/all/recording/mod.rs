@@ -1,8 +1,9 @@
-//! Machines recorded as graphs of operations, and choices by value.
+//! Machines recorded as graphs of operations, choices by value, and searches.
 
 mod c_source;
 mod choices;
 mod code;
 mod machines;
 mod native;
+mod searches;
 mod zero_parameters;

@@ -4,8 +4,9 @@
 use allocation_counter::measure;
 use proptest::prelude::*;
 use vpm_core::error::Error;
-use vpm_core::graph::{Function, Graph, LARGEST, Native, Node, Operation, Program, Unavailable};
+use vpm_core::graph::{Call, Function, Graph, LARGEST, Native, Node, Operation, Program, Unavailable};
 use vpm_core::samples::Random;
+use vpm_core::scalar::Search;
 
 const INPUTS: usize = 5;
 const FUNCTIONS: [Function; 9] = [
@@ -19,6 +20,9 @@ const FUNCTIONS: [Function; 9] = [
     Function::Sine,
     Function::Cosine,
 ];
+
+/// No search, but called like one.
+static SUM: Search = Search { name: "sum", arguments: 3, run: |&[a, b, c, ..]| a - 0.5 * b + c, source: &[] };
 
 /// What a random operation is made from: its kind and the arguments, counted back from the newest number.
 type Seed = (u8, [u16; 4], f64);
@@ -35,13 +39,14 @@ fn graph(seeds: &[Seed], functions: usize) -> (Graph, Vec<Node>) {
         // Near and far arguments: the far ones have to wait in memory, some over the end of a function.
         let reach = |back: u16| if back.is_multiple_of(3) { made.len() } else { made.len().min(24) };
         let [a, b, c, d] = back.map(|back| made[made.len() - 1 - usize::from(back / 3) % reach(back)]);
-        made.push(match kind % 16 {
+        made.push(match kind % 17 {
             0 => graph.constant(value),
             1..4 => graph.add(a, b),
             4..6 => graph.subtract(a, b),
             6..10 => graph.multiply(a, b),
             10 => graph.divide(a, b),
             11..13 => graph.select([a, b, c, d]),
+            16 => graph.search(Call { search: &SUM, arguments: [a, b, c].into() }),
             _ => graph.apply(FUNCTIONS[usize::from(kind / 16) % functions], a),
         });
     }
@@ -52,7 +57,7 @@ fn graph(seeds: &[Seed], functions: usize) -> (Graph, Vec<Node>) {
 fn values(program: &Program, inputs: &[f64]) -> Vec<f64> {
     let mut values: Vec<f64> = Vec::new();
     for operation in program.operations() {
-        let value = operation.value(|node| values[node as usize], |number| inputs[number as usize]);
+        let value = operation.value(program.calls(), |node| values[node as usize], |number| inputs[number as usize]);
         values.push(value);
     }
     values
@@ -75,6 +80,9 @@ fn bounds(program: &Program, values: &[f64]) -> Vec<f64> {
             Operation::Apply(_, a) => e(a),
             Operation::Select([a, b, yes, no]) if (v(a) - v(b)).abs() <= e(a) + e(b) => {
                 e(yes).max(e(no)) + (v(yes) - v(no)).abs()
+            }
+            Operation::Search(call) => {
+                program.calls()[call as usize].arguments.iter().map(|&argument| e(argument)).sum()
             }
             Operation::Select([a, b, yes, no]) => e(if v(a) < v(b) { yes } else { no }),
         };

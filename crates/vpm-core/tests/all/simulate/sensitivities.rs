@@ -47,7 +47,7 @@ fn commands() -> Vec<f64> {
 }
 
 /// Central differences of `outputs(theta)` by every parameter of the machine, against the columns of `jacobian`.
-fn check(machine: &Machine, jacobian: &[f64], what: &str, outputs: impl Fn(&[f64]) -> Vec<f64>) {
+pub(super) fn check(machine: &Machine, jacobian: &[f64], what: &str, outputs: impl Fn(&[f64]) -> Vec<f64>) {
     let variables = machine.values.len();
     assert!(jacobian.iter().all(|slope| slope.is_finite()));
     for (k, name) in machine.names.iter().enumerate() {
@@ -80,7 +80,7 @@ fn moved(machine: &Machine, method: Method, theta: &[f64]) -> Bench {
 }
 
 /// Parameters that the differences cannot move because the body would lose its inertia: they stay at zero, one-sided.
-fn movable(mut machine: Machine) -> Machine {
+pub(super) fn movable(mut machine: Machine) -> Machine {
     // Point masses have zero inertia, whose entries cannot be negative: give each body a small ball's.
     for (name, value) in machine.names.iter().zip(&mut machine.values) {
         let place: Option<usize> = name.split('.').nth(1).and_then(|place| place.parse().ok());

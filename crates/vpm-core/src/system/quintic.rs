@@ -3,14 +3,14 @@
 use crate::scalar::Scalar;
 
 /// Position, velocity and acceleration of a joint.
-pub(super) type State<S> = [S; 3];
+pub(crate) type State<S> = [S; 3];
 
 /// The polynomial of degree 5 through position, velocity and acceleration at both ends of an interval (s), and its derivatives, at
 /// `time` (s) after the begin.
 ///
 /// Law: the quintic Hermite interpolant (Biagiotti & Melchiorri 2008, "Trajectory Planning for Automatic Machines and Robots", section
 /// 2.1.7). Checked: a polynomial of degree 5 is itself.
-pub(super) fn between<S: Scalar>(ends: &[State<S>; 2], time: S, interval: f64) -> State<S> {
+pub(super) fn between<S: Scalar>(ends: &[State<S>; 2], time: S, interval: S) -> State<S> {
     let [[q0, v0, a0], [q1, v1, a1]] = *ends;
     let (h, s) = (interval, time / interval);
     // In units of the interval: q0 + s v + s^2 a / 2 + s^3 (c3 + c4 s + c5 s^2).

@@ -1,0 +1,170 @@
+//! What joints, memories and drives do along a record, with derivatives by the parameters that each depends on.
+
+use super::record::Record;
+use crate::actuator::{Actuator, Drive};
+use crate::description::EffectEntry;
+use crate::error::Result;
+use crate::motion::position_sensors;
+use crate::scalar::Scalar;
+use crate::sensitivity::{Job, Pair, differentiate};
+use crate::sensor::{Channel, Sensor};
+use crate::table::Table;
+
+/// Numbers along a record, with their derivatives by those of the parameters asked for that move them.
+pub(super) struct Course {
+    /// The numbers.
+    pub(super) values: Vec<f64>,
+    /// Places of these parameters among all that are asked for.
+    by: Vec<usize>,
+    /// Derivatives by them, number by number.
+    slopes: Vec<f64>,
+}
+
+impl Course {
+    /// What the first array of `job` is, which depends on no more than the parameters `own`.
+    pub(super) fn new(job: &impl Job, theta: &[f64], sensitivities: &[usize], own: &[usize]) -> Result<Self> {
+        let by: Vec<usize> = (0..sensitivities.len()).filter(|&place| own.contains(&sensitivities[place])).collect();
+        let chosen: Vec<usize> = by.iter().map(|&place| sensitivities[place]).collect();
+        let (pair, slopes) = differentiate(job, theta, &chosen, |pass: &Pair<_>, place| pass.first[place])?;
+        Ok(Self { values: pair.first, by, slopes })
+    }
+
+    /// Whether any of the parameters asked for moves it.
+    pub(super) fn is_moved(&self) -> bool {
+        !self.by.is_empty()
+    }
+
+    /// Adds `factor` times the derivatives of number `place` to those by all parameters asked for.
+    #[inline]
+    pub(super) fn add_slopes(&self, place: usize, factor: f64, slopes: &mut [f64]) {
+        for (&column, &slope) in self.by.iter().zip(&self.slopes[place * self.by.len()..]) {
+            slopes[column] += factor * slope;
+        }
+    }
+
+    /// The derivatives of all numbers by `count` parameters asked for, number by number.
+    pub(super) fn jacobian(&self, count: usize) -> Vec<f64> {
+        let mut jacobian = vec![0.0; self.values.len() * count];
+        for (place, row) in jacobian.chunks_exact_mut(count.max(1)).enumerate() {
+            self.add_slopes(place, 1.0, row);
+        }
+        jacobian
+    }
+}
+
+/// Position, velocity and acceleration of a joint behind its sensor.
+pub(super) struct Behind<'a> {
+    pub(super) record: Record<'a>,
+    pub(super) joint: usize,
+}
+
+impl Behind<'_> {
+    /// The parameters of the sensor.
+    pub(super) fn parameters(&self) -> Vec<usize> {
+        let channel = Channel::Position { joint: self.joint };
+        let sensor = self.record.description.sensors.iter().find(|sensor| sensor.channel == channel);
+        sensor.map_or_else(Vec::new, |sensor| sensor.domains().into_iter().map(|(&index, _)| index).collect())
+    }
+}
+
+impl Job for Behind<'_> {
+    fn run<S: Scalar>(&self, theta: &[S]) -> Result<Pair<S>> {
+        let sensors = position_sensors(self.record.description, theta);
+        let states = self.record.samples().flat_map(|k| self.record.behind(k, self.joint, &sensors));
+        Ok(Pair { first: states.collect(), second: Vec::new() })
+    }
+}
+
+/// Memory of a hysteresis.
+pub(super) struct Memory<'a> {
+    pub(super) record: Record<'a>,
+    pub(super) entry: &'a EffectEntry,
+}
+
+impl Job for Memory<'_> {
+    fn run<S: Scalar>(&self, theta: &[S]) -> Result<Pair<S>> {
+        let sensors = position_sensors(self.record.description, theta);
+        Ok(Pair { first: memories(self.record, self.entry, theta, &sensors), second: Vec::new() })
+    }
+}
+
+/// Effort of an effect on its joint.
+pub(super) struct OfEffect<'a> {
+    pub(super) record: Record<'a>,
+    pub(super) entry: &'a EffectEntry,
+}
+
+impl OfEffect<'_> {
+    /// The parameters of the effect and of the sensor of its joint, on which its memory depends as well if it has one.
+    pub(super) fn parameters(record: Record<'_>, entry: &EffectEntry) -> Vec<usize> {
+        let mut own: Vec<usize> = entry.domains().into_iter().map(|(&index, _)| index).collect();
+        own.extend(entry.joint().into_iter().flat_map(|joint| Behind { record, joint }.parameters()));
+        own
+    }
+}
+
+impl Job for OfEffect<'_> {
+    fn run<S: Scalar>(&self, theta: &[S]) -> Result<Pair<S>> {
+        let Self { record, entry } = *self;
+        let sensors = position_sensors(record.description, theta);
+        let mut first = memories(record, entry, theta, &sensors);
+        if let Some((_, law)) = entry.with_memory(theta) {
+            first.iter_mut().for_each(|memory| *memory = law.effort(*memory));
+        } else if let Some((joint, law)) = entry.on_joint(theta) {
+            let effort = |[q, v, _]: [S; 3]| law.effort(q, v);
+            first = record.samples().map(|k| effort(record.behind(k, joint, &sensors))).collect();
+        }
+        Ok(Pair { first, second: Vec::new() })
+    }
+}
+
+/// Memory of an effect sample by sample, relaxed at first; nothing of one that does not remember.
+fn memories<S: Scalar>(record: Record<'_>, entry: &EffectEntry, theta: &[S], sensors: &[Option<Sensor<S>>]) -> Vec<S> {
+    let Some((joint, law)) = entry.with_memory(theta) else { return Vec::new() };
+    let (mut memory, mut before) = (S::zero(), None);
+    let next = |k| {
+        let [q, ..] = record.behind(k, joint, sensors);
+        memory = before.map_or(memory, |before| law.advance(memory, q - before));
+        before = Some(q);
+        memory
+    };
+    record.samples().map(next).collect()
+}
+
+/// Effort of an ideal drive, mean over the two intervals that meet at each sample.
+pub(super) struct Delivered<'a> {
+    pub(super) actuator: &'a Actuator<usize>,
+    /// Number of the actuator.
+    pub(super) number: usize,
+    pub(super) inputs: Table<'a>,
+    pub(super) time_step: f64,
+}
+
+impl Delivered<'_> {
+    /// The parameters of the actuator.
+    pub(super) fn parameters(&self) -> Vec<usize> {
+        self.actuator.domains().into_iter().map(|(&index, _)| index).collect()
+    }
+}
+
+impl Job for Delivered<'_> {
+    fn run<S: Scalar>(&self, theta: &[S]) -> Result<Pair<S>> {
+        let actuator = self.actuator.map(&mut |&index| theta[index]);
+        let mut first = Vec::new();
+        if let Drive::Ideal(drive) = &actuator.drive {
+            let command = |sample: usize| S::from_f64(self.inputs.at(sample, self.number));
+            let (mut state, mut before) = (None, None);
+            first.extend((0..self.inputs.rows()).map(|k| {
+                let input = actuator.input(k, self.time_step, command);
+                let mean = actuator.lag.as_ref().map_or(input, |lag| {
+                    let (next, mean) = lag.interval(state.unwrap_or(input), input, self.time_step);
+                    state = Some(next);
+                    mean
+                });
+                let effort = drive.effort(mean);
+                (before.replace(effort).unwrap_or(effort) + effort) * 0.5
+            }));
+        }
+        Ok(Pair { first, second: Vec::new() })
+    }
+}

@@ -1,0 +1,275 @@
+//! Runs along a motion: the answer of what does not follow it, sample by sample.
+
+use super::{Run, Setting, halted, lost, names};
+use crate::error::{Diverged, Error, Result};
+use crate::integrator::{Halt, Integrator, Stuck};
+use crate::motion::{JointMotion, StrainRates, position_sensors, state_sensors, strain_sensors};
+use crate::ode::Ode;
+use crate::scalar::Scalar;
+use crate::sensitivity::{Interrupt, Job, Pair, differentiate, differentiate_by};
+use crate::sensor::Sensor;
+use crate::statics::settled;
+use crate::system::{Following, Guidance};
+use crate::table::Table;
+
+/// A motion and what answers to it, all checked.
+pub(super) struct Guide<'a> {
+    pub(super) setting: Setting<'a>,
+    pub(super) motion: JointMotion<'a>,
+    /// Joints that do not follow, ascending.
+    pub(super) passive: &'a [usize],
+    pub(super) strains: Option<StrainRates<'a>>,
+    /// Without them drives and supplies do nothing.
+    pub(super) drives: Option<Drives<'a>>,
+}
+
+/// Drives and supplies that answer to a motion.
+#[derive(Clone, Copy)]
+pub(super) struct Drives<'a> {
+    pub(super) inputs: Table<'a>,
+    /// Their states at the first sample.
+    pub(super) internal: &'a [f64],
+    /// Which of their states were measured, and the readings.
+    pub(super) places: &'a [usize],
+    pub(super) seen: Table<'a>,
+}
+
+impl Guide<'_> {
+    /// Outputs of each sample, then the efforts of the drives on each joint if these answer; states; derivatives.
+    pub(super) fn run(&self) -> Result<Run> {
+        let Setting { theta, sensitivities, .. } = self.setting;
+        // Most questions are for a few parameters: lanes that nobody needs would be most of the work.
+        let (pair, jacobian) = match sensitivities.len() {
+            1 | 2 => differentiate_by::<_, 2>(self, theta, sensitivities, |pass, place| pass.first[place])?,
+            _ => differentiate(self, theta, sensitivities, |pass, place| pass.first[place])?,
+        };
+        Ok(Run { outputs: pair.first, states: pair.second, jacobian })
+    }
+
+    fn rows(&self) -> usize {
+        self.motion.position.rows()
+    }
+
+    fn guidance(&self) -> Guidance {
+        let description = self.setting.description;
+        let gains = self.strains.map_or(&[][..], |strains| strains.gain).iter().enumerate();
+        let bends =
+            |gauge: usize| description.elastic().get(description.gauges[gauge].beam).is_some_and(|&len| len > 0);
+        Guidance {
+            joints: (0..description.n_joints()).filter(|joint| !self.passive.contains(joint)).collect(),
+            gauges: gains.filter(|&(gauge, gain)| *gain > 0.0 && bends(gauge)).map(|(gauge, _)| gauge).collect(),
+            drives: self.drives.is_some(),
+        }
+    }
+}
+
+impl Job for Guide<'_> {
+    fn run<S: Scalar>(&self, theta: &[S]) -> Result<Pair<S>> {
+        let values: Vec<f64> = theta.iter().map(Scalar::inspect).collect();
+        self.setting.description.check_values(&values)?;
+        Way::<S>::new(self, theta)?.run(self.setting.interrupt)
+    }
+}
+
+/// A machine on its way along a motion.
+struct Way<'a, S> {
+    guide: &'a Guide<'a>,
+    guidance: Guidance,
+    sensors: Vec<Sensor<S>>,
+    of_joints: Vec<Option<Sensor<S>>>,
+    of_gauges: Vec<Option<Sensor<S>>>,
+    of_states: Vec<Option<Sensor<S>>>,
+    machine: Following<S>,
+    integrator: Integrator<S>,
+    /// State of what answers.
+    state: Vec<S>,
+    /// The same with measured states in the place of its own.
+    measured: Vec<S>,
+    /// State of the machine, outputs and efforts of the drives at a sample.
+    seen: Vec<S>,
+    /// See [`Guidance::given`].
+    given: Vec<S>,
+    truth: Vec<S>,
+    states: Vec<S>,
+}
+
+impl<'a, S: Scalar> Way<'a, S> {
+    fn new(guide: &'a Guide<'a>, theta: &[S]) -> Result<Self> {
+        let (Setting { description, stepping, .. }, guidance) = (guide.setting, guide.guidance());
+        let machine =
+            Following::new(description.machine(theta)?, guidance.clone(), (stepping.time_step, stepping.method))?;
+        let zeros = |count: usize| vec![S::zero(); count];
+        let seen = description.n_states() + description.n_outputs() + description.n_joints();
+        let mut way = Self {
+            guide,
+            guidance,
+            sensors: description.sensors(theta),
+            of_joints: position_sensors(description, theta),
+            of_gauges: strain_sensors(description, theta),
+            of_states: state_sensors(description, theta, guide.drives.map_or(&[], |drives| drives.places)),
+            integrator: Integrator::new(stepping.method, machine.dim()),
+            state: zeros(machine.dim()),
+            measured: zeros(machine.dim()),
+            machine,
+            seen: zeros(seen),
+            given: Vec::new(),
+            truth: Vec::new(),
+            states: zeros(guide.rows() * description.n_states()),
+        };
+        way.truth = zeros(guide.rows() * way.width());
+        if guide.rows() > 0 {
+            way.begin(theta)?;
+        }
+        Ok(way)
+    }
+
+    /// Puts the free coordinates to rest where the motion begins, and drives into their first states.
+    fn begin(&mut self, theta: &[S]) -> Result<()> {
+        let (description, count) = (self.guide.setting.description, self.machine.free().len());
+        let mut joints = vec![S::zero(); description.n_joints()];
+        self.guidance.joints.iter().for_each(|&joint| joints[joint] = self.joint(joint, 0)[0]);
+        if count > 0 {
+            let q = settled(description, theta, &joints, self.guide.passive)?;
+            self.state.iter_mut().zip(self.machine.free()).for_each(|(entry, &place)| *entry = q[place]);
+        }
+        if let Some(Drives { internal, .. }) = self.guide.drives {
+            let own = self.state[2 * count..].iter_mut().zip(internal);
+            own.for_each(|(state, &value)| *state = S::from_f64(value));
+        }
+        Ok(())
+    }
+
+    /// The true motion of a joint at a sample.
+    fn joint(&self, joint: usize, k: usize) -> [S; 3] {
+        self.guide.motion.behind(self.guide.setting.stepping.time_step, k, joint, self.of_joints[joint].as_ref())
+    }
+
+    fn run(mut self, interrupt: Interrupt<'_>) -> Result<Pair<S>> {
+        let (rows, Setting { description, stepping, .. }) = (self.guide.rows(), self.guide.setting);
+        for row in 0..rows {
+            self.move_on(row);
+            self.sample(row)?;
+            if row + 1 < rows {
+                let Self { integrator, machine, state, .. } = &mut self;
+                let pieces = (stepping.time_step, stepping.substeps);
+                integrator.advance(machine, state, pieces, interrupt).map_err(|halt| {
+                    let halt = match halt {
+                        Halt::Stuck(stuck) => Halt::Stuck(Stuck { state: self.machine.place(stuck.state), ..stuck }),
+                        Halt::Interrupted => halt,
+                    };
+                    halted(description, stepping, row, halt, self.before(row + 1))
+                })?;
+            }
+        }
+        let (layout, width) = (description.layout(), self.width());
+        let mut outputs = self.truth.clone();
+        for sensor in &self.sensors {
+            let column = sensor.channel.column(layout);
+            let truth = |sample: usize| self.truth[sample * width + column];
+            for row in 0..rows {
+                outputs[row * width + column] = sensor.read(row, stepping.time_step, truth);
+            }
+        }
+        Ok(Pair { first: outputs, second: self.states })
+    }
+
+    /// Numbers of a sample: outputs and, where drives answer, their efforts.
+    fn width(&self) -> usize {
+        let description = self.guide.setting.description;
+        description.n_outputs() + if self.guidance.drives { description.n_joints() } else { 0 }
+    }
+
+    /// Takes over what is given for the interval that begins at sample `k`.
+    fn move_on(&mut self, k: usize) {
+        let (samples, time_step) = ([k, (k + 1).min(self.guide.rows() - 1)], self.guide.setting.stepping.time_step);
+        let mut given = std::mem::take(&mut self.given);
+        given.clear();
+        given.push(S::from_f64(time_step));
+        for &joint in &self.guidance.joints {
+            given.extend(samples.into_iter().flat_map(|sample| self.joint(joint, sample)));
+        }
+        if let Some(StrainRates { rate, gain }) = self.guide.strains {
+            for &gauge in &self.guidance.gauges {
+                let reading = |sample| S::from_f64(rate.at(sample, gauge));
+                given.extend(samples.map(|sample| match &self.of_gauges[gauge] {
+                    Some(sensor) => sensor.undo_rate(sample, rate.rows() - 1, time_step, reading),
+                    None => reading(sample),
+                }));
+                given.push(S::from_f64(gain[gauge]));
+            }
+        }
+        self.machine.give(&given);
+        self.given = given;
+        if let Some(Drives { inputs, .. }) = self.guide.drives {
+            for number in 0..inputs.columns() {
+                self.machine.command(number, k, |sample| S::from_f64(inputs.at(sample, number)));
+            }
+        }
+    }
+
+    /// Records what is seen and needed at a sample.
+    fn sample(&mut self, row: usize) -> Result<()> {
+        if let Some(time) = self.state.last_mut() {
+            *time = S::zero();
+        }
+        let (width, description) = (self.width(), self.guide.setting.description);
+        let (dim, n_outputs, layout) = (description.n_states(), description.n_outputs(), description.layout());
+        // Measured states decide the efforts of the drives and nothing else.
+        let measured = self.measure(row);
+        let Self { machine, seen, truth, states, .. } = self;
+        let (outputs, applied) = truth[row * width..(row + 1) * width].split_at_mut(n_outputs);
+        let efforts = dim + n_outputs..dim + n_outputs + applied.len();
+        if measured {
+            machine.sample(&self.measured, seen);
+            applied.copy_from_slice(&seen[efforts.clone()]);
+        }
+        machine.sample(&self.state, seen);
+        if !measured {
+            applied.copy_from_slice(&seen[efforts]);
+        }
+        let state = &mut states[row * dim..(row + 1) * dim];
+        state.copy_from_slice(&seen[..dim]);
+        outputs.copy_from_slice(&seen[dim..dim + n_outputs]);
+        if let Some(Drives { inputs, .. }) = self.guide.drives {
+            let channels = outputs[layout.actuators()..layout.lines()].chunks_exact_mut(2).enumerate();
+            channels.for_each(|(actuator, channels)| channels[0] = S::from_f64(inputs.at(row, actuator)));
+        }
+        let wrong = |number: &S| !number.is_finite();
+        let place = state.iter().position(wrong).map(|place| names::state_name(description, place));
+        let place = place.or_else(|| outputs.iter().position(wrong).map(|c| names::output_name(description, c)));
+        place.map_or(Ok(()), |name| Err(self.diverged(&name, row)))
+    }
+
+    /// Puts the measured states of drives in the place of their own; tells whether there are any.
+    fn measure(&mut self, row: usize) -> bool {
+        let Some(Drives { places, seen, .. }) = self.guide.drives else { return false };
+        let (first, time_step) = (2 * self.machine.free().len(), self.guide.setting.stepping.time_step);
+        self.measured.copy_from_slice(&self.state);
+        for (column, (&place, sensor)) in places.iter().zip(&self.of_states).enumerate() {
+            let reading = |sample| S::from_f64(seen.at(sample, column));
+            self.measured[first + place] = match sensor {
+                Some(sensor) => sensor.undo(row, seen.rows() - 1, time_step, reading),
+                None => reading(row),
+            };
+        }
+        !places.is_empty()
+    }
+
+    /// Values of the samples before `row`: outputs and states.
+    fn before(&self, row: usize) -> (Vec<f64>, Vec<f64>) {
+        let (description, width) = (self.guide.setting.description, self.width());
+        let rows = self.truth[..row * width].chunks_exact(width.max(1));
+        let outputs = rows.flat_map(|row| row[..description.n_outputs()].iter().map(Scalar::re)).collect();
+        (outputs, self.states[..row * description.n_states()].iter().map(Scalar::re).collect())
+    }
+
+    fn diverged(&self, name: &str, row: usize) -> Error {
+        let repair = if self.guidance.drives {
+            "use the integrator adaptive, and check the motion for jumps"
+        } else {
+            "use more substeps or the integrator linearly_implicit, and check the motion for jumps"
+        };
+        let event = (Diverged::NOT_FINITE.to_owned(), repair);
+        lost(self.guide.setting.stepping, format!("the {name}"), event, (row, 0), self.before(row))
+    }
+}

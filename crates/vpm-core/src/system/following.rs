@@ -1,0 +1,227 @@
+//! A machine whose joints follow a motion, for the integrators.
+
+use std::sync::Arc;
+
+use super::Machine;
+use super::guided::{Guidance, Guided, Part};
+use super::recorded::Kind;
+use super::routine::Routines;
+use crate::actuator::Actuator;
+use crate::error::Result;
+use crate::integrator::Method;
+use crate::ode::Ode;
+use crate::scalar::Scalar;
+
+/// Size of a coordinate, rad or m, that a step control counts as small; rates have 1.
+const COORDINATE_SCALE: f64 = 1e-2;
+
+/// What answers to the motion of some joints, see [`Guided`], as an [`Ode`] in numbers `S`: free coordinates, their rates, states of drives
+/// and supplies, time since the last sample.
+///
+/// Plain numbers go through the laws themselves. Numbers with derivatives, and exact derivatives of the rates, go through the recorded
+/// functions.
+pub(crate) struct Following<S> {
+    laws: Guided<f64>,
+    routines: Routines<S>,
+    guidance: Arc<Guidance>,
+    actuators: Vec<Actuator<S>>,
+    /// Number of inputs of the machine.
+    inputs: usize,
+    /// Time between samples, s.
+    interval: f64,
+    /// Whether the laws were evaluated last where the next step begins.
+    ready: bool,
+    /// Rates beside a matrix that is asked for alone.
+    rates: Vec<S>,
+}
+
+impl<S: Scalar> Following<S> {
+    /// The `machine` with `interval` (s) between samples, for steps by `method`.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Unrecorded`] where a law decides by the value of a state.
+    pub(crate) fn new(machine: Machine<'_, S>, guidance: Guidance, (interval, method): (f64, Method)) -> Result<Self> {
+        let Machine { dynamics, functions, theta, inputs, actuators, .. } = machine;
+        let inputs = inputs.len();
+        let held = vec![S::zero(); inputs + guidance.given()];
+        let laws = Guided::new(dynamics, &guidance);
+        let mut machine = Self {
+            rates: vec![S::zero(); laws.rates.len()],
+            laws,
+            routines: Routines::new(functions, theta, held),
+            guidance: Arc::new(guidance),
+            actuators,
+            inputs,
+            interval,
+            ready: false,
+        };
+        let matrix = match method {
+            Method::Rk4 | Method::Additive => None,
+            Method::SemiImplicit => Some(Part::Elasticity),
+            Method::LinearlyImplicit => Some(machine.prepared()),
+            Method::Rosenbrock | Method::Adaptive { .. } | Method::Guarded => Some(Part::Linearised),
+        };
+        for part in [Some(Part::Rates), Some(Part::Sample), matrix].into_iter().flatten() {
+            if !Self::is_direct(part) {
+                machine.routines.make(&machine.kind(part))?;
+            }
+        }
+        Ok(machine)
+    }
+
+    /// Whether the laws themselves give it.
+    fn is_direct(part: Part) -> bool {
+        part != Part::Linearised && S::plain(&[]).is_some()
+    }
+
+    /// What gives the matrix of an implicit step.
+    fn prepared(&self) -> Part {
+        if self.laws.is_stiff_by_beams_alone() { Part::Prepared } else { Part::Linearised }
+    }
+
+    fn kind(&self, part: Part) -> Kind {
+        Kind::Guided(self.guidance.clone(), part)
+    }
+
+    /// Free coordinates: passive joints, then elastic ones.
+    pub(crate) fn free(&self) -> &[usize] {
+        &self.laws.free
+    }
+
+    /// Where a state stands among those of the whole machine; the time nowhere, for which it gives the last.
+    pub(crate) fn place(&self, state: usize) -> usize {
+        let (n, count) = (self.laws.dynamics.coordinates(), self.free().len());
+        let place = match state.checked_sub(2 * count) {
+            Some(internal) => 2 * n + internal,
+            None if state < count => self.free()[state],
+            None => n + self.free()[state - count],
+        };
+        place.min(self.laws.dynamics.dim() - 1)
+    }
+
+    /// Holds what input `number` amounts to over the interval that begins at sample `k`, see [`super::Dynamics::input`].
+    pub(crate) fn command(&mut self, number: usize, k: usize, command: impl Fn(usize) -> S) {
+        let input = match self.actuators.get(number) {
+            Some(actuator) => actuator.input(k, self.interval, command),
+            None => command(k),
+        };
+        self.hold(number, input);
+    }
+
+    /// Takes what is given beside the inputs, see [`Guidance::given`].
+    pub(crate) fn give(&mut self, numbers: &[S]) {
+        (self.inputs..).zip(numbers).for_each(|(number, &value)| self.hold(number, value));
+    }
+
+    fn hold(&mut self, number: usize, value: S) {
+        self.ready = false;
+        self.laws.hold(number, value.re());
+        self.routines.hold(number, value);
+    }
+
+    /// What is seen at `y`, where the next step begins, see [`Guided::sample`].
+    pub(crate) fn sample(&mut self, y: &[S], seen: &mut [S]) {
+        if let (Some(y), Some(seen)) = (S::plain(y), S::plain_mut(seen)) {
+            self.laws.sample(y, seen);
+            self.ready = true;
+        } else {
+            self.copy(Part::Sample, y, seen);
+        }
+    }
+
+    /// Evaluates the laws at `y` unless that is where the step begins and was done.
+    fn begin(&mut self, y: &[f64]) {
+        if !std::mem::take(&mut self.ready) {
+            self.laws.evaluate(y);
+        }
+    }
+
+    /// All outputs of a recorded function; what has none is no number.
+    fn copy(&mut self, part: Part, y: &[S], outputs: &mut [S]) {
+        match self.routines.get(&self.kind(part)) {
+            Some(routine) => outputs.copy_from_slice(routine.at(y)),
+            None => outputs.fill(S::from_f64(f64::NAN)),
+        }
+    }
+
+    /// A recorded matrix in rows of `width` entries, with the rates.
+    fn matrix(&mut self, part: Part, y: &[S], matrix: &mut [S], width: usize, rates: &mut [S]) {
+        self.ready = false;
+        let kind = self.kind(part);
+        match self.routines.make(&kind).ok().and_then(|()| self.routines.get(&kind)) {
+            Some(routine) => routine.matrix(y, matrix, width, rates),
+            None => matrix.fill(S::from_f64(f64::NAN)),
+        }
+    }
+
+    fn matrix_alone(&mut self, part: Part, y: &[S], matrix: &mut [S], width: usize) {
+        let mut rates = std::mem::take(&mut self.rates);
+        self.matrix(part, y, matrix, width, &mut rates);
+        self.rates = rates;
+    }
+}
+
+impl<S: Scalar> Ode<S> for Following<S> {
+    fn dim(&self) -> usize {
+        self.laws.rates.len()
+    }
+
+    fn coordinates(&self) -> usize {
+        self.free().len()
+    }
+
+    fn rhs(&mut self, y: &[S], dydt: &mut [S]) {
+        self.ready = false;
+        if let (Some(y), Some(dydt)) = (S::plain(y), S::plain_mut(dydt)) {
+            self.laws.evaluate(y);
+            dydt.copy_from_slice(&self.laws.rates);
+        } else {
+            self.copy(Part::Rates, y, dydt);
+        }
+    }
+
+    fn jacobian(&mut self, y: &[S], jacobian: &mut [S]) {
+        self.matrix_alone(Part::Linearised, y, jacobian, y.len());
+    }
+
+    fn linearise(&mut self, y: &[S], jacobian: &mut [S], rates: &mut [S]) {
+        self.matrix(Part::Linearised, y, jacobian, y.len(), rates);
+    }
+
+    /// All that is stiff, see [`Guided::stiff`]; with contacts, bushings or drives the exact derivatives.
+    fn prepare(&mut self, y: &[S], matrix: &mut [S], rates: &mut [S]) {
+        let part = self.prepared();
+        let plain = (S::plain(y), S::plain_mut(matrix), S::plain_mut(rates));
+        match plain {
+            (Some(y), Some(matrix), Some(rates)) if Self::is_direct(part) => {
+                self.begin(y);
+                rates.copy_from_slice(&self.laws.rates);
+                self.laws.stiff(matrix);
+            }
+            _ => self.matrix(part, y, matrix, y.len(), rates),
+        }
+    }
+
+    fn elasticity(&mut self, y: &[S], block: &mut [S]) -> bool {
+        let count = self.coordinates();
+        if count == 0 {
+            return false;
+        }
+        if let (Some(y), Some(block)) = (S::plain(y), S::plain_mut(block)) {
+            self.ready = false;
+            self.laws.evaluate(y);
+            self.laws.elasticity(block);
+        } else {
+            self.matrix_alone(Part::Elasticity, y, block, 2 * count);
+        }
+        true
+    }
+
+    fn scales(&self, scales: &mut [f64]) {
+        let (count, last) = (self.coordinates(), scales.len() - 1);
+        scales.fill(1.0);
+        scales[..count].fill(COORDINATE_SCALE);
+        self.laws.dynamics.drive_scales(&mut scales[2 * count..last]);
+        scales[last] = self.interval;
+    }
+}

@@ -1,0 +1,354 @@
+//! A machine some of whose joints follow a motion, and what answers to it: other joints, beams, drives and supplies.
+
+use super::Dynamics;
+use super::quintic::{State, between};
+use super::recorded::{Matrix, Places};
+use crate::algebra::Cholesky;
+use crate::dynamics::flexible;
+use crate::graph::Recorded;
+use crate::model::{Elastic, Strip};
+use crate::scalar::Scalar;
+
+/// Which part of a machine follows a motion, and which answers to it.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub struct Guidance {
+    /// Joints that follow, ascending. The others and the elastic coordinates are free.
+    pub joints: Vec<usize>,
+    /// Gauges that hold their beams.
+    pub gauges: Vec<usize>,
+    /// Whether drives, supplies and memories answer, to their inputs too; otherwise they do nothing.
+    pub drives: bool,
+}
+
+/// What a program of such a machine gives.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Part {
+    /// Rates of the state.
+    Rates,
+    /// What is seen: the state of the whole machine, all its outputs, the efforts of the drives on the joints.
+    Sample,
+    /// Rates, then the entries of their derivatives by the state.
+    Linearised,
+    /// Rates, then the entries of all that is stiff, `[0, 1, 0; -M^-1 K, -M^-1 D, t]`.
+    Prepared,
+    /// What constant stiffness and damping of beams do, see [`crate::ode::Ode::elasticity`], after as many numbers as there are states.
+    Elasticity,
+}
+
+impl Guidance {
+    /// How much is given beside the inputs of the machine: the time between samples (s), position, velocity and acceleration of each joint that
+    /// follows at the sample before and after, of each gauge that holds the rate of strain (1/s) at both and its gain (J s).
+    pub(crate) fn given(&self) -> usize {
+        self.first_gauge() + 3 * self.gauges.len()
+    }
+
+    /// Where the first of the gauges stands among what is given.
+    fn first_gauge(&self) -> usize {
+        1 + 6 * self.joints.len()
+    }
+
+    /// Where the inputs of its programs stand: free coordinates and their rates, states of what drives there are, time since the sample
+    /// before; inputs of the machine, what is given; parameters.
+    pub(super) fn places(&self, machine: Places) -> Places {
+        let coordinates = machine.coordinates - self.joints.len();
+        let internal = if self.drives { machine.states - 2 * machine.coordinates } else { 0 };
+        Places { coordinates, states: 2 * coordinates + internal + 1, inputs: machine.inputs + self.given(), ..machine }
+    }
+}
+
+/// A gauge that holds its beam.
+#[derive(Clone, Debug)]
+struct Hold<S> {
+    /// First coordinate of the beam.
+    first: usize,
+    /// Strain per unit of each of its coordinates.
+    row: Vec<f64>,
+    /// Rate of strain at the sample before and after (1/s), and gain (J s).
+    strain: [S; 3],
+}
+
+/// The equations of what answers, with its buffers.
+///
+/// Law: `M_ff a_f = (effects - bias - K q - D v)_f - M_fj a_j` and `ds/dt = f(s, q, v, u)`, j the joints that follow, f the free coordinates
+/// and s the states of drives and supplies.
+#[derive(Clone, Debug)]
+pub(crate) struct Guided<S> {
+    pub(super) dynamics: Dynamics<S>,
+    guidance: Guidance,
+    /// Passive joints, then elastic coordinates.
+    pub(super) free: Vec<usize>,
+    holds: Vec<Hold<S>>,
+    /// Motion at the sample before and after of the joints that follow.
+    ends: Vec<[State<S>; 2]>,
+    /// Time between samples, s.
+    interval: S,
+    /// State of the whole machine, and its rate.
+    x: Vec<S>,
+    rate: Vec<S>,
+    /// Rates of the state of what answers.
+    pub(super) rates: Vec<S>,
+    /// Efforts on all coordinates that the motion needs, without those for the free accelerations.
+    load: Vec<S>,
+    /// A load on the free coordinates on its way.
+    column: Vec<S>,
+    /// The block of the mass matrix of the free coordinates, and its factors.
+    mass: Vec<S>,
+    factors: Cholesky<S>,
+}
+
+impl<S: Scalar> Guided<S> {
+    pub(super) fn new(dynamics: Dynamics<S>, guidance: &Guidance) -> Self {
+        let (n, dim) = (dynamics.coordinates(), dynamics.dim());
+        let free: Vec<usize> = (0..n).filter(|place| !guidance.joints.contains(place)).collect();
+        let strips = guidance.gauges.iter().map(|&gauge| &dynamics.model.gauges()[gauge]);
+        let hold = |strip: &Strip| Hold { first: strip.first, row: strip.row(), strain: [S::zero(); 3] };
+        let (zeros, count) = (|count: usize| vec![S::zero(); count], free.len());
+        let internal = if guidance.drives { dim - 2 * n } else { 0 };
+        Self {
+            guidance: guidance.clone(),
+            holds: strips.map(hold).collect(),
+            ends: vec![[[S::zero(); 3]; 2]; guidance.joints.len()],
+            interval: S::one(),
+            x: zeros(dim),
+            rate: zeros(dim),
+            rates: zeros(2 * count + internal + 1),
+            load: zeros(n),
+            column: zeros(count),
+            mass: zeros(count * count),
+            factors: Cholesky::new(count),
+            free,
+            dynamics,
+        }
+    }
+
+    /// Holds what an input of the machine amounts to or, after these, what is given, see [`Guidance::given`].
+    pub(super) fn hold(&mut self, number: usize, value: S) {
+        let Some(place) = number.checked_sub(self.dynamics.inputs.len()) else {
+            return self.dynamics.hold(number, value);
+        };
+        match (place.checked_sub(1), place.checked_sub(self.guidance.first_gauge())) {
+            (_, Some(place)) => self.holds[place / 3].strain[place % 3] = value,
+            (Some(place), _) => self.ends[place / 6][place / 3 % 2][place % 3] = value,
+            _ => self.interval = value,
+        }
+    }
+
+    /// Whether [`Guided::stiff`] will do for an implicit step.
+    pub(super) fn is_stiff_by_beams_alone(&self) -> bool {
+        !self.guidance.drives && self.dynamics.connections.is_free()
+    }
+
+    /// Rates of the state at `y`.
+    pub(super) fn evaluate(&mut self, y: &[S]) {
+        self.place(y);
+        if !self.free.is_empty() {
+            self.balance(y);
+        }
+        self.collect();
+    }
+
+    /// The same, then what is seen at `y`: the state of the whole machine, all its outputs, the efforts of the drives on the joints. The
+    /// outputs `effort` of the joints are what the motion needs; commands are left to the caller.
+    pub(super) fn sample(&mut self, y: &[S], seen: &mut [S]) {
+        self.place(y);
+        self.balance(y);
+        self.collect();
+        let (n, joints) = (self.dynamics.coordinates(), self.dynamics.joints());
+        self.require();
+        let Self { dynamics, guidance, x, rate, load, .. } = self;
+        seen.fill(S::zero());
+        let (state, outputs) = seen.split_at_mut(x.len());
+        let (outputs, applied) = outputs.split_at_mut(outputs.len() - joints);
+        state.copy_from_slice(x);
+        dynamics.observe_motion(x, outputs);
+        if guidance.drives {
+            dynamics.observe_efforts(x, rate, outputs);
+            dynamics.add_drives(applied);
+        } else {
+            dynamics.observe_reactions([&x[..n], &x[n..2 * n], &rate[n..2 * n]], outputs);
+        }
+        for ((channels, &a), &effort) in outputs.chunks_exact_mut(4).zip(&rate[n..]).zip(&*load).take(joints) {
+            (channels[2], channels[3]) = (a, effort);
+        }
+    }
+
+    /// Motion of all coordinates, free accelerations apart, and what the drives do in it.
+    fn place(&mut self, y: &[S]) {
+        let Self { dynamics, guidance, free, ends, interval, x, rate, .. } = self;
+        let (n, count, time) = (dynamics.coordinates(), free.len(), y[y.len() - 1]);
+        for (&joint, ends) in guidance.joints.iter().zip(ends) {
+            [x[joint], x[n + joint], rate[n + joint]] = between(ends, time, *interval);
+        }
+        for (k, &place) in free.iter().enumerate() {
+            (x[place], x[n + place], rate[n + place]) = (y[k], y[count + k], S::zero());
+        }
+        if guidance.drives {
+            x[2 * n..].copy_from_slice(&y[2 * count..y.len() - 1]);
+            dynamics.drive(x, rate);
+        }
+    }
+
+    /// The load on all coordinates without free accelerations, and these.
+    fn balance(&mut self, y: &[S]) {
+        let Self { dynamics, free, holds, interval, x, rate, load, column, mass, factors, .. } = self;
+        let (n, share) = (load.len(), y[y.len() - 1] / *interval);
+        let (q, v) = x[..2 * n].split_at(n);
+        dynamics.terms(q, v);
+        flexible::required(&dynamics.model, &dynamics.data, (q, v), &rate[n..2 * n], load);
+        for (joint, effect) in &dynamics.effects {
+            load[*joint] -= effect.effort(q[*joint], v[*joint]);
+        }
+        for (joint, law, memory) in dynamics.memories.iter() {
+            load[joint] -= law.effort(memory);
+        }
+        dynamics.subtract_connections(load);
+        for Hold { first, row, strain: [begin, end, gain] } in &*holds {
+            let own = *first..*first + row.len();
+            let mut lacking = *begin + (*end - *begin) * share;
+            v[own.clone()].iter().zip(row).for_each(|(&rate, &entry)| lacking -= rate * entry);
+            load[own].iter_mut().zip(row).for_each(|(load, &entry)| *load -= lacking * (*gain * entry));
+        }
+        let matrix = dynamics.data.mass_matrix();
+        for (own, &row) in mass.chunks_exact_mut(free.len().max(1)).zip(&*free) {
+            own.iter_mut().zip(&*free).for_each(|(entry, &place)| *entry = matrix[row * n + place]);
+        }
+        factors.factorise(mass);
+        column.iter_mut().zip(&*free).for_each(|(entry, &place)| *entry = -load[place]);
+        factors.solve(column);
+        free.iter().zip(&*column).for_each(|(&place, &a)| rate[n + place] = a);
+    }
+
+    /// The rates of the state from those of the machine.
+    fn collect(&mut self) {
+        let Self { free, x, rate, rates, load, .. } = self;
+        let (n, count, last) = (load.len(), free.len(), rates.len() - 1);
+        for (k, &place) in free.iter().enumerate() {
+            (rates[k], rates[count + k]) = (x[n + place], rate[n + place]);
+        }
+        let internal = last - 2 * count;
+        rates[2 * count..last].copy_from_slice(&rate[2 * n..2 * n + internal]);
+        rates[last] = S::one();
+    }
+
+    /// Turns the load that is left without the free accelerations into the efforts that the motion needs with them, by the mass matrix of
+    /// the last evaluation.
+    fn require(&mut self) {
+        let Self { dynamics, free, x, rate, load, .. } = self;
+        let (n, matrix) = (load.len(), dynamics.data.mass_matrix());
+        for (effort, row) in load.iter_mut().zip(matrix.chunks_exact(n.max(1))) {
+            *effort += free.iter().map(|&place| row[place] * rate[n + place]).sum();
+        }
+        dynamics.follow_load(&x[..n], &x[n..2 * n], load);
+    }
+
+    /// Writes `[0, 1, 0; -M^-1 K, -M^-1 D, t]` from the last evaluation: all that is stiff, for the price of one mass matrix, with the change
+    /// in time of what drives it.
+    pub(super) fn stiff(&mut self, matrix: &mut [S]) {
+        let (n, dim) = (self.free.len(), self.rates.len());
+        matrix.fill(S::zero());
+        for k in 0..n {
+            matrix[k * dim + n + k] = S::one();
+        }
+        let lower = &mut matrix[n * dim..2 * n * dim];
+        self.stiffen(lower, dim);
+        self.resist(lower, dim);
+        self.drift(lower, dim);
+        self.solve(lower, dim);
+    }
+
+    /// Writes `[-M_ff^-1 K, -M_ff^-1 D]` of the beams, and of what holds them, from the last evaluation.
+    pub(super) fn elasticity(&mut self, block: &mut [S]) {
+        let width = 2 * self.free.len();
+        block.fill(S::zero());
+        self.stiffen(block, width);
+        self.solve(block, width);
+    }
+
+    /// Adds `-K` and `-D` of the beams, and of what holds them, to rows of `width` entries.
+    fn stiffen(&self, rows: &mut [S], width: usize) {
+        // The elastic coordinates are the last of all and of the free ones.
+        let (count, driven) = (self.free.len(), self.guidance.joints.len());
+        for Elastic { beam, coordinate, .. } in self.dynamics.model.beams() {
+            let (first, len) = (coordinate - driven, beam.len());
+            for (k, (&stiffness, &damping)) in beam.stiffness().iter().zip(beam.damping()).enumerate() {
+                let row = &mut rows[(first + k / len) * width..][..width];
+                row[first + k % len] -= stiffness;
+                row[count + first + k % len] -= damping;
+            }
+        }
+        for Hold { first, row, strain: [.., gain] } in &self.holds {
+            let first = first - driven;
+            for (line, &own) in rows[first * width..].chunks_exact_mut(width).zip(row) {
+                let entries = line[count + first..].iter_mut().zip(row);
+                entries.for_each(|(entry, &other)| *entry -= *gain * (own * other));
+            }
+        }
+    }
+
+    /// Adds slopes of the effects on passive joints, and chords from rest in the place of the tangents of friction.
+    fn resist(&self, rows: &mut [S], width: usize) {
+        let (n, count) = (self.load.len(), self.free.len());
+        for (joint, effect) in &self.dynamics.effects {
+            if let Some(k) = self.free.iter().position(|place| place == joint) {
+                let (q, v) = (self.x[*joint], self.x[n + *joint]);
+                rows[k * width + k] += effect.slope_at_rest(q);
+                rows[k * width + count + k] -= effect.resistance(q, v);
+            }
+        }
+    }
+
+    /// Adds the column of the time: what the changing accelerations of the joints that follow, and the rates of strain that hold beams, do
+    /// to the load, as chords over the interval. Without it a stiff mode would lag behind by a share of the step.
+    fn drift(&self, rows: &mut [S], width: usize) {
+        let (n, matrix) = (self.load.len(), self.dynamics.data.mass_matrix());
+        for (line, &place) in rows.chunks_exact_mut(width).zip(&self.free) {
+            for (&joint, [begin, end]) in self.guidance.joints.iter().zip(&self.ends) {
+                line[width - 1] -= matrix[place * n + joint] * ((end[2] - begin[2]) / self.interval);
+            }
+            for Hold { first, row, strain: [begin, end, gain] } in &self.holds {
+                let entry = place.checked_sub(*first).and_then(|own| row.get(own)).copied().unwrap_or_default();
+                line[width - 1] += (*end - *begin) * *gain / self.interval * entry;
+            }
+        }
+    }
+
+    /// Multiplies rows of `width` entries by `M_ff^-1`.
+    fn solve(&mut self, rows: &mut [S], width: usize) {
+        for place in 0..width {
+            let entries = rows.iter_mut().skip(place).step_by(width);
+            self.column.iter_mut().zip(entries).for_each(|(own, entry)| *own = *entry);
+            self.factors.solve(&mut self.column);
+            let entries = rows.iter_mut().skip(place).step_by(width);
+            entries.zip(&self.column).for_each(|(entry, &own)| *entry = own);
+        }
+    }
+}
+
+impl Guided<Recorded> {
+    /// What a program gives at state `y`: numbers, and what matrix follows them.
+    pub(super) fn recorded(&mut self, part: Part, y: &[Recorded]) -> (Vec<Recorded>, Option<Matrix>) {
+        let zeros = |count: usize| vec![Recorded::default(); count];
+        if part == Part::Sample {
+            let mut seen = zeros(self.x.len() + self.dynamics.layout().count() + self.dynamics.joints());
+            self.sample(y, &mut seen);
+            return (seen, None);
+        }
+        self.evaluate(y);
+        let (rates, count) = (self.rates.clone(), self.free.len());
+        let matrix = match part {
+            Part::Rates | Part::Sample => None,
+            Part::Linearised => Some(Matrix::by_states(rates.clone(), y.len())),
+            Part::Prepared => {
+                let mut matrix = zeros(y.len() * y.len());
+                self.stiff(&mut matrix);
+                Some(Matrix::Entries(matrix, y.len()))
+            }
+            Part::Elasticity => {
+                let mut block = zeros(2 * count * count);
+                self.elasticity(&mut block);
+                Some(Matrix::Entries(block, 2 * count))
+            }
+        };
+        (rates, matrix)
+    }
+}

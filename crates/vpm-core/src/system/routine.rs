@@ -1,0 +1,226 @@
+//! A function of a machine as somebody runs it, with the memory for it.
+
+use std::sync::Arc;
+
+use super::functions::{Function, Functions};
+use super::recorded::Kind;
+use crate::error::Result;
+use crate::graph::{Evaluator, Work};
+use crate::integrator::Method;
+use crate::scalar::{Dual, Scalar};
+
+/// Evaluations of the rates from which on machine code pays: recording and compiling an operation takes some 10 us, and
+/// each evaluation saves about 1 ns of it.
+const PAYS: usize = 15_000;
+/// Directions that are taken at once.
+const LANES: usize = 8;
+
+/// A function of a machine in numbers `S`.
+#[derive(Clone, Debug)]
+pub(crate) struct Routine<S> {
+    function: Arc<Function>,
+    /// State, inputs, parameters, then what follows from the parameters.
+    inputs: Vec<S>,
+    outputs: Vec<S>,
+    engine: Engine<S>,
+    directions: Option<Box<Directions<S>>>,
+}
+
+/// What works a program out.
+#[derive(Clone, Debug)]
+enum Engine<S> {
+    Operations(Evaluator<S>),
+    /// Machine code, of plain numbers.
+    Code(Work),
+}
+
+/// The numbers of which a matrix is the derivative, along some directions at once.
+#[derive(Clone, Debug)]
+struct Directions<S> {
+    evaluator: Evaluator<Dual<S, LANES>>,
+    inputs: Vec<Dual<S, LANES>>,
+    outputs: Vec<Dual<S, LANES>>,
+}
+
+impl<S: Scalar> Routine<S> {
+    /// A function that is right for the parameters `theta`.
+    pub(crate) fn new(function: Arc<Function>, theta: &[S]) -> Self {
+        let (first, given) = (function.places.first_parameter(), function.places.count());
+        let mut inputs = vec![S::zero(); function.often.n_inputs()];
+        inputs[first..given].copy_from_slice(theta);
+        let (known, constants) = inputs.split_at_mut(given);
+        Evaluator::new(&function.seldom).evaluate(known, constants);
+        let (outputs, engine) = (vec![S::zero(); function.often.outputs().len()], Evaluator::new(&function.often));
+        let directions = function.directions.as_ref().map(|program| {
+            let evaluator: Evaluator<Dual<S, LANES>> = Evaluator::new(program);
+            let outputs = vec![Dual::default(); evaluator.n_outputs()];
+            let inputs = inputs[..given].iter().map(|&value| Dual::constant(value)).collect();
+            Box::new(Directions { evaluator, inputs, outputs })
+        });
+        Self { function, inputs, outputs, engine: Engine::Operations(engine), directions }
+    }
+
+    /// Goes on by machine code, of plain numbers; or says why there is none.
+    pub(crate) fn compile(&mut self) -> std::result::Result<(), String> {
+        self.engine = Engine::Code(self.function.native()?.work());
+        Ok(())
+    }
+
+    /// Puts numbers in from place `first` on.
+    #[inline]
+    pub(crate) fn put(&mut self, first: usize, numbers: &[S]) {
+        self.inputs[first..first + numbers.len()].copy_from_slice(numbers);
+    }
+
+    /// Holds input `number` of the machine.
+    #[inline]
+    pub(crate) fn hold(&mut self, number: usize, input: S) {
+        self.inputs[self.function.places.states + number] = input;
+    }
+
+    /// Puts in the accelerations of all coordinates.
+    #[inline]
+    pub(crate) fn put_accelerations(&mut self, a: &[S]) {
+        self.put(self.function.places.accelerations(), a);
+    }
+
+    /// Begins an additive step at the rates `v` of all coordinates.
+    #[inline]
+    pub(crate) fn depart(&mut self, v: &[S]) {
+        self.put(self.function.places.before(), v);
+    }
+
+    /// Rates of a stage of an additive step at its explicit and implicit state.
+    #[inline]
+    pub(crate) fn additive(&mut self, [explicit, implicit]: [&[S]; 2], reach: S, rates: &mut [S]) {
+        let places = self.function.places;
+        self.put(places.implicit(), implicit);
+        self.put(places.reach(), &[reach]);
+        rates.copy_from_slice(self.at(explicit));
+        // The next stage begins its turns of friction where this one ends.
+        self.depart(&rates[..places.coordinates]);
+    }
+
+    /// All outputs at state `x`.
+    #[inline]
+    pub(crate) fn at(&mut self, x: &[S]) -> &[S] {
+        self.put(0, x);
+        match &mut self.engine {
+            Engine::Operations(evaluator) => evaluator.evaluate(&self.inputs, &mut self.outputs),
+            Engine::Code(work) => {
+                let plain = (S::plain(&self.inputs), S::plain_mut(&mut self.outputs));
+                if let (Ok(native), (Some(inputs), Some(outputs))) = (self.function.native(), plain) {
+                    // The lengths are those of the function, so that this cannot fail.
+                    let done = native.call(inputs, outputs, work);
+                    debug_assert!(done.is_ok());
+                }
+            }
+        }
+        &self.outputs
+    }
+
+    /// The first outputs, as many as there are states, and the matrix at `x`, row by row in `width` columns.
+    pub(crate) fn matrix(&mut self, x: &[S], matrix: &mut [S], width: usize, values: &mut [S]) {
+        self.at(x);
+        let dim = x.len();
+        values.copy_from_slice(&self.outputs[..dim]);
+        matrix.fill(S::zero());
+        for (&(row, column), &entry) in self.function.entries.iter().zip(&self.outputs[dim..]) {
+            matrix[row * width + column] = entry;
+        }
+        if let Some(directions) = &mut self.directions {
+            directions.columns(x, &self.inputs[dim..self.function.places.first_parameter()], matrix);
+        }
+    }
+}
+
+impl<S: Scalar> Directions<S> {
+    /// The derivative along each state, [`LANES`] at a time, as columns of a matrix stored row by row.
+    fn columns(&mut self, x: &[S], others: &[S], matrix: &mut [S]) {
+        let dim = x.len();
+        for (input, &other) in self.inputs[dim..].iter_mut().zip(others) {
+            *input = Dual::constant(other);
+        }
+        for first in (0..dim).step_by(LANES) {
+            for (column, (input, &value)) in self.inputs.iter_mut().zip(x).enumerate() {
+                // A column before `first` wraps around to a lane that does not exist, which gives a constant.
+                *input = Dual::variable(value, column.wrapping_sub(first));
+            }
+            self.evaluator.evaluate(&self.inputs, &mut self.outputs);
+            for (row, output) in matrix.chunks_exact_mut(dim).zip(&self.outputs) {
+                row[first..].iter_mut().zip(&output.gradient).for_each(|(entry, &slope)| *entry = slope);
+            }
+        }
+    }
+}
+
+/// The functions that somebody runs of a machine, each made when it is asked for first.
+#[derive(Clone, Debug)]
+pub(crate) struct Routines<S> {
+    functions: Arc<Functions>,
+    theta: Vec<S>,
+    /// What the inputs of the machine hold.
+    held: Vec<S>,
+    made: Vec<(Kind, Routine<S>)>,
+}
+
+impl<S: Scalar> Routines<S> {
+    /// For the checked parameters `theta`, `inputs` holding at first.
+    pub(crate) fn new(functions: Arc<Functions>, theta: &[S], inputs: Vec<S>) -> Self {
+        Self { functions, theta: theta.to_vec(), held: inputs, made: Vec::new() }
+    }
+
+    /// Makes the function of that kind if it is not there yet.
+    ///
+    /// # Errors
+    /// As [`Functions::function`].
+    pub(crate) fn make(&mut self, kind: &Kind) -> Result<()> {
+        if self.get(kind).is_none() {
+            let values: Vec<f64> = self.theta.iter().map(Scalar::inspect).collect();
+            let mut routine = Routine::new(self.functions.function(kind, &values)?, &self.theta);
+            self.held.iter().enumerate().for_each(|(number, &input)| routine.hold(number, input));
+            self.made.push((kind.clone(), routine));
+        }
+        Ok(())
+    }
+
+    /// Makes the function of that kind as machine code; or says why there is none.
+    pub(crate) fn compile(&mut self, kind: &Kind) -> std::result::Result<(), String> {
+        self.make(kind).map_err(|error| error.to_string())?;
+        self.get(kind).map_or(Ok(()), Routine::compile)
+    }
+
+    /// Forgets the function of that kind.
+    pub(crate) fn forget(&mut self, kind: &Kind) {
+        self.made.retain(|(own, _)| own != kind);
+    }
+
+    /// The function of that kind, if it was made.
+    #[inline]
+    pub(crate) fn get(&mut self, kind: &Kind) -> Option<&mut Routine<S>> {
+        self.made.iter_mut().find(|(own, _)| own == kind).map(|(_, routine)| routine)
+    }
+
+    /// Holds input `number`, see [`super::Dynamics::input`].
+    #[inline]
+    pub(crate) fn hold(&mut self, number: usize, input: S) {
+        self.held[number] = input;
+        self.made.iter_mut().for_each(|(_, routine)| routine.hold(number, input));
+    }
+}
+
+/// Whether machine code pays in a run of so many evaluations of the rates.
+pub(crate) fn code_pays(evaluations: usize) -> bool {
+    evaluations >= PAYS
+}
+
+/// The function that steps by `method` need beside the rates.
+pub(crate) fn kind_of(method: Method) -> Option<Kind> {
+    match method {
+        Method::Rk4 => None,
+        Method::SemiImplicit => Some(Kind::Elasticity),
+        Method::Additive => Some(Kind::Additive),
+        Method::LinearlyImplicit => Some(Kind::Prepared),
+        Method::Rosenbrock | Method::Adaptive { .. } | Method::Guarded => Some(Kind::Linearised),
+    }
+}
