@@ -68,6 +68,17 @@ command_unit = "A"
     return vpm.Model.from_toml(text)
 
 
+def test_values_that_make_no_machine_are_refused() -> None:
+    model, time = arm("rigid"), 1e-3 * np.arange(1200)
+    values = {"shoulder.position": 0.3 * np.sin(9.0 * time), "motor.command": np.sin(11.0 * time)}
+    record = vpm.Experiment.from_arrays(time, values, units={"shoulder.position": "rad", "motor.command": "A"})
+    problem, theta = InverseDynamicsProblem(model, [record], cutoff=60.0), model.theta.copy()
+    problem.evaluate(model, theta)
+    theta[model.index("hub.inertia.xx")] = 10.0
+    with pytest.raises(ValueError, match="inertia"):
+        problem.evaluate(model, theta)
+
+
 def test_a_drives_own_run_balances(cylinder: vpm.Model) -> None:
     problem = InverseDynamicsProblem(cylinder, [cylinder_record(cylinder)])
     assert problem.shown == ("servo.pressure_a", "servo.pressure_b")

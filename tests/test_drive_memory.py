@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from importlib import import_module
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from blind import make_case
 from vpm.discrepancy.coloured import noise_shapes, noise_spectrum
@@ -19,6 +23,7 @@ from vpm.identify.drive_memory import DriveMemory
 from vpm.identify.drives_apart import drives_of
 from vpm.model import Model
 
+Array = NDArray[np.float64]
 Exact = tuple[Model, InverseDynamicsProblem, InverseDynamicsProblem]
 
 
@@ -149,3 +154,17 @@ def test_the_answers_of_single_cylinders_make_up_that_of_the_machine() -> None:
     for one, other in zip(*answers, strict=True):
         largest = np.abs(other).max(axis=0)
         assert (np.abs(one - other).max(axis=0) <= 1e-4 * largest).all()
+
+
+def test_a_memory_forgets_what_is_oldest(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys.modules["vpm.identify.drive_memory"], "MOST_NUMBERS", 50)
+    memory = DriveMemory(lambda values: values)
+    worked: list[int] = []
+
+    def work(key: int, names: Sequence[str]) -> tuple[Array, Array]:
+        worked.append(key)
+        return np.ones((10, 1)), np.ones((10, 1, len(names)))
+
+    for key in (1, 2, 3, 3, 2, 1):
+        memory.recall(key, ["a"], partial(work, key))
+    assert worked == [1, 2, 3, 1]

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from vpm import Experiment, Model, diagnose
+from vpm._core import soft_flights
 from vpm.catalogue import EFFECTS
 from vpm.discrepancy.candidates import Candidate
 from vpm.discrepancy.contacts import beginnings, with_contact
 from vpm.discrepancy.flights import flights
 from vpm.discrepancy.play import only_winds_up, read_off
 from vpm.identify import InverseDynamicsProblem
+
+Array = NDArray[np.float64]
 
 GAP, MASS, ROTOR, VISCOUS = 4e-4, 12.0, 3.0, 30.0
 STIFFNESS, DAMPING = 1.5e6, 900.0
@@ -146,3 +150,25 @@ def test_contacts_are_tried_by_frequency_and_damping_ratio() -> None:
 def test_models_run_along_the_first_seconds_of_all_records_together(loose: tuple[Experiment, ...]) -> None:
     assert [part.time[-1] for part in beginnings(loose)] == pytest.approx([3.0, 3.0], abs=2e-3)
     assert beginnings(loose[:1])[0] is loose[0]
+
+
+def test_flights_are_those_of_one_step_after_the_other() -> None:
+    generator = np.random.default_rng(5)
+    pull = np.cumsum(generator.standard_normal(3000)) * 0.05
+    gaps, rates, dampings = np.array([1e-5, 3e-4, 2e-3]), np.array([50.0, 90.0, 200.0]), np.array([0.5, 1.0, 0.2])
+    swing = soft_flights(pull, gaps, rates, dampings, 1e-3)
+    np.testing.assert_allclose(swing, step_by_step(pull, 0.5 * gaps, rates, dampings, 1e-3), rtol=1e-9, atol=1e-9)
+    with pytest.raises(ValueError, match="give one of each"):
+        soft_flights(pull, gaps, rates[:2], dampings, 1e-3)
+
+
+def step_by_step(pull: Array, half: Array, rates: Array, dampings: Array, interval: float) -> Array:
+    """All plays together, one sample after the other."""
+    place, speed, swing = np.zeros_like(half), np.zeros_like(half), np.zeros((pull.size, half.size))
+    for k, acceleration in enumerate(pull.tolist()):
+        beyond = place - np.clip(place, -half, half)
+        new = speed + interval * (acceleration - rates**2 * beyond)
+        new = np.where(beyond == 0.0, new, new / (1.0 + 2.0 * interval * dampings * rates))
+        swing[k], speed = (new - speed) / interval, new
+        place = place + interval * speed
+    return swing

@@ -331,32 +331,10 @@ class System:
         acceleration: ArrayLike,
         time_step: float,
         sensitivities: Sequence[int] = ...,
-        effects: bool = ...,
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Effort (N, n) that a measured motion needs, as in `inverse_dynamics`, and its derivatives (N, n, k).
 
-        The drives may be any: what they deliver does not enter. Without ``effects`` those on joints are left out, see
-        `effort_of_effect`.
-        """
-    def effort_of_effect(
-        self,
-        theta: ArrayLike,
-        effect: int,
-        position: ArrayLike,
-        velocity: ArrayLike,
-        acceleration: ArrayLike,
-        time_step: float,
-        sensitivities: Sequence[int] = ...,
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Effort (N,) that one effect of the description puts on its joint along a measured motion (N, n).
-
-        All of them together with `required` without effects are what `required` gives, but for a share of the load that
-        an effect takes.
-
-        Returns
-        -------
-        effort, jacobian : ndarray
-            (N,), and its derivatives (N, k).
+        The drives may be any: what they deliver does not enter.
         """
     def check(self, theta: ArrayLike) -> None:
         """Raise ValueError for parameters with which the machine does not exist."""

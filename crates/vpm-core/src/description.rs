@@ -205,12 +205,6 @@ impl Description {
         check_regular(&model, &mut Data::new(&model))
     }
 
-    /// Whether all laws are defined with these parameters: right length, finite, each within its domain. Whether the machine moves with
-    /// them, [`Description::check_values`] says.
-    pub(crate) fn check_numbers(&self, theta: &[f64]) -> Result<()> {
-        check::parameters(self, theta)
-    }
-
     /// The machine with the parameters `theta`, after [`Description::check_values`].
     pub fn system<S: Scalar>(&self, theta: &[S]) -> Result<System<S>> {
         let values: Vec<f64> = theta.iter().map(Scalar::inspect).collect();

@@ -12,7 +12,7 @@ use crate::sensitivity::{Interrupt, check_variables};
 use crate::simulate::check_time_step;
 use crate::system::Kind;
 use crate::table::Table;
-use course::{Course, Delivered, OfEffect};
+use course::{Course, Delivered};
 use record::{Along, Numbers, Record};
 
 /// A measured motion with its commands.
@@ -64,15 +64,12 @@ pub fn inverse_dynamics(
         let (actuator, drive) = (own.name.clone(), own.drive.name());
         return Err(DriveError::Effort { actuator, drive }.into());
     }
-    let (rows, joints) = (motion.position.rows(), description.n_joints());
-    motion.position.expect("position", rows, joints)?;
-    motion.velocity.expect("velocity", rows, joints)?;
-    motion.acceleration.expect("acceleration", rows, joints)?;
-    motion.inputs.expect("inputs", rows, description.n_inputs())?;
-    check_time_step(motion.time_step)?;
-    check_parameters(description, theta, sensitivities)?;
-    let Motion { position, velocity, acceleration, inputs, time_step } = motion;
+    let (joints, Motion { position, velocity, acceleration, inputs, time_step }) = (description.n_joints(), motion);
     let motion = JointMotion { position, velocity, acceleration };
+    motion.expect(joints)?;
+    inputs.expect("inputs", position.rows(), description.n_inputs())?;
+    check_time_step(time_step)?;
+    check_parameters(description, theta, sensitivities)?;
     let along = Along::new(Record { description, motion, time_step, interrupt }, theta, sensitivities)?;
     let Numbers { values: required, mut jacobian } = along.follow(Kind::Required, joints)?;
     let pulls = description.actuators.iter().any(|actuator| matches!(actuator.on, Target::Line(_)));
@@ -125,66 +122,18 @@ pub fn required(
     description: &Description,
     theta: &[f64],
     (motion, time_step): (JointMotion<'_>, f64),
-    part: Part,
     sensitivities: &[usize],
     interrupt: Interrupt<'_>,
 ) -> Result<(Vec<f64>, Vec<f64>)> {
     if let Some((beam, _)) = description.beams.iter().zip(description.elastic()).find(|(_, len)| **len > 0) {
         return Err(Error::Flexible { beam: beam.name.clone() });
     }
-    check_motion(description, motion)?;
+    motion.expect(description.n_joints())?;
     check_time_step(time_step)?;
     check_parameters(description, theta, sensitivities)?;
     let along = Along::new(Record { description, motion, time_step, interrupt }, theta, sensitivities)?;
-    let kind = match part {
-        Part::Whole => Kind::Required,
-        Part::WithoutEffects => Kind::RequiredWithoutEffects,
-    };
-    let Numbers { values, jacobian } = along.follow(kind, description.n_joints())?;
+    let Numbers { values, jacobian } = along.follow(Kind::Required, description.n_joints())?;
     Ok((values, jacobian))
-}
-
-/// Efforts that the effect with the given number puts on its joint along a measured motion, one per sample, and their derivatives: what
-/// it takes off the efforts of [`required`]. A number beyond the effects, and one of an effect that belongs to the tree, is an error.
-///
-/// An effect that follows the load of its joint counts without that: its share depends on all others.
-pub fn effort_of_effect(
-    description: &Description,
-    theta: &[f64],
-    (motion, time_step): (JointMotion<'_>, f64),
-    effect: usize,
-    sensitivities: &[usize],
-) -> Result<(Vec<f64>, Vec<f64>)> {
-    check_motion(description, motion)?;
-    check_time_step(time_step)?;
-    description.check_numbers(theta)?;
-    let law = || {
-        let what = "the request for an effort".to_owned();
-        Error::Reference { what, target: "effect on a joint", index: effect, count: description.effects.len() }
-    };
-    let entry = description.effects.get(effect).filter(|entry| entry.joint().is_some()).ok_or_else(law)?;
-    check_variables(theta, sensitivities)?;
-    let record = Record { description, motion, time_step, interrupt: &|| false };
-    let own = OfEffect::parameters(record, entry);
-    let course = Course::new(&OfEffect { record, entry }, theta, sensitivities, &own)?;
-    let jacobian = course.jacobian(sensitivities.len());
-    Ok((course.values, jacobian))
-}
-
-fn check_motion(description: &Description, motion: JointMotion<'_>) -> Result<()> {
-    let (rows, joints) = (motion.position.rows(), description.n_joints());
-    motion.position.expect("position", rows, joints)?;
-    motion.velocity.expect("velocity", rows, joints)?;
-    motion.acceleration.expect("acceleration", rows, joints)
-}
-
-/// Which part of what a motion needs.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Part {
-    /// All of it.
-    Whole,
-    /// Without the effects on joints, see [`effort_of_effect`].
-    WithoutEffects,
 }
 
 /// Whether the machine exists with these parameters, and the parameters that are asked for.

@@ -129,12 +129,6 @@ impl<S: Scalar> Dynamics<S> {
         Self { memories, ..self }
     }
 
-    /// Leaves out all effects on joints; those of the tree stay.
-    pub(crate) fn leave_effects(&mut self) {
-        self.effects.clear();
-        self.memories = Memories::new(Vec::new());
-    }
-
     /// Number of joints.
     #[inline]
     pub fn joints(&self) -> usize {

@@ -19,8 +19,6 @@ from vpm.errors import DivergedError, SimulationError, VpmError
 from vpm.experiment import Experiment, Motion
 from vpm.identify.drive_answers import apart, driven, first_drives, needed, picked, together
 from vpm.identify.drive_memory import DriveMemory, Filter
-from vpm.identify.effort_parts import delivered, part_delivered, parts_needed
-from vpm.identify.effort_parts import needed as needed_by_parts
 from vpm.identify.gauges import Hold
 from vpm.identify.hidden_motion import with_hidden
 from vpm.identify.reuse import Kept
@@ -184,9 +182,6 @@ def respond(
             swing = partial(_swung, m=m, hold=near.hold)
             return Response(*with_hidden(model, theta, m, (columns, channels), (remembered, near, origin), swing))
         else:
-            known = None if memory is None else _by_parts(model, theta, m, (columns, channels), memory)
-            if known is not None:
-                return known
             answer = _rigid(model, theta, m, columns, channels)
         return answer if memory is None else _filtered(answer, memory.keep)
     except Diverged as error:
@@ -219,20 +214,6 @@ def _rigid(model: Model, theta: Array, m: Motion, columns: Sequence[int], channe
     nothing = np.zeros((len(m.time[rows]), len(channels)))
     slopes = np.zeros((*nothing.shape, len(columns)))
     return Response(required[rows], applied[rows], jacobian[rows], nothing, slopes)
-
-
-def _by_parts(
-    model: Model, theta: Array, m: Motion, wanted: tuple[Sequence[int], Sequence[str]], memory: DriveMemory
-) -> Response | None:
-    """The same of parts that are worked out once; None where they do not add up."""
-    (columns, channels), parts, drives = wanted, parts_needed(model), part_delivered(model)
-    if parts is None or drives is None:
-        return None
-    names = [model.parameter_names[column] for column in columns]
-    required, slopes = needed_by_parts(parts, model, theta, m, names, memory)
-    applied, less = delivered(drives, model, theta, m, names, memory)
-    nothing = np.zeros((len(required), len(channels)))
-    return Response(required, applied, slopes - less, nothing, np.zeros((*nothing.shape, len(columns))))
 
 
 def shows_drives_alone(model: Model, channels: Sequence[str]) -> bool:

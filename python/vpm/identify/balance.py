@@ -86,8 +86,7 @@ class InverseDynamicsProblem:
         self.joints = tuple(measured[place] for place in self._joints)
         #: Channels beside the balance that are compared too: what shows inside of drives, strains of links.
         self.shown = shown_channels(model, measured, experiments)
-        origin = {name: parameter.value for name, parameter in model.parameters.items()}
-        self._memories = tuple(DriveMemory(m.parallel, integrator, origin) for m in self.motions)
+        self._memories = tuple(DriveMemory(m.parallel, integrator) for m in self.motions)
         self._compared = tuple(self._measured(m, e) for m, e in zip(self.motions, self.experiments, strict=True))
         self._gains = self._hold_gains(model)
         self._kept = self._held(self.experiments, self.motions)

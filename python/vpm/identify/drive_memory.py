@@ -8,7 +8,7 @@ work out the same efforts, every time.
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from copy import copy
 from dataclasses import dataclass
 from threading import Lock
@@ -51,13 +51,10 @@ class DriveMemory:
         Filter of a record, from (N, k) to the (n, k) that are compared.
     integrator : str, optional
         How drives are run along the motion, as `vpm.simulate.Setup` names it.
-    origin : mapping of str to float, optional
-        Values from which what is linear in a parameter is taken; zero for any other.
     """
 
-    def __init__(self, keep: Filter, integrator: str = AUTOMATIC, origin: Mapping[str, float] | None = None) -> None:
+    def __init__(self, keep: Filter, integrator: str = AUTOMATIC) -> None:
         self.keep, self.integrator = keep, integrator
-        self.origin: Mapping[str, float] = origin or {}
         #: Which commands the drives are given: 0 for those of the record.
         self.commands = 0
         self._lock = Lock()

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from vpm.experiment import Motion
 from vpm.identify.drive_answers import picked
 from vpm.identify.drive_memory import DriveMemory
-from vpm.identify.effort_parts import delivered, needed, of_laws, of_tree, part_delivered, parts_needed
 from vpm.identify.reuse import SPLITTING, Kept, Parts, parts_of, split
 from vpm.model import Model
 
@@ -58,9 +57,7 @@ def with_hidden(
 
     def bend(machine: Model, values: Array, asked: Sequence[int]) -> Pair:
         outputs, jacobian = picked(machine, *swing(machine, values, asked), slice(None), read)
-        rows, width, count = jacobian.shape
-        both = memory.keep(np.hstack([outputs, jacobian.reshape(rows, width * count)]))
-        return both[:, :width], both[:, width:].reshape(len(both), width, count)
+        return _kept(outputs, jacobian, memory)
 
     parts = parts_of(model, m.joints)
     if parts is None:
@@ -83,11 +80,7 @@ def with_hidden(
 
 
 def _delivered(model: Model, theta: Array, m: Motion, columns: Sequence[int], memory: DriveMemory) -> Pair:
-    drives = part_delivered(model)
-    if drives is not None:
-        return delivered(drives, model, theta, m, [model.parameter_names[column] for column in columns], memory)
-    applied, slopes = model.core.delivered(theta, m.inputs, m.dt, list(columns))
-    return memory.keep(applied), memory.keep(slopes.reshape(len(slopes), -1)).reshape(-1, *slopes.shape[1:])
+    return _kept(*model.core.delivered(theta, m.inputs, m.dt, list(columns)), memory)
 
 
 def _bent(parts: Parts, theta: Array, columns: Sequence[int], near: Callable[..., Pair], origin: Array | None) -> Pair:
@@ -123,26 +116,16 @@ def _with_laws(
 ) -> Pair:
     """What one rigid machine needs more than the other, which lacks the laws of its joints, and the derivative."""
     m, names, memory = asked
-    parts, plain = parts_needed(whole), parts_needed(shell)
+    motion = (m.position, m.velocity, m.acceleration, m.dt)
     common = [place for place, name in enumerate(names) if name in shell.parameter_names]
-    shared = [names[place] for place in common]
-    if parts is None or plain is None:
-        required, slopes = _required(whole, theta, m, names, memory)
-        less, own = _required(shell, bare, m, shared, memory)
-    elif parts.tree.text == plain.tree.text:
-        whole.core.check(theta)
-        taken, slopes = of_laws(parts.laws, whole, theta, m, names, memory)
-        return -taken, -slopes
-    else:
-        required, slopes = needed(parts, whole, theta, m, names, memory)
-        less, own = of_tree(plain.tree, shell, bare, m, shared, memory)
+    required, slopes = whole.core.required(theta, *motion, [whole.index(name) for name in names])
+    less, own = shell.core.required(bare, *motion, [shell.index(names[place]) for place in common])
     slopes[:, :, common] -= own
-    return required - less, slopes
+    return _kept(required - less, slopes, memory)
 
 
-def _required(model: Model, theta: Array, m: Motion, names: Sequence[str], memory: DriveMemory) -> Pair:
-    """What a rigid machine needs where its parts do not add up."""
-    asked = [model.index(name) for name in names]
-    required, slopes = model.core.required(theta, m.position, m.velocity, m.acceleration, m.dt, asked)
-    flat = memory.keep(slopes.reshape(len(slopes), -1)) if asked else np.zeros((len(memory.keep(required)), 0))
-    return memory.keep(required), flat.reshape(len(flat), required.shape[1], len(asked))
+def _kept(efforts: Array, slopes: Array, memory: DriveMemory) -> Pair:
+    """Efforts (N, joints) and their derivative (N, joints, columns), filtered side by side."""
+    rows, width, count = slopes.shape
+    both = memory.keep(np.hstack([efforts, slopes.reshape(rows, width * count)]))
+    return both[:, :width], both[:, width:].reshape(len(both), width, count)

@@ -17,6 +17,7 @@ from vpm.catalogue import SITE_KINDS, effect_type
 from vpm.errors import ModelError, VpmError, near_match
 from vpm.model.check import Checked, check_document
 from vpm.model.compile import description
+from vpm.model.cores import core_of
 from vpm.model.effects import Effect, effects_of
 from vpm.model.evaluation import Evaluations
 from vpm.model.messages import parse_toml, read_toml
@@ -330,6 +331,10 @@ class Model(Evaluations, Storable):
 
     def description(self) -> str:
         """Description for the core, as JSON text."""
+        return self._description
+
+    @cached_property
+    def _description(self) -> str:
         return description(self._checked)
 
     @cached_property
@@ -342,11 +347,9 @@ class Model(Evaluations, Storable):
             The core refuses the description.
         """
         try:
-            from vpm._core import System
-        except ImportError as error:
-            raise VpmError(f"the compiled core of vpm cannot be imported ({error}); reinstall vpm-dynamics") from error
-        try:
-            return System(self.description())
+            return core_of(self.description(), self.theta)
+        except VpmError:
+            raise
         except ValueError as error:
             raise ModelError(f"{self.name}: {error}") from error
 

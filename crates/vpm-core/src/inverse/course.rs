@@ -7,7 +7,7 @@ use crate::error::Result;
 use crate::motion::position_sensors;
 use crate::scalar::Scalar;
 use crate::sensitivity::{Job, Pair, differentiate};
-use crate::sensor::{Channel, Sensor};
+use crate::sensor::Channel;
 use crate::table::Table;
 
 /// Numbers along a record, with their derivatives by those of the parameters asked for that move them.
@@ -41,15 +41,6 @@ impl Course {
             slopes[column] += factor * slope;
         }
     }
-
-    /// The derivatives of all numbers by `count` parameters asked for, number by number.
-    pub(super) fn jacobian(&self, count: usize) -> Vec<f64> {
-        let mut jacobian = vec![0.0; self.values.len() * count];
-        for (place, row) in jacobian.chunks_exact_mut(count.max(1)).enumerate() {
-            self.add_slopes(place, 1.0, row);
-        }
-        jacobian
-    }
 }
 
 /// Position, velocity and acceleration of a joint behind its sensor.
@@ -81,54 +72,30 @@ pub(super) struct Memory<'a> {
     pub(super) entry: &'a EffectEntry,
 }
 
-impl Job for Memory<'_> {
-    fn run<S: Scalar>(&self, theta: &[S]) -> Result<Pair<S>> {
-        let sensors = position_sensors(self.record.description, theta);
-        Ok(Pair { first: memories(self.record, self.entry, theta, &sensors), second: Vec::new() })
-    }
-}
-
-/// Effort of an effect on its joint.
-pub(super) struct OfEffect<'a> {
-    pub(super) record: Record<'a>,
-    pub(super) entry: &'a EffectEntry,
-}
-
-impl OfEffect<'_> {
-    /// The parameters of the effect and of the sensor of its joint, on which its memory depends as well if it has one.
-    pub(super) fn parameters(record: Record<'_>, entry: &EffectEntry) -> Vec<usize> {
-        let mut own: Vec<usize> = entry.domains().into_iter().map(|(&index, _)| index).collect();
-        own.extend(entry.joint().into_iter().flat_map(|joint| Behind { record, joint }.parameters()));
+impl Memory<'_> {
+    /// The parameters of the effect and of the sensor of its joint.
+    pub(super) fn parameters(&self) -> Vec<usize> {
+        let mut own: Vec<usize> = self.entry.domains().into_iter().map(|(&index, _)| index).collect();
+        own.extend(self.entry.joint().into_iter().flat_map(|joint| Behind { record: self.record, joint }.parameters()));
         own
     }
 }
 
-impl Job for OfEffect<'_> {
+impl Job for Memory<'_> {
+    /// The memory sample by sample, relaxed at first; nothing of an effect that does not remember.
     fn run<S: Scalar>(&self, theta: &[S]) -> Result<Pair<S>> {
-        let Self { record, entry } = *self;
-        let sensors = position_sensors(record.description, theta);
-        let mut first = memories(record, entry, theta, &sensors);
-        if let Some((_, law)) = entry.with_memory(theta) {
-            first.iter_mut().for_each(|memory| *memory = law.effort(*memory));
-        } else if let Some((joint, law)) = entry.on_joint(theta) {
-            let effort = |[q, v, _]: [S; 3]| law.effort(q, v);
-            first = record.samples().map(|k| effort(record.behind(k, joint, &sensors))).collect();
+        let sensors = position_sensors(self.record.description, theta);
+        let (mut first, mut memory, mut before) = (Vec::new(), S::zero(), None);
+        if let Some((joint, law)) = self.entry.with_memory(theta) {
+            first.extend(self.record.samples().map(|k| {
+                let [q, ..] = self.record.behind(k, joint, &sensors);
+                memory = before.map_or(memory, |before| law.advance(memory, q - before));
+                before = Some(q);
+                memory
+            }));
         }
         Ok(Pair { first, second: Vec::new() })
     }
-}
-
-/// Memory of an effect sample by sample, relaxed at first; nothing of one that does not remember.
-fn memories<S: Scalar>(record: Record<'_>, entry: &EffectEntry, theta: &[S], sensors: &[Option<Sensor<S>>]) -> Vec<S> {
-    let Some((joint, law)) = entry.with_memory(theta) else { return Vec::new() };
-    let (mut memory, mut before) = (S::zero(), None);
-    let next = |k| {
-        let [q, ..] = record.behind(k, joint, sensors);
-        memory = before.map_or(memory, |before| law.advance(memory, q - before));
-        before = Some(q);
-        memory
-    };
-    record.samples().map(next).collect()
 }
 
 /// Effort of an ideal drive, mean over the two intervals that meet at each sample.

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use super::course::{Behind, Course, Memory, OfEffect};
+use super::course::{Behind, Course, Memory};
 use super::sample_by_sample::SampleBySample;
 use crate::description::{Description, EffectEntry};
 use crate::error::{Error, Result};
@@ -95,8 +95,8 @@ impl<'a> Along<'a> {
         }
         let remembers = |entry: &&EffectEntry| matches!(entry, EffectEntry::Hysteresis { .. });
         for entry in record.description.effects.iter().filter(remembers) {
-            let own = OfEffect::parameters(record, entry);
-            memories.push(Course::new(&Memory { record, entry }, theta, sensitivities, &own)?);
+            let memory = Memory { record, entry };
+            memories.push(Course::new(&memory, theta, sensitivities, &memory.parameters())?);
         }
         Ok(Self { record, theta, sensitivities, joints, memories })
     }
@@ -260,10 +260,7 @@ enum Engine {
 
 impl Engine {
     fn laws(description: &Description, theta: &[f64], kind: &Kind) -> Result<Self> {
-        let mut dynamics: Dynamics<f64> = Build::dynamics(&description, theta)?;
-        if *kind == Kind::RequiredWithoutEffects {
-            dynamics.leave_effects();
-        }
+        let dynamics: Dynamics<f64> = Build::dynamics(&description, theta)?;
         let function = if *kind == Kind::Levers { levers } else { efforts };
         Ok(Self::Laws(Box::new(dynamics), function))
     }

@@ -9,7 +9,7 @@ use crate::scalar::Scalar;
 use crate::sensitivity::{Interrupt, Job, Pair, differentiate, differentiate_by};
 use crate::sensor::Sensor;
 use crate::statics::settled;
-use crate::system::{Following, Guidance};
+use crate::system::{Following, Guidance, code_pays};
 use crate::table::Table;
 
 /// A motion and what answers to it, all checked.
@@ -117,6 +117,10 @@ impl<'a, S: Scalar> Way<'a, S> {
             states: zeros(guide.rows() * description.n_states()),
         };
         way.truth = zeros(guide.rows() * way.width());
+        if S::plain(&[]).is_some() && code_pays(guide.rows() * stepping.substeps * stepping.method.stages()) {
+            // What has no code runs as it is.
+            let _ = way.machine.compile(stepping.method);
+        }
         if guide.rows() > 0 {
             way.begin(theta)?;
         }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::Machine;
 use super::guided::{Guidance, Guided, Part};
 use super::recorded::Kind;
-use super::routine::Routines;
+use super::routine::{Routines, kind_of};
 use crate::actuator::Actuator;
 use crate::error::Result;
 use crate::integrator::Method;
@@ -18,8 +18,8 @@ const COORDINATE_SCALE: f64 = 1e-2;
 /// What answers to the motion of some joints, see [`Guided`], as an [`Ode`] in numbers `S`: free coordinates, their rates, states of drives
 /// and supplies, time since the last sample.
 ///
-/// Plain numbers go through the laws themselves. Numbers with derivatives, and exact derivatives of the rates, go through the recorded
-/// functions.
+/// Plain numbers go through the laws themselves, or through machine code where it pays. Numbers with derivatives, and exact derivatives of
+/// the rates, go through the recorded functions.
 pub(crate) struct Following<S> {
     laws: Guided<f64>,
     routines: Routines<S>,
@@ -55,18 +55,41 @@ impl<S: Scalar> Following<S> {
             interval,
             ready: false,
         };
-        let matrix = match method {
-            Method::Rk4 | Method::Additive => None,
-            Method::SemiImplicit => Some(Part::Elasticity),
-            Method::LinearlyImplicit => Some(machine.prepared()),
-            Method::Rosenbrock | Method::Adaptive { .. } | Method::Guarded => Some(Part::Linearised),
-        };
+        let matrix = machine.matrix_of(method);
         for part in [Some(Part::Rates), Some(Part::Sample), matrix].into_iter().flatten() {
             if !Self::is_direct(part) {
                 machine.routines.make(&machine.kind(part))?;
             }
         }
         Ok(machine)
+    }
+
+    /// Runs samples and steps by `method` as machine code from now on, where they can; or says why they cannot.
+    pub(crate) fn compile(&mut self, method: Method) -> std::result::Result<(), String> {
+        self.routines.compile_all(&[Part::Rates, Part::Sample].map(|part| self.kind(part)))?;
+        // A matrix alone that has no code is worked out as before.
+        let matrix = self.matrix_of(method).filter(|part| *part != Part::Elasticity);
+        if let Some((part, kind)) = matrix.map(|part| (part, self.kind(part))) {
+            if self.routines.compile(&kind).is_err() && Self::is_direct(part) {
+                self.routines.forget(&kind);
+            }
+        }
+        Ok(())
+    }
+
+    /// What gives the matrix of steps by `method`, if these need one.
+    fn matrix_of(&self, method: Method) -> Option<Part> {
+        match kind_of(method)? {
+            Kind::Elasticity => Some(Part::Elasticity),
+            Kind::Prepared => Some(self.prepared()),
+            Kind::Linearised => Some(Part::Linearised),
+            _ => None,
+        }
+    }
+
+    /// Whether a function is worked out by the laws now.
+    fn by_laws(&mut self, part: Part) -> bool {
+        Self::is_direct(part) && self.routines.get(&self.kind(part)).is_none()
     }
 
     /// Whether the laws themselves give it.
@@ -121,11 +144,12 @@ impl<S: Scalar> Following<S> {
 
     /// What is seen at `y`, where the next step begins, see [`Guided::sample`].
     pub(crate) fn sample(&mut self, y: &[S], seen: &mut [S]) {
-        if let (Some(y), Some(seen)) = (S::plain(y), S::plain_mut(seen)) {
-            self.laws.sample(y, seen);
-            self.ready = true;
-        } else {
-            self.copy(Part::Sample, y, seen);
+        match (S::plain(y), S::plain_mut(seen)) {
+            (Some(y), Some(seen)) if self.by_laws(Part::Sample) => {
+                self.laws.sample(y, seen);
+                self.ready = true;
+            }
+            _ => self.routines.copy(&self.kind(Part::Sample), y, &[], seen),
         }
     }
 
@@ -136,22 +160,11 @@ impl<S: Scalar> Following<S> {
         }
     }
 
-    /// All outputs of a recorded function; what has none is no number.
-    fn copy(&mut self, part: Part, y: &[S], outputs: &mut [S]) {
-        match self.routines.get(&self.kind(part)) {
-            Some(routine) => outputs.copy_from_slice(routine.at(y)),
-            None => outputs.fill(S::from_f64(f64::NAN)),
-        }
-    }
-
     /// A recorded matrix in rows of `width` entries, with the rates.
     fn matrix(&mut self, part: Part, y: &[S], matrix: &mut [S], width: usize, rates: &mut [S]) {
         self.ready = false;
         let kind = self.kind(part);
-        match self.routines.make(&kind).ok().and_then(|()| self.routines.get(&kind)) {
-            Some(routine) => routine.matrix(y, matrix, width, rates),
-            None => matrix.fill(S::from_f64(f64::NAN)),
-        }
+        self.routines.matrix(&kind, y, matrix, width, rates);
     }
 
     fn matrix_alone(&mut self, part: Part, y: &[S], matrix: &mut [S], width: usize) {
@@ -172,11 +185,12 @@ impl<S: Scalar> Ode<S> for Following<S> {
 
     fn rhs(&mut self, y: &[S], dydt: &mut [S]) {
         self.ready = false;
-        if let (Some(y), Some(dydt)) = (S::plain(y), S::plain_mut(dydt)) {
-            self.laws.evaluate(y);
-            dydt.copy_from_slice(&self.laws.rates);
-        } else {
-            self.copy(Part::Rates, y, dydt);
+        match (S::plain(y), S::plain_mut(dydt)) {
+            (Some(y), Some(dydt)) if self.by_laws(Part::Rates) => {
+                self.laws.evaluate(y);
+                dydt.copy_from_slice(&self.laws.rates);
+            }
+            _ => self.routines.copy(&self.kind(Part::Rates), y, &[], dydt),
         }
     }
 
@@ -193,7 +207,7 @@ impl<S: Scalar> Ode<S> for Following<S> {
         let part = self.prepared();
         let plain = (S::plain(y), S::plain_mut(matrix), S::plain_mut(rates));
         match plain {
-            (Some(y), Some(matrix), Some(rates)) if Self::is_direct(part) => {
+            (Some(y), Some(matrix), Some(rates)) if self.by_laws(part) => {
                 self.begin(y);
                 rates.copy_from_slice(&self.laws.rates);
                 self.laws.stiff(matrix);

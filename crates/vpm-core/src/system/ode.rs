@@ -88,12 +88,7 @@ impl<S: Scalar> System<S> {
     /// Runs samples and steps by `method` as machine code from now on, where they can; or says why they cannot.
     pub fn compile(&mut self, method: Method) -> std::result::Result<(), String> {
         self.ready = false;
-        for kind in [Kind::Rates, Kind::Sample] {
-            if let Err(reason) = self.routines.compile(&kind) {
-                [Kind::Rates, Kind::Sample].iter().for_each(|kind| self.routines.forget(kind));
-                return Err(reason);
-            }
-        }
+        self.routines.compile_all(&[Kind::Rates, Kind::Sample])?;
         // A matrix alone that has no code is worked out as before.
         let kind = kind_of(method).filter(|kind| *kind != Kind::Elasticity);
         if let Some(kind) = kind.filter(|kind| self.routines.compile(kind).is_err() && self.is_direct(kind)) {
@@ -149,7 +144,8 @@ impl<S: Scalar> System<S> {
             self.dynamics.rhs(x, dxdt);
             self.dynamics.observe(x, dxdt, outputs);
         } else {
-            self.missing(&Kind::Sample, outputs);
+            debug_assert!(false, "samples are asked for before they are made");
+            outputs.fill(S::from_f64(f64::NAN));
         }
     }
 
@@ -159,7 +155,7 @@ impl<S: Scalar> System<S> {
             self.ready = false;
             self.dynamics.observe_motion(x, outputs);
         } else {
-            self.copy(&Kind::Motion, x, &[], outputs);
+            self.routines.copy(&Kind::Motion, x, &[], outputs);
         }
     }
 
@@ -168,7 +164,7 @@ impl<S: Scalar> System<S> {
         if let (Some(q), Some(levers)) = (S::plain(q), S::plain_mut(levers)) {
             self.dynamics().levers(q, levers);
         } else {
-            self.copy(&Kind::Levers, q, &[], levers);
+            self.routines.copy(&Kind::Levers, q, &[], levers);
         }
     }
 
@@ -178,26 +174,8 @@ impl<S: Scalar> System<S> {
             let (q, v) = state.split_at(a.len());
             self.dynamics().inverse_dynamics_of_tree(q, v, a, efforts);
         } else {
-            self.copy(&Kind::RequiredOfTree, state, a, efforts);
+            self.routines.copy(&Kind::RequiredOfTree, state, a, efforts);
         }
-    }
-
-    /// Copies all outputs of a recorded function that is asked for seldom, at the states that stand first and accelerations `a`.
-    fn copy(&mut self, kind: &Kind, x: &[S], a: &[S], outputs: &mut [S]) {
-        match self.routines.make(kind).ok().and_then(|()| self.routines.get(kind)) {
-            Some(routine) => {
-                routine.put_accelerations(a);
-                outputs.copy_from_slice(routine.at(x));
-            }
-            None => outputs.fill(S::from_f64(f64::NAN)),
-        }
-    }
-
-    /// Makes a function that nobody asked for in time; what has none is no number.
-    #[cold]
-    fn missing(&mut self, kind: &Kind, numbers: &mut [S]) {
-        debug_assert!(false, "{kind:?} is asked for before it is made");
-        numbers.fill(S::from_f64(f64::NAN));
     }
 
     /// Takes note that the machine, last evaluated with these `rates`, makes its next step from that very state. What is asked of the
@@ -242,25 +220,15 @@ impl<S: Scalar> System<S> {
         self.matrix_alone(&Kind::LinearFriction, x, matrix);
     }
 
-    /// A recorded matrix at `x` and what the function gives beside it.
-    fn matrix(&mut self, kind: &Kind, x: &[S], matrix: &mut [S], width: usize, values: &mut [S]) {
-        match self.routines.make(kind).ok().and_then(|()| self.routines.get(kind)) {
-            Some(routine) => routine.matrix(x, matrix, width, values),
-            None => matrix.fill(S::from_f64(f64::NAN)),
-        }
-    }
-
     fn matrix_alone(&mut self, kind: &Kind, x: &[S], matrix: &mut [S]) {
         self.ready = false;
         let mut values = std::mem::take(&mut self.rates);
-        self.matrix(kind, x, matrix, x.len(), &mut values);
+        self.routines.matrix(kind, x, matrix, x.len(), &mut values);
         self.rates = values;
     }
 
-    /// Writes [`Ode::iteration_matrix`] of a machine of which beams are all that is stiff, by its laws; false if they have to be recorded.
-    fn prepare_directly(&mut self, x: &[S], matrix: &mut [S]) -> bool {
-        let plain = (S::plain(x), S::plain_mut(matrix));
-        let (true, (Some(x), Some(matrix))) = (self.by_laws(&Kind::Prepared), plain) else { return false };
+    /// Writes [`Ode::iteration_matrix`] of a machine of which beams are all that is stiff, by its laws.
+    fn prepare_directly(&mut self, x: &[f64], matrix: &mut [f64]) {
         let n = self.dynamics.coordinates();
         let (q, v) = x[..2 * n].split_at(n);
         self.dynamics.write_resistances(q, v, &mut self.resistances);
@@ -268,7 +236,6 @@ impl<S: Scalar> System<S> {
         self.dynamics.memories.fadings(&x[first..], v, &mut self.fadings);
         let laws = (&*self.resistances, &*self.fadings);
         stiff::iteration_matrix(&mut self.dynamics, x, matrix, laws, &mut self.column);
-        true
     }
 
     /// Whether a matrix is part of a recorded function that works the rates out too.
@@ -313,17 +280,19 @@ impl<S: Scalar> Ode<S> for System<S> {
 
     fn linearise(&mut self, x: &[S], jacobian: &mut [S], rates: &mut [S]) {
         self.ready = false;
-        self.matrix(&Kind::Linearised, x, jacobian, x.len(), rates);
+        self.routines.matrix(&Kind::Linearised, x, jacobian, x.len(), rates);
     }
 
     fn prepare(&mut self, x: &[S], matrix: &mut [S], rates: &mut [S]) {
         if self.by_laws(&Kind::Prepared) {
             self.begin_by_laws(x, rates);
-            self.prepare_directly(x, matrix);
+            if let (Some(x), Some(matrix)) = (S::plain(x), S::plain_mut(matrix)) {
+                self.prepare_directly(x, matrix);
+            }
             return;
         }
         self.ready = false;
-        self.matrix(&Kind::Prepared, x, matrix, x.len(), rates);
+        self.routines.matrix(&Kind::Prepared, x, matrix, x.len(), rates);
     }
 
     /// As df/dx, but with chords from rest in the place of the tangents of friction laws; of a machine with elastic beams and ideal drives,
@@ -401,7 +370,7 @@ impl<S: Scalar> Ode<S> for System<S> {
             return true;
         }
         let mut values = std::mem::take(&mut self.rates);
-        self.matrix(&Kind::Elasticity, x, block, 2 * n, &mut values);
+        self.routines.matrix(&Kind::Elasticity, x, block, 2 * n, &mut values);
         self.rates = values;
         true
     }

@@ -86,8 +86,6 @@ pub enum Kind {
     Levers,
     /// Efforts that the accelerations need, those of the effects taken off.
     Required,
-    /// The same without any effect on a joint.
-    RequiredWithoutEffects,
     /// The same as [`Kind::Required`], but without what contacts and bushings do.
     RequiredOfTree,
     /// What the coordinates miss at rest, then the entries of its derivatives by them; the only input is the share of the weight.
@@ -100,7 +98,7 @@ pub enum Kind {
 
 impl Kind {
     /// All of a free machine that are no derivatives of others.
-    pub const ALL: [Self; 13] = [
+    pub const ALL: [Self; 12] = [
         Self::Rates,
         Self::Sample,
         Self::Motion,
@@ -112,7 +110,6 @@ impl Kind {
         Self::Additive,
         Self::Levers,
         Self::Required,
-        Self::RequiredWithoutEffects,
         Self::RequiredOfTree,
     ];
 
@@ -269,12 +266,6 @@ fn outputs(build: impl Build<Error = Error>, places: Places, theta: &[f64], kind
         }
         Kind::Required => (required(&mut dynamics, Dynamics::inverse_dynamics), None),
         Kind::RequiredOfTree => (required(&mut dynamics, Dynamics::inverse_dynamics_of_tree), None),
-        Kind::RequiredWithoutEffects => {
-            dynamics.leave_effects();
-            let (a, mut efforts) = (inputs(places.accelerations(), n), zeros(n));
-            dynamics.inverse_dynamics(motion.0, motion.1, &a, &mut efforts);
-            (efforts, None)
-        }
         Kind::Unbalance => {
             let loads = dynamics.unbalance(&x, input(places.states, 0.0));
             (loads.clone(), Some(Matrix::by_states(loads, dim)))

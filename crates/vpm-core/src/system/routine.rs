@@ -190,6 +190,37 @@ impl<S: Scalar> Routines<S> {
         self.get(kind).map_or(Ok(()), Routine::compile)
     }
 
+    /// Makes the functions of these kinds as machine code, all of them or none; or says why there is none.
+    pub(crate) fn compile_all(&mut self, kinds: &[Kind]) -> std::result::Result<(), String> {
+        kinds.iter().try_for_each(|kind| self.compile(kind)).inspect_err(|_| {
+            kinds.iter().for_each(|kind| self.forget(kind));
+        })
+    }
+
+    /// All outputs at the states that stand first and accelerations `a`; what cannot be made is no number.
+    pub(crate) fn copy(&mut self, kind: &Kind, x: &[S], a: &[S], outputs: &mut [S]) {
+        match self.made(kind) {
+            Some(routine) => {
+                routine.put_accelerations(a);
+                outputs.copy_from_slice(routine.at(x));
+            }
+            None => outputs.fill(S::from_f64(f64::NAN)),
+        }
+    }
+
+    /// See [`Routine::matrix`]; what cannot be made is no number.
+    pub(crate) fn matrix(&mut self, kind: &Kind, x: &[S], matrix: &mut [S], width: usize, values: &mut [S]) {
+        match self.made(kind) {
+            Some(routine) => routine.matrix(x, matrix, width, values),
+            None => matrix.fill(S::from_f64(f64::NAN)),
+        }
+    }
+
+    /// The function of that kind, made now if it was not yet.
+    fn made(&mut self, kind: &Kind) -> Option<&mut Routine<S>> {
+        self.make(kind).ok().and_then(|()| self.get(kind))
+    }
+
     /// Forgets the function of that kind.
     pub(crate) fn forget(&mut self, kind: &Kind) {
         self.made.retain(|(own, _)| own != kind);

@@ -4,7 +4,7 @@ use numpy::{PyArray1, PyArray2, PyArray3};
 use pyo3::prelude::*;
 use vpm_core::beam::Beam;
 use vpm_core::evaluate;
-use vpm_core::inverse::{Motion, Part, delivered, effort_of_effect, inverse_dynamics, required};
+use vpm_core::inverse::{Motion, delivered, inverse_dynamics, required};
 use vpm_core::linearize::linearize;
 use vpm_core::motion::JointMotion;
 
@@ -63,41 +63,8 @@ impl System {
         self.checked(py, self.description.check_values(theta.values()))
     }
 
-    /// Effort that one effect puts on its joint along a motion (N,), and its derivatives (N, k).
-    #[pyo3(signature = (theta, effect, position, velocity, acceleration, time_step, sensitivities=vec![]))]
-    #[expect(clippy::too_many_arguments, reason = "the arguments of the Python function")]
-    fn effort_of_effect<'py>(
-        &self,
-        py: Python<'py>,
-        theta: &Any<'py>,
-        effect: i64,
-        position: &Any<'py>,
-        velocity: &Any<'py>,
-        acceleration: &Any<'py>,
-        time_step: f64,
-        sensitivities: Vec<i64>,
-    ) -> PyResult<(Row<'py>, Table<'py>)> {
-        let theta = Numbers::vector("theta", theta)?;
-        let position = Numbers::table("position", position)?;
-        let velocity = Numbers::table("velocity", velocity)?;
-        let acceleration = Numbers::table("acceleration", acceleration)?;
-        let (effect, variables) = (place("effect", effect)?, places("sensitivities", &sensitivities)?);
-        let work = || {
-            let motion = JointMotion {
-                position: position.as_table()?,
-                velocity: velocity.as_table()?,
-                acceleration: acceleration.as_table()?,
-            };
-            effort_of_effect(&self.description, theta.values(), (motion, time_step), effect, &variables)
-        };
-        // Too short to ask for signals meanwhile.
-        let result = py.detach(|| unbroken(work))?;
-        let (efforts, jacobian) = self.checked(py, result)?;
-        Ok((PyArray1::from_vec(py, efforts), matrix(py, jacobian, [position.rows(), variables.len()])?))
-    }
-
-    /// Effort that a motion needs (N, n) whatever the drives are, and its derivatives (N, n, k); without those on joints if no `effects`.
-    #[pyo3(signature = (theta, position, velocity, acceleration, time_step, sensitivities=vec![], effects=true))]
+    /// Effort that a motion needs (N, n) whatever the drives are, and its derivatives (N, n, k).
+    #[pyo3(signature = (theta, position, velocity, acceleration, time_step, sensitivities=vec![]))]
     #[expect(clippy::too_many_arguments, reason = "the arguments of the Python function")]
     fn required<'py>(
         &self,
@@ -108,7 +75,6 @@ impl System {
         acceleration: &Any<'py>,
         time_step: f64,
         sensitivities: Vec<i64>,
-        effects: bool,
     ) -> PyResult<(Table<'py>, Cube<'py>)> {
         let theta = Numbers::vector("theta", theta)?;
         let position = Numbers::table("position", position)?;
@@ -121,8 +87,7 @@ impl System {
                 velocity: velocity.as_table()?,
                 acceleration: acceleration.as_table()?,
             };
-            let part = if effects { Part::Whole } else { Part::WithoutEffects };
-            required(&self.description, theta.values(), (motion, time_step), part, &variables, interrupt)
+            required(&self.description, theta.values(), (motion, time_step), &variables, interrupt)
         })?;
         let (rows, joints) = (position.rows(), self.description.n_joints());
         Ok((matrix(py, efforts, [rows, joints])?, cube(py, jacobian, [rows, joints, variables.len()])?))

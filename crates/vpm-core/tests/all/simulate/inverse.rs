@@ -6,7 +6,7 @@ use rayon::ThreadPoolBuilder;
 use serde_json::json;
 use vpm_core::Error;
 use vpm_core::description::Description;
-use vpm_core::inverse::{Efforts, Motion, Part, delivered, effort_of_effect, inverse_dynamics, required};
+use vpm_core::inverse::{Efforts, Motion, delivered, inverse_dynamics, required};
 use vpm_core::motion::JointMotion;
 use vpm_core::samples::{Random, arm7, double_pendulum, random_tree};
 use vpm_core::system::Kind;
@@ -96,24 +96,15 @@ fn derivatives_are_those_of_the_efforts() {
 }
 
 #[test]
-fn derivatives_of_the_parts_are_those_of_the_parts() {
+fn what_a_motion_needs_is_the_same_without_commands() {
     let machine = machine();
     let (d, by) = (machine.build(), all(&machine));
     let log = Log::new(&d, 40);
     let motion = (log.motion(log.rows()), STEP);
-    for part in [Part::Whole, Part::WithoutEffects] {
-        let at = |theta: &[f64], by: &[usize]| required(&d, theta, motion, part, by, ALWAYS).unwrap();
-        check(&machine, &at(&machine.values, &by).1, &format!("{part:?}"), |theta| at(theta, &[]).0);
-    }
-    let mut rest = required(&d, &machine.values, motion, Part::WithoutEffects, &[], ALWAYS).unwrap().0;
-    for (effect, joint) in [0, 0, 1, 1].into_iter().enumerate() {
-        let at = |theta: &[f64], by: &[usize]| effort_of_effect(&d, theta, motion, effect, by).unwrap();
-        let (efforts, jacobian) = at(&machine.values, &by);
-        check(&machine, &jacobian, &format!("effect {effect}"), |theta| at(theta, &[]).0);
-        rest.iter_mut().skip(joint).step_by(2).zip(efforts).for_each(|(rest, effort)| *rest -= effort);
-    }
-    let whole = required(&d, &machine.values, motion, Part::Whole, &[], ALWAYS).unwrap().0;
-    whole.iter().zip(rest).for_each(|(&whole, rest)| close(whole, rest, 1e-12));
+    let at = |theta: &[f64], by: &[usize]| required(&d, theta, motion, by, ALWAYS).unwrap();
+    let (efforts, jacobian) = at(&machine.values, &by);
+    assert_eq!(efforts, log.efforts(&d, &machine.values, log.rows(), &[]).required);
+    check(&machine, &jacobian, "required", |theta| at(theta, &[]).0);
 }
 
 #[test]

@@ -1,0 +1,58 @@
+"""Compiled systems, one for all models that differ in parameter values only.
+
+A core is given the values at every call; what it records and compiles of the equations then serves every model of the
+same structure.
+"""
+
+from __future__ import annotations
+
+import json
+from collections import OrderedDict
+from threading import Lock
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vpm.errors import VpmError
+
+if TYPE_CHECKING:
+    from vpm._core import System
+
+#: Systems that are kept; each holds what it recorded and compiled.
+KEPT = 64
+
+_systems: OrderedDict[str, System] = OrderedDict()
+_lock = Lock()
+
+
+def core_of(description: str, theta: NDArray[np.float64]) -> System:
+    """Compiled system of a description, as JSON text, for the parameters ``theta`` that it holds.
+
+    Raises
+    ------
+    ValueError
+        The core refuses the description.
+    VpmError
+        There is no core.
+    """
+    try:
+        from vpm._core import System
+    except ImportError as error:
+        raise VpmError(f"the compiled core of vpm cannot be imported ({error}); reinstall vpm-dynamics") from error
+    content = json.loads(description)
+    del content["parameters"]
+    structure = json.dumps(content)
+    with _lock:
+        known = _systems.get(structure)
+        if known is not None:
+            _systems.move_to_end(structure)
+    if known is not None:
+        known.check(theta)
+        return known
+    system = System(description)
+    with _lock:
+        _systems[structure] = system
+        while len(_systems) > KEPT:
+            _systems.popitem(last=False)
+    return system
