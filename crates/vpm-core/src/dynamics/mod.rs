@@ -20,6 +20,7 @@ mod kinematics;
 mod reaction;
 mod regular;
 mod rnea;
+mod slices;
 mod virtual_work;
 mod wrenches;
 

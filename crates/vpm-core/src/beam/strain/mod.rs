@@ -14,6 +14,7 @@ mod motion;
 mod plane;
 mod space;
 mod statics;
+mod sums;
 mod sweep;
 mod tree;
 
@@ -24,5 +25,6 @@ pub use motion::{Drive, TreeMotion};
 pub(super) use plane::PlaneAxis;
 pub(super) use space::SpaceAxis;
 pub use statics::TipLoad;
+pub(crate) use sums::{Slices, Sums};
 pub use sweep::{Frame, TreeWorkspace};
 pub use tree::{FlexibleLink, FlexibleTree};

@@ -1,11 +1,12 @@
 //! The axis of a beam that bends in one plane and cannot stretch or shear: the exact map in closed form but for one quadrature.
 
+use super::sums::{Passing, Slices, Sums};
 use crate::beam::entry::Component;
 use crate::beam::fields::Fields;
 use crate::beam::motion::{SectionMotion, Sections};
 use crate::beam::quadrature::composite;
 use crate::scalar::Scalar;
-use crate::spatial::{Matrix3, Pose, Twist, Vector3};
+use crate::spatial::{Matrix3, Pose, SpatialInertia, Twist, Vector3};
 
 /// Gauss points between neighbouring sections: exact to the sixth order of the angle that the beam bends between them.
 const POINTS: usize = 3;
@@ -63,19 +64,75 @@ impl PlaneAxis {
 
     /// Poses, twists, columns and accelerations of all sections.
     pub fn motion<S: Scalar>(&self, q: &[S], v: &[S], out: &mut Sections<S>) {
+        self.run((q, v), out, None);
+    }
+
+    /// As [`PlaneAxis::motion`], but of slices of the beam alone only sums, for a root that turns with `turn` about the axis of bending.
+    pub fn gather<S: Scalar>(
+        &self,
+        (q, v): (&[S], &[S]),
+        turn: S,
+        (slices, sums): (&Slices<S>, &mut Sums<S>),
+        out: &mut Sections<S>,
+    ) {
+        sums.clear();
+        self.run((q, v), out, Some((turn, slices, sums)));
+    }
+
+    /// The slices of a beam with this axis and these inertias at its stations.
+    pub fn slices<S: Scalar>(
+        &self,
+        inertias: &[SpatialInertia<S>],
+        is_slice: impl Fn(usize) -> bool,
+        (root, spatial): (&Pose<f64>, bool),
+    ) -> Slices<S> {
+        let rows = self.rows.chunks_exact(self.n).zip(&self.weights);
+        let rows: Vec<_> = rows.filter(|(_, weight)| weight.is_none()).map(|(row, _)| row).collect();
+        let across = self.vector([1.0, 0.0]);
+        let axes = Matrix3::from_columns(across, self.axis(), Vector3::new(0.0, 0.0, 1.0));
+        let frame = *root * Pose::new(axes, Vector3::zero());
+        Slices::new((inertias, self.about_y), is_slice, &rows, (frame, spatial))
+    }
+
+    /// The axis of bending.
+    pub fn axis(&self) -> Vector3<f64> {
+        self.twist(1.0, [0.0; 2]).angular
+    }
+
+    /// Along the axis, station by station. With `turn` the rate of the root about the axis of bending, `change` is the acceleration
+    /// in axes that do not turn: the tangent turns with `turn + alpha'`, so `r' = -int_0^mu t (turn + alpha')^2 dmu`.
+    fn run<S: Scalar>(
+        &self,
+        (q, v): (&[S], &[S]),
+        out: &mut Sections<S>,
+        mut sums: Option<(S, &Slices<S>, &mut Sums<S>)>,
+    ) {
         let (n, mut station) = (self.n, 0);
         let zero = S::zero();
+        let turn = sums.as_ref().map_or(zero, |(turn, ..)| *turn);
         // Across and along the root's axis: place, and acceleration at zero coordinate accelerations.
         let (mut place, mut change) = ([zero; 2], [zero; 2]);
         out.scratch.fill(zero);
         for (weight, row) in self.weights.iter().zip(self.rows.chunks_exact(n)) {
-            let (sin, cos) = dot(row, q).sin_cos();
-            let rate = dot(row, v);
             let Some(weight) = *weight else {
-                self.section(row, (sin, cos, rate), (place, change), v, (station, &mut *out));
+                if let Some((_, slices, sums)) = &mut sums
+                    && let Some(slice) = &slices.each[station]
+                {
+                    let passing = Passing { row, place, change, columns: &out.scratch };
+                    sums.add(slice, &passing);
+                    if slices.spatial {
+                        sums.add_in_space(slice, &passing, dot(row, q).sin_cos());
+                    }
+                } else {
+                    let (sin, cos) = dot(row, q).sin_cos();
+                    let rates = (dot(row, v), turn);
+                    self.section(row, (sin, cos, rates), (place, change), v, (station, &mut *out));
+                }
                 station += 1;
                 continue;
             };
+            let (sin, cos) = dot(row, q).sin_cos();
+            let rate = dot(row, v) + turn;
             let (sin, cos) = (sin * weight, cos * weight);
             let square = rate * rate;
             (place[0], place[1]) = (place[0] + sin, place[1] + cos);
@@ -91,7 +148,7 @@ impl PlaneAxis {
     fn section<S: Scalar>(
         &self,
         row: &[f64],
-        (sin, cos, rate): (S, S, S),
+        (sin, cos, (rate, root)): (S, S, (S, S)),
         (place, change): ([S; 2], [S; 2]),
         v: &[S],
         (station, out): (usize, &mut Sections<S>),
@@ -105,9 +162,12 @@ impl PlaneAxis {
             *column = self.twist(S::from_f64(entry), own);
             (speed[0], speed[1]) = (speed[0] + own[0] * v, speed[1] + own[1] * v);
         }
-        let change = turn(change);
+        // Without the root's turning: less `2 w x dr/dt + w x (w x r)`.
+        let square = root * root;
+        let change = turn([change[0] + place[0] * square, change[1] + place[1] * square]);
         // d/dt of R^T dr/dt: the axes turn with the rate.
-        let change = [change[0] - rate * speed[1], change[1] + rate * speed[0]];
+        let both = rate + root * 2.0;
+        let change = [change[0] - both * speed[1], change[1] + both * speed[0]];
         let pose = Pose::new(self.rotation(sin, cos), self.vector(place));
         out.at[station] =
             SectionMotion { pose, twist: self.twist(rate, speed), acceleration: self.twist(S::zero(), change) };
