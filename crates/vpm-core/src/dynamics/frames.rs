@@ -18,7 +18,7 @@ pub fn frames<S: Scalar>(model: &Model<S>, data: &mut Data<S>, q: &[S], v: &[S])
 
 /// How the stations of beams are taken that are nothing but slices of a beam which bends in one plane.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Stations {
+pub(crate) enum Stations {
     /// Each moves as a frame.
     Each,
     /// They have no frames, but sums that go to what carries the beam.
@@ -26,7 +26,7 @@ pub(super) enum Stations {
 }
 
 /// As [`frames`], with a say in how slices of beams are taken.
-pub(super) fn outward<S: Scalar>(model: &Model<S>, data: &mut Data<S>, (q, v): (&[S], &[S]), taken: Stations) {
+pub(crate) fn outward<S: Scalar>(model: &Model<S>, data: &mut Data<S>, (q, v): (&[S], &[S]), taken: Stations) {
     debug_assert!(q.len() == model.n_coordinates() && v.len() == model.n_coordinates());
     let Data { composite: Composite { frames, sections, sums, .. }, drifts, .. } = data;
     frames[0].acceleration = Twist::new(Vector3::zero(), -model.gravity());

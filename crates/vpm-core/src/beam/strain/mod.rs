@@ -8,6 +8,7 @@
 //! IEEE Trans. Robotics 34(6), for strain coordinates; Iserles, Munthe-Kaas, Nørsett & Zanna 2000, "Lie-group methods", Acta
 //! Numerica 9, for the exponentials; Featherstone 2008, "Rigid Body Dynamics Algorithms", for the spatial vectors.
 
+mod angles;
 mod beam;
 mod exponential;
 mod motion;

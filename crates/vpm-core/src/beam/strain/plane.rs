@@ -1,5 +1,6 @@
 //! The axis of a beam that bends in one plane and cannot stretch or shear: the exact map in closed form but for one quadrature.
 
+use super::angles::Angles;
 use super::sums::{Passing, Slices, Sums};
 use crate::beam::entry::Component;
 use crate::beam::fields::Fields;
@@ -24,6 +25,7 @@ pub(in crate::beam) struct PlaneAxis {
     weights: Vec<Option<f64>>,
     /// Derivative of the angle at each point by the coordinates.
     rows: Vec<f64>,
+    angles: Angles,
 }
 
 impl PlaneAxis {
@@ -38,13 +40,16 @@ impl PlaneAxis {
             n: fields.len(),
             weights: Vec::new(),
             rows: Vec::new(),
+            angles: Angles::default(),
         };
+        let mut points = Vec::new();
         let (mut begin, mut angle) = (0.0, vec![0.0; axis.n]);
         for &place in places {
             let inside = fields.breaks().into_iter().filter(|&at| at > begin && at < place);
             for end in inside.chain(std::iter::once(place)).collect::<Vec<_>>() {
                 let reach = |to: f64| turned(fields, &angle, begin, to);
                 for point in composite(POINTS, &[begin, end]) {
+                    points.push((axis.weights.len(), point.place));
                     axis.weights.push(Some(point.weight));
                     axis.rows.extend(reach(point.place));
                 }
@@ -54,12 +59,13 @@ impl PlaneAxis {
             axis.weights.push(None);
             axis.rows.extend(&angle);
         }
+        axis.angles = Angles::new(&points, field.basis.length(), &axis.rows, axis.n);
         Some(axis)
     }
 
     /// Numbers of partial sums that a motion needs.
     pub fn scratch(&self) -> usize {
-        2 * self.n
+        2 * self.n + 2 * self.weights.len()
     }
 
     /// Poses, twists, columns and accelerations of all sections.
@@ -112,36 +118,42 @@ impl PlaneAxis {
         let turn = sums.as_ref().map_or(zero, |(turn, ..)| *turn);
         // Across and along the root's axis: place, and acceleration at zero coordinate accelerations.
         let (mut place, mut change) = ([zero; 2], [zero; 2]);
-        out.scratch.fill(zero);
-        for (weight, row) in self.weights.iter().zip(self.rows.chunks_exact(n)) {
+        let mut scratch = std::mem::take(&mut out.scratch);
+        let (running, rest) = scratch.split_at_mut(2 * n);
+        let (angles, rates) = rest.split_at_mut(self.weights.len());
+        running.fill(zero);
+        self.angles.evaluate(&self.rows, q, zero, angles);
+        self.angles.evaluate(&self.rows, v, turn, rates);
+        let points = self.weights.iter().zip(self.rows.chunks_exact(n)).zip(angles.iter().zip(&*rates));
+        for ((weight, row), (angle, &rate)) in points {
             let Some(weight) = *weight else {
                 if let Some((_, slices, sums)) = &mut sums
                     && let Some(slice) = &slices.each[station]
                 {
-                    let passing = Passing { row, place, change, columns: &out.scratch };
+                    let passing = Passing { row, place, change, columns: running };
                     sums.add(slice, &passing);
                     if slices.spatial {
-                        sums.add_in_space(slice, &passing, dot(row, q).sin_cos());
+                        sums.add_in_space(slice, &passing, dot(row, q, zero).sin_cos());
                     }
                 } else {
-                    let (sin, cos) = dot(row, q).sin_cos();
-                    let rates = (dot(row, v), turn);
-                    self.section(row, (sin, cos, rates), (place, change), v, (station, &mut *out));
+                    let (sin, cos) = dot(row, q, zero).sin_cos();
+                    let rates = (dot(row, v, zero), turn);
+                    self.section(row, (sin, cos, rates), (place, change, &*running), v, (station, &mut *out));
                 }
                 station += 1;
                 continue;
             };
-            let (sin, cos) = dot(row, q).sin_cos();
-            let rate = dot(row, v) + turn;
+            let (sin, cos) = angle.sin_cos();
             let (sin, cos) = (sin * weight, cos * weight);
             let square = rate * rate;
             (place[0], place[1]) = (place[0] + sin, place[1] + cos);
             (change[0], change[1]) = (change[0] - sin * square, change[1] - cos * square);
-            for (sums, &entry) in out.scratch.chunks_exact_mut(2).zip(row) {
+            for (sums, &entry) in running.chunks_exact_mut(2).zip(row) {
                 sums[0] += cos * entry;
                 sums[1] -= sin * entry;
             }
         }
+        out.scratch = scratch;
     }
 
     /// Writes one section from the sums up to it.
@@ -149,7 +161,7 @@ impl PlaneAxis {
         &self,
         row: &[f64],
         (sin, cos, (rate, root)): (S, S, (S, S)),
-        (place, change): ([S; 2], [S; 2]),
+        (place, change, running): ([S; 2], [S; 2], &[S]),
         v: &[S],
         (station, out): (usize, &mut Sections<S>),
     ) {
@@ -157,7 +169,7 @@ impl PlaneAxis {
         let turn = |[across, along]: [S; 2]| [cos * across - sin * along, sin * across + cos * along];
         let columns = &mut out.columns[station * self.n..(station + 1) * self.n];
         let mut speed = [S::zero(); 2];
-        for (((column, sums), &entry), &v) in columns.iter_mut().zip(out.scratch.chunks_exact(2)).zip(row).zip(v) {
+        for (((column, sums), &entry), &v) in columns.iter_mut().zip(running.chunks_exact(2)).zip(row).zip(v) {
             let own = turn([sums[0], sums[1]]);
             *column = self.twist(S::from_f64(entry), own);
             (speed[0], speed[1]) = (speed[0] + own[0] * v, speed[1] + own[1] * v);
@@ -207,6 +219,6 @@ fn turned(fields: &Fields, angle: &[f64], begin: f64, to: f64) -> Vec<f64> {
     turned
 }
 
-fn dot<S: Scalar>(row: &[f64], x: &[S]) -> S {
-    row.iter().zip(x).fold(S::zero(), |sum, (&entry, &x)| sum + x * entry)
+pub(super) fn dot<S: Scalar>(row: &[f64], x: &[S], begin: S) -> S {
+    row.iter().zip(x).fold(begin, |sum, (&entry, &x)| sum + x * entry)
 }
