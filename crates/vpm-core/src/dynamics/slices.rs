@@ -1,10 +1,10 @@
 //! Slices of beams that bend in one plane, all at once: what they are to the root of their beam and to its coordinates.
 //!
-//! Axes: across, the axis of bending, along, with the beam's root for origin. In them a slice at r of mass m has the acceleration
-//! `a + A x r + w x (w x r) + 2 w x dr/dt + d^2r/dt^2`, A the angular acceleration of the root, w its angular velocity. All terms but the
-//! last two are those of a rigid body with the slices' inertia where they are, which goes to what carries the beam before that is weighed.
-//! Source: Shabana 2013, "Dynamics of Multibody Systems", sections 5.3 to 5.5 (quadratic velocity vector and inertia of a floating
-//! frame). Checked: against the sum station by station and Lagrange's equations.
+//! Axes: across, the axis of bending, along, with the beam's root for origin. In them a slice at r has the acceleration
+//! `a + A x r + w x (w x r) + 2 w x dr/dt + d^2r/dt^2`, with A the angular acceleration of the root and w its angular velocity. All terms
+//! but the last two are those of a rigid body with the slices where they are. Its inertia goes to what carries the beam before that is
+//! weighed. Source: Shabana 2013, "Dynamics of Multibody Systems", sections 5.3 to 5.5 (inertia and quadratic velocity vector of a
+//! floating frame). Checked: against the sum station by station, Lagrange's equations, and articulated bodies.
 
 use super::flexible::entry;
 use crate::beam::{Slices, Sums};
@@ -25,9 +25,9 @@ pub(super) fn hand_on<S: Scalar>(slices: &Slices<S>, sums: &Sums<S>, carrier: &m
 
 /// Adds what the slices of a beam do to its coordinates, and what of their wrench on its root is not that of a rigid body.
 ///
-/// Law: with `p_i = sum m J_i`, `l_i = sum m r x J_i` and a the acceleration of the root's point, of coordinate i
-/// `bias_i = p_i . a + l_i A + sum m J_i . r' - w_z^2 s_xx - w_x^2 s_zz + w_x w_z s_xz`, where r' holds what turns about the axis of
-/// bending and s are the sums of [`crate::beam::Sums`] for roots that move in space.
+/// Law: `bias_i = p_i . a + l_i A + sum m J_i . r' - w_z^2 s_xx - w_x^2 s_zz + w_x w_z s_xz`. There `p_i = sum m J_i`,
+/// `l_i = sum m r x J_i`, and a is the acceleration of the root's point. What turns about the axis of bending is in r'; s are the sums
+/// of [`crate::beam::Sums`] for roots that move in space.
 pub(super) fn add<S: Scalar>(
     (elastic, slices): (&Elastic<S>, &Slices<S>),
     number: usize,

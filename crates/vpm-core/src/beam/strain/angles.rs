@@ -29,13 +29,10 @@ type Term = (usize, f64);
 impl Angles {
     /// Of points with these numbers and places on an axis of that length, entry `number n + i` of `rows` by coordinate i.
     pub fn new(points: &[(usize, f64)], length: f64, rows: &[f64], n: usize) -> Self {
-        let (mut alone, mut pairs): (Vec<usize>, Vec<Pair>) = (Vec::new(), Vec::new());
-        let is_image = |a: f64, b: f64| (a + b - length).abs() < ROUNDING * length;
-        for &(number, place) in points {
-            let image = points.iter().find(|&&(_, other)| is_image(place, other) && place < other);
-            match image {
-                Some(&(other, _)) => pairs.push(Pair::new([number, other], rows, n)),
-                None if points.iter().any(|&(_, other)| is_image(place, other) && other < place) => {}
+        let (mut left, mut alone, mut pairs) = (points.to_vec(), Vec::new(), Vec::<Pair>::new());
+        while let Some((number, place)) = left.pop() {
+            match left.iter().position(|&(_, other)| (place + other - length).abs() < ROUNDING * length) {
+                Some(image) => pairs.push(Pair::new([left.swap_remove(image).0, number], rows, n)),
                 None => alone.push(number),
             }
         }

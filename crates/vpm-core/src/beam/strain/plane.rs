@@ -12,6 +12,9 @@ use crate::spatial::{Matrix3, Pose, SpatialInertia, Twist, Vector3};
 /// Gauss points between neighbouring sections: exact to the sixth order of the angle that the beam bends between them.
 const POINTS: usize = 3;
 
+/// Share of a coordinate's largest turn below which its turn at a point is rounding.
+const ROUNDING: f64 = 4e-15;
+
 /// An axis whose slope angle is linear in the coordinates, `alpha(mu) = int_0^mu Phi q`.
 ///
 /// Law: `r(mu) = int_0^mu t dmu` with the tangent t turned by alpha, and its derivatives under the same quadrature, so that Jacobian and
@@ -59,8 +62,20 @@ impl PlaneAxis {
             axis.weights.push(None);
             axis.rows.extend(&angle);
         }
+        axis.drop_rounding();
         axis.angles = Angles::new(&points, field.basis.length(), &axis.rows, axis.n);
         Some(axis)
+    }
+
+    /// Makes zero what is rounding, as at the tip the integral of any Legendre polynomial but the first one.
+    fn drop_rounding(&mut self) {
+        for coordinate in 0..self.n {
+            let own = self.rows.iter().skip(coordinate).step_by(self.n);
+            let size = own.fold(0.0_f64, |most, entry| most.max(entry.abs()));
+            let small =
+                self.rows.iter_mut().skip(coordinate).step_by(self.n).filter(|entry| entry.abs() < ROUNDING * size);
+            small.for_each(|entry| *entry = 0.0);
+        }
     }
 
     /// Numbers of partial sums that a motion needs.
@@ -105,8 +120,10 @@ impl PlaneAxis {
         self.twist(1.0, [0.0; 2]).angular
     }
 
-    /// Along the axis, station by station. With `turn` the rate of the root about the axis of bending, `change` is the acceleration
-    /// in axes that do not turn: the tangent turns with `turn + alpha'`, so `r' = -int_0^mu t (turn + alpha')^2 dmu`.
+    /// Along the axis, station by station.
+    ///
+    /// With `turn` the rate of the root about the axis of bending, `change` is the acceleration in axes that do not turn. There the tangent
+    /// turns with `turn + alpha'`, so that it is `-int_0^mu t (turn + alpha')^2 dmu`.
     fn run<S: Scalar>(
         &self,
         (q, v): (&[S], &[S]),

@@ -1,9 +1,9 @@
 //! Integrals over a beam that bends in one plane, in the axes of its root instead of those of its stations.
 //!
-//! With r the place of a slice, `J_i = dr/dq_i` and m its mass, all that the dynamics need of many slices are sums like `sum m J_i . J_j`
-//! and `sum m r x J_i`: no slice is turned into axes of its own. Source: Shabana 2013, "Dynamics of Multibody Systems", section 5.2 to 5.5,
-//! the inertia shape integrals of a floating frame, here at the current state. The stations are those of the beam, so that both
-//! ways agree to rounding. Axes: across, the axis of bending, along.
+//! Let r be the place of a slice of mass m, and `J_i = dr/dq_i`. Then all that the dynamics need of many slices are sums like
+//! `sum m J_i . J_j` and `sum m r x J_i`: no slice is turned into axes of its own. The stations are those of the beam, so that both ways
+//! agree to rounding. Axes: across, the axis of bending, along. Source: Shabana 2013, "Dynamics of Multibody Systems", sections 5.2 to
+//! 5.5, the inertia shape integrals of a floating frame, here at the current state.
 
 use crate::scalar::Scalar;
 use crate::spatial::{Pose, SpatialInertia, Symmetric3, Vector3};
@@ -79,7 +79,7 @@ pub(super) struct Passing<'a, S> {
 }
 
 impl<S: Scalar> Slices<S> {
-    /// Of a beam with these inertias at its stations, of which those count that `is_slice` names, and these derivatives of its angle there.
+    /// Of a beam with these inertias at its stations and these derivatives of its angle there; those stations count that `is_slice` names.
     pub(super) fn new(
         (inertias, about_y): (&[SpatialInertia<S>], bool),
         is_slice: impl Fn(usize) -> bool,
@@ -130,8 +130,8 @@ impl<S: Scalar> Slices<S> {
 
     /// Inertia of all slices where they are, about the root and in axes across, of bending and along.
     ///
-    /// Law: `I = sum m (|r|^2 1 - r r^T) + R diag(I_b) R^T`. In a root that turns about the axis of bending alone, only the moment about that
-    /// is asked for.
+    /// Law: `I = sum m (|r|^2 1 - r r^T) + R diag(I_b) R^T`. A root that turns about the axis of bending alone asks only for the moment about
+    /// that.
     pub(crate) fn inertia(&self, sums: &Sums<S>) -> SpatialInertia<S> {
         let ([x, z], [xx, zz, xz], zero) = (sums.first, sums.second, S::zero());
         let mut rotational = Symmetric3::zero();

@@ -2,18 +2,22 @@
 //!
 //! A marker on each Gauss point makes a frame of that station, which is then taken by itself, with the same quadrature.
 
+use serde_json::json;
 use vpm_core::Result;
 use vpm_core::beam::quadrature::composite;
 use vpm_core::beam::{Component, Level, SectionEntry, Shape};
 use vpm_core::body::Weld;
 use vpm_core::data::Data;
 use vpm_core::dynamics::flexible;
+use vpm_core::graph::{Function, Operation};
 use vpm_core::joint::JointKind;
 use vpm_core::model::Parts;
 use vpm_core::mount::{Marker, Mount};
 use vpm_core::samples::Random;
+use vpm_core::system::Kind;
 
 use crate::common::trees::{UPRIGHT, beam, body, inertia, model, section, turn};
+use crate::common::two_link;
 
 /// Gauss points of the beams below: as many as coefficients and four, three on each of two elements, three more where they taper.
 fn gauss_points(parts: &Parts<f64>, beam: usize) -> Vec<f64> {
@@ -137,5 +141,17 @@ fn beams_that_move_in_their_plane_are_the_sum_of_their_stations() -> Result<()> 
     for level in [Level::Strain(4), Level::Strain(1), Level::Bezier(5), Level::Elements(2)] {
         (0..4).try_for_each(|seed| agree(&in_a_plane(seed, level), seed))?;
     }
+    Ok(())
+}
+
+#[test]
+fn the_rates_of_a_planar_arm_are_few_operations() -> Result<()> {
+    let description = two_link::arm(&json!({"strain": 4}))?;
+    let program = description.program(&Kind::Rates, &description.parameters)?.program;
+    let is_sine = |operation: &&Operation| matches!(operation, Operation::Apply(Function::Sine, _));
+    let sines = program.operations().iter().filter(is_sine).count();
+    // Three points between neighbouring ones of eight stations, a gauge and the tip, the tip, and the joint: for each link.
+    assert_eq!(sines, 2 * (3 * 10 + 1 + 1));
+    assert!(program.size() < 6_000, "{}", program.size());
     Ok(())
 }
