@@ -96,7 +96,9 @@ impl Fields {
         Ok(stiffness)
     }
 
-    /// Which coordinates couple by stiffness: of one component, and of a uniform beam those whose strains are not orthogonal.
+    /// Which coordinates couple by stiffness: those of one component.
+    ///
+    /// In a uniform beam with a single field those whose strains are orthogonal do not: between them stands nothing but rounding.
     fn coupled<S: Scalar>(&self, profile: &Profile<S>) -> Vec<bool> {
         const ROUNDING: f64 = 1e-14;
         let n = self.len();
@@ -109,7 +111,7 @@ impl Fields {
         }
         let orthogonal = |i: usize, j: usize| {
             let (product, own) = (products[i * n + j], products[i * n + i] * products[j * n + j]);
-            profile.is_uniform() && product * product <= ROUNDING * ROUNDING * own
+            profile.is_uniform() && self.list.len() == 1 && product * product <= ROUNDING * ROUNDING * own
         };
         let pairs = (0..n).flat_map(|i| (0..n).map(move |j| (i, j)));
         pairs.map(|(i, j)| self.components[i] == self.components[j] && !orthogonal(i, j)).collect()
