@@ -3,7 +3,7 @@
 mod segment;
 
 use crate::algebra::BlockCholesky;
-use crate::beam::Sections;
+use crate::beam::{Sections, Slices, Sums};
 use crate::model::Model;
 use crate::scalar::Scalar;
 use crate::spatial::{ArticulatedInertia, Pose, SpatialInertia, Twist, Vector3, Wrench};
@@ -37,6 +37,8 @@ pub(crate) struct Composite<S> {
     pub(crate) frames: Vec<FrameSlot<S>>,
     /// Sections of each beam relative to its root.
     pub(crate) sections: Vec<Sections<S>>,
+    /// Sums over the slices of each beam, where there are any.
+    pub(crate) sums: Vec<Sums<S>>,
     /// Wrench per unit acceleration of each coordinate, on its way to the root.
     pub(crate) columns: Vec<Wrench<S>>,
     /// Velocity terms and gravity, counted as loads.
@@ -222,6 +224,11 @@ impl<S: Scalar> Composite<S> {
         Self {
             frames: vec![world; model.n_frames()],
             sections: model.beams().iter().map(|elastic| elastic.beam.sections()).collect(),
+            sums: model
+                .beams()
+                .iter()
+                .map(|elastic| elastic.slices.as_ref().map_or_else(Sums::default, Slices::sums))
+                .collect(),
             columns: vec![Wrench::zero(); n],
             bias: vec![S::zero(); n],
             factors: BlockCholesky::new(model.blocks()),

@@ -5,13 +5,14 @@ mod finish;
 mod omissions;
 mod order;
 mod place;
+mod turning;
 
 pub use assemble::Parts;
 pub use omissions::Omissions;
 pub(crate) use omissions::Products;
 pub(crate) use place::Place;
 
-use crate::beam::{Beam, Gauge};
+use crate::beam::{Beam, Gauge, Slices};
 use crate::body::{Body, PointMass};
 use crate::error::Result;
 use crate::joint::{Joint, JointKind};
@@ -44,6 +45,8 @@ pub struct Model<S> {
     articulated: bool,
     /// Whether anything with coordinates hangs on each frame.
     carriers: Vec<bool>,
+    /// Whether each frame is a slice of a beam that its beam's sums hold.
+    summed: Vec<bool>,
     drops_velocity_terms: bool,
     /// Which products of rates count, frame by frame.
     products: Vec<Products>,
@@ -122,6 +125,8 @@ pub(crate) struct Elastic<S> {
     pub(crate) inertias: Vec<SpatialInertia<S>>,
     /// Whether a station has inertia or carries something that may, of whatever size.
     pub(crate) heavy: Vec<bool>,
+    /// Its stations that are nothing but slices of a beam that bends in one plane, where these can be summed up.
+    pub(crate) slices: Option<Slices<S>>,
 }
 
 /// A line in its place.
@@ -177,6 +182,12 @@ impl<S: Scalar> Model<S> {
     #[inline]
     pub fn is_articulated(&self) -> bool {
         self.articulated
+    }
+
+    /// Whether a frame is a slice of a beam that its beam's sums hold.
+    #[inline]
+    pub(crate) fn is_summed(&self, frame: usize) -> bool {
+        self.summed[frame]
     }
 
     /// Whether anything with coordinates hangs on a frame.

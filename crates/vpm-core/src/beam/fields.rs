@@ -83,16 +83,38 @@ impl Fields {
     pub fn stiffness<S: Scalar>(&self, profile: &Profile<S>) -> Result<Vec<S>> {
         let n = self.len();
         let mut stiffness = vec![S::zero(); n * n];
+        let coupled = self.coupled(profile);
         for at in profile.rule(self.points(), &self.breaks()) {
             let (row, section) = (self.strain_row(at.place), profile.at(at.place)?);
             for i in 0..n {
                 let modulus = section.stiffness[self.components[i]] * (at.weight * row[i]);
-                for j in (0..n).filter(|&j| self.components[i] == self.components[j]) {
+                for j in (0..n).filter(|&j| coupled[i * n + j]) {
                     stiffness[i * n + j] += modulus * row[j];
                 }
             }
         }
         Ok(stiffness)
+    }
+
+    /// Which coordinates couple by stiffness: those of one component.
+    ///
+    /// In a uniform beam with a single field those whose strains are orthogonal do not: between them stands nothing but rounding.
+    fn coupled<S: Scalar>(&self, profile: &Profile<S>) -> Vec<bool> {
+        const ROUNDING: f64 = 1e-14;
+        let n = self.len();
+        let mut products = vec![0.0; n * n];
+        for at in profile.rule(self.points(), &self.breaks()) {
+            let row = self.strain_row(at.place);
+            for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
+                products[i * n + j] += at.weight * row[i] * row[j];
+            }
+        }
+        let orthogonal = |i: usize, j: usize| {
+            let (product, own) = (products[i * n + j], products[i * n + i] * products[j * n + j]);
+            profile.is_uniform() && self.list.len() == 1 && product * product <= ROUNDING * ROUNDING * own
+        };
+        let pairs = (0..n).flat_map(|i| (0..n).map(move |j| (i, j)));
+        pairs.map(|(i, j)| self.components[i] == self.components[j] && !orthogonal(i, j)).collect()
     }
 }
 

@@ -11,10 +11,10 @@ use super::gauge::Gauge;
 use super::lumped::LumpedAxis;
 use super::motion::Sections;
 use super::segment::Segment;
-use super::strain::{PlaneAxis, SpaceAxis};
+use super::strain::{PlaneAxis, Slices, SpaceAxis, Sums};
 use crate::error::Result;
 use crate::scalar::Scalar;
-use crate::spatial::SpatialInertia;
+use crate::spatial::{Pose, SpatialInertia, Vector3};
 
 /// A straight beam along z of its root frame: a map from elastic coordinates to sections, inertia at sections, and constant
 /// matrices of stiffness and damping.
@@ -126,6 +126,36 @@ impl<S: Scalar> Beam<S> {
     pub(crate) fn sweep(&self, q: &[S], v: &[S], out: &mut Sections<S>, accelerates: bool) {
         debug_assert!(q.len() == self.len() && v.len() == self.len() && out.at.len() == self.stations());
         self.axis.sweep(q, v, out, accelerates);
+    }
+
+    /// As [`Beam::motion`] in what `slices` leaves out, for a root that turns with `turn` about the axis of bending; of the slices only sums.
+    pub(crate) fn gather(
+        &self,
+        motion: (&[S], &[S]),
+        turn: S,
+        sums: (&Slices<S>, &mut Sums<S>),
+        out: &mut Sections<S>,
+    ) {
+        if let Axis::Plane(axis) = &self.axis {
+            axis.gather(motion, turn, sums, out);
+        }
+    }
+
+    /// The axis about which it bends, if it bends in one plane and does nothing else.
+    pub(crate) fn bending_axis(&self) -> Option<Vector3<f64>> {
+        match &self.axis {
+            Axis::Plane(axis) => Some(axis.axis()),
+            _ => None,
+        }
+    }
+
+    /// The slices of a beam that bends in one plane, on a root at `root`, which moves in space or about the axis of bending alone.
+    ///
+    /// Where anything else can sit there are none: at the marks.
+    pub(crate) fn slices(&self, root: &Pose<f64>, spatial: bool) -> Option<Slices<S>> {
+        let Axis::Plane(axis) = &self.axis else { return None };
+        let is_slice = |station: usize| self.heavy[station] && !self.marks.contains(&station);
+        Some(axis.slices(&self.inertia, is_slice, (root, spatial)))
     }
 
     /// Its parts, root to tip, in which some of its coordinates act alone.

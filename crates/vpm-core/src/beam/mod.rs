@@ -46,6 +46,7 @@ pub use motion::{SectionMotion, Sections};
 pub use section::{Material, Section};
 pub(crate) use segment::Segment;
 pub use shape::{Properties, Shape};
+pub(crate) use strain::{Slices, Sums};
 
 use crate::error::{Error, Result};
 use crate::scalar::Scalar;

@@ -32,6 +32,11 @@ impl<'a, S: Scalar> Profile<'a, S> {
         if self.entry.sections.len() > 1 { TAPER } else { 0 }
     }
 
+    /// Whether there is one section for the whole beam.
+    pub fn is_uniform(&self) -> bool {
+        self.entry.sections.len() == 1
+    }
+
     /// Arc lengths between which the section changes smoothly and shape functions with these `breaks` are smooth, ascending.
     pub fn breaks(&self, breaks: &[f64]) -> Vec<f64> {
         let sections = &self.entry.sections;

@@ -6,7 +6,8 @@
 //! Multibody Systems", section 5.5, for the inertia coupling of a deformable body).
 
 use super::energy::{Energy, of_rotors};
-use super::frames::{frames, lines, poses};
+use super::frames::{Stations, frames, lines, outward, poses};
+use super::slices;
 use crate::data::{Composite, Data, FrameSlot, LineSlot};
 use crate::model::{Elastic, Link, Model, Node, Wire};
 use crate::scalar::Scalar;
@@ -19,15 +20,15 @@ use crate::spatial::{Pose, SpatialInertia, Vector3, Wrench};
 /// Checked: against `crba`, `rnea` and `aba` on rigid trees, Lagrange's equations of the energy on flexible ones, a leg with closed
 /// loops on lines.
 pub fn terms<S: Scalar>(model: &Model<S>, data: &mut Data<S>, q: &[S], v: &[S]) {
-    frames(model, data, q, v);
+    outward(model, data, (q, v), Stations::Summed);
     let Data { composite, mass_matrix, .. } = data;
     mass_matrix.fill(S::zero());
     composite.bias.fill(S::zero());
-    weigh_frames(model, &mut composite.frames);
+    weigh_frames(model, &mut composite.frames, Stations::Summed);
     for node in model.order().iter().rev() {
         match node {
             Node::Body(number, beyond) => body(&model.links()[*number], *number, beyond, composite, mass_matrix),
-            Node::Beam(number, beyond) => beam(&model.beams()[*number], *number, beyond, composite, mass_matrix),
+            Node::Beam(number, beyond) => beam((&model.beams()[*number], *number), beyond, v, composite, mass_matrix),
         }
     }
     if !model.lines().is_empty() {
@@ -39,8 +40,11 @@ pub fn terms<S: Scalar>(model: &Model<S>, data: &mut Data<S>, q: &[S], v: &[S]) 
 }
 
 /// The wrench on each frame that its own inertia needs in the motion of [`super::frames()`].
-pub(super) fn weigh_frames<S: Scalar>(model: &Model<S>, frames: &mut [FrameSlot<S>]) {
-    for (slot, products) in frames.iter_mut().zip(model.products()).skip(1) {
+pub(super) fn weigh_frames<S: Scalar>(model: &Model<S>, frames: &mut [FrameSlot<S>], stations: Stations) {
+    for (frame, (slot, products)) in frames.iter_mut().zip(model.products()).enumerate().skip(1) {
+        if stations == Stations::Summed && model.is_summed(frame) {
+            continue;
+        }
         slot.wrench = slot.inertia.apply(slot.acceleration);
         if products.own() {
             slot.wrench += slot.velocity.cross_wrench(slot.inertia.apply(slot.velocity));
@@ -68,22 +72,25 @@ fn body<S: Scalar>(link: &Link<S>, number: usize, beyond: &[usize], data: &mut C
     }
 }
 
-/// A beam: its own block of the mass matrix, station by station, and everything it carries to what its root sits on.
+/// A beam: its own block of the mass matrix, of its slices together and else station by station, and everything it carries to what its root sits on.
 fn beam<S: Scalar>(
-    elastic: &Elastic<S>,
-    number: usize,
+    (elastic, number): (&Elastic<S>, usize),
     beyond: &[(usize, usize)],
+    v: &[S],
     data: &mut Composite<S>,
     mass: &mut [S],
 ) {
-    let Elastic { beam, root, coordinate, frame, heavy, .. } = elastic;
+    let Elastic { beam, root, coordinate, frame, heavy, slices, .. } = elastic;
     let (len, first, frame) = (beam.len(), *coordinate, frame.unwrap_or(0));
+    data.columns[first..first + len].fill(Wrench::zero());
+    if let Some(slices) = slices {
+        slices::add((elastic, slices), number, v, data, mass);
+    }
     let Composite { frames, sections, columns, bias, .. } = data;
     let n = bias.len();
     let jacobian = |station: usize| &sections[number].columns[station * len..(station + 1) * len];
-    columns[first..first + len].fill(Wrench::zero());
     for station in 0..beam.stations() {
-        if !heavy[station] {
+        if !heavy[station] || slices.as_ref().is_some_and(|slices| slices.has(station)) {
             continue;
         }
         let FrameSlot { across, inertia, wrench, .. } = frames[frame + station];
@@ -115,7 +122,7 @@ fn carry<S: Scalar>(parent: &mut FrameSlot<S>, across: &Pose<S>, inertia: &Spati
 }
 
 /// The entry of two coordinates in the lower triangle.
-fn entry<S>(mass: &mut [S], n: usize, i: usize, j: usize) -> &mut S {
+pub(super) fn entry<S>(mass: &mut [S], n: usize, i: usize, j: usize) -> &mut S {
     &mut mass[i.max(j) * n + i.min(j)]
 }
 

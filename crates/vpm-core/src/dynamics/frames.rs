@@ -1,5 +1,6 @@
 //! Where all frames of a machine are and how they move.
 
+use super::slices;
 use crate::beam::Sections;
 use crate::data::{Composite, Data, FrameSlot, LineSlot, PointSlot};
 use crate::model::{Elastic, Model, Node, Place, Products, Wire};
@@ -12,8 +13,22 @@ use crate::spatial::{Pose, Twist, Vector3};
 /// (Featherstone 2008, section 5.3; a station of a beam is a joint of as many coordinates). Gravity is an upward acceleration of the
 /// world. Where the model drops its velocity terms, `A_F = X^-1 A_P`; where it drops those of some parts, they go on from one joint to the next.
 pub fn frames<S: Scalar>(model: &Model<S>, data: &mut Data<S>, q: &[S], v: &[S]) {
+    outward(model, data, (q, v), Stations::Each);
+}
+
+/// How the stations of beams are taken that are nothing but slices of a beam which bends in one plane.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Stations {
+    /// Each moves as a frame.
+    Each,
+    /// They have no frames, but sums that go to what carries the beam.
+    Summed,
+}
+
+/// As [`frames`], with a say in how slices of beams are taken.
+pub(crate) fn outward<S: Scalar>(model: &Model<S>, data: &mut Data<S>, (q, v): (&[S], &[S]), taken: Stations) {
     debug_assert!(q.len() == model.n_coordinates() && v.len() == model.n_coordinates());
-    let Data { composite: Composite { frames, sections, .. }, drifts, .. } = data;
+    let Data { composite: Composite { frames, sections, sums, .. }, drifts, .. } = data;
     frames[0].acceleration = Twist::new(Vector3::zero(), -model.gravity());
     for node in model.order() {
         match node {
@@ -37,13 +52,27 @@ pub fn frames<S: Scalar>(model: &Model<S>, data: &mut Data<S>, q: &[S], v: &[S])
                 slot.inertia = link.inertia;
             }
             Node::Beam(number, _) => {
-                let Elastic { beam, root, coordinate, frame, inertias, .. } = &model.beams()[*number];
+                let Elastic { beam, root, coordinate, frame, inertias, slices, .. } = &model.beams()[*number];
                 let (own, parent) = (*coordinate..coordinate + beam.len(), frames[root.frame]);
                 let sections = &mut sections[*number];
-                beam.sweep(&q[own.clone()], &v[own], sections, model.accelerates(*number));
+                let (q, v) = (&q[own.clone()], &v[own]);
+                let slices = slices.as_ref().filter(|_| taken == Stations::Summed);
+                match slices {
+                    Some(slices) => {
+                        let sums = &mut sums[*number];
+                        beam.gather((q, v), slices::turn(slices, parent.velocity), (slices, sums), sections);
+                        if root.frame != 0 {
+                            slices::hand_on(slices, sums, &mut frames[root.frame]);
+                        }
+                    }
+                    None => beam.sweep(q, v, sections, model.accelerates(*number)),
+                }
                 let (begin, first) = (Pose::from_f64(root.pose), frame.unwrap_or(0));
                 let stations = frames.iter_mut().enumerate().skip(first).zip(&sections.at).zip(inertias);
                 for (((station, slot), section), inertia) in stations {
+                    if slices.is_some_and(|slices| slices.has(station - first)) {
+                        continue;
+                    }
                     slot.across = begin * section.pose;
                     slot.velocity = slot.across.inverse_twist(parent.velocity) + section.twist;
                     slot.acceleration = slot.across.inverse_twist(parent.acceleration);

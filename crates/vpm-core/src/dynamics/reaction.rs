@@ -1,7 +1,7 @@
 //! Reaction wrenches: what the joints of a machine carry.
 
 use super::flexible::weigh_frames;
-use super::frames::{bare_lines, frames, poses};
+use super::frames::{Stations, bare_lines, frames, poses};
 use crate::data::{Data, LineSlot, PointSlot};
 use crate::model::{Elastic, Model, Node, Wire};
 use crate::scalar::Scalar;
@@ -28,7 +28,7 @@ pub(crate) fn reactions<S: Scalar>(
     accelerate(model, data, a, extra);
     poses(model, data);
     bare_lines(model, data);
-    weigh_frames(model, &mut data.composite.frames);
+    weigh_frames(model, &mut data.composite.frames, Stations::Each);
     for (number, wire) in model.lines().iter().enumerate() {
         let tension = tensions.get(number).copied().unwrap_or(S::zero());
         line(wire, number, data, (tension, model.keeps_velocity_terms()));

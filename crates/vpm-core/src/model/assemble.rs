@@ -189,6 +189,7 @@ impl<'a, S: Scalar> Assembly<'a, S> {
                 frame: of_first_station,
                 inertias: Vec::new(),
                 heavy: Vec::new(),
+                slices: None,
             });
         }
         let (inertias, heavy) = (vec![SpatialInertia::zero(); frame], vec![false; frame]);

@@ -3,6 +3,7 @@
 use super::assemble::Assembly;
 use super::omissions::Tree;
 use super::order::Part;
+use super::turning::turning_in_space;
 use super::{BodyFrame, Elastic, Link, Model, Node, Place, Products, Strip, Wire};
 use crate::error::Result;
 use crate::joint::Joint;
@@ -60,6 +61,7 @@ impl<S: Scalar> Assembly<'_, S> {
                 Node::Beam(number, _) => self.beams[*number].root.frame,
             }] = true;
         }
+        let summed = self.slices(&order, &links, &products);
         let massive = lines.iter().any(Wire::is_massive);
         let segmented = couples && uniform && !massive;
         let cut = self.beams.iter().any(|elastic| elastic.beam.segments().len() > 1);
@@ -73,6 +75,7 @@ impl<S: Scalar> Assembly<'_, S> {
             segmented,
             articulated: segmented && !recursive && n_coordinates >= if cut { MANY } else { MANY_UNCUT },
             carriers,
+            summed,
             drops_velocity_terms: self.parts.drop_velocity_terms,
             products,
             blocks,
@@ -86,6 +89,23 @@ impl<S: Scalar> Assembly<'_, S> {
             beams: self.beams,
             n_coordinates,
         })
+    }
+
+    /// Finds the slices of all beams whose products of rates count, and says which frames they are.
+    fn slices(&mut self, order: &[Node], links: &[Link<S>], products: &[Products]) -> Vec<bool> {
+        let spatial = turning_in_space(order, links, &self.beams, products.len());
+        let mut summed = vec![false; products.len()];
+        for (elastic, spatial) in self.beams.iter_mut().zip(spatial) {
+            let Some(first) = elastic.frame else { continue };
+            let own = first..first + elastic.beam.stations();
+            if products[own.clone()].iter().all(|each| *each == Products::Kept) {
+                elastic.slices = elastic.beam.slices(&elastic.root.pose, spatial);
+            }
+            if let Some(slices) = &elastic.slices {
+                own.enumerate().for_each(|(station, frame)| summed[frame] = slices.has(station));
+            }
+        }
+        summed
     }
 
     fn link(&self, number: usize) -> Result<(Link<S>, BodyFrame<S>)> {

@@ -5,8 +5,9 @@ use std::time::Instant;
 
 use super::{Dynamics, Matrix, System, add_effects};
 use crate::contact::ContactFriction;
+use crate::data::Composite;
 use crate::dynamics::articulated::articulated;
-use crate::dynamics::{aba, flexible, frames, lines, motion, poses};
+use crate::dynamics::{Stations, aba, flexible, frames, lines, motion, outward, poses};
 use crate::ode::Ode;
 
 /// Calls in a row between two looks at the clock, which itself takes tens of ns.
@@ -93,11 +94,17 @@ impl Dynamics<f64> {
                 parts.beams += seconds(|| segment.motion(black_box(q), v, &mut slot.sections, keeps));
             }
         } else {
-            let outward = seconds(|| frames(model, data, black_box(q), v));
-            for (number, (elastic, sections)) in model.beams().iter().zip(&mut data.composite.sections).enumerate() {
+            let outward = seconds(|| outward(model, data, (black_box(q), v), Stations::Summed));
+            let Composite { sections, sums, .. } = &mut data.composite;
+            let buffers = sections.iter_mut().zip(sums);
+            for (number, (elastic, (sections, sums))) in model.beams().iter().zip(buffers).enumerate() {
                 let own = elastic.coordinate..elastic.coordinate + elastic.beam.len();
                 let (beam, asked) = (&elastic.beam, model.accelerates(number));
-                parts.beams += seconds(|| beam.sweep(black_box(&q[own.clone()]), &v[own.clone()], sections, asked));
+                let (q, v) = (&q[own.clone()], &v[own]);
+                parts.beams += seconds(|| match &elastic.slices {
+                    Some(slices) => beam.gather((black_box(q), v), 0.0, (slices, sums), sections),
+                    None => beam.sweep(black_box(q), v, sections, asked),
+                });
             }
             let terms = seconds(|| flexible::terms(model, data, black_box(q), v));
             parts.mass_matrix = (terms - outward).max(0.0);

@@ -8,12 +8,14 @@
 //! IEEE Trans. Robotics 34(6), for strain coordinates; Iserles, Munthe-Kaas, Nørsett & Zanna 2000, "Lie-group methods", Acta
 //! Numerica 9, for the exponentials; Featherstone 2008, "Rigid Body Dynamics Algorithms", for the spatial vectors.
 
+mod angles;
 mod beam;
 mod exponential;
 mod motion;
 mod plane;
 mod space;
 mod statics;
+mod sums;
 mod sweep;
 mod tree;
 
@@ -24,5 +26,6 @@ pub use motion::{Drive, TreeMotion};
 pub(super) use plane::PlaneAxis;
 pub(super) use space::SpaceAxis;
 pub use statics::TipLoad;
+pub(crate) use sums::{Slices, Sums};
 pub use sweep::{Frame, TreeWorkspace};
 pub use tree::{FlexibleLink, FlexibleTree};

@@ -11,6 +11,7 @@ mod dual;
 mod flexible_tree;
 mod no_alloc;
 mod omissions;
+mod slices;
 mod spatial;
 mod velocity_terms;
 mod virtual_work;
