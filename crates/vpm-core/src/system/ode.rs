@@ -88,7 +88,10 @@ impl<S: Scalar> System<S> {
     /// Runs samples and steps by `method` as machine code from now on, where they can; or says why they cannot.
     pub fn compile(&mut self, method: Method) -> std::result::Result<(), String> {
         self.ready = false;
-        self.routines.compile_all(&[Kind::Rates, Kind::Sample])?;
+        // An additive step begins with the rates of the sample before it.
+        let rates = Some(Kind::Rates).filter(|_| method != Method::Additive);
+        let needed: Vec<Kind> = rates.into_iter().chain([Kind::Sample]).collect();
+        self.routines.compile_all(&needed)?;
         // A matrix alone that has no code is worked out as before.
         let kind = kind_of(method).filter(|kind| *kind != Kind::Elasticity);
         if let Some(kind) = kind.filter(|kind| self.routines.compile(kind).is_err() && self.is_direct(kind)) {
@@ -99,7 +102,7 @@ impl<S: Scalar> System<S> {
 
     /// Whether its functions run as machine code.
     pub fn has_code(&mut self) -> bool {
-        Self::is_plain() && self.routines.get(&Kind::Rates).is_some()
+        Self::is_plain() && self.routines.get(&Kind::Sample).is_some()
     }
 
     /// The machine in plain numbers.

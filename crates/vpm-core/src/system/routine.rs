@@ -9,9 +9,9 @@ use crate::graph::{Evaluator, Work};
 use crate::integrator::Method;
 use crate::scalar::{Dual, Scalar};
 
-/// Evaluations of the rates from which on machine code pays: recording and compiling an operation takes some 10 us, and
-/// each evaluation saves about 1 ns of it.
-const PAYS: usize = 15_000;
+/// Evaluations of the rates from which on machine code pays in two runs: recording and compiling an operation takes some 10 us, and
+/// each evaluation saves about half a nanosecond of it.
+const PAYS: usize = 10_000;
 /// Directions that are taken at once.
 const LANES: usize = 8;
 
