@@ -68,8 +68,8 @@ impl<S: Scalar> Following<S> {
     pub(crate) fn compile(&mut self, method: Method) -> std::result::Result<(), String> {
         self.routines.compile_all(&[Part::Rates, Part::Sample].map(|part| self.kind(part)))?;
         // A matrix alone that has no code is worked out as before.
-        let matrix = self.matrix_of(method).filter(|part| *part != Part::Elasticity);
-        if let Some((part, kind)) = matrix.map(|part| (part, self.kind(part))) {
+        if let Some(part) = self.matrix_of(method).filter(|part| *part != Part::Elasticity) {
+            let kind = self.kind(part);
             if self.routines.compile(&kind).is_err() && Self::is_direct(part) {
                 self.routines.forget(&kind);
             }

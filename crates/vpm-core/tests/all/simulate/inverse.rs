@@ -192,7 +192,7 @@ fn interrupt_stops_efforts() {
     let log = Log::new(&d, 20);
     for by in [&[][..], &[0, 5]] {
         let motion = (log.motion(log.rows()), STEP);
-        let found = required(&d, &machine.values, motion, Part::Whole, by, &|| true);
+        let found = required(&d, &machine.values, motion, by, &|| true);
         assert_eq!(found, Err(Error::Interrupted));
     }
 }
@@ -207,7 +207,7 @@ fn derivatives_too_large_to_record_are_worked_out_sample_by_sample() {
     let by = all(&machine).into_iter().map(|parameter| (places.first_parameter() + parameter) as u32).collect();
     let derivative = d.program(&Kind::Derived(Box::new(Kind::Required), by), &machine.values).unwrap();
     assert!(derivative.directions.is_some());
-    let at = |theta: &[f64], by: &[usize]| required(&d, theta, motion, Part::Whole, by, ALWAYS).unwrap();
+    let at = |theta: &[f64], by: &[usize]| required(&d, theta, motion, by, ALWAYS).unwrap();
     let (values, few) = at(&machine.values, &[4, 250]);
     let (same, many) = at(&machine.values, &all(&machine));
     values.iter().zip(same).for_each(|(&few, many)| close(many, few, 1e-10 * (1.0 + few.abs())));
