@@ -2,6 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use crate::algebra::dense;
 use crate::beam::eigen;
 use crate::description::Description;
 use crate::error::{Error, Result};
@@ -105,8 +106,7 @@ impl Statics {
         let mut residual = self.residual(&coordinates, weight);
         for _ in 0..STEPS {
             let tangent = self.tangent(&coordinates, weight);
-            let step = tangent.clone().lu().solve(&residual).filter(|step| step.iter().all(|entry| entry.is_finite()));
-            let Some(step) = step else { break };
+            let Some(step) = dense::solve(&tangent, &residual) else { break };
             let size = self.free.iter().fold(1.0_f64, |most, &place| most.max(coordinates[place].abs()));
             let mut share = 1.0;
             for _ in 0..HALVINGS {

@@ -1,7 +1,8 @@
-//! Small dense linear algebra and polynomials, most of it in arrays whose size the type knows.
+//! Dense linear algebra and polynomials: in arrays whose size the type knows, in flat buffers on hot paths, and of any size.
 
 mod blocks;
 mod cholesky;
+pub(crate) mod dense;
 mod polynomial;
 mod singular;
 mod solve;

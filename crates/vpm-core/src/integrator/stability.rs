@@ -2,15 +2,14 @@
 //!
 //! For analysis before a run: this allocates.
 
-use nalgebra::{Cholesky, Complex, DMatrix, DVector, Schur};
+use nalgebra::{Cholesky, Complex, DMatrix, DVector};
 
 use super::Method;
+use crate::algebra::dense;
 use crate::error::{Error, Result};
 
 /// By how much a step may let a mode grow before it counts as unstable: eigenvalues that coincide are known to half of the digits only.
 pub(super) const SLACK: f64 = 1e-6;
-/// QR sweeps before an eigenproblem counts as lost.
-const SWEEPS: usize = 10_000;
 
 /// A linear system `M q'' + D q' + K q = 0`, matrices row by row, with a name for every coordinate.
 ///
@@ -203,15 +202,12 @@ pub(super) fn rk4_limit(value: Complex<f64>) -> f64 {
 
 pub(super) fn eigenvalues(matrix: DMatrix<f64>) -> Result<Vec<Complex<f64>>> {
     let size = matrix.nrows() as f64;
-    match Schur::try_new(matrix, f64::EPSILON, SWEEPS) {
-        Some(schur) => Ok(schur.complex_eigenvalues().iter().copied().collect()),
-        None => Err(Error::Setting {
-            setting: "the size of a linear system's eigenproblem",
-            condition: "be such that the QR algorithm converges".to_owned(),
-            value: size,
-            repair: "check the matrices for entries of very different size",
-        }),
-    }
+    dense::eigenvalues(matrix).ok_or(Error::Setting {
+        setting: "the size of a linear system's eigenproblem",
+        condition: "be such that the QR algorithm converges".to_owned(),
+        value: size,
+        repair: "check the matrices for entries of very different size",
+    })
 }
 
 fn solve_lower(lower: &DMatrix<f64>, mut right: DMatrix<f64>) -> DMatrix<f64> {

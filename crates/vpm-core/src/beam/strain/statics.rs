@@ -3,6 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::tree::FlexibleTree;
+use crate::algebra::dense;
 use crate::beam::dimension;
 use crate::error::{Error, Result};
 use crate::scalar::{Dual, Scalar, seed};
@@ -33,7 +34,7 @@ impl FlexibleTree {
         let mut q = start.to_vec();
         for _ in 0..STEPS {
             let (residual, tangent) = self.unbalance(&q, loads);
-            let step = tangent.lu().solve(&residual).filter(|step| step.iter().all(|entry| entry.is_finite()));
+            let step = dense::solve(&tangent, &residual);
             let Some(step) = step else { break };
             for (entry, step) in q.iter_mut().zip(step.iter()) {
                 *entry -= step;

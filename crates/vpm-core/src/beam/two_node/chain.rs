@@ -3,6 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::{ELEMENT, NODE, TwoNode};
+use crate::algebra::dense;
 use crate::beam::{Section, dimension};
 use crate::error::{Error, Result};
 use crate::scalar::Dual;
@@ -59,7 +60,7 @@ impl TwoNodeChain {
         }
         for _ in 0..STEPS {
             let (residual, jacobian) = self.unbalance(&unknowns, load);
-            let step = jacobian.lu().solve(&residual).filter(|step| step.iter().all(|entry| entry.is_finite()));
+            let step = dense::solve(&jacobian, &residual);
             let Some(step) = step else { break };
             for (entry, step) in unknowns.iter_mut().zip(&step) {
                 *entry -= step;
