@@ -33,7 +33,7 @@ const ALONE: [(&str, &[&str]); 15] = [
     ("graph", &["error", "scalar"]),
     ("delay", &["error", "scalar"]),
     ("ode", &["error", "scalar"]),
-    ("integrator", &["error", "scalar", "ode"]),
+    ("integrator", &["error", "scalar", "algebra", "ode"]),
     ("effect", &["error", "scalar"]),
     (
         "actuator",
