@@ -237,8 +237,9 @@ class System:
         substeps: int,
         integrator: str,
         sensitivities: Sequence[int] = ...,
+        hold: str = ...,
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """Free run: row k of ``inputs`` (N, m) is held from sample k to sample k + 1.
+        """Free run on ``inputs`` (N, m); between samples they do as ``hold`` says: zero_order, first_order or cubic.
 
         Returns
         -------
@@ -294,6 +295,7 @@ class System:
         substeps: int,
         integrator: str,
         sensitivities: Sequence[int] = ...,
+        hold: str = ...,
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Free runs of ``horizon`` samples from each of the S samples ``starts``, row 0 being the start itself.
 

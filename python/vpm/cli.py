@@ -6,7 +6,7 @@ import sys
 import warnings
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from typer.core import TyperGroup
@@ -32,7 +32,11 @@ from vpm.command import (
 )
 from vpm.errors import ValidityWarning, VpmError
 from vpm.excite_command import app as excite_app
-from vpm.simulate import INTEGRATORS
+from vpm.simulate import HOLDS, INTEGRATORS
+
+if TYPE_CHECKING:
+    from vpm.experiment import Experiment
+    from vpm.simulate import Run
 
 
 class _Commands(TyperGroup):
@@ -131,6 +135,9 @@ def simulate(
         str | None,
         typer.Option(help=f"{', '.join(INTEGRATORS)}; auto by default, or what the scenario says."),
     ] = None,
+    hold: Annotated[
+        str | None, typer.Option(help=f"What commands do between samples: {', '.join(HOLDS)}; the first by default.")
+    ] = None,
     channels: Channels = None,
     interpolate: Interpolate = False,
     out: Annotated[Path | None, typer.Option(help="Save the run or the runs (NPZ) here.")] = None,
@@ -144,9 +151,16 @@ def simulate(
 ) -> None:
     """Run a scenario: a test without a log. Or simulate a model on the inputs of a log and compare with it."""
     from vpm.model.messages import read_toml
+    from vpm.simulate import simulate as simulate_log
 
     if "scenario" in read_toml(model):
-        for value, name in ((log, "LOG"), (mode, "--mode"), (integrator, "--integrator"), (channels, "--channels")):
+        for value, name in (
+            (log, "LOG"),
+            (mode, "--mode"),
+            (integrator, "--integrator"),
+            (hold, "--hold"),
+            (channels, "--channels"),
+        ):
             if value is not None:
                 raise VpmError(f"{model} is a scenario, which needs no {name}; leave it out, or name a model file")
         _simulate_scenario(model, out, plot)
@@ -156,7 +170,13 @@ def simulate(
             "the key scenario"
         )
     else:
-        _simulate_log(model, log, mode or "free_run", integrator or "auto", channels, interpolate, out, plot)
+        machine, record = load_pair(model, log, channels, interpolate)
+        with warnings_told():
+            run = simulate_log(
+                machine, record, mode or "free_run", integrator=integrator or "auto", hold=hold or HOLDS[0]
+            )
+        _tell_run(run, record, out)
+        save_plot(run.plot, plot, log)
 
 
 def _simulate_scenario(path: Path, out: Path | None, plot: Path | None) -> None:
@@ -177,22 +197,9 @@ def _simulate_scenario(path: Path, out: Path | None, plot: Path | None) -> None:
         )
 
 
-def _simulate_log(
-    model: Path,
-    log: Path,
-    mode: str,
-    integrator: str,
-    channels: Path | None,
-    interpolate: bool,
-    out: Path | None,
-    plot: Path | None,
-) -> None:
+def _tell_run(run: Run, record: Experiment, out: Path | None) -> None:
     from vpm.compare import compare as compare_run
-    from vpm.simulate import simulate as simulate_log
 
-    machine, record = load_pair(model, log, channels, interpolate)
-    with warnings_told():
-        run = simulate_log(machine, record, mode, integrator=integrator)
     console.print(repr(run), markup=False)
     try:
         console.print(str(compare_run(run, record)), markup=False)
@@ -200,7 +207,6 @@ def _simulate_log(
         console.print(f"not compared: {error}", markup=False)
     if out is not None:
         run.save(out)
-    save_plot(run.plot, plot, log)
 
 
 @app.command(epilog="Example:  vpm compare examples/emps/model.toml log.csv --mode inverse_dynamics")

@@ -52,6 +52,12 @@ Integrator = Annotated[
         help="auto, linearly_implicit, additive, rosenbrock, rk4, semi_implicit, guarded, adaptive, adaptive(1e-8)."
     ),
 ]
+Hold = Annotated[
+    str,
+    typer.Option(
+        help="What commands of a log do between samples: zero_order (as of a digital controller), first_order or cubic."
+    ),
+]
 Plot = Annotated[Path | None, typer.Option(help="Write the plot to this file (PNG, SVG or PDF).")]
 
 

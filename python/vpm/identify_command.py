@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from vpm.command import (
     Channels,
     Cutoff,
+    Hold,
     Integrator,
     Interpolate,
     Logs,
@@ -45,6 +46,7 @@ def identify(
     interpolate: Interpolate = False,
     cutoff: Cutoff = None,
     integrator: Integrator = "auto",
+    hold: Hold = "zero_order",
     substeps: options.Substeps = 1,
     horizon: options.Horizon = 0.25,
     settling: options.Settling = 0.0,
@@ -99,7 +101,7 @@ def identify(
     asked = settings != Fitting(workers=workers, seed=seed) or noise or loss
     machine, records = load_all(model, logs, channels, interpolate)
     unseen = [load_record(path, machine, channels, interpolate) for path in validate or []]
-    setup = Setup(integrator, substeps, horizon, settling)
+    setup = Setup(integrator, substeps, horizon, settling, hold)
     with shown(errors, starts) as tell:
         fit = fit_logs(
             machine,

@@ -238,6 +238,12 @@ pub enum Error {
         /// The name asked for.
         name: String,
     },
+    /// A name that is no hold of inputs.
+    #[error("unknown hold '{name}'; choose zero_order, first_order or cubic")]
+    Hold {
+        /// The name asked for.
+        name: String,
+    },
     /// An explicit step that is too long for the fastest vibration or decay of a system.
     #[error(
         "a step of {step:.3e} s is too large for {method}: the mode that moves `{coordinate}` most, at {frequency:.4} Hz, is stable \

@@ -3,6 +3,8 @@
 mod along;
 mod control;
 mod guide;
+mod hold;
+mod moving;
 mod names;
 mod prescribed;
 mod resolution;
@@ -12,6 +14,7 @@ mod start;
 mod stepper;
 
 pub use along::{Along, drives_along};
+pub use hold::{Hold, Inputs};
 pub(crate) use names::state_name;
 pub use prescribed::{observed, prescribed};
 pub use resolution::resolution;
@@ -93,14 +96,14 @@ pub struct Setting<'a> {
     pub interrupt: Interrupt<'a>,
 }
 
-/// Free run: row k of `inputs` (N x inputs: commands, then pressures of logged supplies) is held from sample k to sample k + 1, from
-/// `initial_state`.
-pub fn free_run(setting: Setting<'_>, initial_state: &[f64], inputs: Table<'_>) -> Result<Run> {
-    inputs.expect("inputs", inputs.rows(), setting.description.n_inputs())?;
+/// Free run on `inputs` (N x inputs: commands, then pressures of logged supplies) from `initial_state`; a mere table is held from each
+/// sample to the next.
+pub fn free_run<'a>(setting: Setting<'a>, initial_state: &'a [f64], inputs: impl Into<Inputs<'a>>) -> Result<Run> {
+    let inputs = inputs.into();
+    inputs.expect(&setting)?;
     check_state("initial_state", setting.description, initial_state)?;
-    let starts = [0];
-    let plan = Plan { drive: Drive::Commands(inputs), initial: initial_state, starts: &starts, horizon: inputs.rows() };
-    execute(setting, plan)
+    let horizon = inputs.table.rows();
+    execute(setting, Plan { drive: Drive::Commands(inputs), initial: initial_state, starts: &[0], horizon })
 }
 
 /// Closed loop: the controllers follow `references`; `disturbances` are added to their commands (both N x inputs). What no controller
@@ -125,28 +128,29 @@ pub fn closed_loop(
 
 /// Free runs of `horizon` samples from each sample in `starts`, from the row of `initial_states` that belongs to it. Delayed commands
 /// reach back into the record before the start; sensor delays see the start value held.
-pub fn restarts(
-    setting: Setting<'_>,
-    initial_states: Table<'_>,
-    starts: &[usize],
+pub fn restarts<'a>(
+    setting: Setting<'a>,
+    initial_states: Table<'a>,
+    starts: &'a [usize],
     horizon: usize,
-    inputs: Table<'_>,
+    inputs: impl Into<Inputs<'a>>,
 ) -> Result<Run> {
-    let description = setting.description;
+    let (description, inputs) = (setting.description, inputs.into());
     description.refuse_sampled(
         "a simulation cannot start again from a state in the middle of a record",
         "simulate the record as a whole",
     )?;
-    inputs.expect("inputs", inputs.rows(), description.n_inputs())?;
+    inputs.expect(&setting)?;
+    let rows = inputs.table.rows();
     initial_states.expect("initial_states", starts.len(), description.n_states())?;
-    if horizon == 0 || horizon > inputs.rows() {
-        let condition = format!("lie between 1 and the {} samples of the inputs", inputs.rows());
+    if horizon == 0 || horizon > rows {
+        let condition = format!("lie between 1 and the {} samples of the inputs", rows);
         let repair = "choose a horizon that fits into the record";
         return Err(Error::Setting { setting: "horizon", condition, value: horizon as f64, repair });
     }
     for &start in starts {
-        if start > inputs.rows() - horizon {
-            let condition = format!("leave {horizon} samples of the {} behind it", inputs.rows());
+        if start > rows - horizon {
+            let condition = format!("leave {horizon} samples of the {} behind it", rows);
             let repair = "drop the last starts or shorten the horizon";
             return Err(Error::Setting { setting: "a start", condition, value: start as f64, repair });
         }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from vpm.errors import SimulationError
 from vpm.experiment import Experiment
@@ -98,7 +99,7 @@ class Judge:
         SimulationError
             The simulation fails in these steps.
         """
-        stepped = Setup(setup.integrator, setup.substeps * self.per_sample, setup.horizon, setup.settling)
+        stepped = replace(setup, substeps=setup.substeps * self.per_sample)
         data = self._outputs(model, self.unseen, stepped)
         residual, _ = data.evaluate(model, model.theta)
         return {channel: share for channel, (_, share, _) in gaps(data, residual).items()}

@@ -4,11 +4,12 @@ from vpm.simulate.inputs import restart_grid, simulation_inputs
 from vpm.simulate.modes import MODES, check_balance, judging_mode, simulate, simulate_arrays, simulated_rows
 from vpm.simulate.resolution import Resolution
 from vpm.simulate.run import Run, SimulatedArrays, copied_channels, judged
-from vpm.simulate.setup import AUTOMATIC, FIXED_STEP, INTEGRATORS, Setup
+from vpm.simulate.setup import AUTOMATIC, FIXED_STEP, HOLDS, INTEGRATORS, Setup
 
 __all__ = [
     "AUTOMATIC",
     "FIXED_STEP",
+    "HOLDS",
     "INTEGRATORS",
     "MODES",
     "Resolution",

@@ -29,11 +29,13 @@ from vpm.model import Model
 from vpm.simulate.inputs import check_controllers, held_inputs, references_of, restart_grid, uncontrolled
 from vpm.simulate.resolution import resolution
 from vpm.simulate.run import Run, SimulatedArrays, judged, run_of
-from vpm.simulate.setup import AUTOMATIC, Setup
+from vpm.simulate.setup import AUTOMATIC, HOLDS, Setup
 
 Array = NDArray[np.float64]
 
 MODES = ("free_run", "inverse_dynamics", "restarts", "closed_loop", "prescribed_motion")
+#: Those whose commands come from the log.
+LOGGED = ("free_run", "restarts")
 
 
 def simulate(
@@ -46,6 +48,7 @@ def simulate(
     horizon: float = 0.25,
     cutoff: float | None = None,
     initial_state: Array | None = None,
+    hold: str = HOLDS[0],
 ) -> Run:
     """Simulate ``model`` on the inputs of ``experiment``.
 
@@ -56,7 +59,7 @@ def simulate(
         Holds the commands (free run, restarts), the motion (inverse dynamics, prescribed motion) or the references
         (closed loop).
     mode : {"free_run", "inverse_dynamics", "restarts", "closed_loop", "prescribed_motion"}
-    integrator, substeps, horizon
+    integrator, substeps, horizon, hold
         See :class:`Setup`.
     cutoff : float, optional
         Cut-off frequency of the motion filter, Hz (inverse dynamics, prescribed motion, initial velocities).
@@ -82,7 +85,12 @@ def simulate(
     """
     if mode == "inverse_dynamics":
         return _inverse_dynamics_run(model, experiment, cutoff)
-    setup = Setup(integrator, substeps, horizon)
+    setup = Setup(integrator, substeps, horizon, hold=hold)
+    if hold != HOLDS[0] and mode not in LOGGED:
+        raise SimulationError(
+            f"hold '{hold}' is for commands of a log, and mode '{mode}' takes none; leave it out, or use the mode "
+            f"{' or '.join(LOGGED)}"
+        )
     arrays = simulate_arrays(model, experiment, mode, setup=setup, cutoff=cutoff, initial_state=initial_state)
     run = run_of(model, experiment, mode, arrays, setup)
     if arrays.states is None:
@@ -170,7 +178,7 @@ def _dispatch(
     if mode == "free_run":
         inputs = held_inputs(model, experiment, mode)
         state = start(model, experiment, theta) if initial_state is None else initial_state
-        outputs, states, jacobian = model.core.simulate(theta, state, inputs, *stepping)
+        outputs, states, jacobian = model.core.simulate(theta, state, inputs, *stepping, setup.hold)
         return SimulatedArrays(outputs, jacobian, rows, begin, states)
     if mode == "closed_loop":
         check_controllers(model)
@@ -182,7 +190,7 @@ def _dispatch(
         inputs = held_inputs(model, experiment, mode)
         starts, length = restart_grid(experiment, setup.horizon)
         states = measured_states(model, experiment, theta, starts, cutoff)
-        outputs, jacobian = model.core.restart(theta, states, starts, length, inputs, *stepping)
+        outputs, jacobian = model.core.restart(theta, states, starts, length, inputs, *stepping, setup.hold)
         flat = outputs.reshape(-1, outputs.shape[-1])
         return SimulatedArrays(flat, jacobian.reshape(len(flat), flat.shape[1], -1), rows, starts)
     raise SimulationError(f"unknown mode '{mode}'; choose one of {', '.join(MODES)}")

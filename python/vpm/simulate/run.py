@@ -17,7 +17,7 @@ from vpm.model import Model
 from vpm.results import Result
 from vpm.simulate.inputs import uncontrolled
 from vpm.simulate.resolution import Resolution
-from vpm.simulate.setup import Setup
+from vpm.simulate.setup import HOLDS, Setup
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -42,7 +42,7 @@ class Run(Result):
     starts : ndarray of int
         Rows at which a piece begins.
     settings : dict
-        Integrator, substeps, horizon, cut-off.
+        Integrator, substeps, horizon, hold, cut-off.
     notes : tuple of str
         What to know before the numbers are trusted: one sentence each, none as a rule.
     resolution : Resolution or None
@@ -142,6 +142,8 @@ def run_of(model: Model, experiment: Experiment, mode: str, arrays: SimulatedArr
     }
     if mode == "restarts":
         settings["horizon"] = setup.horizon
+    if setup.hold != HOLDS[0]:
+        settings["hold"] = setup.hold
     return Run(
         model.name,
         experiment.name,

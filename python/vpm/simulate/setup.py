@@ -13,6 +13,8 @@ FIXED_STEP = ("linearly_implicit", "additive", "rosenbrock", "rk4", "semi_implic
 #: Chooses by what a machine contains.
 AUTOMATIC = "auto"
 INTEGRATORS = (AUTOMATIC, *FIXED_STEP, "guarded", "adaptive")
+#: What commands of a log do between its samples.
+HOLDS = ("zero_order", "first_order", "cubic")
 
 
 @dataclass(frozen=True)
@@ -42,12 +44,18 @@ class Setup(Storable):
     settling : float
         Time at the beginning of each record, s, that a fit simulates but does not compare: until what nobody knows of
         the first state, such as vibrations, has died away. Restarts have none.
+    hold : {"zero_order", "first_order", "cubic"}
+        What commands and logged pressures do between samples of a log, in free runs and restarts. ``zero_order`` keeps
+        each until the next sample, as the output of a digital controller does. ``first_order`` goes straight to the
+        next sample, ``cubic`` smoothly: for signals that are continuous and were sampled, such as an analog reference
+        or a command of a far faster controller. What controllers of the model command is always held.
     """
 
     integrator: str = AUTOMATIC
     substeps: int = 1
     horizon: float = 0.25
     settling: float = 0.0
+    hold: str = HOLDS[0]
 
     def __post_init__(self) -> None:
         """Check the choices."""
@@ -58,6 +66,8 @@ class Setup(Storable):
             raise SimulationError(f"horizon is {self.horizon} s; give a positive time")
         if not self.settling >= 0.0:
             raise SimulationError(f"settling is {self.settling} s; give a time that is not negative")
+        if self.hold not in HOLDS:
+            raise SimulationError(f"unknown hold '{self.hold}'; choose one of {', '.join(HOLDS)}")
 
     def method(self, model: Model, *, bounded: bool = False, guided: bool = False) -> str:
         """Integrator for a model, as the core names it.

@@ -1,6 +1,8 @@
 //! The loop over samples: what happens at a sample, and between two.
 
 use super::control::{Control, reading};
+use super::hold::{Course, Hold, Inputs};
+use super::moving::Courses;
 use super::names::{output_name, state_name};
 use super::sampled::{Astray, SampledDrives};
 use super::{Setting, Stepping, diverged, halted, leapt, strayed};
@@ -18,7 +20,7 @@ use crate::table::Table;
 #[derive(Clone, Copy)]
 pub(crate) enum Drive<'a> {
     /// Given, sample by sample.
-    Commands(Table<'a>),
+    Commands(Inputs<'a>),
     /// From the model's controllers.
     Loop { references: Table<'a>, disturbances: Table<'a> },
 }
@@ -36,6 +38,16 @@ pub(crate) struct Plan<'a> {
     pub(crate) horizon: usize,
 }
 
+impl Plan<'_> {
+    /// What inputs do between samples; those of controllers are held.
+    fn hold(&self) -> Hold {
+        match self.drive {
+            Drive::Commands(inputs) => inputs.hold,
+            Drive::Loop { .. } => Hold::ZeroOrder,
+        }
+    }
+}
+
 /// A machine on its way through a piece of the record. All buffers are there before the first step.
 pub(crate) struct Stepper<'a, S> {
     description: &'a Description,
@@ -48,6 +60,8 @@ pub(crate) struct Stepper<'a, S> {
     /// The controllers, if there is a loop to close.
     control: Option<Control<S>>,
     sampled: SampledDrives,
+    /// Inputs that move between samples, if they do.
+    courses: Option<Courses<S>>,
     state: Vec<S>,
     /// Coordinates in plain numbers.
     place: Vec<f64>,
@@ -70,18 +84,21 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         let (dim, rows, zero) = (system.dim(), plan.horizon, S::zero());
         // A closed loop begins with its disturbances, to which the controllers add.
         let (given, control) = match plan.drive {
-            Drive::Commands(inputs) => (inputs, None),
+            Drive::Commands(inputs) => (inputs.table, None),
             Drive::Loop { references, disturbances } => {
                 (disturbances, Some(Control::new(setting, theta, rows, references.columns())?))
             }
         };
+        let courses = (plan.hold() != Hold::ZeroOrder)
+            .then(|| Courses::new(description.n_inputs(), dim, setting.stepping.time_step));
         let layout = description.layout();
         let sensors = description.sensors(theta).into_iter().map(|sensor| (sensor.channel.column(layout), sensor));
         Ok(Self {
             description,
             plan: *plan,
             stepping: setting.stepping,
-            integrator: Integrator::new(setting.stepping.method, dim),
+            integrator: Integrator::new(setting.stepping.method, dim + usize::from(courses.is_some())),
+            courses,
             sensors: sensors.collect(),
             control,
             sampled: SampledDrives::new(description, setting.stepping.time_step)?,
@@ -180,11 +197,12 @@ impl<'a, S: Scalar> Stepper<'a, S> {
 
     /// Carries the state from sample `row` of the piece that begins at `start` to the next.
     pub(crate) fn advance(&mut self, row: usize, start: usize, interrupt: Interrupt<'_>) -> Result<()> {
-        let (stepping, Self { integrator, system, state, .. }) = (self.stepping, &mut *self);
-        let pieces = (stepping.time_step, stepping.substeps);
-        integrator
-            .advance(system, state, pieces, interrupt)
-            .map_err(|halt| halted(self.description, stepping, start + row, halt, self.before(row + 1)))
+        let (stepping, Self { integrator, system, courses, state, .. }) = (self.stepping, &mut *self);
+        let end = match courses {
+            Some(courses) => courses.advance(system, integrator, state, stepping.substeps, interrupt),
+            None => integrator.advance(system, state, (stepping.time_step, stepping.substeps), interrupt),
+        };
+        end.map_err(|halt| halted(self.description, stepping, start + row, halt, self.before(row + 1)))
     }
 
     /// Complains about a piston that went through its stop; steps of controlled error do not let it.
@@ -217,16 +235,22 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         control.arrive(row, |actuator, command| commands[first + actuator] += command);
     }
 
-    /// Holds what every input amounts to over the interval that begins at sample `row` of the piece; of a sampled drive its effort.
+    /// Holds what every input amounts to at sample `row` of the piece, and tells what it does until the next; the effort of a sampled
+    /// drive is held until then.
     fn hold(&mut self, row: usize, start: usize) -> std::result::Result<(), Astray> {
-        let Self { system, commands, stepping, description, sampled, truth, .. } = self;
-        let (inputs, k) = (description.n_inputs(), row + start);
+        let Self { system, commands, stepping, description, sampled, courses, plan, truth, .. } = self;
+        let inputs = description.n_inputs();
         let truth = &truth[row * description.n_outputs()..];
         for number in 0..inputs {
             let command = |sample: usize| commands[sample * inputs + number];
-            let input = system.input(number, k, stepping.time_step, command);
-            let effort = sampled.sample(number, row, input.re(), |column| truth[column].re())?;
-            system.hold(number, effort.map_or(input, S::from_f64));
+            let input = |row: usize| system.input(number, row + start, stepping.time_step, command);
+            let now = input(row);
+            let effort = sampled.sample(number, row, now.re(), |column| truth[column].re())?.map(S::from_f64);
+            if let Some(courses) = courses {
+                let course = || plan.hold().course(row, plan.horizon - 1, input);
+                courses.begin(number, effort.map_or_else(course, Course::constant));
+            }
+            system.hold(number, effort.unwrap_or(now));
         }
         Ok(())
     }

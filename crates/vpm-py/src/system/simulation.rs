@@ -5,7 +5,9 @@ use pyo3::prelude::*;
 use vpm_core::description::Description;
 use vpm_core::motion::{JointMotion, StrainRates};
 use vpm_core::sensitivity::Interrupt;
-use vpm_core::simulate::{Run, Setting, Stepping, closed_loop, drives_along, free_run, observed, resolution, restarts};
+use vpm_core::simulate::{
+    Hold, Inputs, Run, Setting, Stepping, closed_loop, drives_along, free_run, observed, resolution, restarts,
+};
 
 use super::System;
 use crate::arrays::{self, Numbers, cube, matrix, places};
@@ -57,7 +59,7 @@ impl System {
 #[pymethods]
 impl System {
     /// Free run on given commands: outputs (N, ny), states (N, nx), derivatives of the outputs (N, ny, k).
-    #[pyo3(signature = (theta, initial_state, inputs, time_step, substeps, integrator, sensitivities=vec![]))]
+    #[pyo3(signature = (theta, initial_state, inputs, time_step, substeps, integrator, sensitivities=vec![], hold="zero_order"))]
     #[expect(clippy::too_many_arguments, reason = "the arguments of the Python function")]
     fn simulate<'py>(
         &self,
@@ -69,12 +71,15 @@ impl System {
         substeps: i64,
         integrator: &str,
         sensitivities: Vec<i64>,
+        hold: &str,
     ) -> PyResult<(Table<'py>, Table<'py>, Cube<'py>)> {
         let request = Request::new(self, theta, (time_step, substeps, integrator), &sensitivities)?;
+        let hold = self.checked(py, Hold::from_name(hold))?;
         let initial = Numbers::vector("initial_state", initial_state)?;
         let inputs = Numbers::table("inputs", inputs)?;
         let run = self.compute(py, |interrupt| {
-            free_run(request.setting(&self.description, interrupt), initial.values(), inputs.as_table()?)
+            let inputs = Inputs { table: inputs.as_table()?, hold };
+            free_run(request.setting(&self.description, interrupt), initial.values(), inputs)
         })?;
         self.run(py, run, sensitivities.len())
     }
@@ -129,7 +134,7 @@ impl System {
     }
 
     /// Free runs of `horizon` samples from many samples: outputs (S, horizon, ny), derivatives (S, horizon, ny, k).
-    #[pyo3(signature = (theta, initial_states, starts, horizon, inputs, time_step, substeps, integrator, sensitivities=vec![]))]
+    #[pyo3(signature = (theta, initial_states, starts, horizon, inputs, time_step, substeps, integrator, sensitivities=vec![], hold="zero_order"))]
     #[expect(clippy::too_many_arguments, reason = "the arguments of the Python function")]
     fn restart<'py>(
         &self,
@@ -143,15 +148,17 @@ impl System {
         substeps: i64,
         integrator: &str,
         sensitivities: Vec<i64>,
+        hold: &str,
     ) -> PyResult<(Cube<'py>, Bound<'py, PyArray4<f64>>)> {
         let request = Request::new(self, theta, (time_step, substeps, integrator), &sensitivities)?;
+        let hold = self.checked(py, Hold::from_name(hold))?;
         let initial = Numbers::table("initial_states", initial_states)?;
         let inputs = Numbers::table("inputs", inputs)?;
         let starts = places("starts", &starts)?;
         let horizon = usize::try_from(horizon).unwrap_or(0);
         let run = self.compute(py, |interrupt| {
             let setting = request.setting(&self.description, interrupt);
-            restarts(setting, initial.as_table()?, &starts, horizon, inputs.as_table()?)
+            restarts(setting, initial.as_table()?, &starts, horizon, Inputs { table: inputs.as_table()?, hold })
         })?;
         let outputs = self.description.n_outputs();
         let jacobian = PyArray1::from_vec(py, run.jacobian);

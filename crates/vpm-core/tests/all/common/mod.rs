@@ -24,7 +24,7 @@ use vpm_core::description::Description;
 use vpm_core::integrator::Method;
 use vpm_core::samples::Sample;
 use vpm_core::sensitivity::Interrupt;
-use vpm_core::simulate::{Run, Setting, Stepping, closed_loop, free_run, restarts};
+use vpm_core::simulate::{Hold, Inputs, Run, Setting, Stepping, closed_loop, free_run, restarts};
 use vpm_core::system::System;
 use vpm_core::table::Table;
 
@@ -173,13 +173,14 @@ pub struct Bench {
     pub theta: Vec<f64>,
     pub stepping: Stepping,
     pub sensitivities: Vec<usize>,
+    pub hold: Hold,
 }
 
 impl Bench {
     pub fn new(machine: &Machine, time_step: f64, substeps: usize, method: Method) -> Self {
         let (description, theta) = (machine.build(), machine.values.clone());
         let stepping = Stepping::new(time_step, substeps, method).unwrap();
-        Self { description, theta, stepping, sensitivities: Vec::new() }
+        Self { description, theta, stepping, sensitivities: Vec::new(), hold: Hold::ZeroOrder }
     }
 
     pub fn setting(&self) -> Setting<'_> {
@@ -197,8 +198,12 @@ impl Bench {
         Table::new(name, numbers, numbers.len() / columns.max(1), columns).unwrap()
     }
 
+    fn inputs<'a>(&self, numbers: &'a [f64]) -> Inputs<'a> {
+        Inputs { table: self.table("inputs", numbers), hold: self.hold }
+    }
+
     pub fn try_free(&self, initial: &[f64], inputs: &[f64]) -> vpm_core::Result<Run> {
-        free_run(self.setting(), initial, self.table("inputs", inputs))
+        free_run(self.setting(), initial, self.inputs(inputs))
     }
 
     pub fn free(&self, initial: &[f64], inputs: &[f64]) -> Run {
@@ -213,7 +218,7 @@ impl Bench {
 
     pub fn restart(&self, states: &[f64], starts: &[usize], horizon: usize, inputs: &[f64]) -> Run {
         let states = Table::new("initial_states", states, starts.len(), self.description.n_states()).unwrap();
-        restarts(self.setting(), states, starts, horizon, self.table("inputs", inputs)).unwrap()
+        restarts(self.setting(), states, starts, horizon, self.inputs(inputs)).unwrap()
     }
 
     /// One output channel over time.

@@ -4,7 +4,7 @@ use super::{Bench, Machine};
 use serde_json::{Value, json};
 use vpm_core::description::Description;
 use vpm_core::integrator::Method;
-use vpm_core::simulate::Stepping;
+use vpm_core::simulate::{Hold, Stepping};
 
 /// A description that is still open for parts.
 pub struct Parts(pub Value);
@@ -59,7 +59,13 @@ impl Parts {
     pub fn bench(&self, time_step: f64, substeps: usize) -> Bench {
         let description = self.try_build().unwrap();
         let stepping = Stepping::new(time_step, substeps, Method::Rk4).unwrap();
-        Bench { theta: description.parameters.clone(), description, stepping, sensitivities: Vec::new() }
+        Bench {
+            theta: description.parameters.clone(),
+            description,
+            stepping,
+            sensitivities: Vec::new(),
+            hold: Hold::default(),
+        }
     }
 }
 

@@ -9,7 +9,7 @@ use vpm_core::Error;
 use vpm_core::description::Description;
 use vpm_core::integrator::Method;
 use vpm_core::samples::{double_pendulum, slider};
-use vpm_core::simulate::{Stepping, resolution};
+use vpm_core::simulate::{Hold, Stepping, resolution};
 
 /// A mass of 1 kg on a spring with a damper.
 fn oscillator(frequency: f64, ratio: f64) -> Machine {
@@ -114,7 +114,8 @@ fn drives_too_fast_for_the_explicit_part_are_refused_and_lags_are_not() {
         d["actuators"][0]["drive"]["type"] = json!("dc_motor");
         let d = Description::from_json(&d.to_string()).unwrap();
         let stepping = Stepping::new(1e-3, 1, Method::Additive).unwrap();
-        let bench = Bench { description: d, theta: machine.values, stepping, sensitivities: Vec::new() };
+        let bench =
+            Bench { description: d, theta: machine.values, stepping, sensitivities: Vec::new(), hold: Hold::default() };
         bench.try_free(&[0.0; 3], &[1.0; 20])
     };
     assert!(motor(2.5e-4).is_ok(), "{:?}", motor(2.5e-4).err());

@@ -1,5 +1,6 @@
 //! Whole records: simulation, sensitivities, timing.
 
+mod holds;
 mod inverse;
 mod live;
 mod no_alloc;

@@ -4,6 +4,7 @@ use allocation_counter::measure;
 use serde_json::json;
 use vpm_core::integrator::Method;
 use vpm_core::samples::double_pendulum;
+use vpm_core::simulate::Hold;
 
 use crate::common::hydraulics::nominal;
 use crate::common::servo_machine::{rest, simpler_drives};
@@ -30,7 +31,8 @@ fn steps_allocate_nothing() {
     for method in Method::ALL {
         // One pass of four derivatives stays on this thread, where the counter sees it.
         for sensitivities in [&[][..], &[0, 3, 20, 25][..]] {
-            let bench = bench(method, sensitivities);
+            let (bench, moving) = (bench(method, sensitivities), bench(method, sensitivities));
+            let moving = Bench { hold: Hold::Cubic, ..moving };
             let free = |rows: usize| measure(|| drop(bench.free(&START, &inputs[..2 * rows]))).count_total;
             let closed = |rows: usize| {
                 measure(|| drop(bench.closed(&START, &inputs[..2 * rows], &inputs[..2 * rows]))).count_total
@@ -39,6 +41,9 @@ fn steps_allocate_nothing() {
             free(20);
             let (short, long) = (free(20), free(200));
             assert_eq!(short, long, "free run, {}", method.name());
+            let moving = |rows: usize| measure(|| drop(moving.free(&START, &inputs[..2 * rows]))).count_total;
+            moving(20);
+            assert_eq!(moving(20), moving(200), "moving inputs, {}", method.name());
             closed(20);
             let (short, long) = (closed(20), closed(200));
             assert_eq!(short, long, "closed loop, {}", method.name());

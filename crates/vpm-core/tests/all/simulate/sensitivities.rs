@@ -4,6 +4,7 @@ use serde_json::json;
 use vpm_core::integrator::Method;
 use vpm_core::inverse::{Motion, inverse_dynamics};
 use vpm_core::samples::{Random, double_pendulum};
+use vpm_core::simulate::Hold;
 use vpm_core::table::Table;
 
 use crate::common::{ALWAYS, Bench, Machine};
@@ -94,10 +95,10 @@ pub(super) fn movable(mut machine: Machine) -> Machine {
 #[test]
 fn free_run() {
     let machine = movable(everything());
-    for method in Method::FIXED {
-        let run = bench(&machine, method).free(&initial(), &commands());
-        check(&machine, &run.jacobian, method.name(), |theta| {
-            moved(&machine, method, theta).free(&initial(), &commands()).outputs
+    for (method, hold) in Method::FIXED.into_iter().flat_map(|method| Hold::ALL.map(|hold| (method, hold))) {
+        let run = Bench { hold, ..bench(&machine, method) }.free(&initial(), &commands());
+        check(&machine, &run.jacobian, &format!("{}, {}", method.name(), hold.name()), |theta| {
+            Bench { hold, ..moved(&machine, method, theta) }.free(&initial(), &commands()).outputs
         });
     }
 }
