@@ -11,9 +11,9 @@ from synthetic import Truth, nominal, simulate_axis
 from vpm.compare import compare
 from vpm.errors import DivergedError, ExperimentError, SimulationError
 from vpm.experiment import Experiment
-from vpm.identify import InverseDynamicsProblem
+from vpm.identify import InverseDynamicsProblem, identify
 from vpm.model import Model
-from vpm.simulate import INTEGRATORS, MODES, Run, Setup, simulate
+from vpm.simulate import HOLDS, INTEGRATORS, MODES, Run, Setup, simulate
 
 TRUTH = Truth(mass=20.0, viscous=60.0, noise=0.0)
 
@@ -38,6 +38,42 @@ def test_free_run_reaches_terminal_speed_as_the_closed_form_says(integrator: str
     expected = force / viscous * (1.0 - np.exp(-viscous * run.time / mass))
     tolerance = 1e-3 if integrator == "semi_implicit" else 1e-6
     np.testing.assert_allclose(run["axis.velocity"], expected, atol=tolerance)
+
+
+def swept(dt: float, seconds: float = 4.0) -> Experiment:
+    """A smooth push that comes and goes, sampled so often."""
+    time = np.arange(round(seconds / dt) + 1) * dt
+    push = 3.0 * np.sin(2.0 * np.pi * time / seconds) ** 3
+    channels = {"drive.command": push, "axis.position": np.zeros(time.size)}
+    return Experiment.from_arrays(time, channels, units={"drive.command": "V", "axis.position": "m"}, name="sweep")
+
+
+def test_a_hold_of_higher_order_makes_up_for_a_coarse_log() -> None:
+    fine = simulate(nominal(), swept(0.0005), integrator="rk4", initial_state=np.zeros(2))["axis.position"][::80]
+    errors = []
+    for hold in HOLDS:
+        run = simulate(nominal(), swept(0.04), integrator="rk4", hold=hold, initial_state=np.zeros(2))
+        assert run.settings.get("hold", "zero_order") == hold
+        errors.append(np.abs(run["axis.position"] - fine).max())
+    assert errors[0] > 20.0 * errors[1] > 100.0 * errors[2]
+
+
+@pytest.mark.parametrize("mode", ["free_run", "restarts"])
+def test_a_fit_follows_the_hold(mode: str) -> None:
+    fine = simulate(nominal(), swept(0.0005), integrator="rk4", initial_state=np.zeros(2))["axis.position"][::80]
+    log = swept(0.04).with_channel("axis.position", fine, "m")
+    masses = [
+        identify(nominal(), [log], ["slide.mass"], mode=mode, setup=Setup("rk4", horizon=1.0, hold=hold)).values[0]
+        for hold in HOLDS[:2]
+    ]
+    assert abs(masses[1] - 20.0) < 0.2 * abs(masses[0] - 20.0)
+
+
+def test_a_hold_that_cannot_be_is_refused(record: Experiment) -> None:
+    with pytest.raises(SimulationError, match="unknown hold 'linear'; choose one of zero_order, first_order, cubic"):
+        Setup(hold="linear")
+    with pytest.raises(SimulationError, match="hold 'cubic' is for commands of a log, and mode 'closed_loop' takes"):
+        simulate(nominal(), record, "closed_loop", hold="cubic")
 
 
 def test_closed_loop_follows_the_other_simulation(record: Experiment) -> None:
