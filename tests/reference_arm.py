@@ -4,12 +4,13 @@ The motions were computed with eight curvature coordinates per link and Richards
 """
 
 import json
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vpm.planar import FlexibleLink, Gauge, PlanarArm, Swing
+import vpm
 
 Array = NDArray[np.float64]
 
@@ -25,31 +26,44 @@ def samples(motion: str) -> Array:
     return np.array(REFERENCE["cases"][motion]["samples_10Hz"])
 
 
+@dataclass(frozen=True)
+class Swing:
+    """Where both joints should be: from zero to the amplitude (rad) and back in a period (s)."""
+
+    amplitude: float
+    period: float
+
+    def angle(self, time: Array) -> Array:
+        """Wanted angle, rad."""
+        return 0.5 * self.amplitude * (1.0 - np.cos(2.0 * np.pi * time / self.period))
+
+    def rate(self, time: Array) -> Array:
+        """Wanted rate, rad/s."""
+        return np.pi * self.amplitude / self.period * np.sin(2.0 * np.pi * time / self.period)
+
+
 def swing(motion: str) -> Swing:
     """Where both joints should be."""
     case = REFERENCE["cases"][motion]
     return Swing(case["amp"], case["T"])
 
 
-def planar_arm(motion: str, coefficients: int, points: int, order: int = 2) -> PlanarArm:
-    """The arm with so many curvature coefficients per link, in steps of that order."""
-    strip = {"young": P["E"], "density": P["rho"], "damping": P["beta"]}
-    first = FlexibleLink.strip(
-        P["l1"], P["b"], P["h"], **strip, hub_inertia=P["Jh1"], tip_mass=P["me"], tip_inertia=P["Je"]
-    )
-    second = FlexibleLink.strip(P["l2"], P["b"], P["h"], **strip, hub_inertia=P["Jh2"], tip_mass=P["mt"])
-    gauges = [Gauge(link, P["gauge"], P["h"] / 2) for link in (0, 1)]
-    gains = [(P["kp1"], P["kd1"]), (P["kp2"], P["kd2"])]
-    return PlanarArm(
-        [first, second],
-        gains,
-        swing(motion),
-        gauges,
-        gravity=(0.0, -P["g"]),
-        coefficients=coefficients,
-        points=points,
-        order=order,
-    )
+def log(motion: str, step: float) -> vpm.Experiment:
+    """What the servos are told in a motion, every ``step`` (s): what they push for the wanted angle and rate."""
+    time, wanted = np.arange(round(DURATION / step) + 1) * step, swing(motion)
+    commands = {
+        f"motor_{joint}.command": P[f"kp{joint}"] * wanted.angle(time) + P[f"kd{joint}"] * wanted.rate(time)
+        for joint in (1, 2)
+    }
+    return vpm.Experiment.from_arrays(time, commands, units=dict.fromkeys(commands, "N m"), name=motion)
+
+
+def tip_and_strains(run: vpm.Run) -> tuple[Array, Array]:
+    """Of a run of the arm, at 10 Hz from 0.1 s on."""
+    every = round(0.1 / (run.time[1] - run.time[0]))
+    pairs = (("tip.x", "tip.z"), ("gauge_1.strain", "gauge_2.strain"))
+    tip, strains = (np.column_stack([run[name][every::every] for name in names]) for names in pairs)
+    return tip, strains
 
 
 def errors(motion: str, tip: Array, strains: Array) -> tuple[float, Array]:

@@ -24,21 +24,22 @@ ROOT = Path(__file__).resolve().parent.parent.parent
 sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "benches" / "peers")]
 
 import markdown  # noqa: E402
-from reference_arm import DURATION, MOTIONS, errors, planar_arm  # noqa: E402
+import vpm  # noqa: E402
+from reference_arm import MOTIONS, P, errors, log, tip_and_strains  # noqa: E402
+from validation.machines import arm  # noqa: E402
 
 Array = NDArray[np.float64]
 Run = Callable[[], tuple[Array, Array]]
 
-#: Curvature coefficients, stations, order and steps in 0.1 s of vpm's arm.
+#: Level of both links and step (s).
 OWN = (
-    (2, 4, 2, 50),
-    (3, 4, 2, 50),
-    (3, 4, 2, 100),
-    (4, 5, 2, 50),
-    (4, 5, 2, 100),
-    (3, 4, 4, 10),
-    (4, 5, 4, 10),
-    (4, 5, 4, 20),
+    ("strain(3)", 1e-2),
+    ("strain(4)", 1e-2),
+    ("strain(4)", 5e-3),
+    ("bezier(4)", 1e-2),
+    ("bezier(5)", 1e-2),
+    ("bezier(5)", 5e-3),
+    ("bezier(6)", 5e-3),
 )
 #: Elements per link, step (s), and whether each step renews the Jacobian.
 EXUDYN = ((2, 2e-3, False), (2, 1e-3, False), (2, 1e-3, True), (4, 2e-3, False), (4, 1e-3, False), (4, 1e-3, True))
@@ -83,21 +84,22 @@ def measure(engine: str, setting: str, motion: str, prepare: Callable[[], Run], 
     return Row(engine, setting, motion, distance, (float(strain[0]), float(strain[1])), tuple(wall), tuple(cpu))
 
 
-def own(motion: str, coefficients: int, points: int, order: int, steps: int) -> Callable[[], Run]:
-    arm = planar_arm(motion, coefficients, points, order)
+def own(motion: str, level: str, step: float) -> Callable[[], Run]:
+    model, record = arm(P, level), log(motion, step)
+    start = np.zeros(model.core.n_states)
 
     def run() -> tuple[Array, Array]:
-        found = arm.run(DURATION, samples=241, steps=steps)
-        return found.tip[1:], found.strains[1:]
+        found = vpm.simulate(model, record, integrator="additive", hold="cubic", initial_state=start)
+        return tip_and_strains(found)
 
     return lambda: run
 
 
 def rows(repeats: int, quick: bool) -> Iterator[Row]:
     for motion in MOTIONS:
-        for coefficients, points, order, steps in OWN:
-            setting = f"{coefficients} coefficients, order {order}, {100 / steps:.3g} ms"
-            yield measure("vpm", setting, motion, own(motion, coefficients, points, order, steps), 4 * repeats)
+        for level, step in OWN:
+            setting = f"{level}, {1e3 * step:g} ms"
+            yield measure("vpm", setting, motion, own(motion, level, step), 4 * repeats)
         if find_spec("exudyn"):
             from exudyn_arm import ExudynArm, fastest_solver
 

@@ -36,7 +36,6 @@ if TYPE_CHECKING:
     )
     from vpm.linear import LinearModel
     from vpm.model import Dynamics, Model
-    from vpm.planar import PlanarArm
     from vpm.report import Report, report, write_report
     from vpm.scenario import Scenario, ScenarioRun
     from vpm.simplify import Ladder, simplify
@@ -63,7 +62,6 @@ __all__ = [
     "LinearModel",
     "Model",
     "OilFit",
-    "PlanarArm",
     "Report",
     "Run",
     "Scenario",
@@ -118,7 +116,6 @@ _HOMES = {
     "LinearModel": "vpm.linear",
     "Dynamics": "vpm.model",
     "Model": "vpm.model",
-    "PlanarArm": "vpm.planar",
     "Report": "vpm.report",
     "report": "vpm.report",
     "write_report": "vpm.report",

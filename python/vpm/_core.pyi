@@ -15,7 +15,6 @@ __all__ = [
     "MaxwellNarx",
     "Narx",
     "NarxStepper",
-    "PlanarArm",
     "Simulation",
     "Snapshot",
     "System",
@@ -560,39 +559,6 @@ def hyq_parameters(
     data: str, shank: float
 ) -> tuple[float, list[list[float]], list[list[float]], list[list[float]], float]:
     """Parameters of the leg of HyQ in the order of the arguments of `Leg`: table, identified or plausible."""
-
-@final
-class PlanarArm:
-    """One or two flexible links in a plane with servos on the joints; see `vpm.PlanarArm`.
-
-    ``links`` (n, 10): length, bending stiffness, line density, rotary inertia per length, damping time, hub radius, hub
-    mass, hub inertia, tip mass, tip inertia; ``servos`` (n, 2): gains on angle and rate; all numbers SI.
-    """
-
-    def __new__(
-        cls, links: ArrayLike, servos: ArrayLike, gravity: _Pair, coefficients: int, points: int, order: int
-    ) -> PlanarArm: ...
-    @property
-    def n_coordinates(self) -> int:
-        """Number of coordinates of all links."""
-    def run(
-        self,
-        duration: float,
-        samples: int,
-        steps: int,
-        gauges: ArrayLike,
-        swing: ArrayLike | None = ...,
-        reference: ArrayLike | None = ...,
-        reference_step: float = ...,
-        start: ArrayLike | None = ...,
-    ) -> tuple[_Array, _Array, _Array, _Array, _Array]:
-        """Tips (N, n, 3), joint angles (N, n), joint rates (N, n), strains (N, gauges), states (N, 2 n_coordinates).
-
-        Raises
-        ------
-        Diverged
-            The state is no longer finite.
-        """
 
 @final
 class Narx:

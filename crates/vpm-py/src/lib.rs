@@ -11,7 +11,6 @@ mod flight;
 mod interrupt;
 mod linkage;
 mod narx;
-mod planar;
 mod realtime;
 mod stepping;
 mod system;
@@ -31,8 +30,6 @@ mod _core {
     use crate::linkage::{Karl, Leg, hyq_parameters};
     #[pymodule_export]
     use crate::narx::{MaxwellNarx, Narx, NarxStepper, narx_candidates, narx_fit, narx_select};
-    #[pymodule_export]
-    use crate::planar::PlanarArm;
     #[pymodule_export]
     use crate::realtime::Loop;
     #[pymodule_export]

@@ -9,7 +9,6 @@
 //! deflection; rigid segments with springs.
 //! [`linear`] interpolates the deflection: constant matrices, small deflection, stiffening by the second-order shortening.
 //! [`strain`] interpolates the strain and integrates the pose along the axis: exact at any deflection, in space, in a tree.
-//! [`planar`] is the same for chains of inextensible links that move in one plane, in fixed sizes, made for real time.
 //! [`two_node`] is an independent finite element in absolute coordinates that checks them at large deflection.
 //!
 //! Sources: Selig & Ding 2009, "A screw theory of Timoshenko beams", J. Appl. Mech. 76(3) 031003, for screws and their
@@ -29,7 +28,6 @@ mod gauge;
 pub mod linear;
 mod lumped;
 mod motion;
-pub mod planar;
 mod profile;
 pub mod quadrature;
 pub mod section;

@@ -5,16 +5,13 @@ use crate::ode::Ode;
 use crate::scalar::Scalar;
 
 /// Stages of a step.
-pub(crate) const STAGES: usize = 6;
+const STAGES: usize = 6;
 
 /// The diagonal coefficient of the implicit table, after its explicit first stage.
-pub(crate) const GAMMA: f64 = 0.25;
-
-/// Times of the stages.
-pub(crate) const PLACES: [f64; STAGES] = [0.0, 0.5, 83.0 / 250.0, 31.0 / 50.0, 17.0 / 20.0, 1.0];
+const GAMMA: f64 = 0.25;
 
 /// What the mass matrix, the velocity terms and all forces that are not stiff see.
-pub(crate) const EXPLICIT: [[f64; STAGES]; STAGES] = [
+const EXPLICIT: [[f64; STAGES]; STAGES] = [
     [0.0; STAGES],
     [0.5, 0.0, 0.0, 0.0, 0.0, 0.0],
     [13861.0 / 62500.0, 6889.0 / 62500.0, 0.0, 0.0, 0.0, 0.0],
@@ -45,7 +42,7 @@ pub(crate) const EXPLICIT: [[f64; STAGES]; STAGES] = [
 ];
 
 /// What the stiff forces see; the last row is the step itself.
-pub(crate) const IMPLICIT: [[f64; STAGES]; STAGES] = [
+const IMPLICIT: [[f64; STAGES]; STAGES] = [
     [0.0; STAGES],
     [0.25, GAMMA, 0.0, 0.0, 0.0, 0.0],
     [8611.0 / 62500.0, -1743.0 / 31250.0, GAMMA, 0.0, 0.0, 0.0],

@@ -1,7 +1,7 @@
 //! Time integration without allocation: fixed steps in bounded work, and steps of controlled error. It knows a system only as an [`Ode`].
 
 mod adaptive;
-pub(crate) mod additive;
+mod additive;
 pub mod growth;
 mod linearly_implicit;
 mod lu;

@@ -1,6 +1,5 @@
 //! Flexible links.
 
-mod arm;
 mod bezier_basis;
 mod bezier_large;
 mod first_order;
@@ -9,7 +8,6 @@ mod linear;
 mod map;
 mod motion;
 mod parameters;
-mod planar;
 mod section;
 mod strain;
 mod tree;

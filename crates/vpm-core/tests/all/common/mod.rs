@@ -6,7 +6,6 @@ pub mod connections;
 pub mod derivatives;
 pub mod element_arm;
 pub mod entries;
-pub mod flexible_arm;
 pub mod free_leg;
 pub mod hydraulics;
 pub mod parts;

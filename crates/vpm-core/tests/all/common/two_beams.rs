@@ -1,12 +1,9 @@
-//! A planar arm of two flexible links, as a description and as the special chain.
+//! A planar arm of two flexible links.
 
 #![allow(dead_code, reason = "each test uses some of it")]
 
 use serde_json::{Value, json};
-use vpm_core::Result;
-use vpm_core::beam::linear::TipBody;
-use vpm_core::beam::planar::{Arm, Hub, LinkParameters, Order, PlanarChain, Servo};
-use vpm_core::beam::{Basis, BeamEntry, Component, DampingEntry, Level, Material, Properties, SectionEntry, Shape};
+use vpm_core::beam::{BeamEntry, Component, DampingEntry, Level, Material, Properties, SectionEntry, Shape};
 use vpm_core::body::{Body, Inertia, Weld};
 use vpm_core::description::Description;
 use vpm_core::joint::{Joint, JointKind};
@@ -95,24 +92,4 @@ pub fn hold(content: &mut Value) {
     for (joint, [stiffness, damping]) in SERVOS.into_iter().enumerate() {
         effect(content, "joint_compliance", joint, &[("stiffness", stiffness), ("damping", damping)]);
     }
-}
-
-/// The special chain with servos in the place of the springs.
-pub fn chain<const EACH: usize, const ALL: usize>(step: f64) -> Result<Arm<2, EACH, ALL>> {
-    let strip = strip();
-    let links = [0, 1].map(|number| {
-        let [mass, inertia] = TIPS[number];
-        let parameters = LinkParameters {
-            bending: MATERIAL.young * strip.moment_x,
-            line: MATERIAL.density * strip.area,
-            rotary: MATERIAL.density * strip.moment_x,
-            damping: DAMPING,
-            hub: Hub { radius: 0.0, mass: HUB[0], inertia: HUB[1] },
-            tip: TipBody { mass, inertia },
-        };
-        Basis::legendre(LENGTHS[number], EACH - 1).map(|basis| (parameters, basis))
-    });
-    let [first, second] = links;
-    let servos = SERVOS.map(|[stiffness, damping]| Servo { stiffness, damping });
-    Arm::of_order(Order::Fourth, PlanarChain::new([first?, second?], [0.0, GRAVITY], 12)?, servos, step)
 }
