@@ -50,7 +50,8 @@ def swing(motion: str) -> Swing:
 
 def log(motion: str, step: float) -> vpm.Experiment:
     """What the servos are told in a motion, every ``step`` (s): what they push for the wanted angle and rate."""
-    time, wanted = np.arange(round(DURATION / step) + 1) * step, swing(motion)
+    time: Array = step * np.arange(round(DURATION / step) + 1, dtype=np.float64)
+    wanted = swing(motion)
     commands = {
         f"motor_{joint}.command": P[f"kp{joint}"] * wanted.angle(time) + P[f"kd{joint}"] * wanted.rate(time)
         for joint in (1, 2)

@@ -89,11 +89,30 @@ def test_more_substeps_take_longer() -> None:
 def test_stages_add_up_to_the_median_step(report: BudgetReport) -> None:
     total = sum(stage.seconds for stage in report.stages)
     assert total == pytest.approx(report.quantiles["p50"], rel=1e-9) or report.stages[-1].seconds == 0.0
-    assert {stage.name for stage in report.stages} >= {"actuators", "solve", "iteration matrix", "sensors", REST}
+    assert {stage.name for stage in report.stages} == {"rates", "iteration matrix", "sample", REST}
+
+
+def test_machine_code_is_timed_as_a_whole() -> None:
+    report = budget(Model.load(TUDOR), steps=1000, integrator="linearly_implicit")
+    assert report.direct == ""
+    assert "evaluated as machine code" in str(report)
+    stages = {stage.name: stage for stage in report.stages}
+    assert set(stages) == {"rates", "iteration matrix", "sample", REST}
+    assert [stages[name].calls for name in ("rates", "iteration matrix", "sample")] == [1.0, 1.0, 1.0]
+    assert report.allocations == 0
+
+
+def test_a_machine_too_large_for_code_is_timed_directly_and_says_why() -> None:
+    report = budget(Model.load(TUDOR).at("elements(40)"), steps=1000, integrator="additive")
+    assert "operations" in report.direct
+    assert f"evaluated directly: {report.direct}" in str(report)
+    assert {"beams", "solve"} <= {stage.name for stage in report.stages}
 
 
 def test_stages_of_a_flexible_arm_have_beams_and_a_mass_matrix() -> None:
-    report = budget(Model.load(TUDOR), steps=1000, integrator="linearly_implicit")
+    report = budget(Model.load(TUDOR), steps=1000, integrator="linearly_implicit", compiled=False)
+    assert "not asked for" in report.direct
+    assert "sensors" in {stage.name for stage in report.stages}
     stages = {stage.name: stage for stage in report.stages}
     assert {"kinematics", "beams", "mass matrix"} <= set(stages)
     # One evaluation for the sample, one for the second stage of the method.

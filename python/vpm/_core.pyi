@@ -466,11 +466,13 @@ class System:
         integrator: str,
         count: int,
         states: int,
-    ) -> tuple[NDArray[np.float64], int, int, list[tuple[str, float, float]]]:
+        compiled: bool,
+    ) -> tuple[NDArray[np.float64], int, int, list[tuple[str, float, float]], str | None]:
         """Single steps on the way through ``inputs`` again and again.
 
         Duration (count,) of each in s; how often they asked for memory; bytes that a simulation holds; at so many
-        ``states`` the stages of a step: name, seconds of a call, calls in a step.
+        ``states`` the stages of a step: name, seconds of a call, calls in a step; why ``compiled`` steps were evaluated
+        directly.
         """
 
 _Array = NDArray[np.float64]

@@ -135,6 +135,9 @@ def budget(
     priority: Annotated[
         int | None, typer.Option(help="Time before all ordinary threads, at this priority of SCHED_FIFO, if permitted.")
     ] = None,
+    direct: Annotated[
+        bool, typer.Option("--direct", help="Time direct evaluation in the place of machine code.")
+    ] = False,
     plot: Plot = None,
 ) -> None:
     """Time one step of the model against a controller's period; exit code 1 if it does not fit."""
@@ -153,6 +156,7 @@ def budget(
             latency=latency,
             instructions=instructions,
             priority=priority,
+            compiled=not direct,
             tell=tell,
         )
     console.print(str(report), markup=False)

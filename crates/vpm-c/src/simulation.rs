@@ -36,7 +36,8 @@ pub struct VpmSimulation {
 
 impl VpmSimulation {
     fn new(compiled: Compiled) -> Result<Self> {
-        Ok(Self { live: compiled.live()?, names: Names::new(&compiled), message: CString::default(), compiled })
+        let live = quick(compiled.live()?);
+        Ok(Self { live, names: Names::new(&compiled), message: CString::default(), compiled })
     }
 
     /// Does some work on the simulation, tells how it ended and keeps the sentence of an error.
@@ -55,6 +56,13 @@ impl VpmSimulation {
             }
         }
     }
+}
+
+/// The same by machine code, where the machine has any: made once for all parameters.
+fn quick(mut live: Live) -> Live {
+    // What has no code steps as exactly without.
+    let _ = live.compile();
+    live
 }
 
 /// Opens a compiled model file.
@@ -176,7 +184,7 @@ pub unsafe extern "C" fn vpm_set_parameters(simulation: *mut VpmSimulation, para
         let compiled = &simulation.compiled;
         // SAFETY: as many numbers as the caller promises.
         let theta = unsafe { numbers("parameters", parameters, simulation.names.parameters.len()) }?;
-        simulation.live = Live::new(compiled.description().clone(), theta, &compiled.start, compiled.stepping)?;
+        simulation.live = quick(Live::new(compiled.description().clone(), theta, &compiled.start, compiled.stepping)?);
         Ok(())
     })
 }

@@ -43,6 +43,11 @@ impl<'a> Course<'a> {
         Ok(Self { stepper: Stepper::new(&setting, &plan, setting.theta)?, setting, rows, next: 0 })
     }
 
+    /// Steps by machine code from now on, as long runs and compiled simulations do; or says why there is none.
+    pub fn compile(&mut self) -> std::result::Result<(), String> {
+        self.stepper.compile()
+    }
+
     /// Makes as many steps as there are places and writes the duration of each, s. Allocates nothing.
     pub fn time(&mut self, durations: &mut [f64]) -> Result<()> {
         for duration in durations {

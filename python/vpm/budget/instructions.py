@@ -39,8 +39,10 @@ def count_instructions(
     inputs: Array,
     seconds: float,
     tell: Callable[[str], None] | None = None,
+    *,
+    compiled: bool = False,
 ) -> float:
-    """Instructions of a step that takes about so many ``seconds``.
+    """Instructions of a step that takes about so many ``seconds``; ``compiled`` to machine code, if it is to be.
 
     Raises
     ------
@@ -65,6 +67,7 @@ def count_instructions(
             method=method,
             time_step=1.0 / rate,
             substeps=setup.substeps,
+            compiled=compiled,
         )
         more = int(min(max(WORK / seconds, LEAST), MOST))
         running = [_start(path, count) for count in (FEW, FEW + more)]
@@ -110,6 +113,7 @@ def _make_steps(path: str, count: str) -> None:
             str(file["method"]),
             int(count),
             0,
+            bool(file["compiled"]),
         )
 
 

@@ -32,6 +32,7 @@ def budget(
     latency: float = 0.0,
     instructions: bool = False,
     priority: int | None = None,
+    compiled: bool = True,
     tell: Callable[[str], None] | None = None,
 ) -> BudgetReport:
     """Time single steps of a model along a command.
@@ -57,6 +58,9 @@ def budget(
     priority : int, optional
         Time the steps as a controller runs: before all ordinary threads, with this priority of ``SCHED_FIFO`` (1 to
         99), if permitted; ``machine`` says whether it was.
+    compiled : bool
+        Time steps by machine code, as those of the C library and of ``vpm.Simulation(..., compiled=True)`` are; a
+        machine that has none is evaluated directly, and the report says why.
     tell : callable, optional
         Told now and then how far it is.
 
@@ -78,9 +82,20 @@ def budget(
     setup = Setup(integrator, substeps)
     inputs = commands(model, rate, experiment)
     start = start_state(model, experiment)
-    timed = time_steps(model, rate, setup, steps, inputs, states=STATES, tell=tell, priority=priority, start=start)
+    timed = time_steps(
+        model,
+        rate,
+        setup,
+        steps,
+        inputs,
+        states=STATES,
+        tell=tell,
+        priority=priority,
+        start=start,
+        compiled=compiled,
+    )
     median = float(np.median(timed.seconds))
-    counted = count_instructions(model, rate, setup, inputs, median, tell) if instructions else None
+    counted = count_instructions(model, rate, setup, inputs, median, tell, compiled=compiled) if instructions else None
     return BudgetReport(
         model_name=model.name,
         integrator=setup.method(model, bounded=True),
@@ -95,6 +110,7 @@ def budget(
         instructions=counted,
         latency=_latency(rate, latency, tell) if latency > 0.0 else {},
         machine=describe() + _rank(rate, priority),
+        direct=timed.direct,
     )
 
 

@@ -63,6 +63,8 @@ class BudgetReport(Result):
         Time from a deadline to the wake-up of a periodic loop without work, s: the machine's part, in none of the other
         figures. Empty where it was not measured.
     machine : str
+    direct : str
+        Why the steps were evaluated directly; empty where they ran as machine code.
     """
 
     model_name: str
@@ -78,6 +80,7 @@ class BudgetReport(Result):
     instructions: float | None
     latency: dict[str, float]
     machine: str
+    direct: str = ""
 
     @property
     def taken(self) -> float:
@@ -114,6 +117,7 @@ class BudgetReport(Result):
             f"  {self.verdict}",
             f"  stages of a step: {', '.join(f'{stage.name} {_time(stage.seconds)}' for stage in self.stages)}",
             f"  {self._resources}",
+            f"  evaluated {f'directly: {self.direct}' if self.direct else 'as machine code'}",
         ]
         if self.latency:
             lines.append(f"  wake-up of a loop at this rate, apart from all the above: {_times(self.latency)}")

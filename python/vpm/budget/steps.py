@@ -24,6 +24,8 @@ SWEEP_SAMPLES = 10_000
 SWEEP_FREQUENCIES = (0.3, 0.7, 1.9, 4.3)
 #: Steps between two words to whoever waits; whole ways through the sweep.
 CHUNK = 100_000
+#: Why steps are evaluated directly that could be compiled.
+NOT_ASKED = "machine code was not asked for"
 
 
 @dataclass(frozen=True)
@@ -40,12 +42,15 @@ class Timed:
         Bytes that a simulation holds.
     stages : list of tuple of str, float, float
         Name, seconds of one call, calls in a step.
+    direct : str
+        Why they were evaluated directly; empty where they ran as machine code.
     """
 
     seconds: Array
     allocations: int
     memory: int
     stages: list[tuple[str, float, float]]
+    direct: str
 
 
 def step_times(
@@ -92,8 +97,11 @@ def time_steps(
     tell: Callable[[str], None] | None = None,
     priority: int | None = None,
     start: Array | None = None,
+    compiled: bool = False,
 ) -> Timed:
     """Time steps, and at so many ``states`` along the way their stages; with a ``priority`` before ordinary threads.
+
+    If they are to be ``compiled``, they run as machine code where there is any.
 
     Each way through the inputs begins at ``start``, if it is given.
 
@@ -107,6 +115,7 @@ def time_steps(
     method = setup.method(model, bounded=True)
     durations: list[Array] = []
     allocations = memory = done = 0
+    direct = None if compiled else NOT_ASKED
     stages: list[tuple[str, float, float]] = []
     chunk = CHUNK if tell else steps
     chunk = chunk if start is None else min(chunk, len(inputs))
@@ -115,18 +124,21 @@ def time_steps(
         count = min(chunk, steps - done)
         try:
             with _ahead(rate, priority):
-                seconds, asked, memory, found = model.core.time_steps(
-                    model.theta, first, inputs, 1.0 / rate, setup.substeps, method, count, 0 if done else states
+                looks = 0 if done else states
+                seconds, asked, memory, found, reason = model.core.time_steps(
+                    model.theta, first, inputs, 1.0 / rate, setup.substeps, method, count, looks, compiled
                 )
         except (Diverged, ValueError) as error:
             raise SimulationError(f"{model.name}: {error}") from error
         durations.append(seconds)
         stages = stages or found
+        direct = direct or reason
         allocations += asked
         done += count
         if tell and (start is None or done == steps):
             tell(f"timed {done} of {steps} steps, {1e6 * float(np.median(seconds)):.3g} us each")
-    return Timed(np.concatenate(durations) if durations else np.empty(0), allocations, memory, stages)
+    seconds = np.concatenate(durations) if durations else np.empty(0)
+    return Timed(seconds, allocations, memory, stages, direct or "")
 
 
 def _ahead(rate: float, priority: int | None) -> AbstractContextManager[object]:

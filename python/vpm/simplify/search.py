@@ -284,6 +284,8 @@ def _concluded(trials: Trials, sites: Sites, share: float, against: str) -> Ladd
         substeps=chosen.substeps,
         experiment=trials.courses.record(model),
         priority=PRIORITY,
+        # As all rungs were timed.
+        compiled=False,
     )
     place = rungs.index(chosen)
     chosen = chosen.timed(report.quantiles["p50"], report.quantiles["p99.9"])

@@ -119,9 +119,14 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         let evaluations = self.plan.starts.len() * self.plan.horizon * substeps * method.stages();
         if S::plain(&[]).is_some() && code_pays(evaluations) {
             // What has no code runs as it is.
-            let _ = self.system.compile(method);
+            let _ = self.compile();
         }
         self
+    }
+
+    /// Goes on by machine code, or says why there is none.
+    pub(crate) fn compile(&mut self) -> std::result::Result<(), String> {
+        self.system.compile(self.stepping.method)
     }
 
     pub(crate) fn description(&self) -> &'a Description {
@@ -315,13 +320,20 @@ impl Stepper<'_, f64> {
 
     /// Seconds of each part of a step at the state now, with its name.
     pub(crate) fn parts(&mut self) -> Vec<(&'static str, f64)> {
-        let Self { system, state, description, .. } = self;
-        let mut seconds: Vec<_> = system.dynamics().parts(state).named().into();
+        let Self { system, state, description, stepping, .. } = self;
+        let has_code = system.has_code();
+        let mut seconds: Vec<_> = match has_code {
+            true => vec![("rates", system.rates_seconds(stepping.method, state))],
+            false => system.dynamics().parts(state).named().into(),
+        };
         for kind in Matrix::ALL {
             seconds.push((kind.name(), system.matrix_seconds(kind, state)));
         }
         let mut seen = vec![0.0; description.n_outputs()];
-        seconds.push(("sensors", system.dynamics().observing(state, &mut seen)));
+        seconds.push(match has_code {
+            true => ("sample", system.sample_seconds(state, &mut seen)),
+            false => ("sensors", system.dynamics().observing(state, &mut seen)),
+        });
         seconds
     }
 }

@@ -44,7 +44,8 @@ impl Calls {
         let matrix = Matrix::ALL.into_iter().position(|kind| kind.name() == stage);
         let count = match (matrix, stage) {
             (Some(place), _) => self.matrices[place],
-            (None, "sensors") => self.samples,
+            (None, "sensors" | "sample") => self.samples,
+            (None, "rates") => self.rates,
             // Each sample evaluates the rates once, beside those that the integrator asks for.
             (None, _) => self.rates + self.samples,
         };

@@ -8,12 +8,15 @@ use crate::contact::ContactFriction;
 use crate::data::Composite;
 use crate::dynamics::articulated::articulated;
 use crate::dynamics::{Stations, aba, flexible, frames, lines, motion, outward, poses};
+use crate::integrator::Method;
 use crate::ode::Ode;
 
 /// Calls in a row between two looks at the clock, which itself takes tens of ns.
 const REPEATS: u32 = 16;
 /// Rows of calls; the shortest counts, because nothing makes a computation faster than it is.
 const ROWS: usize = 5;
+/// How far a stage of an additive step reaches, s; what it costs does not depend on it.
+const REACH: f64 = 1e-4;
 
 /// Seconds of one call of each part.
 #[derive(Clone, Copy, Debug, Default)]
@@ -147,6 +150,23 @@ impl Dynamics<f64> {
 }
 
 impl System<f64> {
+    /// Seconds of the rates that steps by `method` ask for at `x`.
+    pub(crate) fn rates_seconds(&mut self, method: Method, x: &[f64]) -> f64 {
+        let mut rates = vec![0.0; self.dim()];
+        match method {
+            Method::Additive => seconds(|| {
+                self.additive_rates(black_box(x), x, REACH, &mut rates);
+            }),
+            _ => seconds(|| self.rhs(black_box(x), &mut rates)),
+        }
+    }
+
+    /// Seconds of the rates with all outputs at `x`.
+    pub(crate) fn sample_seconds(&mut self, x: &[f64], outputs: &mut [f64]) -> f64 {
+        let mut rates = vec![0.0; self.dim()];
+        seconds(|| self.sample(black_box(x), &mut rates, outputs))
+    }
+
     /// Seconds of one matrix of this kind at `x`; the rates there count where they come with it.
     pub(crate) fn matrix_seconds(&mut self, kind: Matrix, x: &[f64]) -> f64 {
         let (dim, n) = (self.dim(), self.coordinates());

@@ -12,13 +12,14 @@ use super::simulation::Request;
 use crate::arrays::Numbers;
 
 type Any<'py> = Bound<'py, PyAny>;
-/// Durations, allocations, bytes, stages.
-type Timed<'py> = (Bound<'py, PyArray1<f64>>, u64, i64, Vec<(&'static str, f64, f64)>);
+/// Durations, allocations, bytes, stages, why there is no machine code.
+type Timed<'py> = (Bound<'py, PyArray1<f64>>, u64, i64, Vec<(&'static str, f64, f64)>, Option<String>);
 
 #[pymethods]
 impl System {
     /// Duration in s of each of `count` steps, on the way through the inputs again and again; how often memory was asked for during
     /// these steps; the bytes that the simulation holds; and the stages of a step at `states` states: name, seconds of a call, calls.
+    /// Compiled, the steps are made by machine code, where there is any; the last answer says why not.
     #[expect(clippy::too_many_arguments, reason = "the arguments of the Python function")]
     fn time_steps<'py>(
         &self,
@@ -31,6 +32,7 @@ impl System {
         integrator: &str,
         count: i64,
         states: usize,
+        compiled: bool,
     ) -> PyResult<Timed<'py>> {
         let request = Request::new(self, theta, (time_step, substeps, integrator), &[])?;
         let initial = Numbers::vector("initial_state", initial_state)?;
@@ -38,7 +40,7 @@ impl System {
         let count = usize::try_from(count).map_err(|_| {
             PyValueError::new_err(format!("count must not be negative, got {count}; ask for some steps"))
         })?;
-        let (durations, allocations, bytes, stages) = self.compute(py, |interrupt| {
+        let (durations, allocations, bytes, stages, reason) = self.compute(py, |interrupt| {
             let setting = request.setting(&self.description, interrupt);
             let mut live = Ok(None);
             let held = measure(|| {
@@ -46,14 +48,15 @@ impl System {
             });
             live?;
             let mut course = Course::new(setting, initial.values(), inputs.as_table()?)?;
+            let reason = if compiled { course.compile().err() } else { None };
             let mut durations = vec![0.0; count];
             let mut end = Ok(());
             let asked = measure(|| end = course.time(&mut durations));
             end?;
             let stages = if states > 0 { course.stages(states)? } else { Vec::new() };
-            Ok((durations, asked.count_total, held.bytes_current, stages))
+            Ok((durations, asked.count_total, held.bytes_current, stages, reason))
         })?;
         let stages = stages.into_iter().map(|Stage { name, seconds, calls }| (name, seconds, calls)).collect();
-        Ok((PyArray1::from_vec(py, durations), allocations, bytes, stages))
+        Ok((PyArray1::from_vec(py, durations), allocations, bytes, stages, reason))
     }
 }
