@@ -38,6 +38,7 @@ def test_info_lists_parameters_with_units() -> None:
     assert done.returncode == 0
     assert "shoulder.friction.viscous" in done.stdout
     assert "N m s/rad" in done.stdout
+    assert "long runs are machine code, made in" in done.stdout
 
 
 def test_simulate_saves_and_plots(tmp_path: Path) -> None:

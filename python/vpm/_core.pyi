@@ -252,6 +252,8 @@ class System:
         Diverged
             The state is no longer finite.
         """
+    def compile(self, theta: ArrayLike, integrator: str) -> str | None:
+        """Make the machine code of steps by ``integrator``, as long runs do; or say why there is none."""
     def resolution(
         self,
         theta: ArrayLike,

@@ -6,6 +6,7 @@ import sys
 import warnings
 from collections.abc import Sequence
 from pathlib import Path
+from time import perf_counter
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -32,10 +33,11 @@ from vpm.command import (
 )
 from vpm.errors import ValidityWarning, VpmError
 from vpm.excite_command import app as excite_app
-from vpm.simulate import HOLDS, INTEGRATORS
+from vpm.simulate import HOLDS, INTEGRATORS, Setup
 
 if TYPE_CHECKING:
     from vpm.experiment import Experiment
+    from vpm.model import Model
     from vpm.simulate import Run
 
 
@@ -98,7 +100,7 @@ def main() -> None:
 
 @app.command(epilog="Example:  vpm info examples/emps/model.toml")
 def info(model: Annotated[Path | None, typer.Argument(metavar="[MODEL]", help="Model file to list.")] = None) -> None:
-    """Version, or a model's flexible links, and its parameters with units and bounds."""
+    """Version, or a model's flexible links, how its steps run, and its parameters with units and bounds."""
     if model is None:
         console.print(f"vpm {__version__}")
         return
@@ -108,11 +110,20 @@ def info(model: Annotated[Path | None, typer.Argument(metavar="[MODEL]", help="M
     console.print(repr(loaded), markup=False)
     for sentence in loaded.beam_summary:
         console.print(f"  {sentence}", markup=False)
+    console.print(f"  {_way(loaded)}", markup=False)
     for p in loaded.parameters.values():
         spread = "known" if p.uncertainty is None else f"± {p.uncertainty:g}"
         console.print(
             f"  {p.name:40s} {p.value:14.6g} {p.unit:10s} {spread:12s} [{p.minimum:g}, {p.maximum:g}]", markup=False
         )
+
+
+def _way(model: Model) -> str:
+    """How steps of a model run."""
+    begin = perf_counter()
+    reason = model.core.compile(model.theta, Setup().method(model))
+    spent = 1e3 * (perf_counter() - begin)
+    return f"no machine code: {reason}" if reason else f"long runs are machine code, made in {spent:.0f} ms"
 
 
 @app.command(

@@ -16,6 +16,7 @@ use crate::support::{AXIS, Axis, text};
 #[test]
 fn steps_are_those_of_the_core() {
     let (axis, mut core) = (Axis::open(), Compiled::parse(AXIS).unwrap().live().unwrap());
+    core.compile().unwrap();
     let mut outputs = [0.0; 6];
     for k in 0..500 {
         let input = (0.01 * f64::from(k)).sin();

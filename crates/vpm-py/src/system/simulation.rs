@@ -84,6 +84,15 @@ impl System {
         self.run(py, run, sensitivities.len())
     }
 
+    /// Makes the machine code of steps, as long runs do; or says why there is none.
+    fn compile<'py>(&self, py: Python<'py>, theta: &Any<'py>, integrator: &str) -> PyResult<Option<String>> {
+        let request = Request::new(self, theta, (1.0, 1, integrator), &[])?;
+        self.compute(py, |interrupt| {
+            let Setting { description, theta, stepping, .. } = request.setting(&self.description, interrupt);
+            Ok(description.system::<f64>(theta)?.compile(stepping.method).err())
+        })
+    }
+
     /// What steps damp because they do not resolve it, in a run of `duration` (s) about `state`: the frequency above which vibrations lose
     /// more than a tenth (Hz), and for each lightly damped mode that does (m, 4): frequency, damping ratio, time, share that is left.
     #[expect(clippy::too_many_arguments, reason = "the arguments of the Python function")]

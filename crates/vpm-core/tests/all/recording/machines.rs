@@ -217,6 +217,61 @@ fn rigid_trees_with_effects_on_all_joints_agree() -> Result<()> {
     Ok(())
 }
 
+/// Effects of joints with their parameters: each a size that is drawn up to it, from a tenth of it.
+const EFFECTS: [(&str, &[(&str, f64)]); 9] = [
+    ("viscous_friction", &[("viscous", 0.5)]),
+    ("coulomb_friction", &[("coulomb", 2.0), ("transition_velocity", 0.2)]),
+    ("stribeck_friction", &[("stribeck", 1.0), ("stribeck_velocity", 0.4), ("transition_velocity", 0.2)]),
+    ("asymmetric_friction", &[("coulomb_difference", 0.3), ("viscous_difference", 0.1), ("transition_velocity", 0.2)]),
+    ("spring", &[("stiffness", 20.0), ("rest", 0.5)]),
+    ("backlash", &[("gap", 0.2), ("stiffness", 50.0), ("damping", 0.2), ("contact_damping", 0.5), ("width", 0.02)]),
+    ("torque_ripple", &[("period", 2.0), ("cosine", 0.5), ("sine", 0.5)]),
+    ("bias_force", &[("force", 1.0)]),
+    ("hysteresis", &[("force", 1.0), ("displacement", 0.2), ("shape", 1.0)]),
+];
+
+/// A tree of one to five joints with some effects, a payload and a drive.
+fn drawn(seed: u64) -> Machine {
+    let random = &mut Random::new(seed);
+    let mut pick = |count: usize| (random.unit() * count as f64) as usize;
+    let joints = 1 + pick(5);
+    let mut machine = Machine::new(&random_tree(seed, joints));
+    let mut taken = Vec::new();
+    for _ in 0..pick(4) {
+        let (effect, joint) = (EFFECTS[pick(EFFECTS.len())], pick(joints));
+        if !taken.contains(&(effect.0, joint)) {
+            taken.push((effect.0, joint));
+            let shares: Vec<f64> = effect.1.iter().map(|_| 0.1 * (1 + pick(10)) as f64).collect();
+            let numbers: Vec<_> =
+                effect.1.iter().zip(shares).map(|(&(name, most), share)| (name, most * share)).collect();
+            machine.effect(effect.0, joint, &numbers);
+        }
+    }
+    machine.payload(pick(joints), 0.1 * (1 + pick(10)) as f64, [0.05, -0.1, 0.2]);
+    machine.actuator(pick(joints), &[("gain", 1.0 + pick(10) as f64), ("lag", 0.01 * (1 + pick(5)) as f64)]);
+    machine
+}
+
+#[test]
+fn a_thousand_random_machines_agree() -> Result<()> {
+    for seed in 0..1000 {
+        let d = drawn(seed).build();
+        let random = &mut Random::new(seed);
+        let mut witness = Witness::new(&d, others(&d, random)?)?;
+        let (x, implicit) = (state(&d, random, &[]), state(&d, random, &[]));
+        let u: Vec<f64> = random.numbers(d.n_inputs(), 1.0);
+        let states = [&x[..], &implicit[..], &u[..]];
+        for kind in [Kind::Sample, Kind::Required, Kind::Additive] {
+            let expected = witness.expected(&kind, states);
+            for (way, found) in ["lanes", "machine code"].into_iter().zip(witness.run(&kind, states)?) {
+                let error = apart(&found, &expected);
+                assert!(error < 1e-12, "machine {seed}, {kind:?}, {way}: {error}");
+            }
+        }
+    }
+    Ok(())
+}
+
 #[test]
 fn cylinders_on_lines_agree() -> Result<()> {
     for source in ["constant", "logged"] {
