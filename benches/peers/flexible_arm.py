@@ -33,6 +33,7 @@ Run = Callable[[], tuple[Array, Array]]
 
 #: Level of both links and step (s).
 OWN = (
+    ("strain(3)", 12.5e-3),
     ("strain(3)", 1e-2),
     ("strain(4)", 1e-2),
     ("strain(4)", 5e-3),
