@@ -117,7 +117,7 @@ impl<'a, S: Scalar> Way<'a, S> {
             states: zeros(guide.rows() * description.n_states()),
         };
         way.truth = zeros(guide.rows() * way.width());
-        if S::plain(&[]).is_some() && code_pays(guide.rows() * stepping.substeps * stepping.method.stages()) {
+        if S::plain(&[]).is_some() && code_pays(guide.rows() * stepping.substeps * stepping.method.evaluations()) {
             // What has no code runs as it is.
             let _ = way.machine.compile(stepping.method);
         }

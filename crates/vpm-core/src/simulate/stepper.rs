@@ -116,7 +116,7 @@ impl<'a, S: Scalar> Stepper<'a, S> {
     /// The same, by machine code where a run of the whole plan is long enough and the machine has any.
     pub(crate) fn by_code(mut self) -> Self {
         let Stepping { substeps, method, .. } = self.stepping;
-        let evaluations = self.plan.starts.len() * self.plan.horizon * substeps * method.stages();
+        let evaluations = self.plan.starts.len() * self.plan.horizon * substeps * method.evaluations();
         if S::plain(&[]).is_some() && code_pays(evaluations) {
             // What has no code runs as it is.
             let _ = self.compile();
