@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     )
     from vpm.linear import LinearModel
     from vpm.model import Dynamics, Model
+    from vpm.observer import Noise, Observation, observe
     from vpm.report import Report, report, write_report
     from vpm.scenario import Scenario, ScenarioRun
     from vpm.simplify import Ladder, simplify
@@ -61,6 +62,8 @@ __all__ = [
     "Ladder",
     "LinearModel",
     "Model",
+    "Noise",
+    "Observation",
     "OilFit",
     "Report",
     "Run",
@@ -81,6 +84,7 @@ __all__ = [
     "impedance",
     "linkages",
     "narx",
+    "observe",
     "realtime",
     "report",
     "simplify",
@@ -116,6 +120,9 @@ _HOMES = {
     "LinearModel": "vpm.linear",
     "Dynamics": "vpm.model",
     "Model": "vpm.model",
+    "Noise": "vpm.observer",
+    "Observation": "vpm.observer",
+    "observe": "vpm.observer",
     "Report": "vpm.report",
     "report": "vpm.report",
     "write_report": "vpm.report",

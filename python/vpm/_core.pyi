@@ -252,6 +252,56 @@ class System:
         Diverged
             The state is no longer finite.
         """
+    def filter(
+        self,
+        theta: ArrayLike,
+        initial_state: ArrayLike,
+        inputs: ArrayLike,
+        channels: Sequence[int],
+        readings: ArrayLike,
+        noise: tuple[ArrayLike, ArrayLike, ArrayLike, ArrayLike],
+        time_step: float,
+        substeps: int,
+        integrator: str,
+        hold: str = ...,
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """An extended Kalman filter on ``readings`` (N, m) of the outputs at the places ``channels``.
+
+        Parameters
+        ----------
+        noise : tuple of array_like
+            Standard deviations (SI), of what is independent from sample to sample: of readings (m,), of forces on
+            coordinates held for a sample (n,), of states over a sample (nx,), and of the first state (nx,).
+
+        Returns
+        -------
+        innovations : ndarray, shape (N, m)
+        covariances : ndarray, shape (N, m, m)
+            Of the innovations.
+        gains : ndarray, shape (N, nx, m)
+        states, deviations : ndarray, shape (N, nx)
+            Corrected by the readings up to then.
+
+        Raises
+        ------
+        Diverged
+            The state is no longer finite.
+        """
+    def observe(
+        self,
+        theta: ArrayLike,
+        initial_state: ArrayLike,
+        inputs: ArrayLike,
+        channels: Sequence[int],
+        readings: ArrayLike,
+        gains: ArrayLike,
+        time_step: float,
+        substeps: int,
+        integrator: str,
+        sensitivities: Sequence[int] = ...,
+        hold: str = ...,
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Follow ``readings`` (N, m) with given ``gains`` (N, nx * m); as `simulate`, before each correction."""
     def compile(self, theta: ArrayLike, integrator: str) -> str | None:
         """Make the machine code of steps by ``integrator``, as long runs do; or say why there is none."""
     def resolution(

@@ -6,6 +6,7 @@ mod guide;
 mod hold;
 mod moving;
 mod names;
+mod observer;
 mod prescribed;
 mod resolution;
 mod sampled;
@@ -16,6 +17,7 @@ mod stepper;
 pub use along::{Along, drives_along};
 pub use hold::{Hold, Inputs};
 pub(crate) use names::state_name;
+pub use observer::{Filtered, Gains, Noise, Readings, filter, observe};
 pub use prescribed::{observed, prescribed};
 pub use resolution::resolution;
 pub(crate) use sampled::SampledDrives;
@@ -103,7 +105,10 @@ pub fn free_run<'a>(setting: Setting<'a>, initial_state: &'a [f64], inputs: impl
     inputs.expect(&setting)?;
     check_state("initial_state", setting.description, initial_state)?;
     let horizon = inputs.table.rows();
-    execute(setting, Plan { drive: Drive::Commands(inputs), initial: initial_state, starts: &[0], horizon })
+    execute(
+        setting,
+        Plan { drive: Drive::Commands(inputs), initial: initial_state, starts: &[0], horizon, gains: None },
+    )
 }
 
 /// Closed loop: the controllers follow `references`; `disturbances` are added to their commands (both N x inputs). What no controller
@@ -123,7 +128,7 @@ pub fn closed_loop(
         return Err(Error::OpenLoop);
     }
     let drive = Drive::Loop { references, disturbances };
-    execute(setting, Plan { drive, initial: initial_state, starts: &[0], horizon: rows })
+    execute(setting, Plan { drive, initial: initial_state, starts: &[0], horizon: rows, gains: None })
 }
 
 /// Free runs of `horizon` samples from each sample in `starts`, from the row of `initial_states` that belongs to it. Delayed commands
@@ -155,7 +160,8 @@ pub fn restarts<'a>(
             return Err(Error::Setting { setting: "a start", condition, value: start as f64, repair });
         }
     }
-    let plan = Plan { drive: Drive::Commands(inputs), initial: initial_states.numbers(), starts, horizon };
+    let initial = initial_states.numbers();
+    let plan = Plan { drive: Drive::Commands(inputs), initial, starts, horizon, gains: None };
     execute(setting, plan)
 }
 

@@ -39,7 +39,13 @@ impl<'a> Course<'a> {
             return Err(Error::Dimension { what, expected: 1, found: 0, each });
         }
         check_starts(setting, initial_state)?;
-        let plan = Plan { drive: Drive::Commands(inputs.into()), initial: initial_state, starts: &[0], horizon: rows };
+        let plan = Plan {
+            drive: Drive::Commands(inputs.into()),
+            initial: initial_state,
+            starts: &[0],
+            horizon: rows,
+            gains: None,
+        };
         Ok(Self { stepper: Stepper::new(&setting, &plan, setting.theta)?, setting, rows, next: 0 })
     }
 

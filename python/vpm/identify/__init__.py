@@ -15,6 +15,7 @@ from vpm.identify.oil import identify_oil
 from vpm.identify.oil_equations import CylinderGeometry, pressures_from_force
 from vpm.identify.oil_fit import OilFit
 from vpm.identify.output_error import OutputErrorProblem
+from vpm.identify.prediction_error import PredictionErrorProblem
 from vpm.identify.problem import Block, Problem, gaps, segments
 from vpm.identify.settings import Fitting
 from vpm.identify.shooting import ShootingProblem
@@ -38,6 +39,7 @@ __all__ = [
     "InverseDynamicsProblem",
     "OilFit",
     "OutputErrorProblem",
+    "PredictionErrorProblem",
     "Problem",
     "Profile",
     "ShootingProblem",

@@ -11,14 +11,15 @@ from vpm.identify.input_error import InputErrorProblem
 from vpm.identify.objective import AnyProblem
 from vpm.identify.output_error import OutputErrorProblem
 from vpm.identify.parallel import worker_count
+from vpm.identify.prediction_error import PredictionErrorProblem
 from vpm.identify.settings import Fitting
 from vpm.identify.shooting import ShootingProblem
-from vpm.identify.ties import TiedProblem
+from vpm.identify.ties import TiedProblem, Untied
 from vpm.model import Model
 from vpm.simulate import MODES, Setup
 
-#: Modes of a fit: those of a simulation, and the model turned round.
-FIT_MODES = (*MODES, "input_error")
+#: Modes of a fit: those of a simulation, the model turned round, and the model that follows the log.
+FIT_MODES = (*MODES, "input_error", "prediction_error")
 
 
 def problem(
@@ -30,7 +31,7 @@ def problem(
     setup: Setup | None = None,
     channels: Sequence[str] | None = None,
     workers: int = 1,
-) -> InverseDynamicsProblem | OutputErrorProblem | InputErrorProblem:
+) -> Untied:
     """Set up the residual of ``model`` against ``experiments`` in one of the modes of a fit.
 
     ``channels`` are the compared outputs of simulated modes, ``workers`` the records that are simulated at a time.
@@ -48,6 +49,8 @@ def problem(
         return InverseDynamicsProblem(model, experiments, cutoff=cutoff)
     if mode == "input_error":
         return InputErrorProblem(model, experiments, channels=channels, setup=setup, cutoff=cutoff, workers=workers)
+    if mode == "prediction_error":
+        return PredictionErrorProblem(model, experiments, channels=channels, setup=setup, workers=workers)
     return OutputErrorProblem(model, experiments, mode, channels=channels, setup=setup, cutoff=cutoff, workers=workers)
 
 

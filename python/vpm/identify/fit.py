@@ -16,6 +16,7 @@ from vpm.identify.engine import Found, fit_problem
 from vpm.identify.estimation import Estimate, Progress, estimate, limits
 from vpm.identify.identifiability import Combination
 from vpm.identify.objective import AnyProblem
+from vpm.identify.prediction_error import PredictionErrorProblem
 from vpm.identify.problem import gaps
 from vpm.identify.remarks import constant_channels, lost_channels, remarks, touching
 from vpm.identify.settings import Fitting
@@ -30,6 +31,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
+
+#: Times that an observer gets gains of the values that it led to, and the move (in deviations) after which it need not.
+RENEWALS, SETTLED = 4, 0.1
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -159,9 +163,12 @@ def identify(
     experiments : Experiment or sequence of Experiment
     free : sequence of str, optional
         Dotted names; by default every parameter that the model file gives an uncertainty.
-    mode : {"inverse_dynamics", "free_run", "restarts", "closed_loop", "prescribed_motion", "input_error"}
+    mode : str
+        ``inverse_dynamics``, ``free_run``, ``restarts``, ``closed_loop``, ``prescribed_motion``, ``input_error`` or
+        ``prediction_error``.
         Inverse dynamics is the linear regression of effort on motion; input error compares the logged commands with
-        those that lead to what was measured; the others are output-error fits through the simulation. Sensitivities
+        those that lead to what was measured; prediction error follows the log with an observer and compares each
+        reading with what those before it say; the others are output-error fits through the simulation. Sensitivities
         are exact to rounding, those of input error near the truth.
     cutoff : float, optional
         Cut-off frequency of the motion filter, Hz.
@@ -197,6 +204,7 @@ def identify(
         raise IdentificationError(f'"{twice[0]}" is named {names.count(twice[0])} times in free=; name it once')
     data = comparison(model, records, mode, cutoff=cutoff, setup=setup, ties=ties, fitting=fitting)
     check_ties(model, ties or {}, names)
+    data = _with_own_gains(model, data, names, tolerance)
     before, _ = data.evaluate(model, model.theta)
     if fitting is None:
         result = estimate(model, data, names, tolerance=tolerance, progress=progress)
@@ -219,6 +227,22 @@ def identify(
         fit = _with_details(fit_of(model, data, result, before, [e.name for e in records], ties or {}), data, found)
     fit = replace(fit, setup=setup, fitting=fitting, ties=dict(ties or {}))
     return replace(fit, warnings=_told(model, records, data, fit, result, (fitting or Fitting()).bounds))
+
+
+def _with_own_gains(model: Model, data: AnyProblem, names: tuple[str, ...], tolerance: float) -> AnyProblem:
+    """An observer with the gains and the noise of the values that it leads to; other problems as they are."""
+    if not isinstance(data, PredictionErrorProblem):
+        return data
+    columns = [model.index(name) for name in names]
+    fitted = model
+    for _ in range(RENEWALS):
+        found = estimate(fitted, data, names, tolerance=tolerance)
+        moved = np.abs(found.values - fitted.theta[columns])
+        fitted = fitted.with_parameters(dict(zip(names, map(float, found.values), strict=True)))
+        data = data.renewed(fitted)
+        if np.all(moved[np.isfinite(found.std)] <= SETTLED * found.std[np.isfinite(found.std)]):
+            break
+    return data
 
 
 def check_bounds(free: Sequence[str], fitting: Fitting) -> None:

@@ -8,18 +8,15 @@ from threading import Lock
 import numpy as np
 from numpy.typing import NDArray
 
-from vpm.identify.balance import InverseDynamicsProblem
-from vpm.identify.input_error import InputErrorProblem
-from vpm.identify.output_error import OutputErrorProblem
 from vpm.identify.problem import Block
 from vpm.identify.settings import Fitting
 from vpm.identify.shooting import ShootingProblem
 from vpm.identify.solver import Point
-from vpm.identify.ties import TiedProblem
+from vpm.identify.ties import TiedProblem, Untied
 from vpm.model import Model
 
 Array = NDArray[np.float64]
-AnyProblem = InverseDynamicsProblem | OutputErrorProblem | InputErrorProblem | TiedProblem
+AnyProblem = Untied | TiedProblem
 
 #: Median of absolute values of a normal variable, in standard deviations.
 NORMAL_MEDIAN = 0.6744897501960817

@@ -17,7 +17,7 @@ def _option(words: str, *names: str) -> object:
 FitMode = Annotated[
     str,
     typer.Option(
-        help="inverse_dynamics, free_run, restarts, closed_loop, prescribed_motion or input_error.",
+        help="inverse_dynamics, free_run, restarts, closed_loop, prescribed_motion, input_error or prediction_error.",
         metavar="MODE",
         show_default=True,
     ),

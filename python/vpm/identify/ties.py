@@ -11,6 +11,7 @@ from vpm.errors import IdentificationError, near_match
 from vpm.identify.balance import InverseDynamicsProblem
 from vpm.identify.input_error import InputErrorProblem
 from vpm.identify.output_error import OutputErrorProblem
+from vpm.identify.prediction_error import PredictionErrorProblem
 from vpm.identify.problem import Block
 from vpm.model import Model
 from vpm.units import parse_unit
@@ -18,7 +19,7 @@ from vpm.units import parse_unit
 Array = NDArray[np.float64]
 
 
-Untied = InverseDynamicsProblem | OutputErrorProblem | InputErrorProblem
+Untied = InverseDynamicsProblem | OutputErrorProblem | InputErrorProblem | PredictionErrorProblem
 
 
 class TiedProblem:

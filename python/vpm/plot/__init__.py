@@ -10,6 +10,7 @@ from vpm.plot.scenarios import plot_scenario
 from vpm.plot.signals import (
     plot_channels,
     plot_correlation,
+    plot_innovations,
     plot_residual_against,
     plot_residual_time,
     plot_run,
@@ -30,6 +31,7 @@ __all__ = [
     "plot_gap",
     "plot_impedances",
     "plot_inertial",
+    "plot_innovations",
     "plot_ladder",
     "plot_loops",
     "plot_narx_run",

@@ -94,6 +94,32 @@ def plot_channels(
 
 
 @styled
+def plot_innovations(
+    time: Array, innovations: Array, expected: Array, channels: Sequence[str], units: Sequence[str]
+) -> Figure:
+    """Draw what each reading says beyond those before it, between the bounds that should hold 95 % of it.
+
+    Parameters
+    ----------
+    time : ndarray, shape (N,)
+        s.
+    innovations, expected : ndarray, shape (N, C)
+        And their standard deviation.
+    channels, units : sequence of str
+    """
+    figure, axes = panels(max(1, len(channels)), height=1.6, share_x=True)
+    for at, (channel, unit) in enumerate(zip(channels, units, strict=True)):
+        axis = axes[at][0]
+        axis.plot(*thinned(time, innovations[:, at]), color=BLUE)
+        for side in (-1.96, 1.96):
+            axis.plot(*thinned(time, side * expected[:, at]), color=ORANGE)
+        axis.set_ylabel(label("", unit).strip())
+        axis.set_title(channel)
+    _finish_time(figure, axes[-1][0], "innovations, and the bounds of 95 % of them")
+    return figure
+
+
+@styled
 def plot_run(run: RunLike) -> Figure:
     """Draw simulated over measured, a panel per channel that was measured.
 

@@ -4,6 +4,7 @@ use super::control::{Control, reading};
 use super::hold::{Course, Hold, Inputs};
 use super::moving::Courses;
 use super::names::{output_name, state_name};
+use super::observer::Gains;
 use super::sampled::{Astray, SampledDrives};
 use super::{Setting, Stepping, diverged, halted, leapt, strayed};
 use crate::description::Description;
@@ -13,7 +14,7 @@ use crate::ode::Ode;
 use crate::scalar::Scalar;
 use crate::sensitivity::{Interrupt, Pair};
 use crate::sensor::Sensor;
-use crate::system::{Calls, Counted, Matrix, System, code_pays};
+use crate::system::{Calls, Counted, Dynamics, Matrix, System, code_pays};
 use crate::table::Table;
 
 /// Where the commands come from.
@@ -36,6 +37,8 @@ pub(crate) struct Plan<'a> {
     pub(crate) starts: &'a [usize],
     /// Samples of a piece.
     pub(crate) horizon: usize,
+    /// What corrects the state at every sample, if anything does.
+    pub(crate) gains: Option<Gains<'a>>,
 }
 
 impl Plan<'_> {
@@ -161,6 +164,7 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         for row in 0..self.plan.horizon {
             self.sample(row, start)?;
             if row + 1 < self.plan.horizon {
+                self.correct(row);
                 self.advance(row, start, interrupt)?;
             }
         }
@@ -208,6 +212,44 @@ impl<'a, S: Scalar> Stepper<'a, S> {
             None => integrator.advance(system, state, (stepping.time_step, stepping.substeps), interrupt),
         };
         end.map_err(|halt| halted(self.description, stepping, start + row, halt, self.before(row + 1)))
+    }
+
+    /// Moves the state by the gains on what the readings of sample `row` are more than its outputs, if there are any.
+    fn correct(&mut self, row: usize) {
+        let Some(Gains { readings, gains }) = self.plan.gains else { return };
+        let outputs = &self.outputs[row * self.description.n_outputs()..];
+        let count = readings.channels.len();
+        for (state, gains) in self.state.iter_mut().zip(gains.row(row).chunks_exact(count.max(1))) {
+            for ((&channel, &measured), &gain) in readings.channels.iter().zip(readings.table.row(row)).zip(gains) {
+                *state += (S::from_f64(measured) - outputs[channel]) * gain;
+            }
+        }
+        self.system.forget();
+    }
+
+    /// Puts the machine into another state.
+    pub(crate) fn place(&mut self, state: impl Iterator<Item = S>) {
+        self.state.iter_mut().zip(state).for_each(|(own, other)| *own = other);
+        self.integrator.reset();
+        self.system.forget();
+    }
+
+    /// The state now.
+    pub(crate) fn state(&self) -> &[S] {
+        &self.state
+    }
+
+    /// The machine in plain numbers.
+    pub(crate) fn dynamics(&mut self) -> &mut Dynamics<f64> {
+        self.system.dynamics()
+    }
+
+    /// Shows the outputs at sample `row`, as sensors show them; from then on they are mere numbers for sensors that look back on them.
+    pub(crate) fn settle(&mut self, row: usize, seen: impl FnOnce(&[S])) {
+        let width = self.description.n_outputs();
+        let own = row * width..(row + 1) * width;
+        seen(&self.outputs[own.clone()]);
+        self.truth[own].iter_mut().for_each(|number| *number = number.frozen());
     }
 
     /// Complains about a piston that went through its stop; steps of controlled error do not let it.

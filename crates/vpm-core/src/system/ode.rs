@@ -188,6 +188,11 @@ impl<S: Scalar> System<S> {
         self.ready = true;
     }
 
+    /// Takes note that the next step begins elsewhere than where the machine was last evaluated.
+    pub(crate) fn forget(&mut self) {
+        self.ready = false;
+    }
+
     /// Whether the rates where the next step begins are at hand.
     pub(crate) fn is_ready(&self) -> bool {
         self.ready

@@ -1,6 +1,7 @@
 //! The class `System`.
 
 mod evaluation;
+mod observer;
 mod simulation;
 mod source;
 mod timing;

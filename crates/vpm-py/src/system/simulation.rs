@@ -45,7 +45,12 @@ impl Request {
 }
 
 impl System {
-    fn run<'py>(&self, py: Python<'py>, run: Run, variables: usize) -> PyResult<(Table<'py>, Table<'py>, Cube<'py>)> {
+    pub(super) fn run<'py>(
+        &self,
+        py: Python<'py>,
+        run: Run,
+        variables: usize,
+    ) -> PyResult<(Table<'py>, Table<'py>, Cube<'py>)> {
         let (outputs, states) = (self.description.n_outputs(), self.description.n_states());
         let rows = run.states.len().checked_div(states).unwrap_or(0);
         Ok((

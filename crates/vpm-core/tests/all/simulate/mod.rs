@@ -4,6 +4,7 @@ mod holds;
 mod inverse;
 mod live;
 mod no_alloc;
+mod observer;
 mod records;
 mod sensitivities;
 mod timing;

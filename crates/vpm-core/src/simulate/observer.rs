@@ -1,0 +1,310 @@
+//! The machine beside its log, corrected at every sample by what was measured.
+//!
+//! Law: `e_k = y_k - h(x_k)`, `x_k <- x_k + K_k e_k`, `x_(k+1) = f(x_k, u_k)`: the innovations of an observer. Its gains are those of an
+//! extended Kalman filter (Jazwinski 1970, chapter 8; Kristensen, Madsen & Jorgensen 2004): forces that nobody knows of move the machine,
+//! and sensors err. They follow the machine's own linearisation at every sample, so that they know by themselves what a joint that sticks, a
+//! play that is open or a contact lets through. What is left of the log is white where model and noise are right.
+
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+
+use super::{Drive, Inputs, Plan, Run, Setting, Stepper, check_state, check_step, execute};
+use crate::error::{Error, Result};
+use crate::scalar::Dual;
+use crate::table::Table;
+
+/// Directions per pass: the gradient of a number then fills one 256-bit register.
+const LANES: usize = 4;
+
+/// A number with its derivatives along some of the states.
+type Number = Dual<f64, LANES>;
+
+/// What was measured.
+#[derive(Clone, Copy, Debug)]
+pub struct Readings<'a> {
+    /// Which outputs, in the order of [`crate::sensor::Layout`].
+    pub channels: &'a [usize],
+    /// Row k: their readings at sample k.
+    pub table: Table<'a>,
+}
+
+/// How far the machine and its sensors are trusted: standard deviations of what is independent from sample to sample.
+#[derive(Clone, Copy, Debug)]
+pub struct Noise<'a> {
+    /// Of each reading.
+    pub readings: &'a [f64],
+    /// Of the force on each coordinate that nobody knows of, held for a sample (N or N m).
+    pub forces: &'a [f64],
+    /// Of what each state moves by over a sample for no known reason.
+    pub states: &'a [f64],
+    /// Of the first state.
+    pub first: &'a [f64],
+}
+
+/// By how much each reading moves each state.
+#[derive(Clone, Copy, Debug)]
+pub struct Gains<'a> {
+    /// What was measured.
+    pub readings: Readings<'a>,
+    /// Row k: states x channels, at sample k.
+    pub gains: Table<'a>,
+}
+
+/// What a filter gives, each table row by row.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Filtered {
+    /// Readings less outputs of each sample.
+    pub innovations: Vec<f64>,
+    /// Covariance of these, channels x channels at each sample.
+    pub covariances: Vec<f64>,
+    /// States x channels at each sample, see [`Gains`].
+    pub gains: Vec<f64>,
+    /// State of each sample, corrected by its readings.
+    pub states: Vec<f64>,
+    /// Standard deviation of each of these.
+    pub deviations: Vec<f64>,
+}
+
+impl Readings<'_> {
+    fn check(&self, setting: &Setting<'_>, inputs: &Inputs<'_>) -> Result<()> {
+        let (description, count) = (setting.description, setting.description.n_outputs());
+        description
+            .refuse_sampled("no observer can correct it", "use an ideal drive that is given the measured effort")?;
+        if let Some(&index) = self.channels.iter().find(|&&channel| channel >= count) {
+            let what = "the list of measured channels".to_owned();
+            return Err(Error::Reference { what, target: "output", index, count });
+        }
+        inputs.expect(setting)?;
+        self.table.expect("readings", inputs.table.rows(), self.channels.len())
+    }
+}
+
+impl Noise<'_> {
+    fn check(&self, setting: &Setting<'_>, channels: usize) -> Result<()> {
+        let (n, states) = (setting.description.n_coordinates(), setting.description.n_states());
+        Table::vector("noise of readings", self.readings, channels, "measured channel")?;
+        Table::vector("noise of forces", self.forces, n, "coordinate")?;
+        Table::vector("noise of states", self.states, states, "state")?;
+        Table::vector("uncertainty of the first state", self.first, states, "state")?;
+        let named = [("of readings", self.readings, true), ("of forces", self.forces, false)];
+        for (name, values, positive) in
+            named.into_iter().chain([("of states", self.states, false), ("of the first state", self.first, false)])
+        {
+            if let Some(&value) = values.iter().find(|&&value| value < 0.0 || (positive && value == 0.0)) {
+                let condition = if positive { "be positive" } else { "not be negative" }.to_owned();
+                let (setting, repair) =
+                    ("a standard deviation", "give the resolution of the sensor where nothing else is known");
+                return Err(Error::Setting { setting, condition: format!("{condition} ({name})"), value, repair });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The innovations of an extended Kalman filter on `readings` from `initial_state`, with its gains; a mere table of inputs is held.
+///
+/// Its linear models are the exact derivatives of the steps that the integrator takes. A force that is held for a sample moves the machine by
+/// `dt/2 (F + 1) [0; M^-1]`, F the transition of the sample.
+///
+/// # Errors
+/// [`Error::Dimension`] or [`Error::Reference`] for tables and channels that do not fit, [`Error::Setting`] for noise that is none, and what a
+/// free run complains about.
+pub fn filter<'a>(
+    setting: Setting<'a>,
+    initial_state: &'a [f64],
+    inputs: impl Into<Inputs<'a>>,
+    readings: Readings<'a>,
+    noise: Noise<'a>,
+) -> Result<Filtered> {
+    let inputs = inputs.into();
+    readings.check(&setting, &inputs)?;
+    noise.check(&setting, readings.channels.len())?;
+    check_state("initial_state", setting.description, initial_state)?;
+    check_step(setting.description, setting.theta, setting.stepping, initial_state)?;
+    let plan = Plan {
+        drive: Drive::Commands(inputs),
+        initial: initial_state,
+        starts: &[0],
+        horizon: inputs.table.rows(),
+        gains: None,
+    };
+    Filter::new(&setting, &plan, readings, noise)?.run(setting)
+}
+
+/// Innovations of an observer with given gains, with their derivatives by parameters while the gains stay: outputs are predicted from the
+/// samples before, and readings less these are the innovations.
+///
+/// # Errors
+/// As [`filter`].
+pub fn observe<'a>(
+    setting: Setting<'a>,
+    initial_state: &'a [f64],
+    inputs: impl Into<Inputs<'a>>,
+    gains: Gains<'a>,
+) -> Result<Run> {
+    let inputs = inputs.into();
+    gains.readings.check(&setting, &inputs)?;
+    let (rows, entries) = (inputs.table.rows(), setting.description.n_states() * gains.readings.channels.len());
+    gains.gains.expect("gains", rows, entries)?;
+    check_state("initial_state", setting.description, initial_state)?;
+    let drive = Drive::Commands(inputs);
+    execute(setting, Plan { drive, initial: initial_state, starts: &[0], horizon: rows, gains: Some(gains) })
+}
+
+/// A filter on its way through a record.
+struct Filter<'a> {
+    stepper: Stepper<'a, Number>,
+    readings: Readings<'a>,
+    noise: Noise<'a>,
+    /// Time between samples, s.
+    time_step: f64,
+    rows: usize,
+    state: DVector<f64>,
+    covariance: DMatrix<f64>,
+    /// Derivative of the next state by this one.
+    transition: DMatrix<f64>,
+    /// Derivative of the outputs by the state.
+    output: DMatrix<f64>,
+    predicted: DVector<f64>,
+}
+
+impl<'a> Filter<'a> {
+    fn new(setting: &Setting<'a>, plan: &Plan<'a>, readings: Readings<'a>, noise: Noise<'a>) -> Result<Self> {
+        let theta: Vec<Number> = setting.theta.iter().map(|&value| Dual::constant(value)).collect();
+        let (nx, m) = (plan.initial.len(), readings.channels.len());
+        let variance = DVector::from_iterator(nx, noise.first.iter().map(|deviation| deviation * deviation));
+        Ok(Self {
+            stepper: Stepper::new(setting, plan, &theta)?,
+            readings,
+            noise,
+            time_step: setting.stepping.time_step,
+            rows: plan.horizon,
+            state: DVector::from_column_slice(plan.initial),
+            covariance: DMatrix::from_diagonal(&variance),
+            transition: DMatrix::zeros(nx, nx),
+            output: DMatrix::zeros(m, nx),
+            predicted: DVector::zeros(m),
+        })
+    }
+
+    fn run(mut self, setting: Setting<'a>) -> Result<Filtered> {
+        let (nx, m) = (self.state.len(), self.readings.channels.len());
+        let table = |width: usize| Vec::with_capacity(self.rows * width);
+        let [mut innovations, mut covariances, mut gains] = [table(m), table(m * m), table(nx * m)];
+        let [mut states, mut deviations] = [table(nx), table(nx)];
+        self.stepper.restart(0);
+        for row in 0..self.rows {
+            self.predict(row)?;
+            let innovation = DVector::from_column_slice(self.readings.table.row(row)) - &self.predicted;
+            let (gain, spread) = self.gain(row)?;
+            self.state += &gain * &innovation;
+            self.correct(&gain);
+            innovations.extend(innovation.iter());
+            covariances.extend(spread.iter());
+            // Row by row, where nalgebra keeps columns.
+            gains.extend(gain.transpose().iter());
+            states.extend(self.state.iter());
+            deviations.extend(self.covariance.diagonal().iter().map(|variance| variance.max(0.0).sqrt()));
+            if row + 1 < self.rows {
+                self.advance(row, setting)?;
+            }
+        }
+        Ok(Filtered { innovations, covariances, gains, states, deviations })
+    }
+
+    /// Puts the stepper at the state, with derivatives along [`LANES`] directions of which `first` is the first.
+    fn seed(&mut self, first: usize) {
+        // A direction before `first` wraps around to a lane that does not exist, which gives a constant.
+        let lift = |(place, &value): (usize, &f64)| Dual::variable(value, place.wrapping_sub(first));
+        self.stepper.place(self.state.iter().enumerate().map(lift));
+    }
+
+    /// The outputs at the state, and their derivative by it.
+    fn predict(&mut self, row: usize) -> Result<()> {
+        for first in (0..self.state.len()).step_by(LANES) {
+            self.seed(first);
+            self.stepper.sample(row, 0)?;
+            let Self { stepper, readings, output, predicted, .. } = self;
+            stepper.settle(row, |seen| {
+                for (place, &channel) in readings.channels.iter().enumerate() {
+                    predicted[place] = seen[channel].value;
+                    take(output, place, first, &seen[channel]);
+                }
+            });
+        }
+        Ok(())
+    }
+
+    /// `K = P H' S^-1`, and `S = H P H' + R`.
+    fn gain(&self, row: usize) -> Result<(DMatrix<f64>, DMatrix<f64>)> {
+        let shared = &self.covariance * self.output.transpose();
+        let mut spread = &self.output * &shared;
+        for (place, deviation) in self.noise.readings.iter().enumerate() {
+            spread[(place, place)] += deviation * deviation;
+        }
+        let factors: Option<Cholesky<f64, Dyn>> = spread.clone().cholesky();
+        let Some(factors) = factors else {
+            let path = format!("the covariance of the innovations at sample {row}");
+            return Err(Error::NonFinite { path, value: f64::NAN });
+        };
+        Ok((factors.solve(&shared.transpose()).transpose(), spread))
+    }
+
+    /// `P <- (1 - K H) P (1 - K H)' + K R K'`, which stays definite however it is rounded (Bucy & Joseph 1968).
+    fn correct(&mut self, gain: &DMatrix<f64>) {
+        let nx = self.state.len();
+        let left = DMatrix::identity(nx, nx) - gain * &self.output;
+        let mut weighed = gain.clone();
+        for (mut column, deviation) in weighed.column_iter_mut().zip(self.noise.readings) {
+            column *= *deviation;
+        }
+        self.covariance = &left * &self.covariance * left.transpose() + &weighed * weighed.transpose();
+    }
+
+    /// State and covariance at the next sample.
+    fn advance(&mut self, row: usize, setting: Setting<'_>) -> Result<()> {
+        let pushed = self.pushed();
+        let mut next = self.state.clone();
+        for first in (0..self.state.len()).step_by(LANES) {
+            self.seed(first);
+            self.stepper.advance(row, 0, setting.interrupt)?;
+            for (place, reached) in self.stepper.state().iter().enumerate() {
+                next[place] = reached.value;
+                take(&mut self.transition, place, first, reached);
+            }
+        }
+        let (n, half) = (pushed.nrows(), 0.5 * self.time_step);
+        let carried = self.transition.columns(n, n) * &pushed;
+        let mut moved = carried * half;
+        let mut rates = moved.rows_mut(n, n);
+        rates += &pushed * half;
+        self.covariance =
+            &self.transition * &self.covariance * self.transition.transpose() + &moved * moved.transpose();
+        for (place, deviation) in self.noise.states.iter().enumerate() {
+            self.covariance[(place, place)] += deviation * deviation;
+        }
+        self.state = next;
+        Ok(())
+    }
+
+    /// Accelerations by one deviation of the force on each coordinate: `M^-1` with columns of these lengths.
+    fn pushed(&mut self) -> DMatrix<f64> {
+        let n = self.noise.forces.len();
+        let (q, v) = self.state.as_slice()[..2 * n].split_at(n);
+        let dynamics = self.stepper.dynamics();
+        dynamics.terms(q, v);
+        dynamics.data.factorise();
+        let mut pushed = DMatrix::from_diagonal(&DVector::from_column_slice(self.noise.forces));
+        for column in pushed.as_mut_slice().chunks_exact_mut(n.max(1)) {
+            dynamics.data.solve(column);
+        }
+        pushed
+    }
+}
+
+/// Takes over the derivatives of a number along the directions from `first` into a row.
+fn take(matrix: &mut DMatrix<f64>, row: usize, first: usize, number: &Number) {
+    let width = matrix.ncols();
+    for (column, &slope) in (first..width).zip(&number.gradient) {
+        matrix[(row, column)] = slope;
+    }
+}

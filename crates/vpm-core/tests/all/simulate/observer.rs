@@ -1,0 +1,165 @@
+//! Observers: gains in closed form, the innovations that they leave, derivatives.
+
+use vpm_core::integrator::Method;
+use vpm_core::samples::{Random, random_tree, slider};
+use vpm_core::simulate::{Filtered, Gains, Noise, Readings, filter, observe};
+use vpm_core::table::Table;
+
+use super::sensitivities::check;
+use crate::common::{Bench, Machine, close};
+
+const STEP: f64 = 0.01;
+
+fn arm() -> Machine {
+    let mut machine = Machine::new(&random_tree(5, 2));
+    machine
+        .effect("viscous_friction", 0, &[("viscous", 0.3)])
+        .effect("coulomb_friction", 1, &[("coulomb", 0.4), ("transition_velocity", 0.3)])
+        .actuator(0, &[("gain", 1.5), ("delay", 0.0137), ("lag", 0.3)])
+        .actuator(1, &[("gain", 0.8)])
+        .sensor(serde_json::json!({"kind": "position", "joint": 0}), &[("gain", 1.1), ("delay", 0.0172)]);
+    machine
+}
+
+const FIRST: [f64; 5] = [0.4, -0.3, 0.5, 0.2, 0.7];
+
+/// Two commands, then the readings of both joints under others.
+fn record(bench: &Bench, rows: usize) -> (Vec<f64>, Vec<f64>) {
+    let commands = |scale: f64| -> Vec<f64> {
+        let at = |k: usize| [2.0 * scale * (0.2 * k as f64).sin(), (0.13 * k as f64 + 1.0).cos()];
+        (0..rows).flat_map(at).collect()
+    };
+    let run = bench.free(&[0.41, -0.28, 0.3, 0.4, 0.7], &commands(1.2));
+    let outputs = run.outputs.chunks_exact(bench.description.n_outputs());
+    (commands(1.0), outputs.flat_map(|row| [row[0], row[4]]).collect())
+}
+
+fn filtered(bench: &Bench, (inputs, readings): (&[f64], &[f64])) -> Filtered {
+    let rows = inputs.len() / 2;
+    let noise = Noise { readings: &[1e-3, 2e-3], forces: &[0.5, 0.1], states: &[0.0; 5], first: &[1e-2; 5] };
+    let readings = Readings { channels: &[0, 4], table: Table::new("readings", readings, rows, 2).unwrap() };
+    filter(bench.setting(), &FIRST, Table::new("inputs", inputs, rows, 2).unwrap(), readings, noise).unwrap()
+}
+
+fn observed(bench: &Bench, (inputs, readings): (&[f64], &[f64]), gains: &[f64]) -> vpm_core::simulate::Run {
+    let rows = inputs.len() / 2;
+    let readings = Readings { channels: &[0, 4], table: Table::new("readings", readings, rows, 2).unwrap() };
+    let gains = Gains { readings, gains: Table::new("gains", gains, rows, 10).unwrap() };
+    observe(bench.setting(), &FIRST, Table::new("inputs", inputs, rows, 2).unwrap(), gains).unwrap()
+}
+
+/// The steady gains of a mass whose place is measured and that unknown forces move: `alpha` and `beta` of Kalata, *IEEE Transactions on
+/// Aerospace and Electronic Systems* 20, 1984.
+#[test]
+fn gains_of_a_mass_settle_at_their_closed_form() {
+    let (mass, force, reading) = (4.0, 30.0, 2e-4);
+    let mut machine = Machine::new(&slider(mass));
+    machine.actuator(0, &[("gain", 1.0)]);
+    let index = force / mass * STEP * STEP / reading;
+    let ratio = (4.0 + index - (8.0 * index + index * index).sqrt()) / 4.0;
+    let alpha = 1.0 - ratio * ratio;
+    let beta = 2.0 * (2.0 - alpha) - 4.0 * (1.0 - alpha).sqrt();
+    let spread = reading * reading / (1.0 - alpha);
+    let rows = 400;
+    let (inputs, places) = (vec![0.0; rows], vec![0.0; rows]);
+    for method in [Method::Rk4, Method::Rosenbrock, Method::SemiImplicit] {
+        let bench = Bench::new(&machine, STEP, 1, method);
+        let noise = Noise { readings: &[reading], forces: &[force], states: &[0.0; 2], first: &[1.0, 1.0] };
+        let readings = Readings { channels: &[0], table: Table::new("readings", &places, rows, 1).unwrap() };
+        let table = Table::new("inputs", &inputs, rows, 1).unwrap();
+        let found = filter(bench.setting(), &[0.0, 0.0], table, readings, noise).unwrap();
+        // The step of the semi-implicit method moves a mass at rest by dt^2 instead of half of it; its transition is the same.
+        close(found.gains[2 * rows - 2], alpha, 1e-9);
+        close(found.gains[2 * rows - 1], beta / STEP, 1e-7);
+        close(found.covariances[rows - 1], spread, 1e-6 * spread);
+        close(found.deviations[2 * rows - 2], reading * alpha.sqrt(), 1e-6 * reading);
+    }
+}
+
+#[test]
+fn an_observer_with_these_gains_leaves_the_same() {
+    for method in [Method::Rk4, Method::LinearlyImplicit, Method::Rosenbrock, Method::Additive] {
+        let bench = Bench::new(&arm(), STEP, 2, method);
+        let (inputs, readings) = record(&bench, 80);
+        let found = filtered(&bench, (&inputs, &readings));
+        let run = observed(&bench, (&inputs, &readings), &found.gains);
+        let outputs = run.outputs.chunks_exact(bench.description.n_outputs());
+        let seen: Vec<_> = outputs.flat_map(|row| [row[0], row[4]]).collect();
+        assert!(found.innovations[100..].iter().any(|innovation| innovation.abs() > 1e-5), "nothing to correct");
+        for ((&seen, &reading), &innovation) in seen.iter().zip(&readings).zip(&found.innovations) {
+            close(reading - seen, innovation, 1e-12);
+        }
+    }
+}
+
+#[test]
+fn without_gains_it_runs_freely() {
+    let bench = Bench::new(&arm(), STEP, 1, Method::Rosenbrock);
+    let (inputs, readings) = record(&bench, 50);
+    let run = observed(&bench, (&inputs, &readings), &vec![0.0; 50 * 10]);
+    assert_eq!(run, bench.free(&FIRST, &inputs));
+}
+
+#[test]
+fn derivatives_are_those_of_differences() {
+    let machine = arm();
+    let mut bench = Bench::new(&machine, STEP, 1, Method::Rosenbrock);
+    let (inputs, readings) = record(&bench, 60);
+    let gains = filtered(&bench, (&inputs, &readings)).gains;
+    bench.sensitivities = (0..machine.values.len()).collect();
+    let exact = observed(&bench, (&inputs, &readings), &gains);
+    check(&machine, &exact.jacobian, "an observer", |theta| {
+        let mut moved = Bench::new(&machine, STEP, 1, Method::Rosenbrock);
+        moved.theta = theta.to_vec();
+        observed(&moved, (&inputs, &readings), &gains).outputs
+    });
+}
+
+/// Forces and readings as the filter believes them: its innovations are as large as it says, one by one.
+#[test]
+fn innovations_are_as_large_as_they_are_said_to_be() {
+    let (mass, force, reading, rows) = (2.0, 5.0, 1e-4, 4000);
+    let mut machine = Machine::new(&slider(mass));
+    machine.effect("viscous_friction", 0, &[("viscous", 3.0)]).actuator(0, &[("gain", 1.0)]);
+    let bench = Bench::new(&machine, STEP, 1, Method::Rk4);
+    let mut random = Random::new(7);
+    // Twelve uniform numbers make a normal one, near enough for second moments.
+    let mut normal = || (0..12).map(|_| 0.5 * random.symmetric()).sum::<f64>();
+    let known: Vec<f64> = (0..rows).map(|k| 10.0 * (0.05 * k as f64).sin()).collect();
+    let pushed: Vec<f64> = known.iter().map(|known| known + force * normal()).collect();
+    let places: Vec<f64> =
+        bench.channel(&bench.free(&[0.0, 0.0], &pushed), 0).iter().map(|place| place + reading * normal()).collect();
+    let noise = Noise { readings: &[reading], forces: &[force], states: &[0.0; 2], first: &[1e-3, 1e-2] };
+    let readings = Readings { channels: &[0], table: Table::new("readings", &places, rows, 1).unwrap() };
+    let found =
+        filter(bench.setting(), &[0.0, 0.0], Table::new("inputs", &known, rows, 1).unwrap(), readings, noise).unwrap();
+    let whitened: Vec<f64> =
+        found.innovations.iter().zip(&found.covariances).map(|(own, spread)| own / spread.sqrt()).collect();
+    let count = rows as f64;
+    let power = whitened.iter().map(|own| own * own).sum::<f64>() / count;
+    // Three standard deviations of a mean of squares, and of a correlation.
+    close(power, 1.0, 3.0 * (2.0 / count).sqrt());
+    for lag in 1..6 {
+        let shared = whitened.iter().zip(&whitened[lag..]).map(|(one, other)| one * other).sum::<f64>() / count;
+        close(shared, 0.0, 3.5 / count.sqrt());
+    }
+}
+
+#[test]
+fn noise_that_is_none_is_refused() {
+    let bench = Bench::new(&arm(), STEP, 1, Method::Rk4);
+    let (inputs, readings) = record(&bench, 20);
+    let table = Table::new("readings", &readings, 20, 2).unwrap();
+    let run = |deviations: &[f64], channels: &[usize]| {
+        let noise = Noise { readings: deviations, forces: &[0.1; 2], states: &[0.0; 5], first: &[0.1; 5] };
+        let inputs = Table::new("inputs", &inputs, 20, 2).unwrap();
+        filter(bench.setting(), &FIRST, inputs, Readings { channels, table }, noise).unwrap_err().to_string()
+    };
+    for (found, said) in [
+        (run(&[0.0, 1e-3], &[0, 4]), "must be positive (of readings), got 0"),
+        (run(&[1e-3], &[0, 4]), "noise of readings"),
+        (run(&[1e-3; 2], &[0, 900]), "output"),
+    ] {
+        assert!(found.contains(said), "{found}");
+    }
+}

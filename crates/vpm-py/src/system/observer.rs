@@ -1,0 +1,98 @@
+//! Observers: a machine beside its log.
+
+use numpy::{PyArray2, PyArray3};
+use pyo3::prelude::*;
+use vpm_core::simulate::{Gains, Hold, Inputs, Noise, Readings, filter, observe};
+
+use super::System;
+use super::simulation::Request;
+use crate::arrays::{self, Numbers, cube, matrix};
+
+type Table<'py> = Bound<'py, PyArray2<f64>>;
+type Cube<'py> = Bound<'py, PyArray3<f64>>;
+type Any<'py> = Bound<'py, PyAny>;
+
+#[pymethods]
+impl System {
+    /// Innovations (N, m) of an extended Kalman filter on readings of some channels, their covariances (N, m, m), its gains (N, nx, m),
+    /// the corrected states (N, nx) and their deviations (N, nx).
+    #[pyo3(signature = (theta, initial_state, inputs, channels, readings, noise, time_step, substeps, integrator, hold="zero_order"))]
+    #[expect(clippy::too_many_arguments, reason = "the arguments of the Python function")]
+    fn filter<'py>(
+        &self,
+        py: Python<'py>,
+        theta: &Any<'py>,
+        initial_state: &Any<'py>,
+        inputs: &Any<'py>,
+        channels: Vec<i64>,
+        readings: &Any<'py>,
+        noise: (Any<'py>, Any<'py>, Any<'py>, Any<'py>),
+        time_step: f64,
+        substeps: i64,
+        integrator: &str,
+        hold: &str,
+    ) -> PyResult<(Table<'py>, Cube<'py>, Cube<'py>, Table<'py>, Table<'py>)> {
+        let request = Request::new(self, theta, (time_step, substeps, integrator), &[])?;
+        let hold = self.checked(py, Hold::from_name(hold))?;
+        let initial = Numbers::vector("initial_state", initial_state)?;
+        let (inputs, readings) = (Numbers::table("inputs", inputs)?, Numbers::table("readings", readings)?);
+        let channels = arrays::places("channels", &channels)?;
+        let of_readings = Numbers::vector("noise of readings", &noise.0)?;
+        let of_forces = Numbers::vector("noise of forces", &noise.1)?;
+        let of_states = Numbers::vector("noise of states", &noise.2)?;
+        let of_first = Numbers::vector("uncertainty of the first state", &noise.3)?;
+        let found = self.compute(py, |interrupt| {
+            let setting = request.setting(&self.description, interrupt);
+            let inputs = Inputs { table: inputs.as_table()?, hold };
+            let readings = Readings { channels: &channels, table: readings.as_table()? };
+            let noise = Noise {
+                readings: of_readings.values(),
+                forces: of_forces.values(),
+                states: of_states.values(),
+                first: of_first.values(),
+            };
+            filter(setting, initial.values(), inputs, readings, noise)
+        })?;
+        let (rows, states, m) = (readings.rows(), self.description.n_states(), channels.len());
+        Ok((
+            matrix(py, found.innovations, [rows, m])?,
+            cube(py, found.covariances, [rows, m, m])?,
+            cube(py, found.gains, [rows, states, m])?,
+            matrix(py, found.states, [rows, states])?,
+            matrix(py, found.deviations, [rows, states])?,
+        ))
+    }
+
+    /// Outputs (N, ny) that an observer with given gains (N, nx * m) predicts from the samples before, its states before they are corrected
+    /// (N, nx), and the derivatives of the outputs (N, ny, k).
+    #[pyo3(signature = (theta, initial_state, inputs, channels, readings, gains, time_step, substeps, integrator, sensitivities=vec![], hold="zero_order"))]
+    #[expect(clippy::too_many_arguments, reason = "the arguments of the Python function")]
+    fn observe<'py>(
+        &self,
+        py: Python<'py>,
+        theta: &Any<'py>,
+        initial_state: &Any<'py>,
+        inputs: &Any<'py>,
+        channels: Vec<i64>,
+        readings: &Any<'py>,
+        gains: &Any<'py>,
+        time_step: f64,
+        substeps: i64,
+        integrator: &str,
+        sensitivities: Vec<i64>,
+        hold: &str,
+    ) -> PyResult<(Table<'py>, Table<'py>, Cube<'py>)> {
+        let request = Request::new(self, theta, (time_step, substeps, integrator), &sensitivities)?;
+        let hold = self.checked(py, Hold::from_name(hold))?;
+        let initial = Numbers::vector("initial_state", initial_state)?;
+        let (inputs, readings) = (Numbers::table("inputs", inputs)?, Numbers::table("readings", readings)?);
+        let (gains, channels) = (Numbers::table("gains", gains)?, arrays::places("channels", &channels)?);
+        let run = self.compute(py, |interrupt| {
+            let setting = request.setting(&self.description, interrupt);
+            let inputs = Inputs { table: inputs.as_table()?, hold };
+            let readings = Readings { channels: &channels, table: readings.as_table()? };
+            observe(setting, initial.values(), inputs, Gains { readings, gains: gains.as_table()? })
+        })?;
+        self.run(py, run, sensitivities.len())
+    }
+}

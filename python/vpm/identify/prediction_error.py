@@ -1,0 +1,121 @@
+"""The residual of an observer: what each reading says beyond the samples before it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vpm.experiment import Experiment
+from vpm.identify.parallel import in_order
+from vpm.identify.problem import Block
+from vpm.model import Model
+from vpm.observer import Noise, Record, filtered, likely_noise
+from vpm.observer.filtering import Pass, whitened
+from vpm.simulate import Setup
+
+Array = NDArray[np.float64]
+
+
+class PredictionErrorProblem:
+    """Innovations of an observer on all records, in units of their size, with its gains fixed.
+
+    Nothing is differentiated and no whole run is asked to stay beside the log: unknown forces and noise of sensors are
+    part of the model, so that closed loops, drift and unstable machines leave no bias (U. Forssell and L. Ljung,
+    *Automatica* 35, 1999). The gains are those of an extended Kalman filter at the parameters with which the problem
+    was set up; `renewed` gives the problem with those of other parameters.
+
+    Parameters
+    ----------
+    model : Model
+    experiments : sequence of Experiment
+    channels : sequence of str, optional
+        Outputs that are compared; by default all that each log holds.
+    setup : Setup, optional
+        Integrator, substeps and hold.
+    noise : Noise, optional
+        By default that which makes the records most likely.
+    workers : int
+        Records that are followed at a time.
+    """
+
+    mode = "prediction_error"
+
+    def __init__(
+        self,
+        model: Model,
+        experiments: Sequence[Experiment],
+        *,
+        channels: Sequence[str] | None = None,
+        setup: Setup | None = None,
+        noise: Noise | None = None,
+        workers: int = 1,
+    ) -> None:
+        self.experiments, self.workers = tuple(experiments), workers
+        self._channels, self._setup, self._stated = channels, setup or Setup(), noise
+        self.records = tuple(Record.of(model, experiment, channels) for experiment in experiments)
+        self.noise = noise or likely_noise(model, self.records, setup=self._setup)
+        self._model = model
+        self._passes: dict[str, tuple[Pass, ...]] = {}
+        self.blocks = self._lay_out(model)
+
+    def renewed(self, model: Model) -> PredictionErrorProblem:
+        """The same with noise and gains of another model."""
+        given = {"channels": self._channels, "setup": self._setup, "noise": self._stated}
+        return PredictionErrorProblem(model, self.experiments, workers=self.workers, **given)  # type: ignore[arg-type]
+
+    def evaluate(self, model: Model, theta: Array, columns: Sequence[int] = ()) -> tuple[Array, Array]:
+        """Whitened innovations and their derivative; see :class:`Problem`."""
+        passes = self._gains(model)
+        jobs = [
+            partial(self._followed, model, theta, list(columns), *pair)
+            for pair in zip(self.records, passes, strict=True)
+        ]
+        residuals, jacobians = [], []
+        for values, slopes in in_order(jobs, self.workers):
+            residuals.append(values.T.ravel())
+            jacobians.append(slopes.transpose(1, 0, 2).reshape(values.size, len(columns)))
+        return np.concatenate(residuals), np.concatenate(jacobians)
+
+    def log_likelihood(self, model: Model, theta: Array) -> float:
+        """Logarithm of the probability density of all readings under the gains of the problem."""
+        residual, _ = self.evaluate(model, theta)
+        logarithms = sum(float(np.sum(np.linalg.slogdet(one.covariances)[1])) for one in self._gains(model))
+        return -0.5 * (float(residual @ residual) + logarithms + residual.size * float(np.log(2.0 * np.pi)))
+
+    def _gains(self, model: Model) -> tuple[Pass, ...]:
+        """A pass over each record by a machine of this structure, at the parameters that it came with first."""
+        key = "|".join(model.state_names)
+        if key not in self._passes:
+            run = partial(filtered, model, noise=self.noise, setup=self._setup)
+            self._passes[key] = tuple(run(record) for record in self.records)
+        return self._passes[key]
+
+    def _followed(
+        self, model: Model, theta: Array, columns: list[int], record: Record, gains: Pass
+    ) -> tuple[Array, Array]:
+        """Whitened innovations (N, m) of one record, and their derivative (N, m, k)."""
+        places = [model.output_channels.index(name) for name in record.channels]
+        first = record.first
+        if len(first) != model.core.n_states:
+            raise ValueError("a model of another structure needs a problem of its own")
+        stepping = (record.dt, self._setup.substeps, self._setup.method(model), columns, self._setup.hold)
+        table = gains.gains.reshape(len(record.time), -1)
+        outputs, _, slopes = model.core.observe(theta, first, record.inputs, places, record.readings, table, *stepping)
+        innovations = record.readings - outputs[:, places]
+        return whitened(gains.covariances, innovations), whitened(gains.covariances, -slopes[:, places])
+
+    def _lay_out(self, model: Model) -> tuple[Block, ...]:
+        blocks, start = [], 0
+        for record, one in zip(self.records, self._gains(model), strict=True):
+            for column, channel in enumerate(record.channels):
+                size = float(np.sqrt(np.mean(one.covariances[:, column, column])))
+                scale = float(np.sqrt(np.mean(record.readings[:, column] ** 2)))
+                samples = slice(start, start + len(record.time))
+                unit = model.channel_unit(channel)
+                counts = np.ones(len(record.time))
+                blocks.append(Block(record.name, channel, unit, samples, record.time, scale, 1.0 / size, counts))
+                start = samples.stop
+        return tuple(blocks)

@@ -1,0 +1,180 @@
+"""One pass of an extended Kalman filter over a record."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vpm.errors import DivergedError, ExperimentError, SimulationError, near_match
+from vpm.experiment import Experiment
+from vpm.initial import initial_state
+from vpm.model import Model
+from vpm.simulate import Setup
+from vpm.simulate.inputs import held_inputs
+
+if TYPE_CHECKING:
+    from vpm.observer.noise import Noise
+
+Array = NDArray[np.float64]
+
+#: How far coordinates and rates may be from the first state, SI; states of drives by this share of themselves.
+COORDINATES, RATES, DRIVES = 1e-2, 1.0, 0.1
+
+
+@dataclass(frozen=True)
+class Record:
+    """What an observer takes of a log.
+
+    Attributes
+    ----------
+    name : str
+    time : ndarray, shape (N,)
+        s.
+    dt : float
+        Time between samples, s.
+    channels : tuple of str
+        Outputs of the model that the log holds.
+    readings : ndarray, shape (N, m)
+    inputs : ndarray, shape (N, inputs)
+    first : ndarray, shape (nx,)
+        State at the first sample as the log suggests it.
+    """
+
+    name: str
+    time: Array
+    dt: float
+    channels: tuple[str, ...]
+    readings: Array
+    inputs: Array
+    first: Array
+
+    @classmethod
+    def of(cls, model: Model, experiment: Experiment, channels: Sequence[str] | None = None) -> Record:
+        """The record of a log.
+
+        Raises
+        ------
+        SimulationError, ExperimentError
+            No channel can be compared, one is unknown, or the log lacks a command.
+        """
+        names = tuple(channels) if channels is not None else _measured(model, experiment)
+        if not names:
+            raise SimulationError(
+                f"{experiment.name}: an observer compares measured outputs, and the log holds none of "
+                f"{model.name}; log a position"
+            )
+        for name in names:
+            if name not in model.output_channels:
+                raise SimulationError(f'channels: "{name}" is unknown; {near_match(name, model.output_channels)}')
+            if name not in experiment:
+                raise ExperimentError(
+                    f'channels: "{name}" is not in {experiment.name}, which holds {", ".join(experiment.channels)}'
+                )
+        readings = np.column_stack([experiment[name] for name in names])
+        inputs = held_inputs(model, experiment, "observe")
+        first = initial_state(model, experiment, model.theta)
+        return cls(experiment.name, experiment.time, experiment.dt, names, readings, inputs, first)
+
+    def stretch(self, samples: int) -> Record:
+        """The first so many samples alone."""
+        kept = {name: getattr(self, name)[:samples] for name in ("time", "readings", "inputs")}
+        return Record(self.name, kept["time"], self.dt, self.channels, kept["readings"], kept["inputs"], self.first)
+
+
+@dataclass(frozen=True)
+class Pass:
+    """What a filter gives of a record, see `vpm._core.System.filter`.
+
+    Attributes
+    ----------
+    innovations : ndarray, shape (N, m)
+    covariances : ndarray, shape (N, m, m)
+    gains : ndarray, shape (N, nx, m)
+    states, deviations : ndarray, shape (N, nx)
+    """
+
+    innovations: Array
+    covariances: Array
+    gains: Array
+    states: Array
+    deviations: Array
+
+    def whitened(self) -> Array:
+        """Innovations in units of what they are said to be (N, m), without correlation among channels."""
+        return whitened(self.covariances, self.innovations)
+
+    def log_likelihood(self) -> float:
+        """Logarithm of the probability density of the readings, one sample after the other."""
+        _, logarithms = np.linalg.slogdet(self.covariances)
+        samples, channels = self.innovations.shape
+        constant = samples * channels * np.log(2.0 * np.pi)
+        return -0.5 * float(np.sum(self.whitened() ** 2) + np.sum(logarithms) + constant)
+
+
+def whitened(covariances: Array, values: Array) -> Array:
+    """``L^-1 e`` with ``L L' = S``, for innovations (N, m) or their derivatives (N, m, k)."""
+    if covariances.shape[1] == 1:
+        deviation = np.sqrt(covariances[:, 0, 0])
+        return np.asarray(values / deviation.reshape(-1, *[1] * (values.ndim - 1)))
+    roots = np.linalg.cholesky(covariances)
+    columns = values if values.ndim == 3 else values[:, :, None]
+    return np.asarray(np.linalg.solve(roots, columns).reshape(values.shape))
+
+
+def filtered(
+    model: Model, record: Record, noise: Noise, *, theta: Array | None = None, setup: Setup | None = None
+) -> Pass:
+    """Filter ``record`` with ``model``.
+
+    Raises
+    ------
+    DivergedError, SimulationError
+        The model runs away from the log, or cannot be filtered.
+    """
+    from vpm._core import Diverged
+
+    setup = setup or Setup()
+    theta = model.theta if theta is None else theta
+    places = [model.output_channels.index(name) for name in record.channels]
+    spreads = noise.spreads(model, record)
+    try:
+        found = model.core.filter(
+            theta,
+            record.first,
+            record.inputs,
+            places,
+            record.readings,
+            spreads,
+            record.dt,
+            setup.substeps,
+            setup.method(model),
+            setup.hold,
+        )
+    except Diverged as error:
+        raise DivergedError(f"{record.name}: {error}", run=None, time=float(record.time[len(error.outputs)])) from None
+    except ValueError as error:
+        raise SimulationError(f"{record.name}: {error}") from error
+    return Pass(*found)
+
+
+def first_deviations(model: Model, first: Array) -> Array:
+    """How far each state may be from the first one (nx,)."""
+    n = len(model.coordinates)
+    spread = np.full(len(first), RATES)
+    spread[:n] = COORDINATES
+    spread[2 * n :] = DRIVES * np.maximum(np.abs(first[2 * n :]), DRIVES)
+    return spread
+
+
+def _measured(model: Model, experiment: Experiment) -> tuple[str, ...]:
+    """Outputs that the log holds, without commands, which are inputs, and accelerations, which are mostly derived."""
+    inputs = set(model.input_channels)
+    return tuple(
+        name
+        for name in model.output_channels
+        if name in experiment and name not in inputs and not name.endswith(".acceleration")
+    )
