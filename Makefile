@@ -66,7 +66,7 @@ bench-counts: $(VENV)/.installed ## count the instructions of one call of the re
 	$(BIN)/python benches/peers/instruction_counts.py
 
 peers: $(VENV)/.installed ## time vpm beside other engines, which this installs; writes docs/performance.md
-	$(BIN)/python -m pip install --quiet 'exudyn>=1.10' 'mujoco>=3.3' 'pin>=3.0' 'casadi>=3.6' 'numba>=0.60' 'sysidentpy>=0.9'
+	$(BIN)/python -m pip install --quiet 'exudyn>=1.10' 'mujoco>=3.3' 'pin>=3.0' 'cmeel-eigen>=3.4' 'casadi>=3.6' 'numba>=0.60' 'sysidentpy>=0.9'
 	$(BIN)/python benches/peers/run.py
 
 chirp: $(VENV)/.installed ## time the servo-cylinder beside the solvers that are installed (C, CasADi, SciPy with Numba)

@@ -3,18 +3,22 @@
     python benches/peers/rigid_chain.py [--calls 30000] [--markdown FILE]
 
 Inverse dynamics (rnea), mass matrix (crba) and forward dynamics (aba), each on prepared buffers and ready arrays, as a
-controller written in Python calls them. Pinocchio takes part where it is installed: pip install "vpm-dynamics[peers]".
+controller written in Python calls them; and efforts along a whole record in one call, beside a loop in Pinocchio's C++.
+Pinocchio takes part where it is installed: pip install "vpm-dynamics[peers]".
 """
 
 from __future__ import annotations
 
 import argparse
+import shutil
 import statistics
+import subprocess
 import sys
 import time
 from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +39,18 @@ MOMENTS = (0.012, 0.011, 0.004, 0.0003, -0.0002, 0.0005)
 #: Values have to agree to this, relative to the largest of them.
 AGREEMENT = 1e-9
 REPEATS = 15
+#: Samples of a record, and passes over it of which the fastest counts.
+RECORD, PASSES = 100_000, 7
+LOOP = ROOT / "benches" / "peers" / "pinocchio_chain.cpp"
+#: What Pinocchio's headers ask of the compiler and of Boost.
+FLAGS = (
+    *("-std=c++17", "-O3", "-march=native", "-DNDEBUG", "-w"),
+    *(
+        "-DBOOST_MPL_LIMIT_LIST_SIZE=30",
+        "-DBOOST_MPL_CFG_NO_PREPROCESSED_HEADERS",
+        "-DBOOST_FUSION_INVOKE_MAX_ARITY=12",
+    ),
+)
 
 
 def axis(k: int) -> tuple[float, float, float]:
@@ -86,6 +102,49 @@ def pinocchio_calls(q: Array, v: Array, a: Array) -> Calls:
     }
 
 
+def compiled(folder: Path) -> Path | None:
+    """The loop in C++, where there are a compiler and the headers of Pinocchio and Eigen."""
+    prefix = next((Path(path) / "cmeel.prefix" for path in sys.path if (Path(path) / "cmeel.prefix").is_dir()), None)
+    compiler = shutil.which("c++")
+    if prefix is None or compiler is None or not (prefix / "include" / "eigen3").is_dir():
+        return None
+    includes = [f"-I{prefix}/include", f"-I{prefix}/include/eigen3"]
+    links = [f"-L{prefix}/lib", "-lpinocchio_default", f"-Wl,-rpath,{prefix}/lib"]
+    target = folder / "pinocchio_chain"
+    subprocess.run([compiler, *FLAGS, *includes, str(LOOP), *links, "-o", str(target)], check=True)  # noqa: S603
+    return target
+
+
+def record_sentence(random: np.random.Generator) -> str:
+    """Time of a sample where efforts along a record are asked for in one call, on one core."""
+    model, states = vpm_model(), random.uniform(-1.0, 1.0, (3, RECORD, len(MASSES)))
+    times = []
+    for _ in range(PASSES):
+        begin = time.process_time()
+        efforts, _ = model.core.required(model.theta, *states, 1e-3)
+        times.append(time.process_time() - begin)
+    own = 1e6 * min(times) / RECORD
+    told = f"Efforts along a record of {RECORD:,} samples in one call: vpm {own:.3f} us of CPU time per sample"
+    with TemporaryDirectory() as folder:
+        loop = compiled(Path(folder))
+        if loop is None:
+            return f"{told}; a compiler, Pinocchio or the headers of Eigen (cmeel-eigen) are missing for a loop in C++."
+        lines = [f"{len(MASSES)} {RECORD} {PASSES}"]
+        for k, mass in enumerate(MASSES):
+            numbers = (mass, *CENTER, *(moment * mass for moment in MOMENTS), *offset(k), 1 + axis(k)[2])
+            lines.append(" ".join(repr(float(number)) for number in numbers))
+        lines += [" ".join(map(repr, row.tolist())) for rows in states.transpose(1, 0, 2) for row in rows]
+        done = subprocess.run([str(loop)], input="\n".join(lines), capture_output=True, text=True, check=True)  # noqa: S603
+    seconds, total = map(float, done.stdout.split())
+    off = abs(total - float(efforts.sum())) / float(np.abs(efforts).sum())
+    if not off <= AGREEMENT:
+        raise SystemExit(
+            f"efforts along a record differ from Pinocchio by {off:.1e} in their sum, allowed {AGREEMENT:g}"
+        )
+    theirs = 1e6 * seconds / RECORD
+    return f"{told}, Pinocchio's `rnea` in a loop of C++ {theirs:.3f} us: {theirs / own:.1f} times as long."
+
+
 def microseconds(call: Callable[[], Array], calls: int) -> tuple[list[float], float]:
     """Wall time of one call in each repeat, and the least CPU time."""
     wall, cpu = [], []
@@ -132,7 +191,8 @@ def main() -> None:
             ratio = f"{cpu / least['vpm']:.2f}" if engine != "vpm" else ""
             spread = f"{statistics.median(wall):.2f}, {max(wall) - min(wall):.2f}"
             lines.append((name, engine, f"{min(wall):.2f}", spread, f"{cpu:.2f}", ratio))
-    text = f"{markdown.table(('call', 'engine', 'wall, us', 'median, spread', 'CPU, us', 'ratio'), lines)}\n\n{note}\n"
+    head = ("call", "engine", "wall, us", "median, spread", "CPU, us", "ratio")
+    text = f"{markdown.table(head, lines)}\n\n{note}\n\n{record_sentence(random)}\n"
     print(text)
     if options.markdown:
         options.markdown.write_text(text, encoding="utf-8")

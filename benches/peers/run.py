@@ -45,6 +45,12 @@ segments with elastic hinges, implicit in the damping. vpm runs the arm of a mod
 integrator `additive` and the hold `cubic`, its links at the level that stands there. The first of the repeats records
 its equations and makes machine code of them, which takes a tenth of a second; the least of all repeats is without.
 
+## Elements
+
+The same arm in steps of 1 ms with more and more finite elements per link (geometrically exact, linear in the curvature;
+Exudyn: quadratic, three nodes), processor time of a step.
+
+{elements}
 ## A servo-cylinder
 
 One second of the servo-cylinder of [hydraulics.md](hydraulics.md), six states, under a current of 0.5 mA from 2 to
@@ -67,7 +73,7 @@ samples, the others 20 000.
 {narx}
 ## A rigid arm of seven joints
 
-One call from Python, on prepared buffers and ready arrays.
+One call from Python, on prepared buffers and ready arrays; then a whole record in one call.
 
 {rigid_chain}
 Instructions of one call inside the core, counted by valgrind, which no other load on the machine disturbs:
@@ -99,7 +105,7 @@ def section(name: str, folder: Path) -> str:
 
 def main() -> None:
     with TemporaryDirectory() as folder:
-        names = ("flexible_arm", "servo_chirp", "narx", "rigid_chain", "instruction_counts")
+        names = ("flexible_arm", "elements", "servo_chirp", "narx", "rigid_chain", "instruction_counts")
         sections = {name: section(name, Path(folder)) for name in names}
     engines = {"vpm": "vpm-dynamics", "Exudyn": "exudyn", "MuJoCo": "mujoco", "Pinocchio": "pin"}
     engines |= {"CasADi": "casadi", "SciPy": "scipy", "Numba": "numba", "sysidentpy": "sysidentpy"}

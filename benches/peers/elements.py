@@ -1,0 +1,122 @@
+"""Time of a step by the number of elements of each link, side by side with Exudyn.
+
+    python benches/peers/elements.py [--repeats 5] [--markdown FILE]
+
+The two-link arm of `flexible_arm.py` in steps of 1 ms, from a model file through `vpm.simulate`; Exudyn runs its
+geometrically exact beams of three nodes with the settings of `exudyn_arm.py`. TUDOR has links that bend in two
+directions and twist.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections.abc import Callable
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+
+ROOT = Path(__file__).resolve().parent.parent.parent
+sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "benches" / "peers")]
+
+import markdown  # noqa: E402
+import vpm  # noqa: E402
+from reference_arm import P, log  # noqa: E402
+from validation.machines import arm  # noqa: E402
+
+ELEMENTS = (2, 5, 10, 20, 40)
+STEP, SAMPLES = 1e-3, 1000
+INTEGRATORS = ("additive", "linearly_implicit")
+TUDOR = ROOT / "examples" / "tudor" / "tudor.toml"
+#: Elements per link of TUDOR.
+FINE = 20
+
+
+def least(run: Callable[[], object], repeats: int) -> float:
+    """Processor time (us) of a step: the least of all repeats, the first of which compiles."""
+    times = []
+    for _ in range(repeats + 1):
+        begin = time.process_time()
+        run()
+        times.append(time.process_time() - begin)
+    return 1e6 * min(times) / SAMPLES
+
+
+def own(model: vpm.Model, record: vpm.Experiment, integrator: str) -> Callable[[], object]:
+    """A run of as many steps as samples: machine code is made by the first."""
+    start = np.zeros(model.core.n_states)
+    return lambda: vpm.simulate(model, record, integrator=integrator, initial_state=start)
+
+
+def exudyn(elements: int) -> float:
+    from exudyn_arm import ExudynArm, fastest_solver
+
+    duration = STEP * SAMPLES
+    best = np.inf
+    for renew in (False, True):
+        solver = fastest_solver(elements, STEP, renew)
+        for _ in range(2):
+            machine = ExudynArm("fast", elements, STEP, solver, renew=renew, duration=duration)
+            begin = time.process_time()
+            machine.run()
+            best = min(best, time.process_time() - begin)
+    return 1e6 * best / SAMPLES
+
+
+def growth(times: dict[int, float], low: int, high: int) -> float:
+    """Power of the number of elements with which the time grows."""
+    return float(np.log(times[high] / times[low]) / np.log(high / low))
+
+
+def arm_table(repeats: int) -> str:
+    record = log("fast", STEP)
+    short = vpm.Experiment.from_arrays(
+        record.time[: SAMPLES + 1], {name: record[name][: SAMPLES + 1] for name in record.channels}, name="fast"
+    )
+    found: dict[str, dict[int, float]] = {name: {} for name in INTEGRATORS}
+    peer: dict[int, float] = {}
+    for count in ELEMENTS:
+        model = arm(P, f"elements({count})")
+        for integrator in INTEGRATORS:
+            found[integrator][count] = least(own(model, short, integrator), repeats)
+        if find_spec("exudyn"):
+            peer[count] = exudyn(count)
+    columns = {**found, **({"Exudyn": peer} if peer else {})}
+    head = ("elements per link", *(f"{name}, us" for name in columns), "Exudyn / additive")
+    rows = []
+    for count in ELEMENTS:
+        ratio = f"{peer[count] / found['additive'][count]:.1f}" if peer else "not installed"
+        rows.append((str(count), *(f"{times[count]:.1f}" for times in columns.values()), ratio))
+    rows.append(("growth from 10 to 40", *(f"n^{growth(times, 10, 40):.2f}" for times in columns.values()), ""))
+    return markdown.table(head, rows)
+
+
+def tudor_sentence(repeats: int) -> str:
+    from vpm.model import Model
+
+    content = Model.load(TUDOR).to_dict()
+    beams = {name: {**beam, "level": f"elements({FINE})"} for name, beam in content["beams"].items()}
+    model = Model.from_dict({**content, "beams": beams})
+    time_ = STEP * np.arange(SAMPLES + 1)
+    commands = {f"{name}.command": 0.1 * np.sin(5.0 * time_) for name in model.actuators}
+    record = vpm.Experiment.from_arrays(time_, commands, model=model, name="sine")
+    times = {name: least(own(model, record, name), min(repeats, 2)) for name in INTEGRATORS}
+    told = ", ".join(f"{value:.0f} us by {name}" for name, value in times.items())
+    return f"TUDOR with {FINE} elements per link ({len(model.coordinates)} coordinates): a step takes {told}."
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("--repeats", type=int, default=5, help="runs of each setting")
+    parser.add_argument("--markdown", type=Path, help="write the section of the performance page here")
+    options = parser.parse_args()
+    text = f"{arm_table(options.repeats)}\n\n{tudor_sentence(options.repeats)}\n"
+    print(text)
+    if options.markdown:
+        options.markdown.write_text(text, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
