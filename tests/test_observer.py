@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 import vpm
-from vpm.errors import ExperimentError, SimulationError
+from vpm.errors import ExperimentError, ModelError, SimulationError
 from vpm.experiment import Experiment
 from vpm.model import Model
 from vpm.observer import Noise, Record, likely_noise
@@ -99,6 +99,34 @@ def test_the_noise_that_moved_a_machine_is_found_again() -> None:
     # Second moments of 6000 samples, of which one in three or so tells of the force.
     assert noise.readings["axis.position"] == pytest.approx(READING, rel=0.1)
     assert noise.forces["axis"] == pytest.approx(FORCE, rel=0.2)
+
+
+def test_what_a_model_file_states_of_its_sensors_is_believed() -> None:
+    """Noise and rounding add up: a step d rounds with a variance of d^2 / 12."""
+    stated = CARRIAGE + '[sensors.scale]\nmeasures = "axis.position"\nnoise = { value = 0.015, unit = "mm" }\n'
+    model = Model.from_toml(stated + 'resolution = { value = 30.0, unit = "um" }\n')
+    deviation = float(np.hypot(1.5e-5, 3e-5 / np.sqrt(12.0)))
+    assert model.sensor_noise == {"axis.position": pytest.approx(deviation, rel=1e-12)}
+    noise = likely_noise(model, [Record.of(model, pushed(0, 3000))])
+    assert noise.readings["axis.position"] == pytest.approx(deviation, rel=1e-12)
+    assert noise.forces["axis"] == pytest.approx(FORCE, rel=0.3)
+    assert Model.from_dict(model.to_dict()).sensor_noise == model.sensor_noise
+
+
+@pytest.mark.parametrize(
+    ("line", "sentence"),
+    [
+        ('noise = { value = 1.0, unit = "s" }', r"sensors.scale.noise has a wrong unit"),
+        ("noise = 0.0", r"sensors.scale.noise is 0 m, but only .* is physically possible"),
+        (
+            "resolution = { value = 1e-6, uncertainty = 1e-7 }",
+            r"sensors.scale.resolution is no parameter: give its value",
+        ),
+    ],
+)
+def test_noise_of_a_sensor_that_cannot_be_meant_is_told(line: str, sentence: str) -> None:
+    with pytest.raises(ModelError, match=sentence):
+        Model.from_toml(f'{CARRIAGE}[sensors.scale]\nmeasures = "axis.position"\n{line}\n')
 
 
 def test_innovations_are_white_where_the_model_is_right_and_not_where_friction_is_missing() -> None:

@@ -20,6 +20,7 @@ from vpm.model.parameters import Parameter, Slot, slots, table
 from vpm.model.references import gauge_problems, reference_problems
 from vpm.model.sampled_files import with_files
 from vpm.model.schema import Document
+from vpm.model.sensor_noise import noise_problems
 from vpm.model.splitting import stop_problems
 from vpm.model.structure import Structure, build_structure
 from vpm.model.tree import joint_problems, name_problems, tree_problems
@@ -69,6 +70,7 @@ def check_document(content: Mapping[str, object], path: str | None = None) -> Ch
     references += connection_problems(document, structure)
     references += omission_problems(document, structure)
     _stop_at([*references, *_command_problems(document)], path)
+    _stop_at(list(noise_problems(document, structure)), path)
     _stop_at(
         [*unit_problems(document), *effect_problems(document, structure), *_channel_problems(document, structure)], path
     )

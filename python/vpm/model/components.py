@@ -11,6 +11,7 @@ from vpm.errors import ModelError
 from vpm.model.check import Checked
 from vpm.model.drive_components import DriveComponents
 from vpm.model.schema import ChannelEntry
+from vpm.model.sensor_noise import stated_noise
 
 #: Drives whose effort follows from the command alone.
 DIRECT = frozenset({"ideal", "narx", "maxwell_narx"})
@@ -233,6 +234,11 @@ class Components(DriveComponents):
             There is no such channel; the message names near ones.
         """
         return self._checked.structure.unit(channel)
+
+    @cached_property
+    def sensor_noise(self) -> dict[str, float]:
+        """Standard deviation (SI) by channel of what the model file says of its sensors: noise, and rounding."""
+        return stated_noise(self._checked.document, self._checked.structure)
 
     def sensor_of(self, channel: str) -> str | None:
         """Sensor that reads a channel, if there is one."""

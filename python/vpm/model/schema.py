@@ -64,9 +64,20 @@ class Joint(Entry):
 
 
 class Sensor(Entry):
-    """Reading of one channel."""
+    """Reading of one channel.
+
+    Attributes
+    ----------
+    measures : str
+    noise : Quantity, optional
+        Standard deviation of what is independent from sample to sample.
+    resolution : Quantity, optional
+        Step between two readings that it can show.
+    """
 
     measures: Text
+    noise: ParameterValue | None = None
+    resolution: ParameterValue | None = None
 
 
 class EffectEntry(BaseModel):

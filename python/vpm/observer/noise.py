@@ -94,13 +94,12 @@ def likely_noise(
     theta: Array | None = None,
     setup: Setup | None = None,
     start: Noise | None = None,
-    known: Sequence[str] = (),
 ) -> Noise:
     """The noise that makes ``records`` most likely under ``model``.
 
-    Unknown are the deviation of each reading, but for ``known`` channels, and one measure of all forces: they bring
-    the same energy into every coordinate, ``s_i^2 / M_ii`` being the same for all. The common scale follows from the
-    innovations themselves; the ratios are found one after the other.
+    Unknown are the deviation of each reading of which the model file states no noise, and one measure of all forces:
+    they bring the same energy into every coordinate, ``s_i^2 / M_ii`` being the same for all. Where nothing is stated
+    the common scale follows from the innovations themselves; the ratios are found one after the other.
 
     Raises
     ------
@@ -110,6 +109,8 @@ def likely_noise(
     theta = model.theta if theta is None else theta
     pieces = [record.stretch(SAMPLES) for record in records]
     noise = start or first_guess(model, pieces, theta)
+    known = {name: model.sensor_noise[name] for name in noise.readings if name in model.sensor_noise}
+    noise = replace(noise, readings={**noise.readings, **known})
 
     def likelihood(candidate: Noise) -> tuple[float, float]:
         """Log likelihood at the best common scale, and its square."""
