@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from vpm.simplify import Ladder, simplify
     from vpm.simulate import Run, Setup, simulate
     from vpm.stepping import Simulation
+    from vpm.weighing import Weighing, weigh
 
     __version__: str
 
@@ -73,6 +74,7 @@ __all__ = [
     "Simulation",
     "Trial",
     "VpmError",
+    "Weighing",
     "__version__",
     "budget",
     "climb",
@@ -90,6 +92,7 @@ __all__ = [
     "simplify",
     "simulate",
     "simulate_batch",
+    "weigh",
     "write_report",
 ]
 
@@ -134,6 +137,8 @@ _HOMES = {
     "Setup": "vpm.simulate",
     "simulate": "vpm.simulate",
     "Simulation": "vpm.stepping",
+    "Weighing": "vpm.weighing",
+    "weigh": "vpm.weighing",
 }
 """The module that each name comes from, once it is asked for: a program loads what it uses."""
 
