@@ -314,6 +314,10 @@ impl Build for &Description {
         let machine = Dynamics::new(model, effects, actuators, supplies).connected(connections);
         Ok(machine.remembering(self.memories_of(theta)))
     }
+
+    fn sensors<S: Scalar>(&self, theta: &[S]) -> Vec<Sensor<S>> {
+        Description::sensors(self, theta)
+    }
 }
 
 impl EffectEntry {
