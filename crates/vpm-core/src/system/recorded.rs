@@ -23,7 +23,7 @@ pub struct Places {
     pub coordinates: usize,
     /// Length of the state, which comes first.
     pub states: usize,
-    /// Number of inputs, see [`Dynamics::input`].
+    /// Number of inputs, see [`super::System::input`].
     pub inputs: usize,
     /// Number of parameters.
     pub parameters: usize,
