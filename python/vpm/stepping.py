@@ -12,7 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from vpm.errors import DivergedError, SimulationError, near_match
 from vpm.model import Model
-from vpm.simulate import AUTOMATIC, Run, Setup, judged
+from vpm.simulate import AUTOMATIC, Resolution, Run, Setup, judged
+from vpm.simulate.resolution import resolution
 
 if TYPE_CHECKING:
     from vpm._core import Snapshot
@@ -119,6 +120,14 @@ class Simulation:
     def _columns(self) -> dict[str, int]:
         return {name: column for column, name in enumerate(self.channels)}
 
+    @property
+    def resolution(self) -> Resolution:
+        """What the steps damp of vibrations about the state where it is, over one second.
+
+        `Run.resolution` says it of a run, about its first state and over its own time.
+        """
+        return resolution(self._model, self.state, self._time_step, self._setup, 1.0)
+
     # ---- where it is -------------------------------------------------------------------------------------------------
 
     @property
@@ -207,7 +216,9 @@ class Simulation:
         """
         begin = self.time
         self._passed.clear()
+        about = self.state
         rows = self._controlled(inputs, duration) if callable(inputs) else self._driven(inputs)
+        steps = resolution(self._model, about, self._time_step, self._setup, len(rows) * self._time_step)
         time = begin + self._time_step * np.arange(1.0, len(rows) + 1.0)
         run = Run(
             self._model.name,
@@ -219,6 +230,7 @@ class Simulation:
             rows,
             np.full(rows.shape, np.nan),
             settings={"integrator": self._setup.integrator, "substeps": self._setup.substeps},
+            resolution=steps if len(rows) else None,
         )
         return judged(self._model, run, np.array(self._passed)) if self._passed else run
 

@@ -209,16 +209,15 @@ impl Description {
     pub fn system<S: Scalar>(&self, theta: &[S]) -> Result<System<S>> {
         let values: Vec<f64> = theta.iter().map(Scalar::inspect).collect();
         self.check_values(&values)?;
-        System::new(self.machine(theta)?)
+        System::new(self.machine(theta, &values)?)
     }
 
-    /// What somebody needs who runs the machine with the checked parameters `theta`.
-    pub(crate) fn machine<'a, S: Scalar>(&self, theta: &'a [S]) -> Result<Machine<'a, S>> {
-        let values: Vec<f64> = theta.iter().map(Scalar::inspect).collect();
+    /// What somebody needs who runs the machine with the checked parameters `theta`, of these `values`.
+    pub(crate) fn machine<'a, S: Scalar>(&self, theta: &'a [S], values: &[f64]) -> Result<Machine<'a, S>> {
         let supplies = self.supplies.iter().filter(|supply| supply.is_logged());
         let commands = self.actuators.iter().map(|_| S::zero());
         Ok(Machine {
-            dynamics: Build::dynamics(&self, &values)?,
+            dynamics: Build::dynamics(&self, values)?,
             functions: self.functions(),
             theta,
             inputs: commands.chain(supplies.map(|supply| theta[supply.pressure])).collect(),
@@ -313,6 +312,10 @@ impl Build for &Description {
         let connections = self.connections(theta, &model)?;
         let machine = Dynamics::new(model, effects, actuators, supplies).connected(connections);
         Ok(machine.remembering(self.memories_of(theta)))
+    }
+
+    fn sensors<S: Scalar>(&self, theta: &[S]) -> Vec<Sensor<S>> {
+        Description::sensors(self, theta)
     }
 }
 

@@ -2,11 +2,9 @@
 
 use crate::description::Description;
 use crate::error::{Error, Result};
-use crate::integrator::Method;
 use crate::scalar::Dual;
-use crate::sensor::Sensor;
 use crate::simulate::check_state;
-use crate::system::System;
+use crate::system::{Kind, Routine};
 use crate::table::Table;
 
 /// Directions per pass: the gradient of a number then fills one 256-bit register.
@@ -58,41 +56,30 @@ pub fn linearize(description: &Description, theta: &[f64], state: &[f64], inputs
         reading: zeros(ny, 1),
     };
     for first in (0..nx + nu).step_by(LANES) {
-        tangent.evaluate(state, inputs, first);
-        result.take(first, &tangent);
+        result.take(first, (nx, nu), tangent.evaluate(state, inputs, first));
     }
     result.checked()
 }
 
-/// The machine in numbers that carry derivatives, with its buffers.
+/// What the machine shows in numbers that carry derivatives.
 struct Tangent {
-    system: System<Number>,
-    sensors: Vec<Sensor<Number>>,
+    readings: Routine<Number>,
     state: Vec<Number>,
     commands: Vec<Number>,
-    rate: Vec<Number>,
-    reading: Vec<Number>,
 }
 
 impl Tangent {
     fn new(description: &Description, theta: &[f64]) -> Result<Self> {
+        description.check_values(theta)?;
+        let readings = description.functions().function(&Kind::Readings, theta)?;
         let theta: Vec<Number> = theta.iter().map(|&value| Dual::constant(value)).collect();
         let zeros = |length: usize| vec![Number::default(); length];
-        let mut system: System<Number> = description.system(&theta)?;
-        // Samples are all that is asked for: no step is made.
-        system.make_for(Method::Rk4)?;
-        Ok(Self {
-            system,
-            sensors: description.sensors(&theta),
-            state: zeros(description.n_states()),
-            commands: zeros(description.n_inputs()),
-            rate: zeros(description.n_states()),
-            reading: zeros(description.n_outputs()),
-        })
+        let (state, commands) = (zeros(description.n_states()), zeros(description.n_inputs()));
+        Ok(Self { readings: Routine::new(readings, &theta), state, commands })
     }
 
     /// Rates and outputs with their derivatives along [`LANES`] directions, of which `first` is the first: states, then inputs.
-    fn evaluate(&mut self, state: &[f64], inputs: &[f64], first: usize) {
+    fn evaluate(&mut self, state: &[f64], inputs: &[f64], first: usize) -> (&[Number], &[Number]) {
         // A direction that is not among these wraps around to a lane that does not exist, which gives a constant.
         let lift = |(place, &value): (usize, &f64)| Dual::variable(value, place.wrapping_sub(first));
         for (number, lifted) in self.state.iter_mut().zip(state.iter().enumerate().map(lift)) {
@@ -101,40 +88,21 @@ impl Tangent {
         for (number, (place, &value)) in self.commands.iter_mut().zip(inputs.iter().enumerate()) {
             *number = lift((state.len() + place, &value));
         }
-        for (number, &command) in self.commands.iter().enumerate() {
-            let input = self.system.input(number, 0, 1.0, |_| command);
-            self.system.hold(number, input);
-        }
-        self.system.sample(&self.state, &mut self.rate, &mut self.reading);
-        self.observe();
-    }
-
-    /// The outputs as the sensors show them.
-    fn observe(&mut self) {
-        let layout = self.system.dynamics().layout();
-        let channels = self.reading[layout.actuators()..layout.lines()].chunks_exact_mut(2);
-        for (channels, &command) in channels.zip(&self.commands) {
-            channels[0] = command;
-        }
-        for sensor in &self.sensors {
-            let reading = &mut self.reading[sensor.channel.column(layout)];
-            let truth = *reading;
-            *reading = sensor.read(0, 1.0, |_| truth);
-        }
+        self.readings.put(state.len(), &self.commands);
+        self.readings.at(&self.state).split_at(state.len())
     }
 }
 
 impl Linearization {
     /// Takes over the columns that begin at direction `first`.
-    fn take(&mut self, first: usize, tangent: &Tangent) {
-        let (nx, nu) = (tangent.state.len(), tangent.commands.len());
-        fill(&tangent.rate, first, [(&mut self.state, 0..nx), (&mut self.input, nx..nx + nu)]);
-        fill(&tangent.reading, first, [(&mut self.output, 0..nx), (&mut self.feedthrough, nx..nx + nu)]);
+    fn take(&mut self, first: usize, (nx, nu): (usize, usize), (rate, reading): (&[Number], &[Number])) {
+        fill(rate, first, [(&mut self.state, 0..nx), (&mut self.input, nx..nx + nu)]);
+        fill(reading, first, [(&mut self.output, 0..nx), (&mut self.feedthrough, nx..nx + nu)]);
         let values = |target: &mut [f64], numbers: &[Number]| {
             target.iter_mut().zip(numbers).for_each(|(value, number)| *value = number.value);
         };
-        values(&mut self.rate, &tangent.rate);
-        values(&mut self.reading, &tangent.reading);
+        values(&mut self.rate, rate);
+        values(&mut self.reading, reading);
     }
 
     fn checked(self) -> Result<Self> {

@@ -368,6 +368,12 @@ impl<S: Scalar> Sensor<S> {
             Some(delay) => SampleDelay::new(delay, time_step).delayed(k, truth),
             None => truth(k),
         };
+        self.show(arrived)
+    }
+
+    /// The reading of a true value that has arrived.
+    #[inline]
+    pub fn show(&self, arrived: S) -> S {
         let scaled = self.gain.map_or(arrived, |gain| gain * arrived);
         self.offset.map_or(scaled, |offset| scaled + offset)
     }

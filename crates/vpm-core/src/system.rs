@@ -28,6 +28,7 @@ pub use functions::{Cache, Functions};
 pub use guided::{Guidance, Part};
 pub use memory::Memories;
 pub use ode::System;
+pub(crate) use recorded::Recording;
 pub use recorded::{Kind, Placed, Places};
 pub(crate) use routine::{Routine, code_pays};
 
@@ -42,6 +43,7 @@ use crate::dynamics::{aba, flexible, frames, lines, motion, poses};
 use crate::effect::JointEffect;
 use crate::model::Model;
 use crate::scalar::Scalar;
+use crate::sensor::Sensor;
 use drives::Shown;
 
 /// The right-hand side: everything that acts, in one number type, with its buffers.
@@ -316,4 +318,6 @@ pub trait Build {
     type Error;
     /// The right-hand side with the parameters `theta`.
     fn dynamics<S: Scalar>(&self, theta: &[S]) -> Result<Dynamics<S>, Self::Error>;
+    /// The sensors with the parameters `theta`.
+    fn sensors<S: Scalar>(&self, theta: &[S]) -> Vec<Sensor<S>>;
 }

@@ -99,7 +99,7 @@ def simulate(
     if mode == "prescribed_motion" or len(arrays.states) == 0:
         return run
     duration = len(arrays.states) * experiment.dt
-    return replace(run, resolution=resolution(model, arrays.states[0], experiment.dt, setup, duration))
+    return replace(run, resolution=resolution(model, arrays.states[0].copy(), experiment.dt, setup, duration))
 
 
 def simulate_arrays(

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from functools import cached_property
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,38 +16,89 @@ from vpm.simulate.setup import Setup
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, repr=False, eq=False)
-class Resolution(Storable):
-    """What the steps of a run damp because they do not resolve it; as a text one sentence.
+class Modes(NamedTuple):
+    """What a linear machine's vibrations lose to steps; see `Resolution`."""
 
-    Modes are those of the linear machine about the first state, without dry friction. One is listed if its own damping
-    ratio is below 0.1 and the method takes more than a tenth of its amplitude.
-
-    Attributes
-    ----------
-    integrator : str
-    step : float
-        s.
-    limit : float
-        Frequency above which an undamped vibration loses more than a tenth of its amplitude over the run, Hz;
-        infinite if there is none.
-    frequencies : ndarray, shape (m,)
-        Modes that are damped, Hz, slowest first.
-    ratios : ndarray, shape (m,)
-        Their own damping ratios.
-    times : ndarray, shape (m,)
-        Over which each loss is counted, s: the run, or the time in which the mode falls to 1/e by itself.
-    left : ndarray, shape (m,)
-        Share of its amplitude that the method leaves of each over that time, beside its own damping.
-    """
-
-    integrator: str
-    step: float
     limit: float
     frequencies: Array
     ratios: Array
     times: Array
     left: Array
+
+
+class Resolution(Storable):
+    """What the steps of a run damp because they do not resolve it; as a text one sentence.
+
+    Modes are those of the linear machine about the first state, without dry friction. One is listed if its own damping
+    ratio is below 0.1 and the method takes more than a tenth of its amplitude. They are worked out when somebody looks:
+    a batch pays for no run that nobody asks.
+
+    Parameters
+    ----------
+    integrator : str
+    step : float
+        s.
+    modes : callable
+        Gives the modes; called once, or never.
+    """
+
+    def __init__(self, integrator: str, step: float, modes: Callable[[], Modes]) -> None:
+        self._integrator, self._step, self._find = integrator, step, modes
+
+    @property
+    def integrator(self) -> str:
+        """Name of the method."""
+        return self._integrator
+
+    @property
+    def step(self) -> float:
+        """Length of a step, s."""
+        return self._step
+
+    @property
+    def limit(self) -> float:
+        """Frequency above which an undamped vibration loses more than a tenth of its amplitude over the run, Hz.
+
+        Infinite if there is none.
+        """
+        return self._modes.limit
+
+    @property
+    def frequencies(self) -> Array:
+        """Modes that are damped, shape (m,), Hz, slowest first."""
+        return self._modes.frequencies
+
+    @property
+    def ratios(self) -> Array:
+        """Their own damping ratios, shape (m,)."""
+        return self._modes.ratios
+
+    @property
+    def times(self) -> Array:
+        """Over which each loss is counted, shape (m,), s: the run, or the time to 1/e by itself if that is shorter."""
+        return self._modes.times
+
+    @property
+    def left(self) -> Array:
+        """Share of its amplitude that the method leaves of each over that time, shape (m,), beside its own damping."""
+        return self._modes.left
+
+    @cached_property
+    def _modes(self) -> Modes:
+        return self._find()
+
+    def to_stored(self) -> Mapping[str, object]:
+        """All of it, worked out."""
+        return {"integrator": self.integrator, "step": self.step, **self._modes._asdict()}
+
+    @classmethod
+    def from_stored(cls, content: Mapping[str, Any]) -> Self:
+        """As it was stored."""
+        modes = Modes(**{name: content[name] for name in Modes._fields})
+        return cls(content["integrator"], content["step"], lambda: modes)
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return type(self).from_stored, (self.to_stored(),)
 
     def __str__(self) -> str:
         """One sentence."""
@@ -75,6 +127,9 @@ def resolution(model: Model, state: Array, dt: float, setup: Setup, duration: fl
     duration : float
     """
     method = setup.method(model)
-    limit, damped = model.core.resolution(model.theta, state, dt, setup.substeps, method, duration)
-    frequencies, ratios, times, left = damped.T.copy()
-    return Resolution(method, dt / setup.substeps, float(limit), frequencies, ratios, times, left)
+
+    def modes() -> Modes:
+        limit, damped = model.core.resolution(model.theta, state, dt, setup.substeps, method, duration)
+        return Modes(float(limit), *damped.T.copy())
+
+    return Resolution(method, dt / setup.substeps, modes)

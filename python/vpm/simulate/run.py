@@ -46,8 +46,8 @@ class Run(Result):
     notes : tuple of str
         What to know before the numbers are trusted: one sentence each, none as a rule.
     resolution : Resolution or None
-        What the steps damp because they do not resolve it; None where nobody asked (restarts, inverse dynamics,
-        prescribed motion).
+        What the steps damp because they do not resolve it, worked out when somebody looks; None where no run goes
+        through (restarts, inverse dynamics, prescribed motion, what diverged).
     """
 
     model_name: str

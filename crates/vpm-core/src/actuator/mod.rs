@@ -110,10 +110,16 @@ impl<S: Scalar> Actuator<S> {
     /// What enters the lag over the interval that begins at sample `k`: the held command after delay, dead zone and saturation.
     #[inline]
     pub fn input(&self, k: usize, time_step: f64, command: impl Fn(usize) -> S) -> S {
-        let mut input = match &self.delay {
+        self.enter(match &self.delay {
             Some(delay) => delay.held(k, time_step, command),
             None => command(k),
-        };
+        })
+    }
+
+    /// What enters the lag of a command that has arrived: what dead zone and saturation leave.
+    #[inline]
+    pub fn enter(&self, arrived: S) -> S {
+        let mut input = arrived;
         if let Some(dead_zone) = &self.dead_zone {
             input = dead_zone.apply(input);
         }

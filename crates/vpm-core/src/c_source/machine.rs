@@ -1,9 +1,9 @@
 //! What the source of a machine is made of: programs for its functions, patterns of its derivatives, prepared constants.
 
-use super::recording::Recording;
 use crate::description::Description;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::graph::{Block, Evaluator, Graph, Node, Program, Source};
+use crate::system::{Kind, Places, Recording};
 
 /// Rows, columns and places of the entries of a matrix, column by column.
 pub(super) struct Pattern {
@@ -40,8 +40,10 @@ impl Pattern {
 }
 
 impl Derivatives {
-    fn new(graph: &mut Graph, numbers: &[Node], widths: [usize; 3]) -> Self {
-        let inputs: Vec<u32> = (0..widths.iter().sum::<usize>() as u32).collect();
+    fn new(graph: &mut Graph, numbers: &[Node], places: Places) -> Self {
+        let widths = [places.states, places.inputs, places.parameters];
+        let inputs: Vec<u32> =
+            (0..places.implicit()).chain(places.first_parameter()..places.count()).map(|place| place as u32).collect();
         let derivative = graph.derive(numbers, &inputs);
         let mut order: Vec<_> = (0..derivative.entries.len()).collect();
         order.sort_by_key(|&entry| (derivative.places[entry].1, derivative.places[entry].0));
@@ -64,21 +66,23 @@ impl Derivatives {
 
 impl Machine {
     pub(super) fn new(description: &Description, theta: &[f64], free: &[usize], name: &str) -> Result<Self> {
-        let Recording { mut graph, rates, outputs } = Recording::new(description, theta, free)?;
-        let [nx, nu, np] = [description.n_states(), description.n_inputs(), free.len()];
-        let of_rates = Derivatives::new(&mut graph, &rates, [nx, nu, np]);
-        let of_outputs = Derivatives::new(&mut graph, &outputs, [nx, nu, np]);
-        let all: Vec<Node> =
-            [&rates, &outputs, &of_rates.entries, &of_outputs.entries].into_iter().flatten().copied().collect();
-        let stages = Program::new(&graph, &all, nx + nu + np).split(|input| input >= nx + nu);
-        let mut point = vec![0.0; nx + nu];
+        let (places, Recording { mut graph, values, .. }) = recorded(description, theta, free)?;
+        let Places { states: nx, inputs: nu, parameters: np, .. } = places;
+        let (rates, outputs) = values.split_at(nx);
+        let of_rates = Derivatives::new(&mut graph, rates, places);
+        let of_outputs = Derivatives::new(&mut graph, outputs, places);
+        let all = [&values, &of_rates.entries, &of_outputs.entries].map(Vec::as_slice).concat();
+        let stages = Program::new(&graph, &all, places.count()).split(|input| input >= places.first_parameter());
+        let mut point = vec![0.0; places.first_parameter()];
         point.extend(free.iter().map(|&place| theta[place]));
         let passed = stages.seldom.outputs().len();
         let mut constants = vec![0.0; passed];
         Evaluator::new(&stages.seldom).run(&point, &mut constants);
-        constants.splice(0..0, point.drain(nx + nu..));
+        constants.splice(0..0, point.drain(places.first_parameter()..));
         let (ny, entries) = (outputs.len(), of_rates.entries.len());
-        let arguments = [("x", nx), ("u", nu), ("c", np + passed)];
+        // Between inputs and parameters stands what additive steps take.
+        let steps = ("", places.first_parameter() - nx - nu);
+        let arguments = [("x", nx), ("u", nu), steps, ("c", np + passed)];
         let often = |what: &str, numbers: Vec<usize>, blocks: &[Block<'_>]| {
             stages.often.part(numbers).to_c(&format!("{name}_run_{what}"), &arguments, blocks)
         };
@@ -87,7 +91,11 @@ impl Machine {
         let [y_x, y_u, y_p] = of_outputs.blocks(["y_x", "y_u", "y_p"]);
         let first = nx + ny;
         let functions = [
-            stages.seldom.to_c(&format!("{name}_run_prepare"), &[("", nx + nu), ("p", np)], &[("c", passed)]),
+            stages.seldom.to_c(
+                &format!("{name}_run_prepare"),
+                &[("", places.first_parameter()), ("p", np)],
+                &[("c", passed)],
+            ),
             often("rates", (0..nx).collect(), &[dx]),
             often("outputs", (nx..first).collect(), &[y]),
             often("rates_jacobian", (0..nx).chain(first..first + entries).collect(), &[dx, dx_x, dx_u, dx_p]),
@@ -100,4 +108,19 @@ impl Machine {
     pub(super) fn work(&self) -> usize {
         self.functions.iter().map(|function| function.work).max().unwrap_or(0)
     }
+}
+
+/// Rates and outputs over states, inputs and the parameters at the places `free`, as numbers of a graph.
+fn recorded(description: &Description, theta: &[f64], free: &[usize]) -> Result<(Places, Recording)> {
+    let recorded = |free: &[usize]| {
+        let places = Places { parameters: free.len(), ..description.places() };
+        Recording::new(description, places, (theta, free), &Kind::Readings).map(|recording| (places, recording))
+    };
+    let (places, recording) = recorded(free)?;
+    let Some(decision) = recording.graph.decisions().first() else { return Ok((places, recording)) };
+    let decides = |&&one: &&usize| recorded(&[one]).is_ok_and(|(_, own)| !own.graph.decisions().is_empty());
+    let name = |&one: &usize| format!("`{}`", description.parameter_names[one]);
+    let names: Vec<_> = free.iter().filter(decides).map(name).collect();
+    let what = format!("a parameter; take {} out of the parameters that stay free", names.join(", "));
+    Err(Error::Unrecorded { place: decision.place(), what })
 }

@@ -7,7 +7,6 @@
 
 mod externals;
 mod machine;
-mod recording;
 
 use std::fmt::Write;
 

@@ -96,8 +96,8 @@ struct Way<'a, S> {
 impl<'a, S: Scalar> Way<'a, S> {
     fn new(guide: &'a Guide<'a>, theta: &[S]) -> Result<Self> {
         let (Setting { description, stepping, .. }, guidance) = (guide.setting, guide.guidance());
-        let machine =
-            Following::new(description.machine(theta)?, guidance.clone(), (stepping.time_step, stepping.method))?;
+        let machine = description.machine(theta, guide.setting.theta)?;
+        let machine = Following::new(machine, guidance.clone(), (stepping.time_step, stepping.method))?;
         let zeros = |count: usize| vec![S::zero(); count];
         let seen = description.n_states() + description.n_outputs() + description.n_joints();
         let mut way = Self {

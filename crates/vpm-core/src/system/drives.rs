@@ -68,7 +68,7 @@ impl<S: Scalar> Dynamics<S> {
         self.memories.rates(&x[first..], v, &mut dxdt[first..]);
     }
 
-    /// Holds what input `number` amounts to, see [`Dynamics::input`].
+    /// Holds what input `number` amounts to, see [`super::System::input`].
     pub fn hold(&mut self, number: usize, input: S) {
         self.inputs[number] = input;
     }
@@ -218,14 +218,19 @@ impl<S: Scalar> Dynamics<S> {
             }
         }
     }
+}
 
-    /// What input `number` amounts to over the interval that begins at sample `k`: of an actuator after delay, dead zone and saturation, of
-    /// a supply as it is.
-    #[inline]
-    pub fn input(&self, number: usize, k: usize, time_step: f64, command: impl Fn(usize) -> S) -> S {
-        match self.actuators.get(number) {
-            Some(actuator) => actuator.input(k, time_step, command),
-            None => command(k),
-        }
+/// What input `number` of a machine with these `actuators` amounts to over the interval that begins at sample `k`: of an actuator after
+/// delay, dead zone and saturation, of a supply as it is.
+#[inline]
+pub(super) fn input<S: Scalar>(
+    actuators: &[Actuator<S>],
+    number: usize,
+    (k, time_step): (usize, f64),
+    command: impl Fn(usize) -> S,
+) -> S {
+    match actuators.get(number) {
+        Some(actuator) => actuator.input(k, time_step, command),
+        None => command(k),
     }
 }

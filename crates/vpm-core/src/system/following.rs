@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use super::Machine;
 use super::guided::{Guidance, Guided, Part};
 use super::recorded::Kind;
 use super::routine::{Routines, kind_of};
+use super::{Machine, drives};
 use crate::actuator::Actuator;
 use crate::error::Result;
 use crate::integrator::Method;
@@ -122,12 +122,9 @@ impl<S: Scalar> Following<S> {
         place.min(self.laws.dynamics.dim() - 1)
     }
 
-    /// Holds what input `number` amounts to over the interval that begins at sample `k`, see [`super::Dynamics::input`].
+    /// Holds what input `number` amounts to over the interval that begins at sample `k`, see [`super::System::input`].
     pub(crate) fn command(&mut self, number: usize, k: usize, command: impl Fn(usize) -> S) {
-        let input = match self.actuators.get(number) {
-            Some(actuator) => actuator.input(k, self.interval, command),
-            None => command(k),
-        };
+        let input = drives::input(&self.actuators, number, (k, self.interval), command);
         self.hold(number, input);
     }
 

@@ -1,11 +1,14 @@
 //! The functions of a machine: recorded as programs when they are asked for first, shared by all that run the machine.
 
-use std::collections::HashMap;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use super::recorded::{Kind, Placed, Places};
 use crate::error::Result;
 use crate::graph::{Evaluator, Lanes, Native, Program};
+
+/// Functions that are kept of a machine: its own, fourteen kinds, and those of the last lists of parameters and of followed joints. A fit
+/// asks for up to four of each list, again and again; what a search asked for and left, the next list puts out.
+const KEPT: usize = 48;
 
 /// Who can record the functions of a machine.
 pub(crate) trait Recorder: std::fmt::Debug + Send + Sync {
@@ -20,12 +23,14 @@ pub(crate) trait Recorder: std::fmt::Debug + Send + Sync {
 #[derive(Debug)]
 pub struct Functions {
     recorder: Box<dyn Recorder>,
-    known: Mutex<HashMap<Kind, Known>>,
+    /// At most [`KEPT`], the last asked for first. Whoever runs a function has it: no evaluation comes here.
+    known: Mutex<Vec<Known>>,
 }
 
 /// A function and the parameters for which it was recorded.
 #[derive(Clone, Debug)]
 struct Known {
+    kind: Kind,
     theta: Vec<f64>,
     function: Arc<Function>,
 }
@@ -72,14 +77,25 @@ impl Functions {
     /// [`crate::error::Error::Unrecorded`] where a law decides by the value of a state.
     pub(crate) fn function(&self, kind: &Kind, theta: &[f64]) -> Result<Arc<Function>> {
         let lock = || self.known.lock().unwrap_or_else(PoisonError::into_inner);
-        let known = lock().get(kind).cloned();
-        if let Some(known) = known.filter(|known| !known.function.of_values || known.theta == theta) {
-            return Ok(known.function);
+        if let Some(function) = recall(&mut lock(), kind, theta) {
+            return Ok(function);
         }
+        // Without the lock: others may record meanwhile.
         let function = Arc::new(Function::new(self.recorder.record(kind, theta)?));
-        lock().insert(kind.clone(), Known { theta: theta.to_vec(), function: function.clone() });
+        let mut known = lock();
+        known.retain(|own| own.kind != *kind);
+        known.insert(0, Known { kind: kind.clone(), theta: theta.to_vec(), function: function.clone() });
+        known.truncate(KEPT);
         Ok(function)
     }
+}
+
+/// The function of that kind, if it is `known` and right for the parameters `theta`.
+fn recall(known: &mut [Known], kind: &Kind, theta: &[f64]) -> Option<Arc<Function>> {
+    let right = |own: &Known| own.kind == *kind && (!own.function.of_values || own.theta == theta);
+    let place = known.iter().position(right)?;
+    known[..=place].rotate_right(1);
+    Some(known[0].function.clone())
 }
 
 impl Function {
@@ -111,5 +127,56 @@ impl Function {
         }
         let made = self.native.get_or_init(|| Native::compile(&self.often).map_err(|reason| reason.to_string()));
         made.as_ref().map_err(Clone::clone)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
+    use super::*;
+    use crate::graph::Graph;
+
+    /// Counts what it records: of each kind one number, which is an input.
+    #[derive(Debug)]
+    struct Counting(Arc<AtomicUsize>);
+
+    impl Recorder for Counting {
+        fn record(&self, _: &Kind, _: &[f64]) -> Result<Placed> {
+            self.0.fetch_add(1, Ordering::Relaxed);
+            let mut graph = Graph::new(1);
+            let node = graph.input(0, 0.0);
+            Ok(Placed {
+                program: Program::new(&graph, &[node], 1),
+                places: Places { coordinates: 0, states: 0, inputs: 0, parameters: 0 },
+                entries: Vec::new(),
+                directions: None,
+                of_values: false,
+            })
+        }
+    }
+
+    #[test]
+    fn of_many_lists_the_last_are_kept_and_so_is_what_is_in_use() -> Result<()> {
+        let recorded = Arc::new(AtomicUsize::new(0));
+        let functions = Cache::default().functions(|| Box::new(Counting(recorded.clone())));
+        let count = || recorded.load(Ordering::Relaxed);
+        let list = |number: usize| Kind::Derived(Box::new(Kind::Required), vec![number as u32]);
+        let running = functions.function(&list(0), &[])?;
+        for number in 0..4 * KEPT {
+            functions.function(&Kind::Rates, &[])?;
+            functions.function(&list(number), &[])?;
+        }
+        // The rates, asked for in between, and each list were recorded once.
+        assert_eq!(count(), 1 + 4 * KEPT);
+        assert_eq!(functions.known.lock().map_or(0, |known| known.len()), KEPT);
+        // The last lists are at hand, the first is recorded again; who runs it still has it.
+        for number in 3 * KEPT + 1..4 * KEPT {
+            functions.function(&list(number), &[])?;
+        }
+        assert_eq!(count(), 1 + 4 * KEPT);
+        assert!(!Arc::ptr_eq(&running, &functions.function(&list(0), &[])?));
+        assert_eq!(count(), 2 + 4 * KEPT);
+        Ok(())
     }
 }

@@ -4,7 +4,7 @@ use super::additive::{Split, Stage};
 use super::memory::Memories;
 use super::recorded::Kind;
 use super::routine::{Routines, kind_of};
-use super::{Dynamics, Machine, Matrix, stiff};
+use super::{Dynamics, Machine, Matrix, drives, stiff};
 use crate::actuator::Actuator;
 use crate::error::Result;
 use crate::integrator::Method;
@@ -117,16 +117,14 @@ impl<S: Scalar> System<S> {
         &self.actuators
     }
 
-    /// What input `number` amounts to over the interval that begins at sample `k`, see [`Dynamics::input`].
+    /// What input `number` amounts to over the interval that begins at sample `k`: of an actuator after delay, dead zone and saturation, of
+    /// a supply as it is.
     #[inline]
-    pub(crate) fn input(&self, number: usize, k: usize, time_step: f64, command: impl Fn(usize) -> S) -> S {
-        match self.actuators.get(number) {
-            Some(actuator) => actuator.input(k, time_step, command),
-            None => command(k),
-        }
+    pub fn input(&self, number: usize, k: usize, time_step: f64, command: impl Fn(usize) -> S) -> S {
+        drives::input(&self.actuators, number, (k, time_step), command)
     }
 
-    /// Holds what input `number` amounts to, see [`Dynamics::input`], from now on: one for each actuator, then the pressures of logged
+    /// Holds what input `number` amounts to, see [`System::input`], from now on: one for each actuator, then the pressures of logged
     /// supplies.
     #[inline]
     pub fn hold(&mut self, number: usize, input: S) {

@@ -8,8 +8,9 @@ use super::{Build, Dynamics, stiff};
 use crate::contact::ContactFriction;
 use crate::effect::JointEffect;
 use crate::error::{Error, Result};
-use crate::graph::{Decision, Node, Program, Recorded, input, record};
+use crate::graph::{Decision, Graph, Node, Program, Recorded, input, record};
 use crate::scalar::Scalar;
+use crate::sensor::Sensor;
 
 /// Operations from which on a matrix is worked out along directions instead of entry by entry.
 const MOST: usize = 200_000;
@@ -22,7 +23,7 @@ pub struct Places {
     pub coordinates: usize,
     /// Length of the state, which comes first.
     pub states: usize,
-    /// Number of inputs, see [`Dynamics::input`].
+    /// Number of inputs, see [`super::System::input`].
     pub inputs: usize,
     /// Number of parameters.
     pub parameters: usize,
@@ -67,6 +68,8 @@ pub enum Kind {
     Rates,
     /// dx/dt, then all true outputs in the order of [`crate::sensor::Layout`]; the command of an actuator is what enters its lag.
     Sample,
+    /// As [`Kind::Sample`], but the inputs are commands that stand for long, which delays pass unchanged, and the outputs what sensors show.
+    Readings,
     /// All outputs of which those stand that the state alone decides, see [`Kind::Sample`].
     Motion,
     /// dx/dt, then the entries of its derivatives by the states.
@@ -97,22 +100,6 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// All of a free machine that are no derivatives of others.
-    pub const ALL: [Self; 12] = [
-        Self::Rates,
-        Self::Sample,
-        Self::Motion,
-        Self::Linearised,
-        Self::Prepared,
-        Self::Frictionless,
-        Self::LinearFriction,
-        Self::Elasticity,
-        Self::Additive,
-        Self::Levers,
-        Self::Required,
-        Self::RequiredOfTree,
-    ];
-
     /// Where the inputs of such a program stand, if those of a free machine stand at `places`.
     fn places(&self, places: Places) -> Places {
         match self {
@@ -138,6 +125,13 @@ pub struct Placed {
     pub of_values: bool,
 }
 
+/// A function of a machine as numbers of a graph.
+pub(crate) struct Recording {
+    pub(crate) graph: Graph,
+    pub(crate) values: Vec<Node>,
+    matrix: Option<Matrix>,
+}
+
 /// Numbers of a graph that are a function of a machine.
 struct Outputs {
     values: Vec<Recorded>,
@@ -159,21 +153,46 @@ impl Matrix {
     }
 }
 
+impl Recording {
+    /// Records a function of the machine that `build` makes with the checked parameters `theta`. Those at the places `free` are its inputs,
+    /// in this order, all others constants.
+    ///
+    /// # Errors
+    /// [`Error::Unrecorded`] where a law decides by the value of a state: the graph would hold for that state alone.
+    pub(crate) fn new(
+        build: impl Build<Error = Error>,
+        places: Places,
+        (theta, free): (&[f64], &[usize]),
+        kind: &Kind,
+    ) -> Result<Self> {
+        let first = places.first_parameter();
+        let (outputs, graph) = record(first as u32, || {
+            let mut parameters: Vec<_> = theta.iter().map(|&value| Recorded::from(value)).collect();
+            for (place, &parameter) in free.iter().enumerate() {
+                parameters[parameter] = input(first + place, theta[parameter]);
+            }
+            outputs(build, places, &parameters, kind)
+        });
+        let Outputs { values, matrix } = outputs?;
+        match graph.decisions().iter().find(|decision| !decision.of_parameters) {
+            Some(decision) => Err(unrecordable(decision)),
+            None => Ok(Self { graph, values: nodes(&values), matrix }),
+        }
+    }
+}
+
 impl Placed {
     /// Records a function of the machine that `build` makes; `theta` are the parameters, checked, for which its parts are built.
     ///
     /// Checked: all programs against the direct evaluation of the same laws, derivatives against dual numbers.
     ///
     /// # Errors
-    /// [`Error::Unrecorded`] where a law decides by the value of a state: the graph would hold for that state alone.
+    /// [`Error::Unrecorded`] where a law decides by the value of a state.
     pub fn new(build: impl Build<Error = Error>, places: Places, theta: &[f64], kind: &Kind) -> Result<Self> {
         let places = kind.places(places);
-        let (outputs, mut graph) = record(places.first_parameter() as u32, || outputs(build, places, theta, kind));
-        let Outputs { values, matrix } = outputs?;
-        if let Some(decision) = graph.decisions().iter().find(|decision| !decision.of_parameters) {
-            return Err(unrecordable(decision));
-        }
-        let (mut nodes, mut entries, mut directions) = (nodes(&values), Vec::new(), None);
+        let free: Vec<usize> = (0..theta.len()).collect();
+        let Recording { mut graph, values: mut nodes, matrix } = Recording::new(build, places, (theta, &free), kind)?;
+        let (mut entries, mut directions) = (Vec::new(), None);
         match matrix {
             None => {}
             Some(Matrix::Entries(numbers, columns)) => {
@@ -200,11 +219,9 @@ impl Placed {
     }
 }
 
-fn outputs(build: impl Build<Error = Error>, places: Places, theta: &[f64], kind: &Kind) -> Result<Outputs> {
+fn outputs(build: impl Build<Error = Error>, places: Places, parameters: &[Recorded], kind: &Kind) -> Result<Outputs> {
     let inputs = |first: usize, count: usize| (first..first + count).map(|place| input(place, 0.0)).collect::<Vec<_>>();
-    let first = places.first_parameter();
-    let parameters: Vec<Recorded> = theta.iter().enumerate().map(|(k, &value)| input(first + k, value)).collect();
-    let mut dynamics: Dynamics<Recorded> = build.dynamics(&parameters)?;
+    let mut dynamics: Dynamics<Recorded> = build.dynamics(parameters)?;
     let x = inputs(0, places.states);
     for number in 0..places.inputs.min(dynamics.inputs.len()) {
         dynamics.hold(number, input(places.states + number, 0.0));
@@ -229,6 +246,11 @@ fn outputs(build: impl Build<Error = Error>, places: Places, theta: &[f64], kind
             dynamics.rhs(&x, &mut rates);
             dynamics.observe(&x, &rates, &mut seen);
             rates.extend(seen);
+            (rates, None)
+        }
+        Kind::Readings => {
+            let shown = dynamics.readings(&x, &mut rates, &build.sensors(parameters));
+            rates.extend(shown);
             (rates, None)
         }
         Kind::Motion => {
@@ -256,7 +278,7 @@ fn outputs(build: impl Build<Error = Error>, places: Places, theta: &[f64], kind
         }
         Kind::Additive => (dynamics.additive(&x, places), None),
         Kind::Derived(kind, by) => {
-            let values = outputs(build, places, theta, kind)?.values;
+            let values = outputs(build, places, parameters, kind)?.values;
             (values.clone(), Some(Matrix::Of(values, by.clone())))
         }
         Kind::Levers => {
@@ -283,6 +305,25 @@ fn outputs(build: impl Build<Error = Error>, places: Places, theta: &[f64], kind
 type Invert = fn(&mut Dynamics<Recorded>, &[Recorded], &[Recorded], &[Recorded], &mut [Recorded]);
 
 impl Dynamics<Recorded> {
+    /// What `sensors` show at `x` of all outputs, under commands that stand for long; writes the rates.
+    fn readings(&mut self, x: &[Recorded], rates: &mut [Recorded], sensors: &[Sensor<Recorded>]) -> Vec<Recorded> {
+        let (layout, commands) = (self.layout(), self.inputs.clone());
+        for (number, &command) in (0..self.actuators.len()).zip(&commands) {
+            self.hold(number, self.actuators[number].enter(command));
+        }
+        let mut outputs = vec![Recorded::default(); layout.count()];
+        self.rhs(x, rates);
+        self.observe(x, rates, &mut outputs);
+        for (channels, command) in outputs[layout.actuators()..layout.lines()].chunks_exact_mut(2).zip(commands) {
+            channels[0] = command;
+        }
+        for sensor in sensors {
+            let reading = &mut outputs[sensor.channel.column(layout)];
+            *reading = sensor.show(*reading);
+        }
+        outputs
+    }
+
     /// The rates of a stage of an additive step whose explicit state is `x`.
     fn additive(&mut self, x: &[Recorded], places: Places) -> Vec<Recorded> {
         let implicit: Vec<Recorded> = (0..x.len()).map(|k| input(places.implicit() + k, 0.0)).collect();
@@ -359,6 +400,6 @@ fn nodes(numbers: &[Recorded]) -> Vec<Node> {
 }
 
 fn unrecordable(decision: &Decision) -> Error {
-    let what = "a state or an input, so that no formula holds everywhere".to_owned();
+    let what = "a state or an input, so that no formula holds everywhere; leave out the effect or the drive that it belongs to".to_owned();
     Error::Unrecorded { place: decision.place(), what }
 }

@@ -232,7 +232,7 @@ impl<S: Scalar> Routines<S> {
         self.made.iter_mut().find(|(own, _)| own == kind).map(|(_, routine)| routine)
     }
 
-    /// Holds input `number`, see [`super::Dynamics::input`].
+    /// Holds input `number`, see [`super::System::input`].
     #[inline]
     pub(crate) fn hold(&mut self, number: usize, input: S) {
         self.held[number] = input;

@@ -265,7 +265,7 @@ fn agrees_at(name: &str, description: &Description, free: &[usize], place: impl 
         same(next(ny * nu), &linear.feedthrough, 1e-12, "D");
         let mut system = description.system(&theta).unwrap();
         for (number, &command) in u.iter().enumerate() {
-            let held = system.dynamics().input(number, 0, 1.0, |_| command);
+            let held = system.input(number, 0, 1.0, |_| command);
             system.hold(number, held);
         }
         let (mut explicit, mut implicit) = (x.clone(), x.clone());
