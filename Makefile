@@ -8,7 +8,7 @@
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .SUFFIXES:
-.PHONY: help demo test test-rust test-python reference validation lint lint-rust lint-python bench peers chirp narx-peers bench-counts c-library bench-diagnosis docs docs-rust figures package clean
+.PHONY: help demo test test-rust test-python test-nightly reference validation lint lint-rust lint-python bench peers chirp narx-peers bench-counts c-library bench-diagnosis docs docs-rust figures package clean
 
 PYTHON ?= python3
 DEMO_OUT ?= demo-report
@@ -42,6 +42,9 @@ reference: | $(VENV)/.tools-found ## integrators against an adaptive solver, whi
 # Test files side by side on all cores; the linear algebra of each stays on one.
 test-python: $(VENV)/.installed
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses auto --dist loadfile $(PYTEST_ARGS)
+
+test-nightly: $(VENV)/.installed ## the claims of some tests on many more cases, which takes minutes
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses auto --dist worksteal -m nightly $(PYTEST_ARGS)
 
 lint: lint-rust lint-python ## formatting, static checks and types, all as errors
 
