@@ -12,12 +12,13 @@ import pytest
 from typer.testing import CliRunner
 
 import vpm
-from blind import EFFECTS, MACHINES, hideable, make_case, make_cases, proving, score, sites_of, table
+from blind import EFFECTS, MACHINES, hideable, proving, score, sites_of, table
 from blind import case as case_module
 from blind.answer import Answer, Named, _Alarm, informed
 from blind.batch import simulated
 from blind.case import _plan
 from blind.proving import Job
+from shared_cases import shared_case
 from vpm.cli import app
 from vpm.errors import DiagnosisError
 from vpm.prove_command import BEGIN, END, numbers, page
@@ -125,9 +126,9 @@ def test_a_payload_behind_a_turning_axis_is_its_centre_and_inertia(seed: int) ->
 
 def test_where_a_machine_begins_says_nothing_of_its_encoder() -> None:
     """On a level slide only the volumes of oil depend on the place; in gravity an offset shows wherever one begins."""
-    slide = make_case("servo_cylinder", "sensor_offset@encoder", 42, recalibrate=False)
+    slide = shared_case("servo_cylinder", "sensor_offset@encoder", 42)
     assert slide.oracle.strength < 0.5
-    arm = make_case("arm2r", "sensor_offset@encoder_2", 5003, recalibrate=False)
+    arm = shared_case("arm2r", "sensor_offset@encoder_2", 5003)
     assert arm.oracle.solvable
 
 
@@ -251,7 +252,7 @@ def test_a_pair_knows_how_strong_each_effect_is_alone_and_beside_the_other() -> 
     ((_, case, strengths, alone, _, error),) = proving.make([job])
     assert not error
     assert case is not None
-    apart = make_cases("axis_linear", [(name, 2) for name in job.request])
+    apart = [shared_case("axis_linear", name, 2) for name in job.request]
     assert alone == pytest.approx([one.oracle.strength for one in apart])
     # A spring's place of rest is unknown too, and that is a constant force.
     assert strengths[0] < 0.05 * alone[0]
@@ -282,7 +283,7 @@ def test_a_case_that_blows_up_loses_itself_only(monkeypatch: pytest.MonkeyPatch)
 
 
 def test_the_oracle_knows_the_hidden_effect() -> None:
-    case = make_case("axis_linear", "spring", 1)
+    case = shared_case("axis_linear", "spring", 1)
     model, free = informed(case)
     hidden = case.truth.hidden[0]
     assert {"axis.spring.stiffness", "axis.spring.rest", "body.mass"} <= set(free)
@@ -291,7 +292,7 @@ def test_the_oracle_knows_the_hidden_effect() -> None:
 
 
 def test_a_case_is_written_for_people(tmp_path: Path) -> None:
-    case = make_case("axis_linear", "spring", 1, recalibrate=False)
+    case = shared_case("axis_linear", "spring", 1)
     case.write(tmp_path / "case")
     model = vpm.Model.load(tmp_path / "case" / "model.toml")
     assert model == case.model()
