@@ -18,10 +18,10 @@ def vpm(*words: str | Path, cwd: Path | None = None) -> CompletedProcess[str]:
     typed: Sequence[str] = ["vpm", *map(str, words)]
     out, err = StringIO(), StringIO()
     code: str | int | None = 0
-    with patch.object(sys, "argv", typed), chdir(cwd) if cwd else nullcontext():
-        with redirect_stdout(out), redirect_stderr(err):
-            try:
-                main()
-            except SystemExit as end:
-                code = end.code
+    there = chdir(cwd) if cwd else nullcontext()
+    with patch.object(sys, "argv", typed), there, redirect_stdout(out), redirect_stderr(err):
+        try:
+            main()
+        except SystemExit as end:
+            code = end.code
     return CompletedProcess(typed, int(code or 0), out.getvalue(), err.getvalue())

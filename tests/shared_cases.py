@@ -18,6 +18,7 @@ FOLDER = "VPM_TESTS_SHARE"
 
 Request = tuple[str | tuple[str, ...], int]
 
+#: Cases of one seed share most of what is simulated, and those of one sampling rate a batch.
 TOGETHER: dict[str, tuple[Request, ...]] = {
     "arm2r": (("saturation", 6001), ("sensor_offset@encoder_2", 5003)),
     "axis_linear": (
@@ -63,14 +64,12 @@ TOGETHER: dict[str, tuple[Request, ...]] = {
         (("gravity_tilt", "stribeck_friction"), 102),
         (("hysteresis", "joint_compliance"), 5002),
     ),
-    "hydraulic_leg": (("none", 1), ("none", 20), ("pressure_dependent_friction@knee_drive", 21)),
+    "hydraulic_leg": (("none", 21), ("pressure_dependent_friction@knee_drive", 21)),
     "servo_cylinder": (
         ("bias_force", 43),
         ("bias_force@axis", 42),
         ("dead_zone", 42),
         ("none", 1),
-        ("none", 5),
-        ("none", 100),
         ("pressure_dependent_friction", 43),
         ("sensor_offset@encoder", 42),
         ("sensor_offset@gauge_b", 42),

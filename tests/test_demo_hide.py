@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import tomllib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from io import StringIO
 from pathlib import Path
 
@@ -43,10 +43,9 @@ def test_every_listed_effect_can_be_made_and_is_in_the_catalogue() -> None:
     assert "tau = -force" in buffer.getvalue()
 
 
-def stories() -> Iterator[ParameterSet]:
+def stories() -> list[ParameterSet]:
     """All that can be hidden, every day one of each kind; what a user sees first has its test with the commands."""
-    for name in LISTED[1:]:
-        yield pytest.param(name, marks=() if name in DAILY else pytest.mark.nightly)
+    return [pytest.param(name, marks=() if name in DAILY else pytest.mark.nightly) for name in LISTED[1:]]
 
 
 @pytest.mark.parametrize("hide", stories())

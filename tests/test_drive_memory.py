@@ -137,7 +137,7 @@ def test_the_size_of_coloured_noise_is_read_off_its_quiet_part(exact: Exact) -> 
 
 
 def test_cylinders_of_a_firm_supply_answer_one_by_one_as_they_do_together() -> None:
-    model = Model.from_toml(shared_case("hydraulic_leg", "none", 1).true_text)
+    model = Model.from_toml(shared_case("hydraulic_leg", "none", 21).true_text)
     one_by_one = drives_of(model)
     assert [drives.model.actuators for drives in one_by_one] == [("hip_drive",), ("knee_drive",)]
     sagging = model.with_effect("supply_drop", at="pump", resistance=1e9, time_constant=0.01)
@@ -145,7 +145,7 @@ def test_cylinders_of_a_firm_supply_answer_one_by_one_as_they_do_together() -> N
 
 
 def test_the_answers_of_single_cylinders_make_up_that_of_the_machine() -> None:
-    case = shared_case("hydraulic_leg", "none", 1)
+    case = shared_case("hydraulic_leg", "none", 21)
     model = Model.from_toml(case.true_text).with_effect("sensor_offset", at="knee_encoder", value=0.01)
     training = InverseDynamicsProblem(model, case.train[:1])
     m, record = training.motions[0], training.experiments[0]

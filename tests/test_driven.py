@@ -203,12 +203,12 @@ def test_one_noise_counts_once_however_many_readings_show_it() -> None:
 
 
 def test_readings_of_a_cylinder_go_with_its_joint_and_those_of_joints_alone() -> None:
-    case = shared_case("servo_cylinder", "none", 5)
+    case = shared_case("servo_cylinder", "none", 1)
     model = case.model()
     problem = OutputErrorProblem(model, case.validate, "closed_loop")
     found = spectra(model, problem, np.zeros((problem.blocks[-1].samples.stop, 1)))
     assert [one.shape[1] for one in found] == [3]
-    leg = shared_case("hydraulic_leg", "none", 20)
+    leg = shared_case("hydraulic_leg", "none", 21)
     problem = OutputErrorProblem(leg.model(), leg.validate, "closed_loop")
     found = spectra(leg.model(), problem, np.zeros((problem.blocks[-1].samples.stop, 1)))
     assert [one.shape[1] for one in found] == [3, 3]
@@ -231,7 +231,7 @@ def test_what_no_model_of_oil_is_exact_to_does_not_tell_late_from_slow() -> None
 
 
 def test_readings_of_a_cylinder_are_what_a_model_of_oil_is_not_exact_to() -> None:
-    case = shared_case("servo_cylinder", "none", 100)
+    case = shared_case("servo_cylinder", "none", 1)
     record = case.train[0].split(0.1)[0]
     run = as_it_is(case.model(), ("servo.valve.flow_gain",), [record], Setup())
     floor = inexact(run)

@@ -1,4 +1,4 @@
-"""The program that valgrind watches: it makes steps, and imports nothing else, because all of it runs fifty times slower."""
+"""The program that valgrind watches: it makes steps, and imports no more than that takes."""
 
 import sys
 
