@@ -36,7 +36,7 @@ TOGETHER: dict[str, tuple[Request, ...]] = {
         ("spring", 1),
         ("spring", 2),
         ("stribeck_friction", 18),
-        ("viscous_friction", 159),
+        (("viscous_friction",), 159),
         ("viscous_friction", 5004),
         (("actuator_lag", "viscous_friction"), 5004),
         (("hysteresis", "sensor_delay"), 140),

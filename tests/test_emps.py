@@ -32,6 +32,10 @@ PUBLISHED = {
 }
 
 
+#: What is found, and what is refused beside it: a diagnosis of all effects is the fixture's.
+TRIED = ("coulomb_friction", "bias_force", "asymmetric_friction", "torque_ripple")
+
+
 @pytest.fixture(scope="module")
 def diagnosis() -> Diagnosis:
     model = Model.load(MODEL)
@@ -79,7 +83,7 @@ def test_asymmetry_and_bias_are_said_to_be_confusable(diagnosis: Diagnosis) -> N
 
 
 def test_command_line(tmp_path: Path) -> None:
-    tried = [word for name in ("coulomb_friction", "bias_force", "torque_ripple") for word in ("--effect", name)]
+    tried = [word for name in TRIED for word in ("--effect", name)]
     unseen = DATA / "emps_pulses_test.csv"
     done = vpm("diagnose", MODEL, DATA / "emps_train.csv", "--validate", unseen, *tried, "--out", tmp_path)
     assert done.returncode == 0, done.stderr
