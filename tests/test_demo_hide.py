@@ -28,8 +28,8 @@ INERTIA = 0.0345 + 1.8 * 0.221**2
 WEIGHT = 1.8 * 9.81 * 0.221
 #: Values that the diagnosis has to find within this share; two that share a hump of friction at rest, within the other.
 CLOSE, SHARED = 0.05, 0.2
-#: Nothing, a law of a joint with one beside it, a drive, a gear, a force.
-DAILY = frozenset({"none", "stribeck_friction", "actuator_lag", "backlash", "bias_force"})
+#: Nothing, a law of a joint with one beside it, a drive, a force.
+DAILY = frozenset({"none", "stribeck_friction", "actuator_lag", "bias_force"})
 
 
 def test_every_listed_effect_can_be_made_and_is_in_the_catalogue() -> None:
