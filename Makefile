@@ -8,7 +8,7 @@
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .SUFFIXES:
-.PHONY: help demo test test-rust test-python reference validation lint lint-rust lint-python bench peers chirp narx-peers bench-counts c-library bench-diagnosis docs docs-rust figures package clean
+.PHONY: help demo test test-rust test-python test-nightly reference validation lint lint-rust lint-python bench peers chirp narx-peers bench-counts c-library bench-diagnosis docs docs-rust figures package clean
 
 PYTHON ?= python3
 DEMO_OUT ?= demo-report
@@ -43,6 +43,9 @@ reference: | $(VENV)/.tools-found ## integrators against an adaptive solver, whi
 test-python: $(VENV)/.installed
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses auto --dist loadfile $(PYTEST_ARGS)
 
+test-nightly: $(VENV)/.installed ## the claims of some tests on many more cases, which takes minutes
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses auto --dist worksteal -m nightly $(PYTEST_ARGS)
+
 lint: lint-rust lint-python ## formatting, static checks and types, all as errors
 
 lint-rust: $(VENV)/.installed
@@ -60,7 +63,7 @@ validation: $(VENV)/.installed ## compute the validation table anew, into docs/v
 	cd tests && ../$(BIN)/python -m validation
 
 bench: | $(VENV)/.tools-found ## time the core: one result per line, with its spread
-	cargo bench --bench '*' $(CARGO_ARGS)
+	cargo bench --package vpm-benches $(CARGO_ARGS)
 
 bench-counts: $(VENV)/.installed ## count the instructions of one call of the recursions (needs valgrind)
 	$(BIN)/python benches/peers/instruction_counts.py

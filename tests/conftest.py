@@ -2,11 +2,13 @@
 
 import os
 import signal
+import tempfile
 from pathlib import Path
 
 import pytest
 from hypothesis import settings
 
+from shared_cases import FOLDER
 from vpm.model import Model
 
 # Generous time for slow machines; failing examples are printed in a form that can be pasted. Where the variable CI is
@@ -19,6 +21,11 @@ settings.load_profile("vpm")
 # inherit that, the programs that tests interrupt among them.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+# What one process of a run has made for tests, the others find here.
+if "PYTEST_XDIST_WORKER" not in os.environ:
+    _share = tempfile.TemporaryDirectory(prefix="vpm-tests-")
+    os.environ[FOLDER] = _share.name
 
 ROOT = Path(__file__).resolve().parent.parent
 

@@ -1,4 +1,4 @@
-"""A linear axis simulated without vpm: plain NumPy at twenty times the sampling rate, many seeds side by side.
+"""A linear axis simulated without vpm: plain numbers at twenty times the sampling rate.
 
 The friction here really sticks, the delay is a real queue and the encoder really counts: none of the package's
 formulas is used, so that what the package finds is found in somebody else's data.
@@ -6,7 +6,8 @@ formulas is used, so that what the package finds is found in somebody else's dat
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from math import copysign, cos, exp, inf, pi
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,10 +55,10 @@ viscous = {{ value = 60.0, unit = "N s/m", uncertainty = 20.0, min = 0.0, max = 
 
 @dataclass(frozen=True)
 class Truth:
-    """What the machine really is; zero means that the effect is not there. Arrays hold one value for each seed."""
+    """What the machine really is; zero means that the effect is not there."""
 
-    mass: float | Array = 21.0
-    viscous: float | Array = 66.0
+    mass: float = 21.0
+    viscous: float = 66.0
     coulomb: float = 0.0
     stribeck: float = 0.0
     stribeck_velocity: float = 0.02
@@ -69,77 +70,80 @@ class Truth:
     delay: float = 0.0
     dead_zone: float = 0.0
     lag: float = 0.0
-    saturation: float = np.inf
+    saturation: float = inf
     cubic: float = 0.0
-    noise: float | Array = 2e-6
-    force_noise: float | Array = 0.0
+    noise: float = 2e-6
+    force_noise: float = 0.0
 
 
-@dataclass
 class _Plant:
-    """The moving parts, one column for each seed."""
+    """The moving parts."""
 
-    truth: Truth
-    position: Array
-    velocity: Array
-    lagged: Array
-    step: float = DT / FINE
-    extra: dict[str, float] = field(default_factory=dict)
+    def __init__(self, truth: Truth) -> None:
+        self.truth = truth
+        self.position = self.velocity = self.lagged = 0.0
 
-    def advance(self, command: Array, disturbance: Array) -> None:
-        """One fine step under constant force, with friction that holds the axis where it can."""
-        t = self.truth
-        command = np.clip(
-            np.sign(command) * np.maximum(np.abs(command) - t.dead_zone, 0.0), -t.saturation, t.saturation
-        )
-        if t.lag > 0.0:
-            self.lagged += (command - self.lagged) * (1.0 - np.exp(-self.step / t.lag))
-            command = self.lagged
-        v = self.velocity
-        force = GAIN * command + disturbance - t.bias - t.viscous * v - t.stiffness * self.position
-        force = force - 0.5 * t.viscous_difference * np.abs(v) - t.cubic * v * np.abs(v) ** 2
-        force = force - t.ripple * np.cos(2.0 * np.pi * self.position / t.ripple_period)
-        holding = t.coulomb + t.stribeck * np.exp(-((v / t.stribeck_velocity) ** 2))
-        free = v + self.step * force / t.mass
-        brake = self.step * holding / t.mass
-        self.velocity = np.sign(free) * np.maximum(np.abs(free) - brake, 0.0)
-        self.position = self.position + 0.5 * self.step * (v + self.velocity)
+    def advance(self, command: float, push: float, steps: int) -> None:
+        """Fine steps under constant force, with friction that holds the axis where it can."""
+        t, h = self.truth, DT / FINE
+        answer = 1.0 - exp(-h / t.lag) if t.lag > 0.0 else 1.0
+        command = copysign(min(max(abs(command) - t.dead_zone, 0.0), t.saturation), command)
+        position, v, lagged = self.position, self.velocity, self.lagged
+        for _ in range(steps):
+            lagged += (command - lagged) * answer
+            force = GAIN * lagged + push - t.bias - t.viscous * v - t.stiffness * position
+            force -= 0.5 * t.viscous_difference * abs(v) + t.cubic * v * v * v
+            if t.ripple:
+                force -= t.ripple * cos(2.0 * pi * position / t.ripple_period)
+            holding = t.coulomb
+            if t.stribeck:
+                holding += t.stribeck * exp(-((v / t.stribeck_velocity) ** 2))
+            free = v + h * force / t.mass
+            moving = copysign(max(abs(free) - h * holding / t.mass, 0.0), free)
+            position += 0.5 * h * (v + moving)
+            v = moving
+        self.position, self.velocity, self.lagged = position, v, lagged
 
 
-def reference(seconds: float, phases: Array, still: float = 0.0) -> Array:
-    """Sum of three sines from rest, shape (samples, seeds); ``still`` is the share of the time spent waiting."""
-    time = np.arange(0.0, seconds, DT)[:, None]
+def reference(seconds: float, phases: Array) -> Array:
+    """Sum of three sines from rest."""
+    time = np.arange(0.0, seconds, DT)
     ramp = np.clip(time / 0.5, 0.0, 1.0) ** 2 * (3.0 - 2.0 * np.clip(time / 0.5, 0.0, 1.0))
     waves = zip((0.10, 0.04, 0.01), (0.31, 0.83, 2.3), phases, strict=True)
     path = sum(a * np.sin(2.0 * np.pi * f * time + p) for a, f, p in waves)
-    return np.asarray(ramp * (path - path[0]) * (1.0 - still))
+    return np.asarray(ramp * (path - path[0]))
 
 
 def simulate_axis(truth: Truth, seeds: int, seconds: float, first_seed: int = 0) -> list[Experiment]:
     """Closed-loop records of the axis, one for each seed."""
-    generators = [np.random.default_rng(first_seed + s) for s in range(seeds)]
-    phases = np.array([g.uniform(0.0, 2.0 * np.pi, 3) for g in generators]).T
-    noise = truth.noise * np.array([g.standard_normal(round(seconds / DT) + 1) for g in generators]).T
-    pushes = truth.force_noise * np.array([g.standard_normal(round(seconds / DT) + 1) for g in generators]).T
-    target = reference(seconds, phases)
-    plant = _Plant(truth, np.zeros(seeds), np.zeros(seeds), np.zeros(seeds))
-    measured, commands = np.zeros_like(target), np.zeros_like(target)
+    return [_record(truth, seconds, seed) for seed in range(first_seed, first_seed + seeds)]
+
+
+def _record(truth: Truth, seconds: float, seed: int) -> Experiment:
+    generator = np.random.default_rng(seed)
+    target = reference(seconds, generator.uniform(0.0, 2.0 * np.pi, 3))
+    noise, pushes = (
+        (size * generator.standard_normal(round(seconds / DT) + 1)).tolist()
+        for size in (truth.noise, truth.force_noise)
+    )
+    plant = _Plant(truth)
+    measured: list[float] = []
+    commands: list[float] = []
     whole, part = divmod(truth.delay / DT, 1.0)
-    before, mean_before = np.zeros(seeds), np.zeros(seeds)
-    for k in range(len(target)):
-        y = COUNT * np.round((plant.position + noise[k]) / COUNT)
-        previous = measured[k - 1] if k else y
-        mean = 0.5 * (y + previous)
-        speed = (mean - mean_before) / DT if k else np.zeros(seeds)
+    switch = round(part * FINE)
+    before = mean_before = 0.0
+    for k, place in enumerate(target.tolist()):
+        y = COUNT * round((plant.position + noise[k]) / COUNT)
+        mean = 0.5 * (y + (measured[-1] if k else y))
+        speed = (mean - mean_before) / DT if k else 0.0
         mean_before = mean
-        u = np.clip(VELOCITY_GAIN * (POSITION_GAIN * (target[k] - y) - speed), -LIMIT, LIMIT)
-        measured[k], commands[k] = y, u
-        late = commands[k - int(whole)] if k >= whole else np.zeros(seeds)
-        switch = round(part * FINE)
-        for fine in range(FINE):
-            plant.advance(before if fine < switch else late, pushes[k])
+        measured.append(y)
+        commands.append(min(max(VELOCITY_GAIN * (POSITION_GAIN * (place - y) - speed), -LIMIT), LIMIT))
+        late = commands[k - int(whole)] if k >= whole else 0.0
+        plant.advance(before, pushes[k], switch)
+        plant.advance(late, pushes[k], FINE - switch)
         before = late
-    return [_experiment(target[:, s], measured[:, s], commands[:, s], first_seed + s) for s in range(seeds)]
+    return _experiment(target, np.array(measured), np.array(commands), seed)
 
 
 def _experiment(target: Array, position: Array, command: Array, seed: int) -> Experiment:

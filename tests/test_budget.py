@@ -19,6 +19,9 @@ from vpm.errors import SimulationError
 from vpm.experiment import Experiment
 from vpm.simulate import Setup
 
+needs_valgrind = pytest.mark.skipif(
+    shutil.which("valgrind") is None, reason="counts instructions with valgrind, which is not here"
+)
 TUDOR = Path(__file__).parent.parent / "examples" / "tudor" / "tudor.toml"
 
 
@@ -161,11 +164,20 @@ def test_settings_without_meaning_are_refused(setting: dict[str, float], words: 
         budget(nominal(), steps=1000, **setting)  # type: ignore[arg-type]
 
 
-@pytest.mark.skipif(shutil.which("valgrind") is None, reason="counts instructions with valgrind, which is not here")
+def counted(substeps: int) -> float:
+    return count_instructions(nominal(), 1000.0, Setup(substeps=substeps), commands(nominal(), 1000.0), 4e-4)
+
+
+@needs_valgrind
+def test_a_step_of_an_axis_takes_some_thousand_instructions() -> None:
+    assert 1e3 < counted(1) < 2e4
+
+
+@needs_valgrind
+@pytest.mark.nightly
 def test_instructions_grow_with_the_substeps() -> None:
-    model, inputs = nominal(), commands(nominal(), 1000.0)
-    one, four = (count_instructions(model, 1000.0, Setup(substeps=n), inputs, 4e-5) for n in (1, 4))
     # The sample itself counts once, each substep as often as there are.
+    one, four = (counted(n) for n in (1, 4))
     assert 1.8 * one < four < 4.2 * one
 
 

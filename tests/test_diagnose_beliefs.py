@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import vpm
-from blind import make_case
+from shared_cases import shared_case
 from vpm.discrepancy.beliefs import driven_away
 
 AXIS = """
@@ -47,7 +47,7 @@ def test_a_parameter_counts_that_effects_alone_and_surely_drive_away(
 
 def test_a_spring_that_turns_a_pendulum_upside_down_is_no_explanation() -> None:
     """A spring that hardens is, to fifth order, a linear one beside a centre of mass above the axis."""
-    case = make_case("axis_rotary", "cubic_spring", 43)
+    case = shared_case("axis_rotary", "cubic_spring", 43)
     why = vpm.diagnose(case.model(), case.train, case.validate, effects=["spring", "bias_force"], workers=1)
     assert why.verdict == "unexplained"
     assert "body.center_of_mass.z" in why.summary

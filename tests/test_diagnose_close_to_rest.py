@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import vpm
-from blind import make_case
+from shared_cases import shared_case
 from vpm.discrepancy.own_run import as_it_is, misfit
 from vpm.discrepancy.sticking import CLOSE_TO_REST
 from vpm.simulate import Setup
@@ -14,7 +14,7 @@ from vpm.simulate import Setup
 
 def test_what_a_balance_hardly_sees_is_told_by_runs() -> None:
     """It fades below 1.5 % of the speed: fitted to the balance, it predicts unseen efforts worse than nothing does."""
-    case = make_case("axis_linear", "stribeck_friction", 18)
+    case = shared_case("axis_linear", "stribeck_friction", 18)
     why = vpm.diagnose(case.model(), case.train, case.validate, effects=[CLOSE_TO_REST], workers=1)
     (found,) = why.effects
     (true,) = case.truth.hidden
@@ -27,7 +27,7 @@ def test_what_a_balance_hardly_sees_is_told_by_runs() -> None:
 
 def test_what_runs_tell_need_not_close_the_balance() -> None:
     """Of what the runs leave nine tenths go, of the balance nothing: a fit without physics finds more there."""
-    case = make_case("axis_rotary", "stribeck_friction", 3001)
+    case = shared_case("axis_rotary", "stribeck_friction", 3001)
     why = vpm.diagnose(case.model(), case.train, case.validate, effects=[CLOSE_TO_REST], workers=1)
     assert [effect.name for effect in why.effects] == [CLOSE_TO_REST]
     assert why.verdict == "effect_found"
@@ -39,7 +39,7 @@ def test_what_runs_tell_need_not_close_the_balance() -> None:
     ids=["nothing", "friction_that_wears_off"],
 )
 def test_runs_ask_for_nothing_that_is_not_there(machine: str, hidden: str, seed: int) -> None:
-    case = make_case(machine, hidden, seed)
+    case = shared_case(machine, hidden, seed)
     why = vpm.diagnose(case.model(), case.train, case.validate, effects=[CLOSE_TO_REST], workers=1)
     assert not why.effects
     (refused,) = why.refused
@@ -48,7 +48,7 @@ def test_runs_ask_for_nothing_that_is_not_there(machine: str, hidden: str, seed:
 
 def test_known_parameters_are_no_misfit() -> None:
     """What a run leaves is judged with the parameters that suit it best, so that near the truth all values do."""
-    case = make_case("axis_linear", "none", 3)
+    case = shared_case("axis_linear", "none", 3)
     model = case.model()
     free = ("body.mass", "axis.friction.viscous")
     run = as_it_is(model, free, case.train, Setup())

@@ -5,11 +5,11 @@ from __future__ import annotations
 import pytest
 
 import vpm
-from blind import make_case
+from shared_cases import shared_case
 
 
 def test_a_spring_that_may_rest_elsewhere_needs_no_constant_force_beside_it() -> None:
-    case = make_case("axis_rotary", "spring", 2)
+    case = shared_case("axis_rotary", "spring", 2)
     (hidden,) = case.truth.hidden
     why = vpm.diagnose(case.model(), case.train, case.validate, effects=["bias_force", "spring"], workers=1)
     assert [step.change for step in why.steps] == ["recalibrated", "added", "added", "removed"]
@@ -22,7 +22,7 @@ def test_a_spring_that_may_rest_elsewhere_needs_no_constant_force_beside_it() ->
 
 
 def test_a_difference_of_friction_with_a_size_of_its_own_needs_no_constant_force_beside_it() -> None:
-    case = make_case("axis_rotary", "asymmetric_friction", 2)
+    case = shared_case("axis_rotary", "asymmetric_friction", 2)
     (hidden,) = case.truth.hidden
     tried = ["bias_force", "asymmetric_friction"]
     why = vpm.diagnose(case.model(), case.train, case.validate, effects=tried, workers=1)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from balances import balances
-from blind import make_case
+from shared_cases import shared_case
 from vpm.catalogue import EFFECTS
 from vpm.discrepancy.candidates import Candidate
 from vpm.discrepancy.choice import choose
@@ -17,7 +17,7 @@ RIVALS = (("bias_force", "axis"), ("sensor_offset", "gauge_a"), ("sensor_offset"
 
 @pytest.mark.parametrize("there", [("sensor_offset", "gauge_b"), ("bias_force", "axis")])
 def test_a_gauge_is_blamed_for_what_it_reads_and_not_for_a_load(there: tuple[str, str]) -> None:
-    case = make_case("servo_cylinder", "@".join(there), 42, recalibrate=False)
+    case = shared_case("servo_cylinder", "@".join(there), 42)
     model, free, data = balances(case)
     without = judge(model, free, data, {})
     listed = [Candidate(EFFECTS[name], site, ({},)) for name, site in RIVALS]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from balances import balances
-from blind import make_case
+from shared_cases import shared_case
 from vpm.discrepancy.confirmation import Data, Judged, judge
 from vpm.discrepancy.remainder import Remainder, remainder
 from vpm.discrepancy.seals import seals
@@ -17,7 +17,7 @@ PISTON = np.pi / 4.0 * 0.016**2
 
 def loaded(hidden: str, seed: int) -> tuple[Data, Judged, Judged, float]:
     """Records of a servo-cylinder, its model without and with a constant force beside dry friction, and the truth."""
-    case = make_case("servo_cylinder", hidden, seed, recalibrate=False)
+    case = shared_case("servo_cylinder", hidden, seed)
     model, free, data = balances(case)
     without = judge(model, free, data, {})
     named, own = without.model, ["axis.bias.force"]
@@ -64,7 +64,7 @@ def test_a_constant_force_that_is_there_stays_the_explanation() -> None:
 
 
 def test_it_is_told_at_the_right_cylinder_of_a_leg() -> None:
-    case = make_case("hydraulic_leg", "pressure_dependent_friction@knee_drive", 21, recalibrate=False)
+    case = shared_case("hydraulic_leg", "pressure_dependent_friction@knee_drive", 21)
     model, free, data = balances(case)
     told_of = seals(judge(model, free, data, {}), data)
     assert told_of is not None

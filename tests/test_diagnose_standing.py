@@ -12,7 +12,7 @@ import pytest
 
 import vpm
 from balances import balances
-from blind import make_case
+from shared_cases import shared_case
 from vpm.discrepancy import standing
 from vpm.discrepancy.ambiguity import Rivals
 from vpm.discrepancy.candidates import candidates
@@ -27,7 +27,7 @@ from vpm.identify import Gain, InverseDynamicsProblem, estimate
 
 
 def test_a_spring_takes_the_place_of_the_constant_force_that_was_the_plainer_name() -> None:
-    case = make_case("axis_rotary", "spring", 7)
+    case = shared_case("axis_rotary", "spring", 7)
     (hidden,) = case.truth.hidden
     why = vpm.diagnose(case.model(), case.train, case.validate, effects=["bias_force", "spring"], workers=1)
     assert [(s.change, s.effect) for s in why.steps][-2:] == [("removed", "bias_force"), ("added", "spring")]
@@ -40,14 +40,14 @@ def test_a_spring_takes_the_place_of_the_constant_force_that_was_the_plainer_nam
 
 
 def test_a_constant_force_keeps_its_name_where_finer_laws_know_nothing_more() -> None:
-    case = make_case("axis_rotary", "bias_force", 2)
+    case = shared_case("axis_rotary", "bias_force", 2)
     tried = ["bias_force", "spring", "asymmetric_friction"]
     why = vpm.diagnose(case.model(), case.train, case.validate, effects=tried, workers=1)
     assert [effect.name for effect in why.effects] == ["bias_force"]
 
 
 def test_a_spring_that_looked_like_a_shifted_centre_of_mass_is_found_beside_the_constant_force() -> None:
-    case = make_case("axis_rotary", "spring", 106)
+    case = shared_case("axis_rotary", "spring", 106)
     (hidden,) = case.truth.hidden
     why = vpm.diagnose(case.model(), case.train, case.validate, effects=["bias_force", "spring"], workers=1)
     assert [(s.change, s.effect) for s in why.steps][1:] == [
@@ -60,7 +60,7 @@ def test_a_spring_that_looked_like_a_shifted_centre_of_mass_is_found_beside_the_
 
 
 def test_a_spring_is_screened_with_the_place_where_it_rests() -> None:
-    case = make_case("axis_rotary", "spring", 100)
+    case = shared_case("axis_rotary", "spring", 100)
     (hidden,) = case.truth.hidden
     data = InverseDynamicsProblem(case.model(), case.train)
     free = tuple(p.name for p in data.nominal.parameters.values() if p.adjustable)
@@ -84,7 +84,7 @@ def test_a_rival_earns_its_additional_numbers_where_they_were_fitted(left: float
 def test_a_search_goes_on_beside_what_took_the_place_of_an_effect(monkeypatch: pytest.MonkeyPatch) -> None:
     """Beside the true name a second effect stands clear; the name that went out does not come back."""
     diagnose = import_module("vpm.discrepancy.diagnose")
-    model, free, data = balances(make_case("axis_linear", ("spring", "viscous_friction"), 3, recalibrate=False))
+    model, free, data = balances(shared_case("axis_linear", ("spring", "viscous_friction"), 3))
     start, each = judge(model, free, data, {}), SideBySide(1)
     spring = search(start, data, ["spring"], 6, print, each)
     gone = (Stage("added", "bias_force", "axis", start), Stage("removed", "bias_force", "axis", start))

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from balances import balances
-from blind import Case, make_case
+from blind import Case
+from shared_cases import shared_case
 from vpm.catalogue import EFFECTS
 from vpm.discrepancy.candidates import Candidate
 from vpm.discrepancy.confirmation import confirm, judge
@@ -20,7 +21,7 @@ MISLED = {"pump.oil.bulk_modulus": 0.45, "servo.valve.flow_gain": 0.75}
 
 @pytest.fixture(scope="module")
 def case() -> Case:
-    return make_case("servo_cylinder", "dead_zone", 42, recalibrate=False)
+    return shared_case("servo_cylinder", "dead_zone", 42)
 
 
 def test_a_refit_leaves_what_a_recalibration_without_the_effect_made_of_the_oil(case: Case) -> None:

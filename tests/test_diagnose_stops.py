@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import vpm
-from blind import make_case
+from shared_cases import shared_case
 from vpm.demo import MODEL
 from vpm.discrepancy.structural import ends_apart, stop_starts
 
@@ -32,7 +32,7 @@ def test_nothing_that_pushes_back_gives_no_place_of_its_own() -> None:
 
 def test_the_end_that_no_record_reached_stays_where_no_joint_comes() -> None:
     """Moved into the way of the unseen record it would ruin what the other end explains."""
-    case = make_case("axis_rotary", "end_stop", 4)
+    case = shared_case("axis_rotary", "end_stop", 4)
     (hidden,) = case.truth.hidden
     why = vpm.diagnose(case.model(), case.train, case.validate, effects=["end_stop"], workers=1)
     assert [(effect.name, effect.site) for effect in why.effects] == [("end_stop", "axis")]

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from blind.case import make_case
+from shared_cases import shared_case
 from vpm.discrepancy import diagnose
 
 
 def test_a_swing_as_white_as_noise_is_named() -> None:
-    case = make_case("axis_rotary", "joint_compliance", 1004)
+    case = shared_case("axis_rotary", "joint_compliance", 1004)
     why = diagnose(case.model(), case.train, case.validate, effects=["joint_compliance"])
     assert why.verdict == "effect_found"
     (found,) = why.effects

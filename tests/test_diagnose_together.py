@@ -5,12 +5,12 @@ from __future__ import annotations
 import pytest
 
 import vpm
-from blind import make_case
+from shared_cases import shared_case
 
 
 def test_a_late_drive_and_friction_that_is_missing_are_named_for_the_law_that_imitates_both() -> None:
     """Alone the lag takes four fifths of the training residual and predicts the unseen record worse than nothing."""
-    case = make_case("axis_linear", ("actuator_lag", "viscous_friction"), 5004)
+    case = shared_case("axis_linear", ("actuator_lag", "viscous_friction"), 5004)
     tried = ["actuator_lag", "input_delay", "viscous_friction", "hysteresis"]
     why = vpm.diagnose(case.model(), case.train, case.validate, effects=tried, workers=1)
     assert {(effect.name, effect.site) for effect in why.effects} == {
@@ -25,14 +25,14 @@ def test_a_late_drive_and_friction_that_is_missing_are_named_for_the_law_that_im
 
 
 def test_one_effect_alone_gets_no_partner() -> None:
-    case = make_case("axis_linear", "viscous_friction", 5004)
+    case = shared_case("axis_linear", "viscous_friction", 5004)
     tried = ["actuator_lag", "input_delay", "viscous_friction", "hysteresis"]
     why = vpm.diagnose(case.model(), case.train, case.validate, effects=tried, workers=1)
     assert [(effect.name, effect.site) for effect in why.effects] == [("viscous_friction", "axis")]
 
 
 def test_a_spring_beside_a_hysteresis_is_fitted_where_the_tangent_at_its_start_does_not_lead() -> None:
-    case = make_case("axis_rotary", ("hysteresis", "joint_compliance"), 5002)
+    case = shared_case("axis_rotary", ("hysteresis", "joint_compliance"), 5002)
     tried = ["hysteresis", "joint_compliance"]
     why = vpm.diagnose(case.model(), case.train, case.validate, effects=tried, workers=1)
     assert {(effect.name, effect.site) for effect in why.effects} == {

@@ -13,7 +13,6 @@ from vpm.discrepancy import Diagnosis, diagnose
 from vpm.errors import DiagnosisError, ExperimentError
 
 SECONDS = 16.0
-SEEDS = 50
 
 HIDDEN = {
     "coulomb_friction": Truth(coulomb=9.0),
@@ -86,18 +85,22 @@ def test_agreement_is_called_agreement() -> None:
     assert diagnosis.verdict == "no_disagreement"
 
 
-def test_at_most_one_false_alarm_in_fifty() -> None:
+@pytest.mark.parametrize("seeds", [8, pytest.param(50, marks=pytest.mark.nightly)])
+def test_at_most_one_false_alarm_in_fifty_and_none_in_the_first(seeds: int) -> None:
     """Nothing is missing; mass, friction, noise of the encoder and of the force differ from seed to seed."""
     generator = np.random.default_rng(5)
-    truth = Truth(
-        mass=20.0 * generator.uniform(0.9, 1.1, SEEDS),
-        viscous=60.0 * generator.uniform(0.9, 1.1, SEEDS),
-        noise=generator.uniform(0.5e-6, 8e-6, SEEDS),
-        force_noise=generator.choice([0.0, 0.5], SEEDS),
-    )
-    diagnoses = [diagnose(nominal(), record) for record in simulate_axis(truth, SEEDS, SECONDS, first_seed=1000)]
-    alarms = [d.summary for d in diagnoses if d.verdict not in {"parameters_only", "no_disagreement"}]
-    assert len(alarms) <= 1, alarms
+    alarms = list[str]()
+    for seed in range(seeds):
+        truth = Truth(
+            mass=20.0 * generator.uniform(0.9, 1.1),
+            viscous=60.0 * generator.uniform(0.9, 1.1),
+            noise=generator.uniform(0.5e-6, 8e-6),
+            force_noise=generator.choice([0.0, 0.5]),
+        )
+        diagnosis = diagnose(nominal(), *simulate_axis(truth, 1, SECONDS, first_seed=1000 + seed))
+        if diagnosis.verdict not in {"parameters_only", "no_disagreement"}:
+            alarms.append(diagnosis.summary)
+    assert len(alarms) <= seeds // 50, alarms
 
 
 def test_what_no_effect_explains_is_called_unexplained() -> None:

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from blind import make_case
+from shared_cases import shared_case
 from vpm.discrepancy.coloured import noise_shapes, noise_spectrum
 from vpm.discrepancy.floor import noise_floor
 from vpm.discrepancy.structure import structure
@@ -30,7 +30,7 @@ Exact = tuple[Model, InverseDynamicsProblem, InverseDynamicsProblem]
 @pytest.fixture(scope="module")
 def exact() -> Exact:
     """A servo-cylinder of the proving ground whose model lacks nothing, with its training and unseen records."""
-    case = make_case("servo_cylinder", "none", 1, recalibrate=False)
+    case = shared_case("servo_cylinder", "none", 1)
     model = Model.from_toml(case.true_text)
     training = InverseDynamicsProblem(model, case.train)
     cutoff = min(m.cutoff for m in training.motions)
@@ -137,7 +137,7 @@ def test_the_size_of_coloured_noise_is_read_off_its_quiet_part(exact: Exact) -> 
 
 
 def test_cylinders_of_a_firm_supply_answer_one_by_one_as_they_do_together() -> None:
-    model = Model.from_toml(make_case("hydraulic_leg", "none", 1, recalibrate=False).true_text)
+    model = Model.from_toml(shared_case("hydraulic_leg", "none", 21).true_text)
     one_by_one = drives_of(model)
     assert [drives.model.actuators for drives in one_by_one] == [("hip_drive",), ("knee_drive",)]
     sagging = model.with_effect("supply_drop", at="pump", resistance=1e9, time_constant=0.01)
@@ -145,7 +145,7 @@ def test_cylinders_of_a_firm_supply_answer_one_by_one_as_they_do_together() -> N
 
 
 def test_the_answers_of_single_cylinders_make_up_that_of_the_machine() -> None:
-    case = make_case("hydraulic_leg", "none", 1, recalibrate=False)
+    case = shared_case("hydraulic_leg", "none", 21)
     model = Model.from_toml(case.true_text).with_effect("sensor_offset", at="knee_encoder", value=0.01)
     training = InverseDynamicsProblem(model, case.train[:1])
     m, record = training.motions[0], training.experiments[0]

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from scipy.stats import t as student_t
 
 import vpm
-from blind import Case, make_case
+from blind import Case
+from shared_cases import shared_case
 from vpm.discrepancy.confirmation import Data, judge
 from vpm.discrepancy.driven import Runs, Verdict, compare_driven, inexact, part
 from vpm.discrepancy.motion_only import LATE
@@ -40,7 +41,7 @@ def fitted_late(case: Case) -> tuple[Data, list[vpm.discrepancy.confirmation.Jud
 
 
 def test_a_long_lag_is_told_from_a_delay_and_a_short_delay_is_not_told_from_a_lag() -> None:
-    data, (lag, delay) = fitted_late(make_case("axis_linear", "actuator_lag", 5))
+    data, (lag, delay) = fitted_late(shared_case("axis_linear", "actuator_lag", 5))
     told = compare_driven(lag, delay, data)
     assert told is not None
     assert told.prefers_first()
@@ -49,7 +50,7 @@ def test_a_long_lag_is_told_from_a_delay_and_a_short_delay_is_not_told_from_a_la
     turned = compare_driven(delay, lag, data)
     assert turned is not None
     assert not turned.prefers_first()
-    data, (lag, delay) = fitted_late(make_case("axis_linear", "input_delay", 5))
+    data, (lag, delay) = fitted_late(shared_case("axis_linear", "input_delay", 5))
     told = compare_driven(lag, delay, data)
     assert told is not None
     assert told.apart < 1.0
@@ -58,7 +59,7 @@ def test_a_long_lag_is_told_from_a_delay_and_a_short_delay_is_not_told_from_a_la
 
 
 def test_a_run_beside_another_shares_its_derivatives_and_is_worked_out_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    data, (lag, delay) = fitted_late(make_case("axis_linear", "input_delay", 5))
+    data, (lag, delay) = fitted_late(shared_case("axis_linear", "input_delay", 5))
     asked = list[int]()
     evaluate = OutputErrorProblem.evaluate
 
@@ -84,7 +85,7 @@ def test_a_run_beside_another_shares_its_derivatives_and_is_worked_out_once(monk
 
 def test_fast_parts_of_a_run_tell_a_short_lag() -> None:
     # Below the few hertz that the balance compares, the two differ by less than the noise here.
-    data, (lag, delay) = fitted_late(make_case("axis_linear", "actuator_lag", 2004))
+    data, (lag, delay) = fitted_late(shared_case("axis_linear", "actuator_lag", 2004))
     told = compare_driven(lag, delay, data)
     assert told is not None
     assert told.prefers_first()
@@ -92,7 +93,7 @@ def test_fast_parts_of_a_run_tell_a_short_lag() -> None:
 
 
 def test_a_gap_that_a_parameter_makes_too_tells_nothing() -> None:
-    data, (lag, _) = fitted_late(make_case("axis_linear", "actuator_lag", 5))
+    data, (lag, _) = fitted_late(shared_case("axis_linear", "actuator_lag", 5))
     values = {name: 1.001 * lag.model.parameters[name].value for name in lag.free if name.endswith("viscous")}
     moved = replace(lag, model=lag.model.with_parameters(values))
     told = compare_driven(lag, moved, data)
@@ -120,14 +121,14 @@ def test_data_that_contradict_both_models_tell_little() -> None:
     ("hidden", "seed", "named"), [("actuator_lag", 5, "actuator_lag"), ("input_delay", 2, "input_delay")]
 )
 def test_a_lag_is_named_only_where_it_shows(hidden: str, seed: int, named: str) -> None:
-    case = make_case("axis_linear", hidden, seed)
+    case = shared_case("axis_linear", hidden, seed)
     why = vpm.diagnose(case.model(), case.train, case.validate, effects=LATE, workers=1)
     assert [effect.name for effect in why.effects] == [named]
 
 
 @pytest.mark.parametrize("hidden", ["input_delay", "sensor_delay"])
 def test_a_part_of_a_sampling_interval_is_named_where_it_explains_most(hidden: str) -> None:
-    case = make_case("axis_linear", hidden, 2003)
+    case = shared_case("axis_linear", hidden, 2003)
     why = vpm.diagnose(case.model(), case.train, case.validate, effects=LATE, workers=1)
     assert [effect.name for effect in why.effects] == ["input_delay"]
     late, truth = why.effects[0].parameters[0], case.truth.hidden[0].parameters["time"]
@@ -138,7 +139,7 @@ def test_a_part_of_a_sampling_interval_is_named_where_it_explains_most(hidden: s
 
 def test_a_delay_of_a_machine_that_sticks_is_timed_along_its_own_run() -> None:
     # The balance of effort says 3.2 ms instead of 1.3 ms, with which a simulation gets worse.
-    case = make_case("axis_linear", "input_delay", 22)
+    case = shared_case("axis_linear", "input_delay", 22)
     truth = case.truth.hidden[0].parameters["time"]
     data, (_, delay) = fitted_late(case)
     name = delay.free[-1]
@@ -152,7 +153,7 @@ def test_a_delay_of_a_machine_that_sticks_is_timed_along_its_own_run() -> None:
 
 
 def test_a_delay_of_a_machine_that_sticks_is_named() -> None:
-    case = make_case("axis_linear", "input_delay", 22)
+    case = shared_case("axis_linear", "input_delay", 22)
     why = vpm.diagnose(case.model(), case.train, case.validate, effects=("input_delay",), workers=1)
     assert [effect.name for effect in why.effects] == ["input_delay"]
     truth = case.truth.hidden[0].parameters["time"]
@@ -161,7 +162,7 @@ def test_a_delay_of_a_machine_that_sticks_is_named() -> None:
 
 def test_steps_of_a_run_beside_dry_friction_do_not_blur_what_parts_a_delay_from_a_lag() -> None:
     # With three steps in the delay they are off by five times that, and speak for the lag.
-    case = make_case("axis_linear", "input_delay", 103)
+    case = shared_case("axis_linear", "input_delay", 103)
     time, record = case.truth.hidden[0].parameters["time"], case.train[0].split(0.3)[0]
     sticks = Model.from_toml(case.true_text).with_parameters({"axis.friction.transition_velocity": 1e-5})
     delay, lag = (
@@ -180,7 +181,7 @@ def test_steps_of_a_run_beside_dry_friction_do_not_blur_what_parts_a_delay_from_
 @pytest.mark.parametrize("hidden", ["input_delay", "sensor_delay"])
 def test_little_that_is_late_beside_a_hysteresis_is_named_if_runs_ask_for_it_too(hidden: str) -> None:
     """It takes a fifth of what the hysteresis leaves: of so little, three times the usual certainty is asked else."""
-    case = make_case("axis_linear", ("hysteresis", "sensor_delay"), 140)
+    case = shared_case("axis_linear", ("hysteresis", "sensor_delay"), 140)
     why = vpm.diagnose(case.model(), case.train, case.validate, effects=("hysteresis", hidden), workers=1)
     assert [effect.name for effect in why.effects] == ["hysteresis", hidden]
     late, truth = why.effects[1].parameters[0], case.truth.hidden[1].parameters["time"]
@@ -202,12 +203,12 @@ def test_one_noise_counts_once_however_many_readings_show_it() -> None:
 
 
 def test_readings_of_a_cylinder_go_with_its_joint_and_those_of_joints_alone() -> None:
-    case = make_case("servo_cylinder", "none", 5, recalibrate=False)
+    case = shared_case("servo_cylinder", "none", 1)
     model = case.model()
     problem = OutputErrorProblem(model, case.validate, "closed_loop")
     found = spectra(model, problem, np.zeros((problem.blocks[-1].samples.stop, 1)))
     assert [one.shape[1] for one in found] == [3]
-    leg = make_case("hydraulic_leg", "none", 20, recalibrate=False)
+    leg = shared_case("hydraulic_leg", "none", 21)
     problem = OutputErrorProblem(leg.model(), leg.validate, "closed_loop")
     found = spectra(leg.model(), problem, np.zeros((problem.blocks[-1].samples.stop, 1)))
     assert [one.shape[1] for one in found] == [3, 3]
@@ -230,7 +231,7 @@ def test_what_no_model_of_oil_is_exact_to_does_not_tell_late_from_slow() -> None
 
 
 def test_readings_of_a_cylinder_are_what_a_model_of_oil_is_not_exact_to() -> None:
-    case = make_case("servo_cylinder", "none", 100, recalibrate=False)
+    case = shared_case("servo_cylinder", "none", 1)
     record = case.train[0].split(0.1)[0]
     run = as_it_is(case.model(), ("servo.valve.flow_gain",), [record], Setup())
     floor = inexact(run)

@@ -93,8 +93,9 @@ def test_mass_matrix_of_the_two_link_arm_is_the_textbooks() -> None:
 
 def test_forward_dynamics_of_the_two_link_arm_is_the_textbooks() -> None:
     arm = Arm(centres=(0.20, 0.18), inertias=(0.04, 0.03), viscous=(0.4, 0.2))
-    q, v, effort = np.array([0.3, -0.7]), np.array([0.5, 1.5]), np.array([4.0, -1.0])
-    np.testing.assert_allclose(nominal().forward_dynamics(q, v, effort), arm.acceleration(q, v, effort), rtol=1e-9)
+    q, v, effort = (0.3, -0.7), (0.5, 1.5), (4.0, -1.0)
+    found = nominal().forward_dynamics(np.array(q), np.array(v), np.array(effort))
+    np.testing.assert_allclose(found, np.array(arm.acceleration(q, v, effort)), rtol=1e-9)
 
 
 @settings(max_examples=40)

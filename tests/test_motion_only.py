@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import vpm
-from blind import make_case
+from shared_cases import shared_case
 from vpm.discrepancy.motion_only import CREEPING, in_motion
 from vpm.identify import InverseDynamicsProblem
 
@@ -15,7 +15,7 @@ HIDDEN, SEED = ("asymmetric_friction", "input_delay"), 0
 
 
 def test_a_delay_beside_dry_friction_is_named_and_timed() -> None:
-    case = make_case("axis_rotary", HIDDEN, SEED)
+    case = shared_case("axis_rotary", HIDDEN, SEED)
     why = vpm.diagnose(case.model(), case.train, case.validate, effects=list(HIDDEN), workers=1)
     assert sorted(effect.name for effect in why.effects) == sorted(HIDDEN)
     delay = next(effect for effect in why.effects if effect.name == "input_delay").parameters[0]
@@ -25,7 +25,7 @@ def test_a_delay_beside_dry_friction_is_named_and_timed() -> None:
 
 
 def test_only_samples_in_clear_motion_count() -> None:
-    case = make_case("axis_rotary", "input_delay", SEED)
+    case = shared_case("axis_rotary", "input_delay", SEED)
     problem = InverseDynamicsProblem(case.model(), case.train)
     counted = in_motion(problem)
     assert set(np.unique(counted)) == {0.0, 1.0}

@@ -12,12 +12,13 @@ import pytest
 from typer.testing import CliRunner
 
 import vpm
-from blind import EFFECTS, MACHINES, hideable, make_case, make_cases, proving, score, sites_of, table
+from blind import EFFECTS, MACHINES, hideable, proving, score, sites_of, table
 from blind import case as case_module
 from blind.answer import Answer, Named, _Alarm, informed
 from blind.batch import simulated
 from blind.case import _plan
 from blind.proving import Job
+from shared_cases import shared_case
 from vpm.cli import app
 from vpm.errors import DiagnosisError
 from vpm.prove_command import BEGIN, END, numbers, page
@@ -38,6 +39,13 @@ def answer(missing: str, *found: str, **more: object) -> Answer:
     plain = Answer("axis_linear", kind, tuple(h.name for h in there) or ("none",), 3, 1.0, known=True)
     full = replace(plain, hidden=there, strengths=(5.0,) * len(there), named=told, ranking=told, verdict="effect_found")
     return replace(full, **more)  # type: ignore[arg-type]
+
+
+@pytest.fixture
+def short(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Records of a third of the length, which say as much about what no record can tell."""
+    monkeypatch.setattr(case_module, "SHORTEST", 3.5)
+    monkeypatch.setattr(case_module, "LONGEST", 4.5)
 
 
 def test_only_the_first_name_counts_as_top_1() -> None:
@@ -125,9 +133,9 @@ def test_a_payload_behind_a_turning_axis_is_its_centre_and_inertia(seed: int) ->
 
 def test_where_a_machine_begins_says_nothing_of_its_encoder() -> None:
     """On a level slide only the volumes of oil depend on the place; in gravity an offset shows wherever one begins."""
-    slide = make_case("servo_cylinder", "sensor_offset@encoder", 42, recalibrate=False)
+    slide = shared_case("servo_cylinder", "sensor_offset@encoder", 42)
     assert slide.oracle.strength < 0.5
-    arm = make_case("arm2r", "sensor_offset@encoder_2", 5003, recalibrate=False)
+    arm = shared_case("arm2r", "sensor_offset@encoder_2", 5003)
     assert arm.oracle.solvable
 
 
@@ -251,13 +259,14 @@ def test_a_pair_knows_how_strong_each_effect_is_alone_and_beside_the_other() -> 
     ((_, case, strengths, alone, _, error),) = proving.make([job])
     assert not error
     assert case is not None
-    apart = make_cases("axis_linear", [(name, 2) for name in job.request])
+    apart = [shared_case("axis_linear", name, 2) for name in job.request]
     assert alone == pytest.approx([one.oracle.strength for one in apart])
     # A spring's place of rest is unknown too, and that is a constant force.
     assert strengths[0] < 0.05 * alone[0]
     assert strengths[1] == pytest.approx(alone[1], rel=0.3)
 
 
+@pytest.mark.usefixtures("short")
 def test_two_names_for_one_physics_cannot_be_told_apart() -> None:
     job = Job("axis_linear", "pairs", ("input_delay", "sensor_delay"), 2, 1.0)
     ((_, _, strengths, alone, _, _),) = proving.make([job])
@@ -265,11 +274,13 @@ def test_two_names_for_one_physics_cannot_be_told_apart() -> None:
     assert min(alone) > 0.0
 
 
+@pytest.mark.usefixtures("short")
 def test_what_is_exactly_a_calibratable_parameter_is_not_solvable() -> None:
     ((_, _, strengths, _, _, _),) = proving.make([Job("axis_linear", "single", ("payload",), 0, 1.0)])
     assert strengths == (0.0,)
 
 
+@pytest.mark.usefixtures("short")
 def test_a_case_that_blows_up_loses_itself_only(monkeypatch: pytest.MonkeyPatch) -> None:
     spring = EFFECTS["spring"]
     wild = replace(spring, draw=lambda _g, _s: {"stiffness": -1e12, "rest": 1.0})
@@ -282,7 +293,7 @@ def test_a_case_that_blows_up_loses_itself_only(monkeypatch: pytest.MonkeyPatch)
 
 
 def test_the_oracle_knows_the_hidden_effect() -> None:
-    case = make_case("axis_linear", "spring", 1)
+    case = shared_case("axis_linear", "spring", 1)
     model, free = informed(case)
     hidden = case.truth.hidden[0]
     assert {"axis.spring.stiffness", "axis.spring.rest", "body.mass"} <= set(free)
@@ -291,7 +302,7 @@ def test_the_oracle_knows_the_hidden_effect() -> None:
 
 
 def test_a_case_is_written_for_people(tmp_path: Path) -> None:
-    case = make_case("axis_linear", "spring", 1, recalibrate=False)
+    case = shared_case("axis_linear", "spring", 1)
     case.write(tmp_path / "case")
     model = vpm.Model.load(tmp_path / "case" / "model.toml")
     assert model == case.model()

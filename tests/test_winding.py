@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import vpm
-from blind import make_case
+from shared_cases import shared_case
 from vpm.discrepancy.candidates import candidates
 from vpm.discrepancy.structural import moved
 from vpm.discrepancy.winding import best_start, is_looked_for
@@ -16,7 +16,7 @@ PAIR = ("joint_compliance", "viscous_friction")
 
 def test_a_spring_is_looked_for_where_it_swings() -> None:
     # A linearised step promises most of a spring that is fifty times as stiff, from where a refit finds a rigid one.
-    case = make_case("axis_linear", PAIR, 159)
+    case = shared_case("axis_linear", PAIR, 159)
     why = vpm.diagnose(case.model(), case.train, case.validate, effects=PAIR, workers=1)
     assert {effect.name for effect in why.effects} == set(PAIR)
     found = next(effect for effect in why.effects if effect.name == "joint_compliance")
@@ -27,7 +27,7 @@ def test_a_spring_is_looked_for_where_it_swings() -> None:
 
 def test_a_start_is_as_near_as_springs_that_are_tried_and_none_where_nothing_winds_up() -> None:
     for hidden in (PAIR, ("viscous_friction",)):
-        case = make_case("axis_linear", hidden, 159)
+        case = shared_case("axis_linear", hidden, 159)
         model = case.model().with_effect("viscous_friction", at="axis")
         data = InverseDynamicsProblem(model, case.train)
         fit = estimate(

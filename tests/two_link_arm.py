@@ -7,14 +7,14 @@ Control*, section 6.4), angles counted downwards from the horizontal, driven by 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import cos, sin, tanh
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.experiment import Experiment
 from vpm.model import Model
 
-Array = NDArray[np.float64]
+Pair = tuple[float, float]
 
 DT, FINE, GRAVITY = 0.002, 10, 9.81
 GAINS = np.array([5.0, 3.0])
@@ -84,34 +84,41 @@ class Arm:
     late: tuple[int, int] = (0, 0)
     noise: float = 2e-5
 
-    def weight(self, q: Array) -> Array:
+    def weight(self, q: Pair) -> Pair:
         """Effort that holds the arm still at ``q``."""
         (m1, m2), (c1, c2) = self.masses, self.centres
-        second = m2 * c2 * np.cos(q[0] + q[1])
-        return -GRAVITY * np.array([(m1 * c1 + m2 * self.length) * np.cos(q[0]) + second, second])
+        second = -GRAVITY * m2 * c2 * cos(q[0] + q[1])
+        return second - GRAVITY * (m1 * c1 + m2 * self.length) * cos(q[0]), second
 
-    def acceleration(self, q: Array, v: Array, effort: Array) -> Array:
+    def acceleration(self, q: Pair, v: Pair, effort: Pair) -> Pair:
         """Angular accelerations under an effort on the joints."""
         (m1, m2), (c1, c2), (i1, i2), length = self.masses, self.centres, self.inertias, self.length
-        cosine, sine = np.cos(q[1]), np.sin(q[1])
+        coupling = m2 * length * c2
         m22 = m2 * c2**2 + i2
-        m12 = m22 + m2 * length * c2 * cosine
-        m11 = m1 * c1**2 + i1 + m22 + m2 * (length**2 + 2.0 * length * c2 * cosine)
-        turning = m2 * length * c2 * sine * np.array([-(2.0 * v[0] + v[1]) * v[1], v[0] ** 2])
-        friction = np.array(self.viscous) * v + np.array(self.coulomb) * np.tanh(v / 1e-3) + np.array(self.bias)
-        load = effort - turning - self.weight(q) - friction
+        m12 = m22 + coupling * cos(q[1])
+        m11 = m1 * c1**2 + i1 + m22 + m2 * length**2 + 2.0 * coupling * cos(q[1])
+        turning = coupling * sin(q[1])
+        weights = self.weight(q)
+        first = effort[0] + turning * (2.0 * v[0] + v[1]) * v[1] - weights[0] - self.friction(0, v[0])
+        second = effort[1] - turning * v[0] ** 2 - weights[1] - self.friction(1, v[1])
         determinant = m11 * m22 - m12**2
-        both = np.array([m22 * load[0] - m12 * load[1], m11 * load[1] - m12 * load[0]])
-        return np.asarray(both / determinant, dtype=np.float64)
+        return (m22 * first - m12 * second) / determinant, (m11 * second - m12 * first) / determinant
+
+    def friction(self, joint: int, speed: float) -> float:
+        """Effort that a joint loses at a speed."""
+        return self.viscous[joint] * speed + self.coulomb[joint] * tanh(speed / 1e-3) + self.bias[joint]
 
 
-def midpoint(arm: Arm, q: Array, v: Array, effort: Array, step: float) -> tuple[Array, Array]:
+def midpoint(arm: Arm, q: Pair, v: Pair, effort: Pair, step: float) -> tuple[Pair, Pair]:
     """One step of second order: what a step of first order gets wrong is more than the noise lets parameters be known.
 
     Efforts that lag by half a step pass for inertia and friction, 6e-4 N m s/rad and 3e-5 kg m² at a tenth of ``DT``.
     """
-    slope = arm.acceleration(q + 0.5 * step * v, v + 0.5 * step * arm.acceleration(q, v, effort), effort)
-    return q + step * v + 0.5 * step**2 * slope, v + step * slope
+    half, (a, b) = 0.5 * step, arm.acceleration(q, v, effort)
+    there, then = (q[0] + half * v[0], q[1] + half * v[1]), (v[0] + half * a, v[1] + half * b)
+    a, b = arm.acceleration(there, then, effort)
+    after = q[0] + step * v[0] + half * step * a, q[1] + step * v[1] + half * step * b
+    return after, (v[0] + step * a, v[1] + step * b)
 
 
 def record(arm: Arm, seconds: float, seed: int) -> Experiment:
@@ -126,17 +133,21 @@ def record(arm: Arm, seconds: float, seed: int) -> Experiment:
     waves = np.sum(amplitude[:, :, None] * np.sin(2.0 * np.pi * frequency[:, :, None] * time + phase[:, :, None]), 1)
     target = ramp * (waves - waves[:, :1])
     positions, commands = np.zeros((count, 2)), np.zeros((count, 2))
-    q, v = np.zeros(2), np.zeros(2)
-    before = q
-    late = arm.delay * FINE + np.array(arm.late)
+    q: Pair = (0.0, 0.0)
+    v: Pair = (0.0, 0.0)
+    before = np.array(q)
+    late = [arm.delay * FINE + tenths for tenths in arm.late]
     for k in range(count):
-        y = q + arm.noise * generator.standard_normal(2)
+        y = np.array(q) + arm.noise * generator.standard_normal(2)
         speed, before = (y - before) / DT, y
         feedback = PROPORTIONAL * (target[:, k] - y) - DERIVATIVE * speed
-        positions[k], commands[k] = y, (feedback + arm.weight(y)) / GAINS
+        positions[k], commands[k] = y, (feedback + np.array(arm.weight((y[0], y[1])))) / GAINS
         for step in range(FINE):
-            held = np.diag(commands[np.maximum((k * FINE + step - late) // FINE, 0)])
-            q, v = midpoint(arm, q, v, GAINS * held, DT / FINE)
+            first, second = (
+                float(GAINS[joint] * commands[max((k * FINE + step - late[joint]) // FINE, 0), joint])
+                for joint in (0, 1)
+            )
+            q, v = midpoint(arm, q, v, (first, second), DT / FINE)
     channels = {
         "shoulder.position": positions[:, 0],
         "elbow.position": positions[:, 1],

@@ -15,7 +15,7 @@ mod start;
 mod stepper;
 
 pub use along::{Along, drives_along};
-pub use hold::{Hold, Inputs};
+pub use hold::{Course, Hold, Inputs};
 pub(crate) use names::state_name;
 pub use observer::{Filtered, Gains, Noise, Readings, filter, observe};
 pub use prescribed::{observed, prescribed};

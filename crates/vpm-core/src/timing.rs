@@ -66,32 +66,31 @@ impl<'a> Course<'a> {
         Ok(())
     }
 
-    /// What the time of a step goes into, at `states` states along one way through the inputs.
+    /// What the time of a step goes into, at `states` states along the way that was timed; along the whole way if none was.
     pub fn stages(&mut self, states: usize) -> Result<Vec<Stage>> {
-        let stride = (self.rows / states.max(1)).max(1);
-        let (mut calls, mut steps, mut looks) = (Calls::default(), 0_usize, 0_usize);
+        let rows = if self.next == 0 { self.rows } else { self.rows.min(self.next) };
+        let stride = (rows / states.max(1)).max(1);
+        let mut calls = Calls::default();
         let mut parts: Vec<Stage> = Vec::new();
         self.next = 0;
-        for row in 0..self.rows {
+        for row in 0..rows {
             self.begin();
             self.stepper.sample(row, 0)?;
-            if row % stride == 0 {
-                looks += 1;
-                for (place, (name, seconds)) in self.stepper.parts().into_iter().enumerate() {
-                    if looks == 1 {
-                        parts.push(Stage { name, seconds: 0.0, calls: 0.0 });
-                    }
-                    parts[place].seconds += seconds;
-                }
-                self.stepper.sample(row, 0)?;
-            }
             calls += self.stepper.advance_counted(row, 0, self.setting.interrupt)?;
-            steps += 1;
+            if row % stride == 0 {
+                // After the step, which has said what the method asks for: nothing else need be timed.
+                for (name, seconds) in self.stepper.parts(&calls) {
+                    match parts.iter_mut().find(|stage| stage.name == name) {
+                        Some(stage) => (stage.seconds, stage.calls) = (stage.seconds + seconds, stage.calls + 1.0),
+                        None => parts.push(Stage { name, seconds, calls: 1.0 }),
+                    }
+                }
+            }
         }
         self.next = 0;
         for stage in &mut parts {
-            stage.seconds /= looks as f64;
-            stage.calls = calls.of(stage.name) / steps as f64;
+            stage.seconds /= stage.calls;
+            stage.calls = calls.of(stage.name) / rows as f64;
         }
         parts.retain(|stage| stage.calls > 0.0 && stage.seconds > 0.0);
         Ok(parts)

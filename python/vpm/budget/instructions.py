@@ -81,8 +81,8 @@ def _start(path: Path, count: int) -> subprocess.Popen[str]:
         "--tool=callgrind",
         "--callgrind-out-file=/dev/null",
         sys.executable,
-        "-m",
-        __name__,
+        "-P",
+        str(Path(__file__).with_name("watched.py")),
         str(path),
     ]
     environment = {**os.environ, **FIXED}
@@ -97,25 +97,3 @@ def _collected(process: subprocess.Popen[str]) -> int:
     if process.returncode or found is None:
         raise SimulationError(f"valgrind counted nothing ({said.strip().splitlines()[-1:]}); count on another machine")
     return int(found[1])
-
-
-def _make_steps(path: str, count: str) -> None:
-    """Make steps; what valgrind watches."""
-    from vpm._core import System
-
-    with np.load(path) as file:
-        System(str(file["description"])).time_steps(
-            file["theta"],
-            file["state"],
-            file["inputs"],
-            float(file["time_step"]),
-            int(file["substeps"]),
-            str(file["method"]),
-            int(count),
-            0,
-            bool(file["compiled"]),
-        )
-
-
-if __name__ == "__main__":
-    _make_steps(*sys.argv[1:])

@@ -2,7 +2,7 @@
 
 mod blocks;
 mod cholesky;
-pub(crate) mod dense;
+pub mod dense;
 mod polynomial;
 mod singular;
 mod solve;

@@ -360,15 +360,15 @@ impl Stepper<'_, f64> {
         Ok(calls)
     }
 
-    /// Seconds of each part of a step at the state now, with its name.
-    pub(crate) fn parts(&mut self) -> Vec<(&'static str, f64)> {
+    /// Seconds of each part of a step at the state now, with its name; of the matrices those that steps asked for.
+    pub(crate) fn parts(&mut self, asked: &Calls) -> Vec<(&'static str, f64)> {
         let Self { system, state, description, stepping, .. } = self;
         let has_code = system.has_code();
         let mut seconds: Vec<_> = match has_code {
             true => vec![("rates", system.rates_seconds(stepping.method, state))],
             false => system.dynamics().parts(state).named().into(),
         };
-        for kind in Matrix::ALL {
+        for kind in Matrix::ALL.into_iter().filter(|kind| asked.of(kind.name()) > 0.0) {
             seconds.push((kind.name(), system.matrix_seconds(kind, state)));
         }
         let mut seen = vec![0.0; description.n_outputs()];

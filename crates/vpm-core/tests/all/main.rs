@@ -6,6 +6,7 @@
 #![cfg(test)]
 
 mod actuator;
+mod algebra;
 mod beam;
 mod common;
 mod contact;

@@ -1,5 +1,6 @@
 //! Whole records: simulation, sensitivities, timing.
 
+mod courses;
 mod holds;
 mod inverse;
 mod live;
