@@ -63,7 +63,7 @@ validation: $(VENV)/.installed ## compute the validation table anew, into docs/v
 	cd tests && ../$(BIN)/python -m validation
 
 bench: | $(VENV)/.tools-found ## time the core: one result per line, with its spread
-	cargo bench --package vpm-benches $(CARGO_ARGS)
+	cargo bench $(CARGO_ARGS)
 
 bench-counts: $(VENV)/.installed ## count the instructions of one call of the recursions (needs valgrind)
 	$(BIN)/python benches/peers/instruction_counts.py
