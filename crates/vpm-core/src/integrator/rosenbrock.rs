@@ -109,7 +109,7 @@ impl<S: Scalar> Rosenbrock<S> {
             }
             let coupling = coupling.map(|weight| weight * RODAS4P2.gamma);
             for_size!(i, N => add::<S, N>(increment, RODAS4P2.gamma * step, known, &coupling), 1 2 3 4 5);
-            left.solve(increment);
+            left.solve(ode, increment);
         }
     }
 

@@ -1,6 +1,7 @@
 //! The linear system of an implicit stage.
 
 use super::lu::{Lu, take};
+use crate::ode::Ode;
 use crate::scalar::Scalar;
 
 /// `1 - r A` of an implicit step, with the coordinates eliminated: they follow their rates.
@@ -16,6 +17,8 @@ pub(super) struct Stage<S> {
     /// -r B, column by column, its rows in the order of the factors.
     coupling: Vec<S>,
     lu: Lu<S>,
+    /// What derivatives missing in A make of a solution.
+    missing: Vec<S>,
     coordinates: usize,
     dim: usize,
     reach: f64,
@@ -25,7 +28,7 @@ impl<S: Scalar> Stage<S> {
     /// Buffers for systems of `dim` states.
     pub(super) fn new(dim: usize) -> Self {
         let (matrix, coupling) = (vec![S::zero(); dim * dim], vec![S::zero(); dim * dim]);
-        Self { matrix, coupling, lu: Lu::new(dim), coordinates: 0, dim, reach: 0.0 }
+        Self { matrix, coupling, lu: Lu::new(dim), missing: vec![S::zero(); dim], coordinates: 0, dim, reach: 0.0 }
     }
 
     /// Where A has to be written, row by row, before it is factorised; it stays there.
@@ -70,9 +73,16 @@ impl<S: Scalar> Stage<S> {
         }
     }
 
-    /// Replaces `b` by the solution x of `(1 - reach A) x = b`.
-    pub(super) fn solve(&mut self, b: &mut [S]) {
+    /// Replaces `b` by the solution x of `(1 - reach A) x = b`, A the last matrix of that system.
+    pub(super) fn solve(&mut self, ode: &mut impl Ode<S>, b: &mut [S]) {
         for_size!(self.lu.dim(), N => self.solve_of::<N>(b));
+        if ode.turned(b, &mut self.missing) {
+            let mut missing = std::mem::take(&mut self.missing);
+            missing.iter_mut().for_each(|entry| *entry = *entry * self.reach);
+            for_size!(self.lu.dim(), N => self.solve_of::<N>(&mut missing));
+            b.iter_mut().zip(&missing).for_each(|(entry, &missing)| *entry += missing);
+            self.missing = missing;
+        }
     }
 
     fn solve_of<const N: usize>(&mut self, b: &mut [S]) {
