@@ -106,7 +106,7 @@ fn free_run() {
 
 #[test]
 fn matrices_too_large_to_record() {
-    let mut machine = Machine::new(&random_tree(3, 24));
+    let mut machine = Machine::new(&random_tree(3, 40));
     machine.actuator(0, &[("gain", 1.5), ("lag", 0.06)]);
     let d = machine.build();
     assert!(d.program(&Kind::Linearised, &machine.values).unwrap().directions.is_some());
