@@ -19,7 +19,8 @@ pub trait Ode<S> {
         self.jacobian(x, matrix);
     }
 
-    /// Writes df/dx and f(x); for systems to which the one is of use for the other.
+    /// Writes df/dx and f(x); for systems to which the one is of use for the other. Derivatives that numbers carry may be missing in the
+    /// matrix: see [`Ode::turned`].
     fn linearise(&mut self, x: &[S], jacobian: &mut [S], rates: &mut [S]) {
         self.jacobian(x, jacobian);
         self.rhs(x, rates);
@@ -29,6 +30,15 @@ pub trait Ode<S> {
     fn prepare(&mut self, x: &[S], matrix: &mut [S], rates: &mut [S]) {
         self.iteration_matrix(x, matrix);
         self.rhs(x, rates);
+    }
+
+    /// Writes what the derivatives that are missing in the matrix of the last [`Ode::linearise`] or [`Ode::prepare`] make of the values of
+    /// `k`: their product, of value zero; tells whether any are missing.
+    ///
+    /// Law: of `(1 - r A) k = b` the derivatives are `k' = (1 - r A)^-1 (b' + r A' k)`: they take the factors of the matrix of values, and
+    /// of A' its product alone.
+    fn turned(&mut self, _k: &[S], _product: &mut [S]) -> bool {
+        false
     }
 
     /// Writes what constant linear stiffness K and damping D add to the accelerations by coordinates and rates, `[-M^-1 K, -M^-1 D]`:

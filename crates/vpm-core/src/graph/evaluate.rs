@@ -1,5 +1,7 @@
 //! Programs worked out operation by operation, without compilation: in numbers of any type, or for many inputs at once.
 
+use std::sync::Arc;
+
 use super::operation::{Call, Function, Node, Operation};
 use super::program::Program;
 use crate::scalar::Scalar;
@@ -21,8 +23,8 @@ pub trait Number: Copy {
     fn over(self, other: Self) -> Self;
     /// A function of the number.
     fn apply(self, function: Function) -> Self;
-    /// `yes` where the number is less than `other`, else `no`.
-    fn choose(self, other: Self, yes: Self, no: Self) -> Self;
+    /// `yes` where the first number is less than the second, else `no`.
+    fn choose(pair: [&Self; 2], yes: &Self, no: &Self) -> Self;
     /// What the search of a call finds, where `at` tells its arguments.
     fn found(call: &Call, at: impl Fn(Node) -> Self) -> Self;
 }
@@ -53,8 +55,12 @@ impl<S: Scalar> Number for S {
         function.of(self)
     }
     #[inline]
-    fn choose(self, other: Self, yes: Self, no: Self) -> Self {
-        self.select_less(other, yes, no)
+    fn choose([a, b]: [&Self; 2], yes: &Self, no: &Self) -> Self {
+        // Where it is known which, the other is not touched: numbers with derivatives are long.
+        match a.known_less(*b) {
+            Some(less) => *if less { yes } else { no },
+            None => a.select_less(*b, *yes, *no),
+        }
     }
     #[inline]
     fn found(call: &Call, at: impl Fn(Node) -> Self) -> Self {
@@ -104,8 +110,8 @@ impl Number for Lanes {
         }
     }
     #[inline]
-    fn choose(self, other: Self, yes: Self, no: Self) -> Self {
-        Self(std::array::from_fn(|lane| if self.0[lane] < other.0[lane] { yes.0[lane] } else { no.0[lane] }))
+    fn choose([a, b]: [&Self; 2], yes: &Self, no: &Self) -> Self {
+        Self(std::array::from_fn(|lane| if a.0[lane] < b.0[lane] { yes.0[lane] } else { no.0[lane] }))
     }
     #[inline]
     fn found(call: &Call, at: impl Fn(Node) -> Self) -> Self {
@@ -120,49 +126,40 @@ struct Step {
     to: u32,
 }
 
-/// A program with the working memory to run it in numbers `T`.
-///
-/// A number's place is used again once nothing needs it any more, so that the memory stays in the cache.
-#[derive(Clone, Debug)]
-pub struct Evaluator<T> {
+/// The order of a program's operations in a working memory. A number's place is used again once nothing needs it any more, so that the
+/// memory stays in the cache.
+#[derive(Debug, Default)]
+pub(super) struct Layout {
     steps: Vec<Step>,
     calls: Vec<Call>,
+    constants: Vec<(u32, f64)>,
     inputs: Vec<(u32, u32)>,
     outputs: Vec<u32>,
-    n_inputs: usize,
-    memory: Vec<T>,
+    /// How many numbers the memory holds.
+    places: u32,
 }
 
-impl<T: Number> Evaluator<T> {
-    /// Prepares `program`.
-    pub fn new(program: &Program) -> Self {
+impl Layout {
+    pub(super) fn new(program: &Program) -> Self {
         let operations = program.operations();
         let last = last_uses(program);
-        let (mut places, mut free) = (vec![0_u32; operations.len()], Vec::new());
-        let mut evaluator = Self {
-            steps: Vec::new(),
-            calls: Vec::new(),
-            inputs: Vec::new(),
-            outputs: Vec::new(),
-            n_inputs: program.n_inputs(),
-            memory: Vec::new(),
-        };
+        let (mut places, mut free, mut layout) = (vec![0_u32; operations.len()], Vec::new(), Self::default());
         for (node, operation) in operations.iter().enumerate() {
             // What is written before the pass begins keeps its place to the end.
             let made = !matches!(operation, Operation::Constant(_) | Operation::Input(_));
             let place = if made { free.pop() } else { None };
             let place = place.unwrap_or_else(|| {
-                evaluator.memory.push(T::constant(0.0));
-                evaluator.memory.len() as u32 - 1
+                layout.places += 1;
+                layout.places - 1
             });
             places[node] = place;
             match *operation {
-                Operation::Constant(bits) => evaluator.memory[place as usize] = T::constant(f64::from_bits(bits)),
-                Operation::Input(number) => evaluator.inputs.push((place, number)),
+                Operation::Constant(bits) => layout.constants.push((place, f64::from_bits(bits))),
+                Operation::Input(number) => layout.inputs.push((place, number)),
                 _ => {
-                    let beside = (program.calls(), &mut evaluator.calls);
+                    let beside = (program.calls(), &mut layout.calls);
                     let operation = operation.renamed(beside, |argument| places[argument as usize]);
-                    evaluator.steps.push(Step { operation, to: place });
+                    layout.steps.push(Step { operation, to: place });
                 }
             }
             let mut ended = Vec::new();
@@ -174,13 +171,33 @@ impl<T: Number> Evaluator<T> {
             });
             free.extend(ended.into_iter().map(|argument| places[argument as usize]));
         }
-        evaluator.outputs = program.outputs().iter().map(|&output| places[output as usize]).collect();
-        evaluator
+        layout.outputs = program.outputs().iter().map(|&output| places[output as usize]).collect();
+        layout
+    }
+}
+
+/// A program with the working memory to run it in numbers `T`.
+#[derive(Clone, Debug)]
+pub struct Evaluator<T> {
+    layout: Arc<Layout>,
+    /// Inputs that are not held, with their places.
+    inputs: Vec<(u32, u32)>,
+    n_inputs: usize,
+    memory: Vec<T>,
+}
+
+impl<T: Number> Evaluator<T> {
+    /// Prepares `program`.
+    pub fn new(program: &Program) -> Self {
+        let layout = program.layout();
+        let mut memory = vec![T::constant(0.0); layout.places as usize];
+        layout.constants.iter().for_each(|&(place, value)| memory[place as usize] = T::constant(value));
+        Self { inputs: layout.inputs.clone(), n_inputs: program.n_inputs(), memory, layout }
     }
 
     /// How many numbers come out.
     pub fn n_outputs(&self) -> usize {
-        self.outputs.len()
+        self.layout.outputs.len()
     }
 
     /// All outputs at `inputs`.
@@ -189,14 +206,14 @@ impl<T: Number> Evaluator<T> {
             self.memory[place as usize] = inputs[number as usize];
         }
         self.pass();
-        for (output, &place) in outputs.iter_mut().zip(&self.outputs) {
+        for (output, &place) in outputs.iter_mut().zip(&self.layout.outputs) {
             *output = self.memory[place as usize];
         }
     }
 
     fn pass(&mut self) {
-        let (memory, calls) = (&mut self.memory, &self.calls);
-        for step in &self.steps {
+        let (memory, calls) = (&mut self.memory, &self.layout.calls);
+        for step in &self.layout.steps {
             let (at, to) = (|place: Node| memory[place as usize], step.to as usize);
             // Each kind writes by itself: a common place for what they make would be one more way through memory.
             match step.operation {
@@ -205,7 +222,10 @@ impl<T: Number> Evaluator<T> {
                 Operation::Multiply(a, b) => memory[to] = at(a).times(at(b)),
                 Operation::Divide(a, b) => memory[to] = at(a).over(at(b)),
                 Operation::Apply(function, a) => memory[to] = at(a).apply(function),
-                Operation::Select([a, b, yes, no]) => memory[to] = at(a).choose(at(b), at(yes), at(no)),
+                Operation::Select(nodes) => {
+                    let [a, b, yes, no] = nodes.map(|place| &memory[place as usize]);
+                    memory[to] = T::choose([a, b], yes, no);
+                }
                 Operation::Search(call) => memory[to] = T::found(&calls[call as usize], at),
                 // These stand in the memory already.
                 Operation::Constant(_) | Operation::Input(_) => {}
@@ -242,7 +262,7 @@ impl Evaluator<Lanes> {
             }
             self.pass();
             for (lane, row) in outputs.chunks_exact_mut(out).enumerate().take(rows) {
-                for (value, &place) in row.iter_mut().zip(&self.outputs) {
+                for (value, &place) in row.iter_mut().zip(&self.layout.outputs) {
                     *value = self.memory[place as usize].0[lane];
                 }
             }

@@ -1,5 +1,8 @@
 //! The part of a graph that some outputs need, ready to be worked out in order.
 
+use std::sync::{Arc, OnceLock};
+
+use super::evaluate::Layout;
 use super::operation::{Call, Function, Node, Operation};
 use super::record::Graph;
 
@@ -10,6 +13,17 @@ pub struct Program {
     calls: Vec<Call>,
     outputs: Vec<Node>,
     inputs: usize,
+    layout: Kept,
+}
+
+/// How the operations are run, worked out when it is asked for first; no part of what the program is.
+#[derive(Clone, Debug, Default)]
+struct Kept(OnceLock<Arc<Layout>>);
+
+impl PartialEq for Kept {
+    fn eq(&self, _: &Self) -> bool {
+        true
+    }
 }
 
 /// A program cut in two by how often its inputs change.
@@ -46,8 +60,13 @@ impl Program {
     fn of((operations, calls): (&[Operation], &[Call]), outputs: &[Node], inputs: usize, frozen: Frozen) -> Self {
         const UNUSED: Node = Node::MAX;
         let mut places = vec![UNUSED; operations.len()];
-        let mut program =
-            Self { operations: Vec::new(), calls: Vec::new(), outputs: Vec::with_capacity(outputs.len()), inputs };
+        let mut program = Self {
+            operations: Vec::new(),
+            calls: Vec::new(),
+            outputs: Vec::with_capacity(outputs.len()),
+            inputs,
+            layout: Kept::default(),
+        };
         let mut open = Vec::new();
         for &output in outputs {
             open.push(output);
@@ -106,6 +125,11 @@ impl Program {
     /// How many numbers go in.
     pub fn n_inputs(&self) -> usize {
         self.inputs
+    }
+
+    /// How the operations are run.
+    pub(super) fn layout(&self) -> Arc<Layout> {
+        self.layout.0.get_or_init(|| Arc::new(Layout::new(self))).clone()
     }
 
     /// How many operations there are, constants and inputs not counted.

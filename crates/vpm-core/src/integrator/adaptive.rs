@@ -198,7 +198,7 @@ impl<S: Scalar> Adaptive<S> {
             }
             let verdict = self.attempt(ode, x, taken);
             let stuck = Stuck { state: verdict.state, reached: gone, step: taken, many: false };
-            let length = taken * (CAUTION * verdict.error.powf(-0.25)).clamp(SHORTER, longest);
+            let length = taken * (CAUTION / verdict.error.sqrt().sqrt()).clamp(SHORTER, longest);
             if verdict.error <= 1.0 || (taken <= floor && verdict.error.is_finite()) {
                 x.copy_from_slice(&self.next);
                 gone = if taken < left { gone + taken } else { duration };
@@ -227,12 +227,12 @@ impl<S: Scalar> Adaptive<S> {
     /// Computes a step into `next`, and judges it.
     fn attempt(&mut self, ode: &mut impl Ode<S>, x: &[S], step: f64) -> Verdict {
         self.method.attempt(ode, x, step);
-        self.next.copy_from_slice(x);
         self.method.accept(&mut self.next);
         let mut worst = Verdict { error: 1e-12, state: 0 };
         let pairs = x.iter().zip(&self.next).zip(self.method.last_increment()).zip(&self.scales);
         for (state, (((before, after), error), scale)) in pairs.enumerate() {
-            let weight = self.rule.tolerance * (scale + before.re().abs().max(after.re().abs()));
+            let (before, after) = (before.re().abs(), after.re().abs());
+            let weight = self.rule.tolerance * (scale + if after > before { after } else { before });
             let error = (error.re() / weight).abs();
             // Not a number is as bad as it gets.
             let error = if error.is_nan() { f64::INFINITY } else { error };

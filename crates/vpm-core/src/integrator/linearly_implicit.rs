@@ -34,7 +34,7 @@ impl<S: Scalar> LinearlyImplicit<S> {
     pub fn step(&mut self, ode: &mut impl Ode<S>, x: &mut [S], step: f64) {
         ode.prepare(x, self.left.matrix(), &mut self.first);
         self.left.factorise(ode.coordinates(), GAMMA * step);
-        self.left.solve(&mut self.first);
+        self.left.solve(ode, &mut self.first);
         for ((stage, &start), &rate) in self.stage.iter_mut().zip(&*x).zip(&self.first) {
             *stage = start + rate * step;
         }
@@ -42,7 +42,7 @@ impl<S: Scalar> LinearlyImplicit<S> {
         for (second, &first) in self.second.iter_mut().zip(&self.first) {
             *second -= first * 2.0;
         }
-        self.left.solve(&mut self.second);
+        self.left.solve(ode, &mut self.second);
         for ((state, &first), &second) in x.iter_mut().zip(&self.first).zip(&self.second) {
             *state += first * (1.5 * step) + second * (0.5 * step);
         }

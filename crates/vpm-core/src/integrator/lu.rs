@@ -4,16 +4,16 @@ use crate::scalar::Scalar;
 
 /// LU factors of a small square matrix, in buffers that are allocated once.
 ///
-/// Law: `P A = L U` with row exchanges for the largest pivot (Golub & Van Loan 2013, "Matrix Computations", algorithm 3.4.1). What
-/// solves is kept column by column, with the inverse of each pivot: columns are added as they stand, without sums that wait for
-/// each other (algorithms 3.1.3 and 3.1.4 there).
+/// Law: `P A = L D R` with ones on the diagonals of L and R and row exchanges for the largest pivot (Golub & Van Loan 2013, "Matrix
+/// Computations", algorithm 3.4.1, U = D R). What solves is kept column by column, with the inverse of each pivot: columns are added as
+/// they stand, without sums that wait for each other (algorithms 3.1.3 and 3.1.4 there), nor for the pivots.
 /// A singular matrix gives infinite or undefined numbers, which the caller finds in its result.
 #[derive(Clone, Debug)]
 pub struct Lu<S> {
     dim: usize,
-    /// The matrix, then L below and U above the diagonal, row by row.
+    /// The matrix, then U, row by row.
     factors: Vec<S>,
-    /// The same column by column, with the inverse of each pivot on the diagonal.
+    /// L below and R above the diagonal, column by column, with the inverse of each pivot on it.
     columns: Vec<S>,
     order: Vec<usize>,
     scratch: Vec<S>,
@@ -47,81 +47,94 @@ impl<S: Scalar> Lu<S> {
 
     /// Factorises the matrix in place.
     pub fn factorise(&mut self) {
-        let n = self.dim;
-        for (row, place) in self.order.iter_mut().enumerate() {
-            *place = row;
-        }
+        for_size!(self.dim, N => self.factorise_of::<N>());
+    }
+
+    pub(super) fn factorise_of<const N: usize>(&mut self) {
+        let n = if N == 0 { self.dim } else { N };
+        let (factors, columns) = (&mut self.factors[..n * n], &mut self.columns[..n * n]);
+        let order = &mut self.order[..n];
+        order.iter_mut().enumerate().for_each(|(row, place)| *place = row);
         for column in 0..n {
-            self.exchange(column);
-            let inverse = self.factors[column * n + column].recip();
-            let (above, below) = self.factors.split_at_mut((column + 1) * n);
-            let pivot_row = &above[column * n + column + 1..];
-            for row in below.chunks_exact_mut(n) {
+            let best = largest(factors, column, n);
+            if best != column {
+                order.swap(column, best);
+                let (upper, lower) = factors.split_at_mut(best * n);
+                upper[column * n..(column + 1) * n].swap_with_slice(&mut lower[..n]);
+                columns[..column * n].chunks_exact_mut(n).for_each(|factors| factors.swap(column, best));
+            }
+            let (above, below) = factors.split_at_mut((column + 1) * n);
+            let pivots = &above[column * n..];
+            let inverse = pivots[column].recip();
+            columns[column * n + column] = inverse;
+            // Few entries are quicker taken all, zeros on the left included, than counted.
+            let left = if N == 0 { column + 1 } else { 0 };
+            for (k, row) in below.chunks_exact_mut(n).enumerate() {
                 let factor = row[column] * inverse;
-                row[column] = factor;
-                for (entry, &pivot) in row[column + 1..].iter_mut().zip(pivot_row) {
+                columns[column * n + column + 1 + k] = factor;
+                for (entry, &pivot) in row[left..].iter_mut().zip(&pivots[left..]) {
                     *entry -= factor * pivot;
                 }
+                row[column] = S::zero();
             }
-            self.columns[column * n + column] = inverse;
-        }
-        self.turn();
-    }
-
-    /// Copies the factors beside the diagonal from rows to columns.
-    fn turn(&mut self) {
-        let n = self.dim;
-        for (row, entries) in self.factors.chunks_exact(n.max(1)).enumerate() {
-            let pivot = self.columns[row * n + row];
-            for (target, &entry) in self.columns[row..].iter_mut().step_by(n).zip(entries) {
-                *target = entry;
+            for (k, &pivot) in pivots.iter().enumerate().skip(column + 1) {
+                columns[k * n + column] = pivot * inverse;
             }
-            self.columns[row * n + row] = pivot;
         }
     }
 
-    /// Brings the row with the largest pivot up; numbers that do not tell how they compare stay where they are.
-    fn exchange(&mut self, column: usize) {
-        let n = self.dim;
-        let size = |row: usize| self.factors[row * n + column].abs();
-        let (mut best, mut largest) = (column, size(column));
-        for row in column + 1..n {
-            let found = size(row);
-            if largest.known_less(found) == Some(true) {
-                (best, largest) = (row, found);
-            }
-        }
-        if best != column {
-            self.order.swap(column, best);
-            let (upper, lower) = self.factors.split_at_mut(best * n);
-            upper[column * n..(column + 1) * n].swap_with_slice(&mut lower[..n]);
-        }
+    /// In which order the factors take the rows of the matrix.
+    pub(super) fn order(&self) -> &[usize] {
+        &self.order
     }
 
     /// Replaces `b` by the solution x of `A x = b`.
     pub fn solve(&mut self, b: &mut [S]) {
-        let n = self.dim;
+        for_size!(self.dim, N => self.solve_of::<N>(b, |_| ()));
+    }
+
+    /// The same after a change of `b`, the entries of which come in the order of the factors; of N rows, or of any number if N is 0.
+    #[inline]
+    pub(super) fn solve_of<const N: usize>(&mut self, b: &mut [S], change: impl FnOnce(&mut [S])) {
         let Self { columns, order, scratch, .. } = self;
-        for (entry, &row) in scratch.iter_mut().zip(&*order) {
+        let mut few = [S::zero(); N];
+        let (n, known) = if N == 0 { (self.dim, &mut scratch[..]) } else { (N, &mut few[..]) };
+        let (columns, b) = (&columns[..n * n], &mut b[..n]);
+        for (entry, &row) in known.iter_mut().zip(&*order) {
             *entry = b[row];
         }
-        for (k, column) in columns.chunks_exact(n.max(1)).enumerate() {
-            let (known, below) = scratch.split_at_mut(k + 1);
-            take(below, &column[k + 1..], known[k]);
+        change(known);
+        for k in 0..n {
+            let (known, below) = known.split_at_mut(k + 1);
+            take(below, &columns[k * n + k + 1..], known[k]);
+            known[k] = known[k] * columns[k * n + k];
         }
-        for (k, column) in columns.chunks_exact(n.max(1)).enumerate().rev() {
-            let (above, known) = scratch.split_at_mut(k);
-            let value = known[0] * column[k];
-            b[k] = value;
-            take(above, &column[..k], value);
+        for k in (0..n).rev() {
+            let (above, known) = known.split_at_mut(k);
+            b[k] = known[0];
+            take(above, &columns[k * n..], known[0]);
         }
     }
 }
 
 /// Takes `factor` times a column off.
 #[inline]
-fn take<S: Scalar>(entries: &mut [S], column: &[S], factor: S) {
+pub(super) fn take<S: Scalar>(entries: &mut [S], column: &[S], factor: S) {
     for (entry, &part) in entries.iter_mut().zip(column) {
         *entry -= part * factor;
     }
+}
+
+/// The row from `column` down with the largest entry in that column; numbers that do not tell how they compare stay where they are.
+#[inline(always)]
+fn largest<S: Scalar>(factors: &[S], column: usize, n: usize) -> usize {
+    let size = |row: usize| factors[row * n + column].abs();
+    let (mut best, mut largest) = (column, size(column));
+    for row in column + 1..n {
+        let found = size(row);
+        if largest.known_less(found) == Some(true) {
+            (best, largest) = (row, found);
+        }
+    }
+    best
 }

@@ -1,5 +1,18 @@
 //! Time integration without allocation: fixed steps in bounded work, and steps of controlled error. It knows a system only as an [`Ode`].
 
+/// Does something with a count as a constant where it is small, so that loops are written out; where it is not, the constant is 0.
+macro_rules! for_size {
+    ($count:expr, $n:ident => $work:expr) => {
+        for_size!($count, $n => $work, 1 2 3 4 5 6 7 8 9 10 11 12)
+    };
+    ($count:expr, $n:ident => $work:expr, $($size:literal)*) => {
+        match $count {
+            $($size => { const $n: usize = $size; $work })*
+            _ => { const $n: usize = 0; $work }
+        }
+    };
+}
+
 mod adaptive;
 mod additive;
 pub mod growth;

@@ -96,24 +96,20 @@ impl<S: Scalar> Rosenbrock<S> {
     pub(super) fn attempt(&mut self, ode: &mut impl Ode<S>, x: &[S], step: f64) {
         let dim = x.len();
         self.left.factorise(ode.coordinates(), RODAS4P2.gamma * step);
+        let Self { left, rates, stage, increments } = self;
         for (i, (distance, coupling)) in RODAS4P2.distance.iter().zip(&RODAS4P2.coupling).enumerate() {
-            let (known, rest) = self.increments.split_at_mut(i * dim);
+            let (known, rest) = increments.split_at_mut(i * dim);
             let increment = &mut rest[..dim];
             if i == 0 {
-                increment.copy_from_slice(&self.rates);
+                increment.copy_from_slice(rates);
             } else {
-                self.stage.copy_from_slice(x);
-                add(&mut self.stage, known, distance);
-                ode.rhs(&self.stage, increment);
+                stage.copy_from_slice(x);
+                for_size!(i, N => add::<S, N>(stage, 1.0, known, distance), 1 2 3 4 5);
+                ode.rhs(stage, increment);
             }
-            for entry in increment.iter_mut() {
-                *entry = *entry * step;
-            }
-            add(increment, known, coupling);
-            for entry in increment.iter_mut() {
-                *entry = *entry * RODAS4P2.gamma;
-            }
-            self.left.solve(increment);
+            let coupling = coupling.map(|weight| weight * RODAS4P2.gamma);
+            for_size!(i, N => add::<S, N>(increment, RODAS4P2.gamma * step, known, &coupling), 1 2 3 4 5);
+            left.solve(ode, increment);
         }
     }
 
@@ -131,11 +127,15 @@ impl<S: Scalar> Rosenbrock<S> {
     }
 }
 
-/// Adds the `known` increments with their `weights`.
-fn add<S: Scalar>(total: &mut [S], known: &[S], weights: &[f64; STAGES]) {
-    for (increment, &weight) in known.chunks_exact(total.len().max(1)).zip(weights) {
-        for (total, &entry) in total.iter_mut().zip(increment) {
-            *total += entry * weight;
+/// Makes `total` its `scale` times, and adds the first N of the `known` increments with their `weights`.
+fn add<S: Scalar, const N: usize>(total: &mut [S], scale: f64, known: &[S], weights: &[f64; STAGES]) {
+    let dim = total.len();
+    let known: [&[S]; N] = std::array::from_fn(|stage| &known[stage * dim..(stage + 1) * dim]);
+    for (k, total) in total.iter_mut().enumerate() {
+        let mut sum = *total * scale;
+        for (increment, &weight) in known.iter().zip(weights) {
+            sum += increment[k] * weight;
         }
+        *total = sum;
     }
 }

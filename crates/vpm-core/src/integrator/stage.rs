@@ -1,6 +1,7 @@
 //! The linear system of an implicit stage.
 
-use super::lu::Lu;
+use super::lu::{Lu, take};
+use crate::ode::Ode;
 use crate::scalar::Scalar;
 
 /// `1 - r A` of an implicit step, with the coordinates eliminated: they follow their rates.
@@ -13,9 +14,11 @@ use crate::scalar::Scalar;
 pub(super) struct Stage<S> {
     /// A, row by row.
     matrix: Vec<S>,
-    /// r B, row by row.
+    /// -r B, column by column, its rows in the order of the factors.
     coupling: Vec<S>,
     lu: Lu<S>,
+    /// What derivatives missing in A make of a solution.
+    missing: Vec<S>,
     coordinates: usize,
     dim: usize,
     reach: f64,
@@ -25,7 +28,7 @@ impl<S: Scalar> Stage<S> {
     /// Buffers for systems of `dim` states.
     pub(super) fn new(dim: usize) -> Self {
         let (matrix, coupling) = (vec![S::zero(); dim * dim], vec![S::zero(); dim * dim]);
-        Self { matrix, coupling, lu: Lu::new(dim), coordinates: 0, dim, reach: 0.0 }
+        Self { matrix, coupling, lu: Lu::new(dim), missing: vec![S::zero(); dim], coordinates: 0, dim, reach: 0.0 }
     }
 
     /// Where A has to be written, row by row, before it is factorised; it stays there.
@@ -36,34 +39,60 @@ impl<S: Scalar> Stage<S> {
     /// Prepares `1 - reach A`, where that many coordinates lead the state.
     pub(super) fn factorise(&mut self, coordinates: usize, reach: f64) {
         (self.coordinates, self.reach) = (coordinates, reach);
-        let (n, dim, left) = (coordinates, self.dim, self.dim - coordinates);
+        let left = self.dim - coordinates;
         if self.lu.dim() != left {
             self.lu.resize(left);
         }
-        let rows = self.matrix.chunks_exact(dim.max(1)).skip(n).zip(self.coupling.chunks_exact_mut(n.max(1)));
-        for (k, ((row, coupling), target)) in rows.zip(self.lu.matrix().chunks_exact_mut(left.max(1))).enumerate() {
-            let (of_coordinates, others) = row.split_at(n);
-            for (target, &entry) in target.iter_mut().zip(others) {
-                *target = entry * -reach;
-            }
-            for ((target, coupling), &entry) in target.iter_mut().zip(coupling).zip(of_coordinates) {
-                *coupling = entry * reach;
-                *target -= *coupling * reach;
-            }
-            target[k] = target[k] + 1.0;
-        }
-        self.lu.factorise();
+        for_size!(left, N => self.eliminate::<N>());
     }
 
-    /// Replaces `b` by the solution x of `(1 - reach A) x = b`.
-    pub(super) fn solve(&mut self, b: &mut [S]) {
-        let (coordinates, others) = b.split_at_mut(self.coordinates);
-        for (entry, row) in others.iter_mut().zip(self.coupling.chunks_exact(self.coordinates.max(1))) {
-            for (&part, &coordinate) in row.iter().zip(&*coordinates) {
-                *entry += part * coordinate;
+    /// Factorises the matrix that is left without the coordinates; of N rows, or of any number if N is 0.
+    fn eliminate<const N: usize>(&mut self) {
+        let (n, reach) = (self.coordinates, self.reach);
+        let left = if N == 0 { self.dim - n } else { N };
+        let (dim, given) = (n + left, &self.matrix[n * (n + left)..]);
+        let matrix = &mut self.lu.matrix()[..left * left];
+        for k in 0..left {
+            let row = &mut matrix[k * left..(k + 1) * left];
+            for (target, &entry) in row.iter_mut().zip(&given[k * dim + n..]) {
+                *target = entry * -reach;
+            }
+            row[k] = row[k] + 1.0;
+        }
+        for column in 0..n {
+            for k in 0..left {
+                matrix[k * left + column] -= given[k * dim + column] * (reach * reach);
             }
         }
-        self.lu.solve(others);
+        self.lu.factorise_of::<N>();
+        for column in 0..n {
+            let coupling = &mut self.coupling[column * left..(column + 1) * left];
+            for (coupling, &row) in coupling.iter_mut().zip(self.lu.order()) {
+                *coupling = given[row * dim + column] * -reach;
+            }
+        }
+    }
+
+    /// Replaces `b` by the solution x of `(1 - reach A) x = b`, A the last matrix of that system.
+    pub(super) fn solve(&mut self, ode: &mut impl Ode<S>, b: &mut [S]) {
+        for_size!(self.lu.dim(), N => self.solve_of::<N>(b));
+        if ode.turned(b, &mut self.missing) {
+            let mut missing = std::mem::take(&mut self.missing);
+            missing.iter_mut().for_each(|entry| *entry = *entry * self.reach);
+            for_size!(self.lu.dim(), N => self.solve_of::<N>(&mut missing));
+            b.iter_mut().zip(&missing).for_each(|(entry, &missing)| *entry += missing);
+            self.missing = missing;
+        }
+    }
+
+    fn solve_of<const N: usize>(&mut self, b: &mut [S]) {
+        let (coordinates, others) = b.split_at_mut(self.coordinates);
+        let left = if N == 0 { others.len() } else { N };
+        self.lu.solve_of::<N>(others, |others| {
+            for (&coordinate, column) in coordinates.iter().zip(self.coupling.chunks_exact(left.max(1))) {
+                take(others, column, coordinate);
+            }
+        });
         for (coordinate, &rate) in coordinates.iter_mut().zip(&*others) {
             *coordinate += rate * self.reach;
         }

@@ -150,6 +150,12 @@ impl<S: Scalar> Ode<S> for Moving<'_, S> {
         self.matrix(x, matrix, rates, |system, x, matrix, rates| system.prepare(x, matrix, rates));
     }
 
+    fn turned(&mut self, k: &[S], product: &mut [S]) -> bool {
+        let dim = self.system.dim();
+        product[dim] = S::zero();
+        self.system.turned(&k[..dim], &mut product[..dim])
+    }
+
     fn elasticity(&mut self, x: &[S], block: &mut [S]) -> bool {
         let state = self.enter(x);
         self.system.elasticity(state, block)

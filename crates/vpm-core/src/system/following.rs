@@ -213,6 +213,10 @@ impl<S: Scalar> Ode<S> for Following<S> {
         }
     }
 
+    fn turned(&mut self, k: &[S], product: &mut [S]) -> bool {
+        self.routines.turned(k, product)
+    }
+
     fn elasticity(&mut self, y: &[S], block: &mut [S]) -> bool {
         let count = self.coordinates();
         if count == 0 {

@@ -301,6 +301,10 @@ impl<S: Scalar> Ode<S> for System<S> {
         self.routines.matrix(&Kind::Prepared, x, matrix, x.len(), rates);
     }
 
+    fn turned(&mut self, k: &[S], product: &mut [S]) -> bool {
+        self.routines.turned(k, product)
+    }
+
     /// As df/dx, but with chords from rest in the place of the tangents of friction laws; of a machine with elastic beams and ideal drives,
     /// all that is stiff in it, for the price of one mass matrix.
     ///

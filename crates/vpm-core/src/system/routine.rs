@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::functions::{Function, Functions};
 use super::recorded::Kind;
 use crate::error::Result;
-use crate::graph::{Evaluator, Work};
+use crate::graph::{Evaluator, Program, Work};
 use crate::integrator::Method;
 use crate::scalar::{Dual, Scalar};
 
@@ -34,12 +34,21 @@ enum Engine<S> {
     Code(Work),
 }
 
-/// The numbers of which a matrix is the derivative, along some directions at once.
+/// The numbers of which a matrix is the derivative, along N directions at once.
+#[derive(Clone, Debug)]
+struct Along<S, const N: usize> {
+    evaluator: Evaluator<Dual<S, N>>,
+    inputs: Vec<Dual<S, N>>,
+    outputs: Vec<Dual<S, N>>,
+}
+
+/// A matrix worked out along directions.
 #[derive(Clone, Debug)]
 struct Directions<S> {
-    evaluator: Evaluator<Dual<S, LANES>>,
-    inputs: Vec<Dual<S, LANES>>,
-    outputs: Vec<Dual<S, LANES>>,
+    /// Its values, some columns at a time: derivatives of all of it would be derivatives of derivatives.
+    columns: Along<f64, LANES>,
+    /// What it makes of one vector, with the derivatives that numbers carry, if any.
+    product: Option<Along<S, 1>>,
 }
 
 impl<S: Scalar> Routine<S> {
@@ -52,10 +61,9 @@ impl<S: Scalar> Routine<S> {
         Evaluator::new(&function.seldom).evaluate(known, constants);
         let (outputs, engine) = (vec![S::zero(); function.often.outputs().len()], Evaluator::new(&function.often));
         let directions = function.directions.as_ref().map(|program| {
-            let evaluator: Evaluator<Dual<S, LANES>> = Evaluator::new(program);
-            let outputs = vec![Dual::default(); evaluator.n_outputs()];
-            let inputs = inputs[..given].iter().map(|&value| Dual::constant(value)).collect();
-            Box::new(Directions { evaluator, inputs, outputs })
+            let values: Vec<f64> = inputs[..given].iter().map(Scalar::re).collect();
+            let product = S::plain(&[]).is_none().then(|| Along::new(program, &inputs[..given]));
+            Box::new(Directions { columns: Along::new(program, &values), product })
         });
         Self { function, inputs, outputs, engine: Engine::Operations(engine), directions }
     }
@@ -128,27 +136,58 @@ impl<S: Scalar> Routine<S> {
         for (&(row, column), &entry) in self.function.entries.iter().zip(&self.outputs[dim..]) {
             matrix[row * width + column] = entry;
         }
-        if let Some(directions) = &mut self.directions {
-            directions.columns(x, &self.inputs[dim..self.function.places.first_parameter()], matrix);
+        if let Some(Directions { columns, product }) = self.directions.as_deref_mut() {
+            let inputs = &self.inputs[..self.function.places.first_parameter()];
+            columns.place(inputs.iter().map(Scalar::re));
+            columns.matrix(matrix, dim);
+            if let Some(product) = product {
+                product.place(inputs.iter().copied());
+            }
         }
+    }
+
+    /// What the derivatives that the last matrix lacks make of the values of `k`, see [`crate::ode::Ode::turned`].
+    fn turned(&mut self, k: &[S], product: &mut [S]) -> bool {
+        let Some(Along { evaluator, inputs, outputs }) = self.directions.as_mut().and_then(|all| all.product.as_mut())
+        else {
+            return false;
+        };
+        for (input, k) in inputs.iter_mut().zip(k) {
+            input.gradient = [S::from_f64(k.re())];
+        }
+        evaluator.evaluate(inputs, outputs);
+        for (product, Dual { gradient: [along], .. }) in product.iter_mut().zip(outputs) {
+            *product = *along - along.frozen();
+        }
+        true
     }
 }
 
-impl<S: Scalar> Directions<S> {
-    /// The derivative along each state, [`LANES`] at a time, as columns of a matrix stored row by row.
-    fn columns(&mut self, x: &[S], others: &[S], matrix: &mut [S]) {
-        let dim = x.len();
-        for (input, &other) in self.inputs[dim..].iter_mut().zip(others) {
-            *input = Dual::constant(other);
-        }
+impl<S: Scalar, const N: usize> Along<S, N> {
+    /// A program at `inputs`.
+    fn new(program: &Program, inputs: &[S]) -> Self {
+        let evaluator: Evaluator<Dual<S, N>> = Evaluator::new(program);
+        let outputs = vec![Dual::default(); evaluator.n_outputs()];
+        Self { evaluator, inputs: inputs.iter().map(|&value| Dual::constant(value)).collect(), outputs }
+    }
+
+    /// Puts its first inputs in.
+    fn place(&mut self, inputs: impl Iterator<Item = S>) {
+        self.inputs.iter_mut().zip(inputs).for_each(|(input, value)| *input = Dual::constant(value));
+    }
+}
+
+impl Along<f64, LANES> {
+    /// The derivatives by the first `dim` inputs as columns of a matrix stored row by row.
+    fn matrix<S: Scalar>(&mut self, matrix: &mut [S], dim: usize) {
         for first in (0..dim).step_by(LANES) {
-            for (column, (input, &value)) in self.inputs.iter_mut().zip(x).enumerate() {
+            for (column, input) in self.inputs[..dim].iter_mut().enumerate() {
                 // A column before `first` wraps around to a lane that does not exist, which gives a constant.
-                *input = Dual::variable(value, column.wrapping_sub(first));
+                *input = Dual::variable(input.value, column.wrapping_sub(first));
             }
             self.evaluator.evaluate(&self.inputs, &mut self.outputs);
             for (row, output) in matrix.chunks_exact_mut(dim).zip(&self.outputs) {
-                row[first..].iter_mut().zip(&output.gradient).for_each(|(entry, &slope)| *entry = slope);
+                row[first..].iter_mut().zip(output.gradient).for_each(|(entry, slope)| *entry = S::from_f64(slope));
             }
         }
     }
@@ -162,12 +201,14 @@ pub(crate) struct Routines<S> {
     /// What the inputs of the machine hold.
     held: Vec<S>,
     made: Vec<(Kind, Routine<S>)>,
+    /// Which of them gave a matrix last.
+    last: Option<usize>,
 }
 
 impl<S: Scalar> Routines<S> {
     /// For the checked parameters `theta`, `inputs` holding at first.
     pub(crate) fn new(functions: Arc<Functions>, theta: &[S], inputs: Vec<S>) -> Self {
-        Self { functions, theta: theta.to_vec(), held: inputs, made: Vec::new() }
+        Self { functions, theta: theta.to_vec(), held: inputs, made: Vec::new(), last: None }
     }
 
     /// Makes the function of that kind if it is not there yet.
@@ -214,6 +255,14 @@ impl<S: Scalar> Routines<S> {
             Some(routine) => routine.matrix(x, matrix, width, values),
             None => matrix.fill(S::from_f64(f64::NAN)),
         }
+        self.last = self.made.iter().position(|(own, _)| own == kind);
+    }
+
+    /// See [`crate::ode::Ode::turned`].
+    #[inline]
+    pub(crate) fn turned(&mut self, k: &[S], product: &mut [S]) -> bool {
+        S::plain(&[]).is_none()
+            && self.last.and_then(|last| self.made.get_mut(last)).is_some_and(|(_, routine)| routine.turned(k, product))
     }
 
     /// The function of that kind, made now if it was not yet.
@@ -224,6 +273,7 @@ impl<S: Scalar> Routines<S> {
     /// Forgets the function of that kind.
     pub(crate) fn forget(&mut self, kind: &Kind) {
         self.made.retain(|(own, _)| own != kind);
+        self.last = None;
     }
 
     /// The function of that kind, if it was made.

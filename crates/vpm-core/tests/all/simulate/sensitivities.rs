@@ -3,8 +3,9 @@
 use serde_json::json;
 use vpm_core::integrator::Method;
 use vpm_core::inverse::{Motion, inverse_dynamics};
-use vpm_core::samples::{Random, double_pendulum};
+use vpm_core::samples::{Random, double_pendulum, random_tree};
 use vpm_core::simulate::Hold;
+use vpm_core::system::Kind;
 use vpm_core::table::Table;
 
 use crate::common::{ALWAYS, Bench, Machine};
@@ -100,6 +101,34 @@ fn free_run() {
         check(&machine, &run.jacobian, &format!("{}, {}", method.name(), hold.name()), |theta| {
             Bench { hold, ..moved(&machine, method, theta) }.free(&initial(), &commands()).outputs
         });
+    }
+}
+
+#[test]
+fn matrices_too_large_to_record() {
+    let mut machine = Machine::new(&random_tree(3, 40));
+    machine.actuator(0, &[("gain", 1.5), ("lag", 0.06)]);
+    let d = machine.build();
+    assert!(d.program(&Kind::Linearised, &machine.values).unwrap().directions.is_some());
+    let (state, commands) = (Random::new(4).numbers(d.n_states(), 0.5), [2.0, -1.0, 0.5, 1.0]);
+    let parameters = [3, 17, machine.values.len() - 1];
+    for (method, hold) in [(Method::Rosenbrock, Hold::FirstOrder), (Method::LinearlyImplicit, Hold::ZeroOrder)] {
+        let bench = Bench { hold, sensitivities: parameters.to_vec(), ..bench(&machine, method) };
+        let run = bench.free(&state, &commands);
+        for (k, &parameter) in parameters.iter().enumerate() {
+            let at = |side: f64| {
+                let mut theta = machine.values.clone();
+                theta[parameter] += side * 1e-5;
+                Bench { hold, ..moved(&machine, method, &theta) }.free(&state, &commands).outputs
+            };
+            let slopes: Vec<f64> =
+                at(1.0).iter().zip(at(-1.0)).map(|(ahead, behind)| (ahead - behind) / 2e-5).collect();
+            let size = slopes.iter().fold(0.0_f64, |size, slope| size.max(slope.abs()));
+            assert!(size > 1e-3, "parameter {parameter} does nothing");
+            for (row, slope) in run.jacobian.chunks_exact(parameters.len()).zip(slopes) {
+                assert!((row[k] - slope).abs() < 1e-7 * size, "{}: {} is not {slope}", method.name(), row[k]);
+            }
+        }
     }
 }
 
