@@ -13,7 +13,8 @@ from vpm.errors import IdentificationError
 from vpm.experiment import Experiment
 from vpm.identify import PredictionErrorProblem, estimate
 from vpm.model import Model
-from vpm.weighing import Prior, _evidence, _Known, priors_of
+from vpm.weighing import Prior, priors_of
+from vpm.weighing.weigh import _evidence, _Known
 
 Array = NDArray[np.float64]
 
@@ -61,7 +62,7 @@ def test_the_evidence_of_a_linear_parameter_is_exact(bias: float) -> None:
     model, log = held_model(bias=bias), pushed(4, 1500, drift=0.3)
     noise = vpm.Noise({"axis.position": READING}, {"axis": FORCE})
     data = PredictionErrorProblem(model, [log], setup=vpm.Setup("rk4"), noise=noise)
-    priors = priors_of(model, [log])
+    priors = priors_of(model, data)
     assert priors["axis.bias.force"] == Prior(0.0, bias, -np.inf, np.inf)
     known = _Known(data, priors)
     found = estimate(model, known, list(priors))
@@ -89,7 +90,7 @@ def test_laplace_agrees_with_the_integral_over_a_parameter(viscous: float) -> No
         prior = -0.5 * (value / 4.0) ** 2 + np.log(2.0 / (4.0 * np.sqrt(2.0 * np.pi)))
         return data.log_likelihood(model, theta) + float(prior)
 
-    known = _Known(data, priors_of(model, [log]))
+    known = _Known(data, priors_of(model, data))
     found = estimate(model, known, ["axis.friction.viscous"])
     best = float(found.values[0])
     fitted = model.with_parameters({"axis.friction.viscous": best})
@@ -123,3 +124,6 @@ def test_models_that_nothing_tells_apart_share_the_probability() -> None:
         found["third"]
     with pytest.raises(IdentificationError, match="no model was given to weigh"):
         vpm.weigh({}, log)
+    limited = model.with_effect("saturation", at="drive")
+    with pytest.raises(IdentificationError, match=r'"drive.saturation.limit" is .*; give it a value to begin with'):
+        vpm.weigh({"limited": limited}, log)

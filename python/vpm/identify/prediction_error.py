@@ -68,7 +68,7 @@ class PredictionErrorProblem:
 
     def evaluate(self, model: Model, theta: Array, columns: Sequence[int] = ()) -> tuple[Array, Array]:
         """Whitened innovations and their derivative; see :class:`Problem`."""
-        passes = self._gains(model)
+        passes = self.passes(model)
         jobs = [
             partial(self._followed, model, theta, list(columns), *pair)
             for pair in zip(self.records, passes, strict=True)
@@ -82,10 +82,10 @@ class PredictionErrorProblem:
     def log_likelihood(self, model: Model, theta: Array) -> float:
         """Logarithm of the probability density of all readings under the gains of the problem."""
         residual, _ = self.evaluate(model, theta)
-        logarithms = sum(float(np.sum(np.linalg.slogdet(one.covariances)[1])) for one in self._gains(model))
+        logarithms = sum(float(np.sum(np.linalg.slogdet(one.covariances)[1])) for one in self.passes(model))
         return -0.5 * (float(residual @ residual) + logarithms + residual.size * float(np.log(2.0 * np.pi)))
 
-    def _gains(self, model: Model) -> tuple[Pass, ...]:
+    def passes(self, model: Model) -> tuple[Pass, ...]:
         """A pass over each record by a machine of this structure, at the parameters that it came with first."""
         key = "|".join(model.state_names)
         if key not in self._passes:
@@ -98,18 +98,31 @@ class PredictionErrorProblem:
     ) -> tuple[Array, Array]:
         """Whitened innovations (N, m) of one record, and their derivative (N, m, k)."""
         places = [model.output_channels.index(name) for name in record.channels]
-        first = record.first
-        if len(first) != model.core.n_states:
-            raise ValueError("a model of another structure needs a problem of its own")
-        stepping = (record.dt, self._setup.substeps, self._setup.method(model), columns, self._setup.hold)
-        table = gains.gains.reshape(len(record.time), -1)
-        outputs, _, slopes = model.core.observe(theta, first, record.inputs, places, record.readings, table, *stepping)
+        outputs, slopes = self._observed(model, theta, columns, record, gains)
         innovations = record.readings - outputs[:, places]
         return whitened(gains.covariances, innovations), whitened(gains.covariances, -slopes[:, places])
 
+    def outputs(self, model: Model) -> Array:
+        """All outputs that are predicted along the records, one after the other, shape (N, outputs)."""
+        pairs = zip(self.records, self.passes(model), strict=True)
+        return np.concatenate([self._observed(model, model.theta, [], record, gains)[0] for record, gains in pairs])
+
+    def _observed(
+        self, model: Model, theta: Array, columns: list[int], record: Record, gains: Pass
+    ) -> tuple[Array, Array]:
+        """Outputs (N, outputs) of one record and their derivative (N, outputs, k)."""
+        if len(record.first) != model.core.n_states:
+            raise ValueError("a model of another structure needs a problem of its own")
+        places = [model.output_channels.index(name) for name in record.channels]
+        stepping = (record.dt, self._setup.substeps, self._setup.method(model), columns, self._setup.hold)
+        table = gains.gains.reshape(len(record.time), -1)
+        log = (record.first, record.inputs, places, record.readings)
+        outputs, _, slopes = model.core.observe(theta, *log, table, *stepping)
+        return outputs, slopes
+
     def _lay_out(self, model: Model) -> tuple[Block, ...]:
         blocks, start = [], 0
-        for record, one in zip(self.records, self._gains(model), strict=True):
+        for record, one in zip(self.records, self.passes(model), strict=True):
             for column, channel in enumerate(record.channels):
                 size = float(np.sqrt(np.mean(one.covariances[:, column, column])))
                 scale = float(np.sqrt(np.mean(record.readings[:, column] ** 2)))

@@ -15,60 +15,18 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import log_ndtr, logsumexp
 
-from vpm.catalogue import EffectParameter
 from vpm.errors import IdentificationError
 from vpm.experiment import Experiment, as_records
 from vpm.identify import Block, PredictionErrorProblem, estimate
-from vpm.model import Effect, Model
-from vpm.observer import Record, filtered
+from vpm.model import Model
 from vpm.results import Result
 from vpm.simulate import Setup
+from vpm.weighing.priors import Prior, priors_of
 
 Array = NDArray[np.float64]
 
 #: Times that an observer gets the gains of the values that it led to, and the gain (nats) after which it need not.
 RENEWALS, SETTLED = 5, 0.05
-#: What an effect may amount to, as a share of what the records show of its kind.
-SHARE = 0.3
-#: The same for numbers that are near a value by nature, such as a gain.
-NEAR = 0.1
-#: Logarithm of the factor by which a shape may differ from where it starts.
-FACTOR = float(np.log(10.0))
-
-
-@dataclass(frozen=True)
-class Prior:
-    """What is known of a parameter before the records.
-
-    Attributes
-    ----------
-    centre, spread : float
-        Mean and standard deviation, SI; of the logarithm where it is ``logarithmic``, centre being the median.
-    logarithmic : bool
-    low, high : float
-        What is possible, SI.
-    """
-
-    centre: float
-    spread: float
-    low: float
-    high: float
-    logarithmic: bool = False
-
-    def standard(self, value: float) -> float:
-        """The value in deviations from the centre."""
-        if self.logarithmic:
-            return float(np.log(max(value, 1e-300) / self.centre)) / self.spread
-        return (value - self.centre) / self.spread
-
-    def slope(self, value: float) -> float:
-        """Change of the value by a deviation."""
-        return self.spread * (max(value, 1e-300) if self.logarithmic else 1.0)
-
-    def possible(self) -> float:
-        """Logarithm of the share of the prior that is possible."""
-        low = -np.inf if self.logarithmic and self.low <= 0.0 else self.standard(self.low)
-        return float(np.log(max(np.exp(log_ndtr(self.standard(self.high))) - np.exp(log_ndtr(low)), 1e-300)))
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -168,9 +126,9 @@ def _weighed(
     model: Model, records: Sequence[Experiment], channels: Sequence[str] | None, setup: Setup | None
 ) -> tuple[float, float, Model]:
     """Evidence, log likelihood and the model at its most likely values."""
-    priors = priors_of(model, records, channels, setup)
-    names = tuple(priors)
     data = PredictionErrorProblem(model, records, channels=channels, setup=setup)
+    priors = priors_of(model, data)
+    names = tuple(priors)
     best = (-np.inf, -np.inf, model)
     for _ in range(RENEWALS):
         known = _Known(data, priors)
@@ -246,111 +204,3 @@ def _inside(prior: Prior, own: float, width: float, pull: float) -> float:
     pair = (-lower, -upper) if lower > 0.0 else (upper, lower)
     first, second = log_ndtr(pair[0]), log_ndtr(pair[1])
     return float(0.5 * lean**2 + first + np.log1p(-np.exp(min(second - first, -1e-300))))
-
-
-def priors_of(
-    model: Model, records: Sequence[Experiment], channels: Sequence[str] | None = None, setup: Setup | None = None
-) -> dict[str, Prior]:
-    """What is known of each adjustable parameter before the records.
-
-    Raises
-    ------
-    IdentificationError
-        Nothing is known of one, and the records give it no size.
-    """
-    unknown = {p.name for p in model.parameters.values() if p.adjustable and not np.isfinite(p.uncertainty or np.inf)}
-    owners = {name: (effect, short) for effect in model.effects for short, name in effect.parameter_names.items()}
-    sizes = _Sizes(model, records, channels, setup) if unknown else None
-    priors = {}
-    for parameter in model.parameters.values():
-        if not parameter.adjustable or parameter.uncertainty is None:
-            continue
-        box = (parameter.minimum, parameter.maximum)
-        if parameter.name not in unknown or sizes is None:
-            priors[parameter.name] = Prior(parameter.value, parameter.uncertainty, *box)
-            continue
-        if parameter.name not in owners:
-            raise IdentificationError(
-                f'nothing is known of "{parameter.name}" before the records; give it an uncertainty in the model file'
-            )
-        effect, short = owners[parameter.name]
-        priors[parameter.name] = sizes.prior(effect, effect.type.parameter(short), parameter.value, box)
-    return priors
-
-
-class _Sizes:
-    """How large what the records show is, by kind: the natural sizes of effects."""
-
-    def __init__(
-        self, model: Model, records: Sequence[Experiment], channels: Sequence[str] | None, setup: Setup | None
-    ) -> None:
-        self.model = model
-        taken = [Record.of(model, record, channels) for record in records]
-        noise = PredictionErrorProblem(model, records[:1], channels=channels, setup=setup).noise
-        states = np.concatenate([filtered(model, record, noise, setup=setup).states for record in taken])
-        self._inputs = np.concatenate([record.inputs for record in taken])
-        self._readings = {name: taken[0].readings[:, at] for at, name in enumerate(taken[0].channels)}
-        n = len(model.coordinates)
-        self._ways = 0.5 * np.ptp(states[:, :n], axis=0)
-        self._speeds = np.sqrt(np.mean(states[:, n : 2 * n] ** 2, axis=0))
-
-    def prior(self, effect: Effect, parameter: EffectParameter, value: float, box: tuple[float, float]) -> Prior:
-        """Prior of a parameter of which the model file says nothing."""
-        size = parameter.neutral is not None and not parameter.shape
-        if box[0] > 0.0 or (not size and box[0] == 0.0 and value > 0.0):
-            return Prior(value, FACTOR, *box, logarithmic=True)
-        centre = parameter.neutral if size and parameter.neutral is not None else value
-        share = NEAR if parameter.scale == "one" else SHARE
-        return Prior(centre, share * self._size(effect, parameter), *box)
-
-    def _size(self, effect: Effect, parameter: EffectParameter) -> float:
-        """Size of a kind of quantity at the joint of an effect, in the records.
-
-        Raises
-        ------
-        IdentificationError
-            The records do not show it.
-        """
-        joint = self._joint(effect.at)
-        way, speed = float(self._ways[joint]), float(self._speeds[joint])
-        effort, command = self._effort(), float(np.sqrt(np.mean(self._inputs**2)))
-        reading = self._readings.get(self._measured(effect.at), np.ones(1))
-        sizes = {
-            "one": 1.0,
-            "effort": effort,
-            "effort_per_speed": effort / speed if speed else 0.0,
-            "effort_per_coordinate": effort / way if way else 0.0,
-            "coordinate": way,
-            "speed": speed,
-            "mass": effort * way / speed**2 if speed else 0.0,
-            "inertia": effort * way / speed**2 if speed else 0.0,
-            "time": NEAR * way / speed if speed else 0.0,
-            "command": command,
-            "channel": float(np.sqrt(np.mean(reading**2))),
-            "one_per_speed": 1.0 / speed if speed else 0.0,
-        }
-        size = sizes.get(parameter.scale, 0.0)
-        if not (np.isfinite(size) and size > 0.0):
-            raise IdentificationError(
-                f'the records give "{effect.parameter_names[parameter.name]}" no size ({parameter.scale}); '
-                "give it an uncertainty in the model file"
-            )
-        return size
-
-    def _joint(self, site: str) -> int:
-        if site in self.model.joints:
-            return self.model.joints.index(site)
-        if site in self.model.actuators:
-            return self.model.joints.index(self.model.joints_of_actuator(site)[0])
-        return 0
-
-    def _measured(self, site: str) -> str:
-        return next((name for name in self._readings if self.model.sensor_of(name) == site), "")
-
-    def _effort(self) -> float:
-        """Root mean square of what ideal drives deliver."""
-        gains = [
-            self.model.parameters[f"{name}.gain"].value if f"{name}.gain" in self.model.parameters else 1.0
-            for name in self.model.actuators
-        ]
-        return float(np.sqrt(np.mean((self._inputs[:, : len(gains)] * gains) ** 2)))
