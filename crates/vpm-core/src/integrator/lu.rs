@@ -107,7 +107,7 @@ impl<S: Scalar> Lu<S> {
         for k in 0..n {
             let (known, below) = known.split_at_mut(k + 1);
             take(below, &columns[k * n + k + 1..], known[k]);
-            known[k] = known[k] * columns[k * n + k];
+            known[k] *= columns[k * n + k];
         }
         for k in (0..n).rev() {
             let (above, known) = known.split_at_mut(k);
