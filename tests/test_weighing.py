@@ -124,6 +124,8 @@ def test_models_that_nothing_tells_apart_share_the_probability() -> None:
         found["third"]
     with pytest.raises(IdentificationError, match="no model was given to weigh"):
         vpm.weigh({}, log)
+    with pytest.raises(IdentificationError, match="no experiment was given"):
+        vpm.weigh({"one": model}, [])
     limited = model.with_effect("saturation", at="drive")
     with pytest.raises(IdentificationError, match=r'"drive.saturation.limit" is .*; give it a value to begin with'):
         vpm.weigh({"limited": limited}, log)

@@ -19,6 +19,7 @@ from vpm.errors import IdentificationError
 from vpm.experiment import Experiment, as_records
 from vpm.identify import Block, PredictionErrorProblem, estimate
 from vpm.model import Model
+from vpm.observer import Record
 from vpm.results import Result
 from vpm.simulate import Setup
 from vpm.weighing.priors import Prior, priors_of
@@ -88,7 +89,7 @@ def weigh(
     experiments : Experiment or sequence of Experiment
         With commands, and any of the outputs.
     channels : sequence of str, optional
-        Outputs that are compared; by default all that each log holds.
+        Outputs that are compared; by default those that every log holds and every model has.
     setup : Setup, optional
         Integrator, substeps and hold.
 
@@ -99,7 +100,7 @@ def weigh(
     Raises
     ------
     IdentificationError
-        No model was given, or nothing is known of a parameter that the records give no size.
+        No model or record was given, or nothing is known of a parameter that the records give no size.
 
     Examples
     --------
@@ -110,7 +111,12 @@ def weigh(
     if not models:
         raise IdentificationError("no model was given to weigh; pass at least two by name")
     records = as_records(experiments)
-    weighed = {name: _weighed(model, records, channels, setup) for name, model in models.items()}
+    if not records:
+        raise IdentificationError("no experiment was given; pass at least one")
+    # Densities compare only where they are of the same readings.
+    pairs = [Record.of(model, record, channels).channels for model in models.values() for record in records]
+    shared = [name for name in pairs[0] if all(name in names for names in pairs)]
+    weighed = {name: _weighed(model, records, shared, setup) for name, model in models.items()}
     order = sorted(weighed, key=lambda name: -weighed[name][0])
     evidence = np.array([weighed[name][0] for name in order])
     return Weighing(
@@ -123,7 +129,7 @@ def weigh(
 
 
 def _weighed(
-    model: Model, records: Sequence[Experiment], channels: Sequence[str] | None, setup: Setup | None
+    model: Model, records: Sequence[Experiment], channels: Sequence[str], setup: Setup | None
 ) -> tuple[float, float, Model]:
     """Evidence, log likelihood and the model at its most likely values."""
     data = PredictionErrorProblem(model, records, channels=channels, setup=setup)
