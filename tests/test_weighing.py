@@ -88,7 +88,7 @@ def test_laplace_agrees_with_the_integral_over_a_parameter(viscous: float) -> No
         theta = model.theta.copy()
         theta[column] = value
         prior = -0.5 * (value / 4.0) ** 2 + np.log(2.0 / (4.0 * np.sqrt(2.0 * np.pi)))
-        return data.log_likelihood(model, theta) + float(prior)
+        return data.log_likelihood(data.evaluate(model, theta)[0]) + float(prior)
 
     known = _Known(data, priors_of(model, data))
     found = estimate(model, known, ["axis.friction.viscous"])

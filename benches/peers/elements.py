@@ -94,11 +94,9 @@ def arm_table(repeats: int) -> str:
 
 
 def tudor_sentence(repeats: int) -> str:
-    from vpm.model import Model
-
-    content = Model.load(TUDOR).to_dict()
+    content = vpm.Model.load(TUDOR).to_dict()
     beams = {name: {**beam, "level": f"elements({FINE})"} for name, beam in content["beams"].items()}
-    model = Model.from_dict({**content, "beams": beams})
+    model = vpm.Model.from_dict({**content, "beams": beams})
     time_ = STEP * np.arange(SAMPLES + 1)
     commands = {f"{name}.command": 0.1 * np.sin(5.0 * time_) for name in model.actuators}
     record = vpm.Experiment.from_arrays(time_, commands, model=model, name="sine")

@@ -57,8 +57,8 @@ class PredictionErrorProblem:
         self._channels, self._setup, self._stated = channels, setup or Setup(), noise
         self.records = tuple(Record.of(model, experiment, channels) for experiment in experiments)
         self.noise = noise or likely_noise(model, self.records, setup=self._setup)
-        self._model = model
-        self._passes: dict[str, tuple[Pass, ...]] = {}
+        #: A pass over each record, whose gains stay.
+        self.passes = tuple(filtered(model, record, self.noise, setup=self._setup) for record in self.records)
         self.blocks = self._lay_out(model)
 
     def renewed(self, model: Model) -> PredictionErrorProblem:
@@ -68,10 +68,9 @@ class PredictionErrorProblem:
 
     def evaluate(self, model: Model, theta: Array, columns: Sequence[int] = ()) -> tuple[Array, Array]:
         """Whitened innovations and their derivative; see :class:`Problem`."""
-        passes = self.passes(model)
         jobs = [
             partial(self._followed, model, theta, list(columns), *pair)
-            for pair in zip(self.records, passes, strict=True)
+            for pair in zip(self.records, self.passes, strict=True)
         ]
         residuals, jacobians = [], []
         for values, slopes in in_order(jobs, self.workers):
@@ -79,19 +78,11 @@ class PredictionErrorProblem:
             jacobians.append(slopes.transpose(1, 0, 2).reshape(values.size, len(columns)))
         return np.concatenate(residuals), np.concatenate(jacobians)
 
-    def log_likelihood(self, model: Model, theta: Array) -> float:
-        """Logarithm of the probability density of all readings under the gains of the problem."""
-        residual, _ = self.evaluate(model, theta)
-        logarithms = sum(float(np.sum(np.linalg.slogdet(one.covariances)[1])) for one in self.passes(model))
-        return -0.5 * (float(residual @ residual) + logarithms + residual.size * float(np.log(2.0 * np.pi)))
-
-    def passes(self, model: Model) -> tuple[Pass, ...]:
-        """A pass over each record by a machine of this structure, at the parameters that it came with first."""
-        key = "|".join(model.state_names)
-        if key not in self._passes:
-            run = partial(filtered, model, noise=self.noise, setup=self._setup)
-            self._passes[key] = tuple(run(record) for record in self.records)
-        return self._passes[key]
+    def log_likelihood(self, residual: Array) -> float:
+        """Logarithm of the probability density of all readings, of the residual that `evaluate` gave."""
+        ends = np.cumsum([one.innovations.size for one in self.passes])[:-1]
+        pairs = zip(self.passes, np.split(residual, ends), strict=True)
+        return sum(one.log_likelihood(part) for one, part in pairs)
 
     def _followed(
         self, model: Model, theta: Array, columns: list[int], record: Record, gains: Pass
@@ -104,15 +95,13 @@ class PredictionErrorProblem:
 
     def outputs(self, model: Model) -> Array:
         """All outputs that are predicted along the records, one after the other, shape (N, outputs)."""
-        pairs = zip(self.records, self.passes(model), strict=True)
+        pairs = zip(self.records, self.passes, strict=True)
         return np.concatenate([self._observed(model, model.theta, [], record, gains)[0] for record, gains in pairs])
 
     def _observed(
         self, model: Model, theta: Array, columns: list[int], record: Record, gains: Pass
     ) -> tuple[Array, Array]:
         """Outputs (N, outputs) of one record and their derivative (N, outputs, k)."""
-        if len(record.first) != model.core.n_states:
-            raise ValueError("a model of another structure needs a problem of its own")
         places = [model.output_channels.index(name) for name in record.channels]
         stepping = (record.dt, self._setup.substeps, self._setup.method(model), columns, self._setup.hold)
         table = gains.gains.reshape(len(record.time), -1)
@@ -122,7 +111,7 @@ class PredictionErrorProblem:
 
     def _lay_out(self, model: Model) -> tuple[Block, ...]:
         blocks, start = [], 0
-        for record, one in zip(self.records, self.passes(model), strict=True):
+        for record, one in zip(self.records, self.passes, strict=True):
             for column, channel in enumerate(record.channels):
                 size = float(np.sqrt(np.mean(one.covariances[:, column, column])))
                 scale = float(np.sqrt(np.mean(record.readings[:, column] ** 2)))

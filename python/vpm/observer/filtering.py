@@ -107,12 +107,17 @@ class Pass:
         """Innovations in units of what they are said to be (N, m), without correlation among channels."""
         return whitened(self.covariances, self.innovations)
 
-    def log_likelihood(self) -> float:
-        """Logarithm of the probability density of the readings, one sample after the other."""
-        _, logarithms = np.linalg.slogdet(self.covariances)
-        samples, channels = self.innovations.shape
-        constant = samples * channels * np.log(2.0 * np.pi)
-        return -0.5 * float(np.sum(self.whitened() ** 2) + np.sum(logarithms) + constant)
+    def log_likelihood(self, whitened: Array | None = None) -> float:
+        """Logarithm of the probability density of the readings, one sample after the other.
+
+        ``whitened`` innovations, of any shape, may be those of other parameters under the same gains.
+        """
+        values = self.whitened() if whitened is None else whitened
+        return -0.5 * float(np.sum(values**2) + self.log_volume() + values.size * np.log(2.0 * np.pi))
+
+    def log_volume(self) -> float:
+        """Sum of the logarithms of the determinants of the covariances."""
+        return float(np.sum(np.linalg.slogdet(self.covariances)[1]))
 
 
 def whitened(covariances: Array, values: Array) -> Array:
@@ -125,9 +130,7 @@ def whitened(covariances: Array, values: Array) -> Array:
     return np.asarray(np.linalg.solve(roots, columns).reshape(values.shape))
 
 
-def filtered(
-    model: Model, record: Record, noise: Noise, *, theta: Array | None = None, setup: Setup | None = None
-) -> Pass:
+def filtered(model: Model, record: Record, noise: Noise, *, setup: Setup | None = None) -> Pass:
     """Filter ``record`` with ``model``.
 
     Raises
@@ -138,12 +141,11 @@ def filtered(
     from vpm._core import Diverged
 
     setup = setup or Setup()
-    theta = model.theta if theta is None else theta
     places = [model.output_channels.index(name) for name in record.channels]
     spreads = noise.spreads(model, record)
     try:
         found = model.core.filter(
-            theta,
+            model.theta,
             record.first,
             record.inputs,
             places,

@@ -91,9 +91,7 @@ def likely_noise(
     model: Model,
     records: Sequence[Record],
     *,
-    theta: Array | None = None,
     setup: Setup | None = None,
-    start: Noise | None = None,
 ) -> Noise:
     """The noise that makes ``records`` most likely under ``model``.
 
@@ -106,9 +104,8 @@ def likely_noise(
     DivergedError
         The model runs away from every record.
     """
-    theta = model.theta if theta is None else theta
     pieces = [record.stretch(SAMPLES) for record in records]
-    noise = start or first_guess(model, pieces, theta)
+    noise = first_guess(model, pieces)
     known = {name: model.sensor_noise[name] for name in noise.readings if name in model.sensor_noise}
     noise = replace(noise, readings={**noise.readings, **known})
 
@@ -117,11 +114,11 @@ def likely_noise(
         power, logarithms, count = 0.0, 0.0, 0
         for piece in pieces:
             try:
-                found = filtered(model, piece, candidate, theta=theta, setup=setup)
+                found = filtered(model, piece, candidate, setup=setup)
             except DivergedError:
                 return -np.inf, 1.0
             power += float(np.sum(found.whitened() ** 2))
-            logarithms += float(np.sum(np.linalg.slogdet(found.covariances)[1]))
+            logarithms += found.log_volume()
             count += found.innovations.size
         if known:
             return -0.5 * (power + logarithms), 1.0
@@ -146,7 +143,7 @@ def likely_noise(
     return noise.scaled(float(np.sqrt(best[1])))
 
 
-def first_guess(model: Model, pieces: Sequence[Record], theta: Array) -> Noise:
+def first_guess(model: Model, pieces: Sequence[Record]) -> Noise:
     """A noise to begin with: readings by their differences, forces a hundredth of what moves the machine."""
     readings = {}
     for place, name in enumerate(pieces[0].channels):
@@ -156,7 +153,7 @@ def first_guess(model: Model, pieces: Sequence[Record], theta: Array) -> Noise:
         readings[name] = max(float(np.sqrt(np.mean(rough**2) / 20.0)), 1e-9 * max(float(np.ptp(size)), 1e-9))
     first = pieces[0].first
     n = len(model.coordinates)
-    mass = np.diag(model.core.mass_matrix(theta, first[:n])) if n else np.ones(0)
+    mass = np.diag(model.core.mass_matrix(model.theta, first[:n])) if n else np.ones(0)
     speeds = []
     for place, name in enumerate(pieces[0].channels):
         joint, _, quantity = name.rpartition(".")

@@ -54,10 +54,19 @@ class Prior:
         """Change of the value by a deviation."""
         return self.spread * (max(value, 1e-300) if self.logarithmic else 1.0)
 
-    def possible(self) -> float:
-        """Logarithm of the share of the prior that is possible."""
+    @property
+    def ends(self) -> tuple[float, float]:
+        """What is possible, in deviations from the centre."""
         low = -np.inf if self.logarithmic and self.low <= 0.0 else self.standard(self.low)
-        return float(np.log(max(np.exp(log_ndtr(self.standard(self.high))) - np.exp(log_ndtr(low)), 1e-300)))
+        return low, self.standard(self.high)
+
+
+def log_share(lower: float, upper: float) -> float:
+    """Logarithm of the share of a normal bell between two ends, in deviations."""
+    # The smaller tails are differences of numbers near zero, not near one.
+    pair = (-lower, -upper) if lower > 0.0 else (upper, lower)
+    first, second = log_ndtr(pair[0]), log_ndtr(pair[1])
+    return float(first + np.log1p(-np.exp(min(second - first, -1e-300))))
 
 
 def priors_of(model: Model, data: PredictionErrorProblem) -> dict[str, Prior]:

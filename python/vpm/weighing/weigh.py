@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import log_ndtr, logsumexp
+from scipy.special import logsumexp
 
 from vpm.errors import IdentificationError
 from vpm.experiment import Experiment, as_records
@@ -22,7 +22,7 @@ from vpm.model import Model
 from vpm.observer import Record
 from vpm.results import Result
 from vpm.simulate import Setup
-from vpm.weighing.priors import Prior, priors_of
+from vpm.weighing.priors import Prior, log_share, priors_of
 
 Array = NDArray[np.float64]
 
@@ -166,13 +166,17 @@ class _Known:
     def evaluate(self, model: Model, theta: Array, columns: Sequence[int] = ()) -> tuple[Array, Array]:
         """See `vpm.identify.Problem`."""
         residual, jacobian = self.data.evaluate(model, theta, columns)
-        places = [model.index(name) for name in self.priors]
-        off = np.array([p.standard(float(theta[at])) for p, at in zip(self.priors.values(), places, strict=True)])
-        rows = np.zeros((len(places), len(columns)))
-        for row, (prior, at) in enumerate(zip(self.priors.values(), places, strict=True)):
-            if at in columns:
-                rows[row, list(columns).index(at)] = 1.0 / prior.slope(float(theta[at]))
+        off, slopes = self.standard(model, theta)
+        rows = np.zeros((len(off), len(columns)))
+        for row, name in enumerate(self.priors):
+            if (at := model.index(name)) in columns:
+                rows[row, list(columns).index(at)] = 1.0 / slopes[row]
         return np.concatenate([residual, off]), np.concatenate([jacobian, rows])
+
+    def standard(self, model: Model, theta: Array) -> tuple[Array, Array]:
+        """Each parameter in deviations of its prior, and its change by a deviation."""
+        values = [(prior, float(theta[model.index(name)])) for name, prior in self.priors.items()]
+        return np.array([p.standard(x) for p, x in values]), np.array([p.slope(x) for p, x in values])
 
 
 def _evidence(model: Model, known: _Known) -> tuple[float, float]:
@@ -181,32 +185,25 @@ def _evidence(model: Model, known: _Known) -> tuple[float, float]:
     In deviations ``z`` of the priors: ``l - z'z/2 - ln det(1 + J'J)/2``, with the share of each parameter's bell that
     is possible, after the records and before.
     """
-    names, priors = list(known.priors), list(known.priors.values())
-    columns = [model.index(name) for name in names]
-    likelihood = known.data.log_likelihood(model, model.theta)
-    if not names:
-        return likelihood, likelihood
-    values = model.theta[columns]
+    columns = [model.index(name) for name in known.priors]
     residual, jacobian = known.data.evaluate(model, model.theta, columns)
-    slopes = jacobian * np.array([prior.slope(float(x)) for prior, x in zip(priors, values, strict=True)])
-    z = np.array([prior.standard(float(x)) for prior, x in zip(priors, values, strict=True)])
+    likelihood = known.data.log_likelihood(residual)
+    if not columns:
+        return likelihood, likelihood
+    z, changes = known.standard(model, model.theta)
+    slopes = jacobian * changes
     curvature = np.eye(len(z)) + slopes.T @ slopes
     gradient = slopes.T @ residual + z
     total = likelihood - 0.5 * float(z @ z) - 0.5 * float(np.linalg.slogdet(curvature)[1])
     widths = np.sqrt(np.diag(np.linalg.inv(curvature)))
-    for prior, own, width, pull in zip(priors, z, widths, gradient, strict=True):
-        total += _inside(prior, float(own), float(width), float(pull)) - prior.possible()
+    for prior, own, width, pull in zip(known.priors.values(), z, widths, gradient, strict=True):
+        total += _inside(prior, float(own), float(width), float(pull)) - log_share(*prior.ends)
     return total, likelihood
 
 
 def _inside(prior: Prior, own: float, width: float, pull: float) -> float:
     """Logarithm of the share of a bell of that width within what is possible; at a bound it falls off with ``pull``."""
-    low = -np.inf if prior.logarithmic and prior.low <= 0.0 else prior.standard(prior.low)
-    high = prior.standard(prior.high)
+    low, high = prior.ends
     resting = own - low < 1e-3 * width or high - own < 1e-3 * width
     lean = pull * width if resting else 0.0
-    upper, lower = (high - own) / width + lean, (low - own) / width + lean
-    # The smaller tails are differences of numbers near zero, not near one.
-    pair = (-lower, -upper) if lower > 0.0 else (upper, lower)
-    first, second = log_ndtr(pair[0]), log_ndtr(pair[1])
-    return float(0.5 * lean**2 + first + np.log1p(-np.exp(min(second - first, -1e-300))))
+    return 0.5 * lean**2 + log_share((low - own) / width + lean, (high - own) / width + lean)
