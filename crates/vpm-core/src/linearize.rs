@@ -3,12 +3,10 @@
 use crate::description::Description;
 use crate::error::{Error, Result};
 use crate::scalar::Dual;
+use crate::sensitivity::LANES;
 use crate::simulate::check_state;
 use crate::system::{Kind, Routine};
 use crate::table::Table;
-
-/// Directions per pass: the gradient of a number then fills one 256-bit register.
-const LANES: usize = 4;
 
 /// What a sampled drive takes away.
 const NO_LINEAR_MODEL: &str = "the machine has no linear model in continuous time";

@@ -10,10 +10,8 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use super::{Drive, Inputs, Plan, Run, Setting, Stepper, check_state, check_step, execute};
 use crate::error::{Error, Result};
 use crate::scalar::Dual;
+use crate::sensitivity::LANES;
 use crate::table::Table;
-
-/// Directions per pass: the gradient of a number then fills one 256-bit register.
-const LANES: usize = 4;
 
 /// A number with its derivatives along some of the states.
 type Number = Dual<f64, LANES>;
