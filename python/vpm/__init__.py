@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from vpm.linear import LinearModel
     from vpm.model import Dynamics, Model
     from vpm.observer import Noise, Observation, observe
+    from vpm.ranking import Ranking, rank
     from vpm.report import Report, report, write_report
     from vpm.scenario import Scenario, ScenarioRun
     from vpm.simplify import Ladder, simplify
@@ -66,6 +67,7 @@ __all__ = [
     "Noise",
     "Observation",
     "OilFit",
+    "Ranking",
     "Report",
     "Run",
     "Scenario",
@@ -87,6 +89,7 @@ __all__ = [
     "linkages",
     "narx",
     "observe",
+    "rank",
     "realtime",
     "report",
     "simplify",
@@ -126,6 +129,8 @@ _HOMES = {
     "Noise": "vpm.observer",
     "Observation": "vpm.observer",
     "observe": "vpm.observer",
+    "Ranking": "vpm.ranking",
+    "rank": "vpm.ranking",
     "Report": "vpm.report",
     "report": "vpm.report",
     "write_report": "vpm.report",

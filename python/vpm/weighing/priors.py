@@ -50,6 +50,12 @@ class Prior:
             return float(np.log(max(value, 1e-300) / self.centre)) / self.spread
         return (value - self.centre) / self.spread
 
+    def value(self, standard: float) -> float:
+        """The value that lies so many deviations from the centre, as far as it is possible."""
+        far = self.spread * standard
+        value = self.centre * float(np.exp(far)) if self.logarithmic else self.centre + far
+        return min(max(value, self.low), self.high)
+
     def slope(self, value: float) -> float:
         """Change of the value by a deviation."""
         return self.spread * (max(value, 1e-300) if self.logarithmic else 1.0)

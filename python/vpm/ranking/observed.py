@@ -1,0 +1,111 @@
+"""Records beside a model that an observer of stated bandwidth keeps on them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vpm.experiment import Experiment
+from vpm.initial import initial_state
+from vpm.model import Model
+from vpm.observer import Record
+from vpm.ranking.colour import Parts
+from vpm.ranking.settings import Settings
+from vpm.simulate import Setup
+
+Array = NDArray[np.float64]
+
+#: Damping of the error of an observer.
+DAMPING = float(np.sqrt(0.5))
+#: Name of the coordinate by which a joint that was split differs from its motor.
+SPLIT = "_deflection"
+#: Steps of the integrator within a sample where a joint is split: contacts and gears ring fast.
+STEPS = 4
+
+
+class Observed:
+    """Records, and what a model leaves of them under an observer.
+
+    The observer knows no noise: each measured joint is drawn to its encoder with the bandwidth, as by a soft spring
+    with a damper between the machine and its log. All structures are compared under the same one. Where a joint is
+    split, the encoder sits at the motor and the motor alone is drawn; the load follows through its spring or its play.
+
+    Parameters
+    ----------
+    model : Model
+    experiments : sequence of Experiment
+    settings : Settings
+    setup : Setup, optional
+    """
+
+    def __init__(
+        self, model: Model, experiments: Sequence[Experiment], settings: Settings, setup: Setup | None = None
+    ) -> None:
+        self.setup = setup or Setup()
+        self.experiments = tuple(experiments)
+        self.records = tuple(Record.of(model, record) for record in self.experiments)
+        self.channels = self.records[0].channels
+        ends = np.cumsum([len(record.time) for record in self.records])
+        self.parts: Parts = [
+            slice(int(end) - len(r.time) + int(settings.settling / r.dt), int(end))
+            for end, r in zip(ends, self.records, strict=True)
+        ]
+
+    def follow(self, model: Model, theta: Array, band: float, columns: Sequence[int] = ()) -> tuple[Array, Array]:
+        """Readings less outputs (N, m) of all records, one after the other, and derivatives (N, m, len(columns))."""
+        residuals, slopes = [], []
+        steps = self.setup.substeps * (STEPS if any(name.endswith(SPLIT) for name in model.coordinates) else 1)
+        for record, experiment in zip(self.records, self.experiments, strict=True):
+            outputs, slope = self._followed(model, theta, band, columns, steps, record, experiment)
+            residuals.append(record.readings - outputs)
+            slopes.append(-slope)
+        return np.concatenate(residuals), np.concatenate(slopes)
+
+    def _followed(
+        self,
+        model: Model,
+        theta: Array,
+        band: float,
+        columns: Sequence[int],
+        steps: int,
+        record: Record,
+        experiment: Experiment,
+    ) -> tuple[Array, Array]:
+        places = [model.output_channels.index(name) for name in record.channels]
+        gain = observer_gain(model, record.channels, band, record.dt)
+        outputs, _, slopes = model.core.observe(
+            theta,
+            initial_state(model, experiment, theta),
+            record.inputs,
+            places,
+            record.readings,
+            np.tile(gain.ravel(), (len(record.time), 1)),
+            record.dt,
+            steps,
+            self.setup.method(model),
+            list(columns),
+            self.setup.hold,
+        )
+        return outputs[:, places], slopes[:, places]
+
+
+def observer_gain(model: Model, channels: Sequence[str], band: float, dt: float) -> Array:
+    """By how much the reading of each channel moves each state at a sample (nx, m).
+
+    The gain of a mass without friction whose error dies away with the bandwidth (Hz) and `DAMPING`.
+    """
+    gain = np.zeros((len(model.state_names), len(channels)))
+    coordinates, turn = model.coordinates, 2.0 * np.pi * band * dt
+    for column, channel in enumerate(channels):
+        joint, _, quantity = channel.rpartition(".")
+        if quantity != "position" or joint not in coordinates:
+            continue
+        place = coordinates.index(joint)
+        moved = -np.expm1(-2.0 * DAMPING * turn), turn**2 / dt
+        for row, share in zip((place, len(coordinates) + place), moved, strict=True):
+            gain[row, column] = share
+            if joint + SPLIT in coordinates:
+                gain[row - place + coordinates.index(joint + SPLIT), column] = -share
+    return gain

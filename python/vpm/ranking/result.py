@@ -1,0 +1,68 @@
+"""What a ranking gives back."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from vpm.model import Model
+from vpm.results import Result, Storable
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class Ranked(Storable):
+    """An effect that was tried.
+
+    Attributes
+    ----------
+    effect, site : str
+    evidence : float
+        Nats that it adds to the evidence of the structure without it.
+    values : dict
+        Its parameters, SI.
+    rivals : tuple of str
+        Effects that the records do not tell from it: within a few nats of its evidence.
+    """
+
+    effect: str
+    site: str
+    evidence: float
+    values: dict[str, float]
+    rivals: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class Ranking(Result):
+    """What a model is missing, in the order in which it was found.
+
+    Attributes
+    ----------
+    effects : tuple of Ranked
+        What was added.
+    rounds : tuple of tuple of Ranked
+        All that was fitted beside what had been found before, the best first.
+    model : Model
+        With what was added, at its most probable values.
+    band : float
+        Bandwidth of the observer under which the records are most probable, Hz: the smaller, the less is left.
+    log_likelihood : float
+        Of the records under ``model``.
+    """
+
+    effects: tuple[Ranked, ...]
+    rounds: tuple[tuple[Ranked, ...], ...]
+    model: Model
+    band: float
+    log_likelihood: float
+
+    def _headline(self) -> Mapping[str, object]:
+        return {f"{one.effect} at {one.site}": one.evidence for one in self.effects} or {"effects": "none"}
+
+    def _frame_columns(self) -> Mapping[str, object]:
+        tried = [(number + 1, one) for number, several in enumerate(self.rounds) for one in several]
+        return {
+            "round": [number for number, _ in tried],
+            "effect": [one.effect for _, one in tried],
+            "site": [one.site for _, one in tried],
+            "evidence": [one.evidence for _, one in tried],
+        }

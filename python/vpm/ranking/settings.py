@@ -1,0 +1,53 @@
+"""Every number that decides in a ranking."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settings:
+    """Numbers that decide.
+
+    Attributes
+    ----------
+    bands : tuple of float
+        Bandwidths of the observers that search, Hz: a slow one, whose residual is wide and easy to rank, and one that
+        keeps a load behind a play in step.
+    widest, narrowest : float
+        Bandwidths among which a structure finds its own, Hz.
+    order : int
+        Length of the autoregression that whitens what an observer leaves of a channel, samples.
+    settling : float
+        Time at the beginning of each record that is left out, s: what an observer makes of the first state.
+    seats : int
+        Effects of a round that are fitted for each observer and each way to look at what it leaves.
+    starts : int
+        Start values of an effect that are fitted, of those that were screened, in each seat.
+    iterations : int
+        Steps of a fit.
+    tolerance : float
+        Gain of a step, nats, below which a fit ends.
+    reach : float
+        Deviations of its prior that a parameter may move in a step.
+    odds : float
+        Evidence, nats, that another effect has to bring.
+    same : float
+        Effects within so many nats of the best cannot be told from it.
+    effects : int
+        Most effects of a structure.
+    """
+
+    bands: tuple[float, ...] = (1.0, 10.0)
+    widest: float = 160.0
+    narrowest: float = 0.25
+    order: int = 12
+    settling: float = 0.5
+    seats: int = 5
+    starts: int = 1
+    iterations: int = 8
+    tolerance: float = 0.5
+    reach: float = 6.0
+    odds: float = 8.0
+    same: float = 3.0
+    effects: int = 4

@@ -1,0 +1,84 @@
+"""What is known of the parameters of an effect before the records: natural sizes, read off the records."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vpm.catalogue import EffectParameter
+from vpm.discrepancy.candidates import Candidate
+from vpm.identify import InverseDynamicsProblem
+from vpm.model import Model
+from vpm.weighing.priors import FACTOR, NATURAL, NEAR, SHARE, Prior
+
+Array = NDArray[np.float64]
+
+#: Delay that is nothing unusual, s: a few intervals of a field bus.
+DELAY = 5e-3
+
+
+class Sizes:
+    """How large what the records show is, by joint: effort, speed and way."""
+
+    def __init__(self, model: Model, data: InverseDynamicsProblem) -> None:
+        self.model = model
+        records = range(len(data.motions))
+        efforts = [data.effort(model, model.theta, record)[1] for record in records]
+        states = [data.state(record) for record in records]
+        self.joints = {
+            joint: (
+                _strength(np.concatenate([effort[:, place] for effort in efforts])),
+                _strength(np.concatenate([state[1][:, place] for state in states])),
+                0.5 * float(np.ptp(np.concatenate([state[0][:, place] for state in states]))),
+            )
+            for place, joint in enumerate(data.joints)
+        }
+        self.commands = {
+            name: _strength(np.concatenate([motion.inputs[:, place] for motion in data.motions]))
+            for place, name in enumerate(model.actuators)
+        }
+
+    def prior(self, candidate: Candidate, parameter: EffectParameter, value: float) -> Prior:
+        """Prior of a parameter of an effect that begins at ``value``."""
+        low, high = candidate.bounds.get(parameter.name, parameter.physical)
+        size = self._size(candidate.site, parameter.scale)
+        neutral = np.nan if parameter.shape or parameter.neutral is None else parameter.neutral
+        if neutral in NATURAL and (candidate.neutral or value == neutral):
+            share = NEAR if parameter.scale in {"one", "channel"} else 1.0 if parameter.scale == "time" else SHARE
+            return Prior(neutral, share * size, low, high)
+        if low < 0.0 or value <= 0.0:
+            return Prior(value, SHARE * size, low, high)
+        return Prior(value, FACTOR, max(low, 1e-12), high, logarithmic=True)
+
+    def _size(self, site: str, scale: str) -> float:
+        effort, speed, way = (max(number, 1e-9) for number in self._shown(site))
+        sizes = {
+            "effort": effort,
+            "effort_per_speed": effort / speed,
+            "effort_per_coordinate": effort / way,
+            "coordinate": way,
+            "channel": way,
+            "speed": speed,
+            "mass": effort * way / speed**2,
+            "inertia": effort * way / speed**2,
+            "time": DELAY,
+            "one_per_speed": 1.0 / speed,
+            "command": self.commands.get(site, 1.0),
+        }
+        return sizes.get(scale, 1.0)
+
+    def _shown(self, site: str) -> tuple[float, float, float]:
+        """Effort, speed and way at a site; the largest of all joints where it is at none of them."""
+        if site in self.joints:
+            return self.joints[site]
+        if site in self.model.actuators:
+            return self.joints[self.model.joints_of_actuator(site)[0]]
+        for channel in self.model.output_channels:
+            if self.model.sensor_of(channel) == site and channel.rpartition(".")[0] in self.joints:
+                return self.joints[channel.rpartition(".")[0]]
+        effort, speed, way = np.max(list(self.joints.values()), axis=0)
+        return float(effort), float(speed), float(way)
+
+
+def _strength(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2)))

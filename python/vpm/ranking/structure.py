@@ -1,0 +1,243 @@
+"""A model with what is unknown of it, fitted to records under an observer, and its evidence."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import lsq_linear
+
+from vpm.discrepancy.candidates import Key
+from vpm.errors import VpmError
+from vpm.model import Model
+from vpm.ranking.colour import Colour, colour_of, log_likelihood, plain
+from vpm.ranking.observed import Observed
+from vpm.ranking.settings import Settings
+from vpm.weighing.priors import Prior
+
+Array = NDArray[np.float64]
+#: Shares of a step that are tried, the largest first.
+SHARES = (1.0, 0.3, 0.08)
+
+
+@dataclass(frozen=True, eq=False)
+class Structure:
+    """Effects in a model, the values of its parameters, and what is known of the unknown ones beforehand.
+
+    Attributes
+    ----------
+    model : Model
+    theta : ndarray, shape (p,)
+        Values; those of the model are its own.
+    priors : mapping of str to Prior
+        Parameters that are unknown.
+    effects : tuple of (str, str)
+        What was added to the model of the user, in order.
+    """
+
+    model: Model
+    theta: Array
+    priors: Mapping[str, Prior]
+    effects: tuple[Key, ...] = ()
+
+    @cached_property
+    def columns(self) -> list[int]:
+        """Places of the unknown parameters."""
+        return [self.model.index(name) for name in self.priors]
+
+    @cached_property
+    def ends(self) -> Array:
+        """What is possible (k, 2), in deviations of the priors."""
+        return np.array([prior.ends for prior in self.priors.values()]).reshape(-1, 2)
+
+    @cached_property
+    def standard(self) -> Array:
+        """The unknown parameters in deviations of their priors (k,)."""
+        pairs = zip(self.priors.values(), self.columns, strict=True)
+        return np.array([prior.standard(float(self.theta[column])) for prior, column in pairs])
+
+    @cached_property
+    def slopes(self) -> Array:
+        """Change of each unknown parameter by a deviation (k,)."""
+        pairs = zip(self.priors.values(), self.columns, strict=True)
+        return np.array([prior.slope(float(self.theta[column])) for prior, column in pairs])
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Unknown parameters by name, SI."""
+        return {name: float(self.theta[column]) for name, column in zip(self.priors, self.columns, strict=True)}
+
+    def at(self, standard: Array) -> Structure:
+        """With unknown parameters at these deviations of their priors, as far as they are possible."""
+        inside = np.clip(standard, self.ends[:, 0], self.ends[:, 1])
+        theta = self.theta.copy()
+        for prior, column, z in zip(self.priors.values(), self.columns, inside, strict=True):
+            theta[column] = prior.value(float(z))
+        return replace(self, theta=theta)
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """A structure under an observer of some bandwidth.
+
+    Attributes
+    ----------
+    structure : Structure
+    band : float
+        Hz.
+    residual : ndarray, shape (N, m)
+    jacobian : ndarray, shape (N, m, k)
+        By unknown parameters.
+    samples : ndarray
+        Log likelihood of each sample by the structure's own colour.
+    evidence : float
+        Logarithm of the probability density of the records under the structure, nats.
+    colour : Colour
+    """
+
+    structure: Structure
+    band: float
+    residual: Array
+    jacobian: Array
+    samples: Array
+    evidence: float
+    colour: Colour
+
+    @property
+    def log_likelihood(self) -> float:
+        """At the values."""
+        return float(np.sum(self.samples))
+
+
+class Fitter:
+    """Fits structures to what an observer leaves."""
+
+    def __init__(self, observed: Observed, settings: Settings) -> None:
+        self.observed, self.settings = observed, settings
+
+    def weighed(self, structure: Structure, band: float) -> Fitted:
+        """The structure as it stands.
+
+        Raises
+        ------
+        VpmError
+            It runs away from the records.
+        """
+        return self._weighed(structure, band, *self.followed(structure, band))
+
+    def fitted(self, structure: Structure, band: float, colour: Colour | None = None) -> Fitted:
+        """Most probable values, by bounded Gauss-Newton steps; under a given colour, or else as the channels are.
+
+        Raises
+        ------
+        VpmError
+            The structure runs away from the records where it begins.
+        """
+        structure = structure.at(structure.standard)
+        residual, jacobian = self.followed(structure, band)
+        colour = colour or plain(residual, self.observed.parts)
+        for _ in range(self.settings.iterations if structure.priors else 0):
+            before = self._cost(structure, residual, colour)
+            move = bounded_step(structure, *self._white(structure, residual, jacobian, colour), self.settings.reach)
+            better = self._better(structure, band, colour, move, before)
+            if better is None:
+                break
+            structure, residual, jacobian = better
+            if before - self._cost(structure, residual, colour) < self.settings.tolerance:
+                break
+        return self._weighed(structure, band, residual, jacobian)
+
+    def settled(self, found: Fitted) -> Fitted:
+        """At its own colour and its own bandwidth."""
+        for _ in range(3):
+            start = found
+            found = max(found, self.fitted(found.structure, found.band, found.colour), key=_evidence)
+            for factor in (0.5, 2.0):
+                other = self._climbed(found, factor)
+                if other is not found:
+                    found = other
+                    break
+            if found.evidence < start.evidence + self.settings.tolerance or found.band == start.band:
+                break
+        return found
+
+    def _climbed(self, found: Fitted, factor: float) -> Fitted:
+        """Bandwidths in steps of ``factor`` for as long as the evidence grows."""
+        while self.settings.narrowest <= found.band * factor <= self.settings.widest:
+            try:
+                other = self.weighed(found.structure, found.band * factor)
+            except (VpmError, ArithmeticError):
+                break
+            if not other.evidence > found.evidence:
+                break
+            found = other
+        return found
+
+    def _better(
+        self, structure: Structure, band: float, colour: Colour, move: Array, before: float
+    ) -> tuple[Structure, Array, Array] | None:
+        for share in SHARES:
+            tried = structure.at(structure.standard + share * move)
+            try:
+                residual, jacobian = self.followed(tried, band)
+            except (VpmError, ArithmeticError):
+                continue
+            if self._cost(tried, residual, colour) < before:
+                return tried, residual, jacobian
+        return None
+
+    def followed(self, structure: Structure, band: float) -> tuple[Array, Array]:
+        """What the observer leaves of the records (N, m), and its derivatives by unknown parameters (N, m, k).
+
+        Raises
+        ------
+        VpmError
+            The structure runs away from the records.
+        """
+        residual, jacobian = self.observed.follow(structure.model, structure.theta, band, structure.columns)
+        if not (np.all(np.isfinite(residual)) and np.all(np.isfinite(jacobian))):
+            raise VpmError(f"{structure.model.name} runs away from the records")
+        return residual, jacobian
+
+    def _white(self, structure: Structure, residual: Array, jacobian: Array, colour: Colour) -> tuple[Array, Array]:
+        """Prediction errors, and their change by deviations of the priors."""
+        parts = self.observed.parts
+        return colour.whitened(residual, parts), colour.whitened(jacobian, parts) * structure.slopes
+
+    def _cost(self, structure: Structure, residual: Array, colour: Colour) -> float:
+        """Negative logarithm of the posterior density, its scale being the most likely one."""
+        errors = colour.whitened(residual, self.observed.parts)
+        return 0.5 * len(errors) * math.log(float(np.mean(errors**2))) + 0.5 * float(
+            structure.standard @ structure.standard
+        )
+
+    def _weighed(self, structure: Structure, band: float, residual: Array, jacobian: Array) -> Fitted:
+        parts = self.observed.parts
+        colour = colour_of(residual, parts, self.settings.order)
+        samples = log_likelihood(colour, residual, parts)
+        _, slopes = self._white(structure, residual, jacobian, colour)
+        z = structure.standard
+        curvature = np.eye(len(z)) + slopes.T @ slopes
+        evidence = float(np.sum(samples)) - 0.5 * float(z @ z) - 0.5 * float(np.linalg.slogdet(curvature)[1])
+        return Fitted(structure, band, residual, jacobian, samples, evidence, colour)
+
+
+def bounded_step(structure: Structure, errors: Array, slopes: Array, reach: float) -> Array:
+    """Gauss-Newton step in deviations of the priors, within what is possible (bounded least squares)."""
+    z, scale = structure.standard, max(float(np.mean(errors**2)), 1e-300)
+    normal = slopes.T @ slopes / scale + np.eye(len(z))
+    sizes = 1.0 / np.sqrt(np.diag(normal))
+    root = np.linalg.cholesky(normal * np.outer(sizes, sizes) + 1e-12 * np.eye(len(z))).T
+    pull = -(slopes.T @ errors / scale + z) * sizes
+    target = np.linalg.solve(root.T, pull)
+    low = np.minimum(np.maximum(structure.ends[:, 0] - z, -reach), -1e-12) / sizes
+    high = np.maximum(np.minimum(structure.ends[:, 1] - z, reach), 1e-12) / sizes
+    return np.asarray(lsq_linear(root, target, (low, high), method="bvls").x * sizes)
+
+
+def _evidence(found: Fitted) -> float:
+    return found.evidence
