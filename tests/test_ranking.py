@@ -52,22 +52,28 @@ def pushed(
     )
     command = 5.0 * swing * np.minimum(time, 1.0)
     place, speed, force = 0.0, 0.0, 0.0
-    queue = deque([0.0] * max(round(late / h), 0))
+    queue = deque([0.0] * round(late / h))
     places = np.empty(samples)
     for sample in range(samples):
         places[sample] = place
         for _ in range(FINE):
             queue.append(command[sample])
-            asked = GAIN * queue.popleft()
-            force = asked if lag == 0.0 else force + (1.0 - np.exp(-h / lag)) * (asked - force)
+            asked, before = GAIN * queue.popleft(), speed
+            mean = asked + (force - asked) * (_mean_decay(h / lag) if lag else 0.0)
+            force = asked + (force - asked) * (np.exp(-h / lag) if lag else 0.0)
             stop = -4e4 * (place - np.clip(place, -ends, ends))
-            speed += h * (force + stop - OIL * speed) / MASS
+            speed = speed * np.exp(-h * OIL / MASS) + h * _mean_decay(h * OIL / MASS) * (mean + stop) / MASS
             speed -= np.clip(speed, -h * dry / MASS, h * dry / MASS)
-            place += h * speed
+            place += 0.5 * h * (before + speed)
     readings = places + READING * random.standard_normal(samples)
     return Experiment.from_arrays(
         time, {"motor.command": command, "way.position": readings}, model=Model.from_toml(SLEDGE), name=f"push {seed}"
     )
+
+
+def _mean_decay(turn: float) -> float:
+    """Mean of ``exp(-x)`` for x from 0 to ``turn``."""
+    return float(-np.expm1(-turn) / turn)
 
 
 def test_an_autoregression_is_found_again_and_its_density_is_the_exact_one() -> None:

@@ -16,6 +16,7 @@ from vpm.identify import InverseDynamicsProblem
 from vpm.ranking.colour import Colour, plain
 from vpm.ranking.settings import Settings
 from vpm.ranking.sizes import Sizes
+from vpm.ranking.starts import started
 from vpm.ranking.structure import Fitted, Fitter, Structure, bounded_step
 
 Array = NDArray[np.float64]
@@ -36,12 +37,15 @@ class Proposal:
     colour : Colour
     gain : float
         What one step of a fit promises, nats.
+    neutral : bool
+        The effect does nothing where it begins.
     """
 
     structure: Structure
     band: float
     colour: Colour
     gain: float
+    neutral: bool
 
     @property
     def key(self) -> Key:
@@ -57,8 +61,6 @@ def extended(structure: Structure, candidate: Candidate, start: Mapping[str, flo
     VpmError
         The effect cannot sit there with these values.
     """
-    if candidate.effect.name == "backlash":  # what rubs within the play is friction, not the contact
-        start = {**start, "contact_damping": start["damping"], "damping": 0.0}
     model = structure.model.with_effect(candidate.effect.name, candidate.site, **start)
     theta = model.theta.copy()
     for name, value in zip(structure.model.parameter_names, structure.theta, strict=True):
@@ -69,7 +71,7 @@ def extended(structure: Structure, candidate: Candidate, start: Mapping[str, flo
         parameter = candidate.effect.parameter(short)
         if name in structure.model.parameters or short in candidate.fixed:
             continue
-        if not parameter.shape or parameter.learnt or short in start or short in candidate.bounds:
+        if not parameter.shape or parameter.learnt or short in start:
             priors[name] = sizes.prior(candidate, parameter, model.parameters[name].value)
     return Structure(model, theta, priors, (*structure.effects, candidate.key))
 
@@ -83,7 +85,8 @@ def proposals(
     motion is large, and whitened, where a weak one stands out.
     """
     model = found.structure.model.with_parameters(found.structure.values)
-    listed = candidates(model, data, data.evaluate(model, model.theta)[0])
+    seen = candidates(model, data, data.evaluate(model, model.theta)[0])
+    listed = [started(candidate, model, sizes) for candidate in seen]
     references = [fitter.fitted(found.structure, band) for band in fitter.settings.bands]
     items = [(candidate, start) for candidate in listed for start in candidate.starts]
     screened = each(
@@ -92,11 +95,11 @@ def proposals(
         items,
         lambda item: item[0].label,
     )
-    seen = [views for views in screened if not isinstance(views, Failure)]
+    ranked = [views for views in screened if not isinstance(views, Failure)]
     chosen: list[Proposal] = []
     for band in range(len(references)):
         for view in range(VIEWS):
-            chosen += _seated([views[band][view] for views in seen], fitter.settings)
+            chosen += _seated([views[band][view] for views in ranked], fitter.settings)
     return chosen
 
 
@@ -119,7 +122,7 @@ def _seen(
         move = bounded_step(structure, errors, slopes, fitter.settings.reach)
         after = min(float(np.sum((errors + slopes @ move) ** 2)), float(errors @ errors))
         gain = 0.5 * len(before) * math.log(float(before @ before) / max(after, 1e-300))
-        yield Proposal(structure, reference.band, colour, gain)
+        yield Proposal(structure, reference.band, colour, gain, candidate.neutral)
 
 
 def _seated(seen: list[Proposal], settings: Settings) -> list[Proposal]:
@@ -130,6 +133,6 @@ def _seated(seen: list[Proposal], settings: Settings) -> list[Proposal]:
             break
         if proposal.key not in taken and len(taken) == settings.seats:
             continue
-        if len(taken[proposal.key]) < settings.starts:
+        if len(taken[proposal.key]) < (1 if proposal.neutral else settings.starts):
             taken[proposal.key].append(proposal)
     return [proposal for several in taken.values() for proposal in several]

@@ -109,7 +109,7 @@ class _Search:
         rounds: list[tuple[Ranked, ...]] = []
         effects: list[Ranked] = []
         while len(effects) < self.settings.effects:
-            tried = self._round(found)
+            found, tried = self._round(found)
             rounds.append(tuple(self._ranked(one, found) for one in tried))
             if not tried or rounds[-1][0].evidence < self.settings.odds:
                 break
@@ -118,31 +118,71 @@ class _Search:
             rivals = tuple(f"{one.effect} at {one.site}" for one in close)
             effects.append(replace(best, rivals=rivals))
             self.say(f"{best.effect} at {best.site}: {best.evidence:.1f} nats")
-            found = tried[0]
+            found, needless = self._without_needless(tried[0])
+            effects = [one for one in effects if (one.effect, one.site) not in needless]
+            if needless:
+                self.say("no longer needed: " + ", ".join(" at ".join(key) for key in needless))
         model = found.structure.model.with_parameters(found.structure.values)
         return Ranking(tuple(effects), tuple(rounds), model, found.band, found.log_likelihood)
 
-    def _round(self, found: Fitted) -> list[Fitted]:
-        """Structures with one effect more, the most probable first; each effect once."""
-        chosen = proposals(found, self.fitter, self.data, self.sizes, self.each)
-        trials = self.each("fitting", self._settled, chosen, lambda one: " at ".join(one.key))
-        best: dict[Key, Fitted] = {}
-        for trial in trials:
-            if isinstance(trial, Failure) or not np.isfinite(trial.evidence):
-                continue
-            key = trial.structure.effects[-1]
-            if key not in best or trial.evidence > best[key].evidence:
-                best[key] = trial
-        return sorted(best.values(), key=lambda one: -one.evidence)
+    def _round(self, found: Fitted) -> tuple[Fitted, list[Fitted]]:
+        """What had been found, and structures with one effect more, the most probable first; each effect once.
 
-    def _settled(self, proposal: Proposal) -> Fitted:
-        return self.fitter.settled(self.fitter.fitted(proposal.structure, proposal.band, proposal.colour))
+        What the best of them makes of the parameters that had been found may be better without it too: a fit that had
+        not come to its end is no evidence for one effect more.
+        """
+        while True:
+            tried = self._tried(found)
+            if not tried or tried[0].evidence - found.evidence < self.settings.odds:
+                return found, tried
+            other = self._settled_without(tried[0], tried[0].structure.effects[-1])
+            if other is None or other.evidence < found.evidence + self.settings.same:
+                return found, tried
+            found = other
+
+    def _tried(self, found: Fitted) -> list[Fitted]:
+        chosen = proposals(found, self.fitter, self.data, self.sizes, self.each)
+        trials = self.each("fitting", self._fitted, chosen, lambda one: " at ".join(one.key))
+        several = _by_effect(trials)
+        last = [one for trial in several[: self.settings.finalists] for one in trial[: self.settings.optima]]
+        ends = self.each("settling", self.fitter.settled, last, lambda one: " at ".join(one.structure.effects[-1]))
+        return [trial[0] for trial in _by_effect([*ends, *trials])]
+
+    def _fitted(self, proposal: Proposal) -> Fitted:
+        return self.fitter.fitted(proposal.structure, proposal.band, proposal.colour)
+
+    def _without_needless(self, found: Fitted) -> tuple[Fitted, list[Key]]:
+        """Without those of the earlier effects that a later one has made needless."""
+        needless: list[Key] = []
+        for key in found.structure.effects[:-1]:
+            other = self._settled_without(found, key)
+            if other is not None and found.evidence - other.evidence < self.settings.odds:
+                found = other
+                needless.append(key)
+        return found, needless
+
+    def _settled_without(self, found: Fitted, key: Key) -> Fitted | None:
+        """The same without an effect; None where that runs away or another one rests on it."""
+        try:
+            structure = found.structure.without(key)
+            return self.fitter.settled(self.fitter.fitted(structure, found.band, found.colour))
+        except (VpmError, ArithmeticError):
+            return None
 
     @staticmethod
     def _ranked(one: Fitted, found: Fitted) -> Ranked:
         effect, site = one.structure.effects[-1]
         values = {name: value for name, value in one.structure.values.items() if name not in found.structure.priors}
         return Ranked(effect, site, one.evidence - found.evidence, values)
+
+
+def _by_effect(trials: Sequence[Fitted | Failure]) -> list[list[Fitted]]:
+    """The fits of each effect, the most probable first."""
+    several: dict[Key, list[Fitted]] = {}
+    whole = [one for one in trials if isinstance(one, Fitted) and np.isfinite(one.evidence)]
+    for trial in sorted(whole, key=lambda one: -one.evidence):
+        several.setdefault(trial.structure.effects[-1], []).append(trial)
+    return list(several.values())
 
 
 def known(model: Model, data: InverseDynamicsProblem) -> dict[str, Prior]:

@@ -23,7 +23,11 @@ class Settings:
     seats : int
         Effects of a round that are fitted for each observer and each way to look at what it leaves.
     starts : int
-        Start values of an effect that are fitted, of those that were screened, in each seat.
+        Start values that are fitted, of those that were screened, of an effect that is there at its start already.
+    finalists : int
+        Effects of a round that are fitted at every bandwidth that serves them.
+    optima : int
+        Fits of each of these that are pursued: contacts have several optima.
     iterations : int
         Steps of a fit.
     tolerance : float
@@ -44,7 +48,9 @@ class Settings:
     order: int = 12
     settling: float = 0.5
     seats: int = 5
-    starts: int = 1
+    starts: int = 3
+    finalists: int = 4
+    optima: int = 2
     iterations: int = 8
     tolerance: float = 0.5
     reach: float = 6.0

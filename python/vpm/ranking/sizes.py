@@ -33,6 +33,10 @@ class Sizes:
             )
             for place, joint in enumerate(data.joints)
         }
+        self.ways = {
+            joint: (min(float(s[0][:, place].min()) for s in states), max(float(s[0][:, place].max()) for s in states))
+            for place, joint in enumerate(data.joints)
+        }
         self.commands = {
             name: _strength(np.concatenate([motion.inputs[:, place] for motion in data.motions]))
             for place, name in enumerate(model.actuators)

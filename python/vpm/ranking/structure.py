@@ -79,6 +79,19 @@ class Structure:
             theta[column] = prior.value(float(z))
         return replace(self, theta=theta)
 
+    def without(self, key: Key) -> Structure:
+        """The same without one of its effects.
+
+        Raises
+        ------
+        ModelError
+            Another effect rests on it.
+        """
+        model = self.model.without_effect(*key)
+        theta = np.array([self.theta[self.model.index(name)] for name in model.parameter_names])
+        priors = {name: prior for name, prior in self.priors.items() if name in model.parameters}
+        return Structure(model, theta, priors, tuple(effect for effect in self.effects if effect != key))
+
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
@@ -152,30 +165,37 @@ class Fitter:
         return self._weighed(structure, band, residual, jacobian)
 
     def settled(self, found: Fitted) -> Fitted:
-        """At its own colour and its own bandwidth."""
-        for _ in range(3):
-            start = found
-            found = max(found, self.fitted(found.structure, found.band, found.colour), key=_evidence)
-            for factor in (0.5, 2.0):
-                other = self._climbed(found, factor)
-                if other is not found:
-                    found = other
+        """At its own colour and its own bandwidth, the effects being fitted anew at each."""
+        found = self._improved(found, found.band)
+        for factor in (2.0, 0.5):
+            while self.settings.narrowest <= found.band * factor <= self.settings.widest:
+                other = self._improved(found, found.band * factor)
+                if other.band == found.band:
                     break
-            if found.evidence < start.evidence + self.settings.tolerance or found.band == start.band:
-                break
+                found = other
         return found
 
-    def _climbed(self, found: Fitted, factor: float) -> Fitted:
-        """Bandwidths in steps of ``factor`` for as long as the evidence grows."""
-        while self.settings.narrowest <= found.band * factor <= self.settings.widest:
-            try:
-                other = self.weighed(found.structure, found.band * factor)
-            except (VpmError, ArithmeticError):
-                break
-            if not other.evidence > found.evidence:
-                break
-            found = other
-        return found
+    def _improved(self, found: Fitted, band: float) -> Fitted:
+        """Fitted at another bandwidth, under the colour there, if that is better."""
+        try:
+            other = self.weighed(found.structure, band)
+            while other.evidence + 2.0 * self._promise(other) > found.evidence:
+                better = self.fitted(other.structure, band, other.colour)
+                if not better.evidence > other.evidence + self.settings.tolerance:
+                    break
+                other = better
+        except (VpmError, ArithmeticError):
+            return found
+        return max(found, other, key=_evidence)
+
+    def _promise(self, found: Fitted) -> float:
+        """What a bounded Gauss-Newton step would gain if all were linear, nats."""
+        structure = found.structure
+        errors, slopes = self._white(structure, found.residual, found.jacobian, found.colour)
+        move = bounded_step(structure, errors, slopes, self.settings.reach)
+        after = structure.standard + move
+        before = float(errors @ errors) + float(structure.standard @ structure.standard)
+        return 0.5 * (before - float(np.sum((errors + slopes @ move) ** 2)) - float(after @ after))
 
     def _better(
         self, structure: Structure, band: float, colour: Colour, move: Array, before: float

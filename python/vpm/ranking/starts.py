@@ -1,0 +1,37 @@
+"""Where a fit of an effect begins, beside what the candidates of the catalogue say."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+from vpm.discrepancy.candidates import Candidate
+from vpm.discrepancy.structural import moved
+from vpm.model import Model
+from vpm.ranking.sizes import Sizes
+
+#: Share of its force by which a stop is stronger against the fastest impact, to begin with.
+LOSS = 0.1
+
+
+def started(candidate: Candidate, model: Model, sizes: Sizes) -> Candidate:
+    """A candidate whose contacts begin closed and stiff, where a fit can see them."""
+    if candidate.effect.name == "backlash":
+        return replace(candidate, starts=tuple(_play(start) for start in candidate.starts), fixed=())
+    if candidate.effect.name == "end_stop":
+        starts = tuple(_stop(start, candidate.site, model, sizes) for start in candidate.starts)
+        return replace(candidate, starts=starts, neutral=False)
+    return candidate
+
+
+def _play(start: Mapping[str, float]) -> Mapping[str, float]:
+    """What rubs within the play is friction, not the contact."""
+    return {**start, "contact_damping": start["damping"], "damping": 0.0}
+
+
+def _stop(start: Mapping[str, float], site: str, model: Model, sizes: Sizes) -> Mapping[str, float]:
+    """Stiff enough to turn the fastest motion round on the way that is seen beyond the end."""
+    low, high, speed = sizes.ways[site][0], sizes.ways[site][1], sizes.joints[site][1]
+    beyond = max(high - start.get("high", high), start.get("low", low) - low, 1e-3 * (high - low))
+    stiffness = moved(model, site) * (speed / beyond) ** 2
+    return {**start, "stiffness": stiffness, "damping": LOSS / speed}
