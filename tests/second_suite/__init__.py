@@ -1,0 +1,20 @@
+"""A second suite of blind cases for the diagnosis: other machines, other habits, other laws than in `blind`.
+
+Six machines, written from the laws of mechanics in NumPy alone: a belt axis, a rotary arm on a gear, a cart with a
+pendulum, a SCARA, a hoist with a load on a springy rope, and a six-axis arm. Joints truly stick (`plant.py`),
+hysteresis is of Maxwell slip, friction sits behind soft gears on some machines, four of six model files do not know the
+controller, there are joints without a drive or an encoder, and each case has five records of unequal lengths.
+
+    python tests/second_suite/run.py --machine belt --effect backlash --seeds 0-2
+    python tests/second_suite/run.py --machine belt --diagnose other.module.diagnose
+
+Cases are frozen: a generator is never changed to suit a diagnosis.
+
+``machine.py``   what a machine says of itself; ``belt.py`` to ``arm.py`` are the machines
+``pid.py``       the controller that two model files know
+``laws.py``      forces; ``plant.py`` the machine in time; ``loop.py`` encoders, controllers, drives
+``motions.py``   references
+``cases.py``     cases, and the rule that says which can be solved
+``score.py``     what counts as right
+``run.py``       the runner
+"""
