@@ -124,7 +124,7 @@ def motion(rng: np.random.Generator, time: Array, record: int) -> Array:
     for i in range(COUNT):
         if record in {0, 2}:
             path = moves(rng, time, REACH[i], SPEED[i])
-        elif record in {1, 3}:
+        elif record == 1:
             path = sines(rng, time, REACH[i], 0.12, 0.9)
         else:
             path = mixed(rng, time, REACH[i], SPEED[i], 1.2)
@@ -180,7 +180,7 @@ MACHINE = Machine(
     ),
     rate=125.0,
     substeps=4,
-    lengths=(7.0, 9.0, 6.0, 8.0, 7.5),
+    lengths=(7.0, 9.0, 6.0, 7.5),
     values={
         **{f"{name}.coulomb": COULOMB[i] for i, name in enumerate(NAMES)},
         **{f"{name}.viscous": VISCOUS[i] for i, name in enumerate(NAMES)},
@@ -206,11 +206,8 @@ MACHINE = Machine(
         Choice("sensor_offset", "e3", {"value": (0.04, 0.08)}),
     ),
     outside=(
-        Choice("load_friction", "j2", {"share": (0.12, 0.25)}),
+        Choice("load_dependent_friction", "j2", {"share": (0.12, 0.25)}),
         Choice("warming_friction", "j1", {"coulomb": (6.0, 10.0), "time": (2.0, 4.0)}),
     ),
-    pairs=(
-        # The textbook has links and rotors, but nobody's friction and no tool.
-        (("payload", "link6"), *((("coulomb_friction", name)) for name in NAMES)),
-    ),
+    pairs=((("payload", "link6"), ("coulomb_friction", "j2")), (("joint_compliance", "j1"), ("bias_force", "j2"))),
 )

@@ -76,7 +76,7 @@ MACHINE = Machine(
     ),
     rate=400.0,
     substeps=10,
-    lengths=(6.5, 9.0, 5.5, 7.5, 8.0),
+    lengths=(6.5, 9.0, 7.5, 8.0),
     values={"carriage.mass": 12.0, "axis.rotor": 6.0, "axis.coulomb": 14.0, "axis.viscous": 25.0},
     adjustable={"carriage.mass": 0.1, "axis.coulomb": 0.3, "axis.viscous": 0.3},
     tree=tree,
@@ -84,10 +84,7 @@ MACHINE = Machine(
     motion=motion,
     document=document,
     latency=1,
-    same=(
-        (("input_delay", "drive"), ("sensor_delay", "encoder")),
-        (("bias_force", "axis"), ("gravity_tilt", "world")),
-    ),
+    same=((("input_delay", "drive"), ("sensor_delay", "encoder")), (("bias_force", "axis"), ("gravity_tilt", "world"))),
     choices=(
         Choice("coulomb_friction", "axis", base="axis.coulomb"),
         Choice("viscous_friction", "axis", base="axis.viscous"),
@@ -123,7 +120,7 @@ MACHINE = Machine(
         Choice("quadratic_drag", "axis", {"drag": (40.0, 80.0)}),
         Choice("cubic_spring", "axis", {"stiffness": (900.0, 1800.0), "rest": (-0.02, 0.02)}),
         Choice("warming_friction", "axis", {"coulomb": (12.0, 22.0), "time": (2.0, 4.0)}),
-        Choice("position_friction", "axis", {"coulomb": (12.0, 22.0), "period": (0.25, 0.4)}),
+        Choice("position_dependent_friction", "axis", {"coulomb": (12.0, 22.0), "period": (0.25, 0.4)}),
     ),
     pairs=(
         (("backlash", "axis"), ("coulomb_friction", "axis")),

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from second_suite.machine import Choice, Joint, Machine, Values, loss_entries
+from second_suite.machine import Choice, Joint, Machine, Values, below, loss_entries
 from second_suite.motions import usual
 from second_suite.pid import Pid
 
@@ -47,12 +47,6 @@ def rest(values: Values, first: Array) -> Array:
 
 
 def document(number: Callable[[str], object], without: frozenset[str]) -> dict[str, object]:
-    lever = number("bob.lever")
-    low = (
-        {"value": -lever["value"], "uncertainty": lever["uncertainty"]}
-        if isinstance(lever, dict)
-        else -float(str(lever))
-    )
     return {
         "name": "cart with a pendulum",
         "gravity": [0.0, 0.0, -9.81],
@@ -60,7 +54,7 @@ def document(number: Callable[[str], object], without: frozenset[str]) -> dict[s
             "cart": {"mass": number("cart.mass")},
             "bob": {
                 "mass": BOB_MASS,
-                "center_of_mass": [0.0, 0.0, low],
+                "center_of_mass": [0.0, 0.0, below(number("bob.lever"))],
                 "inertia": [BOB_INERTIA, BOB_INERTIA, 1e-3, 0.0, 0.0, 0.0],
             },
         },
@@ -98,14 +92,8 @@ MACHINE = Machine(
     ),
     rate=125.0,
     substeps=16,
-    lengths=(9.0, 12.0, 10.0, 8.0, 11.0),
-    values={
-        "cart.mass": 4.0,
-        "bob.lever": 0.33,
-        "rail.coulomb": 3.0,
-        "rail.viscous": 6.0,
-        "pivot.viscous": 0.006,
-    },
+    lengths=(9.0, 12.0, 8.0, 11.0),
+    values={"cart.mass": 4.0, "bob.lever": 0.33, "rail.coulomb": 3.0, "rail.viscous": 6.0, "pivot.viscous": 0.006},
     adjustable={"cart.mass": 0.1, "bob.lever": 0.05, "rail.coulomb": 0.3, "rail.viscous": 0.3, "pivot.viscous": 0.5},
     tree=tree,
     law=SERVO.law,
@@ -136,8 +124,5 @@ MACHINE = Machine(
         Choice("cubic_spring", "rail", {"stiffness": (150.0, 300.0), "rest": (-0.02, 0.02)}),
         Choice("warming_friction", "rail", {"coulomb": (2.5, 5.0), "time": (3.0, 5.0)}),
     ),
-    pairs=(
-        (("coulomb_friction", "pivot"), ("bias_force", "rail")),
-        (("sensor_offset", "swing"), ("spring", "rail")),
-    ),
+    pairs=((("coulomb_friction", "pivot"), ("bias_force", "rail")), (("sensor_offset", "swing"), ("spring", "rail"))),
 )

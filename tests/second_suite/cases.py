@@ -1,4 +1,8 @@
-"""Cases: a model file that lacks something, five records of the machine that has it, and whether that can be seen.
+"""Cases: a model file that lacks something, four records of the machine that has it, and whether that can be seen.
+
+**Frozen cases.** `frozen` lists them by seed. Each seed has, of every machine, both kinds of clean case and every fifth
+of the other requests, so that five consecutive seeds have each request once. Seeds of `DEV` are to develop on. Seeds of
+`FRESH` are never run, or looked at, while anything is developed: they are for one count of what is finished.
 
 **Rule for "solvable".** Each case is simulated without noise with the effect and without it. The change of all logged
 signals is divided by the noise of each channel, which is what noise and counts change in the machine without the effect
@@ -11,7 +15,7 @@ squares on the training records, and the same values are then tried on the recor
 from __future__ import annotations
 
 import zlib
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -21,7 +25,7 @@ from numpy.typing import NDArray
 
 from second_suite import arm, belt, cart, hoist, rotary, scara
 from second_suite.loop import Inputs, Signals, simulated
-from second_suite.machine import Choice, Machine, columns_of, drawn
+from second_suite.machine import Machine, columns_of, drawn
 from second_suite.plant import Hidden
 from vpm import Experiment, Model
 
@@ -29,6 +33,8 @@ Array = NDArray[np.float64]
 
 MACHINES: dict[str, Machine] = {m.MACHINE.name: m.MACHINE for m in (belt, rotary, cart, scara, hoist, arm)}
 NONE, PARAMETERS = "none", "parameters"
+CLEAN = frozenset({NONE, PARAMETERS})
+DEV, FRESH, SLICES = range(5), range(100, 105), 5
 #: How far clear of the noise an effect has to stand.
 CLEAR = 3.0
 #: Errors of the file's parameters, as share of their uncertainty; range of the wrong one in the cases "parameters".
@@ -47,7 +53,7 @@ class Case:
         ``kind`` is single, pair, outside, none or parameters.
     document : dict
         The model file.
-    train, validate : list of Experiment
+    train, holdout : list of Experiment
     hidden : tuple of Hidden
     strengths : tuple of float
         Of each hidden effect, see the rule above.
@@ -59,7 +65,7 @@ class Case:
     kind: str
     document: dict[str, Any]
     train: list[Experiment]
-    validate: list[Experiment]
+    holdout: list[Experiment]
     hidden: tuple[Hidden, ...]
     strengths: tuple[float, ...]
 
@@ -82,10 +88,19 @@ def requests(machine: str) -> dict[str, str]:
     return found | {f"{c.effect}@{c.site}": "outside" for c in m.outside}
 
 
+def frozen(seeds: Iterable[int]) -> Iterator[tuple[str, str, int]]:
+    """The cases of some seeds: machine, request, seed."""
+    for seed in seeds:
+        for machine in MACHINES:
+            for number, (request, kind) in enumerate(requests(machine).items()):
+                if kind in CLEAN or number % SLICES == seed % SLICES:
+                    yield machine, request, seed
+
+
 def make_case(machine: str, request: str, seed: int) -> Case:
     """One case, the same for the same words and number."""
     m, kind = MACHINES[machine], requests(machine)[request]
-    hidden = () if kind in {NONE, PARAMETERS} else hidden_of(m, request, seed)
+    hidden = () if kind in CLEAN else hidden_of(m, request, seed)
     values = true_values(m, seed)
     rng = _rng(machine, request, seed)
     names = [name for name in m.adjustable if name not in {h.base for h in hidden}]
@@ -100,18 +115,11 @@ def make_case(machine: str, request: str, seed: int) -> Case:
 
 def hidden_of(m: Machine, request: str, seed: int) -> tuple[Hidden, ...]:
     """What a request hides, with numbers drawn by the seed."""
-    known: dict[str, tuple[Choice, bool]] = {f"{c.effect}@{c.site}": (c, True) for c in m.choices}
-    known |= {f"{c.effect}@{c.site}": (c, False) for c in m.outside}
-    found = []
-    for word in request.split("+"):
-        rng = _rng(m.name, word, seed)
-        if word not in known:  # the coulomb friction of a joint, as part of several effects
-            effect, site = word.split("@")
-            found.append(Hidden(effect, site, {}, base=f"{site}.coulomb"))
-            continue
-        choice, in_catalogue = known[word]
-        found.append(Hidden(choice.effect, choice.site, drawn(rng, choice.ranges), choice.base, in_catalogue))
-    return tuple(found)
+    choices = {f"{c.effect}@{c.site}": c for c in (*m.choices, *m.outside)}
+    return tuple(
+        Hidden(c.effect, c.site, drawn(_rng(m.name, word, seed), c.ranges), c.base)
+        for word, c in ((word, choices[word]) for word in request.split("+"))
+    )
 
 
 def true_values(m: Machine, seed: int) -> dict[str, float]:
@@ -121,7 +129,7 @@ def true_values(m: Machine, seed: int) -> dict[str, float]:
 
 
 def inputs_of(m: Machine, seed: int) -> tuple[Inputs, list[int]]:
-    """References and torques of the five records, and how many samples each has; short ones are held to the end."""
+    """References and torques of all records, and how many samples each has; short ones are held to the end."""
     counts = [round(length * m.rate) for length in m.lengths]
     longest, n = max(counts), len(m.joints)
     reference, torque = np.zeros((longest, n, len(counts))), np.zeros((longest, n, len(counts)))

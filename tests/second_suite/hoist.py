@@ -104,7 +104,7 @@ MACHINE = Machine(
     ),
     rate=160.0,
     substeps=20,
-    lengths=(8.0, 10.0, 7.0, 9.0, 8.5),
+    lengths=(8.0, 10.0, 9.0, 8.5),
     values={
         "platform.mass": PLATFORM_MASS,
         "rope.stiffness": 2.4e4,
@@ -154,10 +154,7 @@ MACHINE = Machine(
         Choice("quadratic_drag", "lift", {"drag": (150.0, 300.0)}),
         Choice("cubic_spring", "lift", {"stiffness": (900.0, 1800.0), "rest": (-0.05, 0.05)}),
         Choice("warming_friction", "lift", {"coulomb": (30.0, 50.0), "time": (2.0, 4.0)}),
-        Choice("position_friction", "lift", {"coulomb": (30.0, 50.0), "period": (0.3, 0.5)}),
+        Choice("position_dependent_friction", "lift", {"coulomb": (30.0, 50.0), "period": (0.3, 0.5)}),
     ),
-    pairs=(
-        (("payload", "load"), ("coulomb_friction", "lift")),
-        (("rotor_inertia", "lift"), ("torque_ripple", "lift")),
-    ),
+    pairs=((("payload", "load"), ("coulomb_friction", "lift")), (("rotor_inertia", "lift"), ("torque_ripple", "lift"))),
 )

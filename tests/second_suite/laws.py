@@ -80,9 +80,9 @@ def dry(name: str, values: Numbers, q: Array, v: Array, time: float, load: Array
         level = np.full_like(q, values["coulomb"])
     elif name == "warming_friction":
         level = np.full_like(q, values["coulomb"] * np.exp(-time / values["time"]))
-    elif name == "position_friction":
+    elif name == "position_dependent_friction":
         level = values["coulomb"] * (0.5 + 0.5 * np.sin(2.0 * np.pi * q / values["period"]))
-    elif name == "load_friction":
+    elif name == "load_dependent_friction":
         level = values["share"] * np.abs(load)
     else:
         return None

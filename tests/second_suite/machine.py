@@ -139,12 +139,16 @@ class Machine:
         """Coordinates with an encoder."""
         return tuple(i for i, joint in enumerate(self.joints) if joint.encoder)
 
+    def joint_of(self, site: str) -> int | None:
+        """The coordinate that a joint, a drive or an encoder belongs to; None for bodies and the world."""
+        return next((i for i, j in enumerate(self.joints) if site and site in {j.name, j.drive, j.encoder}), None)
+
     def index(self, site: str) -> int:
-        """The coordinate that a joint, a drive or an encoder belongs to."""
-        for i, joint in enumerate(self.joints):
-            if site in {joint.name, joint.drive, joint.encoder}:
-                return i
-        raise KeyError(site)
+        """The same of a site that has one."""
+        found = self.joint_of(site)
+        if found is None:
+            raise KeyError(site)
+        return found
 
 
 def columns_of(values: Mapping[str, float], count: int) -> dict[str, Array]:
@@ -161,6 +165,13 @@ def drawn(rng: np.random.Generator, ranges: Mapping[str, Range]) -> dict[str, fl
         else:
             numbers[name] = float(rng.uniform(low, high))
     return numbers
+
+
+def below(number: object) -> object:
+    """A number of a model file for what hangs below a joint: files count heights upward."""
+    if isinstance(number, dict):
+        return {**number, "value": -number["value"]}
+    return -float(str(number))
 
 
 def loss_entries(

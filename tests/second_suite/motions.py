@@ -53,11 +53,11 @@ def mixed(rng: np.random.Generator, time: Array, reach: float, speed: float, hig
 
 
 def usual(rng: np.random.Generator, time: Array, record: int, reach: float, speed: float, high: float) -> Array:
-    """What most axes run: moves, sines, moves and a chirp to learn from, moves with sines to judge."""
-    if record in {0, 2}:
+    """What most axes run: moves, sines and a chirp to learn from, moves with sines to judge."""
+    if record == 0:
         return moves(rng, time, reach, speed)
     if record == 1:
         return sines(rng, time, reach, 0.12, high)
-    if record == 3:
+    if record == 2:
         return chirp(rng, time, reach, 0.15, high)
     return mixed(rng, time, reach, speed, high)

@@ -34,7 +34,6 @@ class Hidden:
     site: str
     values: Mapping[str, float]
     base: str = ""
-    known: bool = True
 
 
 class Plant:

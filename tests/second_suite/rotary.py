@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from second_suite.machine import Choice, Joint, Law, Machine, Values, loss_entries
+from second_suite.machine import Choice, Joint, Law, Machine, Values, below, loss_entries
 from second_suite.motions import fade, sines, usual
 
 Array = NDArray[np.float64]
@@ -52,20 +52,13 @@ def torque(rng: np.random.Generator, time: Array, record: int) -> tuple[Array, b
 
 
 def document(number: Callable[[str], object], without: frozenset[str]) -> dict[str, object]:
-    lever = number("arm.lever")
-    # The centre of mass hangs below the joint: the file counts upward.
-    low = (
-        {"value": -lever["value"], "uncertainty": lever["uncertainty"]}
-        if isinstance(lever, dict)
-        else -float(str(lever))
-    )
     return {
         "name": "rotary arm",
         "gravity": [0.0, 0.0, -9.81],
         "bodies": {
             "arm": {
                 "mass": MASS,
-                "center_of_mass": [0.0, 0.0, low],
+                "center_of_mass": [0.0, 0.0, below(number("arm.lever"))],
                 "inertia": [0.05, number("arm.inertia"), 0.01, 0.0, 0.0, 0.0],
             }
         },
@@ -102,14 +95,8 @@ MACHINE = Machine(
     ),
     rate=250.0,
     substeps=16,
-    lengths=(8.0, 10.0, 7.0, 6.0, 9.0),
-    values={
-        "arm.lever": 0.22,
-        "arm.inertia": 0.045,
-        "elbow.rotor": 0.2,
-        "elbow.coulomb": 0.55,
-        "elbow.viscous": 0.3,
-    },
+    lengths=(8.0, 10.0, 7.0, 9.0),
+    values={"arm.lever": 0.22, "arm.inertia": 0.045, "elbow.rotor": 0.2, "elbow.coulomb": 0.55, "elbow.viscous": 0.3},
     adjustable={"arm.lever": 0.08, "arm.inertia": 0.2, "elbow.coulomb": 0.3, "elbow.viscous": 0.3},
     tree=tree,
     law=law,
@@ -157,8 +144,8 @@ MACHINE = Machine(
         Choice("quadratic_drag", "elbow", {"drag": (0.25, 0.45)}),
         Choice("cubic_spring", "elbow", {"stiffness": (0.9, 1.6), "rest": (-0.1, 0.1)}),
         Choice("warming_friction", "elbow", {"coulomb": (0.6, 1.1), "time": (2.0, 4.0)}),
-        Choice("position_friction", "elbow", {"coulomb": (0.6, 1.1), "period": (1.0, 1.6)}),
-        Choice("load_friction", "elbow", {"share": (0.12, 0.22)}),
+        Choice("position_dependent_friction", "elbow", {"coulomb": (0.6, 1.1), "period": (1.0, 1.6)}),
+        Choice("load_dependent_friction", "elbow", {"share": (0.12, 0.22)}),
     ),
     pairs=(
         (("joint_compliance", "elbow"), ("bias_force", "elbow")),

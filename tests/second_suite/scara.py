@@ -103,11 +103,7 @@ def document(number: Callable[[str], object], without: frozenset[str]) -> dict[s
         },
         "joints": joints,
         "actuators": {
-            f"{joint.name}_motor": {
-                "joint": joint.name,
-                "gain": joint.gain,
-                "command_unit": "A",
-            }
+            f"{joint.name}_motor": {"joint": joint.name, "gain": joint.gain, "command_unit": "A"}
             for joint in MACHINE.joints
         },
         "sensors": {
@@ -161,7 +157,7 @@ MACHINE = Machine(
     ),
     rate=200.0,
     substeps=10,
-    lengths=(7.0, 9.0, 6.0, 7.0, 8.0),
+    lengths=(7.0, 9.0, 6.0, 8.0),
     values={
         "upper.inertia": 0.12,
         "fore.inertia": 0.055,
@@ -229,8 +225,8 @@ MACHINE = Machine(
     outside=(
         Choice("quadratic_drag", "shoulder", {"drag": (1.6, 2.8)}),
         Choice("warming_friction", "elbow", {"coulomb": (1.5, 2.5), "time": (2.0, 4.0)}),
-        Choice("position_friction", "shoulder", {"coulomb": (3.0, 5.0), "period": (0.8, 1.2)}),
-        Choice("load_friction", "quill", {"share": (0.12, 0.25)}),
+        Choice("position_dependent_friction", "shoulder", {"coulomb": (3.0, 5.0), "period": (0.8, 1.2)}),
+        Choice("load_dependent_friction", "quill", {"share": (0.12, 0.25)}),
     ),
     pairs=(
         (("payload", "tool"), ("coulomb_friction", "elbow")),

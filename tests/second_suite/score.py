@@ -1,24 +1,40 @@
-"""What a diagnosis answered to a case, what counts as right, and the table of many answers."""
+"""What a solver answered to a case, how many points that makes, and the table of many answers."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, field
-from typing import Any
+from dataclasses import dataclass
+from itertools import permutations
 
-from second_suite.cases import MACHINES, NONE, PARAMETERS, Case
+from second_suite.cases import CLEAN, MACHINES, Case
+from vpm import Experiment, Model
 
 #: Names that speak of one kind of physics: a wrong name of the right class sends an engineer to the right place.
+FRICTION = frozenset(
+    f"{kind}_friction"
+    for kind in (
+        "coulomb",
+        "stribeck",
+        "asymmetric",
+        "viscous",
+        "warming",
+        "position_dependent",
+        "load_dependent",
+        "lugre",
+    )
+)
 CLASSES = (
-    {"coulomb_friction", "stribeck_friction", "asymmetric_friction", "hysteresis", "viscous_friction"},
-    {"bias_force", "gravity_tilt", "sensor_offset", "spring", "end_stop", "torque_ripple"},
+    FRICTION | {"hysteresis", "quadratic_drag"},
+    {"bias_force", "gravity_tilt", "sensor_offset", "spring", "cubic_spring", "end_stop", "torque_ripple"},
     {"payload", "rotor_inertia", "sensor_gain"},
     {"input_delay", "actuator_lag", "sensor_delay"},
     {"joint_compliance", "backlash", "link_flexibility"},
     {"dead_zone", "saturation"},
 )
 Named = tuple[str, str]
+#: From the model file and the records to learn from and to judge by, to what is missing: (effect, site) of each.
+Solver = Callable[[Model, list[Experiment], list[Experiment]], Sequence[Named]]
 
 
 @dataclass(frozen=True)
@@ -29,141 +45,108 @@ class Answer:
     request: str
     seed: int
     kind: str
-    hidden: list[Named]
-    strengths: list[float]
+    hidden: tuple[Named, ...]
+    strengths: tuple[float, ...]
     solvable: bool
-    verdict: str = ""
-    named: list[Named] = field(default_factory=list)
-    candidates: list[Named] = field(default_factory=list)
+    named: tuple[Named, ...] = ()
     seconds: float = 0.0
-    making: float = 0.0
     error: str = ""
-    numbers: dict[str, float] = field(default_factory=dict)
-    truth: dict[str, float] = field(default_factory=dict)
-    summary: str = ""
 
     @property
-    def right(self) -> bool:
-        """Whether the first name is one that was hidden."""
-        return bool(self.named) and any(self._same(self.named[0], true)[0] for true in self.hidden)
+    def points(self) -> float:
+        """One for the hidden effects and nothing else, half if all are of the right class at the right joint.
+
+        Two names that are one physics on this machine (`Machine.same`) are one name. A solver that fails has none.
+        """
+        if self.error:
+            return 0.0
+        if self._matched(self._same):
+            return 1.0
+        return 0.5 if self._matched(self._alike) else 0.0
 
     @property
-    def site_right(self) -> bool:
-        """The same, at the right site."""
-        return bool(self.named) and any(self._same(self.named[0], true)[1] for true in self.hidden)
+    def line(self) -> str:
+        """The case and its answer on one line."""
+        mark = {1.0: "+", 0.5: "/", 0.0: "-"}[self.points] if self.solvable else "~"
+        truth, answer = _words(self.hidden) or self.request, _words(self.named) or "-"
+        clear = "/".join(f"{s:.0f}" for s in self.strengths) or "-"
+        said = f"{mark} {self.machine} {self.seed} {truth} -> {self.error or answer}"
+        return f"{said} ({self.seconds:.1f} s, {clear} times the noise)"
 
-    @property
-    def class_right(self) -> bool:
-        """Whether the first name is of the class of one that was hidden."""
-        first = self.named[0][0] if self.named else ""
-        return self.right or any({first, true} <= group for group in CLASSES for true, _ in self.hidden)
+    def _matched(self, fits: Callable[[Named, Named], bool]) -> bool:
+        """Whether each name fits one hidden effect, and each hidden effect one name."""
+        return len(self.named) == len(self.hidden) and any(
+            all(map(fits, order, self.hidden)) for order in permutations(self.named)
+        )
 
-    @property
-    def found(self) -> int:
-        """How many of the hidden effects are named at their sites."""
-        return sum(any(self._same(name, true)[1] for name in self.named) for true in self.hidden)
+    def _same(self, name: Named, true: Named) -> bool:
+        return name == true or any({name, true} == set(pair) for pair in MACHINES[self.machine].same)
 
-    @property
-    def more(self) -> list[Named]:
-        """Names that nothing hidden explains."""
-        return [name for name in self.named if not any(self._same(name, true)[1] for true in self.hidden)]
-
-    @property
-    def good(self) -> bool:
-        """Whether the answer is what it should be."""
-        if self.kind in {NONE, PARAMETERS}:
-            return not self.named and self.verdict in {"no_disagreement", "parameters_only"}
-        if self.kind == "outside":
-            return self.verdict == "unexplained"
-        if self.kind == "pair":
-            return self.found == len(self.hidden)
-        return self.right and self.site_right
-
-    def _same(self, name: Named, true: Named) -> tuple[bool, bool]:
-        """Whether two names are one, and the sites too; what is one physics on this machine is one."""
-        if any({name, true} == set(pair) for pair in MACHINES[self.machine].same):
-            return True, True
-        return name[0] == true[0], tuple(name) == tuple(true)
+    def _alike(self, name: Named, true: Named) -> bool:
+        """Whether two names are of one class, at one joint as far as their sites are of joints."""
+        at = {MACHINES[self.machine].joint_of(site) for _, site in (name, true)} - {None}
+        one_class = any({name[0], true[0]} <= group for group in (*CLASSES, {name[0]}))
+        return self._same(name, true) or (one_class and len(at) <= 1)
 
 
-def answered(case: Case, diagnose: Callable[..., Any], making: float) -> Answer:
-    """Ask ``diagnose(model, train, validate)``; an error is an answer, too."""
-    began = time.process_time()
-    known: dict[str, Any] = {
-        "machine": case.machine,
-        "request": case.request,
-        "seed": case.seed,
-        "kind": case.kind,
-        "hidden": [(h.effect, h.site) for h in case.hidden],
-        "strengths": [round(s, 2) for s in case.strengths],
-        "solvable": case.solvable,
-        "making": making,
-        "truth": {f"{h.effect}@{h.site}.{k}": v for h in case.hidden for k, v in h.values.items()},
-    }
+def _words(names: Sequence[Named]) -> str:
+    return " + ".join(f"{effect}@{site}" for effect, site in names)
+
+
+def answered(case: Case, solver: Solver) -> Answer:
+    """Ask a solver; an error is an answer, too. Time is that of the processor, of all threads of this process."""
+    model, began = case.model(), time.process_time()
+    named: Sequence[Named] = ()
+    error = ""
     try:
-        why = diagnose(case.model(), case.train, case.validate)
-    except Exception as error:  # noqa: BLE001  whatever a diagnosis raises is a failure of it, and counts as one
-        return Answer(**known, seconds=time.process_time() - began, error=f"{type(error).__name__}: {error}")
-    seconds = time.process_time() - began
-    named = [_named(effect) for effect in why.effects]
-    numbers = {
-        f"{effect.name}@{effect.site}.{p.name}": float(p.value)
-        for effect in why.effects
-        for p in getattr(effect, "parameters", ())
-    }
-    candidates = list(dict.fromkeys(_named(candidate) for candidate in why.candidates))
-    summary = str(getattr(why, "summary", ""))
+        named = solver(model, case.train, case.holdout)
+    except Exception as failure:  # noqa: BLE001  whatever a solver raises is a failure of it, and counts as one
+        error = f"{type(failure).__name__}: {failure}"
     return Answer(
-        **known,
-        verdict=why.verdict,
-        named=named,
-        candidates=candidates[:6],
-        seconds=seconds,
-        numbers=numbers,
-        summary=summary,
+        case.machine,
+        case.request,
+        case.seed,
+        case.kind,
+        tuple((h.effect, h.site) for h in case.hidden),
+        case.strengths,
+        case.solvable,
+        tuple((effect, site) for effect, site in named),
+        time.process_time() - began,
+        error,
     )
 
 
-def _named(entry: Any) -> Named:
-    return str(getattr(entry, "name", getattr(entry, "effect", ""))), str(entry.site)
-
-
-def to_dict(answer: Answer) -> dict[str, Any]:
-    """Plain data, with what the score makes of it."""
-    return {**asdict(answer), "good": answer.good}
+HEAD = ("machine", "cases", "single", "exact", "pair", "outside", "false alarms", "weak", "failed", "median s", "max s")
 
 
 def table(answers: Sequence[Answer]) -> str:
-    """Counts by machine."""
-    rows: list[tuple[str, ...]] = [
-        ("machine", "cases", "top-1", "class", "site", "pairs", "false", "unexpl.", "weak", "failed", "s", "max s")
-    ]
+    """Points by machine and kind; a weak case, whose effect drowns in the noise, is not counted."""
     machines = list(dict.fromkeys(a.machine for a in answers))
-    shown = [*machines, "all"] if len(machines) > 1 else machines
-    rows += [(machine, *_counts([a for a in answers if machine in {a.machine, "all"}])) for machine in shown]
-    widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
+    rows = [
+        HEAD,
+        *((m, *_counts([a for a in answers if a.machine == m])) for m in machines),
+        ("all", *_counts(answers)),
+    ]
+    widths = [max(len(row[i]) for row in rows) for i in range(len(HEAD))]
     return "\n".join("  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True)) for row in rows)
 
 
 def _counts(answers: Sequence[Answer]) -> tuple[str, ...]:
-    single = [a for a in answers if a.kind == "single" and a.solvable]
-    pairs = [a for a in answers if a.kind == "pair" and a.solvable]
-    nothing = [a for a in answers if a.kind in {NONE, PARAMETERS}]
-    outside = [a for a in answers if a.kind == "outside" and a.solvable]
+    def of(*kinds: str) -> list[Answer]:
+        return [a for a in answers if a.kind in kinds and a.solvable]
+
+    def points(group: Sequence[Answer]) -> str:
+        return f"{sum(a.points for a in group):g}/{len(group)}" if group else "."
+
+    clean, single = of(*CLEAN), of("single")
     times = sorted(a.seconds for a in answers)
-
-    def share(count: int, group: Sequence[Answer]) -> str:
-        return f"{count}/{len(group)}" if group else "."
-
-    first = [a for a in single if a.right]
     return (
         str(len(answers)),
-        share(len(first), single),
-        share(sum(a.class_right for a in single), single),
-        share(sum(a.site_right for a in first), first),
-        share(sum(a.good for a in pairs), pairs),
-        share(sum(bool(a.named) for a in nothing), nothing),
-        share(sum(a.good for a in outside), outside),
+        points(single),
+        str(sum(a.points == 1.0 for a in single)),
+        points(of("pair")),
+        points(of("outside")),
+        f"{sum(bool(a.named) for a in clean)}/{len(clean)}" if clean else ".",
         str(sum(not a.solvable for a in answers)),
         str(sum(bool(a.error) for a in answers)),
         f"{times[len(times) // 2]:.1f}",
