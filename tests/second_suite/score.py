@@ -69,9 +69,8 @@ class Answer:
         """The case and its answer on one line."""
         mark = {1.0: "+", 0.5: "/", 0.0: "-"}[self.points] if self.solvable else "~"
         truth, answer = _words(self.hidden) or self.request, _words(self.named) or "-"
-        clear = "/".join(f"{s:.0f}" for s in self.strengths) or "-"
-        said = f"{mark} {self.machine} {self.seed} {truth} -> {self.error or answer}"
-        return f"{said} ({self.seconds:.1f} s, {clear} times the noise)"
+        clear = "".join(f", {s:.0f} times the noise" for s in self.strengths)
+        return f"{mark} {self.machine} {self.seed} {truth} -> {self.error or answer} ({self.seconds:.1f} s{clear})"
 
     def _matched(self, fits: Callable[[Named, Named], bool]) -> bool:
         """Whether each name fits one hidden effect, and each hidden effect one name."""
