@@ -155,6 +155,17 @@ def test_mass_and_loads_are_those_of_the_model_file_at_any_place(name: str) -> N
             assert mass[0] @ a + load[:, 0] + drag == pytest.approx(required, abs=1e-12 * np.abs(required).max())
 
 
+@pytest.mark.parametrize("name", NAMES)
+def test_a_model_file_can_be_read_however_wrong_its_numbers_are(name: str) -> None:
+    m, rng = MACHINES[name], np.random.default_rng(0)
+    for _ in range(10):
+        signs = {key: float(rng.choice([-3.0, 3.0])) for key in m.adjustable}
+        values = {
+            key: v * float(np.exp(signs.get(key, 0.0) * m.adjustable.get(key, 0.0))) for key, v in m.values.items()
+        }
+        assert written(m, values).joints == tuple(joint.name for joint in m.joints)
+
+
 def gap(m: Machine, model: Model, log: Experiment, state: Array) -> float:
     """Largest difference of a free run of the model file and a log, over the way that is made."""
     first = np.zeros(model.core.n_states)

@@ -172,12 +172,7 @@ VISCOUS = (4.0, 6.0, 2.5, 0.6, 0.5, 0.4)
 ROTOR = (1.14, 4.71, 0.83, 0.2, 0.18, 0.19)
 MACHINE = Machine(
     name="arm",
-    joints=tuple(
-        Joint(
-            name, f"m{i + 1}", f"e{i + 1}", GAIN[i], "deg", "A", DEGREE, noise=2e-5, resolution=5e-5, drive_noise=0.01
-        )
-        for i, name in enumerate(NAMES)
-    ),
+    joints=tuple(Joint(name, f"m{i + 1}", f"e{i + 1}", GAIN[i], 2e-5, 5e-5, 0.01) for i, name in enumerate(NAMES)),
     rate=125.0,
     substeps=4,
     lengths=(7.0, 9.0, 6.0, 7.5),

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from second_suite.machine import Choice, Joint, Law, Machine, Values, loss_entries
+from second_suite.machine import Choice, Joint, Law, Machine, Values, loss_entries, uneven
 from second_suite.motions import usual
 
 Array = NDArray[np.float64]
@@ -59,21 +59,7 @@ def document(number: Callable[[str], object], without: frozenset[str]) -> dict[s
 GAIN = 42.0
 MACHINE = Machine(
     name="belt",
-    joints=(
-        Joint(
-            "axis",
-            "drive",
-            "encoder",
-            GAIN,
-            "mm",
-            "A",
-            1e-3,
-            noise=4e-6,
-            resolution=1e-5,
-            drive_noise=0.02,
-            prismatic=True,
-        ),
-    ),
+    joints=(Joint("axis", "drive", "encoder", GAIN, 4e-6, 1e-5, 0.02, prismatic=True),),
     rate=400.0,
     substeps=10,
     lengths=(6.5, 9.0, 7.5, 8.0),
@@ -89,16 +75,7 @@ MACHINE = Machine(
         Choice("coulomb_friction", "axis", base="axis.coulomb"),
         Choice("viscous_friction", "axis", base="axis.viscous"),
         Choice("stribeck_friction", "axis", {"stribeck": (8.0, 14.0), "speed": (0.01, 0.03)}),
-        Choice(
-            "asymmetric_friction",
-            "axis",
-            {
-                "coulomb_up": (8.0, 14.0),
-                "coulomb_down": (0.5, 1.0),
-                "viscous_up": (8.0, 20.0),
-                "viscous_down": (0.5, 1.0),
-            },
-        ),
+        uneven("axis", ((8.0, 14.0), (8.0, 20.0)), ((0.5, 1.0), (0.5, 1.0))),
         Choice("bias_force", "axis", {"force": (8.0, 16.0)}),
         Choice("spring", "axis", {"stiffness": (50.0, 110.0), "rest": (-0.05, 0.05)}),
         Choice("hysteresis", "axis", {"force": (12.0, 22.0), "way": (0.006, 0.015)}),

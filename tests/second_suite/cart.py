@@ -75,20 +75,8 @@ def document(number: Callable[[str], object], without: frozenset[str]) -> dict[s
 MACHINE = Machine(
     name="cart",
     joints=(
-        Joint(
-            "rail",
-            "winch",
-            "tape",
-            GAIN,
-            "mm",
-            "A",
-            1e-3,
-            noise=2e-5,
-            resolution=5e-5,
-            drive_noise=0.008,
-            prismatic=True,
-        ),
-        Joint("pivot", "", "swing", 1.0, "deg", per_unit=np.pi / 180.0, noise=3e-4, resolution=7.7e-4),
+        Joint("rail", "winch", "tape", GAIN, 2e-5, 5e-5, 0.008, prismatic=True),
+        Joint("pivot", "", "swing", 1.0, 3e-4, 7.7e-4),
     ),
     rate=125.0,
     substeps=16,

@@ -230,12 +230,12 @@ def _log(m: Machine, seed: int, signals: Signals, record: int) -> Experiment:
             units[f"{joint.name}.velocity"] = joint.speed_unit
         if joint.drive:
             data[f"{joint.drive}.command"] = signals.command[:count, i, record]
-            units[f"{joint.drive}.command"] = joint.command_unit
+            units[f"{joint.drive}.command"] = "A"
         if joint.drive and m.known_loop:
             data[f"{joint.drive}.reference"] = asked.reference[:count, i, record] / joint.per_unit
             units[f"{joint.drive}.reference"] = joint.unit
             data[f"{joint.drive}.disturbance"] = asked.torque[:count, i, record]
-            units[f"{joint.drive}.disturbance"] = joint.command_unit
+            units[f"{joint.drive}.disturbance"] = "A"
     return Experiment.from_arrays(np.arange(count) / m.rate, data, units, name=f"record {record + 1}")
 
 

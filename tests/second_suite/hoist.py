@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from second_suite.machine import Choice, Joint, Machine, Values, loss_entries
+from second_suite.machine import Choice, Joint, Machine, Values, loss_entries, uneven
 from second_suite.motions import usual
 from second_suite.pid import Pid
 
@@ -84,22 +84,7 @@ def document(number: Callable[[str], object], without: frozenset[str]) -> dict[s
 MACHINE = Machine(
     name="hoist",
     joints=(
-        Joint(
-            "lift",
-            "hoisting",
-            "cable_encoder",
-            GAIN,
-            "mm",
-            "A",
-            1e-3,
-            "m/min",
-            METRE_PER_MINUTE,
-            noise=5e-6,
-            resolution=1e-5,
-            speed_noise=4e-4,
-            drive_noise=0.02,
-            prismatic=True,
-        ),
+        Joint("lift", "hoisting", "cable_encoder", GAIN, 5e-6, 1e-5, 0.02, True, "m/min", METRE_PER_MINUTE, 4e-4),
         Joint("rope", prismatic=True),
     ),
     rate=160.0,
@@ -126,16 +111,7 @@ MACHINE = Machine(
         Choice("rotor_inertia", "lift", base="lift.rotor"),
         Choice("coulomb_friction", "rope", {"coulomb": (15.0, 30.0)}),
         Choice("stribeck_friction", "lift", {"stribeck": (28.0, 40.0), "speed": (0.01, 0.03)}),
-        Choice(
-            "asymmetric_friction",
-            "lift",
-            {
-                "coulomb_up": (20.0, 40.0),
-                "coulomb_down": (1.0, 2.0),
-                "viscous_up": (40.0, 80.0),
-                "viscous_down": (1.0, 2.0),
-            },
-        ),
+        uneven("lift", ((20.0, 40.0), (40.0, 80.0)), ((1.0, 2.0), (1.0, 2.0))),
         Choice("spring", "lift", {"stiffness": (100.0, 200.0), "rest": (-0.1, 0.1)}),
         Choice("hysteresis", "lift", {"force": (25.0, 45.0), "way": (0.01, 0.03)}),
         Choice("torque_ripple", "lift", {"size": (12.0, 22.0), "period": (0.08, 0.15), "phase": (-3.0, 3.0)}),

@@ -28,31 +28,37 @@ class Joint:
         "" for none.
     gain : float
         Effort per command.
-    unit, command_unit, speed_unit : str
-        In which the log is written; speeds are logged only if they have a unit.
-    per_unit, per_speed_unit : float
-        SI per unit of the log.
-    noise, resolution, speed_noise : float
-        Of the encoder and the tachometer (SI).
+    noise, resolution : float
+        Of the encoder (SI).
     drive_noise : float
-        Standard deviation of what the drive adds unseen from sample to sample, in units of the command.
+        Standard deviation of what the drive adds unseen from sample to sample, in A.
     prismatic : bool
+        Logged in mm, else in degrees.
+    speed_unit, per_speed_unit, speed_noise : str, float, float
+        Of a tachometer, if there is one: unit in the log, SI per unit, noise (SI).
     """
 
     name: str
     drive: str = ""
     encoder: str = ""
     gain: float = 1.0
-    unit: str = ""
-    command_unit: str = "A"
-    per_unit: float = 1.0
-    speed_unit: str = ""
-    per_speed_unit: float = 1.0
     noise: float = 0.0
     resolution: float = 0.0
-    speed_noise: float = 0.0
     drive_noise: float = 0.0
     prismatic: bool = False
+    speed_unit: str = ""
+    per_speed_unit: float = 1.0
+    speed_noise: float = 0.0
+
+    @property
+    def unit(self) -> str:
+        """In which positions are logged."""
+        return "mm" if self.prismatic else "deg"
+
+    @property
+    def per_unit(self) -> float:
+        """SI per unit of a logged position."""
+        return 1e-3 if self.prismatic else np.pi / 180.0
 
 
 @dataclass(frozen=True)
@@ -154,6 +160,12 @@ class Machine:
 def columns_of(values: Mapping[str, float], count: int) -> dict[str, Array]:
     """One column of numbers for each simulation side by side."""
     return {name: np.full(count, value) for name, value in values.items()}
+
+
+def uneven(site: str, up: tuple[Range, Range], down: tuple[Range, Range]) -> Choice:
+    """Dry and viscous friction that is not the same in both directions."""
+    ranges = {"coulomb_up": up[0], "coulomb_down": down[0], "viscous_up": up[1], "viscous_down": down[1]}
+    return Choice("asymmetric_friction", site, ranges)
 
 
 def drawn(rng: np.random.Generator, ranges: Mapping[str, Range]) -> dict[str, float]:

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from second_suite.machine import Choice, Joint, Law, Machine, Values, below, loss_entries
+from second_suite.machine import Choice, Joint, Law, Machine, Values, below, loss_entries, uneven
 from second_suite.motions import fade, sines, usual
 
 Array = NDArray[np.float64]
@@ -59,7 +59,7 @@ def document(number: Callable[[str], object], without: frozenset[str]) -> dict[s
             "arm": {
                 "mass": MASS,
                 "center_of_mass": [0.0, 0.0, below(number("arm.lever"))],
-                "inertia": [0.05, number("arm.inertia"), 0.01, 0.0, 0.0, 0.0],
+                "inertia": [0.1, number("arm.inertia"), 0.1, 0.0, 0.0, 0.0],
             }
         },
         "joints": {
@@ -79,20 +79,7 @@ def document(number: Callable[[str], object], without: frozenset[str]) -> dict[s
 
 MACHINE = Machine(
     name="rotary",
-    joints=(
-        Joint(
-            "elbow",
-            "motor",
-            "resolver",
-            GAIN,
-            "deg",
-            "A",
-            DEGREE,
-            noise=0.001 * DEGREE,
-            resolution=0.002 * DEGREE,
-            drive_noise=0.006,
-        ),
-    ),
+    joints=(Joint("elbow", "motor", "resolver", GAIN, 0.001 * DEGREE, 0.002 * DEGREE, 0.006),),
     rate=250.0,
     substeps=16,
     lengths=(8.0, 10.0, 7.0, 9.0),
@@ -111,16 +98,7 @@ MACHINE = Machine(
         Choice("coulomb_friction", "elbow", base="elbow.coulomb"),
         Choice("viscous_friction", "elbow", base="elbow.viscous"),
         Choice("stribeck_friction", "elbow", {"stribeck": (0.5, 0.8), "speed": (0.08, 0.2)}),
-        Choice(
-            "asymmetric_friction",
-            "elbow",
-            {
-                "coulomb_up": (0.01, 0.02),
-                "coulomb_down": (0.5, 0.8),
-                "viscous_up": (0.01, 0.02),
-                "viscous_down": (0.1, 0.2),
-            },
-        ),
+        uneven("elbow", ((0.01, 0.02), (0.01, 0.02)), ((0.5, 0.8), (0.1, 0.2))),
         Choice("bias_force", "elbow", {"force": (0.5, 0.9)}),
         Choice("spring", "elbow", {"stiffness": (1.2, 2.2), "rest": (0.3, 0.6)}),
         Choice("hysteresis", "elbow", {"force": (0.7, 1.2), "way": (0.03, 0.08)}),

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from second_suite.machine import Choice, Joint, Law, Machine, Values, columns_of, loss_entries
+from second_suite.machine import Choice, Joint, Law, Machine, Values, columns_of, loss_entries, uneven
 from second_suite.motions import usual
 
 Array = NDArray[np.float64]
@@ -92,12 +92,12 @@ def document(number: Callable[[str], object], without: frozenset[str]) -> dict[s
             "upper": {
                 "mass": UPPER_MASS,
                 "center_of_mass": [UPPER_LEVER, 0.0, 0.0],
-                "inertia": [0.02, 0.11, number("upper.inertia"), 0.0, 0.0, 0.0],
+                "inertia": [0.2, 0.2, number("upper.inertia"), 0.0, 0.0, 0.0],
             },
             "fore": {
                 "mass": FORE_MASS,
                 "center_of_mass": [FORE_LEVER, 0.0, 0.0],
-                "inertia": [0.01, 0.05, number("fore.inertia"), 0.0, 0.0, 0.0],
+                "inertia": [0.1, 0.1, number("fore.inertia"), 0.0, 0.0, 0.0],
             },
             "tool": {"mass": QUILL_MASS, "inertia": [0.02, 0.02, QUILL_INERTIA, 0.0, 0.0, 0.0]},
         },
@@ -117,43 +117,9 @@ def document(number: Callable[[str], object], without: frozenset[str]) -> dict[s
 MACHINE = Machine(
     name="scara",
     joints=(
-        Joint(
-            "shoulder",
-            "shoulder_motor",
-            "shoulder_encoder",
-            14.0,
-            "deg",
-            "A",
-            DEGREE,
-            noise=2e-5,
-            resolution=4e-5,
-            drive_noise=0.015,
-        ),
-        Joint(
-            "elbow",
-            "elbow_motor",
-            "elbow_encoder",
-            7.0,
-            "deg",
-            "A",
-            DEGREE,
-            noise=2e-5,
-            resolution=4e-5,
-            drive_noise=0.015,
-        ),
-        Joint(
-            "quill",
-            "quill_motor",
-            "quill_encoder",
-            30.0,
-            "mm",
-            "A",
-            1e-3,
-            noise=4e-6,
-            resolution=1e-5,
-            drive_noise=0.01,
-            prismatic=True,
-        ),
+        Joint("shoulder", "shoulder_motor", "shoulder_encoder", 14.0, 2e-5, 4e-5, 0.015),
+        Joint("elbow", "elbow_motor", "elbow_encoder", 7.0, 2e-5, 4e-5, 0.015),
+        Joint("quill", "quill_motor", "quill_encoder", 30.0, 4e-6, 1e-5, 0.01, prismatic=True),
     ),
     rate=200.0,
     substeps=10,
@@ -171,16 +137,9 @@ MACHINE = Machine(
         "elbow.viscous": 1.0,
         "quill.viscous": 20.0,
     },
-    adjustable={
-        "upper.inertia": 0.3,
-        "fore.inertia": 0.3,
-        "shoulder.coulomb": 0.3,
-        "elbow.coulomb": 0.3,
-        "quill.coulomb": 0.3,
-        "shoulder.viscous": 0.3,
-        "elbow.viscous": 0.3,
-        "quill.viscous": 0.3,
-    },
+    adjustable=dict.fromkeys(
+        ("upper.inertia", "fore.inertia", *(f"{j}.coulomb" for j in NAMES), *(f"{j}.viscous" for j in NAMES)), 0.3
+    ),
     tree=tree,
     law=law,
     motion=motion,
@@ -192,16 +151,7 @@ MACHINE = Machine(
         Choice("viscous_friction", "shoulder", base="shoulder.viscous"),
         Choice("rotor_inertia", "elbow", base="elbow.rotor"),
         Choice("stribeck_friction", "shoulder", {"stribeck": (1.5, 3.0), "speed": (0.03, 0.1)}),
-        Choice(
-            "asymmetric_friction",
-            "quill",
-            {
-                "coulomb_up": (3.0, 6.0),
-                "coulomb_down": (0.1, 0.2),
-                "viscous_up": (4.0, 10.0),
-                "viscous_down": (0.1, 0.2),
-            },
-        ),
+        uneven("quill", ((3.0, 6.0), (4.0, 10.0)), ((0.1, 0.2), (0.1, 0.2))),
         Choice("bias_force", "quill", {"force": (5.0, 9.0)}),
         Choice("spring", "elbow", {"stiffness": (0.8, 1.8), "rest": (-0.4, 0.4)}),
         Choice("hysteresis", "shoulder", {"force": (2.5, 4.5), "way": (0.02, 0.05)}),

@@ -11,21 +11,9 @@ from second_suite.cases import CLEAN, MACHINES, Case
 from vpm import Experiment, Model
 
 #: Names that speak of one kind of physics: a wrong name of the right class sends an engineer to the right place.
-FRICTION = frozenset(
-    f"{kind}_friction"
-    for kind in (
-        "coulomb",
-        "stribeck",
-        "asymmetric",
-        "viscous",
-        "warming",
-        "position_dependent",
-        "load_dependent",
-        "lugre",
-    )
-)
+FRICTIONS = ("coulomb", "stribeck", "asymmetric", "viscous", "warming", "position_dependent", "load_dependent", "lugre")
 CLASSES = (
-    FRICTION | {"hysteresis", "quadratic_drag"},
+    {*(f"{kind}_friction" for kind in FRICTIONS), "hysteresis", "quadratic_drag"},
     {"bias_force", "gravity_tilt", "sensor_offset", "spring", "cubic_spring", "end_stop", "torque_ripple"},
     {"payload", "rotor_inertia", "sensor_gain"},
     {"input_delay", "actuator_lag", "sensor_delay"},
