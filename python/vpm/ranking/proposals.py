@@ -39,6 +39,8 @@ class Proposal:
         What one step of a fit promises, nats.
     neutral : bool
         The effect does nothing where it begins.
+    base : float
+        Evidence without it under the same observer.
     """
 
     structure: Structure
@@ -46,6 +48,7 @@ class Proposal:
     colour: Colour
     gain: float
     neutral: bool
+    base: float
 
     @property
     def key(self) -> Key:
@@ -122,7 +125,7 @@ def _seen(
         move = bounded_step(structure, errors, slopes, fitter.settings.reach)
         after = min(float(np.sum((errors + slopes @ move) ** 2)), float(errors @ errors))
         gain = 0.5 * len(before) * math.log(float(before @ before) / max(after, 1e-300))
-        yield Proposal(structure, reference.band, colour, gain, candidate.neutral)
+        yield Proposal(structure, reference.band, colour, gain, candidate.neutral, reference.evidence)
 
 
 def _seated(seen: list[Proposal], settings: Settings) -> list[Proposal]:

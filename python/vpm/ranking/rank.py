@@ -143,10 +143,11 @@ class _Search:
     def _tried(self, found: Fitted) -> list[Fitted]:
         chosen = proposals(found, self.fitter, self.data, self.sizes, self.each)
         trials = self.each("fitting", self._fitted, chosen, lambda one: " at ".join(one.key))
-        several = _by_effect(trials)
-        last = [one for trial in several[: self.settings.finalists] for one in trial[: self.settings.optima]]
+        bases = {id(trial): one.base for one, trial in zip(chosen, trials, strict=True)}
+        several = [[one for one in fits if one.evidence > bases[id(one)]] for fits in _by_effect(trials)]
+        last = [one for fits in several[: self.settings.finalists] for one in fits[: self.settings.optima]]
         ends = self.each("settling", self.fitter.settled, last, lambda one: " at ".join(one.structure.effects[-1]))
-        return [trial[0] for trial in _by_effect([*ends, *trials])]
+        return [fits[0] for fits in _by_effect([*ends, *trials])]
 
     def _fitted(self, proposal: Proposal) -> Fitted:
         return self.fitter.fitted(proposal.structure, proposal.band, proposal.colour)

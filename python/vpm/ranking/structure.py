@@ -154,13 +154,17 @@ class Fitter:
         residual, jacobian = self.followed(structure, band)
         colour = colour or plain(residual, self.observed.parts)
         for _ in range(self.settings.iterations if structure.priors else 0):
+            errors, slopes = self._white(structure, residual, jacobian, colour)
+            move = bounded_step(structure, errors, slopes, self.settings.reach)
             before = self._cost(structure, residual, colour)
-            move = bounded_step(structure, *self._white(structure, residual, jacobian, colour), self.settings.reach)
+            if before - _cost(structure.standard + move, errors + slopes @ move) < self.settings.tolerance:
+                break
             better = self._better(structure, band, colour, move, before)
             if better is None:
                 break
-            structure, residual, jacobian = better
-            if before - self._cost(structure, residual, colour) < self.settings.tolerance:
+            structure, after = better
+            residual, jacobian = self.followed(structure, band)
+            if before - after < self.settings.tolerance:
                 break
         return self._weighed(structure, band, residual, jacobian)
 
@@ -199,26 +203,30 @@ class Fitter:
 
     def _better(
         self, structure: Structure, band: float, colour: Colour, move: Array, before: float
-    ) -> tuple[Structure, Array, Array] | None:
+    ) -> tuple[Structure, float] | None:
+        """The first of the shares of a step that is better, and its cost; it is looked for without derivatives."""
         for share in SHARES:
             tried = structure.at(structure.standard + share * move)
             try:
-                residual, jacobian = self.followed(tried, band)
+                residual, _ = self.followed(tried, band, slopes=False)
             except (VpmError, ArithmeticError):
                 continue
-            if self._cost(tried, residual, colour) < before:
-                return tried, residual, jacobian
+            after = self._cost(tried, residual, colour)
+            if after < before:
+                return tried, after
         return None
 
-    def followed(self, structure: Structure, band: float) -> tuple[Array, Array]:
+    def followed(self, structure: Structure, band: float, *, slopes: bool = True) -> tuple[Array, Array]:
         """What the observer leaves of the records (N, m), and its derivatives by unknown parameters (N, m, k).
+
+        Without ``slopes`` there are none of these (N, m, 0).
 
         Raises
         ------
         VpmError
             The structure runs away from the records.
         """
-        residual, jacobian = self.observed.follow(structure.model, structure.theta, band, structure.columns)
+        residual, jacobian = self.observed.follow(structure.model, structure.theta, band, structure.columns if slopes else ())
         if not (np.all(np.isfinite(residual)) and np.all(np.isfinite(jacobian))):
             raise VpmError(f"{structure.model.name} runs away from the records")
         return residual, jacobian
@@ -229,11 +237,7 @@ class Fitter:
         return colour.whitened(residual, parts), colour.whitened(jacobian, parts) * structure.slopes
 
     def _cost(self, structure: Structure, residual: Array, colour: Colour) -> float:
-        """Negative logarithm of the posterior density, its scale being the most likely one."""
-        errors = colour.whitened(residual, self.observed.parts)
-        return 0.5 * len(errors) * math.log(float(np.mean(errors**2))) + 0.5 * float(
-            structure.standard @ structure.standard
-        )
+        return _cost(structure.standard, colour.whitened(residual, self.observed.parts))
 
     def _weighed(self, structure: Structure, band: float, residual: Array, jacobian: Array) -> Fitted:
         parts = self.observed.parts
@@ -257,6 +261,11 @@ def bounded_step(structure: Structure, errors: Array, slopes: Array, reach: floa
     low = np.minimum(np.maximum(structure.ends[:, 0] - z, -reach), -1e-12) / sizes
     high = np.maximum(np.minimum(structure.ends[:, 1] - z, reach), 1e-12) / sizes
     return np.asarray(lsq_linear(root, target, (low, high), method="bvls").x * sizes)
+
+
+def _cost(standard: Array, errors: Array) -> float:
+    """Negative logarithm of the posterior density, the scale of the errors being the most likely one."""
+    return 0.5 * len(errors) * math.log(max(float(np.mean(errors**2)), 1e-300)) + 0.5 * float(standard @ standard)
 
 
 def _evidence(found: Fitted) -> float:
