@@ -218,6 +218,11 @@ residual, applied less required effort, drawn for one link on a horizontal axis 
 for a servo-cylinder; and what records may take it for, with what parts the two. Units follow the site: C is m or rad, E
 is N or N m, U the unit of the command, S that of the sensor. Keys of a model file: [model-file.md](model-file.md); what
 a diagnosis does with the entries: [diagnosis.md](diagnosis.md).
+
+A joint with [joint_compliance](#joint_compliance) or [backlash](#backlash) has two sides. On the motor side, before the
+spring or play, q and v are those of the joint, which are measured; on the link side, behind it, q + d and their rate,
+with the deflection d. Effects are on the motor side unless they say `side = "link"`; one of each may be on either.
+Without spring or play the sides are one.
 """
 
 
@@ -240,6 +245,8 @@ def _section(effect: EffectType) -> list[str]:
         f"{effect.title[0].upper()}{effect.title[1:]}, at {_article(effect.site)}: `{effect.law}`",
         "",
     ]
+    if effect.has_sides:
+        lines += ['**Side:** motor, or link with `side = "link"`.', ""]
     if effect.requires:
         lines += [f"A correction of [{effect.requires}](#{effect.requires}), which has to be there.", ""]
     if effect.name in SHOWN:

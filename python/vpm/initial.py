@@ -126,11 +126,15 @@ def _along(model: Model, theta: Array, given: tuple[Array, Array, Array], joints
 
 @lru_cache(maxsize=128)
 def _forgetful(model: Model, joints: tuple[str, ...]) -> tuple[Model, NDArray[np.int64]]:
-    """A machine without the hystereses of some joints, with its parameters among those that it had."""
+    """A machine without the hystereses of some joints, with its parameters among those that it had.
+
+    One behind a spring moves what nobody measures, and stays.
+    """
     bare = model
     for effect in model.effects:
-        if effect.name == "hysteresis" and effect.at in joints:
-            bare = bare.without_effect(effect.name, effect.at)
+        behind = effect.side == "link" and f"{effect.at}_deflection" in model.joints
+        if effect.name == "hysteresis" and effect.at in joints and not behind:
+            bare = bare.without_effect(*effect.key)
     return bare, np.array([model.index(name) for name in bare.parameter_names], dtype=np.int64)
 
 

@@ -18,7 +18,7 @@ from vpm.catalogue.elsewhere import ACTUATOR_EFFECTS, BODY_EFFECTS, SENSOR_EFFEC
 from vpm.catalogue.empirical import EMPIRICAL_EFFECTS
 from vpm.catalogue.hydraulic import CYLINDER_EFFECTS, SUPPLY_EFFECTS
 from vpm.catalogue.joint import JOINT_EFFECTS
-from vpm.catalogue.kinds import POSITIVE, SITE_KINDS, EffectParameter, EffectType, JointKind, Scale, SiteKind
+from vpm.catalogue.kinds import POSITIVE, SITE_KINDS, EffectParameter, EffectType, JointKind, Scale, Side, SiteKind
 from vpm.catalogue.link import LINK_EFFECTS
 from vpm.catalogue.own import entry_of
 from vpm.catalogue.world import WORLD_EFFECTS
@@ -32,6 +32,7 @@ __all__ = [
     "EffectType",
     "JointKind",
     "Scale",
+    "Side",
     "SiteKind",
     "effect_type",
     "effects_for_site",

@@ -12,6 +12,7 @@ from collections import OrderedDict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
+from operator import itemgetter
 from threading import Lock
 from typing import Any
 
@@ -87,6 +88,8 @@ def split(model: Model, joints: tuple[str, ...], splits: frozenset[str]) -> Part
     """The same where all ``splits``, effects that bring a coordinate of their own, count as plays do."""
     plays = [e for e in model.effects if e.name in splits and f"{e.at}_deflection" in model.joints]
     flying = {f"{e.at}_deflection" for e in plays}
+    if any(e.side == "link" and f"{e.at}_deflection" in model.joints for e in model.effects):
+        return None  # what acts behind a spring moves it
     if tuple(joint for joint in model.joints if joint not in flying) != joints:
         return None
     if not model.core.n_elastic and (not plays or any(e.name == "rotor_inertia" for e in model.effects)):
@@ -119,8 +122,9 @@ def split(model: Model, joints: tuple[str, ...], splits: frozenset[str]) -> Part
 
 def _without(content: Mapping[str, Any], effects: Sequence[Effect], *, rigid: bool = False) -> Model:
     """The machine of a model file's content without some effects, and with rigid links."""
-    gone = {(effect.name, effect.at) for effect in effects}
-    kept = [entry for entry in content.get("effects", ()) if (entry["type"], entry["at"]) not in gone]
+    gone = {(effect.name, effect.at, effect.side) for effect in effects}
+    of = itemgetter("type", "at")
+    kept = [entry for entry in content.get("effects", ()) if (*of(entry), entry.get("side", "motor")) not in gone]
     changed = {**content, "effects": kept}
     if rigid:
         changed["beams"] = {name: {**beam, "level": "rigid"} for name, beam in content["beams"].items()}

@@ -7,7 +7,7 @@ use serde_json::{Map, Value};
 use super::TreeEffect;
 use crate::body::Site;
 use crate::controller::ControlLaw;
-use crate::effect::{Domain, Hysteresis, JointEffect, Payload};
+use crate::effect::{Domain, Hysteresis, JointEffect, Payload, Seat};
 use crate::sensor::Channel;
 
 /// An effect and its site, written as one flat table with a `type`.
@@ -16,15 +16,15 @@ use crate::sensor::Channel;
 pub enum EffectEntry {
     /// An effect on a joint.
     Joint {
-        /// Number of the joint.
-        joint: usize,
+        /// Where it acts.
+        seat: Seat,
         /// Its law.
         law: Box<JointEffect<usize>>,
     },
     /// An effect on a joint that remembers its path.
     Hysteresis {
-        /// Number of the joint.
-        joint: usize,
+        /// Where it acts.
+        seat: Seat,
         /// Its law.
         law: Hysteresis<usize>,
     },
@@ -106,12 +106,13 @@ impl TryFrom<Map<String, Value>> for EffectEntry {
             if matches!(kind.as_str(), "rotor_inertia" | "gravity_tilt") || table.contains_key("beam") {
                 return Ok(Self::Tree(serde_json::from_value(Value::Object(table))?));
             }
-            let joint = take(&mut table, "joint")?;
+            let behind = table.remove("behind").map_or(Ok(None), serde_json::from_value)?;
+            let seat = Seat { joint: take(&mut table, "joint")?, behind };
             if kind == "hysteresis" {
                 table.remove("type");
-                return Ok(Self::Hysteresis { joint, law: serde_json::from_value(Value::Object(table))? });
+                return Ok(Self::Hysteresis { seat, law: serde_json::from_value(Value::Object(table))? });
             }
-            Ok(Self::Joint { joint, law: serde_json::from_value(Value::Object(table))? })
+            Ok(Self::Joint { seat, law: serde_json::from_value(Value::Object(table))? })
         })
     }
 }

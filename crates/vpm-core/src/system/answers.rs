@@ -4,7 +4,7 @@ use super::{Dynamics, add_effects};
 use crate::actuator::{Actuator, Drive, Target};
 use crate::contact::ContactFriction;
 use crate::dynamics::{Energy, crba, energy, flexible, for_each_column, frames, lines, poses, rnea};
-use crate::effect::JointEffect;
+use crate::effect::{JointEffect, Seat};
 use crate::scalar::Scalar;
 use crate::spatial::{Pose, Twist};
 
@@ -46,7 +46,7 @@ impl<S: Scalar> Dynamics<S> {
     /// From efforts r that arrive to efforts u of the actuators, of which effects take a share k of the load:
     /// `u - k |u| = r`, so `u = r / (1 - k sign(r))`.
     pub(crate) fn follow_load(&self, q: &[S], v: &[S], efforts: &mut [S]) {
-        for (joint, effect) in &self.effects {
+        for (Seat { joint, .. }, effect) in &self.effects {
             let JointEffect::EmpiricalForce(law) = effect else { continue };
             let (share, arriving) = (law.share_of_load(q[*joint], v[*joint]), efforts[*joint]);
             let taken = arriving.if_negative(|| -share, || share);
@@ -64,8 +64,8 @@ impl<S: Scalar> Dynamics<S> {
             flexible::required(model, data, (q, v), a, efforts);
         }
         loads.fill(S::zero());
-        for (joint, effect) in &self.effects {
-            loads[*joint] += effect.effort(q[*joint], v[*joint]);
+        for (seat, effect) in &self.effects {
+            seat.push(loads, effect.effort(seat.of(q), seat.of(v)));
         }
         self.memories.add_efforts(loads);
         for (effort, &effect) in efforts.iter_mut().zip(&*loads) {
@@ -92,7 +92,7 @@ impl<S: Scalar> Dynamics<S> {
             true => energy(model, data, q, v),
             false => flexible::energy(model, data, q, v),
         };
-        total.potential += effects.iter().map(|(joint, effect)| effect.potential(q[*joint])).sum();
+        total.potential += effects.iter().map(|(seat, effect)| effect.potential(seat.of(q))).sum();
         if !connections.is_free() {
             frames(model, data, q, v);
             poses(model, data);
@@ -111,8 +111,8 @@ impl<S: Scalar> Dynamics<S> {
         for (load, &bias) in loads.iter_mut().zip(&self.data.composite.bias) {
             *load -= bias * (S::one() - weight);
         }
-        for (joint, effect) in &self.effects {
-            loads[*joint] -= effect.effort_at_rest(q[*joint]);
+        for (seat, effect) in &self.effects {
+            seat.push(&mut loads, -effect.effort_at_rest(seat.of(q)));
         }
         self.subtract_connections(&mut loads);
         loads

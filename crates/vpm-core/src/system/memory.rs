@@ -1,13 +1,13 @@
 //! Effects that remember: where their states stand, and how they move.
 
-use crate::effect::Hysteresis;
+use crate::effect::{Hysteresis, Seat};
 use crate::scalar::Scalar;
 
 /// Hystereses of joints with their memories, which follow the states of drives and supplies.
 #[derive(Clone, Debug)]
 pub struct Memories<S> {
-    /// Laws, each with the number of its joint.
-    laws: Vec<(usize, Hysteresis<S>)>,
+    /// Laws, each with its seat.
+    laws: Vec<(Seat, Hysteresis<S>)>,
     /// Memory of each.
     values: Vec<S>,
     /// What stands for the fading of each in an iteration matrix.
@@ -16,7 +16,7 @@ pub struct Memories<S> {
 
 impl<S: Scalar> Memories<S> {
     /// Relaxed ones.
-    pub(crate) fn new(laws: Vec<(usize, Hysteresis<S>)>) -> Self {
+    pub(crate) fn new(laws: Vec<(Seat, Hysteresis<S>)>) -> Self {
         let (values, chords) = (vec![S::zero(); laws.len()], vec![None; laws.len()]);
         Self { laws, values, chords }
     }
@@ -27,10 +27,10 @@ impl<S: Scalar> Memories<S> {
         self.laws.len()
     }
 
-    /// Laws with their joints and memories.
+    /// Laws with their seats and memories.
     #[inline]
-    pub(crate) fn iter(&self) -> impl Iterator<Item = (usize, &Hysteresis<S>, S)> {
-        self.laws.iter().zip(&self.values).map(|((joint, law), &value)| (*joint, law, value))
+    pub(crate) fn iter(&self) -> impl Iterator<Item = (Seat, &Hysteresis<S>, S)> {
+        self.laws.iter().zip(&self.values).map(|((seat, law), &value)| (*seat, law, value))
     }
 
     /// Takes over the memories.
@@ -44,10 +44,10 @@ impl<S: Scalar> Memories<S> {
     pub(super) fn rates(&mut self, values: &[S], v: &[S], rates: &mut [S]) {
         self.hold(values);
         let laws = self.laws.iter().zip(&self.chords);
-        for (((joint, law), chord), (rate, &z)) in laws.zip(rates.iter_mut().zip(values)) {
+        for (((seat, law), chord), (rate, &z)) in laws.zip(rates.iter_mut().zip(values)) {
             *rate = match *chord {
-                Some(fading) => v[*joint] / law.displacement - fading * z,
-                None => law.rate(v[*joint], z),
+                Some(fading) => seat.of(v) / law.displacement - fading * z,
+                None => law.rate(seat.of(v), z),
             };
         }
     }
@@ -55,29 +55,29 @@ impl<S: Scalar> Memories<S> {
     /// Adds the efforts on the joints.
     #[inline]
     pub(super) fn add_efforts(&self, total: &mut [S]) {
-        for (joint, law, z) in self.iter() {
-            total[joint] += law.effort(z);
+        for (seat, law, z) in self.iter() {
+            seat.push(total, law.effort(z));
         }
     }
 
     /// Moves the memories on along ways of the joints, exactly.
     pub(crate) fn travel(&mut self, way: impl Fn(usize) -> S) {
-        for ((joint, law), value) in self.laws.iter().zip(&mut self.values) {
-            *value = law.advance(*value, way(*joint));
+        for ((seat, law), value) in self.laws.iter().zip(&mut self.values) {
+            *value = law.advance(*value, seat.sum(&way));
         }
     }
 
     /// Writes the mean rates of the memories over a `step` at the velocities `v`, from `values`.
     pub(super) fn mean_rates(&self, values: &[S], v: &[S], step: f64, rates: &mut [S]) {
-        for (((joint, law), &z), rate) in self.laws.iter().zip(values).zip(rates) {
-            *rate = (law.advance(z, v[*joint] * step) - z) / step;
+        for (((seat, law), &z), rate) in self.laws.iter().zip(values).zip(rates) {
+            *rate = (law.advance(z, seat.of(v) * step) - z) / step;
         }
     }
 
     /// Fading of each at the velocities `v`, to stand for it in an iteration matrix.
     pub(super) fn fadings(&self, values: &[S], v: &[S], fadings: &mut [Option<S>]) {
-        for (((joint, law), &z), fading) in self.laws.iter().zip(values).zip(fadings) {
-            *fading = Some(law.fading(v[*joint], z));
+        for (((seat, law), &z), fading) in self.laws.iter().zip(values).zip(fadings) {
+            *fading = Some(law.fading(seat.of(v), z));
         }
     }
 

@@ -45,7 +45,7 @@ impl<S: Scalar> System<S> {
             actuators,
             memories,
             split: Split::new(&dynamics),
-            resistances: vec![0.0; dynamics.joints()],
+            resistances: vec![0.0; dynamics.effects.len()],
             fadings: vec![None; dynamics.memories.len()],
             column: vec![0.0; dynamics.coordinates()],
             rates: vec![S::zero(); dynamics.dim()],

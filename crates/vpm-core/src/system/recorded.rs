@@ -6,7 +6,7 @@ use super::additive::{Split, Stage};
 use super::guided::{Guidance, Guided, Part};
 use super::{Build, Dynamics, stiff};
 use crate::contact::ContactFriction;
-use crate::effect::JointEffect;
+use crate::effect::{JointEffect, Seat};
 use crate::error::{Error, Result};
 use crate::graph::{Decision, Graph, Node, Program, Recorded, input, record};
 use crate::scalar::Scalar;
@@ -343,7 +343,7 @@ impl Dynamics<Recorded> {
         let (q, v) = x[..2 * n].split_at(n);
         let mut fadings = vec![None; self.memories.len()];
         self.memories.fadings(&x[self.first_memory()..], v, &mut fadings);
-        let mut resistances = vec![Recorded::default(); self.joints()];
+        let mut resistances = vec![Recorded::default(); self.effects.len()];
         self.write_resistances(q, v, &mut resistances);
         if self.is_stiff_by_beams_alone() {
             let (mut matrix, mut column) = (vec![Recorded::default(); dim * dim], vec![Recorded::default(); n]);
@@ -358,15 +358,12 @@ impl Dynamics<Recorded> {
     /// The derivative of the rates at `x` with this resistance of each effect in the place of friction.
     fn resisted(&mut self, x: &[Recorded], resistance: impl Fn(&JointEffect<Recorded>) -> Recorded) -> Matrix {
         let zero = Recorded::default();
-        let mut resistances = vec![zero; self.joints()];
-        for (joint, effect) in &self.effects {
-            resistances[*joint] += resistance(effect);
-        }
+        let resistances: Vec<_> = self.effects.iter().map(|(_, effect)| resistance(effect)).collect();
         let (seals, fadings) = (vec![Some(zero); self.seals.len()], vec![Some(zero); self.memories.len()]);
         self.chords(x, &resistances, &seals, &fadings)
     }
 
-    /// The derivative of the rates at `x` with these constants in the place of the resistance of joints and `seals` and of the fading of
+    /// The derivative of the rates at `x` with these constants in the place of the resistance of effects and `seals` and of the fading of
     /// memories, and with the chords of contacts.
     fn chords(
         &mut self,
@@ -379,12 +376,9 @@ impl Dynamics<Recorded> {
         self.memories.replace(fadings.iter().map(|fading| fading.map(Recorded::frozen)));
         let resistances: Vec<_> = resistances.iter().map(|resistance| resistance.frozen()).collect();
         let chords =
-            |effects: &[(usize, JointEffect<Recorded>)], [q, v, _]: [&[Recorded]; 3], total: &mut [Recorded]| {
-                for (joint, effect) in effects {
-                    total[*joint] += effect.effort_at_rest(q[*joint]);
-                }
-                for ((total, &v), &resistance) in total.iter_mut().zip(v).zip(&resistances) {
-                    *total -= resistance * v;
+            |effects: &[(Seat, JointEffect<Recorded>)], [q, v, _]: [&[Recorded]; 3], total: &mut [Recorded]| {
+                for ((seat, effect), &resistance) in effects.iter().zip(&resistances) {
+                    seat.push(total, effect.effort_at_rest(seat.of(q)) - resistance * seat.of(v));
                 }
             };
         let resistance =

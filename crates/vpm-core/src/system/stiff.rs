@@ -27,17 +27,18 @@ pub(super) fn iteration_matrix<S: Scalar>(
     let lower = &mut matrix[n * dim..];
     elasticity(dynamics, lower, dim, column);
     let Dynamics { data, effects, actuators, .. } = dynamics;
-    for (joint, &resistance) in resistances.iter().enumerate() {
-        let own = || effects.iter().filter(|(place, _)| *place == joint);
-        if own().next().is_none() {
+    for (number, (seat, _)) in effects.iter().enumerate() {
+        if effects[..number].iter().any(|(earlier, _)| earlier == seat) {
             continue;
         }
-        let slope: S = own().map(|(_, effect)| effect.slope_at_rest(q[joint])).sum();
-        for (entry, place) in [(slope, joint), (-resistance, n + joint)] {
+        let own = || effects.iter().zip(resistances).filter(|((place, _), _)| place == seat);
+        let slope: S = own().map(|((_, effect), _)| effect.slope_at_rest(seat.of(q))).sum();
+        let resistance: S = own().map(|(_, &resistance)| resistance).sum();
+        for (entry, block) in [(slope, 0), (-resistance, n)] {
             column.fill(S::zero());
-            column[joint] = entry;
+            seat.push(column, entry);
             data.solve(column);
-            add_column(lower, dim, place, column);
+            seat.joints().for_each(|joint| add_column(lower, dim, block + joint, column));
         }
     }
     let lagging = actuators.iter().filter_map(|actuator| actuator.lag.as_ref().map(|lag| (actuator, lag)));
@@ -59,13 +60,13 @@ pub(super) fn iteration_matrix<S: Scalar>(
 /// The columns and rows of the memories.
 fn remember<S: Scalar>(dynamics: &Dynamics<S>, rows: &mut [S], dim: usize, fadings: &[Option<S>], column: &mut [S]) {
     let (n, first) = (dynamics.coordinates(), dynamics.first_memory());
-    for ((place, (joint, law, _)), fading) in (first..).zip(dynamics.memories.iter()).zip(fadings) {
+    for ((place, (seat, law, _)), fading) in (first..).zip(dynamics.memories.iter()).zip(fadings) {
         column.fill(S::zero());
-        column[joint] = law.effort(S::one());
+        seat.push(column, law.effort(S::one()));
         dynamics.data.solve(column);
         add_column(rows, dim, place, column);
         let row = &mut rows[(place - n) * dim..];
-        row[n + joint] = law.displacement.recip();
+        seat.joints().for_each(|joint| row[n + joint] = law.displacement.recip());
         row[place] = -fading.unwrap_or_else(S::zero);
     }
 }
