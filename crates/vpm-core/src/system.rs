@@ -184,8 +184,8 @@ impl<S: Scalar> Dynamics<S> {
     /// Resistance of each effect at (q, v), under the efforts of the actuators in the last state evaluated.
     fn write_resistances(&self, q: &[S], v: &[S], resistances: &mut [S]) {
         for ((seat, effect), resistance) in self.effects.iter().zip(resistances) {
-            let (q, v, load) = (seat.of(q), seat.of(v), self.efforts[seat.joint].abs());
-            *resistance = effect.resistance(q, v) + effect.resistance_per_load(v) * load;
+            let (law, q, v, u) = (effect.law(), seat.of(q), seat.of(v), self.efforts[seat.joint]);
+            *resistance = law.resistance(q, v) + law.resistance_per_load(v, u) * u.abs();
         }
     }
 
@@ -287,11 +287,8 @@ impl<S: Scalar> Dynamics<S> {
 #[inline]
 pub(crate) fn add_effects<S: Scalar>(effects: &[(Seat, JointEffect<S>)], [q, v, u]: [&[S]; 3], total: &mut [S]) {
     for (seat, effect) in effects {
-        let (q, v) = (seat.of(q), seat.of(v));
-        seat.push(total, effect.effort(q, v));
-        if let JointEffect::EmpiricalForce(law) = effect {
-            total[seat.joint] -= law.share_of_load(q, v) * u[seat.joint].abs();
-        }
+        let (law, q, v, u) = (effect.law(), seat.of(q), seat.of(v), u[seat.joint]);
+        seat.push(total, law.effort(q, v) - law.share_of_load(q, v, u) * u.abs());
     }
 }
 

@@ -54,7 +54,7 @@ struct Spring<S> {
 impl<S: Scalar> Spring<S> {
     /// About `q`. A spring that pushes away is left explicit.
     fn new(effect: &JointEffect<S>, q: S) -> Self {
-        Self { at_rest: effect.effort_at_rest(q), stiffness: -effect.slope_at_rest(q).min(S::zero()) }
+        Self { at_rest: effect.law().effort_at_rest(q), stiffness: -effect.slope_at_rest(q).min(S::zero()) }
     }
 
     /// Its effort at `other`.
@@ -66,7 +66,8 @@ impl<S: Scalar> Spring<S> {
 impl<S: Scalar> Split<S> {
     /// For the machine `dynamics`.
     pub(super) fn new(dynamics: &Dynamics<S>) -> Self {
-        let apart = |(seat, effect): &&(Seat, JointEffect<S>)| seat.behind.is_some() || !effect.is_damped_linearly();
+        let apart =
+            |(seat, effect): &&(Seat, JointEffect<S>)| seat.behind.is_some() || effect.law().damping().is_none();
         let mut seats: Vec<Seat> = dynamics.effects.iter().filter(apart).map(|(seat, _)| *seat).collect();
         seats.extend(dynamics.memories.iter().map(|(seat, ..)| seat));
         seats.sort_unstable();
@@ -119,17 +120,18 @@ impl<S: Scalar> Split<S> {
     fn rub(&mut self, dynamics: &Dynamics<S>, Stage { explicit, implicit, reach }: Stage<'_, S>) {
         let n = dynamics.coordinates();
         for (k, &seat) in self.seats.iter().enumerate() {
-            let (q, w, load) = (seat.of(explicit), self.velocity[k], dynamics.efforts[seat.joint].abs());
+            let (q, w, u) = (seat.of(explicit), self.velocity[k], dynamics.efforts[seat.joint]);
             let (mut resistance, mut rest) = (S::zero(), S::zero());
             for (_, effect) in dynamics.effects.iter().filter(|(place, _)| *place == seat) {
-                let per_load = effect.resistance_per_load(w);
-                resistance += effect.resistance(q, w) - effect.damping() + per_load * load;
-                rest -= (effect.share_of_load(q, w) - per_load * w) * load;
+                let (law, load) = (effect.law(), u.abs());
+                let (linear, per_load) = (law.damping().unwrap_or_default(), law.resistance_per_load(w, u));
+                resistance += law.resistance(q, w) - linear + per_load * load;
+                rest -= (law.share_of_load(q, w, u) - per_load * w) * load;
                 if seat.behind.is_some() {
                     let spring = Spring::new(effect, q);
                     let (coasting, v) = (seat.of(&self.coasting), seat.of(&implicit[n..]));
                     // Where the stage ends, `coasting + reach (w - v)`.
-                    resistance += effect.damping() + spring.stiffness * reach;
+                    resistance += linear + spring.stiffness * reach;
                     rest += spring.effort(q, coasting - v * reach);
                 }
             }
@@ -221,7 +223,7 @@ impl<S: Scalar> Dynamics<S> {
         damping.fill(S::zero());
         for (seat, effect) in effects.iter().filter(|(seat, _)| seat.behind.is_none()) {
             let (joint, q) = (seat.joint, explicit[seat.joint]);
-            let (spring, linear) = (Spring::new(effect, q), effect.damping());
+            let (spring, linear) = (Spring::new(effect, q), effect.law().damping().unwrap_or_default());
             loads[joint] += spring.effort(q, coasting[joint]) - linear * v[joint];
             damping[joint] += linear + spring.stiffness * reach;
         }

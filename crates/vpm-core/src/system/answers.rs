@@ -44,13 +44,16 @@ impl<S: Scalar> Dynamics<S> {
     }
 
     /// From efforts r that arrive to efforts u of the actuators, of which effects take a share k of the load:
-    /// `u - k |u| = r`, so `u = r / (1 - k sign(r))`.
+    /// `u - k |u| = r`, so `u = r / (1 - k sign(r))`, k the sum of their shares.
     pub(crate) fn follow_load(&self, q: &[S], v: &[S], efforts: &mut [S]) {
-        for (Seat { joint, .. }, effect) in &self.effects {
-            let JointEffect::EmpiricalForce(law) = effect else { continue };
-            let (share, arriving) = (law.share_of_load(q[*joint], v[*joint]), efforts[*joint]);
-            let taken = arriving.if_negative(|| -share, || share);
-            efforts[*joint] = arriving / (S::one() - taken);
+        for (joint, effort) in efforts.iter_mut().enumerate().take(self.joints()) {
+            let own = |(seat, effect): &&(Seat, JointEffect<S>)| seat.joint == joint && effect.law().follows_load();
+            if !self.effects.iter().any(|effect| own(&effect)) {
+                continue;
+            }
+            let share = |(_, effect): &(Seat, JointEffect<S>)| effect.law().share_of_load(q[joint], v[joint], *effort);
+            let taken: S = self.effects.iter().filter(own).map(share).sum();
+            *effort = *effort / (S::one() - effort.if_negative(|| -taken, || taken));
         }
     }
 
@@ -65,7 +68,7 @@ impl<S: Scalar> Dynamics<S> {
         }
         loads.fill(S::zero());
         for (seat, effect) in &self.effects {
-            seat.push(loads, effect.effort(seat.of(q), seat.of(v)));
+            seat.push(loads, effect.law().effort(seat.of(q), seat.of(v)));
         }
         self.memories.add_efforts(loads);
         for (effort, &effect) in efforts.iter_mut().zip(&*loads) {
@@ -92,7 +95,7 @@ impl<S: Scalar> Dynamics<S> {
             true => energy(model, data, q, v),
             false => flexible::energy(model, data, q, v),
         };
-        total.potential += effects.iter().map(|(seat, effect)| effect.potential(seat.of(q))).sum();
+        total.potential += effects.iter().map(|(seat, effect)| effect.law().potential(seat.of(q))).sum();
         if !connections.is_free() {
             frames(model, data, q, v);
             poses(model, data);
@@ -112,7 +115,7 @@ impl<S: Scalar> Dynamics<S> {
             *load -= bias * (S::one() - weight);
         }
         for (seat, effect) in &self.effects {
-            seat.push(&mut loads, -effect.effort_at_rest(seat.of(q)));
+            seat.push(&mut loads, -effect.law().effort_at_rest(seat.of(q)));
         }
         self.subtract_connections(&mut loads);
         loads

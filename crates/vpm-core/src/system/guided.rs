@@ -196,7 +196,7 @@ impl<S: Scalar> Guided<S> {
         dynamics.terms(q, v);
         flexible::required(&dynamics.model, &dynamics.data, (q, v), &rate[n..2 * n], load);
         for (seat, effect) in &dynamics.effects {
-            seat.push(load, -effect.effort(seat.of(q), seat.of(v)));
+            seat.push(load, -effect.law().effort(seat.of(q), seat.of(v)));
         }
         for (seat, law, memory) in dynamics.memories.iter() {
             seat.push(load, -law.effort(memory));
@@ -294,7 +294,7 @@ impl<S: Scalar> Guided<S> {
             for k in own.clone() {
                 for other in own.clone() {
                     rows[k * width + other] += effect.slope_at_rest(q);
-                    rows[k * width + count + other] -= effect.resistance(q, v);
+                    rows[k * width + count + other] -= effect.law().resistance(q, v);
                 }
             }
         }

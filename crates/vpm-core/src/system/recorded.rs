@@ -268,7 +268,9 @@ fn outputs(build: impl Build<Error = Error>, places: Places, parameters: &[Recor
             (rates, Some(matrix))
         }
         Kind::Frictionless => (rates, Some(dynamics.resisted(&x, |_| Recorded::default()))),
-        Kind::LinearFriction => (rates, Some(dynamics.resisted(&x, JointEffect::damping))),
+        Kind::LinearFriction => {
+            (rates, Some(dynamics.resisted(&x, |effect| effect.law().damping().unwrap_or_default())))
+        }
         Kind::Elasticity => {
             let (mut block, mut column) = (zeros(2 * n * n), zeros(n));
             dynamics.terms(motion.0, motion.1);
@@ -378,7 +380,7 @@ impl Dynamics<Recorded> {
         let chords =
             |effects: &[(Seat, JointEffect<Recorded>)], [q, v, _]: [&[Recorded]; 3], total: &mut [Recorded]| {
                 for ((seat, effect), &resistance) in effects.iter().zip(&resistances) {
-                    seat.push(total, effect.effort_at_rest(seat.of(q)) - resistance * seat.of(v));
+                    seat.push(total, effect.law().effort_at_rest(seat.of(q)) - resistance * seat.of(v));
                 }
             };
         let resistance =

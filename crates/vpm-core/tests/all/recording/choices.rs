@@ -51,9 +51,10 @@ impl Laws for Effects {
     fn of<S: Scalar>(&self, [q, v, way, z, ..]: [S; WIDTH]) -> Vec<S> {
         let mut found = Vec::new();
         for law in &self.0 {
-            let law = law.map(&mut |&number| S::from_f64(number));
+            let effect = law.map(&mut |&number| S::from_f64(number));
+            let law = effect.law();
             found.extend([law.effort(q, v), law.resistance(q, v), law.effort_at_rest(q), law.potential(q)]);
-            found.extend([law.share_of_load(q, v), law.resistance_per_load(v), law.slope_at_rest(q)]);
+            found.extend([law.share_of_load(q, v, z), law.resistance_per_load(v, z), effect.slope_at_rest(q)]);
         }
         for law in &self.1 {
             let (law, z) = (law.map(&mut |&number| S::from_f64(number)), z * 0.3);
