@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from scipy.linalg import expm
 from typer.testing import CliRunner
 
+from test_frictions import geared
 from test_sides import rubbing_on_both_sides
 from vpm import Model, Simulation
 from vpm.cli import app
@@ -160,7 +161,7 @@ MACHINES = tuple(
 
 
 #: Machines of one slide that winds up, with effects in groups that act at once.
-OWN = {"both_sides": rubbing_on_both_sides}
+OWN = {"both_sides": rubbing_on_both_sides, "geared": geared}
 
 
 def machine(name: str) -> Model:

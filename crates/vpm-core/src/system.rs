@@ -265,7 +265,7 @@ impl<S: Scalar> Dynamics<S> {
         elastic.fill(S::zero());
         elastic[..on_beams.len()].copy_from_slice(on_beams);
         add(&self.effects, [q, v, &self.efforts], of_joints);
-        self.memories.add_efforts(of_joints);
+        self.memories.add_efforts(v, of_joints);
         if self.pulls {
             flexible::add_line_forces(data, tensions, loads);
         }
@@ -288,7 +288,7 @@ impl<S: Scalar> Dynamics<S> {
 pub(crate) fn add_effects<S: Scalar>(effects: &[(Seat, JointEffect<S>)], [q, v, u]: [&[S]; 3], total: &mut [S]) {
     for (seat, effect) in effects {
         let (law, q, v, u) = (effect.law(), seat.of(q), seat.of(v), u[seat.joint]);
-        seat.push(total, law.effort(q, v) - law.share_of_load(q, v, u) * u.abs());
+        seat.push(total, law.effort_under(q, v, u));
     }
 }
 

@@ -21,6 +21,7 @@ from vpm.catalogue.joint import JOINT_EFFECTS
 from vpm.catalogue.kinds import POSITIVE, SITE_KINDS, EffectParameter, EffectType, JointKind, Scale, Side, SiteKind
 from vpm.catalogue.link import LINK_EFFECTS
 from vpm.catalogue.own import entry_of
+from vpm.catalogue.unscreened import UNSCREENED_EFFECTS
 from vpm.catalogue.world import WORLD_EFFECTS
 from vpm.errors import ModelError, near_match
 
@@ -49,6 +50,7 @@ _BUILT_IN = (
     *CYLINDER_EFFECTS,
     *SUPPLY_EFFECTS,
     *SENSOR_EFFECTS,
+    *UNSCREENED_EFFECTS,
     *EMPIRICAL_EFFECTS,
 )
 _ENTRIES = {effect.name: effect for effect in _BUILT_IN}
@@ -142,14 +144,14 @@ def register(
     Examples
     --------
     >>> effect = register(
-    ...     "cubic_spring",
-    ...     law="-hardening*q**3",
-    ...     sizes={"hardening": "{E}/{C}^3"},
-    ...     sentence="{at} is pulled back with the cube of its way, {hardening}.",
+    ...     "quintic_spring",
+    ...     law="-hardening*q**5",
+    ...     sizes={"hardening": "{E}/{C}^5"},
+    ...     sentence="{at} is pulled back with the fifth power of its way, {hardening}.",
     ... )
     >>> effect.title
-    'cubic spring'
-    >>> unregister("cubic_spring")
+    'quintic spring'
+    >>> unregister("quintic_spring")
     """
     if name in _ENTRIES and _ENTRIES[name].formula is None:
         raise ModelError(f'the catalogue has an effect "{name}" already; choose another name', where=name)

@@ -35,7 +35,9 @@ Side = Literal["motor", "link"]
 Scale = Literal[
     "effort",
     "effort_per_speed",
+    "effort_per_speed_squared",
     "effort_per_coordinate",
+    "effort_per_coordinate_cubed",
     "coordinate",
     "speed",
     "mass",
@@ -154,6 +156,8 @@ class EffectType:
         Law of an entry that a user wrote, see `vpm.catalogue.register`.
     motor_side_alone : bool
         Whether, at a joint that winds up or plays, it belongs to the motor side or to the spring itself.
+    remembers : bool
+        Whether its law has a memory, a state of the machine.
     """
 
     name: str
@@ -169,6 +173,7 @@ class EffectType:
     shows: Signature | None = None
     formula: Formula | None = None
     motor_side_alone: bool = False
+    remembers: bool = False
 
     @property
     def has_sides(self) -> bool:
@@ -184,7 +189,7 @@ class EffectType:
     def title(self) -> str:
         """Name in words: ``"Coulomb friction"``."""
         words = self.name.replace("_", " ")
-        return words.replace("coulomb", "Coulomb").replace("stribeck", "Stribeck")
+        return words.replace("coulomb", "Coulomb").replace("stribeck", "Stribeck").replace("lugre", "LuGre")
 
     def parameter(self, name: str) -> EffectParameter:
         """Parameter by short name.

@@ -77,7 +77,7 @@ def beyond(effect: EffectType, site: str, model: Model, measured: Sequence[str])
     A motion with joints that nobody measures is integrated, and there no hysteresis carries its memory along; but it
     does on the motor side of a joint that is split where that is measured, see `vpm.identify.reuse.parts_of`.
     """
-    remembering = [entry.at for entry in model.effects if entry.name == "hysteresis"]
+    remembering = [entry.at for entry in model.effects if entry.type.remembers]
     split_off = {f"{entry.at}_deflection" for entry in model.effects if entry.name in SPLITTING}
     alone = tuple(joint for joint in model.joints if joint not in split_off) == tuple(measured)
     known = alone and not has_own_drives(model) and not any(entry.name == "rotor_inertia" for entry in model.effects)

@@ -27,8 +27,6 @@ Array = NDArray[np.float64]
 
 #: Effects of joints that add a motion of their own, and those that weigh the acceleration: the tree has them.
 SPLITTING = frozenset({"joint_compliance", "backlash"})
-#: The law of a joint that depends on the way it came.
-REMEMBERS = "hysteresis"
 #: Simulations that are kept for each record: those of one round of a search.
 KEPT = 48
 #: Values that have moved by no more than this share of themselves leave derivatives good enough for a first look: by
@@ -79,7 +77,7 @@ def parts_of(model: Model, joints: tuple[str, ...]) -> Parts | None:
     Where a joint remembers its way, joints that wind up count as plays do: a motion that is worked out carries no
     memory along, and the measured joint, on the side of the motor, is the one that remembers.
     """
-    remembers = any(effect.name == REMEMBERS for effect in model.effects)
+    remembers = any(effect.type.remembers for effect in model.effects)
     return split(model, joints, SPLITTING if remembers else frozenset({"backlash"}))
 
 

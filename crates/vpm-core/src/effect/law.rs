@@ -1,4 +1,4 @@
-//! What a law of a joint is: numbers in, effort out.
+//! What a law of a joint is: numbers in, effort out; some have a memory besides.
 
 use crate::scalar::Scalar;
 
@@ -40,6 +40,12 @@ pub trait Law<S: Scalar> {
         S::zero()
     }
 
+    /// Effort with what follows the load.
+    #[inline]
+    fn effort_under(&self, q: S, v: S, u: S) -> S {
+        if self.follows_load() { self.effort(q, v) - self.share_of_load(q, v, u) * u.abs() } else { self.effort(q, v) }
+    }
+
     /// Whether it takes a share of the load.
     #[inline]
     fn follows_load(&self) -> bool {
@@ -56,6 +62,68 @@ pub trait Law<S: Scalar> {
     #[inline]
     fn resistance_per_load(&self, _v: S, _u: S) -> S {
         S::zero()
+    }
+}
+
+/// A law with a memory z, a state without unit that is zero at first.
+pub trait MemoryLaw<S: Scalar> {
+    /// What it is at velocity `v` and memory `z`, in terms that are linear in both.
+    fn chords(&self, v: S, z: S) -> MemoryChords<S>;
+
+    /// The memory after a `time` (s) in which the joint has moved on by `way` (m or rad) in one direction, from `z`: exact for a steady
+    /// velocity.
+    fn advance(&self, z: S, way: S, time: S) -> S;
+
+    /// Effort, N or N m.
+    #[inline]
+    fn effort(&self, v: S, z: S) -> S {
+        self.chords(v, z).effort(v, z)
+    }
+
+    /// dz/dt, 1/s.
+    #[inline]
+    fn rate(&self, v: S, z: S) -> S {
+        self.chords(v, z).rate(v, z)
+    }
+}
+
+/// A law with a memory where it has come to: `tau = -push z - resistance v`, `dz/dt = gain v + source - fading z`.
+#[derive(Clone, Copy, Debug)]
+pub struct MemoryChords<S> {
+    /// Effort per memory, N or N m.
+    pub push: S,
+    /// Effort per velocity, N s/m or N m s/rad.
+    pub resistance: S,
+    /// Memory per way, 1/m or 1/rad.
+    pub gain: S,
+    /// What drives the memory at rest, 1/s.
+    pub source: S,
+    /// How fast it fades, 1/s.
+    pub fading: S,
+}
+
+impl<S: Scalar> MemoryChords<S> {
+    /// Effort at `v` and `z`.
+    #[inline]
+    pub fn effort(&self, v: S, z: S) -> S {
+        -(self.push * z + self.resistance * v)
+    }
+
+    /// dz/dt at `v` and `z`.
+    #[inline]
+    pub fn rate(&self, v: S, z: S) -> S {
+        self.gain * v + self.source - self.fading * z
+    }
+
+    /// What is left of it where nothing rubs: a spring.
+    pub(crate) fn frictionless(self) -> Self {
+        Self { resistance: S::zero(), fading: S::zero(), ..self }
+    }
+
+    /// Each number through `f`.
+    pub(crate) fn map(self, f: impl Fn(S) -> S) -> Self {
+        let Self { push, resistance, gain, source, fading } = self;
+        Self { push: f(push), resistance: f(resistance), gain: f(gain), source: f(source), fading: f(fading) }
     }
 }
 

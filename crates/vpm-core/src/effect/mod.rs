@@ -7,6 +7,7 @@ mod asymmetric_friction;
 mod backlash;
 mod bias_force;
 mod coulomb_friction;
+mod cubic_spring;
 mod domain;
 mod empirical_force;
 mod end_stop;
@@ -15,31 +16,42 @@ mod hysteresis;
 mod joint_compliance;
 mod law;
 mod link_flexibility;
+mod load_dependent_friction;
+mod lugre_friction;
 mod payload;
+mod position_dependent_friction;
+mod quadratic_drag;
 mod seat;
 mod spring;
 mod stribeck_friction;
 mod torque_ripple;
 mod viscous_friction;
+mod warming_friction;
 
 pub use asymmetric_friction::AsymmetricFriction;
 pub use backlash::Backlash;
 pub use bias_force::BiasForce;
 pub use coulomb_friction::CoulombFriction;
+pub use cubic_spring::CubicSpring;
 pub use domain::Domain;
 pub use empirical_force::EmpiricalForce;
 pub use end_stop::EndStop;
 pub use formula::{Formula, Instruction};
 pub use hysteresis::Hysteresis;
 pub use joint_compliance::JointCompliance;
-pub use law::Law;
+pub use law::{Law, MemoryChords, MemoryLaw};
 pub use link_flexibility::LinkFlexibility;
+pub use load_dependent_friction::LoadDependentFriction;
+pub use lugre_friction::LugreFriction;
 pub use payload::Payload;
+pub use position_dependent_friction::PositionDependentFriction;
+pub use quadratic_drag::QuadraticDrag;
 pub use seat::Seat;
 pub use spring::Spring;
 pub use stribeck_friction::StribeckFriction;
 pub use torque_ripple::TorqueRipple;
 pub use viscous_friction::ViscousFriction;
+pub use warming_friction::WarmingFriction;
 
 use crate::scalar::{Dual, Scalar};
 use law::{LARGEST_SHARE, family, law};
@@ -57,10 +69,18 @@ family! {
         AsymmetricFriction,
         /// Extra friction at low speed.
         StribeckFriction,
+        /// Dry friction that changes along the way.
+        PositionDependentFriction,
+        /// Dry friction in proportion to the load.
+        LoadDependentFriction,
+        /// Resistance proportional to the square of the speed.
+        QuadraticDrag,
         /// Constant load.
         BiasForce,
         /// Linear spring.
         Spring,
+        /// Spring with the cube of the way.
+        CubicSpring,
         /// Effort periodic in the coordinate.
         TorqueRipple,
         /// Spring with a dead band.
@@ -73,6 +93,18 @@ family! {
         EndStop,
         /// Law that a user wrote.
         Formula,
+    }
+}
+
+family! {
+    /// Any effect that puts an effort on a joint as a function of its velocity and of a memory.
+    MemoryEffect: MemoryLaw {
+        /// Between a spring for short ways and dry friction for long ones.
+        Hysteresis,
+        /// Bristles that bend and slide.
+        LugreFriction,
+        /// Friction that a machine loses as it gets warm.
+        WarmingFriction,
     }
 }
 

@@ -67,7 +67,7 @@ impl Job for Behind<'_> {
     }
 }
 
-/// Memory of a hysteresis.
+/// Memory of an effect.
 pub(super) struct Memory<'a> {
     pub(super) record: Record<'a>,
     pub(super) entry: &'a EffectEntry,
@@ -88,10 +88,11 @@ impl Job for Memory<'_> {
     fn run<S: Scalar>(&self, theta: &[S]) -> Result<Pair<S>> {
         let sensors = position_sensors(self.record.description, theta);
         let (mut first, mut memory, mut before) = (Vec::new(), S::zero(), None);
-        if let Some((seat, law)) = self.entry.with_memory(theta) {
+        if let Some((seat, effect)) = self.entry.with_memory(theta) {
+            let (law, time) = (effect.law(), S::from_f64(self.record.time_step));
             first.extend(self.record.samples().map(|k| {
                 let q = seat.sum(|joint| self.record.behind(k, joint, &sensors)[0]);
-                memory = before.map_or(memory, |before| law.advance(memory, q - before));
+                memory = before.map_or(memory, |before| law.advance(memory, q - before, time));
                 before = Some(q);
                 memory
             }));

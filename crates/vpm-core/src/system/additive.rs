@@ -69,7 +69,7 @@ impl<S: Scalar> Split<S> {
         let apart =
             |(seat, effect): &&(Seat, JointEffect<S>)| seat.behind.is_some() || effect.law().damping().is_none();
         let mut seats: Vec<Seat> = dynamics.effects.iter().filter(apart).map(|(seat, _)| *seat).collect();
-        seats.extend(dynamics.memories.iter().map(|(seat, ..)| seat));
+        seats.extend(dynamics.memories.seats());
         seats.sort_unstable();
         seats.dedup();
         let (n, count) = (dynamics.coordinates(), seats.len());
@@ -123,10 +123,13 @@ impl<S: Scalar> Split<S> {
             let (q, w, u) = (seat.of(explicit), self.velocity[k], dynamics.efforts[seat.joint]);
             let (mut resistance, mut rest) = (S::zero(), S::zero());
             for (_, effect) in dynamics.effects.iter().filter(|(place, _)| *place == seat) {
-                let (law, load) = (effect.law(), u.abs());
-                let (linear, per_load) = (law.damping().unwrap_or_default(), law.resistance_per_load(w, u));
-                resistance += law.resistance(q, w) - linear + per_load * load;
-                rest -= (law.share_of_load(q, w, u) - per_load * w) * load;
+                let (law, linear) = (effect.law(), effect.law().damping().unwrap_or_default());
+                resistance += law.resistance(q, w) - linear;
+                if law.follows_load() {
+                    let (load, per_load) = (u.abs(), law.resistance_per_load(w, u));
+                    resistance += per_load * load;
+                    rest -= (law.share_of_load(q, w, u) - per_load * w) * load;
+                }
                 if seat.behind.is_some() {
                     let spring = Spring::new(effect, q);
                     let (coasting, v) = (seat.of(&self.coasting), seat.of(&implicit[n..]));
@@ -135,12 +138,10 @@ impl<S: Scalar> Split<S> {
                     rest += spring.effort(q, coasting - v * reach);
                 }
             }
-            let memories = implicit[dynamics.first_memory()..].iter().zip(dynamics.memories.iter());
-            for (&z, (_, law, _)) in memories.filter(|(_, (place, ..))| *place == seat) {
-                let fading = law.fading(w, z);
-                let kept = (fading * reach + 1.0).recip();
-                resistance -= law.effort(kept / law.displacement * reach);
-                rest += law.effort(z * kept);
+            let memories = &implicit[dynamics.first_memory()..];
+            for [own, at_rest] in dynamics.memories.at_end(seat, w, memories, reach) {
+                resistance += own;
+                rest += at_rest;
             }
             // What drives instead of resisting would take the inverse apart.
             let driving = resistance.min(S::zero());
@@ -185,13 +186,7 @@ impl<S: Scalar> Dynamics<S> {
         self.actuate(&split.state, rates);
         split.accelerate(self, stage, rates);
         let (motion, memories) = rates.split_at_mut(first);
-        for ((rate, &z), (seat, law, _)) in memories.iter_mut().zip(&stage.implicit[first..]).zip(self.memories.iter())
-        {
-            let w = seat.of(motion);
-            // At the velocity by which its effort was reckoned the fading is that of the turn before, to the error of the turns.
-            let fading = law.fading(w, z);
-            *rate = (w / law.displacement - fading * z) / (fading * stage.reach + 1.0);
-        }
+        self.memories.rates_at_end(&stage.implicit[first..], motion, stage.reach, memories);
     }
 
     /// Puts the lags to the end of the stage.

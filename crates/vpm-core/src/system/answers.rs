@@ -53,7 +53,8 @@ impl<S: Scalar> Dynamics<S> {
             }
             let share = |(_, effect): &(Seat, JointEffect<S>)| effect.law().share_of_load(q[joint], v[joint], *effort);
             let taken: S = self.effects.iter().filter(own).map(share).sum();
-            *effort = *effort / (S::one() - effort.if_negative(|| -taken, || taken));
+            let arriving = *effort;
+            *effort = arriving / (S::one() - arriving.if_negative(|| -taken, || taken));
         }
     }
 
@@ -70,7 +71,7 @@ impl<S: Scalar> Dynamics<S> {
         for (seat, effect) in &self.effects {
             seat.push(loads, effect.law().effort(seat.of(q), seat.of(v)));
         }
-        self.memories.add_efforts(loads);
+        self.memories.add_efforts(v, loads);
         for (effort, &effect) in efforts.iter_mut().zip(&*loads) {
             *effort -= effect;
         }

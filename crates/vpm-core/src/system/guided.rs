@@ -198,9 +198,7 @@ impl<S: Scalar> Guided<S> {
         for (seat, effect) in &dynamics.effects {
             seat.push(load, -effect.law().effort(seat.of(q), seat.of(v)));
         }
-        for (seat, law, memory) in dynamics.memories.iter() {
-            seat.push(load, -law.effort(memory));
-        }
+        dynamics.memories.subtract_efforts(v, load);
         dynamics.subtract_connections(load);
         for Hold { first, row, strain: [begin, end, gain] } in &*holds {
             let own = *first..*first + row.len();

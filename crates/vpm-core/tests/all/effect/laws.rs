@@ -2,8 +2,9 @@
 
 use std::f64::consts::PI;
 use vpm_core::effect::{
-    AsymmetricFriction, Backlash, BiasForce, CoulombFriction, EndStop, Formula, JointCompliance, JointEffect, Law,
-    LinkFlexibility, Spring, StribeckFriction, TorqueRipple, ViscousFriction,
+    AsymmetricFriction, Backlash, BiasForce, CoulombFriction, CubicSpring, EndStop, Formula, JointCompliance,
+    JointEffect, Law, LinkFlexibility, PositionDependentFriction, QuadraticDrag, Spring, StribeckFriction,
+    TorqueRipple, ViscousFriction,
 };
 use vpm_core::evaluate;
 use vpm_core::integrator::Method;
@@ -138,6 +139,7 @@ fn potentials_are_what_the_efforts_integrate_to() {
     let laws = [
         JointEffect::BiasForce(BiasForce { force: 2.0 }),
         JointEffect::Spring(Spring { stiffness: 70.0, rest: 0.2 }),
+        JointEffect::CubicSpring(CubicSpring { stiffness: 70.0, rest: 0.2 }),
         JointEffect::TorqueRipple(TorqueRipple { period: 0.3, cosine: 1.0, sine: 2.0 }),
         JointEffect::Backlash(Backlash { gap: 0.4, stiffness: 30.0, damping: 0.0, contact_damping: 0.0, width: 0.05 }),
         JointEffect::JointCompliance(JointCompliance { stiffness: 30.0, damping: 0.0 }),
@@ -170,8 +172,16 @@ fn every_law_splits_into_rest_and_resistance() {
             stribeck_velocity: 0.3,
             transition_velocity: 0.04,
         }),
+        JointEffect::QuadraticDrag(QuadraticDrag { drag: 3.0 }),
+        JointEffect::PositionDependentFriction(PositionDependentFriction {
+            period: 0.3,
+            cosine: 1.0,
+            sine: 2.0,
+            transition_velocity: 0.04,
+        }),
         JointEffect::BiasForce(BiasForce { force: 2.0 }),
         JointEffect::Spring(Spring { stiffness: 70.0, rest: 0.2 }),
+        JointEffect::CubicSpring(CubicSpring { stiffness: 70.0, rest: 0.2 }),
         JointEffect::TorqueRipple(TorqueRipple { period: 0.3, cosine: 1.0, sine: 2.0 }),
         JointEffect::Backlash(Backlash { gap: 0.4, stiffness: 30.0, damping: 3.0, contact_damping: 2.0, width: 0.05 }),
         JointEffect::JointCompliance(JointCompliance { stiffness: 30.0, damping: 2.0 }),

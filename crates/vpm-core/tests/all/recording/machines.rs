@@ -218,6 +218,16 @@ fn rigid_trees_with_effects_on_all_joints_agree() -> Result<()> {
 }
 
 #[test]
+fn every_effect_agrees_with_its_derivatives() -> Result<()> {
+    for (seed, (kind, numbers)) in (1..).zip(EFFECTS) {
+        let mut machine = Machine::new(&random_tree(seed, 2));
+        machine.effect(kind, 1, numbers).actuator(1, &[("gain", 3e3)]);
+        check(kind, &machine.build(), &WITH_DERIVATIVES, &[])?;
+    }
+    Ok(())
+}
+
+#[test]
 fn effects_behind_a_joint_agree() -> Result<()> {
     for seed in 1..5 {
         let mut machine = Machine::new(&random_tree(seed, 2 + seed as usize % 3));
@@ -234,7 +244,7 @@ fn effects_behind_a_joint_agree() -> Result<()> {
 }
 
 /// Effects of joints with their parameters: each a size that is drawn up to it, from a tenth of it.
-const EFFECTS: [(&str, &[(&str, f64)]); 9] = [
+const EFFECTS: [(&str, &[(&str, f64)]); 15] = [
     ("viscous_friction", &[("viscous", 0.5)]),
     ("coulomb_friction", &[("coulomb", 2.0), ("transition_velocity", 0.2)]),
     ("stribeck_friction", &[("stribeck", 1.0), ("stribeck_velocity", 0.4), ("transition_velocity", 0.2)]),
@@ -244,6 +254,15 @@ const EFFECTS: [(&str, &[(&str, f64)]); 9] = [
     ("torque_ripple", &[("period", 2.0), ("cosine", 0.5), ("sine", 0.5)]),
     ("bias_force", &[("force", 1.0)]),
     ("hysteresis", &[("force", 1.0), ("displacement", 0.2), ("shape", 1.0)]),
+    ("quadratic_drag", &[("drag", 0.5)]),
+    ("cubic_spring", &[("stiffness", 20.0), ("rest", 0.5)]),
+    ("position_dependent_friction", &[("period", 2.0), ("cosine", 0.5), ("sine", 0.5), ("transition_velocity", 0.2)]),
+    ("load_dependent_friction", &[("driving", 0.3), ("driven", 0.2), ("transition_velocity", 0.2)]),
+    (
+        "lugre_friction",
+        &[("coulomb", 1.0), ("displacement", 0.2), ("damping", 0.1), ("excess", 0.5), ("stribeck_velocity", 0.4)],
+    ),
+    ("warming_friction", &[("coulomb", 1.0), ("viscous", 0.3), ("time_constant", 2.0), ("transition_velocity", 0.2)]),
 ];
 
 /// A tree of one to five joints with some effects, a payload and a drive.
