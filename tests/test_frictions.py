@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from test_sides import TIMES, force
-from test_split_joints import SLIDE, J, K
+from test_sides import TIMES, elastic, force
+from test_split_joints import commanded, slide
 from vpm import EFFECTS, Experiment, Model, simulate
 from vpm.discrepancy.candidates import candidates
-from vpm.errors import ModelError
+from vpm.errors import ModelError, SimulationError
 from vpm.identify import InverseDynamicsProblem, identify
 
 Array = NDArray[np.float64]
@@ -31,12 +31,12 @@ VALUES: dict[str, dict[str, float]] = {
 
 
 def with_one(name: str) -> Model:
-    return Model.from_toml(SLIDE).with_effect(name, at="axis", **VALUES[name])
+    return slide().with_effect(name, at="axis", **VALUES[name])
 
 
 def geared() -> Model:
     """All of them at one joint that winds up, those that have sides on both."""
-    model = Model.from_toml(SLIDE).with_effect("joint_compliance", at="axis", stiffness=K, damping=8.0, inertia=J)
+    model = elastic()
     for name, values in VALUES.items():
         model = model.with_effect(name, at="axis", **values)
         if EFFECTS[name].has_sides:
@@ -71,7 +71,7 @@ def test_methods_agree_on_the_motion(name: str) -> None:
 
 @pytest.mark.parametrize("name", VALUES)
 def test_along_a_record_the_balance_vanishes_and_knows_its_slopes(name: str) -> None:
-    truth, bare = with_one(name), Model.from_toml(SLIDE)
+    truth, bare = with_one(name), slide()
     data = InverseDynamicsProblem(bare, [record(truth)], cutoff=150.0)
     columns = [truth.index(dotted) for dotted in truth.effects[0].parameter_names.values()]
     with_it, slopes = data.evaluate(truth, truth.theta, columns)
@@ -110,7 +110,18 @@ def test_runs_that_start_within_a_record_remember_what_was_before(name: str) -> 
     place = run.channels.index("axis.position")
     gap = np.nanmax(np.abs(run["axis.position"] - run.measured[:, place]))
     assert gap < 0.02 * np.ptp(whole["axis.position"])
-    assert model.internal_names == (f"axis.{EFFECTS[name].group}.memory",)
+    assert model.internal_names == (f"axis.{EFFECTS[name].memory}",)
+
+
+@pytest.mark.parametrize("name", ["lugre_friction", "warming_friction"])
+def test_what_remembers_is_balanced_before_a_spring_and_refused_behind_it(name: str) -> None:
+    truth = elastic().with_effect(name, at="axis", **VALUES[name])
+    data = InverseDynamicsProblem(slide(), [commanded(truth)], cutoff=150.0)
+    left, without = (np.linalg.norm(data.evaluate(model, model.theta)[0]) for model in (truth, slide()))
+    assert left < 0.01 * without
+    behind = elastic().with_effect(name, at="axis", side="link", **VALUES[name])
+    with pytest.raises(SimulationError, match="joint `axis` has an effect that remembers"):
+        data.evaluate(behind, behind.theta)
 
 
 def test_the_cold_joint_is_cold_at_the_first_sample_alone() -> None:
@@ -124,7 +135,7 @@ def test_files_keep_them_and_a_diagnosis_leaves_them_alone() -> None:
     model = geared()
     assert Model.from_toml(model.to_toml()) == model
     assert len(set(model.internal_names)) == 4
-    bare = Model.from_toml(SLIDE)
+    bare = slide()
     data = InverseDynamicsProblem(bare, [record(with_one("quadratic_drag"))])
     tried = {c.effect.name for c in candidates(bare, data, data.evaluate(bare, bare.theta)[0])}
     assert tried

@@ -133,7 +133,7 @@ def _forgetful(model: Model, joints: tuple[str, ...]) -> tuple[Model, NDArray[np
     bare = model
     for effect in model.effects:
         behind = effect.side == "link" and f"{effect.at}_deflection" in model.joints
-        if effect.type.remembers and effect.at in joints and not behind:
+        if effect.type.memory and effect.at in joints and not behind:
             bare = bare.without_effect(*effect.key)
     return bare, np.array([model.index(name) for name in bare.parameter_names], dtype=np.int64)
 

@@ -248,7 +248,7 @@ HYSTERESIS = EffectType(
     name="hysteresis",
     site="joint",
     group="hysteresis",
-    remembers=True,
+    memory="memory",
     parameters=(
         size(
             "force",

@@ -156,8 +156,8 @@ class EffectType:
         Law of an entry that a user wrote, see `vpm.catalogue.register`.
     motor_side_alone : bool
         Whether, at a joint that winds up or plays, it belongs to the motor side or to the spring itself.
-    remembers : bool
-        Whether its law has a memory, a state of the machine.
+    memory : str
+        What the memory of its law, a state of the machine, is called at its site; "" if it has none.
     """
 
     name: str
@@ -173,7 +173,7 @@ class EffectType:
     shows: Signature | None = None
     formula: Formula | None = None
     motor_side_alone: bool = False
-    remembers: bool = False
+    memory: str = ""
 
     @property
     def has_sides(self) -> bool:

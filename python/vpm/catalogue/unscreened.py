@@ -196,7 +196,7 @@ LUGRE_FRICTION = EffectType(
     impossible="a negative friction of bristles would push along the motion and feed energy into it",
     confused_with={},
     screened=False,
-    remembers=True,
+    memory="lugre.memory",
 )
 
 WARMING_FRICTION = EffectType(
@@ -242,7 +242,7 @@ WARMING_FRICTION = EffectType(
     impossible="a negative one would mean friction that grows as the machine gets warm",
     confused_with={},
     screened=False,
-    remembers=True,
+    memory="warming.memory",
 )
 
 UNSCREENED_EFFECTS = (

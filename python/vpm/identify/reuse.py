@@ -77,7 +77,7 @@ def parts_of(model: Model, joints: tuple[str, ...]) -> Parts | None:
     Where a joint remembers its way, joints that wind up count as plays do: a motion that is worked out carries no
     memory along, and the measured joint, on the side of the motor, is the one that remembers.
     """
-    remembers = any(effect.type.remembers for effect in model.effects)
+    remembers = any(effect.type.memory for effect in model.effects)
     return split(model, joints, SPLITTING if remembers else frozenset({"backlash"}))
 
 

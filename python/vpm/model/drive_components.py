@@ -14,7 +14,6 @@ from vpm.model.check import Checked
 from vpm.model.drives import COMPLIANT
 from vpm.model.hydraulic import Hydraulic
 from vpm.model.pose import Pose
-from vpm.model.schema import EffectEntry
 from vpm.model.structure import Mount, Structure
 from vpm.model.table import Table, beyond
 
@@ -146,8 +145,9 @@ class DriveComponents:
         """States beside coordinates and rates: of actuators (lag, drive), of supplies (pressure, drop), memories."""
         of_drives = (state for name in self.actuators for state in self._states_of(name))
         of_supplies = (state for name in self.supplies for state in self._states_of_supply(name))
-        remembering = (entry for entry in self._checked.document.effects if EFFECTS[entry.type].remembers)
-        return (*of_drives, *of_supplies, *map(_memory, remembering))
+        effects = self._checked.document.effects
+        memories = (f"{e.owner}.{EFFECTS[e.type].memory}" for e in effects if EFFECTS[e.type].memory)
+        return (*of_drives, *of_supplies, *memories)
 
     def _states_of(self, actuator: str) -> Iterator[str]:
         if self.has_lag(actuator):
@@ -183,12 +183,6 @@ class DriveComponents:
             model = self._checked.document.name
             raise ModelError(f'{model} has no {what} "{name}"; {near_match(name, names, what="it has")}', where=name)
         return name
-
-
-def _memory(entry: EffectEntry) -> str:
-    """Name of the memory of an effect; that of a hysteresis is the plain one."""
-    own = "" if entry.type == "hysteresis" else f"{EFFECTS[entry.type].group}."
-    return f"{entry.owner}.{own}memory"
 
 
 def _way(structure: Structure, mount: Mount) -> Iterator[int]:

@@ -46,7 +46,7 @@ pub trait Law<S: Scalar> {
         if self.follows_load() { self.effort(q, v) - self.share_of_load(q, v, u) * u.abs() } else { self.effort(q, v) }
     }
 
-    /// Whether it takes a share of the load.
+    /// Whether it takes a share of the load, which the motor side of a joint knows alone.
     #[inline]
     fn follows_load(&self) -> bool {
         false

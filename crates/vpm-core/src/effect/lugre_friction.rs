@@ -9,11 +9,12 @@ law! {
     /// Law: with the memory z, the mean deflection of the bristles by `displacement`, and `h = 1 + excess exp(-(v / stribeck_velocity)^2)`,
     /// `dz/dt = (v - |v| z / h) / displacement` and `tau = -coulomb z - damping displacement dz/dt`; tau and `coulomb` in N or N m,
     /// `displacement` in m or rad, `damping` in N s/m or N m s/rad, velocities in m/s or rad/s. In steady motion `tau = -coulomb h sign(v)`;
-    /// about z = 0 it is a spring of stiffness `coulomb / displacement`. Viscous friction is an effect of its own. With much `damping` beside
-    /// `coulomb / |v|` it is not passive, as the source says.
+    /// about z = 0 it is a spring of stiffness `coulomb / displacement`. Viscous friction is an effect of its own.
+    ///
+    /// Bent bristles store `coulomb displacement z^2 / 2`; beside that it only takes energy where `damping |v| <= 4 coulomb h`.
     /// Source: Canudas de Wit, Olsson, Åström & Lischinsky 1995, "A new model for control of systems with friction", IEEE Trans. Automatic
     /// Control 40(3), equations (1) to (4), with sigma_0 = coulomb / displacement, sigma_1 = damping, F_s = coulomb (1 + excess).
-    /// Checked: steady curve, stiffness of pre-sliding, Dahl's law where `excess` and `damping` vanish.
+    /// Checked: steady curve, stiffness of pre-sliding, Dahl's law where `excess` and `damping` vanish, energy.
     LugreFriction {
         /// Resistance in fast motion, N or N m.
         coulomb: Any,

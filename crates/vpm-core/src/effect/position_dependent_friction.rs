@@ -11,8 +11,8 @@ law! {
     /// Law: with `phi = 2 pi q / period`, `tau = -(cosine cos(phi) + sine sin(phi)) tanh(v / transition_velocity)`, tau, `cosine` and
     /// `sine` in N or N m, q and `period` in m or rad, velocities in m/s or rad/s. Beside Coulomb friction the sum is not negative where
     /// that is at least `sqrt(cosine^2 + sine^2)`.
-    /// Source: Armstrong-Hélouvry 1991, "Control of Machines with Friction", section 4.4 (friction as a function of position, by its
-    /// Fourier components), first component. Checked: work over whole periods in both directions.
+    /// Source: Armstrong-Hélouvry 1991, "Control of Machines with Friction" (friction as a function of position, by its Fourier
+    /// components), first component. Checked: work over whole periods in both directions.
     PositionDependentFriction {
         /// Way after which the level repeats, m or rad.
         period: NonZero,

@@ -174,6 +174,19 @@ fn bristles_without_excess_and_damping_are_dahls() {
 }
 
 #[test]
+fn bristles_only_take_energy_where_they_are_damped_little() {
+    let mut random = Random::new(8);
+    let lost = |v: f64, z: f64| -BRISTLES.effort(v, z) * v - 4.0 * 1e-3 * z * BRISTLES.rate(v, z);
+    for _ in 0..1000 {
+        // 30 |v| stays below 16.
+        let (v, z) = (0.5 * random.symmetric(), 1.5 * random.symmetric());
+        assert!(lost(v, z) >= -1e-12, "{v} {z}: {}", lost(v, z));
+    }
+    // Faster ones give some back of what slow sliding bent.
+    assert!(lost(2.0, 1.4) < 0.0);
+}
+
+#[test]
 fn the_way_of_bristles_is_the_integral_of_their_rate_and_takes_energy() {
     let (v, time, pieces) = (0.03, 0.1, 20_000);
     for start in [-1.0, 0.0, 0.7] {
