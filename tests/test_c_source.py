@@ -18,6 +18,8 @@ from numpy.typing import NDArray
 from scipy.linalg import expm
 from typer.testing import CliRunner
 
+from test_frictions import geared
+from test_sides import rubbing_on_both_sides
 from vpm import Model, Simulation
 from vpm.cli import app
 from vpm.errors import SimulationError, VpmError
@@ -158,8 +160,14 @@ MACHINES = tuple(
 )
 
 
+#: Machines of one slide that winds up, with effects in groups that act at once.
+OWN = {"both_sides": rubbing_on_both_sides, "geared": geared}
+
+
 def machine(name: str) -> Model:
-    """A machine of the examples, with flexible links of few coordinates."""
+    """A machine of the examples, with flexible links of few coordinates, or one of these tests."""
+    if name in OWN:
+        return OWN[name]()
     model = Model.load(EXAMPLES / name)
     return model.at(COARSE[name]) if name in COARSE else model
 
@@ -173,7 +181,7 @@ def test_all_machines_of_the_examples_can_be_written() -> None:
 
 
 @WITHOUT_COMPILER
-@pytest.mark.parametrize("name", MACHINES)
+@pytest.mark.parametrize("name", [*MACHINES, *OWN])
 def test_examples_say_the_same_in_c(name: str, tmp_path: Path) -> None:
     model = machine(name)
     written = c_source(model, name="m")
@@ -208,7 +216,7 @@ def test_examples_say_the_same_in_c(name: str, tmp_path: Path) -> None:
         near(model, found, sim.state, 1e-9)
 
 
-@pytest.mark.parametrize("name", MACHINES)
+@pytest.mark.parametrize("name", [*MACHINES, *OWN])
 def test_examples_say_the_same_as_machine_code_and_recorded(name: str) -> None:
     """The laws themselves against machine code, and against their record evaluated in numbers with derivatives."""
     model = machine(name)

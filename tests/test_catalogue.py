@@ -29,8 +29,11 @@ BOOM = {
     "material": {"young": 7e10, "poisson": 0.3, "density": 2700.0},
     "section": {"shape": "rectangle", "width": 0.02, "height": 0.03},
 }
-#: Effects that put a joint behind the one they sit at, or say nothing about an effort at a state.
-ELSEWHERE = {"empirical_force", "hysteresis", "joint_compliance", "rotor_inertia", "end_stop"}
+#: Effects that put a joint behind the one they sit at, or say nothing about an effort at a coordinate and rate.
+ELSEWHERE = {
+    *("empirical_force", "hysteresis", "joint_compliance", "rotor_inertia", "end_stop"),
+    *("load_dependent_friction", "lugre_friction", "warming_friction"),
+}
 
 
 def machine(kind: str, sensed: str = "position", site: str = "joint") -> Model:
@@ -152,7 +155,9 @@ def test_every_effect_can_be_added_and_its_units_fit_its_law(effect: EffectType,
     states = {
         "effort": "1",
         "effort_per_speed": f"{joint_unit}/s",
+        "effort_per_speed_squared": f"{joint_unit}^2/s^2",
         "effort_per_coordinate": joint_unit,
+        "effort_per_coordinate_cubed": f"{joint_unit}^3",
     }
     for size in effect.parameters:
         if size.scale in states:
@@ -165,6 +170,7 @@ def test_every_effect_can_be_added_and_its_units_fit_its_law(effect: EffectType,
 def law_of(effect: EffectType) -> str:
     """Right-hand side of a law as a Python expression in q, v and the parameters."""
     text = effect.law.removeprefix("tau = ").replace("2 pi q", "2*pi*q").replace("1/2 ", "0.5*").replace("^", "**")
+    text = re.sub(r"\|(\w)\|", r"abs(\1)", text)
     text = re.sub(r"(?<=[\w)]) (?=[\w(])", "*", text)
     return re.sub(r"\b(tanh|exp|cos|sin|sqrt)\*\(", r"\1(", text)
 

@@ -41,6 +41,18 @@ SHOWN: Mapping[str, dict[str, float]] = {
     "backlash": {"gap": 0.05, "stiffness": 300.0, "damping": 4.0, "inertia": 0.01},
     "rotor_inertia": {"inertia": 0.02},
     "end_stop": {"stiffness": 20.0, "damping": 0.1, "low": -10.0, "high": 0.7},
+    "quadratic_drag": {"drag": 0.15},
+    "cubic_spring": {"stiffness": 0.8, "rest": 0.2},
+    "position_dependent_friction": {"period": 1.1, "cosine": 0.2, "sine": 0.3, "transition_velocity": 0.02},
+    "load_dependent_friction": {"driving": 0.15, "driven": 0.1, "transition_velocity": 0.02},
+    "lugre_friction": {
+        "coulomb": 0.4,
+        "damping": 0.0,
+        "displacement": 0.05,
+        "excess": 0.5,
+        "stribeck_velocity": 0.4,
+    },
+    "warming_friction": {"coulomb": 0.3, "viscous": 0.1, "time_constant": 4.0, "transition_velocity": 0.02},
     "empirical_force": {
         "reach": 1.2,
         "speed": 4.0,
@@ -218,6 +230,11 @@ residual, applied less required effort, drawn for one link on a horizontal axis 
 for a servo-cylinder; and what records may take it for, with what parts the two. Units follow the site: C is m or rad, E
 is N or N m, U the unit of the command, S that of the sensor. Keys of a model file: [model-file.md](model-file.md); what
 a diagnosis does with the entries: [diagnosis.md](diagnosis.md).
+
+A joint with [joint_compliance](#joint_compliance) or [backlash](#backlash) has two sides. On the motor side, before the
+spring or play, q and v are those of the joint, which are measured; on the link side, behind it, q + d and their rate,
+with the deflection d. Effects are on the motor side unless they say `side = "link"`; one of each may be on either.
+Without spring or play the sides are one.
 """
 
 
@@ -240,6 +257,10 @@ def _section(effect: EffectType) -> list[str]:
         f"{effect.title[0].upper()}{effect.title[1:]}, at {_article(effect.site)}: `{effect.law}`",
         "",
     ]
+    if not effect.screened:
+        lines += ["A diagnosis does not screen for it.", ""]
+    if effect.has_sides:
+        lines += ['**Side:** motor, or link with `side = "link"`.', ""]
     if effect.requires:
         lines += [f"A correction of [{effect.requires}](#{effect.requires}), which has to be there.", ""]
     if effect.name in SHOWN:

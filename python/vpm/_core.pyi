@@ -492,8 +492,8 @@ class System:
         It stood at ``position`` (n_coordinates,). Shape (n_states - 2 n_coordinates,): lags, currents and spools zero,
         visco-elastic elements settled, chambers without net force, sagging supplies at their pressure.
         """
-    def memories(self, theta: ArrayLike, position: ArrayLike) -> NDArray[np.float64]:
-        """Memories (N, hystereses) at every sample of a path of the joints (N, n), relaxed at the first."""
+    def memories(self, theta: ArrayLike, position: ArrayLike, time_step: float) -> NDArray[np.float64]:
+        """Memories (N, effects that remember) at every sample of a path of the joints (N, n), relaxed at the first."""
     def equilibrium(self, theta: ArrayLike, position: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Coordinates (n_coordinates,) at rest with the joints held at ``position``, and the holding efforts (n,)."""
     def natural_frequencies(self, theta: ArrayLike, position: ArrayLike) -> NDArray[np.float64]:

@@ -31,7 +31,7 @@ def measured_states(
 
     Sensor errors are undone; flexible links are deflected as in equilibrium; lags and spools have followed the commands
     from the beginning of the log, currents have settled on the held one, and chambers are without net force, unless the
-    log holds what is inside of a drive. Hystereses remember the way since the first sample. Joints that effects have
+    log holds what is inside of a drive. Effects remember what was since the first sample. Joints that effects have
     split off are where the measured motion of the others takes them. The motion of all joints may be ``given``.
     """
     m = given or whole_motion(model, experiment, theta, cutoff)
@@ -52,7 +52,7 @@ def measured_states(
         state[2 * coordinates :] = _seen(model, experiment, theta, state[:coordinates], internal, int(row))
     memories = sum(name.endswith(".memory") for name in model.internal_names)
     if memories:  # what the joints remember of their way until then
-        states[:, -memories:] = model.core.memories(theta, (m.position - offset) / gain)[rows]
+        states[:, -memories:] = model.core.memories(theta, (m.position - offset) / gain, m.dt)[rows]
     return states
 
 
@@ -126,11 +126,15 @@ def _along(model: Model, theta: Array, given: tuple[Array, Array, Array], joints
 
 @lru_cache(maxsize=128)
 def _forgetful(model: Model, joints: tuple[str, ...]) -> tuple[Model, NDArray[np.int64]]:
-    """A machine without the hystereses of some joints, with its parameters among those that it had."""
+    """A machine without what remembers at some joints, with its parameters among those that it had.
+
+    One behind a spring moves what nobody measures, and stays.
+    """
     bare = model
     for effect in model.effects:
-        if effect.name == "hysteresis" and effect.at in joints:
-            bare = bare.without_effect(effect.name, effect.at)
+        behind = effect.side == "link" and f"{effect.at}_deflection" in model.joints
+        if effect.type.memory and effect.at in joints and not behind:
+            bare = bare.without_effect(*effect.key)
     return bare, np.array([model.index(name) for name in bare.parameter_names], dtype=np.int64)
 
 

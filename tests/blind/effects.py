@@ -1,8 +1,8 @@
 """What can be hidden, where, and how large: sizes are drawn relative to the machine's efforts, speeds and ways.
 
-The sizes reach from what drowns in the noise to what nobody overlooks, evenly on a logarithmic scale. Parameters are
-named as in the catalogue where it has the effect; an effect with ``known = False`` is physics that the catalogue does
-not have, for which "unexplained" is the right answer.
+The sizes reach from what drowns in the noise to what nobody overlooks, evenly on a logarithmic scale. Parameters of
+known effects are named as in the catalogue; an effect with ``known = False`` is physics that no diagnosis screens for,
+whether the catalogue has a law for it or not, so that "unexplained" is the right answer.
 """
 
 from __future__ import annotations

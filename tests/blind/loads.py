@@ -115,7 +115,7 @@ class JointLoads:
             self._smooth.append(end_stop)
 
     def _outside(self, get: Callable[..., Array]) -> None:
-        """Effects that the catalogue does not have."""
+        """Effects that no diagnosis screens for."""
         drag, cubic = get("quadratic_drag.drag"), get("cubic_spring.stiffness")
         load, place = get("load_dependent_friction.share"), get("position_dependent_friction.coulomb")
         wave, shift = (

@@ -189,7 +189,7 @@ def pairs_alone(answers: Iterable[Answer]) -> list[Answer]:
 
 
 def outside(answers: Iterable[Answer]) -> list[Answer]:
-    """Solvable cases of effects that the catalogue does not have."""
+    """Solvable cases of effects that no diagnosis screens for."""
     return [a for a in answers if a.kind == "outside" and a.solvable]
 
 

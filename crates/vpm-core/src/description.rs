@@ -28,6 +28,7 @@ use crate::bushing::BushingEntry;
 use crate::contact::ContactEntry;
 use crate::data::Data;
 use crate::dynamics::check_regular;
+use crate::effect::{JointEffect, MemoryEffect, Seat};
 use crate::error::{Error, Result};
 use crate::line::Line;
 use crate::model::{Model, Omissions, Parts};
@@ -159,10 +160,10 @@ impl Description {
         2 * self.n_coordinates() + drives + of_supplies + self.remembering().count()
     }
 
-    /// Numbers of the joints with hysteresis, one for each.
+    /// Numbers of the joints with effects that remember, one for each.
     pub(crate) fn remembering(&self) -> impl Iterator<Item = usize> {
         self.effects.iter().filter_map(|entry| match entry {
-            EffectEntry::Hysteresis { joint, .. } => Some(*joint),
+            EffectEntry::Memory { seat, .. } => Some(seat.joint),
             EffectEntry::Joint { .. } | EffectEntry::Payload { .. } | EffectEntry::Tree(_) => None,
         })
     }
@@ -326,28 +327,28 @@ impl EffectEntry {
                 let payload = law.map(&mut |&index| theta[index]);
                 Some(PointMass { on: *on, mass: payload.mass, position: payload.position })
             }
-            Self::Joint { .. } | Self::Hysteresis { .. } | Self::Tree(_) => None,
+            Self::Joint { .. } | Self::Memory { .. } | Self::Tree(_) => None,
         }
     }
 
-    /// The joint that it puts an effort on; none for what belongs to the tree.
-    pub(crate) fn joint(&self) -> Option<usize> {
+    /// Where it puts an effort on joints; nowhere for what belongs to the tree.
+    pub(crate) fn seat(&self) -> Option<Seat> {
         match self {
-            Self::Joint { joint, .. } | Self::Hysteresis { joint, .. } => Some(*joint),
+            Self::Joint { seat, .. } | Self::Memory { seat, .. } => Some(*seat),
             Self::Payload { .. } | Self::Tree(_) => None,
         }
     }
 
-    pub(crate) fn on_joint<S: Scalar>(&self, theta: &[S]) -> Option<(usize, crate::effect::JointEffect<S>)> {
+    pub(crate) fn on_joint<S: Scalar>(&self, theta: &[S]) -> Option<(Seat, JointEffect<S>)> {
         match self {
-            Self::Joint { joint, law } => Some((*joint, law.map(&mut |&index| theta[index]))),
-            Self::Payload { .. } | Self::Hysteresis { .. } | Self::Tree(_) => None,
+            Self::Joint { seat, law } => Some((*seat, law.map(&mut |&index| theta[index]))),
+            Self::Payload { .. } | Self::Memory { .. } | Self::Tree(_) => None,
         }
     }
 
-    pub(crate) fn with_memory<S: Scalar>(&self, theta: &[S]) -> Option<(usize, crate::effect::Hysteresis<S>)> {
+    pub(crate) fn with_memory<S: Scalar>(&self, theta: &[S]) -> Option<(Seat, MemoryEffect<S>)> {
         match self {
-            Self::Hysteresis { joint, law } => Some((*joint, law.map(&mut |&index| theta[index]))),
+            Self::Memory { seat, law } => Some((*seat, law.map(&mut |&index| theta[index]))),
             Self::Payload { .. } | Self::Joint { .. } | Self::Tree(_) => None,
         }
     }

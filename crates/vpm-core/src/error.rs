@@ -96,10 +96,10 @@ pub enum Error {
         /// Name of the first such beam.
         beam: String,
     },
-    /// A prescribed motion of a machine with hysteresis.
+    /// A prescribed motion of a machine with an effect that remembers.
     #[error(
-        "joint `{joint}` has hysteresis, whose memory a simulation with prescribed motion does not carry; balance the efforts of the joints \
-         (inverse dynamics) or simulate it on its commands"
+        "joint `{joint}` has an effect that remembers, whose memory a simulation with prescribed motion does not carry; balance the efforts \
+         of the joints (inverse dynamics) or simulate it on its commands"
     )]
     Memory {
         /// Name of the first such joint.

@@ -53,8 +53,9 @@ pub fn internal_state(description: &Description, theta: &[f64], position: &[f64]
     Ok(states)
 }
 
-/// Memories of hystereses at every sample of a path of the joints (`position`, N x joints, m or rad), row by row, relaxed at the first.
-pub fn memories(description: &Description, theta: &[f64], position: Table<'_>) -> Result<Vec<f64>> {
+/// Memories of effects at every sample, `time_step` (s) apart, of a path of the joints (`position`, N x joints, m or rad), row by row,
+/// relaxed at the first.
+pub fn memories(description: &Description, theta: &[f64], position: Table<'_>, time_step: f64) -> Result<Vec<f64>> {
     position.expect("position", position.rows(), description.n_joints())?;
     description.check_values(theta)?;
     let mut dynamics = Build::dynamics(&description, theta)?;
@@ -62,9 +63,9 @@ pub fn memories(description: &Description, theta: &[f64], position: Table<'_>) -
     let mut values = vec![0.0; position.rows() * memories.len()];
     for (k, row) in values.chunks_exact_mut(memories.len().max(1)).enumerate() {
         if k > 0 {
-            memories.travel(|joint| position.at(k, joint) - position.at(k - 1, joint));
+            memories.travel(time_step, |joint| position.at(k, joint) - position.at(k - 1, joint));
         }
-        memories.iter().zip(row).for_each(|((.., value), entry)| *entry = value);
+        row.copy_from_slice(memories.values());
     }
     Ok(values)
 }

@@ -40,7 +40,7 @@ use crate::contact::ContactFriction;
 use crate::data::Data;
 use crate::dynamics::articulated::articulated;
 use crate::dynamics::{aba, flexible, frames, lines, motion, poses};
-use crate::effect::JointEffect;
+use crate::effect::{JointEffect, Seat};
 use crate::model::Model;
 use crate::scalar::Scalar;
 use crate::sensor::Sensor;
@@ -57,8 +57,8 @@ pub struct Dynamics<S> {
     pub model: Model<S>,
     /// Working memory of the tree's algorithms.
     pub data: Data<S>,
-    /// Effects, each with the number of its joint.
-    pub effects: Vec<(usize, JointEffect<S>)>,
+    /// Effects, each with its seat.
+    pub effects: Vec<(Seat, JointEffect<S>)>,
     /// Actuators.
     pub actuators: Vec<Actuator<S>>,
     /// Supplies of the hydraulic ones.
@@ -90,7 +90,7 @@ impl<S: Scalar> Dynamics<S> {
     /// Puts the parts together. The joints, lines and supplies that effects and actuators name must exist.
     pub fn new(
         model: Model<S>,
-        effects: Vec<(usize, JointEffect<S>)>,
+        effects: Vec<(Seat, JointEffect<S>)>,
         actuators: Vec<Actuator<S>>,
         supplies: Vec<Supply<S>>,
     ) -> Self {
@@ -181,12 +181,11 @@ impl<S: Scalar> Dynamics<S> {
         flexible::terms(&self.model, &mut self.data, q, v);
     }
 
-    /// Resistances of the effects on the joints at (q, v), under the efforts of the actuators in the last state evaluated.
+    /// Resistance of each effect at (q, v), under the efforts of the actuators in the last state evaluated.
     fn write_resistances(&self, q: &[S], v: &[S], resistances: &mut [S]) {
-        resistances.fill(S::zero());
-        for (joint, effect) in &self.effects {
-            let (q, v, load) = (q[*joint], v[*joint], self.efforts[*joint].abs());
-            resistances[*joint] += effect.resistance(q, v) + effect.resistance_per_load(v) * load;
+        for ((seat, effect), resistance) in self.effects.iter().zip(resistances) {
+            let (law, q, v, u) = (effect.law(), seat.of(q), seat.of(v), self.efforts[seat.joint]);
+            *resistance = law.resistance(q, v) + law.resistance_per_load(v, u) * u.abs();
         }
     }
 
@@ -207,7 +206,7 @@ impl<S: Scalar> Dynamics<S> {
         &mut self,
         x: &[S],
         dxdt: &mut [S],
-        laws: (impl FnOnce(&[(usize, JointEffect<S>)], [&[S]; 3], &mut [S]), impl Fn(&ContactFriction<S>, S, S) -> S),
+        laws: (impl FnOnce(&[(Seat, JointEffect<S>)], [&[S]; 3], &mut [S]), impl Fn(&ContactFriction<S>, S, S) -> S),
     ) {
         let n = self.coordinates();
         let (q, v) = x[..2 * n].split_at(n);
@@ -255,7 +254,7 @@ impl<S: Scalar> Dynamics<S> {
         q: &[S],
         v: &[S],
         (add, resistance): (
-            impl FnOnce(&[(usize, JointEffect<S>)], [&[S]; 3], &mut [S]),
+            impl FnOnce(&[(Seat, JointEffect<S>)], [&[S]; 3], &mut [S]),
             impl Fn(&ContactFriction<S>, S, S) -> S,
         ),
         on_beams: &[S],
@@ -266,7 +265,7 @@ impl<S: Scalar> Dynamics<S> {
         elastic.fill(S::zero());
         elastic[..on_beams.len()].copy_from_slice(on_beams);
         add(&self.effects, [q, v, &self.efforts], of_joints);
-        self.memories.add_efforts(of_joints);
+        self.memories.add_efforts(v, of_joints);
         if self.pulls {
             flexible::add_line_forces(data, tensions, loads);
         }
@@ -286,13 +285,10 @@ impl<S: Scalar> Dynamics<S> {
 
 /// Adds to `total` the efforts of all effects on the joints at coordinates q and rates v, where the actuators push with u.
 #[inline]
-pub(crate) fn add_effects<S: Scalar>(effects: &[(usize, JointEffect<S>)], [q, v, u]: [&[S]; 3], total: &mut [S]) {
-    for (joint, effect) in effects {
-        let (q, v) = (q[*joint], v[*joint]);
-        total[*joint] += effect.effort(q, v);
-        if let JointEffect::EmpiricalForce(law) = effect {
-            total[*joint] -= law.share_of_load(q, v) * u[*joint].abs();
-        }
+pub(crate) fn add_effects<S: Scalar>(effects: &[(Seat, JointEffect<S>)], [q, v, u]: [&[S]; 3], total: &mut [S]) {
+    for (seat, effect) in effects {
+        let (law, q, v, u) = (effect.law(), seat.of(q), seat.of(v), u[seat.joint]);
+        seat.push(total, law.effort_under(q, v, u));
     }
 }
 

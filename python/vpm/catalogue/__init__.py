@@ -1,7 +1,7 @@
 """The catalogue of physical effects: one table that says everything about each of them.
 
 An effect is an ordinary component of a model, with a type, a site and parameters. The model file accepts what stands
-here, the diagnosis tries what stands here, and the report speaks in the words that stand here. The laws themselves are
+here, the diagnosis tries what it marks as screened, and the report speaks in the words that stand here. The laws are
 in the core, one file per effect.
 
 Units are templates, because the same law sits on different machines: ``{C}`` is the unit of the joint coordinate (m or
@@ -18,9 +18,10 @@ from vpm.catalogue.elsewhere import ACTUATOR_EFFECTS, BODY_EFFECTS, SENSOR_EFFEC
 from vpm.catalogue.empirical import EMPIRICAL_EFFECTS
 from vpm.catalogue.hydraulic import CYLINDER_EFFECTS, SUPPLY_EFFECTS
 from vpm.catalogue.joint import JOINT_EFFECTS
-from vpm.catalogue.kinds import POSITIVE, SITE_KINDS, EffectParameter, EffectType, JointKind, Scale, SiteKind
+from vpm.catalogue.kinds import POSITIVE, SITE_KINDS, EffectParameter, EffectType, JointKind, Scale, Side, SiteKind
 from vpm.catalogue.link import LINK_EFFECTS
 from vpm.catalogue.own import entry_of
+from vpm.catalogue.unscreened import UNSCREENED_EFFECTS
 from vpm.catalogue.world import WORLD_EFFECTS
 from vpm.errors import ModelError, near_match
 
@@ -32,6 +33,7 @@ __all__ = [
     "EffectType",
     "JointKind",
     "Scale",
+    "Side",
     "SiteKind",
     "effect_type",
     "effects_for_site",
@@ -48,6 +50,7 @@ _BUILT_IN = (
     *CYLINDER_EFFECTS,
     *SUPPLY_EFFECTS,
     *SENSOR_EFFECTS,
+    *UNSCREENED_EFFECTS,
     *EMPIRICAL_EFFECTS,
 )
 _ENTRIES = {effect.name: effect for effect in _BUILT_IN}
@@ -141,14 +144,14 @@ def register(
     Examples
     --------
     >>> effect = register(
-    ...     "cubic_spring",
-    ...     law="-hardening*q**3",
-    ...     sizes={"hardening": "{E}/{C}^3"},
-    ...     sentence="{at} is pulled back with the cube of its way, {hardening}.",
+    ...     "quintic_spring",
+    ...     law="-hardening*q**5",
+    ...     sizes={"hardening": "{E}/{C}^5"},
+    ...     sentence="{at} is pulled back with the fifth power of its way, {hardening}.",
     ... )
     >>> effect.title
-    'cubic spring'
-    >>> unregister("cubic_spring")
+    'quintic spring'
+    >>> unregister("quintic_spring")
     """
     if name in _ENTRIES and _ENTRIES[name].formula is None:
         raise ModelError(f'the catalogue has an effect "{name}" already; choose another name', where=name)

@@ -32,6 +32,7 @@ JOINT_COMPLIANCE = EffectType(
     name="joint_compliance",
     site="joint",
     group="compliance",
+    motor_side_alone=True,
     parameters=(
         nonlinear(
             "stiffness",
@@ -72,6 +73,7 @@ BACKLASH = EffectType(
     name="backlash",
     site="joint",
     group="backlash",
+    motor_side_alone=True,
     parameters=(
         shape(
             "gap",
@@ -128,6 +130,7 @@ ROTOR_INERTIA = EffectType(
     name="rotor_inertia",
     site="joint",
     group="rotor",
+    motor_side_alone=True,
     parameters=(
         size(
             "inertia",

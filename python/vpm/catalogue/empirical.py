@@ -57,6 +57,7 @@ EMPIRICAL_FORCE = EffectType(
     name="empirical_force",
     site="joint",
     group="empirical",
+    motor_side_alone=True,
     parameters=(
         _shape("middle", "{C}", "middle of the range of positions that was seen", 0.0, ANY),
         _shape("reach", "{C}", "half of that range", None),

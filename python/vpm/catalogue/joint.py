@@ -248,6 +248,7 @@ HYSTERESIS = EffectType(
     name="hysteresis",
     site="joint",
     group="hysteresis",
+    memory="memory",
     parameters=(
         size(
             "force",

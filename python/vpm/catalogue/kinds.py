@@ -27,11 +27,17 @@ SITE_KINDS: tuple[SiteKind, ...] = (
 
 JointKind = Literal["prismatic", "revolute", "helical"]
 
+#: Where at a joint that winds up or plays: before the spring or play, on the coordinate of the joint, or behind it, on
+#: the sum of that and the deflection.
+Side = Literal["motor", "link"]
+
 #: What in a record sets the natural size of a parameter; "one" means that the parameter is near 1 by nature.
 Scale = Literal[
     "effort",
     "effort_per_speed",
+    "effort_per_speed_squared",
     "effort_per_coordinate",
+    "effort_per_coordinate_cubed",
     "coordinate",
     "speed",
     "mass",
@@ -148,6 +154,10 @@ class EffectType:
         Where it shows, for an entry without a row in `vpm.catalogue.signature`.
     formula : Formula or None
         Law of an entry that a user wrote, see `vpm.catalogue.register`.
+    motor_side_alone : bool
+        Whether, at a joint that winds up or plays, it belongs to the motor side or to the spring itself.
+    memory : str
+        What the memory of its law, a state of the machine, is called at its site; "" if it has none.
     """
 
     name: str
@@ -162,6 +172,13 @@ class EffectType:
     screened: bool = True
     shows: Signature | None = None
     formula: Formula | None = None
+    motor_side_alone: bool = False
+    memory: str = ""
+
+    @property
+    def has_sides(self) -> bool:
+        """Whether it may sit on either side of a joint that winds up or plays; the motor side if nothing is said."""
+        return self.site == "joint" and not self.motor_side_alone
 
     @property
     def signature(self) -> Signature:
@@ -172,7 +189,7 @@ class EffectType:
     def title(self) -> str:
         """Name in words: ``"Coulomb friction"``."""
         words = self.name.replace("_", " ")
-        return words.replace("coulomb", "Coulomb").replace("stribeck", "Stribeck")
+        return words.replace("coulomb", "Coulomb").replace("stribeck", "Stribeck").replace("lugre", "LuGre")
 
     def parameter(self, name: str) -> EffectParameter:
         """Parameter by short name.

@@ -13,7 +13,7 @@ from vpm.units import parse_unit
 
 _NAME = re.compile(r"[a-z][a-z0-9_]*")
 #: Words that mean something else in a law or in a model file.
-_TAKEN = frozenset({"q", "v", "pi", "at", "type", "abs", "sqrt", "exp", "tanh", "sin", "cos"})
+_TAKEN = frozenset({"q", "v", "pi", "at", "side", "type", "abs", "sqrt", "exp", "tanh", "sin", "cos"})
 #: States (SI) and sizes at which a law is tried.
 _STATES = ((0.31, -0.77), (-0.52, 0.13), (1.3, 0.9), (0.017, -0.004))
 _SIZES = (0.83, 1.9)

@@ -169,6 +169,32 @@ SIGNATURES: Mapping[str, Signature] = MappingProxyType(
             "A straight line over the rate of the command",
             "Steps, and time stamps of a second sensor",
         ),
+        "quadratic_drag": Signature(
+            ("velocity",), "A parabola that changes its sign at rest", "Fast motion at several constant speeds"
+        ),
+        "cubic_spring": Signature(
+            ("position",), "A cubic parabola that crosses zero at the place of rest", "Slow motion over the whole way"
+        ),
+        "position_dependent_friction": Signature(
+            ("position", "velocity"),
+            "A wave that repeats over the way and turns over with the direction",
+            "Slow motion at constant speed over many periods, forward and back",
+        ),
+        "load_dependent_friction": Signature(
+            ("effort",),
+            "Lines through zero over the effort, one for each direction",
+            "The same slow motion forward and back under several loads",
+        ),
+        "lugre_friction": Signature(
+            ("position", "velocity"),
+            "A loop over short ways, and over long ones levels with a hump close to rest",
+            "Slow reversals over ways of several lengths, and starts from rest",
+        ),
+        "warming_friction": Signature(
+            ("time", "velocity"),
+            "Levels for each direction that come together over time",
+            "The same motion again and again after a cold start",
+        ),
         "empirical_force": Signature(
             ("velocity", "position", "acceleration", "effort", "command"),
             "Whatever the sparse formula says over the states that it was found in",

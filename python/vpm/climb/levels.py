@@ -39,7 +39,7 @@ def families(model: Model) -> list[Family]:
     ideal = stiff
     for effect in stiff.effects:
         if effect.at in model.actuators:
-            ideal = ideal.without_effect(effect.name, effect.at)
+            ideal = ideal.without_effect(*effect.key)
     found = [[(RIGID, ideal)]]
     if len(ideal.effects) < len(stiff.effects):
         found.append([(ACTUATORS, stiff)])

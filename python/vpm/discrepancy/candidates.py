@@ -124,13 +124,13 @@ def left_out(model: Model, data: InverseDynamicsProblem, effects: Sequence[str] 
 
 def _absent(model: Model, effects: Sequence[str] | None) -> list[tuple[EffectType, str]]:
     """Effects of the catalogue that ``model`` does not have, with each of their sites."""
-    present = {(effect.name, effect.at) for effect in model.effects}
+    present, by_key = {(effect.name, effect.at) for effect in model.effects}, {effect.key for effect in model.effects}
     found = []
     for effect in EFFECTS.values():
         if not effect.screened or (effects is not None and effect.name not in effects):
             continue
         for site in sites_worth_trying(effect, model):
-            needed = effect.requires is None or (effect.requires, site) in present
+            needed = effect.requires is None or (effect.requires, site) in by_key
             if (effect.name, site) not in present and needed:
                 found.append((effect, site))
     return found

@@ -393,7 +393,7 @@ def _out_of_reach(probe: Probe) -> set[str]:
 
 
 def _short_names(probe: Probe) -> dict[str, str]:
-    mine = (dict(e.parameter_names) for e in probe.model.effects if (e.name, e.at) == probe.candidate.key)
+    mine = (dict(e.parameter_names) for e in probe.model.effects if e.key == probe.candidate.key)
     return next(mine, {})
 
 

@@ -113,8 +113,8 @@ def _described(base: Judged, data: Data) -> Described:
 
 def _before(recalibrated: Judged, final: Judged, data: Data) -> Array:
     """What the recalibrated model leaves, less a shift within the sampling interval unless that is what was named."""
-    known = {(effect.name, effect.at) for effect in recalibrated.model.effects}
-    late = any(effect.name in LATE and (effect.name, effect.at) not in known for effect in final.model.effects)
+    known = {effect.key for effect in recalibrated.model.effects}
+    late = any(effect.name in LATE and effect.key not in known for effect in final.model.effects)
     return recalibrated.unseen if late else in_time(recalibrated, data).unseen
 
 

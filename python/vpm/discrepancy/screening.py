@@ -276,7 +276,7 @@ def _sizes(model: Model, candidate: Candidate, known: Sequence[str], added: Sequ
 
 def _added(model: Model, candidate: Candidate) -> tuple[str, ...]:
     for effect in model.effects:
-        if effect.name == candidate.effect.name and effect.at == candidate.site:
+        if effect.key == candidate.key:
             return tuple(effect.parameter_names.values())
     return ()
 

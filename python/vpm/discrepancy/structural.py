@@ -74,19 +74,19 @@ def sites_worth_trying(effect: EffectType, model: Model) -> tuple[str, ...]:
 def beyond(effect: EffectType, site: str, model: Model, measured: Sequence[str]) -> str:
     """Why a model with one effect more could not be built, or balanced along the ``measured`` joints, or "".
 
-    A motion with joints that nobody measures is integrated, and there no hysteresis carries its memory along; but it
+    A motion with joints that nobody measures is integrated, and there no effect carries its memory along; but it
     does on the motor side of a joint that is split where that is measured, see `vpm.identify.reuse.parts_of`.
     """
-    remembering = [entry.at for entry in model.effects if entry.name == "hysteresis"]
+    remembering = [f"{entry.type.title} at {entry.at}" for entry in model.effects if entry.type.memory]
     split_off = {f"{entry.at}_deflection" for entry in model.effects if entry.name in SPLITTING}
     alone = tuple(joint for joint in model.joints if joint not in split_off) == tuple(measured)
     known = alone and not has_own_drives(model) and not any(entry.name == "rotor_inertia" for entry in model.effects)
-    if effect.name == "hysteresis" and tuple(model.joints) != tuple(measured) and not known:
+    if effect.memory and tuple(model.joints) != tuple(measured) and not known:
         return "its memory cannot be balanced beside what moves unseen in this model"
     if effect.name not in HIDING:
         return ""
     if remembering and not (known and effect.name in SPLITTING):
-        return f"what moves unseen cannot be balanced beside the memory of the hysteresis at {remembering[0]}"
+        return f"what moves unseen cannot be balanced beside the memory of the {remembering[0]}"
     split = [(entry.name, entry.at) for entry in model.effects if entry.name in HIDING]
     whole = model
     for key in split:

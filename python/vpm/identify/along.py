@@ -253,7 +253,7 @@ def _unsplit(model: Model, joints: tuple[str, ...]) -> tuple[Model, NDArray[np.i
     """
     bare = model
     for effect in model.effects:
-        candidate = bare.without_effect(effect.name, effect.at)
+        candidate = bare.without_effect(*effect.key)
         bare = candidate if len(candidate.joints) < len(bare.joints) else bare
     if bends(model) or tuple(bare.joints) != joints:
         return None

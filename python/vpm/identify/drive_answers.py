@@ -46,7 +46,7 @@ def together(
     """Channels and efforts of drives on joints (n, k), filtered, and their derivative: of the machine as a whole."""
     columns, channels = wanted
     internal = first_drives(model, theta, m, experiment)
-    effects = tuple((effect.name, effect.at) for effect in model.effects)
+    effects = tuple(effect.key for effect in model.effects)
     key = (memory.commands, model.description(), effects, theta.tobytes(), internal.tobytes(), tuple(channels))
     work = partial(_answered, model, theta, m, experiment, channels, internal, memory.integrator)
     return memory.recall(key, [model.parameter_names[column] for column in columns], work)

@@ -12,6 +12,7 @@ from collections import OrderedDict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
+from operator import itemgetter
 from threading import Lock
 from typing import Any
 
@@ -26,8 +27,6 @@ Array = NDArray[np.float64]
 
 #: Effects of joints that add a motion of their own, and those that weigh the acceleration: the tree has them.
 SPLITTING = frozenset({"joint_compliance", "backlash"})
-#: The law of a joint that depends on the way it came.
-REMEMBERS = "hysteresis"
 #: Simulations that are kept for each record: those of one round of a search.
 KEPT = 48
 #: Values that have moved by no more than this share of themselves leave derivatives good enough for a first look: by
@@ -78,7 +77,7 @@ def parts_of(model: Model, joints: tuple[str, ...]) -> Parts | None:
     Where a joint remembers its way, joints that wind up count as plays do: a motion that is worked out carries no
     memory along, and the measured joint, on the side of the motor, is the one that remembers.
     """
-    remembers = any(effect.name == REMEMBERS for effect in model.effects)
+    remembers = any(effect.type.memory for effect in model.effects)
     return split(model, joints, SPLITTING if remembers else frozenset({"backlash"}))
 
 
@@ -87,6 +86,8 @@ def split(model: Model, joints: tuple[str, ...], splits: frozenset[str]) -> Part
     """The same where all ``splits``, effects that bring a coordinate of their own, count as plays do."""
     plays = [e for e in model.effects if e.name in splits and f"{e.at}_deflection" in model.joints]
     flying = {f"{e.at}_deflection" for e in plays}
+    if any(e.side == "link" and f"{e.at}_deflection" in model.joints for e in model.effects):
+        return None  # what acts behind a spring moves it
     if tuple(joint for joint in model.joints if joint not in flying) != joints:
         return None
     if not model.core.n_elastic and (not plays or any(e.name == "rotor_inertia" for e in model.effects)):
@@ -119,8 +120,9 @@ def split(model: Model, joints: tuple[str, ...], splits: frozenset[str]) -> Part
 
 def _without(content: Mapping[str, Any], effects: Sequence[Effect], *, rigid: bool = False) -> Model:
     """The machine of a model file's content without some effects, and with rigid links."""
-    gone = {(effect.name, effect.at) for effect in effects}
-    kept = [entry for entry in content.get("effects", ()) if (entry["type"], entry["at"]) not in gone]
+    gone = {(effect.name, effect.at, effect.side) for effect in effects}
+    of = itemgetter("type", "at")
+    kept = [entry for entry in content.get("effects", ()) if (*of(entry), entry.get("side", "motor")) not in gone]
     changed = {**content, "effects": kept}
     if rigid:
         changed["beams"] = {name: {**beam, "level": "rigid"} for name, beam in content["beams"].items()}

@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from vpm.catalogue import EFFECTS
 from vpm.errors import ModelError, near_match
 from vpm.model.check import Checked
 from vpm.model.drives import COMPLIANT
@@ -144,7 +145,8 @@ class DriveComponents:
         """States beside coordinates and rates: of actuators (lag, drive), of supplies (pressure, drop), memories."""
         of_drives = (state for name in self.actuators for state in self._states_of(name))
         of_supplies = (state for name in self.supplies for state in self._states_of_supply(name))
-        memories = (f"{effect.at}.memory" for effect in self._checked.document.effects if effect.type == "hysteresis")
+        effects = self._checked.document.effects
+        memories = (f"{e.owner}.{EFFECTS[e.type].memory}" for e in effects if EFFECTS[e.type].memory)
         return (*of_drives, *of_supplies, *memories)
 
     def _states_of(self, actuator: str) -> Iterator[str]:
@@ -168,7 +170,7 @@ class DriveComponents:
 
     def internal_unit(self, state: str) -> str:
         """SI unit of a state of `internal_names`."""
-        owner, _, name = state.partition(".")
+        owner, _, name = state.rpartition(".")
         pressures = dict.fromkeys(("chamber_a", "chamber_b", "load", "pressure", "drop"), "Pa")
         units = {"current": "A", "stretch": "m", "memory": "1"} | pressures
         if name in units:

@@ -32,15 +32,17 @@ def effect_json(effect: Effect, structure: Structure, index: Mapping[str, int]) 
 
 def _on_joint(effect: Effect, structure: Structure, numbers: dict[str, int]) -> list[dict[str, Any]]:
     places, formula = structure.joints, effect.type.formula
-    if formula is not None:
-        law = {"program": list(formula.program), "constants": list(formula.constants)}
-        joint = places.index(effect.at)
-        return [{"type": "formula", "joint": joint, **law, "parameters": list(numbers.values())}]
     before, behind = effect.at, deflections(structure.document).get(effect.at)
     if effect.type.site == "link":
         before, behind = structure.turned[effect.at], bendings(structure.document)[effect.at]
+    seat = {"joint": places.index(before)}
+    if effect.side == "link" and behind is not None:
+        seat["behind"] = places.index(behind)
+    if formula is not None:
+        law = {"program": list(formula.program), "constants": list(formula.constants)}
+        return [{"type": "formula", **seat, **law, "parameters": list(numbers.values())}]
     if effect.name not in {"joint_compliance", "backlash", "link_flexibility"}:
-        return [{"type": effect.name, "joint": places.index(before), **numbers}]
+        return [{"type": effect.name, **seat, **numbers}]
     inertia = {"type": "rotor_inertia", "joint": places.index(before), "inertia": numbers.pop("inertia")}
     return [{"type": effect.name, "joint": places.index(behind or before), **numbers}, inertia]
 

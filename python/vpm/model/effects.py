@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from vpm.catalogue import EFFECTS, EffectParameter, EffectType
+from vpm.catalogue import EFFECTS, EffectParameter, EffectType, Side
 from vpm.errors import near_match
 from vpm.model.entry import Quantity
 from vpm.model.messages import Problem, place
@@ -25,13 +25,26 @@ class Effect:
         Type in the catalogue.
     at : str
         Component that it sits at.
+    side : {"motor", "link"}
+        Where at a joint that winds up or plays.
     parameter_names : mapping of str to str
         Short name to dotted name of each parameter.
     """
 
     name: str
     at: str
+    side: Side
     parameter_names: Mapping[str, str]
+
+    @property
+    def key(self) -> tuple[str, str] | tuple[str, str, Side]:
+        """What no other effect of the model shares: name and component, and the side if it is that of the link."""
+        return (self.name, self.at) if self.side == "motor" else (self.name, self.at, self.side)
+
+    @property
+    def place(self) -> str:
+        """Component and side in words."""
+        return self.at if self.side == "motor" else f"{self.at}, {self.side} side"
 
     @property
     def type(self) -> EffectType:
@@ -56,7 +69,9 @@ def effect_problems(document: Document, structure: Structure) -> Iterator[Proble
                 repair = f"the seals of {entry.at} rub at the joint that it moves; {repair}"
             rest = f'is "{entry.at}", which is no {effect.site} of the model; {effect.name} sits at one, {repair}'
             yield Problem(place(*keys, "at"), rest)
-        earlier = seen.setdefault((entry.type, entry.at), position)
+        if entry.side == "link" and not effect.has_sides:
+            yield Problem(place(*keys, "side"), f'is "link", but a {effect.title} has no sides; leave the key out')
+        earlier = seen.setdefault((entry.type, entry.owner), position)
         if earlier != position:
             rest = f'is a second {entry.type} at "{entry.at}", after effects[{earlier}]; remove one'
             yield Problem(place(*keys), rest)
@@ -68,7 +83,7 @@ def _value_problems(effect: EffectType, entry: EffectEntry, keys: tuple[str, int
     names = [parameter.name for parameter in effect.parameters]
     for key in entry.values:
         if key not in names:
-            repair = near_match(key, ["type", "at", *names])
+            repair = near_match(key, ["type", "at", *(["side"] if effect.has_sides else []), *names])
             yield Problem(place(*keys, key), f"is not a known key of {effect.name}; {repair}")
     for parameter in effect.parameters:
         if parameter.start is None and not parameter.optional and parameter.name not in entry.values:
@@ -96,7 +111,7 @@ def complete_effects(document: Document, structure: Structure) -> Document:
             quantity = given[parameter.name] if start is None else given.get(parameter.name, Quantity(value=start))
             unit = quantity.unit or effect_unit(parameter.unit, entry, structure)
             values[parameter.name] = quantity.model_copy(update={"unit": unit})
-        entries.append(EffectEntry.model_validate({"type": entry.type, "at": entry.at, **values}))
+        entries.append(EffectEntry.model_validate({"type": entry.type, "at": entry.at, "side": entry.side, **values}))
     return document.model_copy(update={"effects": tuple(entries)})
 
 
@@ -130,6 +145,6 @@ class _Parenthesised(dict[str, str]):
 def effects_of(document: Document) -> tuple[Effect, ...]:
     """The effects of a checked document, in the order of the file."""
     return tuple(
-        Effect(entry.type, entry.at, {p.name: f"{entry.at}.{p.suffix}" for p in parameters_of(entry)})
+        Effect(entry.type, entry.at, entry.side, {p.name: f"{entry.owner}.{p.suffix}" for p in parameters_of(entry)})
         for entry in document.effects
     )

@@ -8,12 +8,12 @@ from functools import cached_property
 from os import PathLike
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, NoReturn, Self
+from typing import TYPE_CHECKING, Any, NoReturn, Self, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vpm.catalogue import SITE_KINDS, effect_type
+from vpm.catalogue import SITE_KINDS, Side, effect_type
 from vpm.errors import ModelError, VpmError, near_match
 from vpm.model.check import Checked, check_document
 from vpm.model.compile import description
@@ -197,8 +197,8 @@ class Model(Evaluations, Storable):
         """Effects in the order of the file."""
         return effects_of(self._checked.document)
 
-    def effect(self, name: str, at: str) -> Effect:
-        """The effect of one name at one site.
+    def effect(self, name: str, at: str, side: Side = "motor") -> Effect:
+        """The effect of one name at one site, on one side of what winds up or plays there.
 
         Raises
         ------
@@ -206,12 +206,20 @@ class Model(Evaluations, Storable):
             The model has no such effect at this site.
         """
         for effect in self.effects:
-            if (effect.name, effect.at) == (name, at):
+            if (effect.name, effect.at, effect.side) == (name, at, side):
                 return effect
-        present = ", ".join(f"{effect.name} at {effect.at}" for effect in self.effects) or "none"
-        raise ModelError(f'{self.name} has no effect {name} at "{at}"; its effects are: {present}', where=name)
+        present = ", ".join(f"{effect.name} at {effect.place}" for effect in self.effects) or "none"
+        where = f'"{at}"' if side == "motor" else f'"{at}", {side} side'
+        raise ModelError(f"{self.name} has no effect {name} at {where}; its effects are: {present}", where=name)
 
-    def with_effect(self, name: str, at: str, **values: float) -> Self:
+    # Two of them, so that a dictionary of values is not taken for one that may hold a side.
+    @overload
+    def with_effect(self, name: str, at: str, **values: float) -> Self: ...
+
+    @overload
+    def with_effect(self, name: str, at: str, *, side: Side, **values: float) -> Self: ...
+
+    def with_effect(self, name: str, at: str, *, side: Any = "motor", **values: float) -> Self:
         """Model with one effect more.
 
         Parameters
@@ -220,6 +228,8 @@ class Model(Evaluations, Storable):
             Effect of the catalogue.
         at : str
             Component that it sits at; ``"world"`` for a tilt of gravity.
+        side : {"motor", "link"}
+            Where at a joint that winds up or plays; names of parameters on the link side begin with ``axis.link``.
         **values : float
             SI values by short name. Sizes that are not given start where the effect does nothing, shape parameters at
             the start value of the catalogue. Sizes, and velocities and ways of friction laws that are not given, become
@@ -231,7 +241,7 @@ class Model(Evaluations, Storable):
             Effect, site or parameter is unknown; the effect is already there; a value is physically impossible.
         """
         effect = effect_type(name)
-        entry: dict[str, Any] = {"type": name, "at": at}
+        entry: dict[str, Any] = {"type": name, "at": at, "side": side}
         for short in values:
             effect.parameter(short)
         kind = self.joint_kind(at) if at in self.joints else None
@@ -273,7 +283,7 @@ class Model(Evaluations, Storable):
     def _drives(self, actuator: str, joint: str) -> bool:
         return self._checked.document.actuators[actuator].joint == joint
 
-    def without_effect(self, name: str, at: str) -> Self:
+    def without_effect(self, name: str, at: str, side: Side = "motor") -> Self:
         """Model with one effect less.
 
         Raises
@@ -281,9 +291,9 @@ class Model(Evaluations, Storable):
         ModelError
             The model has no such effect at this site.
         """
-        self.effect(name, at)
-        content = self.to_dict()
-        content["effects"] = [entry for entry in content["effects"] if (entry["type"], entry["at"]) != (name, at)]
+        gone, content = self.effect(name, at, side), self.to_dict()
+        kept = zip(self.effects, content["effects"], strict=True)
+        content["effects"] = [entry for effect, entry in kept if effect != gone]
         return type(self)(content)
 
     def sites(self, kind: str) -> tuple[str, ...]:

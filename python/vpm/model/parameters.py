@@ -281,7 +281,7 @@ def _effect_slots(position: int, entry: EffectEntry, structure: Structure) -> It
     effect, given = EFFECTS[entry.type], entry.values
     for parameter in parameters_of(entry):
         yield Slot(
-            f"{entry.at}.{parameter.suffix}",
+            f"{entry.owner}.{parameter.suffix}",
             ("effects", position, parameter.name),
             given[parameter.name],
             effect_unit(parameter.unit, entry, structure),

@@ -10,6 +10,7 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
+from vpm.catalogue import Side
 from vpm.model.beam import Beam, Gauge, Line, Marker
 from vpm.model.contact import Bushing, Contact, LoadCell
 from vpm.model.controller import TYPES, Controller
@@ -81,13 +82,27 @@ class Sensor(Entry):
 
 
 class EffectEntry(BaseModel):
-    """An effect of the catalogue at a site; the other keys are its parameters."""
+    """An effect of the catalogue at a site; the other keys are its parameters.
+
+    Attributes
+    ----------
+    type : str
+    at : str
+    side : {"motor", "link"}
+        Where at a joint that winds up or plays.
+    """
 
     model_config = ConfigDict(extra="allow", frozen=True)
     __pydantic_extra__: dict[str, ParameterValue] = Field(init=False)
 
     type: Text
     at: Text
+    side: Side = "motor"
+
+    @property
+    def owner(self) -> str:
+        """What the dotted names of its parameters begin with."""
+        return self.at if self.side == "motor" else f"{self.at}.{self.side}"
 
     @property
     def values(self) -> dict[str, Quantity]:

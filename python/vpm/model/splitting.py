@@ -1,9 +1,9 @@
 """What effects divide: joints whose drive and link part ways, links that bend although they are described as rigid.
 
-A split joint keeps its name and coordinate on the motor side, with the actuator and all other effects on it. Behind it
-comes a joint of the same kind and axis without actuator, which carries the link: ``axis_deflection`` for play and
-wind-up, ``arm_bending`` for a body that bends at its root. A rigid beam that bends is not split; it gets a level of
-detail that bends.
+A split joint keeps its name and coordinate on the motor side, with the actuator and, unless they say that they sit on
+the link side, all other effects on it. Behind it comes a joint of the same kind and axis without actuator, which
+carries the link: ``axis_deflection`` for play and wind-up, ``arm_bending`` for a body that bends at its root. A rigid
+beam that bends is not split; it gets a level of detail that bends.
 """
 
 from __future__ import annotations
@@ -87,7 +87,7 @@ def stop_problems(document: Document, values: Mapping[str, float]) -> Iterator[P
     """End stops that leave no way between them."""
     for position, entry in enumerate(document.effects):
         if entry.type == "end_stop":
-            low, high = (values[f"{entry.at}.end_stop.{end}"] for end in ("low", "high"))
+            low, high = (values[f"{entry.owner}.end_stop.{end}"] for end in ("low", "high"))
             if low >= high:
                 rest = f"is {low:g}, but the upper end is {high:g} (SI); the lower one has to be below"
                 yield Problem(place("effects", position, "low"), rest)

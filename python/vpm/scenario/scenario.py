@@ -261,7 +261,7 @@ class Scenario:
 
     def _repr_html_(self) -> str:
         rows: list[tuple[object, ...]] = [
-            (entry.name, entry.model, ", ".join([*entry.set, *(f"{e.type} at {e.at}" for e in entry.with_effects)]))
+            (entry.name, entry.model, ", ".join([*entry.set, *(f"{e.type} at {e.owner}" for e in entry.with_effects)]))
             for entry in self._document.runs
         ]
         return html_table(self.name, ("run", "model", "changes"), rows)

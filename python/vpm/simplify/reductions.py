@@ -7,9 +7,10 @@ reduced model takes one change, or none, at each site.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
+from vpm.catalogue import Side
 from vpm.errors import VpmError
 from vpm.model import Model
 from vpm.model.level import deforms_of, size_of
@@ -49,11 +50,14 @@ class Reduction(Storable):
     at : str
         Site of the effect, flexible link, drive; of velocity terms bodies and links, of coupling joints, with commas
         between them, or ``"the machine"``.
+    side : {"motor", "link"}
+        Of an effect at a joint that winds up or plays.
     """
 
     kind: str
     name: str
     at: str
+    side: Side = field(default="motor", kw_only=True)
 
     def __str__(self) -> str:
         match self.kind:
@@ -65,7 +69,7 @@ class Reduction(Storable):
                 return f"{self.at} with {self.name}"
             case "terms":
                 return f"{self.at} without {self.name} terms"
-        return f"{self.name} at {self.at}"
+        return f"{self.name} at {self.at}" + ("" if self.side == "motor" else f", {self.side} side")
 
     @property
     def site(self) -> tuple[str, str]:
@@ -73,7 +77,10 @@ class Reduction(Storable):
         if self.kind == "terms":
             return (f"terms {self.name}", terms_site(self.name, self.at))
         alone = self.kind in ("level", "drive")
-        return (self.kind if alone else f"{self.kind} {self.name}", self.at)
+        return (
+            self.kind if alone else f"{self.kind} {self.name}",
+            self.at if self.side == "motor" else f"{self.at}.{self.side}",
+        )
 
     def applied(self, model: Model) -> Model:
         """Model with this change.
@@ -89,7 +96,7 @@ class Reduction(Storable):
         """
         match self.kind:
             case "effect":
-                return model.without_effect(self.name, self.at)
+                return model.without_effect(self.name, self.at, self.side)
             case "level":
                 return model.at({self.at: self.name})
             case "drive":
@@ -149,7 +156,7 @@ def reduced(model: Model, changes: Sequence[Reduction]) -> Model:
 
 def _imaginable(model: Model) -> Iterator[Reduction]:
     for effect in model.effects:
-        yield Reduction("effect", effect.name, effect.at)
+        yield Reduction("effect", effect.name, effect.at, side=effect.side)
     for name, beam in _beams(model).items():
         deforms = deforms_of(beam)
         own = size_of(beam["level"], beam)

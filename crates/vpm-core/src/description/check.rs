@@ -107,8 +107,8 @@ fn sites(description: &Description) -> Result<()> {
     for (number, effect) in description.effects.iter().enumerate() {
         let what = format!("effect number {number}");
         match effect {
-            EffectEntry::Joint { joint, .. } | EffectEntry::Hysteresis { joint, .. } => {
-                within(&what, "joint", *joint, joints)?
+            EffectEntry::Joint { seat, .. } | EffectEntry::Memory { seat, .. } => {
+                seat.joints().try_for_each(|joint| within(&what, "joint", joint, joints))?;
             }
             EffectEntry::Payload { on: Site::Body(body), .. } => within(&what, "body", *body, joints)?,
             EffectEntry::Payload { on: Site::Weld(weld), .. } => within(&what, "weld", *weld, description.welds.len())?,

@@ -7,7 +7,7 @@ use serde_json::{Map, Value};
 use super::TreeEffect;
 use crate::body::Site;
 use crate::controller::ControlLaw;
-use crate::effect::{Domain, Hysteresis, JointEffect, Payload};
+use crate::effect::{Domain, JointEffect, MemoryEffect, Payload, Seat};
 use crate::sensor::Channel;
 
 /// An effect and its site, written as one flat table with a `type`.
@@ -16,17 +16,17 @@ use crate::sensor::Channel;
 pub enum EffectEntry {
     /// An effect on a joint.
     Joint {
-        /// Number of the joint.
-        joint: usize,
+        /// Where it acts.
+        seat: Seat,
         /// Its law.
         law: Box<JointEffect<usize>>,
     },
-    /// An effect on a joint that remembers its path.
-    Hysteresis {
-        /// Number of the joint.
-        joint: usize,
+    /// An effect on a joint that remembers.
+    Memory {
+        /// Where it acts.
+        seat: Seat,
         /// Its law.
-        law: Hysteresis<usize>,
+        law: MemoryEffect<usize>,
     },
     /// A payload on a body or at the tip of a beam.
     Payload {
@@ -64,7 +64,7 @@ impl EffectEntry {
     pub fn domains(&self) -> Vec<(&usize, Domain)> {
         match self {
             Self::Joint { law, .. } => law.domains(),
-            Self::Hysteresis { law, .. } => law.domains(),
+            Self::Memory { law, .. } => law.domains(),
             Self::Payload { law, .. } => law.domains(),
             Self::Tree(law) => law.domains(),
         }
@@ -106,12 +106,12 @@ impl TryFrom<Map<String, Value>> for EffectEntry {
             if matches!(kind.as_str(), "rotor_inertia" | "gravity_tilt") || table.contains_key("beam") {
                 return Ok(Self::Tree(serde_json::from_value(Value::Object(table))?));
             }
-            let joint = take(&mut table, "joint")?;
-            if kind == "hysteresis" {
-                table.remove("type");
-                return Ok(Self::Hysteresis { joint, law: serde_json::from_value(Value::Object(table))? });
+            let behind = table.remove("behind").map_or(Ok(None), serde_json::from_value)?;
+            let seat = Seat { joint: take(&mut table, "joint")?, behind };
+            if matches!(kind.as_str(), "hysteresis" | "lugre_friction" | "warming_friction") {
+                return Ok(Self::Memory { seat, law: serde_json::from_value(Value::Object(table))? });
             }
-            Ok(Self::Joint { joint, law: serde_json::from_value(Value::Object(table))? })
+            Ok(Self::Joint { seat, law: serde_json::from_value(Value::Object(table))? })
         })
     }
 }

@@ -4,11 +4,8 @@ use std::f64::consts::TAU;
 
 use serde::Deserialize;
 
-use super::{Domain, tanh_ratio};
+use super::{Domain, LARGEST_SHARE, Law, tanh_ratio};
 use crate::scalar::Scalar;
-
-/// Largest share of a joint's load that may go: beyond it, the effort that a motion needs would not be unique.
-const LARGEST_SHARE: f64 = 0.95;
 
 /// Empirical force of a joint: a short sum of terms that a fit chose. It describes a record; it explains nothing.
 ///
@@ -165,25 +162,17 @@ fn held<S: Scalar>(value: S) -> S {
     value.max(-S::one()).min(S::one())
 }
 
-impl<S: Scalar> EmpiricalForce<S> {
-    /// Effort on the joint at coordinate `q` and velocity `v`, but for what follows its load.
+impl<S: Scalar> Law<S> for EmpiricalForce<S> {
     #[inline]
-    pub fn effort(&self, q: S, v: S) -> S {
-        self.effort_at_rest(q) - self.resistance(q, v) * v
-    }
-
-    /// The same at rest.
-    #[inline]
-    pub fn effort_at_rest(&self, q: S) -> S {
+    fn effort_at_rest(&self, q: S) -> S {
         let x = self.place(q);
         let even = times(self.constant, S::one()) + times(self.position_2, x * x);
         let odd = times(self.position, x) + times(self.position_3, x * x * x);
         -(even + odd + self.harmonics(q, self.cosine, self.sine))
     }
 
-    /// Resistance r at coordinate `q` and velocity `v`, with `effort = effort_at_rest - r v`; finite at rest.
     #[inline]
-    pub fn resistance(&self, q: S, v: S) -> S {
+    fn resistance(&self, q: S, v: S) -> S {
         let (x, y) = (self.place(q), held(v / self.speed));
         // y/v: beyond the largest speed the effort stays what it is there.
         let per_velocity = self.speed.if_less(v.abs(), || v.abs().recip(), || self.speed.recip());
@@ -200,20 +189,25 @@ impl<S: Scalar> EmpiricalForce<S> {
         viscous * per_velocity + dry * tanh_ratio(v / self.transition_velocity) / self.transition_velocity
     }
 
-    /// Share of the load |u| that is taken off at (q, v), within bounds in which the balance of effort has one solution.
     #[inline]
-    pub fn share_of_load(&self, q: S, v: S) -> S {
+    fn follows_load(&self) -> bool {
+        self.load_dry.is_some() || self.load_cosine.is_some() || self.load_sine.is_some()
+    }
+
+    #[inline]
+    fn share_of_load(&self, q: S, v: S, _: S) -> S {
         let dry = times(self.load_dry, (v / self.transition_velocity).tanh());
         let limit = S::from_f64(LARGEST_SHARE);
         (dry + self.harmonics(q, self.load_cosine, self.load_sine)).max(-limit).min(limit)
     }
 
-    /// Resistance per load |u| at velocity `v`: chord from rest of the dry part of the share.
     #[inline]
-    pub fn resistance_per_load(&self, v: S) -> S {
+    fn resistance_per_load(&self, v: S, _: S) -> S {
         times(self.load_dry, tanh_ratio(v / self.transition_velocity) / self.transition_velocity)
     }
+}
 
+impl<S: Scalar> EmpiricalForce<S> {
     #[inline]
     fn place(&self, q: S) -> S {
         held((q - self.middle) / self.reach)

@@ -1,83 +1,54 @@
 //! Ends of a joint's way.
 
-use serde::Deserialize;
-
-use super::Domain;
+use super::{Law, law};
 use crate::scalar::Scalar;
 
 /// Over which share of its own force the push of a stop that rebounds fades to none.
 const FADE: f64 = 0.1;
 
-/// End stops: springs that push back beyond both ends of the way, with damping in proportion to the depth, and that never pull.
-///
-/// Law: `tau = -stiffness (p(q - high) r(damping v) - p(low - q) r(-damping v))`, tau in N or N m, q in m or rad, v in m/s or rad/s, with
-/// the depth `p(x) = 1/2 (x + sqrt(x^2 + width^2))`, zero far before the stop and `x` far beyond, and
-/// `r(y) = 1/2 (y + b + sqrt((y + b)^2 + e^2))`, e = 0.1 and b = 1 - e^2/4, which is `1 + y` but for a rounded end at zero, and 1 at rest.
-/// Source: Hunt & Crossley 1975, "Coefficient of restitution interpreted as damping in vibroimpact", J. Appl. Mech. 42, with exponent 1;
-/// rounding by hyperbolas of which the sharp corners are the asymptotes.
-/// Checked: pushes back only; takes energy out of every closed way, for r grows with y; potential and chord against the effort.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct EndStop<P> {
-    /// Effort per depth, N/m or N m/rad.
-    pub stiffness: P,
-    /// Share by which the effort grows per approaching speed, s/m or s/rad.
-    pub damping: P,
-    /// Lower end of the way, m or rad.
-    pub low: P,
-    /// Upper end of the way, m or rad.
-    pub high: P,
-    /// Way over which a contact closes, m or rad.
-    pub width: P,
-}
-
-impl<P> EndStop<P> {
-    /// The same law over another number type.
-    pub fn map<T>(&self, f: &mut impl FnMut(&P) -> T) -> EndStop<T> {
-        let Self { stiffness, damping, low, high, width } = self;
-        EndStop { stiffness: f(stiffness), damping: f(damping), low: f(low), high: f(high), width: f(width) }
-    }
-
-    /// The parameters and where each is defined.
-    pub fn domains(&self) -> Vec<(&P, Domain)> {
-        let Self { stiffness, damping, low, high, width } = self;
-        vec![
-            (stiffness, Domain::Any),
-            (damping, Domain::Any),
-            (low, Domain::Any),
-            (high, Domain::Any),
-            (width, Domain::Positive),
-        ]
+law! {
+    /// End stops: springs that push back beyond both ends of the way, with damping in proportion to the depth, and that never pull.
+    ///
+    /// Law: `tau = -stiffness (p(q - high) r(damping v) - p(low - q) r(-damping v))`, tau in N or N m, q in m or rad, v in m/s or rad/s, with
+    /// the depth `p(x) = 1/2 (x + sqrt(x^2 + width^2))`, zero far before the stop and `x` far beyond, and
+    /// `r(y) = 1/2 (y + b + sqrt((y + b)^2 + e^2))`, e = 0.1 and b = 1 - e^2/4, which is `1 + y` but for a rounded end at zero, and 1 at rest.
+    /// Source: Hunt & Crossley 1975, "Coefficient of restitution interpreted as damping in vibroimpact", J. Appl. Mech. 42, with exponent 1;
+    /// rounding by hyperbolas of which the sharp corners are the asymptotes.
+    /// Checked: pushes back only; takes energy out of every closed way, for r grows with y; potential and chord against the effort.
+    EndStop {
+        /// Effort per depth, N/m or N m/rad.
+        stiffness: Any,
+        /// Share by which the effort grows per approaching speed, s/m or s/rad.
+        damping: Any,
+        /// Lower end of the way, m or rad.
+        low: Any,
+        /// Upper end of the way, m or rad.
+        high: Any,
+        /// Way over which a contact closes, m or rad.
+        width: Positive,
     }
 }
 
-impl<S: Scalar> EndStop<S> {
-    /// Effort on the joint at coordinate `q` and velocity `v`.
+impl<S: Scalar> Law<S> for EndStop<S> {
     #[inline]
-    pub fn effort(&self, q: S, v: S) -> S {
-        self.effort_at_rest(q) - self.resistance(q, v) * v
-    }
-
-    /// Effort of the springs.
-    #[inline]
-    pub fn effort_at_rest(&self, q: S) -> S {
+    fn effort_at_rest(&self, q: S) -> S {
         self.stiffness * (self.depth(self.low - q) - self.depth(q - self.high))
     }
 
-    /// Resistance to the velocity.
     #[inline]
-    pub fn resistance(&self, q: S, v: S) -> S {
+    fn resistance(&self, q: S, v: S) -> S {
         let push = self.damping * v;
         let chords = self.depth(q - self.high) * chord(push) + self.depth(self.low - q) * chord(-push);
         self.stiffness * self.damping * chords
     }
 
-    /// Potential energy in J.
     #[inline]
-    pub fn potential(&self, q: S) -> S {
+    fn potential(&self, q: S) -> S {
         self.stiffness * (self.area(q - self.high) + self.area(self.low - q))
     }
+}
 
+impl<S: Scalar> EndStop<S> {
     /// Depth beyond a stop.
     #[inline]
     fn depth(&self, way: S) -> S {

@@ -2,7 +2,7 @@
 
 use serde::Deserialize;
 
-use super::Domain;
+use super::{Domain, Law};
 use crate::scalar::{Dual, Scalar};
 
 /// Most instructions of a formula.
@@ -143,9 +143,8 @@ impl<P> Formula<P> {
     }
 }
 
-impl<S: Scalar> Formula<S> {
-    /// Effort on the joint at coordinate `q` and velocity `v`.
-    pub fn effort(&self, q: S, v: S) -> S {
+impl<S: Scalar> Law<S> for Formula<S> {
+    fn effort(&self, q: S, v: S) -> S {
         let (mut stack, mut top) = ([S::zero(); DEPTH], 0);
         for instruction in &self.program[..usize::from(self.length)] {
             let number = match *instruction {
@@ -164,14 +163,12 @@ impl<S: Scalar> Formula<S> {
         stack[0]
     }
 
-    /// Effort at rest.
     #[inline]
-    pub fn effort_at_rest(&self, q: S) -> S {
+    fn effort_at_rest(&self, q: S) -> S {
         self.effort(q, S::zero())
     }
 
-    /// Resistance to the velocity.
-    pub fn resistance(&self, q: S, v: S) -> S {
+    fn resistance(&self, q: S, v: S) -> S {
         let slope = || {
             let law = self.map(&mut |&parameter| Dual::<S, 1>::constant(parameter));
             -law.effort(Dual::constant(q), Dual::variable(v, 0)).gradient[0]

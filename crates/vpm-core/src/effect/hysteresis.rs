@@ -1,72 +1,46 @@
 //! Friction with memory: a force that depends on the path of the joint.
 
-use serde::Deserialize;
-
-use super::Domain;
+use super::{MemoryChords, MemoryLaw, law};
 use crate::scalar::Scalar;
 
-/// Hysteresis of a joint: a normalised Bouc-Wen element, between a spring for small ways and dry friction for large ones.
-///
-/// Law: `tau = -force z` with tau and `force` in N or N m and the memory z a state without unit,
-/// `dz/dt = (v / displacement) (1 - |z|)` while it is being loaded, `v z >= 0`, and `(v / displacement) (1 + shape |z|)` while it is being
-/// unloaded; v in m/s or rad/s, `displacement` in m or rad. About z = 0 it is a spring of stiffness `force / displacement`, on reversal
-/// one that is `1 + shape` times as stiff; along a long way z tends to the sign of the motion. With `shape = 1` it is Dahl's law of
-/// pre-sliding, `dz/dt = (v - |v| z) / displacement`; with `shape = 0` it gives way elastically and loads along an exponential.
-///
-/// It depends on the path alone, not on the speed; |z| never leaves 1, or falls towards it. For `force >= 0` and `shape >= 0` it
-/// only takes energy: what is stored is `force displacement` times the integral of `s / (1 + shape s)` from 0 to |z|.
-/// Source: Ikhouane & Rodellar 2007, "Systems with Hysteresis: Analysis, Identification and Control using the Bouc-Wen Model", section
-/// 2.5 (normalised form, with exponent 1, rho = 1/displacement and sigma = (1 + shape)/2); Dahl 1968, "A solid friction model", Aerospace
-/// Corporation TOR-158(3107-18). Checked: Dahl's closed form, energy over closed loops, independence of the speed.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Hysteresis<P> {
-    /// Resistance after a long way in one direction, N or N m.
-    pub force: P,
-    /// Way over which it builds up: after that way from z = 0, 63 % are there, m or rad.
-    pub displacement: P,
-    /// Stiffness on reversal from the full resistance over that about z = 0, less 1.
-    pub shape: P,
-}
-
-impl<P> Hysteresis<P> {
-    /// The same law over another number type.
-    pub fn map<T>(&self, f: &mut impl FnMut(&P) -> T) -> Hysteresis<T> {
-        Hysteresis { force: f(&self.force), displacement: f(&self.displacement), shape: f(&self.shape) }
-    }
-
-    /// The parameters and where each is defined.
-    pub fn domains(&self) -> Vec<(&P, Domain)> {
-        vec![(&self.force, Domain::Any), (&self.displacement, Domain::Positive), (&self.shape, Domain::NonNegative)]
-    }
-}
-
-impl<S: Scalar> Hysteresis<S> {
-    /// Effort on the joint with memory `z`.
-    #[inline]
-    pub fn effort(&self, z: S) -> S {
-        -(self.force * z)
-    }
-
-    /// dz/dt at velocity `v`.
-    #[inline]
-    pub fn rate(&self, v: S, z: S) -> S {
-        v / self.displacement - self.fading(v, z) * z
-    }
-
-    /// The r >= 0 in 1/s of `dz/dt = v / displacement - r z`.
-    #[inline]
-    pub fn fading(&self, v: S, z: S) -> S {
-        let loading = v.abs() / self.displacement;
-        (v * z).if_negative(|| loading * self.shape, || loading)
-    }
-
-    /// The memory after a way `way` (m or rad) in one direction, from `z`: the exact solution.
+law! {
+    /// Hysteresis of a joint: a normalised Bouc-Wen element, between a spring for small ways and dry friction for large ones.
     ///
+    /// Law: `tau = -force z` with tau and `force` in N or N m and the memory z a state without unit,
+    /// `dz/dt = (v / displacement) (1 - |z|)` while it is being loaded, `v z >= 0`, and `(v / displacement) (1 + shape |z|)` while it is being
+    /// unloaded; v in m/s or rad/s, `displacement` in m or rad. About z = 0 it is a spring of stiffness `force / displacement`, on reversal
+    /// one that is `1 + shape` times as stiff; along a long way z tends to the sign of the motion. With `shape = 1` it is Dahl's law of
+    /// pre-sliding, `dz/dt = (v - |v| z) / displacement`; with `shape = 0` it gives way elastically and loads along an exponential.
+    ///
+    /// It depends on the path alone, not on the speed; |z| never leaves 1, or falls towards it. For `force >= 0` and `shape >= 0` it
+    /// only takes energy: what is stored is `force displacement` times the integral of `s / (1 + shape s)` from 0 to |z|.
+    /// Source: Ikhouane & Rodellar 2007, "Systems with Hysteresis: Analysis, Identification and Control using the Bouc-Wen Model", section
+    /// 2.5 (normalised form, with exponent 1, rho = 1/displacement and sigma = (1 + shape)/2); Dahl 1968, "A solid friction model", Aerospace
+    /// Corporation TOR-158(3107-18). Checked: Dahl's closed form, energy over closed loops, independence of the speed.
+    Hysteresis {
+        /// Resistance after a long way in one direction, N or N m.
+        force: Any,
+        /// Way over which it builds up: after that way from z = 0, 63 % are there, m or rad.
+        displacement: Positive,
+        /// Stiffness on reversal from the full resistance over that about z = 0, less 1.
+        shape: NonNegative,
+    }
+}
+
+impl<S: Scalar> MemoryLaw<S> for Hysteresis<S> {
+    /// The fading is not negative.
+    #[inline]
+    fn chords(&self, v: S, z: S) -> MemoryChords<S> {
+        let loading = v.abs() / self.displacement;
+        let fading = (v * z).if_negative(|| loading * self.shape, || loading);
+        let (push, gain, zero) = (self.force, self.displacement.recip(), S::zero());
+        MemoryChords { push, resistance: zero, gain, source: zero, fading }
+    }
+
     /// Law: with `u = |way| / displacement` and y = z along the motion, `y+ = (y + (1 - e^(-b u))/b) - y (1 - e^(-b u))` for y < 0, b the
     /// shape, until y = 0 at `u = ln(1 - b y)/b`; from there `1 - y` falls by `e^(-u)`.
     #[inline]
-    pub fn advance(&self, z: S, way: S) -> S {
+    fn advance(&self, z: S, way: S, _: S) -> S {
         let along = way.if_negative(|| -z, || z);
         let left = way.abs() / self.displacement;
         let load = |along: S, left: S| along - (along - 1.0) * -(-left).exp_m1();
@@ -81,7 +55,9 @@ impl<S: Scalar> Hysteresis<S> {
         let moved = along.if_negative(unload, || load(along, left));
         way.if_negative(|| -moved, || moved)
     }
+}
 
+impl<S: Scalar> Hysteresis<S> {
     /// Energy in J that unloading gives back.
     #[inline]
     pub fn stored(&self, z: S) -> S {

@@ -3,6 +3,7 @@
 use super::record::Record;
 use crate::actuator::{Actuator, Drive};
 use crate::description::EffectEntry;
+use crate::effect::Seat;
 use crate::error::Result;
 use crate::motion::position_sensors;
 use crate::scalar::Scalar;
@@ -66,17 +67,18 @@ impl Job for Behind<'_> {
     }
 }
 
-/// Memory of a hysteresis.
+/// Memory of an effect.
 pub(super) struct Memory<'a> {
     pub(super) record: Record<'a>,
     pub(super) entry: &'a EffectEntry,
 }
 
 impl Memory<'_> {
-    /// The parameters of the effect and of the sensor of its joint.
+    /// The parameters of the effect and of the sensors of its joints.
     pub(super) fn parameters(&self) -> Vec<usize> {
         let mut own: Vec<usize> = self.entry.domains().into_iter().map(|(&index, _)| index).collect();
-        own.extend(self.entry.joint().into_iter().flat_map(|joint| Behind { record: self.record, joint }.parameters()));
+        let joints = self.entry.seat().into_iter().flat_map(Seat::joints);
+        own.extend(joints.flat_map(|joint| Behind { record: self.record, joint }.parameters()));
         own
     }
 }
@@ -86,10 +88,11 @@ impl Job for Memory<'_> {
     fn run<S: Scalar>(&self, theta: &[S]) -> Result<Pair<S>> {
         let sensors = position_sensors(self.record.description, theta);
         let (mut first, mut memory, mut before) = (Vec::new(), S::zero(), None);
-        if let Some((joint, law)) = self.entry.with_memory(theta) {
+        if let Some((seat, effect)) = self.entry.with_memory(theta) {
+            let (law, time) = (effect.law(), S::from_f64(self.record.time_step));
             first.extend(self.record.samples().map(|k| {
-                let [q, ..] = self.record.behind(k, joint, &sensors);
-                memory = before.map_or(memory, |before| law.advance(memory, q - before));
+                let q = seat.sum(|joint| self.record.behind(k, joint, &sensors)[0]);
+                memory = before.map_or(memory, |before| law.advance(memory, q - before, time));
                 before = Some(q);
                 memory
             }));

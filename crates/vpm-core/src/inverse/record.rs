@@ -93,7 +93,7 @@ impl<'a> Along<'a> {
                 joints.push((joint, Course::new(&behind, theta, sensitivities, &own)?));
             }
         }
-        let remembers = |entry: &&EffectEntry| matches!(entry, EffectEntry::Hysteresis { .. });
+        let remembers = |entry: &&EffectEntry| matches!(entry, EffectEntry::Memory { .. });
         for entry in record.description.effects.iter().filter(remembers) {
             let memory = Memory { record, entry };
             memories.push(Course::new(&memory, theta, sensitivities, &memory.parameters())?);

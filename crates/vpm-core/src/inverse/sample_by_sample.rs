@@ -32,10 +32,10 @@ impl Job for SampleBySample<'_> {
                 [state[joint], state[n + joint], a[joint]] = self.record.behind(k, joint, &sensors);
             }
             if k > 0 {
-                memories.travel(|joint| state[joint] - before[joint]);
+                memories.travel(self.record.time_step, |joint| state[joint] - before[joint]);
             }
             before.copy_from_slice(&state[..n]);
-            memories.iter().zip(&mut state[first..]).for_each(|((_, _, memory), place)| *place = memory);
+            state[first..].copy_from_slice(memories.values());
             routine.put_accelerations(&a);
             row.copy_from_slice(routine.at(&state));
         }

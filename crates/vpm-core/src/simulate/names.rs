@@ -21,7 +21,7 @@ pub(crate) fn state_name(description: &Description, place: usize) -> String {
     let of_supplies = states.map(|(state, supply)| format!("{state} of supply `{}`", supply.name));
     let of_effects = description
         .remembering()
-        .map(|joint| format!("hysteresis of joint `{}`", description.bodies[joint].joint.name));
+        .map(|joint| format!("memory of an effect of joint `{}`", description.bodies[joint].joint.name));
     of_drives.chain(of_supplies).chain(of_effects).nth(place - 2 * n).unwrap_or_default()
 }
 

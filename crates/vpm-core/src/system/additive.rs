@@ -4,6 +4,7 @@ use super::Dynamics;
 use crate::contact::ContactFriction;
 use crate::dynamics::articulated::{Shift, shifted};
 use crate::dynamics::{flexible, poses};
+use crate::effect::{JointEffect, Seat};
 use crate::integrator::Lu;
 use crate::scalar::Scalar;
 
@@ -21,13 +22,13 @@ pub(super) struct Split<S> {
     state: Vec<S>,
     /// Where the coordinates would be without acceleration.
     coasting: Vec<S>,
-    /// Joints with friction that is not linear, or with a memory.
-    joints: Vec<usize>,
-    /// Acceleration of all coordinates per effort on each of these joints.
+    /// Where friction that is not linear acts, or a memory, or anything on the link side of a joint that winds up.
+    seats: Vec<Seat>,
+    /// Acceleration of all coordinates per effort at each of these.
     columns: Vec<S>,
     /// Linear damping of each joint, and what its springs do as such over the reach of a stage.
     damping: Vec<S>,
-    /// Velocity of these joints at the end of the stage: with no friction, and as the last turn has it.
+    /// Velocity there at the end of the stage: with no friction, and as the last turn has it.
     free: Vec<S>,
     velocity: Vec<S>,
     /// Resistance of each, and what acts on it at rest.
@@ -44,43 +45,62 @@ pub(super) struct Stage<'a, S> {
     pub(super) reach: S,
 }
 
+/// What a law does at rest, linear about where it has come to.
+struct Spring<S> {
+    at_rest: S,
+    stiffness: S,
+}
+
+impl<S: Scalar> Spring<S> {
+    /// About `q`. A spring that pushes away is left explicit.
+    fn new(effect: &JointEffect<S>, q: S) -> Self {
+        Self { at_rest: effect.law().effort_at_rest(q), stiffness: -effect.slope_at_rest(q).min(S::zero()) }
+    }
+
+    /// Its effort at `other`.
+    fn effort(&self, q: S, other: S) -> S {
+        self.at_rest + self.stiffness * (q - other)
+    }
+}
+
 impl<S: Scalar> Split<S> {
     /// For the machine `dynamics`.
     pub(super) fn new(dynamics: &Dynamics<S>) -> Self {
-        let laws = dynamics.effects.iter().filter(|(_, effect)| !effect.is_damped_linearly());
-        let mut joints: Vec<usize> = laws.map(|(joint, _)| *joint).collect();
-        joints.extend(dynamics.memories.iter().map(|(joint, ..)| joint));
-        joints.sort_unstable();
-        joints.dedup();
-        let (n, count) = (dynamics.coordinates(), joints.len());
+        let apart =
+            |(seat, effect): &&(Seat, JointEffect<S>)| seat.behind.is_some() || effect.law().damping().is_none();
+        let mut seats: Vec<Seat> = dynamics.effects.iter().filter(apart).map(|(seat, _)| *seat).collect();
+        seats.extend(dynamics.memories.seats());
+        seats.sort_unstable();
+        seats.dedup();
+        let (n, count) = (dynamics.coordinates(), seats.len());
         let [free, velocity, resistance, rest] = [0; 4].map(|_| vec![S::zero(); count]);
         let (coasting, columns) = (vec![S::zero(); n], vec![S::zero(); n * count]);
         let state = vec![S::zero(); dynamics.dim()];
         let damping = vec![S::zero(); dynamics.joints()];
-        Self { state, coasting, joints, columns, damping, free, velocity, resistance, rest, lu: Lu::new(count) }
+        Self { state, coasting, seats, columns, damping, free, velocity, resistance, rest, lu: Lu::new(count) }
     }
 
     /// Begins a step at the rates `v` of all coordinates.
     pub(super) fn depart(&mut self, v: &[S]) {
-        for (velocity, &joint) in self.velocity.iter_mut().zip(&self.joints) {
-            *velocity = v[joint];
+        for (velocity, seat) in self.velocity.iter_mut().zip(&self.seats) {
+            *velocity = seat.of(v);
         }
     }
 
     /// Writes the accelerations of a stage into `rates`.
     ///
-    /// Law: with a without friction from `M + reach D + reach^2 K` and the columns Y of its inverse, the joints of the friction move at
+    /// Law: with a without friction from `M + reach D + reach^2 K` and the columns Y of its inverse, the seats of the friction move at
     /// `(1 + reach Y R) w = v_I + reach (a + Y f)`, R and f taken where they are at w; then `a += Y (f - R w)`.
     pub(super) fn accelerate(&mut self, dynamics: &mut Dynamics<S>, stage: Stage<'_, S>, rates: &mut [S]) {
-        let (n, count, reach) = (dynamics.coordinates(), self.joints.len(), stage.reach);
+        let (n, count, reach) = (dynamics.coordinates(), self.seats.len(), stage.reach);
         let v = &stage.implicit[n..2 * n];
         self.coasting.copy_from_slice(&stage.implicit[..n]);
         self.coasting.iter_mut().zip(v).for_each(|(q, &v)| *q += v * reach);
         dynamics.push_apart(stage, &self.coasting, &mut self.damping);
         let acceleration = &mut rates[n..2 * n];
-        dynamics.solve_apart(stage, &self.damping, acceleration, (&self.joints, &mut self.columns));
-        for (free, &joint) in self.free.iter_mut().zip(&self.joints) {
-            *free = v[joint] + acceleration[joint] * reach;
+        dynamics.solve_apart(stage, &self.damping, acceleration, (&self.seats, &mut self.columns));
+        for (free, seat) in self.free.iter_mut().zip(&self.seats) {
+            *free = seat.of(v) + seat.of(acceleration) * reach;
         }
         for _ in 0..if count == 0 { 0 } else { TURNS } {
             self.rub(dynamics, stage);
@@ -96,22 +116,32 @@ impl<S: Scalar> Split<S> {
         }
     }
 
-    /// Resistances at the velocities that are known, and what acts on the joints beside them.
+    /// Resistances at the velocities that are known, and what acts on the seats beside them.
     fn rub(&mut self, dynamics: &Dynamics<S>, Stage { explicit, implicit, reach }: Stage<'_, S>) {
-        for (k, &joint) in self.joints.iter().enumerate() {
-            let (q, w, load) = (explicit[joint], self.velocity[k], dynamics.efforts[joint].abs());
+        let n = dynamics.coordinates();
+        for (k, &seat) in self.seats.iter().enumerate() {
+            let (q, w, u) = (seat.of(explicit), self.velocity[k], dynamics.efforts[seat.joint]);
             let (mut resistance, mut rest) = (S::zero(), S::zero());
-            for (_, effect) in dynamics.effects.iter().filter(|(place, _)| *place == joint) {
-                let per_load = effect.resistance_per_load(w);
-                resistance += effect.resistance(q, w) - effect.damping() + per_load * load;
-                rest -= (effect.share_of_load(q, w) - per_load * w) * load;
+            for (_, effect) in dynamics.effects.iter().filter(|(place, _)| *place == seat) {
+                let (law, linear) = (effect.law(), effect.law().damping().unwrap_or_default());
+                resistance += law.resistance(q, w) - linear;
+                if law.follows_load() {
+                    let (load, per_load) = (u.abs(), law.resistance_per_load(w, u));
+                    resistance += per_load * load;
+                    rest -= (law.share_of_load(q, w, u) - per_load * w) * load;
+                }
+                if seat.behind.is_some() {
+                    let spring = Spring::new(effect, q);
+                    let (coasting, v) = (seat.of(&self.coasting), seat.of(&implicit[n..]));
+                    // Where the stage ends, `coasting + reach (w - v)`.
+                    resistance += linear + spring.stiffness * reach;
+                    rest += spring.effort(q, coasting - v * reach);
+                }
             }
-            let memories = implicit[dynamics.first_memory()..].iter().zip(dynamics.memories.iter());
-            for (&z, (_, law, _)) in memories.filter(|(_, (place, ..))| *place == joint) {
-                let fading = law.fading(w, z);
-                let kept = (fading * reach + 1.0).recip();
-                resistance -= law.effort(kept / law.displacement * reach);
-                rest += law.effort(z * kept);
+            let memories = &implicit[dynamics.first_memory()..];
+            for [own, at_rest] in dynamics.memories.at_end(seat, w, memories, reach) {
+                resistance += own;
+                rest += at_rest;
             }
             // What drives instead of resisting would take the inverse apart.
             let driving = resistance.min(S::zero());
@@ -121,12 +151,12 @@ impl<S: Scalar> Split<S> {
 
     /// Velocities that these resistances lead to.
     fn turn(&mut self, n: usize, reach: S) {
-        let count = self.joints.len();
+        let count = self.seats.len();
         self.velocity.copy_from_slice(&self.free);
-        for (k, &joint) in self.joints.iter().enumerate() {
+        for (k, seat) in self.seats.iter().enumerate() {
             let row = &mut self.lu.matrix()[k * count..(k + 1) * count];
             for (other, (entry, column)) in row.iter_mut().zip(self.columns.chunks_exact(n)).enumerate() {
-                let moved = column[joint] * reach;
+                let moved = seat.of(column) * reach;
                 self.velocity[k] += moved * self.rest[other];
                 *entry = moved * self.resistance[other];
             }
@@ -156,13 +186,7 @@ impl<S: Scalar> Dynamics<S> {
         self.actuate(&split.state, rates);
         split.accelerate(self, stage, rates);
         let (motion, memories) = rates.split_at_mut(first);
-        for ((rate, &z), (joint, law, _)) in memories.iter_mut().zip(&stage.implicit[first..]).zip(self.memories.iter())
-        {
-            let w = motion[joint];
-            // At the velocity by which its effort was reckoned the fading is that of the turn before, to the error of the turns.
-            let fading = law.fading(w, z);
-            *rate = (w / law.displacement - fading * z) / (fading * stage.reach + 1.0);
-        }
+        self.memories.rates_at_end(&stage.implicit[first..], motion, stage.reach, memories);
     }
 
     /// Puts the lags to the end of the stage.
@@ -192,38 +216,36 @@ impl<S: Scalar> Dynamics<S> {
         }
         flexible::subtract_elastic(model, coasting, v, loads);
         damping.fill(S::zero());
-        for (joint, effect) in effects {
-            let (joint, q) = (*joint, explicit[*joint]);
-            // A spring that pushes away is left explicit.
-            let stiffness = -effect.slope_at_rest(q).min(S::zero());
-            let linear = effect.damping();
-            loads[joint] += effect.effort_at_rest(q) + stiffness * (q - coasting[joint]) - linear * v[joint];
-            damping[joint] += linear + stiffness * reach;
+        for (seat, effect) in effects.iter().filter(|(seat, _)| seat.behind.is_none()) {
+            let (joint, q) = (seat.joint, explicit[seat.joint]);
+            let (spring, linear) = (Spring::new(effect, q), effect.law().damping().unwrap_or_default());
+            loads[joint] += spring.effort(q, coasting[joint]) - linear * v[joint];
+            damping[joint] += linear + spring.stiffness * reach;
         }
     }
 
     /// Writes the accelerations under these loads with `M + reach D + reach^2 K` in the place of the mass matrix, and those that a unit of
-    /// effort on each of the `joints` adds.
+    /// effort on each of the `seats` adds.
     fn solve_apart(
         &mut self,
         stage: Stage<'_, S>,
         damping: &[S],
         acceleration: &mut [S],
-        (joints, columns): (&[usize], &mut [S]),
+        (seats, columns): (&[Seat], &mut [S]),
     ) {
         let n = self.coordinates();
-        let columns = columns.chunks_exact_mut(n.max(1)).zip(joints);
+        let columns = columns.chunks_exact_mut(n.max(1)).zip(seats);
         let Self { model, data, loads, .. } = self;
         if model.is_articulated() {
             let (q, v) = stage.explicit[..2 * n].split_at(n);
             let shift = Shift { reach: stage.reach, resistances: damping };
             acceleration.copy_from_slice(shifted(model, data, (q, v), loads, shift));
-            for (column, &joint) in columns {
+            for (column, seat) in columns {
                 // The recursion is linear in the efforts.
-                let own = loads[joint];
-                loads[joint] = own + 1.0;
+                let own = [Some(seat.joint), seat.behind].map(|joint| joint.map(|joint| (joint, loads[joint])));
+                seat.push(loads, S::one());
                 column.copy_from_slice(shifted(model, data, (q, v), loads, shift));
-                loads[joint] = own;
+                own.into_iter().flatten().for_each(|(joint, load)| loads[joint] = load);
                 column.iter_mut().zip(&*acceleration).for_each(|(entry, &a)| *entry -= a);
             }
             return;
@@ -237,9 +259,9 @@ impl<S: Scalar> Dynamics<S> {
             *acceleration = load - bias;
         }
         data.solve(acceleration);
-        for (column, &joint) in columns {
+        for (column, seat) in columns {
             column.fill(S::zero());
-            column[joint] = S::one();
+            seat.push(column, S::one());
             data.solve(column);
         }
     }

@@ -4,7 +4,7 @@ use super::{Dynamics, add_effects};
 use crate::actuator::{Actuator, Drive, Target};
 use crate::contact::ContactFriction;
 use crate::dynamics::{Energy, crba, energy, flexible, for_each_column, frames, lines, poses, rnea};
-use crate::effect::JointEffect;
+use crate::effect::{JointEffect, Seat};
 use crate::scalar::Scalar;
 use crate::spatial::{Pose, Twist};
 
@@ -44,13 +44,17 @@ impl<S: Scalar> Dynamics<S> {
     }
 
     /// From efforts r that arrive to efforts u of the actuators, of which effects take a share k of the load:
-    /// `u - k |u| = r`, so `u = r / (1 - k sign(r))`.
+    /// `u - k |u| = r`, so `u = r / (1 - k sign(r))`, k the sum of their shares.
     pub(crate) fn follow_load(&self, q: &[S], v: &[S], efforts: &mut [S]) {
-        for (joint, effect) in &self.effects {
-            let JointEffect::EmpiricalForce(law) = effect else { continue };
-            let (share, arriving) = (law.share_of_load(q[*joint], v[*joint]), efforts[*joint]);
-            let taken = arriving.if_negative(|| -share, || share);
-            efforts[*joint] = arriving / (S::one() - taken);
+        for (joint, effort) in efforts.iter_mut().enumerate().take(self.joints()) {
+            let own = |(seat, effect): &&(Seat, JointEffect<S>)| seat.joint == joint && effect.law().follows_load();
+            if !self.effects.iter().any(|effect| own(&effect)) {
+                continue;
+            }
+            let share = |(_, effect): &(Seat, JointEffect<S>)| effect.law().share_of_load(q[joint], v[joint], *effort);
+            let taken: S = self.effects.iter().filter(own).map(share).sum();
+            let arriving = *effort;
+            *effort = arriving / (S::one() - arriving.if_negative(|| -taken, || taken));
         }
     }
 
@@ -64,10 +68,10 @@ impl<S: Scalar> Dynamics<S> {
             flexible::required(model, data, (q, v), a, efforts);
         }
         loads.fill(S::zero());
-        for (joint, effect) in &self.effects {
-            loads[*joint] += effect.effort(q[*joint], v[*joint]);
+        for (seat, effect) in &self.effects {
+            seat.push(loads, effect.law().effort(seat.of(q), seat.of(v)));
         }
-        self.memories.add_efforts(loads);
+        self.memories.add_efforts(v, loads);
         for (effort, &effect) in efforts.iter_mut().zip(&*loads) {
             *effort -= effect;
         }
@@ -92,7 +96,7 @@ impl<S: Scalar> Dynamics<S> {
             true => energy(model, data, q, v),
             false => flexible::energy(model, data, q, v),
         };
-        total.potential += effects.iter().map(|(joint, effect)| effect.potential(q[*joint])).sum();
+        total.potential += effects.iter().map(|(seat, effect)| effect.law().potential(seat.of(q))).sum();
         if !connections.is_free() {
             frames(model, data, q, v);
             poses(model, data);
@@ -111,8 +115,8 @@ impl<S: Scalar> Dynamics<S> {
         for (load, &bias) in loads.iter_mut().zip(&self.data.composite.bias) {
             *load -= bias * (S::one() - weight);
         }
-        for (joint, effect) in &self.effects {
-            loads[*joint] -= effect.effort_at_rest(q[*joint]);
+        for (seat, effect) in &self.effects {
+            seat.push(&mut loads, -effect.law().effort_at_rest(seat.of(q)));
         }
         self.subtract_connections(&mut loads);
         loads

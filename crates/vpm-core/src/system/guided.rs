@@ -195,12 +195,10 @@ impl<S: Scalar> Guided<S> {
         let (q, v) = x[..2 * n].split_at(n);
         dynamics.terms(q, v);
         flexible::required(&dynamics.model, &dynamics.data, (q, v), &rate[n..2 * n], load);
-        for (joint, effect) in &dynamics.effects {
-            load[*joint] -= effect.effort(q[*joint], v[*joint]);
+        for (seat, effect) in &dynamics.effects {
+            seat.push(load, -effect.law().effort(seat.of(q), seat.of(v)));
         }
-        for (joint, law, memory) in dynamics.memories.iter() {
-            load[joint] -= law.effort(memory);
-        }
+        dynamics.memories.subtract_efforts(v, load);
         dynamics.subtract_connections(load);
         for Hold { first, row, strain: [begin, end, gain] } in &*holds {
             let own = *first..*first + row.len();
@@ -288,11 +286,14 @@ impl<S: Scalar> Guided<S> {
     /// Adds slopes of the effects on passive joints, and chords from rest in the place of the tangents of friction.
     fn resist(&self, rows: &mut [S], width: usize) {
         let (n, count) = (self.load.len(), self.free.len());
-        for (joint, effect) in &self.dynamics.effects {
-            if let Some(k) = self.free.iter().position(|place| place == joint) {
-                let (q, v) = (self.x[*joint], self.x[n + *joint]);
-                rows[k * width + k] += effect.slope_at_rest(q);
-                rows[k * width + count + k] -= effect.resistance(q, v);
+        for (seat, effect) in &self.dynamics.effects {
+            let (q, v) = (seat.of(&self.x), seat.of(&self.x[n..]));
+            let own = seat.joints().filter_map(|joint| self.free.iter().position(|&place| place == joint));
+            for k in own.clone() {
+                for other in own.clone() {
+                    rows[k * width + other] += effect.slope_at_rest(q);
+                    rows[k * width + count + other] -= effect.law().resistance(q, v);
+                }
             }
         }
     }

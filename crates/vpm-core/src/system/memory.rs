@@ -1,22 +1,22 @@
 //! Effects that remember: where their states stand, and how they move.
 
-use crate::effect::Hysteresis;
+use crate::effect::{MemoryChords, MemoryEffect, Seat};
 use crate::scalar::Scalar;
 
-/// Hystereses of joints with their memories, which follow the states of drives and supplies.
+/// Effects of joints that remember, with their memories, which follow the states of drives and supplies.
 #[derive(Clone, Debug)]
 pub struct Memories<S> {
-    /// Laws, each with the number of its joint.
-    laws: Vec<(usize, Hysteresis<S>)>,
+    /// Effects, each with its seat.
+    laws: Vec<(Seat, MemoryEffect<S>)>,
     /// Memory of each.
     values: Vec<S>,
-    /// What stands for the fading of each in an iteration matrix.
-    chords: Vec<Option<S>>,
+    /// What stands for each law in an iteration matrix.
+    chords: Vec<Option<MemoryChords<S>>>,
 }
 
 impl<S: Scalar> Memories<S> {
     /// Relaxed ones.
-    pub(crate) fn new(laws: Vec<(usize, Hysteresis<S>)>) -> Self {
+    pub(crate) fn new(laws: Vec<(Seat, MemoryEffect<S>)>) -> Self {
         let (values, chords) = (vec![S::zero(); laws.len()], vec![None; laws.len()]);
         Self { laws, values, chords }
     }
@@ -27,10 +27,15 @@ impl<S: Scalar> Memories<S> {
         self.laws.len()
     }
 
-    /// Laws with their joints and memories.
+    /// Memories that are held.
     #[inline]
-    pub(crate) fn iter(&self) -> impl Iterator<Item = (usize, &Hysteresis<S>, S)> {
-        self.laws.iter().zip(&self.values).map(|((joint, law), &value)| (*joint, law, value))
+    pub(crate) fn values(&self) -> &[S] {
+        &self.values
+    }
+
+    /// Where each of them is.
+    pub(super) fn seats(&self) -> impl Iterator<Item = Seat> {
+        self.laws.iter().map(|(seat, _)| *seat)
     }
 
     /// Takes over the memories.
@@ -39,52 +44,91 @@ impl<S: Scalar> Memories<S> {
         self.values.copy_from_slice(values);
     }
 
+    /// Each law where it has come to, at the joints' velocities `v` and these memories, or what stands for it.
+    #[inline]
+    fn at(&self, v: &[S], values: &[S]) -> impl Iterator<Item = (Seat, MemoryChords<S>)> {
+        let laws = self.laws.iter().zip(&self.chords).zip(values);
+        laws.map(|(((seat, effect), chords), &z)| (*seat, chords.unwrap_or_else(|| effect.law().chords(seat.of(v), z))))
+    }
+
+    /// What the laws at one seat do at the end of an implicit step over the time `reach`, from `values`, moving with `w` then: resistance,
+    /// and effort at rest.
+    #[inline]
+    pub(super) fn at_end(&self, seat: Seat, w: S, values: &[S], reach: S) -> impl Iterator<Item = [S; 2]> {
+        let own = self.laws.iter().zip(values).filter(move |((place, _), _)| *place == seat);
+        own.map(move |((_, effect), &z)| {
+            let MemoryChords { push, gain, source, fading, .. } = effect.law().chords(w, z);
+            let kept = (fading * reach + 1.0).recip();
+            let end = (z + (gain * w + source) * reach) * kept;
+            let resistance = effect.law().chords(w, end).resistance;
+            [resistance + push * gain * kept * reach, -(push * (z + source * reach) * kept)]
+        })
+    }
+
     /// Takes over the memories and writes their rates at the joints' velocities `v`.
     #[inline]
     pub(super) fn rates(&mut self, values: &[S], v: &[S], rates: &mut [S]) {
         self.hold(values);
-        let laws = self.laws.iter().zip(&self.chords);
-        for (((joint, law), chord), (rate, &z)) in laws.zip(rates.iter_mut().zip(values)) {
-            *rate = match *chord {
-                Some(fading) => v[*joint] / law.displacement - fading * z,
-                None => law.rate(v[*joint], z),
-            };
+        for (((seat, chords), &z), rate) in self.at(v, values).zip(values).zip(rates) {
+            *rate = chords.rate(seat.of(v), z);
         }
     }
 
-    /// Adds the efforts on the joints.
+    /// Writes their rates at the end of an implicit step over the time `reach`, from `values`, where the joints move with `v` then.
+    ///
+    /// At the velocity by which the efforts were reckoned the fading is that of the turn before, to the error of the turns.
+    pub(super) fn rates_at_end(&self, values: &[S], v: &[S], reach: S, rates: &mut [S]) {
+        for (((seat, chords), &z), rate) in self.at(v, values).zip(values).zip(rates) {
+            *rate = chords.rate(seat.of(v), z) / (chords.fading * reach + 1.0);
+        }
+    }
+
+    /// Adds the efforts on the joints at their velocities `v`.
     #[inline]
-    pub(super) fn add_efforts(&self, total: &mut [S]) {
-        for (joint, law, z) in self.iter() {
-            total[joint] += law.effort(z);
+    pub(super) fn add_efforts(&self, v: &[S], total: &mut [S]) {
+        for ((seat, chords), &z) in self.at(v, &self.values).zip(&self.values) {
+            seat.push(total, chords.effort(seat.of(v), z));
         }
     }
 
-    /// Moves the memories on along ways of the joints, exactly.
-    pub(crate) fn travel(&mut self, way: impl Fn(usize) -> S) {
-        for ((joint, law), value) in self.laws.iter().zip(&mut self.values) {
-            *value = law.advance(*value, way(*joint));
+    /// Takes them off loads.
+    pub(super) fn subtract_efforts(&self, v: &[S], loads: &mut [S]) {
+        for ((seat, chords), &z) in self.at(v, &self.values).zip(&self.values) {
+            seat.push(loads, -chords.effort(seat.of(v), z));
+        }
+    }
+
+    /// Moves the memories on by a time in s along ways of the joints.
+    pub(crate) fn travel(&mut self, time: f64, way: impl Fn(usize) -> S) {
+        for ((seat, effect), value) in self.laws.iter().zip(&mut self.values) {
+            *value = effect.law().advance(*value, seat.sum(&way), S::from_f64(time));
         }
     }
 
     /// Writes the mean rates of the memories over a `step` at the velocities `v`, from `values`.
     pub(super) fn mean_rates(&self, values: &[S], v: &[S], step: f64, rates: &mut [S]) {
-        for (((joint, law), &z), rate) in self.laws.iter().zip(values).zip(rates) {
-            *rate = (law.advance(z, v[*joint] * step) - z) / step;
+        for (((seat, effect), &z), rate) in self.laws.iter().zip(values).zip(rates) {
+            *rate = (effect.law().advance(z, seat.of(v) * step, S::from_f64(step)) - z) / step;
         }
     }
 
-    /// Fading of each at the velocities `v`, to stand for it in an iteration matrix.
-    pub(super) fn fadings(&self, values: &[S], v: &[S], fadings: &mut [Option<S>]) {
-        for (((joint, law), &z), fading) in self.laws.iter().zip(values).zip(fadings) {
-            *fading = Some(law.fading(v[*joint], z));
+    /// Writes each law where it has come to, to stand for it in an iteration matrix.
+    pub(super) fn write_chords(&self, values: &[S], v: &[S], chords: &mut [Option<MemoryChords<S>>]) {
+        for ((_, own), entry) in self.at(v, values).zip(chords) {
+            *entry = Some(own);
         }
     }
 
-    /// Replaces the fadings, or takes the laws as they are.
-    pub(super) fn replace(&mut self, fadings: impl Iterator<Item = Option<S>>) {
-        for (chord, fading) in self.chords.iter_mut().zip(fadings) {
-            *chord = fading;
+    /// What stands for the laws where nothing rubs.
+    pub(super) fn frictionless(&self) -> Vec<Option<MemoryChords<S>>> {
+        let at_rest = |(_, effect): &(Seat, MemoryEffect<S>)| effect.law().chords(S::zero(), S::zero());
+        self.laws.iter().map(|law| Some(at_rest(law).frictionless())).collect()
+    }
+
+    /// Lets these stand for the laws, or takes the laws as they are.
+    pub(super) fn replace(&mut self, chords: impl Iterator<Item = Option<MemoryChords<S>>>) {
+        for (own, chords) in self.chords.iter_mut().zip(chords) {
+            *own = chords;
         }
     }
 }

@@ -6,6 +6,7 @@ use super::recorded::Kind;
 use super::routine::{Routines, kind_of};
 use super::{Dynamics, Machine, Matrix, drives, stiff};
 use crate::actuator::Actuator;
+use crate::effect::MemoryChords;
 use crate::error::Result;
 use crate::integrator::Method;
 use crate::ode::Ode;
@@ -24,7 +25,7 @@ pub struct System<S> {
     memories: Memories<S>,
     split: Split<f64>,
     resistances: Vec<f64>,
-    fadings: Vec<Option<f64>>,
+    chords: Vec<Option<MemoryChords<f64>>>,
     /// A column of an iteration matrix on its way.
     column: Vec<f64>,
     /// Rates at a state whose matrix is asked for alone.
@@ -45,8 +46,8 @@ impl<S: Scalar> System<S> {
             actuators,
             memories,
             split: Split::new(&dynamics),
-            resistances: vec![0.0; dynamics.joints()],
-            fadings: vec![None; dynamics.memories.len()],
+            resistances: vec![0.0; dynamics.effects.len()],
+            chords: vec![None; dynamics.memories.len()],
             column: vec![0.0; dynamics.coordinates()],
             rates: vec![S::zero(); dynamics.dim()],
             ready: false,
@@ -239,8 +240,8 @@ impl<S: Scalar> System<S> {
         let (q, v) = x[..2 * n].split_at(n);
         self.dynamics.write_resistances(q, v, &mut self.resistances);
         let first = self.dynamics.first_memory();
-        self.dynamics.memories.fadings(&x[first..], v, &mut self.fadings);
-        let laws = (&*self.resistances, &*self.fadings);
+        self.dynamics.memories.write_chords(&x[first..], v, &mut self.chords);
+        let laws = (&*self.resistances, &*self.chords);
         stiff::iteration_matrix(&mut self.dynamics, x, matrix, laws, &mut self.column);
     }
 

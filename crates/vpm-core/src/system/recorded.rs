@@ -6,7 +6,7 @@ use super::additive::{Split, Stage};
 use super::guided::{Guidance, Guided, Part};
 use super::{Build, Dynamics, stiff};
 use crate::contact::ContactFriction;
-use crate::effect::JointEffect;
+use crate::effect::{JointEffect, MemoryChords, Seat};
 use crate::error::{Error, Result};
 use crate::graph::{Decision, Graph, Node, Program, Recorded, input, record};
 use crate::scalar::Scalar;
@@ -268,7 +268,9 @@ fn outputs(build: impl Build<Error = Error>, places: Places, parameters: &[Recor
             (rates, Some(matrix))
         }
         Kind::Frictionless => (rates, Some(dynamics.resisted(&x, |_| Recorded::default()))),
-        Kind::LinearFriction => (rates, Some(dynamics.resisted(&x, JointEffect::damping))),
+        Kind::LinearFriction => {
+            (rates, Some(dynamics.resisted(&x, |effect| effect.law().damping().unwrap_or_default())))
+        }
         Kind::Elasticity => {
             let (mut block, mut column) = (zeros(2 * n * n), zeros(n));
             dynamics.terms(motion.0, motion.1);
@@ -341,50 +343,44 @@ impl Dynamics<Recorded> {
     fn prepared(&mut self, x: &[Recorded]) -> Matrix {
         let (n, dim) = (self.coordinates(), x.len());
         let (q, v) = x[..2 * n].split_at(n);
-        let mut fadings = vec![None; self.memories.len()];
-        self.memories.fadings(&x[self.first_memory()..], v, &mut fadings);
-        let mut resistances = vec![Recorded::default(); self.joints()];
+        let mut memories = vec![None; self.memories.len()];
+        self.memories.write_chords(&x[self.first_memory()..], v, &mut memories);
+        let mut resistances = vec![Recorded::default(); self.effects.len()];
         self.write_resistances(q, v, &mut resistances);
         if self.is_stiff_by_beams_alone() {
             let (mut matrix, mut column) = (vec![Recorded::default(); dim * dim], vec![Recorded::default(); n]);
-            stiff::iteration_matrix(self, x, &mut matrix, (&resistances, &fadings), &mut column);
+            stiff::iteration_matrix(self, x, &mut matrix, (&resistances, &memories), &mut column);
             return Matrix::Entries(matrix, dim);
         }
         let mut seals = vec![None; self.seals.len()];
         self.seal_chords(q, v, &mut seals);
-        self.chords(x, &resistances, &seals, &fadings)
+        self.chords(x, &resistances, &seals, &memories)
     }
 
     /// The derivative of the rates at `x` with this resistance of each effect in the place of friction.
     fn resisted(&mut self, x: &[Recorded], resistance: impl Fn(&JointEffect<Recorded>) -> Recorded) -> Matrix {
         let zero = Recorded::default();
-        let mut resistances = vec![zero; self.joints()];
-        for (joint, effect) in &self.effects {
-            resistances[*joint] += resistance(effect);
-        }
-        let (seals, fadings) = (vec![Some(zero); self.seals.len()], vec![Some(zero); self.memories.len()]);
-        self.chords(x, &resistances, &seals, &fadings)
+        let resistances: Vec<_> = self.effects.iter().map(|(_, effect)| resistance(effect)).collect();
+        let (seals, memories) = (vec![Some(zero); self.seals.len()], self.memories.frictionless());
+        self.chords(x, &resistances, &seals, &memories)
     }
 
-    /// The derivative of the rates at `x` with these constants in the place of the resistance of joints and `seals` and of the fading of
-    /// memories, and with the chords of contacts.
+    /// The derivative of the rates at `x` with these constants in the place of the resistance of effects and `seals` and of what
+    /// remembers, and with the chords of contacts.
     fn chords(
         &mut self,
         x: &[Recorded],
         resistances: &[Recorded],
         seals: &[Option<Recorded>],
-        fadings: &[Option<Recorded>],
+        memories: &[Option<MemoryChords<Recorded>>],
     ) -> Matrix {
         self.seals = seals.iter().map(|seal| seal.map(Recorded::frozen)).collect();
-        self.memories.replace(fadings.iter().map(|fading| fading.map(Recorded::frozen)));
+        self.memories.replace(memories.iter().map(|law| law.map(|law| law.map(Recorded::frozen))));
         let resistances: Vec<_> = resistances.iter().map(|resistance| resistance.frozen()).collect();
         let chords =
-            |effects: &[(usize, JointEffect<Recorded>)], [q, v, _]: [&[Recorded]; 3], total: &mut [Recorded]| {
-                for (joint, effect) in effects {
-                    total[*joint] += effect.effort_at_rest(q[*joint]);
-                }
-                for ((total, &v), &resistance) in total.iter_mut().zip(v).zip(&resistances) {
-                    *total -= resistance * v;
+            |effects: &[(Seat, JointEffect<Recorded>)], [q, v, _]: [&[Recorded]; 3], total: &mut [Recorded]| {
+                for ((seat, effect), &resistance) in effects.iter().zip(&resistances) {
+                    seat.push(total, effect.law().effort_at_rest(seat.of(q)) - resistance * seat.of(v));
                 }
             };
         let resistance =

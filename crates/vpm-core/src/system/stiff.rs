@@ -2,10 +2,11 @@
 
 use super::Dynamics;
 use crate::actuator::{Drive, Target};
+use crate::effect::MemoryChords;
 use crate::scalar::Scalar;
 
 /// `[0, 1; -M^-1 K, -M^-1 D]` with the slopes of the effects in K and their chords, `resistances`, in D, and the columns and rows of
-/// the lags of ideal drives and of memories with their `fadings`, for the price of one mass matrix.
+/// the lags of ideal drives and of memories with their `chords`, for the price of one mass matrix.
 ///
 /// What it leaves out, the change of gravity, of velocity terms and of levers with the state, is slow beside the vibrations. Checked:
 /// against the exact Jacobian of a beam at rest without gravity, where nothing is left out.
@@ -13,7 +14,7 @@ pub(super) fn iteration_matrix<S: Scalar>(
     dynamics: &mut Dynamics<S>,
     x: &[S],
     matrix: &mut [S],
-    (resistances, fadings): (&[S], &[Option<S>]),
+    (resistances, chords): (&[S], &[Option<MemoryChords<S>>]),
     column: &mut [S],
 ) {
     let (n, dim) = (dynamics.coordinates(), x.len());
@@ -27,17 +28,18 @@ pub(super) fn iteration_matrix<S: Scalar>(
     let lower = &mut matrix[n * dim..];
     elasticity(dynamics, lower, dim, column);
     let Dynamics { data, effects, actuators, .. } = dynamics;
-    for (joint, &resistance) in resistances.iter().enumerate() {
-        let own = || effects.iter().filter(|(place, _)| *place == joint);
-        if own().next().is_none() {
+    for (number, (seat, _)) in effects.iter().enumerate() {
+        if effects[..number].iter().any(|(earlier, _)| earlier == seat) {
             continue;
         }
-        let slope: S = own().map(|(_, effect)| effect.slope_at_rest(q[joint])).sum();
-        for (entry, place) in [(slope, joint), (-resistance, n + joint)] {
+        let own = || effects.iter().zip(resistances).filter(|((place, _), _)| place == seat);
+        let slope: S = own().map(|((_, effect), _)| effect.slope_at_rest(seat.of(q))).sum();
+        let resistance: S = own().map(|(_, &resistance)| resistance).sum();
+        for (entry, block) in [(slope, 0), (-resistance, n)] {
             column.fill(S::zero());
-            column[joint] = entry;
+            seat.push(column, entry);
             data.solve(column);
-            add_column(lower, dim, place, column);
+            seat.joints().for_each(|joint| add_column(lower, dim, block + joint, column));
         }
     }
     let lagging = actuators.iter().filter_map(|actuator| actuator.lag.as_ref().map(|lag| (actuator, lag)));
@@ -53,20 +55,30 @@ pub(super) fn iteration_matrix<S: Scalar>(
         add_column(lower, dim, place, column);
         lower[(place - n) * dim + place] = lag.rate(S::one(), S::zero());
     }
-    remember(dynamics, lower, dim, fadings, column);
+    remember(dynamics, lower, dim, chords, column);
 }
 
 /// The columns and rows of the memories.
-fn remember<S: Scalar>(dynamics: &Dynamics<S>, rows: &mut [S], dim: usize, fadings: &[Option<S>], column: &mut [S]) {
+fn remember<S: Scalar>(
+    dynamics: &Dynamics<S>,
+    rows: &mut [S],
+    dim: usize,
+    chords: &[Option<MemoryChords<S>>],
+    column: &mut [S],
+) {
     let (n, first) = (dynamics.coordinates(), dynamics.first_memory());
-    for ((place, (joint, law, _)), fading) in (first..).zip(dynamics.memories.iter()).zip(fadings) {
-        column.fill(S::zero());
-        column[joint] = law.effort(S::one());
-        dynamics.data.solve(column);
-        add_column(rows, dim, place, column);
+    for ((place, seat), law) in (first..).zip(dynamics.memories.seats()).zip(chords.iter().flatten()) {
+        let mut pushed = |effort: S, places: &mut dyn Iterator<Item = usize>| {
+            column.fill(S::zero());
+            seat.push(column, effort);
+            dynamics.data.solve(column);
+            places.for_each(|place| add_column(rows, dim, place, column));
+        };
+        pushed(-law.push, &mut std::iter::once(place));
+        pushed(-law.resistance, &mut seat.joints().map(|joint| n + joint));
         let row = &mut rows[(place - n) * dim..];
-        row[n + joint] = law.displacement.recip();
-        row[place] = -fading.unwrap_or_else(S::zero);
+        seat.joints().for_each(|joint| row[n + joint] = law.gain);
+        row[place] = -law.fading;
     }
 }
 

@@ -44,6 +44,7 @@ const ALONE: [(&str, &[&str]); 15] = [
             "ode",
             "effect::Domain",
             "effect::CoulombFriction",
+            "effect::Law",
             "effect::StribeckFriction",
             "effect::ViscousFriction",
         ],

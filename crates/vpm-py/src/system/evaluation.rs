@@ -175,11 +175,17 @@ impl System {
         Ok(PyArray1::from_vec(py, self.checked(py, result)?))
     }
 
-    /// Memories (N, hystereses) at every sample of a path of the joints (N, n), relaxed at the first.
-    fn memories<'py>(&self, py: Python<'py>, theta: &Any<'py>, position: &Any<'py>) -> PyResult<Table<'py>> {
+    /// Memories (N, effects that remember) at every sample of a path of the joints (N, n), relaxed at the first.
+    fn memories<'py>(
+        &self,
+        py: Python<'py>,
+        theta: &Any<'py>,
+        position: &Any<'py>,
+        time_step: f64,
+    ) -> PyResult<Table<'py>> {
         let (theta, position) = (Numbers::vector("theta", theta)?, Numbers::table("position", position)?);
-        let values =
-            self.compute(py, |_| evaluate::memories(self.description(), theta.values(), position.as_table()?))?;
+        let values = self
+            .compute(py, |_| evaluate::memories(self.description(), theta.values(), position.as_table()?, time_step))?;
         let (rows, count) = (position.rows(), values.len() / position.rows().max(1));
         matrix(py, values, [rows, count])
     }

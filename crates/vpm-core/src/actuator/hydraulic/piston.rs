@@ -4,6 +4,7 @@ use serde::Deserialize;
 
 use super::NamedDomain;
 use crate::effect::CoulombFriction;
+use crate::effect::Law;
 use crate::effect::StribeckFriction;
 use crate::effect::ViscousFriction;
 use crate::scalar::Scalar;
@@ -81,16 +82,16 @@ impl<S: Scalar> SealFriction<S> {
     /// Force in N on a piston moving with `v` (m/s).
     #[inline]
     pub fn force(&self, v: S) -> S {
-        let viscous = self.viscous.map_or(S::zero(), |law| law.effort(v));
-        let coulomb = self.coulomb.map_or(S::zero(), |law| law.effort(v));
-        viscous + coulomb + self.stribeck.map_or(S::zero(), |law| law.effort(v))
+        let viscous = self.viscous.map_or(S::zero(), |law| law.effort(S::zero(), v));
+        let coulomb = self.coulomb.map_or(S::zero(), |law| law.effort(S::zero(), v));
+        viscous + coulomb + self.stribeck.map_or(S::zero(), |law| law.effort(S::zero(), v))
     }
     /// Resistance in N s/m at velocity `v` (m/s): the force is `-r v`, the slope of the chord from rest.
     #[inline]
     pub fn resistance(&self, v: S) -> S {
-        let viscous = self.viscous.map_or(S::zero(), |law| law.resistance());
-        let coulomb = self.coulomb.map_or(S::zero(), |law| law.resistance(v));
-        viscous + coulomb + self.stribeck.map_or(S::zero(), |law| law.resistance(v))
+        let viscous = self.viscous.map_or(S::zero(), |law| law.resistance(S::zero(), v));
+        let coulomb = self.coulomb.map_or(S::zero(), |law| law.resistance(S::zero(), v));
+        viscous + coulomb + self.stribeck.map_or(S::zero(), |law| law.resistance(S::zero(), v))
     }
 
     /// Whether there is any.

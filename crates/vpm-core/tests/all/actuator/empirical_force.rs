@@ -1,6 +1,6 @@
 //! Empirical forces in machines: exact state Jacobians, where the load comes from a command or from oil, and chords.
 
-use vpm_core::effect::{EmpiricalForce, JointEffect};
+use vpm_core::effect::{EmpiricalForce, Law};
 use vpm_core::ode::Ode;
 use vpm_core::samples::slider;
 
@@ -107,15 +107,14 @@ fn it_never_takes_more_than_its_share_of_the_load_and_stays_finite() {
         load_cosine: None,
         load_sine: None,
     };
-    close(law.share_of_load(0.1, 1.0), 0.95, 0.0);
-    close(law.share_of_load(0.1, -1.0), -0.95, 0.0);
+    close(law.share_of_load(0.1, 1.0, 3.0), 0.95, 0.0);
+    close(law.share_of_load(0.1, -1.0, 3.0), -0.95, 0.0);
     close(law.effort(1e9, 1e9), -10.0, 1e-12);
     close(law.effort(1e9, -1e9), 4.0, 1e-12);
     // In one piece: at the edge and just beyond, the efforts agree.
     close(law.effort(0.5, 2.0), law.effort(0.5 + 1e-12, 2.0 + 1e-12), 1e-9);
-    let effect = JointEffect::EmpiricalForce(law);
     for v in [0.0, 1e-7, -0.3, 2.0, -2.5, 1e12] {
-        close(effect.effort_at_rest(0.2) - effect.resistance(0.2, v) * v, effect.effort(0.2, v), 1e-12);
-        assert!(effect.resistance(0.2, v).is_finite());
+        close(law.effort_at_rest(0.2) - law.resistance(0.2, v) * v, law.effort(0.2, v), 1e-12);
+        assert!(law.resistance(0.2, v).is_finite());
     }
 }

@@ -101,6 +101,12 @@ impl Machine {
         self.part("effects", kind, json!({"type": kind, "joint": joint}), numbers)
     }
 
+    /// The same on the sum of two joints' coordinates; its parameters are named `type_behind.parameter`.
+    pub fn effect_behind(&mut self, kind: &str, [joint, behind]: [usize; 2], numbers: &[(&str, f64)]) -> &mut Self {
+        let part = json!({"type": kind, "joint": joint, "behind": behind});
+        self.part("effects", &format!("{kind}_behind"), part, numbers)
+    }
+
     /// A payload on a body.
     pub fn payload(&mut self, body: usize, mass: f64, position: [f64; 3]) -> &mut Self {
         let position: Vec<_> = ["x", "y", "z"]

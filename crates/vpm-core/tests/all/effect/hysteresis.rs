@@ -1,7 +1,7 @@
 //! Friction with memory against Dahl's closed form, the second law, and itself under other integrators and number types.
 
 use serde_json::json;
-use vpm_core::effect::Hysteresis;
+use vpm_core::effect::{Hysteresis, MemoryLaw};
 use vpm_core::integrator::Method;
 use vpm_core::inverse::{Motion, inverse_dynamics};
 use vpm_core::ode::Ode;
@@ -38,11 +38,11 @@ fn dahl_friction_follows_its_closed_form() {
     // dz/dq = (1 - z)/d forward: z = 1 - (1 - z0) e^(-q/d) with either sign of z0; backward likewise with the signs turned.
     for z in [-0.95_f64, -0.2, 0.0, 0.4, 0.99] {
         for way in [1e-5, 4e-4, 3e-3, 2e-2] {
-            close(DAHL.advance(z, way), 1.0 - (1.0 - z) * (-way / 2e-3).exp(), 1e-14);
-            close(DAHL.advance(z, -way), -1.0 + (1.0 + z) * (-way / 2e-3).exp(), 1e-14);
+            close(DAHL.advance(z, way, 0.0), 1.0 - (1.0 - z) * (-way / 2e-3).exp(), 1e-14);
+            close(DAHL.advance(z, -way, 0.0), -1.0 + (1.0 + z) * (-way / 2e-3).exp(), 1e-14);
         }
     }
-    close(DAHL.effort(DAHL.advance(0.0, 1.0)), -3.0, 1e-15);
+    close(DAHL.effort(0.0, DAHL.advance(0.0, 1.0, 0.0)), -3.0, 1e-15);
 }
 
 #[test]
@@ -51,9 +51,9 @@ fn the_exact_way_is_the_integral_of_the_rate() {
         let law = shaped(shape);
         for z in [-0.9, -0.3, 0.0, 0.5, 1.0] {
             for way in [-7e-3, -8e-4, 3e-4, 5e-3] {
-                close(law.advance(z, way), stepped(&law, z, way, 4000), 2e-7);
-                let half = law.advance(law.advance(z, 0.3 * way), 0.7 * way);
-                close(law.advance(z, way), half, 1e-13);
+                close(law.advance(z, way, 0.0), stepped(&law, z, way, 4000), 2e-7);
+                let half = law.advance(law.advance(z, 0.3 * way, 0.0), 0.7 * way, 0.0);
+                close(law.advance(z, way, 0.0), half, 1e-13);
             }
         }
     }
@@ -63,7 +63,7 @@ fn the_exact_way_is_the_integral_of_the_rate() {
 fn stiffness_about_rest_and_on_reversal() {
     for shape in SHAPES {
         let law = shaped(shape);
-        let slope = |z: f64, way: f64| (law.effort(law.advance(z, way)) - law.effort(z)) / way;
+        let slope = |z: f64, way: f64| (law.effort(0.0, law.advance(z, way, 0.0)) - law.effort(0.0, z)) / way;
         close(slope(0.0, 1e-9), -3.0 / 2e-3, 1e-3);
         close(slope(1.0, -1e-9) / (-3.0 / 2e-3), 1.0 + shape, 1e-5);
     }
@@ -77,10 +77,10 @@ fn closed_loops_only_take_energy() {
         let way = |k: usize| 4e-3 * ((k as f64) * 0.001).sin() + 1.5e-3 * ((k as f64) * 0.00271).sin();
         for k in 0..600_000 {
             let step = way(k + 1) - way(k);
-            let (stored, middle) = (law.stored(z), law.advance(z, 0.5 * step));
-            let next = law.advance(z, step);
+            let (stored, middle) = (law.stored(z), law.advance(z, 0.5 * step, 0.0));
+            let next = law.advance(z, step, 0.0);
             // Simpson's rule for the work against the element along the step.
-            let taken = -step / 6.0 * (law.effort(z) + 4.0 * law.effort(middle) + law.effort(next));
+            let taken = -step / 6.0 * (law.effort(0.0, z) + 4.0 * law.effort(0.0, middle) + law.effort(0.0, next));
             least = least.min(taken - (law.stored(next) - stored));
             work += taken;
             z = next;
@@ -95,11 +95,11 @@ fn closed_loops_only_take_energy() {
 fn a_wide_loop_takes_the_work_of_dry_friction() {
     // Dahl: the force rises from -F to F along 2 F e^(-q/d), so that a loop of width w takes 2 F (w - 2 d (1 - e^(-w/d))).
     let (width, pieces) = (0.05, 20_000);
-    let (mut z, mut work) = (-DAHL.advance(0.0, 1.0), 0.0);
+    let (mut z, mut work) = (-DAHL.advance(0.0, 1.0, 0.0), 0.0);
     for k in 0..2 * pieces {
         let step = if k < pieces { width } else { -width } / pieces as f64;
-        let next = DAHL.advance(z, step);
-        work -= 0.5 * (DAHL.effort(z) + DAHL.effort(next)) * step;
+        let next = DAHL.advance(z, step, 0.0);
+        work -= 0.5 * (DAHL.effort(0.0, z) + DAHL.effort(0.0, next)) * step;
         z = next;
     }
     close(work, 2.0 * 3.0 * (width - 2.0 * 2e-3), 1e-6);
@@ -114,7 +114,7 @@ fn the_loop_closes_and_knows_no_speed() {
             for _ in 0..200 {
                 for k in 0..4 * pieces {
                     let sign = if (pieces..3 * pieces).contains(&k) { -1.0 } else { 1.0 };
-                    z = law.advance(z, sign * 1.3e-3 / pieces as f64);
+                    z = law.advance(z, sign * 1.3e-3 / pieces as f64, 0.0);
                 }
             }
             z
@@ -132,11 +132,12 @@ fn the_loop_closes_and_knows_no_speed() {
 fn the_exact_way_has_exact_derivatives() {
     for shape in [0.0, 1e-6, 0.3, 1.0, 4.0] {
         let numbers = [2e-3, shape, -0.6, 1.9e-3];
-        let end = |n: [f64; 4]| Hysteresis { force: 1.0, displacement: n[0], shape: n[1] }.advance(n[2], n[3]);
+        let end = |n: [f64; 4]| Hysteresis { force: 1.0, displacement: n[0], shape: n[1] }.advance(n[2], n[3], 0.0);
         let dual = numbers.map(Dual::<f64, 4>::constant);
         let lifted: [Dual<f64, 4>; 4] = std::array::from_fn(|k| Dual::variable(dual[k].value, k));
         let [displacement, shape_of, z, way] = lifted;
-        let slopes = Hysteresis { force: Dual::one(), displacement, shape: shape_of }.advance(z, way).gradient;
+        let slopes =
+            Hysteresis { force: Dual::one(), displacement, shape: shape_of }.advance(z, way, Dual::zero()).gradient;
         for (k, slope) in slopes.into_iter().enumerate() {
             let step = if k == 1 { 1e-5 } else { 1e-6 * numbers[k].abs() };
             let moved = |by: f64| {

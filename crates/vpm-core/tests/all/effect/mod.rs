@@ -1,4 +1,5 @@
 //! Effects on joints.
 
+mod frictions;
 mod hysteresis;
 mod laws;

@@ -15,7 +15,7 @@ use vpm_core::bushing::Bushing;
 use vpm_core::contact::{ContactFriction, NormalContact};
 use vpm_core::controller::{ControlMemory, Pid};
 use vpm_core::description::Description;
-use vpm_core::effect::{Hysteresis, JointEffect};
+use vpm_core::effect::{Hysteresis, JointEffect, MemoryEffect};
 use vpm_core::mount::Mount;
 use vpm_core::samples::Random;
 use vpm_core::spatial::{Matrix3, Pose, Twist, Vector3};
@@ -45,19 +45,24 @@ fn read<T: serde::de::DeserializeOwned>(value: Value) -> T {
     serde_json::from_value(value).unwrap()
 }
 
-struct Effects(Vec<JointEffect<f64>>, Vec<Hysteresis<f64>>);
+struct Effects(Vec<JointEffect<f64>>, Vec<MemoryEffect<f64>>);
 
 impl Laws for Effects {
     fn of<S: Scalar>(&self, [q, v, way, z, ..]: [S; WIDTH]) -> Vec<S> {
         let mut found = Vec::new();
         for law in &self.0 {
-            let law = law.map(&mut |&number| S::from_f64(number));
+            let effect = law.map(&mut |&number| S::from_f64(number));
+            let law = effect.law();
             found.extend([law.effort(q, v), law.resistance(q, v), law.effort_at_rest(q), law.potential(q)]);
-            found.extend([law.share_of_load(q, v), law.resistance_per_load(v), law.slope_at_rest(q)]);
+            found.extend([law.share_of_load(q, v, z), law.resistance_per_load(v, z), effect.slope_at_rest(q)]);
         }
         for law in &self.1 {
-            let (law, z) = (law.map(&mut |&number| S::from_f64(number)), z * 0.3);
-            found.extend([law.rate(v, z), law.advance(z, way), law.stored(z), law.effort(z)]);
+            let (effect, z) = (law.map(&mut |&number| S::from_f64(number)), z * 0.3);
+            let law = effect.law();
+            found.extend([law.rate(v, z), law.advance(z, way, S::from_f64(0.1)), law.effort(v, z)]);
+            if let MemoryEffect::Hysteresis(law) = effect {
+                found.push(law.stored(z));
+            }
         }
         found
     }
@@ -76,9 +81,15 @@ fn effects() -> Effects {
         "drag": 0.3, "speed_2": 0.1, "position_3": 2.0, "dry_cosine": 0.5, "load_dry": 2.0, "load_sine": 0.4});
     let formula = json!({"type": "formula", "constants": [], "parameters": [2.0],
         "program": ["velocity", "abs", "velocity", "multiply", {"parameter": 0}, "multiply"]});
-    let laws = [end_stop, backlash, stribeck, coulomb, uneven, fitted, formula].map(read);
-    let memory = |shape: f64| Hysteresis { force: 3.0, displacement: 0.2, shape };
-    Effects(laws.into(), vec![memory(0.0), memory(1.0), memory(4.0)])
+    let drag = json!({"type": "quadratic_drag", "drag": 2.0});
+    let gear = json!({"type": "load_dependent_friction", "driving": 0.2, "driven": 0.1, "transition_velocity": 0.1});
+    let laws = [end_stop, backlash, stribeck, coulomb, uneven, fitted, formula, drag, gear].map(read);
+    let memory = |shape: f64| MemoryEffect::Hysteresis(Hysteresis { force: 3.0, displacement: 0.2, shape });
+    let bristles = json!({"type": "lugre_friction", "coulomb": 3.0, "displacement": 0.2, "damping": 0.3, "excess": 0.5,
+        "stribeck_velocity": 0.4});
+    let warming = json!({"type": "warming_friction", "coulomb": 2.0, "viscous": 0.3, "time_constant": 0.5,
+        "transition_velocity": 0.1});
+    Effects(laws.into(), vec![memory(0.0), memory(1.0), memory(4.0), read(bristles), read(warming)])
 }
 
 struct Contacts(NormalContact<f64>, ContactFriction<f64>);

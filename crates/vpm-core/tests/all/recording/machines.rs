@@ -217,8 +217,34 @@ fn rigid_trees_with_effects_on_all_joints_agree() -> Result<()> {
     Ok(())
 }
 
+#[test]
+fn every_effect_agrees_with_its_derivatives() -> Result<()> {
+    for (seed, (kind, numbers)) in (1..).zip(EFFECTS) {
+        let mut machine = Machine::new(&random_tree(seed, 2));
+        machine.effect(kind, 1, numbers).actuator(1, &[("gain", 3e3)]);
+        check(kind, &machine.build(), &WITH_DERIVATIVES, &[])?;
+    }
+    Ok(())
+}
+
+#[test]
+fn effects_behind_a_joint_agree() -> Result<()> {
+    for seed in 1..5 {
+        let mut machine = Machine::new(&random_tree(seed, 2 + seed as usize % 3));
+        machine
+            .effect("coulomb_friction", 0, &[("coulomb", 0.8), ("transition_velocity", 0.1)])
+            .effect("joint_compliance", 1, &[("stiffness", 20.0), ("damping", 0.1)])
+            .effect_behind("coulomb_friction", [0, 1], &[("coulomb", 0.5), ("transition_velocity", 0.1)])
+            .effect_behind("viscous_friction", [0, 1], &[("viscous", 0.2)])
+            .effect_behind("spring", [0, 1], &[("stiffness", 6.0), ("rest", 0.3)])
+            .effect_behind("hysteresis", [0, 1], &[("force", 0.5), ("displacement", 0.1), ("shape", 1.0)]);
+        check(&format!("tree {seed}"), &machine.build(), &WITH_DERIVATIVES, &[])?;
+    }
+    Ok(())
+}
+
 /// Effects of joints with their parameters: each a size that is drawn up to it, from a tenth of it.
-const EFFECTS: [(&str, &[(&str, f64)]); 9] = [
+const EFFECTS: [(&str, &[(&str, f64)]); 15] = [
     ("viscous_friction", &[("viscous", 0.5)]),
     ("coulomb_friction", &[("coulomb", 2.0), ("transition_velocity", 0.2)]),
     ("stribeck_friction", &[("stribeck", 1.0), ("stribeck_velocity", 0.4), ("transition_velocity", 0.2)]),
@@ -228,6 +254,15 @@ const EFFECTS: [(&str, &[(&str, f64)]); 9] = [
     ("torque_ripple", &[("period", 2.0), ("cosine", 0.5), ("sine", 0.5)]),
     ("bias_force", &[("force", 1.0)]),
     ("hysteresis", &[("force", 1.0), ("displacement", 0.2), ("shape", 1.0)]),
+    ("quadratic_drag", &[("drag", 0.5)]),
+    ("cubic_spring", &[("stiffness", 20.0), ("rest", 0.5)]),
+    ("position_dependent_friction", &[("period", 2.0), ("cosine", 0.5), ("sine", 0.5), ("transition_velocity", 0.2)]),
+    ("load_dependent_friction", &[("driving", 0.3), ("driven", 0.2), ("transition_velocity", 0.2)]),
+    (
+        "lugre_friction",
+        &[("coulomb", 1.0), ("displacement", 0.2), ("damping", 0.1), ("excess", 0.5), ("stribeck_velocity", 0.4)],
+    ),
+    ("warming_friction", &[("coulomb", 1.0), ("viscous", 0.3), ("time_constant", 2.0), ("transition_velocity", 0.2)]),
 ];
 
 /// A tree of one to five joints with some effects, a payload and a drive.
@@ -244,7 +279,11 @@ fn drawn(seed: u64) -> Machine {
             let shares: Vec<f64> = effect.1.iter().map(|_| 0.1 * (1 + pick(10)) as f64).collect();
             let numbers: Vec<_> =
                 effect.1.iter().zip(shares).map(|(&(name, most), share)| (name, most * share)).collect();
-            machine.effect(effect.0, joint, &numbers);
+            // Now and then on the sum of two coordinates.
+            match pick(4) {
+                0 if joints > 1 => machine.effect_behind(effect.0, [joint, (joint + 1) % joints], &numbers),
+                _ => machine.effect(effect.0, joint, &numbers),
+            };
         }
     }
     machine.payload(pick(joints), 0.1 * (1 + pick(10)) as f64, [0.05, -0.1, 0.2]);

@@ -1,0 +1,192 @@
+//! What a law of a joint is: numbers in, effort out; some have a memory besides.
+
+use crate::scalar::Scalar;
+
+/// Largest share of a joint's load that one law takes: beyond it, the effort that a motion needs would not be unique.
+pub(super) const LARGEST_SHARE: f64 = 0.95;
+
+/// An effort on a joint as a function of its coordinate q (m or rad), its velocity v and the effort u of the actuators on it (N or N m).
+///
+/// Law: `tau = effort(q, v) - share_of_load(q, v, u) |u|`. A law says what differs from nothing at all.
+pub trait Law<S: Scalar> {
+    /// Effort, N or N m, but for what follows the load.
+    #[inline]
+    fn effort(&self, q: S, v: S) -> S {
+        self.effort_at_rest(q) - self.resistance(q, v) * v
+    }
+
+    /// The same at rest.
+    #[inline]
+    fn effort_at_rest(&self, _q: S) -> S {
+        S::zero()
+    }
+
+    /// Resistance r in N s/m or N m s/rad: what depends on the velocity is `-r v`, so that `effort(q, v) = effort(q, 0) - r v`. It is the
+    /// slope of the chord from rest to `v`, not of the tangent, and finite at rest.
+    #[inline]
+    fn resistance(&self, _q: S, _v: S) -> S {
+        self.damping().unwrap_or_else(S::zero)
+    }
+
+    /// The resistance where it is the same everywhere; none where it is not.
+    #[inline]
+    fn damping(&self) -> Option<S> {
+        None
+    }
+
+    /// Potential energy in J, `effort_at_rest = -d potential/dq`: zero for friction, for formulas and for what is read off data.
+    #[inline]
+    fn potential(&self, _q: S) -> S {
+        S::zero()
+    }
+
+    /// Effort with what follows the load.
+    #[inline]
+    fn effort_under(&self, q: S, v: S, u: S) -> S {
+        if self.follows_load() { self.effort(q, v) - self.share_of_load(q, v, u) * u.abs() } else { self.effort(q, v) }
+    }
+
+    /// Whether it takes a share of the load, which the motor side of a joint knows alone.
+    #[inline]
+    fn follows_load(&self) -> bool {
+        false
+    }
+
+    /// Share k of the load |u| that is taken off besides, within -1 and 1. Of u it may ask the sign alone.
+    #[inline]
+    fn share_of_load(&self, _q: S, _v: S, _u: S) -> S {
+        S::zero()
+    }
+
+    /// Resistance per load |u|, the chord from rest of the part of that share that vanishes there.
+    #[inline]
+    fn resistance_per_load(&self, _v: S, _u: S) -> S {
+        S::zero()
+    }
+}
+
+/// A law with a memory z, a state without unit that is zero at first.
+pub trait MemoryLaw<S: Scalar> {
+    /// What it is at velocity `v` and memory `z`, in terms that are linear in both.
+    fn chords(&self, v: S, z: S) -> MemoryChords<S>;
+
+    /// The memory after a `time` (s) in which the joint has moved on by `way` (m or rad) in one direction, from `z`: exact for a steady
+    /// velocity.
+    fn advance(&self, z: S, way: S, time: S) -> S;
+
+    /// Effort, N or N m.
+    #[inline]
+    fn effort(&self, v: S, z: S) -> S {
+        self.chords(v, z).effort(v, z)
+    }
+
+    /// dz/dt, 1/s.
+    #[inline]
+    fn rate(&self, v: S, z: S) -> S {
+        self.chords(v, z).rate(v, z)
+    }
+}
+
+/// A law with a memory where it has come to: `tau = -push z - resistance v`, `dz/dt = gain v + source - fading z`.
+#[derive(Clone, Copy, Debug)]
+pub struct MemoryChords<S> {
+    /// Effort per memory, N or N m.
+    pub push: S,
+    /// Effort per velocity, N s/m or N m s/rad.
+    pub resistance: S,
+    /// Memory per way, 1/m or 1/rad.
+    pub gain: S,
+    /// What drives the memory at rest, 1/s.
+    pub source: S,
+    /// How fast it fades, 1/s.
+    pub fading: S,
+}
+
+impl<S: Scalar> MemoryChords<S> {
+    /// Effort at `v` and `z`.
+    #[inline]
+    pub fn effort(&self, v: S, z: S) -> S {
+        -(self.push * z + self.resistance * v)
+    }
+
+    /// dz/dt at `v` and `z`.
+    #[inline]
+    pub fn rate(&self, v: S, z: S) -> S {
+        self.gain * v + self.source - self.fading * z
+    }
+
+    /// What is left of it where nothing rubs: a spring.
+    pub(crate) fn frictionless(self) -> Self {
+        Self { resistance: S::zero(), fading: S::zero(), ..self }
+    }
+
+    /// Each number through `f`.
+    pub(crate) fn map(self, f: impl Fn(S) -> S) -> Self {
+        let Self { push, resistance, gain, source, fading } = self;
+        Self { push: f(push), resistance: f(resistance), gain: f(gain), source: f(source), fading: f(fading) }
+    }
+}
+
+/// Declares a law by its parameters, each with the [`super::Domain`] where it is defined.
+macro_rules! law {
+    ($(#[$doc:meta])* $name:ident { $($(#[$of_field:meta])* $field:ident: $domain:ident,)* }) => {
+        $(#[$doc])*
+        #[derive(Clone, Copy, Debug, PartialEq, serde::Deserialize)]
+        #[serde(deny_unknown_fields)]
+        pub struct $name<P> {
+            $($(#[$of_field])* pub $field: P,)*
+        }
+
+        impl<P> $name<P> {
+            /// The same law over another number type.
+            pub fn map<T>(&self, f: &mut impl FnMut(&P) -> T) -> $name<T> {
+                $name { $($field: f(&self.$field),)* }
+            }
+
+            /// The parameters and where each is defined.
+            pub fn domains(&self) -> Vec<(&P, super::Domain)> {
+                vec![$((&self.$field, super::Domain::$domain),)*]
+            }
+        }
+    };
+}
+
+/// Declares an enumeration of laws that answer to one trait.
+macro_rules! family {
+    ($(#[$doc:meta])* $name:ident: $law:ident { $($(#[$of_kind:meta])* $kind:ident,)* }) => {
+        $(#[$doc])*
+        #[derive(Clone, Copy, Debug, PartialEq, serde::Deserialize)]
+        #[serde(tag = "type", rename_all = "snake_case")]
+        pub enum $name<P> {
+            $($(#[$of_kind])* $kind($kind<P>),)*
+        }
+
+        impl<P> $name<P> {
+            /// The same effect over another number type.
+            pub fn map<T>(&self, f: &mut impl FnMut(&P) -> T) -> $name<T> {
+                match self {
+                    $(Self::$kind(law) => $name::$kind(law.map(f)),)*
+                }
+            }
+
+            /// The parameters and where each is defined.
+            pub fn domains(&self) -> Vec<(&P, Domain)> {
+                match self {
+                    $(Self::$kind(law) => law.domains(),)*
+                }
+            }
+        }
+
+        impl<S: Scalar> $name<S> {
+            /// Its law.
+            #[inline]
+            pub fn law(&self) -> &dyn $law<S> {
+                match self {
+                    $(Self::$kind(law) => law,)*
+                }
+            }
+        }
+    };
+}
+
+pub(super) use {family, law};

@@ -1,0 +1,255 @@
+"""Effects of a joint for those who know that they are there: a diagnosis does not try them.
+
+Drag, a stiffening spring, and friction that depends on the place, on the load, on the time since a cold start and on
+the way of bristles. The sources stand at the laws in the core.
+"""
+
+from __future__ import annotations
+
+from vpm.catalogue.kinds import ABOVE_ZERO, ANY, NOT_NEGATIVE, EffectParameter, EffectType, shape, size
+
+#: Transition velocity and Stribeck velocity where none is given: prismatic (m/s), revolute (rad/s).
+_TRANSITION, _STRIBECK = (1e-3, 1e-2), (1e-2, 1e-1)
+#: Way over which bristles bend where none is given: prismatic (m), revolute (rad).
+_PRESLIDING = (1e-5, 1e-4)
+#: Largest share of a load that the balance of effort has one solution for.
+_SHARE = (0.0, 0.95)
+
+
+def _transition(suffix: str) -> EffectParameter:
+    meaning = "speed below which the law bends from one sign to the other"
+    return shape("transition_velocity", suffix, "{C}/s", "speed", meaning, start=_TRANSITION, learnt=True)
+
+
+QUADRATIC_DRAG = EffectType(
+    name="quadratic_drag",
+    site="joint",
+    group="friction",
+    parameters=(
+        size(
+            "drag",
+            "friction.quadratic",
+            "{E} s^2/{C}^2",
+            "effort_per_speed_squared",
+            "resistance per square of the speed",
+            physical=NOT_NEGATIVE,
+        ),
+    ),
+    law="tau = -drag |v| v",
+    sentence="{at} resists motion in proportion to the square of its speed, with {drag}.",
+    impossible="a negative drag would feed energy into the motion instead of taking it out",
+    confused_with={},
+    screened=False,
+)
+
+CUBIC_SPRING = EffectType(
+    name="cubic_spring",
+    site="joint",
+    group="cubic_spring",
+    parameters=(
+        size(
+            "stiffness",
+            "cubic_spring.stiffness",
+            "{E}/{C}^3",
+            "effort_per_coordinate_cubed",
+            "restoring effort per cube of the way",
+        ),
+        shape(
+            "rest",
+            "cubic_spring.rest",
+            "{C}",
+            "coordinate",
+            "position without restoring effort",
+            start=0.0,
+            bounds=ANY,
+        ),
+    ),
+    law="tau = -stiffness (q - rest)^3",
+    sentence="{at} is pulled back towards {rest} with the cube of its way, with {stiffness}.",
+    impossible="either sign is possible: beside a spring a negative one makes it softer on its way",
+    confused_with={},
+    screened=False,
+)
+
+POSITION_DEPENDENT_FRICTION = EffectType(
+    name="position_dependent_friction",
+    site="joint",
+    group="friction",
+    parameters=(
+        shape(
+            "period",
+            "friction.position_period",
+            "{C}",
+            "coordinate",
+            "way after which the level repeats; it follows from the machine: a turn of a shaft, screw or gear",
+            start=None,
+        ),
+        size("cosine", "friction.position_cosine", "{E}", "effort", "part of the level that is greatest at zero"),
+        size("sine", "friction.position_sine", "{E}", "effort", "part of the level that vanishes at zero"),
+        _transition("friction.position_transition_velocity"),
+    ),
+    law="tau = -(cosine cos(2 pi q/period) + sine sin(2 pi q/period)) tanh(v/transition_velocity)",
+    sentence="{at} rubs differently along its way, by {cosine} (cosine) and {sine} (sine), every {period} alike.",
+    impossible="either sign is possible; the friction of each place as a whole has to stay above zero",
+    confused_with={},
+    requires="coulomb_friction",
+    screened=False,
+)
+
+LOAD_DEPENDENT_FRICTION = EffectType(
+    name="load_dependent_friction",
+    site="joint",
+    group="friction",
+    parameters=(
+        size(
+            "driving",
+            "friction.driving",
+            "1",
+            "one",
+            "share of the actuators' effort that is lost where they drive the joint",
+            physical=_SHARE,
+            linear=False,
+        ),
+        size(
+            "driven",
+            "friction.driven",
+            "1",
+            "one",
+            "share of their effort that brakes the joint besides where it drives them",
+            physical=_SHARE,
+            linear=False,
+        ),
+        _transition("friction.load_transition_velocity"),
+    ),
+    law=(
+        "tau = -|u| s (driving + driven + (driving - driven) s sign(u))/2, s = tanh(v/transition_velocity), u the"
+        " effort of the actuators on the joint, each share within 0.95"
+    ),
+    sentence=(
+        "{at} rubs in proportion to its load: it loses {driving} of the effort where the drive pushes, and {driven} of"
+        " it brakes where the joint pushes the drive."
+    ),
+    impossible="a negative share would give out more power than goes in",
+    confused_with={},
+    screened=False,
+    motor_side_alone=True,
+)
+
+LUGRE_FRICTION = EffectType(
+    name="lugre_friction",
+    site="joint",
+    group="lugre",
+    parameters=(
+        size(
+            "coulomb",
+            "lugre.coulomb",
+            "{E}",
+            "effort",
+            "resistance in fast motion, but for its viscous part",
+            physical=NOT_NEGATIVE,
+        ),
+        size(
+            "damping",
+            "lugre.damping",
+            "{E} s/{C}",
+            "effort_per_speed",
+            "resistance of the bristles to bending",
+            physical=NOT_NEGATIVE,
+        ),
+        shape(
+            "displacement",
+            "lugre.displacement",
+            "{C}",
+            "coordinate",
+            "way over which the bristles bend; their stiffness is coulomb/displacement",
+            start=_PRESLIDING,
+            learnt=True,
+        ),
+        shape(
+            "excess",
+            "lugre.excess",
+            "1",
+            "one",
+            "share by which the resistance in slow motion is larger",
+            start=0.0,
+            bounds=NOT_NEGATIVE,
+            learnt=True,
+        ),
+        shape(
+            "stribeck_velocity",
+            "lugre.stribeck_velocity",
+            "{C}/s",
+            "speed",
+            "speed at which this share has fallen to 37 %",
+            start=_STRIBECK,
+            learnt=True,
+        ),
+    ),
+    law=(
+        "tau = -coulomb z - damping displacement dz/dt, dz/dt = (v - |v| z/h)/displacement,"
+        " h = 1 + excess exp(-(v/stribeck_velocity)^2)"
+    ),
+    sentence=(
+        "{at} rubs as bristles do: they bend over ways of about {displacement}, damped with {damping}, and slide with"
+        " {coulomb} in fast motion."
+    ),
+    impossible="a negative friction of bristles would push along the motion and feed energy into it",
+    confused_with={},
+    screened=False,
+    memory="lugre.memory",
+)
+
+WARMING_FRICTION = EffectType(
+    name="warming_friction",
+    site="joint",
+    group="warming",
+    parameters=(
+        size(
+            "coulomb",
+            "warming.coulomb",
+            "{E}",
+            "effort",
+            "cold less warm resistance that does not depend on speed",
+            physical=NOT_NEGATIVE,
+        ),
+        size(
+            "viscous",
+            "warming.viscous",
+            "{E} s/{C}",
+            "effort_per_speed",
+            "cold less warm resistance per speed",
+            physical=NOT_NEGATIVE,
+        ),
+        shape(
+            "time_constant",
+            "warming.time_constant",
+            "s",
+            "time",
+            "time after which 63 % of these are gone",
+            start=None,
+            bounds=ABOVE_ZERO,
+        ),
+        _transition("warming.transition_velocity"),
+    ),
+    law=(
+        "tau = -(1 - w) (coulomb tanh(v/transition_velocity) + viscous v), dw/dt = (1 - w)/time_constant,"
+        " w = 0 at the first sample"
+    ),
+    sentence=(
+        "{at} rubs more while it is cold: at the beginning by {coulomb} at any speed and by {viscous} in proportion to"
+        " speed, which fade with a time constant of {time_constant}."
+    ),
+    impossible="a negative one would mean friction that grows as the machine gets warm",
+    confused_with={},
+    screened=False,
+    memory="warming.memory",
+)
+
+UNSCREENED_EFFECTS = (
+    QUADRATIC_DRAG,
+    CUBIC_SPRING,
+    POSITION_DEPENDENT_FRICTION,
+    LOAD_DEPENDENT_FRICTION,
+    LUGRE_FRICTION,
+    WARMING_FRICTION,
+)
