@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vpm.catalogue.kinds import Side
 from vpm.discrepancy.candidates import Candidate, Key, candidates
 from vpm.discrepancy.side_by_side import Failure, SideBySide
 from vpm.identify import InverseDynamicsProblem
+from vpm.identify.reuse import SPLITTING
+from vpm.model import Model
 from vpm.ranking.colour import Colour, plain
+from vpm.ranking.observed import SPLIT
 from vpm.ranking.settings import Settings
 from vpm.ranking.sizes import Sizes
 from vpm.ranking.starts import started
@@ -23,6 +27,7 @@ Array = NDArray[np.float64]
 
 #: Ways to look at what an observer leaves: as it is, and whitened.
 VIEWS = 2
+SIDES: tuple[Side, Side] = ("motor", "link")
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,19 +61,28 @@ class Proposal:
         return self.structure.effects[-1]
 
 
-def extended(structure: Structure, candidate: Candidate, start: Mapping[str, float], sizes: Sizes) -> Structure:
-    """A structure with one more effect.
+def extended(
+    structure: Structure, candidate: Candidate, start: Mapping[str, float], side: Side, sizes: Sizes
+) -> Structure:
+    """A structure with one more effect, on one side of what winds up or plays.
+
+    What splits a joint takes the friction and the like that was there to that side.
 
     Raises
     ------
     VpmError
         The effect cannot sit there with these values.
     """
-    model = structure.model.with_effect(candidate.effect.name, candidate.site, **start)
+    splits = candidate.effect.name in SPLITTING
+    if splits and side == "link":
+        structure = structure.behind(candidate.site)
+    model = structure.model.with_effect(
+        candidate.effect.name, candidate.site, side="motor" if splits else side, **start
+    )
     theta = model.theta.copy()
     for name, value in zip(structure.model.parameter_names, structure.theta, strict=True):
         theta[model.index(name)] = value
-    effect = next(e for e in model.effects if (e.name, e.at) == candidate.key)
+    effect = model.effect(*candidate.key, "motor" if splits else side)
     priors = dict(structure.priors)
     for short, name in effect.parameter_names.items():
         parameter = candidate.effect.parameter(short)
@@ -76,7 +90,16 @@ def extended(structure: Structure, candidate: Candidate, start: Mapping[str, flo
             continue
         if not parameter.shape or parameter.learnt or short in start:
             priors[name] = sizes.prior(candidate, parameter, model.parameters[name].value)
-    return Structure(model, theta, priors, (*structure.effects, candidate.key))
+    shown = (*structure.shown, *(effect.parameter_names[short] for short in start if short in candidate.bounds))
+    return Structure(model, theta, priors, (*structure.effects, candidate.key), shown)
+
+
+def sides_of(candidate: Candidate, model: Model) -> tuple[Side, ...]:
+    """Sides of a joint on which an effect may sit, or what it splits there may stay."""
+    site = candidate.site
+    if candidate.effect.name in SPLITTING:
+        return SIDES if any(effect.at == site and effect.type.has_sides for effect in model.effects) else SIDES[:1]
+    return SIDES if candidate.effect.has_sides and site + SPLIT in model.joints else SIDES[:1]
 
 
 def proposals(
@@ -90,25 +113,38 @@ def proposals(
     model = found.structure.model.with_parameters(found.structure.values)
     seen = candidates(model, data, data.evaluate(model, model.theta)[0])
     listed = [started(candidate, model, sizes) for candidate in seen]
-    references = [fitter.fitted(found.structure, band) for band in fitter.settings.bands]
-    items = [(candidate, start) for candidate in listed for start in candidate.starts]
+    references = observers(found, fitter)
+    items = [
+        (one, candidate, start, side)
+        for one in references
+        for candidate in listed
+        for start in candidate.starts
+        for side in sides_of(candidate, model)
+    ]
     screened = each(
         "screening",
-        lambda item: [list(_seen(one, *item, fitter, sizes)) for one in references],
+        lambda item: _seen(*item, fitter, sizes),
         items,
-        lambda item: item[0].label,
+        lambda item: f"{item[1].label}, {item[0].band:g} Hz",
     )
-    ranked = [views for views in screened if not isinstance(views, Failure)]
     chosen: list[Proposal] = []
-    for band in range(len(references)):
+    for one in references:
+        pairs = [pair for pair in screened if not isinstance(pair, Failure) and pair[0].band == one.band]
         for view in range(VIEWS):
-            chosen += _seated([views[band][view] for views in ranked], fitter.settings)
+            chosen += _seated([pair[view] for pair in pairs if pair[view].neutral], fitter.settings)
+        chosen += _begun([max(pair, key=_gain) for pair in pairs if not pair[0].neutral], fitter.settings)
     return chosen
 
 
+def observers(found: Fitted, fitter: Fitter) -> list[Fitted]:
+    """What was found, under the observers that search and at its own bandwidth, unless that is one of theirs."""
+    others = [band for band in fitter.settings.bands if not 0.5 < band / found.band < 2.0]
+    return [found, *(fitter.fitted(found.structure, band) for band in others)]
+
+
 def _seen(
-    reference: Fitted, candidate: Candidate, start: Mapping[str, float], fitter: Fitter, sizes: Sizes
-) -> Iterator[Proposal]:
+    reference: Fitted, candidate: Candidate, start: Mapping[str, float], side: Side, fitter: Fitter, sizes: Sizes
+) -> list[Proposal]:
     """One effect at start values under one observer, in each of the ways to look at what is left.
 
     Raises
@@ -117,25 +153,37 @@ def _seen(
         It cannot be there, or runs away from the records.
     """
     parts = fitter.observed.parts
-    structure = extended(reference.structure, candidate, start, sizes)
+    structure = extended(reference.structure, candidate, start, side, sizes)
     residual, jacobian = fitter.followed(structure, reference.band)
+    views = []
     for colour in (plain(reference.residual, parts), reference.colour):
         before = colour.whitened(reference.residual, parts)
         errors, slopes = colour.whitened(residual, parts), colour.whitened(jacobian, parts) * structure.slopes
         move = bounded_step(structure, errors, slopes, fitter.settings.reach)
         after = min(float(np.sum((errors + slopes @ move) ** 2)), float(errors @ errors))
         gain = 0.5 * len(before) * math.log(float(before @ before) / max(after, 1e-300))
-        yield Proposal(structure, reference.band, colour, gain, candidate.neutral, reference.evidence)
+        views.append(Proposal(structure, reference.band, colour, gain, candidate.neutral, reference.evidence))
+    return views
 
 
 def _seated(seen: list[Proposal], settings: Settings) -> list[Proposal]:
-    """The best starts of the best effects."""
-    taken: dict[Key, list[Proposal]] = defaultdict(list)
-    for proposal in sorted(seen, key=lambda one: -one.gain):
-        if proposal.gain < settings.tolerance:
+    """The best start of each of the best effects, of which a step of a fit says well what they are good for."""
+    taken: dict[Key, Proposal] = {}
+    for proposal in sorted(seen, key=_gain, reverse=True):
+        if proposal.gain < settings.least or len(taken) == settings.seats:
             break
-        if proposal.key not in taken and len(taken) == settings.seats:
-            continue
-        if len(taken[proposal.key]) < (1 if proposal.neutral else settings.starts):
+        taken.setdefault(proposal.key, proposal)
+    return list(taken.values())
+
+
+def _begun(seen: list[Proposal], settings: Settings) -> list[Proposal]:
+    """The best starts of each effect that is there at its start already: a step says little of where it ends."""
+    taken: dict[Key, list[Proposal]] = defaultdict(list)
+    for proposal in sorted(seen, key=_gain, reverse=True):
+        if len(taken[proposal.key]) < settings.starts:
             taken[proposal.key].append(proposal)
     return [proposal for several in taken.values() for proposal in several]
+
+
+def _gain(proposal: Proposal) -> float:
+    return proposal.gain

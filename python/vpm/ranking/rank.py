@@ -11,7 +11,7 @@ from threadpoolctl import threadpool_limits
 
 from vpm.discrepancy.candidates import Key, slow_speeds
 from vpm.discrepancy.side_by_side import Failure, Progress, SideBySide
-from vpm.errors import DiagnosisError
+from vpm.errors import DiagnosisError, VpmError
 from vpm.experiment import Experiment, as_records
 from vpm.identify import InverseDynamicsProblem
 from vpm.model import Model
@@ -180,7 +180,7 @@ class _Search:
 def _by_effect(trials: Sequence[Fitted | Failure]) -> list[list[Fitted]]:
     """The fits of each effect, the most probable first."""
     several: dict[Key, list[Fitted]] = {}
-    whole = [one for one in trials if isinstance(one, Fitted) and np.isfinite(one.evidence)]
+    whole = [one for one in trials if isinstance(one, Fitted) and one.structure.seen and np.isfinite(one.evidence)]
     for trial in sorted(whole, key=lambda one: -one.evidence):
         several.setdefault(trial.structure.effects[-1], []).append(trial)
     return list(several.values())

@@ -22,6 +22,8 @@ class Settings:
         Time at the beginning of each record that is left out, s: what an observer makes of the first state.
     seats : int
         Effects of a round that are fitted for each observer and each way to look at what it leaves.
+    least : float
+        What a step has to promise, nats, for an effect to be fitted.
     starts : int
         Start values that are fitted, of those that were screened, of an effect that is there at its start already.
     finalists : int
@@ -48,6 +50,7 @@ class Settings:
     order: int = 12
     settling: float = 0.5
     seats: int = 5
+    least: float = 4.0
     starts: int = 3
     finalists: int = 4
     optima: int = 2

@@ -59,7 +59,9 @@ class Sizes:
         sizes = {
             "effort": effort,
             "effort_per_speed": effort / speed,
+            "effort_per_speed_squared": effort / speed**2,
             "effort_per_coordinate": effort / way,
+            "effort_per_coordinate_cubed": effort / way**3,
             "coordinate": way,
             "channel": way,
             "speed": speed,

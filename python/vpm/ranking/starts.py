@@ -12,10 +12,14 @@ from vpm.ranking.sizes import Sizes
 
 #: Share of its force by which a stop is stronger against the fastest impact, to begin with.
 LOSS = 0.1
+#: How sharply a law bends: a detail that need not be seen.
+DETAILS = frozenset({"transition_velocity", "width"})
 
 
 def started(candidate: Candidate, model: Model, sizes: Sizes) -> Candidate:
     """A candidate whose contacts begin closed and stiff, where a fit can see them."""
+    ends = {name: pair for name, pair in candidate.bounds.items() if name not in DETAILS}
+    candidate = replace(candidate, bounds=ends)
     if candidate.effect.name == "backlash":
         return replace(candidate, starts=tuple(_play(start) for start in candidate.starts), fixed=())
     if candidate.effect.name == "end_stop":

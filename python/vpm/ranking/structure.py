@@ -37,12 +37,21 @@ class Structure:
         Parameters that are unknown.
     effects : tuple of (str, str)
         What was added to the model of the user, in order.
+    shown : tuple of str
+        Shapes that records show between two ends alone: at one of these the effect is another one, or none.
     """
 
     model: Model
     theta: Array
     priors: Mapping[str, Prior]
     effects: tuple[Key, ...] = ()
+    shown: tuple[str, ...] = ()
+
+    @property
+    def seen(self) -> bool:
+        """Whether each of its shapes lies inside of what the records can show."""
+        pairs = [(self.priors[name], float(self.theta[self.model.index(name)])) for name in self.shown]
+        return all(prior.low < value < prior.high for prior, value in pairs)
 
     @cached_property
     def columns(self) -> list[int]:
@@ -79,6 +88,21 @@ class Structure:
             theta[column] = prior.value(float(z))
         return replace(self, theta=theta)
 
+    def behind(self, joint: str) -> Structure:
+        """The same with what rubs, pulls or stops at a joint on its link side."""
+        content, renamed = self.model.to_dict(), {}
+        for entry, effect in zip(content["effects"], self.model.effects, strict=True):
+            if effect.at == joint and effect.type.has_sides:
+                entry["side"] = "link"
+        model = type(self.model)(content)
+        for old, new in zip(self.model.effects, model.effects, strict=True):
+            renamed.update({name: new.parameter_names[short] for short, name in old.parameter_names.items()})
+        theta = model.theta.copy()
+        for name, value in zip(self.model.parameter_names, self.theta, strict=True):
+            theta[model.index(renamed.get(name, name))] = value
+        priors = {renamed.get(name, name): prior for name, prior in self.priors.items()}
+        return Structure(model, theta, priors, self.effects, tuple(renamed.get(name, name) for name in self.shown))
+
     def without(self, key: Key) -> Structure:
         """The same without one of its effects.
 
@@ -87,10 +111,17 @@ class Structure:
         ModelError
             Another effect rests on it.
         """
-        model = self.model.without_effect(*key)
+        effect = next(effect for effect in reversed(self.model.effects) if (effect.name, effect.at) == key)
+        model = self.model.without_effect(*key, effect.side)
         theta = np.array([self.theta[self.model.index(name)] for name in model.parameter_names])
         priors = {name: prior for name, prior in self.priors.items() if name in model.parameters}
-        return Structure(model, theta, priors, tuple(effect for effect in self.effects if effect != key))
+        return Structure(
+            model,
+            theta,
+            priors,
+            tuple(effect for effect in self.effects if effect != key),
+            tuple(name for name in self.shown if name in priors),
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -226,7 +257,9 @@ class Fitter:
         VpmError
             The structure runs away from the records.
         """
-        residual, jacobian = self.observed.follow(structure.model, structure.theta, band, structure.columns if slopes else ())
+        residual, jacobian = self.observed.follow(
+            structure.model, structure.theta, band, structure.columns if slopes else ()
+        )
         if not (np.all(np.isfinite(residual)) and np.all(np.isfinite(jacobian))):
             raise VpmError(f"{structure.model.name} runs away from the records")
         return residual, jacobian
