@@ -8,12 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.stats import norm
+from scipy.stats import t as student
 
 import vpm
 from vpm.errors import DiagnosisError
 from vpm.experiment import Experiment
 from vpm.model import Model
-from vpm.ranking.colour import colour_of, log_likelihood, plain
+from vpm.ranking.colour import Colour, colour_of, log_student, plain, scale_of
 from vpm.ranking.observed import DAMPING, observer_gain
 
 Array = NDArray[np.float64]
@@ -86,11 +88,37 @@ def test_an_autoregression_is_found_again_and_its_density_is_the_exact_one() -> 
     colour = colour_of(values[:, None], parts, 2)
     assert colour.filters[0] == pytest.approx([1.0, -first, -second], abs=0.01)
     assert colour.deviations[0] == pytest.approx(size, rel=0.01)
-    told = log_likelihood(colour, values[:, None], parts)
+    told = colour.log_density(colour.whitened(values[:, None], parts))
     kept = np.concatenate([errors[part][2:] for part in parts])
     exact = np.sum(-0.5 * (kept / size) ** 2 - 0.5 * np.log(2.0 * np.pi * size**2))
     # The most likely values of three parameters are better than the true ones by 3/2 nats in the mean.
     assert 0.0 <= np.sum(told) - exact < 8.0
+
+
+def test_the_density_of_errors_is_students_of_scipy() -> None:
+    errors = np.linspace(-6.0, 6.0, 50)
+    for freedom in (3.0, 10.0):
+        assert log_student(errors, np.full(50, freedom)) == pytest.approx(student.logpdf(errors, freedom), abs=1e-12)
+    assert log_student(errors, np.full(50, np.inf)) == pytest.approx(norm.logpdf(errors), abs=1e-12)
+
+
+def test_errors_with_heavy_tails_are_known_as_such_and_outliers_weigh_little() -> None:
+    errors = 0.02 * np.random.default_rng(3).standard_t(4.0, 20_000)
+    colour = colour_of(errors[:, None], [slice(0, len(errors))], 2)
+    assert colour.tails == (4.0,)
+    assert colour.deviations[0] == pytest.approx(0.02, rel=0.03)
+    assert scale_of(errors, np.full(len(errors), 4.0)) == pytest.approx(0.02, rel=0.03)
+    heavy = Colour((np.ones(1),), (1.0,), (4.0,)).roots(np.array([0.1] * 20 + [20.0]))
+    assert heavy[-1] < 0.3 * heavy[0]
+
+
+def test_weights_give_the_slope_of_the_cost() -> None:
+    """About any errors, at their own scale: the slope of the density is that of weighted squares."""
+    errors = np.random.default_rng(4).standard_t(3.0, 400)
+    errors /= scale_of(errors, np.full(400, 6.0))
+    colour, move = Colour((np.ones(1),), (1.0,), (6.0,)), np.cos(np.arange(400.0))
+    slope = (colour.cost(errors + 1e-5 * move) - colour.cost(errors - 1e-5 * move)) / 2e-5
+    assert slope == pytest.approx(float((colour.roots(errors) ** 2 * errors) @ move), rel=1e-6)
 
 
 def test_channels_are_whitened_each_by_its_own_past() -> None:

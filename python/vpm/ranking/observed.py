@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,8 +22,29 @@ Array = NDArray[np.float64]
 DAMPING = float(np.sqrt(0.5))
 #: Name of the coordinate by which a joint that was split differs from its motor.
 SPLIT = "_deflection"
-#: Steps of the integrator within a sample where a joint is split: contacts and gears ring fast.
+#: Fewest steps of the integrator within a sample where a joint is split: contacts and gears ring fast.
 STEPS = 4
+
+
+@dataclass(frozen=True)
+class Observer:
+    """How a model is kept on its records.
+
+    Attributes
+    ----------
+    band : float
+        Bandwidth, Hz.
+    steps : int
+        Steps of the integrator within a sample: its errors are errors of the model too.
+    """
+
+    band: float
+    steps: int = 1
+
+    @property
+    def label(self) -> str:
+        """For people."""
+        return f"{self.band:g} Hz"
 
 
 class Observed:
@@ -53,12 +75,13 @@ class Observed:
             for end, r in zip(ends, self.records, strict=True)
         ]
 
-    def follow(self, model: Model, theta: Array, band: float, columns: Sequence[int] = ()) -> tuple[Array, Array]:
+    def follow(
+        self, model: Model, theta: Array, observer: Observer, columns: Sequence[int] = ()
+    ) -> tuple[Array, Array]:
         """Readings less outputs (N, m) of all records, one after the other, and derivatives (N, m, len(columns))."""
         residuals, slopes = [], []
-        steps = self.setup.substeps * (STEPS if any(name.endswith(SPLIT) for name in model.coordinates) else 1)
         for record, experiment in zip(self.records, self.experiments, strict=True):
-            outputs, slope = self._followed(model, theta, band, columns, steps, record, experiment)
+            outputs, slope = self._followed(model, theta, observer, columns, record, experiment)
             residuals.append(record.readings - outputs)
             slopes.append(-slope)
         return np.concatenate(residuals), np.concatenate(slopes)
@@ -67,14 +90,13 @@ class Observed:
         self,
         model: Model,
         theta: Array,
-        band: float,
+        observer: Observer,
         columns: Sequence[int],
-        steps: int,
         record: Record,
         experiment: Experiment,
     ) -> tuple[Array, Array]:
         places = [model.output_channels.index(name) for name in record.channels]
-        gain = observer_gain(model, record.channels, band, record.dt)
+        gain = observer_gain(model, record.channels, observer.band, record.dt)
         outputs, _, slopes = model.core.observe(
             theta,
             initial_state(model, experiment, theta),
@@ -83,7 +105,7 @@ class Observed:
             record.readings,
             np.tile(gain.ravel(), (len(record.time), 1)),
             record.dt,
-            steps,
+            self.setup.substeps * observer.steps,
             self.setup.method(model),
             list(columns),
             self.setup.hold,

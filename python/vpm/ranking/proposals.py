@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import defaultdict
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ from vpm.identify import InverseDynamicsProblem
 from vpm.identify.reuse import SPLITTING
 from vpm.model import Model
 from vpm.ranking.colour import Colour, plain
-from vpm.ranking.observed import SPLIT
+from vpm.ranking.observed import SPLIT, STEPS, Observer
 from vpm.ranking.settings import Settings
 from vpm.ranking.sizes import Sizes
 from vpm.ranking.starts import started
@@ -37,23 +37,22 @@ class Proposal:
     Attributes
     ----------
     structure : Structure
-    band : float
-        Hz.
+    observer : Observer
     colour : Colour
     gain : float
         What one step of a fit promises, nats.
     neutral : bool
         The effect does nothing where it begins.
-    base : float
-        Evidence without it under the same observer.
+    reference : Fitted
+        What there is without it, under the same bandwidth.
     """
 
     structure: Structure
-    band: float
+    observer: Observer
     colour: Colour
     gain: float
     neutral: bool
-    base: float
+    reference: Fitted
 
     @property
     def key(self) -> Key:
@@ -125,11 +124,11 @@ def proposals(
         "screening",
         lambda item: _seen(*item, fitter, sizes),
         items,
-        lambda item: f"{item[1].label}, {item[0].band:g} Hz",
+        lambda item: f"{item[1].label}, {item[0].observer.label}",
     )
     chosen: list[Proposal] = []
     for one in references:
-        pairs = [pair for pair in screened if not isinstance(pair, Failure) and pair[0].band == one.band]
+        pairs = [pair for pair in screened if not isinstance(pair, Failure) and pair[0].reference is one]
         for view in range(VIEWS):
             chosen += _seated([pair[view] for pair in pairs if pair[view].neutral], fitter.settings)
         chosen += _begun([max(pair, key=_gain) for pair in pairs if not pair[0].neutral], fitter.settings)
@@ -138,8 +137,9 @@ def proposals(
 
 def observers(found: Fitted, fitter: Fitter) -> list[Fitted]:
     """What was found, under the observers that search and at its own bandwidth, unless that is one of theirs."""
-    others = [band for band in fitter.settings.bands if not 0.5 < band / found.band < 2.0]
-    return [found, *(fitter.fitted(found.structure, band) for band in others)]
+    own = found.observer
+    others = [band for band in fitter.settings.bands if not 0.5 < band / own.band < 2.0]
+    return [found, *(fitter.fitted(found.structure, Observer(band, own.steps)) for band in others)]
 
 
 def _seen(
@@ -154,15 +154,21 @@ def _seen(
     """
     parts = fitter.observed.parts
     structure = extended(reference.structure, candidate, start, side, sizes)
-    residual, jacobian = fitter.followed(structure, reference.band)
+    observer = reference.observer
+    if len(structure.model.joints) > len(reference.structure.model.joints):
+        observer = replace(observer, steps=max(observer.steps, STEPS))
+    residual, jacobian = fitter.followed(structure, observer)
     views = []
     for colour in (plain(reference.residual, parts), reference.colour):
         before = colour.whitened(reference.residual, parts)
-        errors, slopes = colour.whitened(residual, parts), colour.whitened(jacobian, parts) * structure.slopes
+        roots = colour.roots(before)
+        before = before * roots
+        errors = colour.whitened(residual, parts) * roots
+        slopes = colour.whitened(jacobian, parts) * structure.slopes * roots[:, None]
         move = bounded_step(structure, errors, slopes, fitter.settings.reach)
         after = min(float(np.sum((errors + slopes @ move) ** 2)), float(errors @ errors))
         gain = 0.5 * len(before) * math.log(float(before @ before) / max(after, 1e-300))
-        views.append(Proposal(structure, reference.band, colour, gain, candidate.neutral, reference.evidence))
+        views.append(Proposal(structure, observer, colour, gain, candidate.neutral, reference))
     return views
 
 

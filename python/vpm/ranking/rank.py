@@ -15,7 +15,7 @@ from vpm.errors import DiagnosisError, VpmError
 from vpm.experiment import Experiment, as_records
 from vpm.identify import InverseDynamicsProblem
 from vpm.model import Model
-from vpm.ranking.observed import Observed
+from vpm.ranking.observed import Observed, Observer
 from vpm.ranking.proposals import Proposal, proposals
 from vpm.ranking.result import Ranked, Ranking
 from vpm.ranking.settings import Settings
@@ -105,7 +105,7 @@ class _Search:
     def run(self) -> Ranking:
         """See `rank`."""
         self.say("fitting what is uncertain")
-        found = self.fitter.settled(self.fitter.fitted(self.start, self.settings.bands[0]))
+        found = self.fitter.settled(self.fitter.fitted(self.start, Observer(self.settings.bands[0])))
         rounds: list[tuple[Ranked, ...]] = []
         effects: list[Ranked] = []
         while len(effects) < self.settings.effects:
@@ -123,7 +123,7 @@ class _Search:
             if needless:
                 self.say("no longer needed: " + ", ".join(" at ".join(key) for key in needless))
         model = found.structure.model.with_parameters(found.structure.values)
-        return Ranking(tuple(effects), tuple(rounds), model, found.band, found.log_likelihood)
+        return Ranking(tuple(effects), tuple(rounds), model, found.observer.band, found.log_likelihood)
 
     def _round(self, found: Fitted) -> tuple[Fitted, list[Fitted]]:
         """What had been found, and structures with one effect more, the most probable first; each effect once.
@@ -143,14 +143,20 @@ class _Search:
     def _tried(self, found: Fitted) -> list[Fitted]:
         chosen = proposals(found, self.fitter, self.data, self.sizes, self.each)
         trials = self.each("fitting", self._fitted, chosen, lambda one: " at ".join(one.key))
-        bases = {id(trial): one.base for one, trial in zip(chosen, trials, strict=True)}
-        several = [[one for one in fits if one.evidence > bases[id(one)]] for fits in _by_effect(trials)]
+        hopeful = {
+            id(trial)
+            for trial, one in zip(trials, chosen, strict=True)
+            if isinstance(trial, Fitted)
+            and trial.evidence + 2.0 * self.fitter.promise(trial) > one.reference.evidence + self.settings.tolerance
+        }
+        several = [[one for one in fits if id(one) in hopeful] for fits in _by_effect(trials)]
         last = [one for fits in several[: self.settings.finalists] for one in fits[: self.settings.optima]]
         ends = self.each("settling", self.fitter.settled, last, lambda one: " at ".join(one.structure.effects[-1]))
         return [fits[0] for fits in _by_effect([*ends, *trials])]
 
     def _fitted(self, proposal: Proposal) -> Fitted:
-        return self.fitter.fitted(proposal.structure, proposal.band, proposal.colour)
+        steps = None if proposal.neutral else self.settings.glance
+        return self.fitter.fitted(proposal.structure, proposal.observer, proposal.colour, steps)
 
     def _without_needless(self, found: Fitted) -> tuple[Fitted, list[Key]]:
         """Without those of the earlier effects that a later one has made needless."""
@@ -166,7 +172,7 @@ class _Search:
         """The same without an effect; None where that runs away or another one rests on it."""
         try:
             structure = found.structure.without(key)
-            return self.fitter.settled(self.fitter.fitted(structure, found.band, found.colour))
+            return self.fitter.settled(self.fitter.fitted(structure, found.observer, found.colour))
         except (VpmError, ArithmeticError):
             return None
 

@@ -16,6 +16,8 @@ class Settings:
         keeps a load behind a play in step.
     widest, narrowest : float
         Bandwidths among which a structure finds its own, Hz.
+    finest : int
+        Most steps of the integrator within a sample among which a structure finds its own.
     order : int
         Length of the autoregression that whitens what an observer leaves of a channel, samples.
     settling : float
@@ -32,6 +34,8 @@ class Settings:
         Fits of each of these that are pursued: contacts have several optima.
     iterations : int
         Steps of a fit.
+    glance : int
+        Steps of a fit after which an effect that is there at its start already is judged for the first time.
     tolerance : float
         Gain of a step, nats, below which a fit ends.
     reach : float
@@ -47,6 +51,7 @@ class Settings:
     bands: tuple[float, ...] = (1.0, 10.0)
     widest: float = 160.0
     narrowest: float = 0.25
+    finest: int = 8
     order: int = 12
     settling: float = 0.5
     seats: int = 5
@@ -55,6 +60,7 @@ class Settings:
     finalists: int = 4
     optima: int = 2
     iterations: int = 8
+    glance: int = 3
     tolerance: float = 0.5
     reach: float = 6.0
     odds: float = 8.0

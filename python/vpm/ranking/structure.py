@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -14,8 +13,8 @@ from scipy.optimize import lsq_linear
 from vpm.discrepancy.candidates import Key
 from vpm.errors import VpmError
 from vpm.model import Model
-from vpm.ranking.colour import Colour, colour_of, log_likelihood, plain
-from vpm.ranking.observed import Observed
+from vpm.ranking.colour import Colour, colour_of, plain
+from vpm.ranking.observed import Observed, Observer
 from vpm.ranking.settings import Settings
 from vpm.weighing.priors import Prior
 
@@ -126,13 +125,12 @@ class Structure:
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
-    """A structure under an observer of some bandwidth.
+    """A structure under an observer.
 
     Attributes
     ----------
     structure : Structure
-    band : float
-        Hz.
+    observer : Observer
     residual : ndarray, shape (N, m)
     jacobian : ndarray, shape (N, m, k)
         By unknown parameters.
@@ -144,7 +142,7 @@ class Fitted:
     """
 
     structure: Structure
-    band: float
+    observer: Observer
     residual: Array
     jacobian: Array
     samples: Array
@@ -163,7 +161,7 @@ class Fitter:
     def __init__(self, observed: Observed, settings: Settings) -> None:
         self.observed, self.settings = observed, settings
 
-    def weighed(self, structure: Structure, band: float) -> Fitted:
+    def weighed(self, structure: Structure, observer: Observer) -> Fitted:
         """The structure as it stands.
 
         Raises
@@ -171,9 +169,11 @@ class Fitter:
         VpmError
             It runs away from the records.
         """
-        return self._weighed(structure, band, *self.followed(structure, band))
+        return self._weighed(structure, observer, *self.followed(structure, observer))
 
-    def fitted(self, structure: Structure, band: float, colour: Colour | None = None) -> Fitted:
+    def fitted(
+        self, structure: Structure, observer: Observer, colour: Colour | None = None, iterations: int | None = None
+    ) -> Fitted:
         """Most probable values, by bounded Gauss-Newton steps; under a given colour, or else as the channels are.
 
         Raises
@@ -182,64 +182,61 @@ class Fitter:
             The structure runs away from the records where it begins.
         """
         structure = structure.at(structure.standard)
-        residual, jacobian = self.followed(structure, band)
+        residual, jacobian = self.followed(structure, observer)
         colour = colour or plain(residual, self.observed.parts)
-        for _ in range(self.settings.iterations if structure.priors else 0):
+        for _ in range((iterations or self.settings.iterations) if structure.priors else 0):
             errors, slopes = self._white(structure, residual, jacobian, colour)
             move = bounded_step(structure, errors, slopes, self.settings.reach)
             before = self._cost(structure, residual, colour)
-            if before - _cost(structure.standard + move, errors + slopes @ move) < self.settings.tolerance:
+            if _promised(structure, errors, slopes, move) < self.settings.tolerance:
                 break
-            better = self._better(structure, band, colour, move, before)
+            better = self._better(structure, observer, colour, move, before)
             if better is None:
                 break
             structure, after = better
-            residual, jacobian = self.followed(structure, band)
+            residual, jacobian = self.followed(structure, observer)
             if before - after < self.settings.tolerance:
                 break
-        return self._weighed(structure, band, residual, jacobian)
+        return self._weighed(structure, observer, residual, jacobian)
 
     def settled(self, found: Fitted) -> Fitted:
-        """At its own colour and its own bandwidth, the effects being fitted anew at each."""
-        found = self._improved(found, found.band)
-        for factor in (2.0, 0.5):
-            while self.settings.narrowest <= found.band * factor <= self.settings.widest:
-                other = self._improved(found, found.band * factor)
-                if other.band == found.band:
+        """At its own colour, bandwidth and number of steps, the effects being fitted anew at each."""
+        found = self._improved(found, found.observer)
+        for change in (_finer, _wider, _narrower):
+            while (observer := change(found.observer, self.settings)) is not None:
+                other = self._improved(found, observer)
+                if other is found:
                     break
                 found = other
         return found
 
-    def _improved(self, found: Fitted, band: float) -> Fitted:
-        """Fitted at another bandwidth, under the colour there, if that is better."""
+    def _improved(self, found: Fitted, observer: Observer) -> Fitted:
+        """Fitted under another observer, under the colour there, if that is better."""
         try:
-            other = self.weighed(found.structure, band)
-            while other.evidence + 2.0 * self._promise(other) > found.evidence:
-                better = self.fitted(other.structure, band, other.colour)
+            other = self.weighed(found.structure, observer)
+            while other.evidence + 2.0 * self.promise(other) > found.evidence:
+                better = self.fitted(other.structure, observer, other.colour)
                 if not better.evidence > other.evidence + self.settings.tolerance:
                     break
                 other = better
         except (VpmError, ArithmeticError):
             return found
-        return max(found, other, key=_evidence)
+        return other if other.evidence > found.evidence + self.settings.tolerance else found
 
-    def _promise(self, found: Fitted) -> float:
+    def promise(self, found: Fitted) -> float:
         """What a bounded Gauss-Newton step would gain if all were linear, nats."""
-        structure = found.structure
-        errors, slopes = self._white(structure, found.residual, found.jacobian, found.colour)
-        move = bounded_step(structure, errors, slopes, self.settings.reach)
-        after = structure.standard + move
-        before = float(errors @ errors) + float(structure.standard @ structure.standard)
-        return 0.5 * (before - float(np.sum((errors + slopes @ move) ** 2)) - float(after @ after))
+        errors, slopes = self._white(found.structure, found.residual, found.jacobian, found.colour)
+        move = bounded_step(found.structure, errors, slopes, self.settings.reach)
+        return _promised(found.structure, errors, slopes, move)
 
     def _better(
-        self, structure: Structure, band: float, colour: Colour, move: Array, before: float
+        self, structure: Structure, observer: Observer, colour: Colour, move: Array, before: float
     ) -> tuple[Structure, float] | None:
         """The first of the shares of a step that is better, and its cost; it is looked for without derivatives."""
         for share in SHARES:
             tried = structure.at(structure.standard + share * move)
             try:
-                residual, _ = self.followed(tried, band, slopes=False)
+                residual, _ = self.followed(tried, observer, slopes=False)
             except (VpmError, ArithmeticError):
                 continue
             after = self._cost(tried, residual, colour)
@@ -247,7 +244,7 @@ class Fitter:
                 return tried, after
         return None
 
-    def followed(self, structure: Structure, band: float, *, slopes: bool = True) -> tuple[Array, Array]:
+    def followed(self, structure: Structure, observer: Observer, *, slopes: bool = True) -> tuple[Array, Array]:
         """What the observer leaves of the records (N, m), and its derivatives by unknown parameters (N, m, k).
 
         Without ``slopes`` there are none of these (N, m, 0).
@@ -258,29 +255,35 @@ class Fitter:
             The structure runs away from the records.
         """
         residual, jacobian = self.observed.follow(
-            structure.model, structure.theta, band, structure.columns if slopes else ()
+            structure.model, structure.theta, observer, structure.columns if slopes else ()
         )
         if not (np.all(np.isfinite(residual)) and np.all(np.isfinite(jacobian))):
             raise VpmError(f"{structure.model.name} runs away from the records")
         return residual, jacobian
 
     def _white(self, structure: Structure, residual: Array, jacobian: Array, colour: Colour) -> tuple[Array, Array]:
-        """Prediction errors, and their change by deviations of the priors."""
+        """Prediction errors in roots of their weights, and their change by deviations of the priors."""
         parts = self.observed.parts
-        return colour.whitened(residual, parts), colour.whitened(jacobian, parts) * structure.slopes
+        errors = colour.whitened(residual, parts)
+        roots = colour.roots(errors)
+        return errors * roots, colour.whitened(jacobian, parts) * structure.slopes * roots[:, None]
 
     def _cost(self, structure: Structure, residual: Array, colour: Colour) -> float:
-        return _cost(structure.standard, colour.whitened(residual, self.observed.parts))
+        """Negative logarithm of the posterior density but for a constant."""
+        errors = colour.whitened(residual, self.observed.parts)
+        return colour.cost(errors) + 0.5 * float(structure.standard @ structure.standard)
 
-    def _weighed(self, structure: Structure, band: float, residual: Array, jacobian: Array) -> Fitted:
+    def _weighed(self, structure: Structure, observer: Observer, residual: Array, jacobian: Array) -> Fitted:
         parts = self.observed.parts
         colour = colour_of(residual, parts, self.settings.order)
-        samples = log_likelihood(colour, residual, parts)
-        _, slopes = self._white(structure, residual, jacobian, colour)
+        errors = colour.whitened(residual, parts)
+        samples = colour.log_density(errors)
+        informed = np.repeat(np.sqrt(colour.information()), len(errors) // residual.shape[1])
+        slopes = colour.whitened(jacobian, parts) * structure.slopes * informed[:, None]
         z = structure.standard
         curvature = np.eye(len(z)) + slopes.T @ slopes
         evidence = float(np.sum(samples)) - 0.5 * float(z @ z) - 0.5 * float(np.linalg.slogdet(curvature)[1])
-        return Fitted(structure, band, residual, jacobian, samples, evidence, colour)
+        return Fitted(structure, observer, residual, jacobian, samples, evidence, colour)
 
 
 def bounded_step(structure: Structure, errors: Array, slopes: Array, reach: float) -> Array:
@@ -296,10 +299,21 @@ def bounded_step(structure: Structure, errors: Array, slopes: Array, reach: floa
     return np.asarray(lsq_linear(root, target, (low, high), method="bvls").x * sizes)
 
 
-def _cost(standard: Array, errors: Array) -> float:
-    """Negative logarithm of the posterior density, the scale of the errors being the most likely one."""
-    return 0.5 * len(errors) * math.log(max(float(np.mean(errors**2)), 1e-300)) + 0.5 * float(standard @ standard)
+def _promised(structure: Structure, errors: Array, slopes: Array, move: Array) -> float:
+    """What a step gains if all is linear, nats, the scale of the errors being the most likely one before it."""
+    z, scale = structure.standard, max(float(np.mean(errors**2)), 1e-300)
+    after = float(np.sum((errors + slopes @ move) ** 2))
+    gain = (float(errors @ errors) - after) / scale
+    return 0.5 * (gain + float(z @ z) - float((z + move) @ (z + move)))
 
 
-def _evidence(found: Fitted) -> float:
-    return found.evidence
+def _finer(observer: Observer, settings: Settings) -> Observer | None:
+    return Observer(observer.band, 2 * observer.steps) if 2 * observer.steps <= settings.finest else None
+
+
+def _wider(observer: Observer, settings: Settings) -> Observer | None:
+    return Observer(2.0 * observer.band, observer.steps) if 2.0 * observer.band <= settings.widest else None
+
+
+def _narrower(observer: Observer, settings: Settings) -> Observer | None:
+    return Observer(0.5 * observer.band, observer.steps) if 0.5 * observer.band >= settings.narrowest else None
