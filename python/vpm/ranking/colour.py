@@ -63,7 +63,7 @@ class Colour:
     def log_density(self, errors: Array) -> Array:
         """Logarithm of the density of each sample (n,), the errors being in their scales."""
         sizes = np.repeat(np.log(self.deviations), len(errors) // len(self.deviations))
-        return log_student(errors, self.freedom(errors)) - sizes
+        return np.asarray(log_student(errors, self.freedom(errors)) - sizes)
 
     def cost(self, errors: Array) -> float:
         """Negative logarithm of the density but for a constant, the common scale being the most likely one."""

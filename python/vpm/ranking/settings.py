@@ -58,9 +58,9 @@ class Settings:
     least: float = 4.0
     starts: int = 3
     finalists: int = 4
-    optima: int = 2
+    optima: int = 3
     iterations: int = 8
-    glance: int = 3
+    glance: int = 6
     tolerance: float = 0.5
     reach: float = 6.0
     odds: float = 8.0
