@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -69,6 +70,7 @@ class Observed:
         self.experiments = tuple(experiments)
         self.records = tuple(Record.of(model, record) for record in self.experiments)
         self.channels = self.records[0].channels
+        self._starts: WeakKeyDictionary[Model, list[Array]] = WeakKeyDictionary()
         ends = np.cumsum([len(record.time) for record in self.records])
         self.parts: Parts = [
             slice(int(end) - len(r.time) + int(settings.settling / r.dt), int(end))
@@ -80,11 +82,17 @@ class Observed:
     ) -> tuple[Array, Array]:
         """Readings less outputs (N, m) of all records, one after the other, and derivatives (N, m, len(columns))."""
         residuals, slopes = [], []
-        for record, experiment in zip(self.records, self.experiments, strict=True):
-            outputs, slope = self._followed(model, theta, observer, columns, record, experiment)
+        for record, start in zip(self.records, self._begun(model), strict=True):
+            outputs, slope = self._followed(model, theta, observer, columns, record, start)
             residuals.append(record.readings - outputs)
             slopes.append(-slope)
         return np.concatenate(residuals), np.concatenate(slopes)
+
+    def _begun(self, model: Model) -> list[Array]:
+        """First states, by a model's own values: an observer soon forgets them."""
+        if model not in self._starts:
+            self._starts[model] = [initial_state(model, experiment, model.theta) for experiment in self.experiments]
+        return self._starts[model]
 
     def _followed(
         self,
@@ -93,13 +101,13 @@ class Observed:
         observer: Observer,
         columns: Sequence[int],
         record: Record,
-        experiment: Experiment,
+        start: Array,
     ) -> tuple[Array, Array]:
         places = [model.output_channels.index(name) for name in record.channels]
         gain = observer_gain(model, record.channels, observer.band, record.dt)
         outputs, _, slopes = model.core.observe(
             theta,
-            initial_state(model, experiment, theta),
+            start,
             record.inputs,
             places,
             record.readings,

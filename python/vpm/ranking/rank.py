@@ -145,9 +145,8 @@ class _Search:
         trials = self.each("fitting", self._fitted, chosen, lambda one: " at ".join(one.key))
         hopeful = {
             id(trial)
-            for trial, one in zip(trials, chosen, strict=True)
-            if isinstance(trial, Fitted)
-            and trial.evidence + 2.0 * self.fitter.promise(trial) > one.reference.evidence + self.settings.tolerance
+            for trial in trials
+            if isinstance(trial, Fitted) and trial.evidence + 2.0 * self.fitter.promise(trial) > found.evidence
         }
         several = [[one for one in fits if id(one) in hopeful] for fits in _by_effect(trials)]
         last = [one for fits in several[: self.settings.finalists] for one in fits[: self.settings.optima]]
