@@ -9,6 +9,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import NDArray
 
+from vpm.errors import VpmError
 from vpm.experiment import Experiment
 from vpm.initial import initial_state
 from vpm.model import Model
@@ -89,9 +90,19 @@ class Observed:
         return np.concatenate(residuals), np.concatenate(slopes)
 
     def _begun(self, model: Model) -> list[Array]:
-        """First states, by a model's own values: an observer soon forgets them."""
+        """First states, by a model's own values: an observer soon forgets them.
+
+        Raises
+        ------
+        VpmError
+            What moves unseen cannot be held in balance in this model.
+        """
         if model not in self._starts:
-            self._starts[model] = [initial_state(model, experiment, model.theta) for experiment in self.experiments]
+            try:
+                starts = [initial_state(model, experiment, model.theta) for experiment in self.experiments]
+            except ValueError as error:
+                raise VpmError(str(error)) from error
+            self._starts[model] = starts
         return self._starts[model]
 
     def _followed(

@@ -117,6 +117,7 @@ def proposals(
         (one, candidate, start, side)
         for one in references
         for candidate in listed
+        if candidate.neutral or one is not found or len(references) <= len(fitter.settings.bands)
         for start in candidate.starts
         for side in sides_of(candidate, model)
     ]

@@ -154,8 +154,9 @@ class _Search:
         return [fits[0] for fits in _by_effect([*ends, *trials])]
 
     def _fitted(self, proposal: Proposal) -> Fitted:
-        steps = None if proposal.neutral else self.settings.glance
-        return self.fitter.fitted(proposal.structure, proposal.observer, proposal.colour, steps)
+        without = proposal.reference
+        goal = self.fitter.cost(without.structure, without.residual, proposal.colour)
+        return self.fitter.fitted(proposal.structure, proposal.observer, proposal.colour, goal)
 
     def _without_needless(self, found: Fitted) -> tuple[Fitted, list[Key]]:
         """Without those of the earlier effects that a later one has made needless."""

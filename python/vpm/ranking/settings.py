@@ -34,8 +34,8 @@ class Settings:
         Fits of each of these that are pursued: contacts have several optima.
     iterations : int
         Steps of a fit.
-    glance : int
-        Steps of a fit after which an effect that is there at its start already is judged for the first time.
+    patience : float
+        By how much more than a step promises a fit may still gain before it is given up.
     tolerance : float
         Gain of a step, nats, below which a fit ends.
     reach : float
@@ -60,7 +60,7 @@ class Settings:
     finalists: int = 4
     optima: int = 3
     iterations: int = 8
-    glance: int = 6
+    patience: float = 3.0
     tolerance: float = 0.5
     reach: float = 6.0
     odds: float = 8.0

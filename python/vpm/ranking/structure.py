@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -172,9 +173,11 @@ class Fitter:
         return self._weighed(structure, observer, *self.followed(structure, observer))
 
     def fitted(
-        self, structure: Structure, observer: Observer, colour: Colour | None = None, iterations: int | None = None
+        self, structure: Structure, observer: Observer, colour: Colour | None = None, goal: float = math.inf
     ) -> Fitted:
         """Most probable values, by bounded Gauss-Newton steps; under a given colour, or else as the channels are.
+
+        It gives up where several times what a step promises would not bring the `cost` below a goal.
 
         Raises
         ------
@@ -184,11 +187,12 @@ class Fitter:
         structure = structure.at(structure.standard)
         residual, jacobian = self.followed(structure, observer)
         colour = colour or plain(residual, self.observed.parts)
-        for _ in range((iterations or self.settings.iterations) if structure.priors else 0):
+        for _ in range(self.settings.iterations if structure.priors else 0):
             errors, slopes = self._white(structure, residual, jacobian, colour)
             move = bounded_step(structure, errors, slopes, self.settings.reach)
-            before = self._cost(structure, residual, colour)
-            if _promised(structure, errors, slopes, move) < self.settings.tolerance:
+            before = self.cost(structure, residual, colour)
+            gain = _promised(structure, errors, slopes, move)
+            if gain < self.settings.tolerance or before - self.settings.patience * gain > goal:
                 break
             better = self._better(structure, observer, colour, move, before)
             if better is None:
@@ -239,7 +243,7 @@ class Fitter:
                 residual, _ = self.followed(tried, observer, slopes=False)
             except (VpmError, ArithmeticError):
                 continue
-            after = self._cost(tried, residual, colour)
+            after = self.cost(tried, residual, colour)
             if after < before:
                 return tried, after
         return None
@@ -268,7 +272,7 @@ class Fitter:
         roots = colour.roots(errors)
         return errors * roots, colour.whitened(jacobian, parts) * structure.slopes * roots[:, None]
 
-    def _cost(self, structure: Structure, residual: Array, colour: Colour) -> float:
+    def cost(self, structure: Structure, residual: Array, colour: Colour) -> float:
         """Negative logarithm of the posterior density but for a constant."""
         errors = colour.whitened(residual, self.observed.parts)
         return colour.cost(errors) + 0.5 * float(structure.standard @ structure.standard)
