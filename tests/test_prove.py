@@ -131,6 +131,7 @@ def test_a_payload_behind_a_turning_axis_is_its_centre_and_inertia(seed: int) ->
     assert proving.absorbed("axis_rotary", "payload", "body")
 
 
+@pytest.mark.nightly
 def test_where_a_machine_begins_says_nothing_of_its_encoder() -> None:
     """On a level slide only the volumes of oil depend on the place; in gravity an offset shows wherever one begins."""
     slide = shared_case("servo_cylinder", "sensor_offset@encoder", 42)
@@ -254,6 +255,7 @@ def test_cases_are_dealt_out_over_seeds() -> None:
             proving.jobs(**wrong)
 
 
+@pytest.mark.nightly
 def test_a_pair_knows_how_strong_each_effect_is_alone_and_beside_the_other() -> None:
     job = Job("axis_linear", "pairs", ("bias_force", "spring"), 2, 1.0)
     ((_, case, strengths, alone, _, error),) = proving.make([job])
