@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 import vpm
 from model_texts import DAMPED_AXIS
 from vpm.discrepancy import ProposedExperiment
+from vpm.discrepancy.telling_apart import _imitation
 
 Array = NDArray[np.float64]
 
@@ -129,3 +131,15 @@ def test_a_file_keeps_the_experiments(why: vpm.Diagnosis, tmp_path: Path) -> Non
     told = why.to_dict()["experiments"]
     assert isinstance(told, list)
     assert len(told) == len(why.experiments)
+
+
+def test_what_the_records_do_not_see_is_the_limit_of_what_they_see_badly() -> None:
+    random = np.random.default_rng(5)
+    slopes, change = random.standard_normal((60, 3)), random.standard_normal(60)
+
+    def imitated(variance: float) -> Array:
+        covariance = np.array([[0.02, 0.005, 0.0], [0.005, 0.01, 0.0], [0.0, 0.0, variance]])
+        return _imitation(change, slopes, SimpleNamespace(fit=SimpleNamespace(covariance=covariance)), 0.5)  # type: ignore[arg-type]
+
+    assert imitated(np.inf) == pytest.approx(imitated(1e10), rel=1e-6)
+    assert imitated(np.inf)[2] != pytest.approx(imitated(1e-4)[2], rel=0.1)

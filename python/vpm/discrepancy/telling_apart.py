@@ -121,10 +121,17 @@ def _difference(first: Judged, second: Judged, motion: Motion, seen: Seen) -> tu
 
 
 def _imitation(change: Array, slopes: Array, second: Judged, spread: float) -> Array:
-    """Change of the parameters that brings the second model nearest to the first, held back by the records."""
-    std = np.maximum(np.sqrt(np.clip(np.diag(second.fit.covariance), 0.0, None)), 1e-12)
+    """Change of the parameters that brings the second model nearest to the first, held back by the records.
+
+    Nothing holds back what the records do not see: its variance is infinite.
+    """
+    seen = np.isfinite(np.diag(second.fit.covariance))
+    among = np.ix_(seen, seen)
+    std = np.ones(len(seen))
+    std[seen] = np.maximum(np.sqrt(np.clip(np.diag(second.fit.covariance)[seen], 0.0, None)), 1e-12)
     scaled = slopes * std / spread
-    inverse = np.linalg.pinv(second.fit.covariance / np.outer(std, std), hermitian=True)
+    inverse = np.zeros((len(seen), len(seen)))
+    inverse[among] = np.linalg.pinv((second.fit.covariance / np.outer(std, std))[among], hermitian=True)
     normal = scaled.T @ scaled + inverse
     return np.asarray(std * np.linalg.lstsq(normal, scaled.T @ (change / spread), rcond=1e-12)[0])
 
