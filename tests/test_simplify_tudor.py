@@ -77,8 +77,9 @@ def test_the_coarsest_come_first_and_what_is_dear_is_not_fitted(ladder: Ladder, 
     stepped = {
         rung.integrator for rung in ladder.rungs if rung.removed == ("strip_1 as bezier(3)", "strip_2 as bezier(3)")
     }
-    assert "linearly_implicit" in stepped
-    assert "rosenbrock" not in stepped
+    # Which of the two quick ones is tried first is a matter of measured times.
+    assert stepped
+    assert stepped <= {"linearly_implicit", "semi_implicit"}
     assert not any("elements" in change for rung in ladder.rungs for change in rung.removed)
 
 
