@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections import defaultdict
 from collections.abc import Mapping
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 from vpm.catalogue.kinds import Side
 from vpm.discrepancy.candidates import Candidate, Key, candidates
 from vpm.discrepancy.side_by_side import Failure, SideBySide
+from vpm.errors import VpmError
 from vpm.identify import InverseDynamicsProblem
 from vpm.identify.reuse import SPLITTING
 from vpm.model import Model
@@ -140,7 +142,11 @@ def observers(found: Fitted, fitter: Fitter) -> list[Fitted]:
     """What was found, under the observers that search and at its own bandwidth, unless that is one of theirs."""
     own = found.observer
     others = [band for band in fitter.settings.bands if not 0.5 < band / own.band < 2.0]
-    return [found, *(fitter.fitted(found.structure, Observer(band, own.steps)) for band in others)]
+    references = [found]
+    for band in others:
+        with contextlib.suppress(VpmError):  # a slow observer may lose what hangs behind a contact
+            references.append(fitter.fitted(found.structure, Observer(band, own.steps)))
+    return references
 
 
 def _seen(

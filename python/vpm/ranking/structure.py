@@ -22,6 +22,8 @@ from vpm.weighing.priors import Prior
 Array = NDArray[np.float64]
 #: Shares of a step that are tried, the largest first.
 SHARES = (1.0, 0.3, 0.08)
+#: Residuals and derivatives that no record has; their squares are still numbers.
+RUNAWAY = 1e100
 
 
 @dataclass(frozen=True, eq=False)
@@ -261,7 +263,7 @@ class Fitter:
         residual, jacobian = self.observed.follow(
             structure.model, structure.theta, observer, structure.columns if slopes else ()
         )
-        if not (np.all(np.isfinite(residual)) and np.all(np.isfinite(jacobian))):
+        if not all(np.max(np.abs(numbers), initial=0.0) < RUNAWAY for numbers in (residual, jacobian)):
             raise VpmError(f"{structure.model.name} runs away from the records")
         return residual, jacobian
 
