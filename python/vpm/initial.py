@@ -132,7 +132,7 @@ def _forgetful(model: Model, joints: tuple[str, ...]) -> tuple[Model, NDArray[np
     """
     bare = model
     for effect in model.effects:
-        behind = effect.side == "link" and f"{effect.at}_deflection" in model.joints
+        behind = effect.side == "link" and model.joint_behind(effect.at) is not None
         if effect.type.memory and effect.at in joints and not behind:
             bare = bare.without_effect(*effect.key)
     return bare, np.array([model.index(name) for name in bare.parameter_names], dtype=np.int64)

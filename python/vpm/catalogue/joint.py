@@ -12,21 +12,22 @@ from vpm.catalogue.drivetrain import DRIVETRAIN_EFFECTS
 from vpm.catalogue.kinds import ANY, NOT_NEGATIVE, EffectParameter, EffectType, shape, size
 
 #: Transition velocity where none is given: prismatic (m/s), revolute (rad/s).
-_TRANSITION = (1e-3, 1e-2)
+TRANSITION = (1e-3, 1e-2)
 #: Stribeck velocity where none is given: prismatic (m/s), revolute (rad/s).
-_STRIBECK = (1e-2, 1e-1)
+STRIBECK = (1e-2, 1e-1)
 #: Pre-sliding way where none is given: prismatic (m), revolute (rad).
 _PRESLIDING = (1e-3, 1e-2)
 
 
-def _transition(suffix: str) -> EffectParameter:
+def transition(suffix: str) -> EffectParameter:
+    """Speed at which a friction law bends."""
     return shape(
         "transition_velocity",
-        f"friction.{suffix}",
+        suffix,
         "{C}/s",
         "speed",
         "speed below which the law bends from one sign to the other",
-        start=_TRANSITION,
+        start=TRANSITION,
         learnt=True,
     )
 
@@ -72,7 +73,7 @@ COULOMB_FRICTION = EffectType(
             "resistance that does not depend on speed",
             physical=NOT_NEGATIVE,
         ),
-        _transition("transition_velocity"),
+        transition("friction.transition_velocity"),
     ),
     law="tau = -coulomb tanh(v/transition_velocity)",
     sentence="{at} resists motion with {coulomb} at any speed, against the direction of motion.",
@@ -105,7 +106,7 @@ ASYMMETRIC_FRICTION = EffectType(
             "effort_per_speed",
             "viscous friction in positive minus in negative direction",
         ),
-        _transition("asymmetric_transition_velocity"),
+        transition("friction.asymmetric_transition_velocity"),
     ),
     law=(
         "tau = -1/2 coulomb_difference tanh(v/transition_velocity)^2"
@@ -143,10 +144,10 @@ STRIBECK_FRICTION = EffectType(
             "{C}/s",
             "speed",
             "speed at which the excess has fallen to 37 %",
-            start=_STRIBECK,
+            start=STRIBECK,
             learnt=True,
         ),
-        _transition("stribeck_transition_velocity"),
+        transition("friction.stribeck_transition_velocity"),
     ),
     law="tau = -stribeck tanh(v/transition_velocity) exp(-(v/stribeck_velocity)^2)",
     sentence=(

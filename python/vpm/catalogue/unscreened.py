@@ -6,19 +6,13 @@ the way of bristles. The sources stand at the laws in the core.
 
 from __future__ import annotations
 
-from vpm.catalogue.kinds import ABOVE_ZERO, ANY, NOT_NEGATIVE, EffectParameter, EffectType, shape, size
+from vpm.catalogue.joint import STRIBECK, transition
+from vpm.catalogue.kinds import ABOVE_ZERO, ANY, NOT_NEGATIVE, EffectType, shape, size
 
-#: Transition velocity and Stribeck velocity where none is given: prismatic (m/s), revolute (rad/s).
-_TRANSITION, _STRIBECK = (1e-3, 1e-2), (1e-2, 1e-1)
 #: Way over which bristles bend where none is given: prismatic (m), revolute (rad).
 _PRESLIDING = (1e-5, 1e-4)
 #: Largest share of a load that the balance of effort has one solution for.
 _SHARE = (0.0, 0.95)
-
-
-def _transition(suffix: str) -> EffectParameter:
-    meaning = "speed below which the law bends from one sign to the other"
-    return shape("transition_velocity", suffix, "{C}/s", "speed", meaning, start=_TRANSITION, learnt=True)
 
 
 QUADRATIC_DRAG = EffectType(
@@ -86,7 +80,7 @@ POSITION_DEPENDENT_FRICTION = EffectType(
         ),
         size("cosine", "friction.position_cosine", "{E}", "effort", "part of the level that is greatest at zero"),
         size("sine", "friction.position_sine", "{E}", "effort", "part of the level that vanishes at zero"),
-        _transition("friction.position_transition_velocity"),
+        transition("friction.position_transition_velocity"),
     ),
     law="tau = -(cosine cos(2 pi q/period) + sine sin(2 pi q/period)) tanh(v/transition_velocity)",
     sentence="{at} rubs differently along its way, by {cosine} (cosine) and {sine} (sine), every {period} alike.",
@@ -119,7 +113,7 @@ LOAD_DEPENDENT_FRICTION = EffectType(
             physical=_SHARE,
             linear=False,
         ),
-        _transition("friction.load_transition_velocity"),
+        transition("friction.load_transition_velocity"),
     ),
     law=(
         "tau = -|u| s (driving + driven + (driving - driven) s sign(u))/2, s = tanh(v/transition_velocity), u the"
@@ -181,7 +175,7 @@ LUGRE_FRICTION = EffectType(
             "{C}/s",
             "speed",
             "speed at which this share has fallen to 37 %",
-            start=_STRIBECK,
+            start=STRIBECK,
             learnt=True,
         ),
     ),
@@ -229,7 +223,7 @@ WARMING_FRICTION = EffectType(
             start=None,
             bounds=ABOVE_ZERO,
         ),
-        _transition("warming.transition_velocity"),
+        transition("warming.transition_velocity"),
     ),
     law=(
         "tau = -(1 - w) (coulomb tanh(v/transition_velocity) + viscous v), dw/dt = (1 - w)/time_constant,"

@@ -16,6 +16,7 @@ from vpm._core import soft_flights
 from vpm.experiment import Motion
 from vpm.identify import InverseDynamicsProblem
 from vpm.model import Model
+from vpm.model.splitting import name_behind
 
 Array = NDArray[np.float64]
 
@@ -69,7 +70,7 @@ def flights(
 
 def _course(model: Model, site: str, m: Motion) -> _Course:
     """The measured motion with the link at rest in the play, and once more with one unit of acceleration there."""
-    behind = model.joints.index(f"{site}_deflection")
+    behind = model.joints.index(name_behind(site))
     before = [model.joints.index(joint) for joint in m.joints]
     motion = np.zeros((3, len(m.time), len(model.joints)))
     for order, values in enumerate((m.position, m.velocity, m.acceleration)):

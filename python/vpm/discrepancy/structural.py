@@ -17,6 +17,7 @@ from vpm.identify import InverseDynamicsProblem
 from vpm.identify.along import has_own_drives
 from vpm.identify.reuse import SPLITTING
 from vpm.model import Model
+from vpm.model.splitting import name_behind
 
 Array = NDArray[np.float64]
 
@@ -67,7 +68,7 @@ def sites_worth_trying(effect: EffectType, model: Model) -> tuple[str, ...]:
         return tuple(site for site in sites if model.levels[site] != "rigid")
     if effect.name in {"backlash", "joint_compliance"}:
         driven = {joint for name in model.actuators for joint in model.joints_of_actuator(name)}
-        return tuple(site for site in sites if site in driven and f"{site}_deflection" not in model.joints)
+        return tuple(site for site in sites if site in driven and not model.joint_behind(site))
     return sites
 
 
@@ -78,7 +79,7 @@ def beyond(effect: EffectType, site: str, model: Model, measured: Sequence[str])
     does on the motor side of a joint that is split where that is measured, see `vpm.identify.reuse.parts_of`.
     """
     remembering = [f"{entry.type.title} at {entry.at}" for entry in model.effects if entry.type.memory]
-    split_off = {f"{entry.at}_deflection" for entry in model.effects if entry.name in SPLITTING}
+    split_off = {model.joint_behind(entry.at) for entry in model.effects if entry.name in SPLITTING}
     alone = tuple(joint for joint in model.joints if joint not in split_off) == tuple(measured)
     known = alone and not has_own_drives(model) and not any(entry.name == "rotor_inertia" for entry in model.effects)
     if effect.memory and tuple(model.joints) != tuple(measured) and not known:
@@ -104,8 +105,7 @@ def in_series(effect: str) -> tuple[str, ...]:
 
 def coupled(model: Model) -> bool:
     """Whether it has several joints beside those that effects have split off, whose errors can cancel each other."""
-    added = {f"{entry.at}_{suffix}" for entry in model.effects for suffix in ("bending", "deflection")}
-    return len(set(model.joints) - added) > 1
+    return len(set(model.joints) - set(model.added_joints)) > 1
 
 
 def _joint(model: Model, site: str) -> str:
@@ -119,7 +119,7 @@ def logged_swing(data: InverseDynamicsProblem, model: Model, site: str) -> tuple
     What hangs on the spring obeys ``a + d'' = -(k/J) d - (c/J) d'``, ``a`` the acceleration of the joint before it.
     Two numbers by linear least squares, without gravity and the motion of other joints, so good for a start only.
     """
-    logged = [c for c in data.shown if c in {f"{site}_bending.position", f"{site}_deflection.position"}]
+    logged = [c for c in data.shown if c in {f"{site}_bending.position", f"{name_behind(site)}.position"}]
     if not logged:
         return None
     column = data.motions[0].joints.index(_joint(model, site))

@@ -84,9 +84,9 @@ def parts_of(model: Model, joints: tuple[str, ...]) -> Parts | None:
 @lru_cache(maxsize=128)
 def split(model: Model, joints: tuple[str, ...], splits: frozenset[str]) -> Parts | None:
     """The same where all ``splits``, effects that bring a coordinate of their own, count as plays do."""
-    plays = [e for e in model.effects if e.name in splits and f"{e.at}_deflection" in model.joints]
-    flying = {f"{e.at}_deflection" for e in plays}
-    if any(e.side == "link" and f"{e.at}_deflection" in model.joints for e in model.effects):
+    plays = [e for e in model.effects if e.name in splits and model.joint_behind(e.at)]
+    flying = {model.joint_behind(e.at) for e in plays}
+    if any(e.side == "link" and model.joint_behind(e.at) for e in model.effects):
         return None  # what acts behind a spring moves it
     if tuple(joint for joint in model.joints if joint not in flying) != joints:
         return None

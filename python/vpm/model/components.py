@@ -12,6 +12,7 @@ from vpm.model.check import Checked
 from vpm.model.drive_components import DriveComponents
 from vpm.model.schema import ChannelEntry
 from vpm.model.sensor_noise import stated_noise
+from vpm.model.splitting import name_behind
 
 #: Drives whose effort follows from the command alone.
 DIRECT = frozenset({"ideal", "narx", "maxwell_narx"})
@@ -49,6 +50,11 @@ class Components(DriveComponents):
     def deflections(self) -> tuple[str, ...]:
         """Channels that a log may hold and this model takes for zero, such as ``arm_bending.position``."""
         return tuple(self._checked.structure.deflections)
+
+    def joint_behind(self, joint: str) -> str | None:
+        """Joint that carries the link where an effect has split ``joint``; None where it is whole."""
+        name = name_behind(joint)
+        return name if name in self.added_joints else None
 
     def joint_before(self, site: str) -> str:
         """Joint with one coordinate that moves a body or a beam, or a joint itself.

@@ -18,6 +18,11 @@ from vpm.model.schema import Document, EffectEntry
 FLEXED = "strain(2)"
 
 
+def name_behind(joint: str) -> str:
+    """Name of the joint that carries the link where an effect splits one."""
+    return f"{joint}_deflection"
+
+
 def splits_joint(entry: EffectEntry, document: Document) -> bool:
     """Whether an effect parts motor and link: wind-up always, play at a joint that an actuator drives directly.
 
@@ -30,7 +35,7 @@ def splits_joint(entry: EffectEntry, document: Document) -> bool:
 
 def deflections(document: Document) -> Mapping[str, str]:
     """Coordinates that are split, each with the name of the joint behind it."""
-    return {entry.at: f"{entry.at}_deflection" for entry in document.effects if splits_joint(entry, document)}
+    return {entry.at: name_behind(entry.at) for entry in document.effects if splits_joint(entry, document)}
 
 
 def bendings(document: Document) -> Mapping[str, str]:
@@ -69,7 +74,7 @@ def splitting_problems(document: Document, names: Mapping[str, str]) -> Iterator
             other = document.effects[earlier].type
             rest = f'splits joint "{joint}" again, after {other} in effects[{earlier}], and no inertia is between'
             yield Problem(where, f"{rest}; keep one of them")
-        added = f"{entry.at}_bending" if bends else f"{entry.at}_deflection"
+        added = f"{entry.at}_bending" if bends else name_behind(entry.at)
         if added in {*document.joints, *document.bodies, *document.beams, *document.actuators, *document.sensors}:
             yield Problem(where, f'adds a joint "{added}", but the model has a component of this name; rename that one')
         if not _has_rotor(document, joint):

@@ -11,7 +11,7 @@ from vpm.errors import ModelError, near_match
 from vpm.model.expand import Coordinate, Direction, coordinates, plane, unit
 from vpm.model.pose import Pose, denavit_hartenberg, pose
 from vpm.model.schema import Document, Joint
-from vpm.model.splitting import bendings, deflections, flexed
+from vpm.model.splitting import bendings, deflections, flexed, name_behind
 from vpm.model.tree import WORLD
 from vpm.units import si_unit
 
@@ -147,7 +147,7 @@ class Structure:
         A log may hold one, from a strain gauge or a second encoder; the machine as it is takes it for zero.
         """
         bent = {f"{body}_bending": joint for body, joint in self.turned.items()}
-        wound = {f"{joint}_deflection": joint for joint in self.sites("joint")}
+        wound = {name_behind(joint): joint for joint in self.sites("joint")}
         return {f"{name}.position": joint for name, joint in (bent | wound).items() if name not in self.joints}
 
     @property

@@ -22,8 +22,6 @@ Array = NDArray[np.float64]
 
 #: Damping of the error of an observer.
 DAMPING = float(np.sqrt(0.5))
-#: Name of the coordinate by which a joint that was split differs from its motor.
-SPLIT = "_deflection"
 #: Fewest steps of the integrator within a sample where a joint is split: contacts and gears ring fast.
 STEPS = 4
 
@@ -143,10 +141,10 @@ def observer_gain(model: Model, channels: Sequence[str], band: float, dt: float)
         joint, _, quantity = channel.rpartition(".")
         if quantity != "position" or joint not in coordinates:
             continue
-        place = coordinates.index(joint)
+        place, behind = coordinates.index(joint), model.joint_behind(joint)
         moved = -np.expm1(-2.0 * DAMPING * turn), turn**2 / dt
         for row, share in zip((place, len(coordinates) + place), moved, strict=True):
             gain[row, column] = share
-            if joint + SPLIT in coordinates:
-                gain[row - place + coordinates.index(joint + SPLIT), column] = -share
+            if behind is not None:
+                gain[row - place + coordinates.index(behind), column] = -share
     return gain

@@ -19,7 +19,7 @@ from vpm.identify import InverseDynamicsProblem
 from vpm.identify.reuse import SPLITTING
 from vpm.model import Model
 from vpm.ranking.colour import Colour, plain
-from vpm.ranking.observed import SPLIT, STEPS, Observer
+from vpm.ranking.observed import STEPS, Observer
 from vpm.ranking.settings import Settings
 from vpm.ranking.sizes import Sizes
 from vpm.ranking.starts import started
@@ -100,7 +100,7 @@ def sides_of(candidate: Candidate, model: Model) -> tuple[Side, ...]:
     site = candidate.site
     if candidate.effect.name in SPLITTING:
         return SIDES if any(effect.at == site and effect.type.has_sides for effect in model.effects) else SIDES[:1]
-    return SIDES if candidate.effect.has_sides and site + SPLIT in model.joints else SIDES[:1]
+    return SIDES if candidate.effect.has_sides and model.joint_behind(site) else SIDES[:1]
 
 
 def proposals(
