@@ -17,7 +17,9 @@ Parts = Sequence[slice]
 #: Degrees of freedom of Student's density among which that of the errors is chosen; without end it is the normal one.
 TAILS = (3.0, 4.0, 6.0, 10.0, 20.0, np.inf)
 #: Turns of the fixed point by which the scale of that density is found.
-TURNS = 30
+TURNS = 60
+#: Relative change of the scale at which it is found.
+SAME = 1e-7
 
 #: Relative noise on the diagonal of the normal equations, so that a residual of a few lines can be predicted.
 FLOOR = 1e-9
@@ -101,7 +103,9 @@ def scale_of(errors: Array, freedom: Array) -> float:
     if not np.any(np.isfinite(freedom)):
         return size
     for _ in range(TURNS):
-        size = max(float(np.sqrt(np.mean(_weights(errors / size, freedom) * errors**2))), 1e-300)
+        last, size = size, max(float(np.sqrt(np.mean(_weights(errors / size, freedom) * errors**2))), 1e-300)
+        if abs(size - last) < SAME * size:
+            break
     return size
 
 

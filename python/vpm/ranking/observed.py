@@ -68,7 +68,6 @@ class Observed:
         self.setup = setup or Setup()
         self.experiments = tuple(experiments)
         self.records = tuple(Record.of(model, record) for record in self.experiments)
-        self.channels = self.records[0].channels
         self._starts: WeakKeyDictionary[Model, list[Array]] = WeakKeyDictionary()
         ends = np.cumsum([len(record.time) for record in self.records])
         self.parts: Parts = [
@@ -128,6 +127,11 @@ class Observed:
             self.setup.hold,
         )
         return outputs[:, places], slopes[:, places]
+
+
+def fewest_steps(model: Model) -> int:
+    """Steps of the integrator within a sample that a model needs at least."""
+    return STEPS if model.added_joints else 1
 
 
 def observer_gain(model: Model, channels: Sequence[str], band: float, dt: float) -> Array:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import math
 from collections import defaultdict
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,17 +19,45 @@ from vpm.identify import InverseDynamicsProblem
 from vpm.identify.reuse import SPLITTING
 from vpm.model import Model
 from vpm.ranking.colour import Colour, plain
-from vpm.ranking.observed import STEPS, Observer
+from vpm.ranking.fit import Fitted, Fitter, Followed, View, bounded_step
+from vpm.ranking.observed import Observer, fewest_steps
 from vpm.ranking.settings import Settings
 from vpm.ranking.sizes import Sizes
 from vpm.ranking.starts import started
-from vpm.ranking.structure import Fitted, Fitter, Structure, bounded_step
+from vpm.ranking.structure import Structure
 
 Array = NDArray[np.float64]
 
-#: Ways to look at what an observer leaves: as it is, and whitened.
-VIEWS = 2
 SIDES: tuple[Side, Side] = ("motor", "link")
+
+
+class Reference:
+    """What there is without another effect, and one way to look at what an observer leaves of it.
+
+    Attributes
+    ----------
+    followed : Followed
+    view : View
+        Derivatives by what is unknown already are taken as known for structures with an effect more.
+    cost : float
+        See `Fitter.cost`.
+    """
+
+    def __init__(self, followed: Followed, colour: Colour, fitter: Fitter) -> None:
+        self.followed, parts = followed, fitter.observed.parts
+        self.view = View(colour, dict(zip(followed.names, colour.whitened(followed.jacobian, parts).T, strict=True)))
+        self.cost = fitter.cost(followed.structure, followed.residual, colour)
+        self._parts, self._reach = parts, fitter.settings.reach
+        errors = colour.whitened(followed.residual, parts)
+        self._roots = colour.roots(errors)
+        self._left = float(np.sum((errors * self._roots) ** 2))
+
+    def promised(self, other: Followed) -> float:
+        """What another structure gains by a step of a fit, or as it stands, nats."""
+        errors, slopes = self.view.errors(other, self._parts, self._roots)
+        move = bounded_step(other.structure, errors, slopes, self._reach)
+        left = min(float(np.sum((errors + slopes @ move) ** 2)), float(errors @ errors))
+        return 0.5 * len(errors) * math.log(self._left / max(left, 1e-300))
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,21 +68,24 @@ class Proposal:
     ----------
     structure : Structure
     observer : Observer
-    colour : Colour
     gain : float
         What one step of a fit promises, nats.
     neutral : bool
         The effect does nothing where it begins.
-    reference : Fitted
+    reference : Reference
         What there is without it, under the same bandwidth.
     """
 
     structure: Structure
     observer: Observer
-    colour: Colour
     gain: float
     neutral: bool
-    reference: Fitted
+    reference: Reference
+
+    @property
+    def view(self) -> View:
+        """How it is looked at; where an effect does nothing, derivatives by all others are those without it."""
+        return self.reference.view if self.neutral else View(self.reference.view.colour, {})
 
     @property
     def key(self) -> Key:
@@ -65,7 +96,7 @@ class Proposal:
 def extended(
     structure: Structure, candidate: Candidate, start: Mapping[str, float], side: Side, sizes: Sizes
 ) -> Structure:
-    """A structure with one more effect, on one side of what winds up or plays.
+    """A structure with one more effect, on one side of a joint that is split.
 
     What splits a joint takes the friction and the like that was there to that side.
 
@@ -77,22 +108,18 @@ def extended(
     splits = candidate.effect.name in SPLITTING
     if splits and side == "link":
         structure = structure.behind(candidate.site)
-    model = structure.model.with_effect(
-        candidate.effect.name, candidate.site, side="motor" if splits else side, **start
-    )
-    theta = model.theta.copy()
-    for name, value in zip(structure.model.parameter_names, structure.theta, strict=True):
-        theta[model.index(name)] = value
-    effect = model.effect(*candidate.key, "motor" if splits else side)
-    priors = dict(structure.priors)
+    side = "motor" if splits else side
+    model = structure.model.with_effect(candidate.effect.name, candidate.site, side=side, **start)
+    effect, carried = model.effect(*candidate.key, side), structure.carried(model)
+    priors = dict(carried.priors)
     for short, name in effect.parameter_names.items():
         parameter = candidate.effect.parameter(short)
         if name in structure.model.parameters or short in candidate.fixed:
             continue
         if not parameter.shape or parameter.learnt or short in start:
             priors[name] = sizes.prior(candidate, parameter, model.parameters[name].value)
-    shown = (*structure.shown, *(effect.parameter_names[short] for short in start if short in candidate.bounds))
-    return Structure(model, theta, priors, (*structure.effects, candidate.key), shown)
+    shown = (*carried.shown, *(effect.parameter_names[short] for short in start if short in candidate.bounds))
+    return replace(carried, priors=priors, effects=(*structure.effects, candidate.key), shown=shown)
 
 
 def sides_of(candidate: Candidate, model: Model) -> tuple[Side, ...]:
@@ -108,18 +135,17 @@ def proposals(
 ) -> list[Proposal]:
     """Effects of the catalogue that are worth a fit beside ``found``.
 
-    They are the best few by each observer and each way to look at what it leaves: as it is, where an effect of slow
-    motion is large, and whitened, where a weak one stands out.
+    They are the best few by each observer and each way to look at what it leaves.
     """
     model = found.structure.model.with_parameters(found.structure.values)
-    seen = candidates(model, data, data.evaluate(model, model.theta)[0])
-    listed = [started(candidate, model, sizes) for candidate in seen]
-    references = observers(found, fitter)
+    plausible = candidates(model, data, data.evaluate(model, model.theta)[0])
+    listed = [started(candidate, model, sizes) for candidate in plausible]
+    looks = [_references(one, fitter) for one in observers(found, fitter)]
     items = [
-        (one, candidate, start, side)
-        for one in references
+        (several, candidate, start, side)
+        for place, several in enumerate(looks)
         for candidate in listed
-        if candidate.neutral or one is not found or len(references) <= len(fitter.settings.bands)
+        if candidate.neutral or place > 0 or len(looks) <= len(fitter.settings.bands)
         for start in candidate.starts
         for side in sides_of(candidate, model)
     ]
@@ -127,19 +153,19 @@ def proposals(
         "screening",
         lambda item: _seen(*item, fitter, sizes),
         items,
-        lambda item: f"{item[1].label}, {item[0].observer.label}",
+        lambda item: f"{item[1].label}, {item[0][0].followed.observer.label}",
     )
     chosen: list[Proposal] = []
-    for one in references:
-        pairs = [pair for pair in screened if not isinstance(pair, Failure) and pair[0].reference is one]
-        for view in range(VIEWS):
-            chosen += _seated([pair[view] for pair in pairs if pair[view].neutral], fitter.settings)
-        chosen += _begun([max(pair, key=_gain) for pair in pairs if not pair[0].neutral], fitter.settings)
+    for several in looks:
+        seen = [one for one in screened if not isinstance(one, Failure) and one[0].reference is several[0]]
+        for alike in zip(*seen, strict=True):
+            chosen += _seated([proposal for proposal in alike if proposal.neutral], fitter.settings)
+        chosen += _begun([max(one, key=_gain) for one in seen if not one[0].neutral], fitter.settings)
     return chosen
 
 
 def observers(found: Fitted, fitter: Fitter) -> list[Fitted]:
-    """What was found, under the observers that search and at its own bandwidth, unless that is one of theirs."""
+    """What was found, under its own observer first, and under those that search, unless one of them is like its own."""
     own = found.observer
     others = [band for band in fitter.settings.bands if not 0.5 < band / own.band < 2.0]
     references = [found]
@@ -149,8 +175,19 @@ def observers(found: Fitted, fitter: Fitter) -> list[Fitted]:
     return references
 
 
+def _references(found: Fitted, fitter: Fitter) -> list[Reference]:
+    """Ways to look at it: as it is, where an effect of slow motion is large, and whitened, where a weak one is."""
+    followed = fitter.followed(found.structure, found.observer)
+    return [Reference(followed, c, fitter) for c in (plain(followed.residual, fitter.observed.parts), found.colour)]
+
+
 def _seen(
-    reference: Fitted, candidate: Candidate, start: Mapping[str, float], side: Side, fitter: Fitter, sizes: Sizes
+    references: Sequence[Reference],
+    candidate: Candidate,
+    start: Mapping[str, float],
+    side: Side,
+    fitter: Fitter,
+    sizes: Sizes,
 ) -> list[Proposal]:
     """One effect at start values under one observer, in each of the ways to look at what is left.
 
@@ -159,24 +196,12 @@ def _seen(
     VpmError, ArithmeticError
         It cannot be there, or runs away from the records.
     """
-    parts = fitter.observed.parts
-    structure = extended(reference.structure, candidate, start, side, sizes)
-    observer = reference.observer
-    if len(structure.model.joints) > len(reference.structure.model.joints):
-        observer = replace(observer, steps=max(observer.steps, STEPS))
-    residual, jacobian = fitter.followed(structure, observer)
-    views = []
-    for colour in (plain(reference.residual, parts), reference.colour):
-        before = colour.whitened(reference.residual, parts)
-        roots = colour.roots(before)
-        before = before * roots
-        errors = colour.whitened(residual, parts) * roots
-        slopes = colour.whitened(jacobian, parts) * structure.slopes * roots[:, None]
-        move = bounded_step(structure, errors, slopes, fitter.settings.reach)
-        after = min(float(np.sum((errors + slopes @ move) ** 2)), float(errors @ errors))
-        gain = 0.5 * len(before) * math.log(float(before @ before) / max(after, 1e-300))
-        views.append(Proposal(structure, observer, colour, gain, candidate.neutral, reference))
-    return views
+    without = references[0].followed
+    structure = extended(without.structure, candidate, start, side, sizes)
+    observer = replace(without.observer, steps=max(without.observer.steps, fewest_steps(structure.model)))
+    known = without.names if candidate.neutral else ()
+    followed = fitter.followed(structure, observer, [name for name in structure.priors if name not in known])
+    return [Proposal(structure, observer, one.promised(followed), candidate.neutral, one) for one in references]
 
 
 def _seated(seen: list[Proposal], settings: Settings) -> list[Proposal]:

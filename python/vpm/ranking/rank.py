@@ -15,12 +15,13 @@ from vpm.errors import DiagnosisError, VpmError
 from vpm.experiment import Experiment, as_records
 from vpm.identify import InverseDynamicsProblem
 from vpm.model import Model
+from vpm.ranking.fit import Fitted, Fitter
 from vpm.ranking.observed import Observed, Observer
 from vpm.ranking.proposals import Proposal, proposals
 from vpm.ranking.result import Ranked, Ranking
 from vpm.ranking.settings import Settings
 from vpm.ranking.sizes import Sizes
-from vpm.ranking.structure import Fitted, Fitter, Structure
+from vpm.ranking.structure import Structure
 from vpm.simulate import Setup
 from vpm.weighing import Prior
 
@@ -146,7 +147,7 @@ class _Search:
         hopeful = {
             id(trial)
             for trial in trials
-            if isinstance(trial, Fitted) and trial.evidence + 2.0 * self.fitter.promise(trial) > found.evidence
+            if isinstance(trial, Fitted) and trial.evidence + 2.0 * trial.promise > found.evidence
         }
         several = [[one for one in fits if id(one) in hopeful] for fits in _by_effect(trials)]
         last = [one for fits in several[: self.settings.finalists] for one in fits[: self.settings.optima]]
@@ -154,9 +155,8 @@ class _Search:
         return [fits[0] for fits in _by_effect([*ends, *trials])]
 
     def _fitted(self, proposal: Proposal) -> Fitted:
-        without = proposal.reference
-        goal = self.fitter.cost(without.structure, without.residual, proposal.colour)
-        return self.fitter.fitted(proposal.structure, proposal.observer, proposal.colour, goal)
+        goal = proposal.reference.cost
+        return self.fitter.searched(proposal.structure, proposal.observer, proposal.view, goal)
 
     def _without_needless(self, found: Fitted) -> tuple[Fitted, list[Key]]:
         """Without those of the earlier effects that a later one has made needless."""

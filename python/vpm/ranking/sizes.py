@@ -9,7 +9,7 @@ from vpm.catalogue import EffectParameter
 from vpm.discrepancy.candidates import Candidate
 from vpm.identify import InverseDynamicsProblem
 from vpm.model import Model
-from vpm.weighing.priors import FACTOR, NATURAL, NEAR, SHARE, Prior
+from vpm.weighing.priors import FACTOR, NATURAL, NEAR, SHARE, Prior, natural_sizes
 
 Array = NDArray[np.float64]
 
@@ -57,18 +57,9 @@ class Sizes:
     def _size(self, site: str, scale: str) -> float:
         effort, speed, way = (max(number, 1e-9) for number in self._shown(site))
         sizes = {
-            "effort": effort,
-            "effort_per_speed": effort / speed,
-            "effort_per_speed_squared": effort / speed**2,
-            "effort_per_coordinate": effort / way,
-            "effort_per_coordinate_cubed": effort / way**3,
-            "coordinate": way,
+            **natural_sizes(effort, speed, way),
             "channel": way,
-            "speed": speed,
-            "mass": effort * way / speed**2,
-            "inertia": effort * way / speed**2,
             "time": DELAY,
-            "one_per_speed": 1.0 / speed,
             "command": self.commands.get(site, 1.0),
         }
         return sizes.get(scale, 1.0)

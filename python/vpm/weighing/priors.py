@@ -67,6 +67,23 @@ class Prior:
         return low, self.standard(self.high)
 
 
+def natural_sizes(effort: float, speed: float, way: float) -> dict[str, float]:
+    """Sizes of each kind of quantity at a joint with this effort, speed and way; zero or less where they show none."""
+    return {
+        "one": 1.0,
+        "effort": effort,
+        "effort_per_speed": effort / speed if speed else 0.0,
+        "effort_per_speed_squared": effort / speed**2 if speed else 0.0,
+        "effort_per_coordinate": effort / way if way else 0.0,
+        "effort_per_coordinate_cubed": effort / way**3 if way else 0.0,
+        "coordinate": way,
+        "speed": speed,
+        "mass": effort * way / speed**2 if speed else 0.0,
+        "inertia": effort * way / speed**2 if speed else 0.0,
+        "one_per_speed": 1.0 / speed if speed else 0.0,
+    }
+
+
 def log_share(lower: float, upper: float) -> float:
     """Logarithm of the share of a normal bell between two ends, in deviations."""
     # The smaller tails are differences of numbers near zero, not near one.
@@ -146,20 +163,10 @@ class _Sizes:
             self._strength(f"{name}.effort") for name in self.model.joints
         )
         sizes = {
-            "one": 1.0,
-            "effort": effort,
-            "effort_per_speed": effort / speed if speed else 0.0,
-            "effort_per_speed_squared": effort / speed**2 if speed else 0.0,
-            "effort_per_coordinate": effort / way if way else 0.0,
-            "effort_per_coordinate_cubed": effort / way**3 if way else 0.0,
-            "coordinate": way,
-            "speed": speed,
-            "mass": effort * way / speed**2 if speed else 0.0,
-            "inertia": effort * way / speed**2 if speed else 0.0,
+            **natural_sizes(effort, speed, way),
             "time": NEAR * way / speed if speed else 0.0,
             "command": self._strength(f"{effect.at}.command"),
             "channel": self._strength(self._measured(effect.at)),
-            "one_per_speed": 1.0 / speed if speed else 0.0,
         }
         size = sizes.get(parameter.scale, 0.0)
         if not (np.isfinite(size) and size > 0.0):

@@ -1,0 +1,272 @@
+"""Structures fitted to what an observer leaves of the records, and their evidence."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import lsq_linear
+
+from vpm.errors import VpmError
+from vpm.ranking.colour import Colour, Parts, colour_of, plain
+from vpm.ranking.observed import Observed, Observer, fewest_steps
+from vpm.ranking.settings import Settings
+from vpm.ranking.structure import Structure
+
+Array = NDArray[np.float64]
+#: Shares of a step that are tried, the largest first.
+SHARES = (1.0, 0.3, 0.08)
+#: Residuals and derivatives that no record has; their squares are still numbers.
+RUNAWAY = 1e100
+
+
+@dataclass(frozen=True, eq=False)
+class Followed:
+    """What an observer leaves of the records under a structure.
+
+    Attributes
+    ----------
+    structure : Structure
+    observer : Observer
+    names : tuple of str
+        Unknown parameters by which there are derivatives.
+    residual : ndarray, shape (N, m)
+    jacobian : ndarray, shape (N, m, len(names))
+    """
+
+    structure: Structure
+    observer: Observer
+    names: tuple[str, ...]
+    residual: Array
+    jacobian: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """A structure under an observer, weighed.
+
+    Attributes
+    ----------
+    structure : Structure
+    observer : Observer
+    colour : Colour
+        Of what the observer leaves.
+    log_likelihood : float
+        Of the records under that colour.
+    evidence : float
+        Logarithm of the probability density of the records under the structure, nats.
+    promise : float
+        What a bounded Gauss-Newton step would gain if all were linear, nats.
+    """
+
+    structure: Structure
+    observer: Observer
+    colour: Colour
+    log_likelihood: float
+    evidence: float
+    promise: float
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """A way to look at residuals: their colour, and derivatives that are taken as known under it.
+
+    Attributes
+    ----------
+    colour : Colour
+    known : mapping of str to ndarray, shape (n,)
+        Prediction errors by a unit of parameters, which stay as they are while a structure is fitted.
+    """
+
+    colour: Colour
+    known: Mapping[str, Array]
+
+    def errors(self, followed: Followed, parts: Parts, roots: Array | None = None) -> tuple[Array, Array]:
+        """Prediction errors (n,) in roots of their weights, and their change by deviations of the priors (n, k)."""
+        errors = self.colour.whitened(followed.residual, parts)
+        roots = self.colour.roots(errors) if roots is None else roots
+        fresh = dict(zip(followed.names, self.colour.whitened(followed.jacobian, parts).T, strict=True))
+        slopes = np.empty((len(errors), len(followed.structure.priors)))
+        for place, (name, slope) in enumerate(zip(followed.structure.priors, followed.structure.slopes, strict=True)):
+            slopes[:, place] = (fresh[name] if name in fresh else self.known[name]) * (slope * roots)
+        return errors * roots, slopes
+
+
+class Fitter:
+    """Fits structures to what an observer leaves.
+
+    While it searches, derivatives come from the fewest steps of the integrator: they only show the way, and cost most.
+    """
+
+    def __init__(self, observed: Observed, settings: Settings) -> None:
+        self.observed, self.settings = observed, settings
+
+    def fitted(self, structure: Structure, observer: Observer, colour: Colour | None = None) -> Fitted:
+        """Most probable values, by bounded Gauss-Newton steps; under a given colour, or else as the channels are.
+
+        Raises
+        ------
+        VpmError
+            The structure runs away from the records where it begins.
+        """
+        begun = self.followed(structure.at(structure.standard), observer)
+        colour = colour or plain(begun.residual, self.observed.parts)
+        return self._weighed(self._descended(begun, View(colour, {})))
+
+    def searched(self, structure: Structure, observer: Observer, view: View, goal: float) -> Fitted:
+        """The same with derivatives by some parameters as they are known.
+
+        It gives up where several times what a step promises would not bring the `cost` below a goal.
+
+        Raises
+        ------
+        VpmError
+            The structure runs away from the records where it begins.
+        """
+        fresh = tuple(name for name in structure.priors if name not in view.known)
+        begun = self.followed(structure.at(structure.standard), observer, fresh)
+        ended = self._descended(begun, view, goal)
+        return self._weighed(self.followed(ended.structure, observer))
+
+    def settled(self, found: Fitted) -> Fitted:
+        """At its own colour, bandwidth and number of steps, the effects being fitted anew at each."""
+        found = self._improved(found, found.observer)
+        for change in (_finer, _wider, _narrower):
+            while (observer := change(found.observer, self.settings)) is not None:
+                other = self._improved(found, observer)
+                if other is found:
+                    break
+                found = other
+        return found
+
+    def followed(
+        self, structure: Structure, observer: Observer, names: Sequence[str] | None = None, *, exact: bool = False
+    ) -> Followed:
+        """What the observer leaves of the records, with derivatives by some parameters, or by all that are unknown.
+
+        ``exact`` derivatives are those of the observer's own steps.
+
+        Raises
+        ------
+        VpmError
+            The structure runs away from the records.
+        """
+        names = tuple(structure.priors if names is None else names)
+        columns = [structure.model.index(name) for name in names]
+        steps = observer.steps if exact else fewest_steps(structure.model)
+        if steps >= observer.steps:
+            return Followed(structure, observer, names, *self._pass(structure, observer, columns))
+        residual, _ = self._pass(structure, observer, ())
+        _, jacobian = self._pass(structure, replace(observer, steps=steps), columns)
+        return Followed(structure, observer, names, residual, jacobian)
+
+    def cost(self, structure: Structure, residual: Array, colour: Colour) -> float:
+        """Negative logarithm of the posterior density but for a constant."""
+        errors = colour.whitened(residual, self.observed.parts)
+        return colour.cost(errors) + 0.5 * float(structure.standard @ structure.standard)
+
+    def _improved(self, found: Fitted, observer: Observer) -> Fitted:
+        """Fitted under another observer, under the colour there, if that is better."""
+        try:
+            followed = self.followed(found.structure, observer, exact=True)
+            other = self._weighed(followed)
+            while other.evidence + 2.0 * other.promise > found.evidence:
+                followed = self._descended(followed, View(other.colour, {}), exact=True)
+                better = self._weighed(followed)
+                if not better.evidence > other.evidence + self.settings.tolerance:
+                    break
+                other = better
+        except (VpmError, ArithmeticError):
+            return found
+        return other if other.evidence > found.evidence + self.settings.tolerance else found
+
+    def _descended(self, now: Followed, view: View, goal: float = math.inf, *, exact: bool = False) -> Followed:
+        """The most probable values, as far as steps lead."""
+        for _ in range(self.settings.iterations if now.structure.priors else 0):
+            move, gain = self._step(now, view)
+            before = self.cost(now.structure, now.residual, view.colour)
+            if gain < self.settings.tolerance or before - self.settings.patience * gain > goal:
+                break
+            better = self._better(now, view.colour, move, before)
+            if better is None:
+                break
+            structure, after = better
+            now = self.followed(structure, now.observer, now.names, exact=exact)
+            if before - after < self.settings.tolerance:
+                break
+        return now
+
+    def _step(self, followed: Followed, view: View) -> tuple[Array, float]:
+        """A bounded Gauss-Newton step, and what it promises, nats."""
+        errors, slopes = view.errors(followed, self.observed.parts)
+        move = bounded_step(followed.structure, errors, slopes, self.settings.reach)
+        return move, _promised(followed.structure, errors, slopes, move)
+
+    def _better(self, now: Followed, colour: Colour, move: Array, before: float) -> tuple[Structure, float] | None:
+        """The first of the shares of a step that is better, and its cost; it is looked for without derivatives."""
+        for share in SHARES:
+            tried = now.structure.at(now.structure.standard + share * move)
+            try:
+                residual, _ = self._pass(tried, now.observer, ())
+            except (VpmError, ArithmeticError):
+                continue
+            after = self.cost(tried, residual, colour)
+            if after < before:
+                return tried, after
+        return None
+
+    def _pass(self, structure: Structure, observer: Observer, columns: Sequence[int]) -> tuple[Array, Array]:
+        residual, jacobian = self.observed.follow(structure.model, structure.theta, observer, columns)
+        if not all(np.max(np.abs(numbers), initial=0.0) < RUNAWAY for numbers in (residual, jacobian)):
+            raise VpmError(f"{structure.model.name} runs away from the records")
+        return residual, jacobian
+
+    def _weighed(self, followed: Followed) -> Fitted:
+        """Evidence under the structure's own colour, all derivatives being there."""
+        structure, parts = followed.structure, self.observed.parts
+        colour = colour_of(followed.residual, parts, self.settings.order)
+        errors = colour.whitened(followed.residual, parts)
+        likely = float(np.sum(colour.log_density(errors)))
+        informed = np.repeat(np.sqrt(colour.information()), len(errors) // followed.residual.shape[1])
+        _, slopes = View(colour, {}).errors(followed, parts, informed)
+        z = structure.standard
+        curvature = np.eye(len(z)) + slopes.T @ slopes
+        evidence = likely - 0.5 * float(z @ z) - 0.5 * float(np.linalg.slogdet(curvature)[1])
+        _, promise = self._step(followed, View(colour, {}))
+        return Fitted(structure, followed.observer, colour, likely, evidence, promise)
+
+
+def bounded_step(structure: Structure, errors: Array, slopes: Array, reach: float) -> Array:
+    """Gauss-Newton step in deviations of the priors, within what is possible (bounded least squares)."""
+    z, scale = structure.standard, max(float(np.mean(errors**2)), 1e-300)
+    normal = slopes.T @ slopes / scale + np.eye(len(z))
+    sizes = 1.0 / np.sqrt(np.diag(normal))
+    root = np.linalg.cholesky(normal * np.outer(sizes, sizes) + 1e-12 * np.eye(len(z))).T
+    pull = -(slopes.T @ errors / scale + z) * sizes
+    target = np.linalg.solve(root.T, pull)
+    low = np.minimum(np.maximum(structure.ends[:, 0] - z, -reach), -1e-12) / sizes
+    high = np.maximum(np.minimum(structure.ends[:, 1] - z, reach), 1e-12) / sizes
+    return np.asarray(lsq_linear(root, target, (low, high), method="bvls").x * sizes)
+
+
+def _promised(structure: Structure, errors: Array, slopes: Array, move: Array) -> float:
+    """What a step gains if all is linear, nats, the scale of the errors being the most likely one before it."""
+    z, scale = structure.standard, max(float(np.mean(errors**2)), 1e-300)
+    after = float(np.sum((errors + slopes @ move) ** 2))
+    gain = (float(errors @ errors) - after) / scale
+    return 0.5 * (gain + float(z @ z) - float((z + move) @ (z + move)))
+
+
+def _finer(observer: Observer, settings: Settings) -> Observer | None:
+    return Observer(observer.band, 2 * observer.steps) if 2 * observer.steps <= settings.finest else None
+
+
+def _wider(observer: Observer, settings: Settings) -> Observer | None:
+    return Observer(2.0 * observer.band, observer.steps) if 2.0 * observer.band <= settings.widest else None
+
+
+def _narrower(observer: Observer, settings: Settings) -> Observer | None:
+    return Observer(0.5 * observer.band, observer.steps) if 0.5 * observer.band >= settings.narrowest else None
