@@ -39,6 +39,8 @@ LIMIT_SHARES = (0.95, 0.7, 0.4)
 PRESLIDING_SHARES = (0.004, 0.02, 0.1)
 #: Times tried in which hoses and filters lose their pressure, s.
 DROP_TIMES = (0.01, 0.05, 0.2)
+#: Times after which a machine is warm, as shares of the longest record.
+WARMING_SHARES = (0.1, 0.4)
 #: Number of ripple periods proposed by the periodogram.
 PERIODS = 3
 
@@ -105,7 +107,7 @@ def candidates(
     residual : ndarray
         Residual of ``model`` on ``data``; periods of a ripple are read from it.
     effects : sequence of str, optional
-        Restrict the search to these.
+        Restrict the search to these; to those that a diagnosis tries if not given.
     """
     return tuple(
         _candidate(effect, site, model, data, residual)
@@ -127,7 +129,7 @@ def _absent(model: Model, effects: Sequence[str] | None) -> list[tuple[EffectTyp
     present, by_key = {(effect.name, effect.at) for effect in model.effects}, {effect.key for effect in model.effects}
     found = []
     for effect in EFFECTS.values():
-        if not effect.screened or (effects is not None and effect.name not in effects):
+        if effect.name not in effects if effects is not None else not effect.screened:
             continue
         for site in sites_worth_trying(effect, model):
             needed = effect.requires is None or (effect.requires, site) in by_key
@@ -158,11 +160,11 @@ def _candidate(effect: EffectType, site: str, model: Model, data: InverseDynamic
         starts = tuple({"stribeck_velocity": s * seen.speed, "transition_velocity": velocity} for s in STRIBECK_SHARES)
         bounds = {"stribeck_velocity": (2e-3 * seen.speed, HIGHEST_STRIBECK * seen.speed)}
         return Candidate(effect, site, starts, bounds, fixed=("transition_velocity",))
-    if effect.name == "torque_ripple":
+    if effect.name in {"torque_ripple", "position_dependent_friction"}:
         periods = _ripple_periods(data, model, joint, residual)
         bounds = {"period": (min(periods) / 1.5, max(periods) * 1.5)}
         return Candidate(effect, site, tuple({"period": p} for p in periods), bounds)
-    if effect.name == "spring":
+    if effect.name in {"spring", "cubic_spring"}:
         return Candidate(effect, site, ({"rest": seen.middle},), {"rest": _around(seen)})
     if effect.name == "hysteresis":
         # A way that is passed between two samples cannot be told from dry friction.
@@ -175,8 +177,8 @@ def _candidate(effect: EffectType, site: str, model: Model, data: InverseDynamic
         limited = effect.name == "saturation"
         guessed = seen_limit(data, model.joints[joint], seen.input, residual) if limited else None
         return _in_drive(effect, site, seen, guessed)
-    if effect.name == "supply_drop":
-        return Candidate(effect, site, tuple({"time_constant": t} for t in DROP_TIMES), {"time_constant": (1e-3, 5.0)})
+    if effect.name in {"supply_drop", "warming_friction"}:
+        return _fading(effect, site, max(m.dt * len(m.time) for m in data.motions))
     if effect.name == "entrained_air":
         # Data hardly show in which way air is compressed.
         return Candidate(effect, site, ({},), fixed=("exponent", "reference_pressure"))
@@ -192,6 +194,14 @@ def _in_drive(effect: EffectType, site: str, seen: Excitation, guessed: float | 
         name, bounds = "limit", (0.02 * seen.command, seen.command)
         values = [share * seen.command for share in LIMIT_SHARES] + ([] if guessed is None else [guessed])
     return Candidate(effect, site, tuple({name: value} for value in values), {name: bounds}, neutral=False)
+
+
+def _fading(effect: EffectType, site: str, longest: float) -> Candidate:
+    """What comes or goes with a time constant; warmth that outlasts the ``longest`` record, s, is no change."""
+    if effect.name == "warming_friction":
+        bounds = {"time_constant": (0.01 * longest, longest)}
+        return Candidate(effect, site, _grid("time_constant", WARMING_SHARES, longest), bounds)
+    return Candidate(effect, site, _grid("time_constant", DROP_TIMES, 1.0), {"time_constant": (1e-3, 5.0)})
 
 
 def _payload_places(model: Model, body: str) -> tuple[Mapping[str, float], ...]:

@@ -2,25 +2,33 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
+from vpm.discrepancy.candidates import Key
 from vpm.errors import VpmError
 from vpm.ranking.colour import Colour, Parts, colour_of, plain
-from vpm.ranking.observed import Observed, Observer, fewest_steps
+from vpm.ranking.observed import FINEST, Observed, Observer, fewest_steps
 from vpm.ranking.settings import Settings
 from vpm.ranking.structure import Structure
 
 Array = NDArray[np.float64]
+#: Another observer, if there is one.
+Change = Callable[[Observer, Settings], Observer | None]
 #: Shares of a step that are tried, the largest first.
 SHARES = (1.0, 0.3, 0.08)
+#: Shares of an effect that are left on the way to nothing.
+FADING = (0.75, 0.5, 0.25, 0.0)
 #: Residuals and derivatives that no record has; their squares are still numbers.
 RUNAWAY = 1e100
+#: What is raised of structures that the records contradict, or that cannot be computed.
+ASTRAY = (VpmError, ArithmeticError)
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,22 +140,66 @@ class Fitter:
         return self._weighed(self.followed(ended.structure, observer))
 
     def settled(self, found: Fitted) -> Fitted:
-        """At its own colour, bandwidth and number of steps, the effects being fitted anew at each."""
-        found = self._improved(found, found.observer)
-        for change in (_finer, _wider, _narrower):
-            while (observer := change(found.observer, self.settings)) is not None:
-                other = self._improved(found, observer)
-                if other is found:
-                    break
-                found = other
-        return found
+        """At its own colour, bandwidth and number of equal steps, the effects being fitted anew at each."""
+        return self._changed(self._improved(found, found.observer), (_finer, _wider, _narrower))
+
+    def finished(self, found: Fitted) -> Fitted:
+        """The same, and where equal steps are still too coarse, under steps of controlled error."""
+        found = self.settled(found)
+        if found.observer.controlled or found.observer.steps < FINEST:
+            return found
+        return self._changed(found, (_controlled, _wider, _narrower))
+
+    def equally_coarse(self, found: Fitted) -> Fitted:
+        """What was found, under equal steps."""
+        if not found.observer.controlled:
+            return found
+        return self.fitted(found.structure, replace(found.observer, steps=FINEST, controlled=False), found.colour)
+
+    def without(self, found: Fitted, key: Key) -> Fitted:
+        """The same without one of its effects, whose part the others take over as far as they can.
+
+        Raises
+        ------
+        VpmError, ArithmeticError
+            Another effect rests on it, or the rest runs away from the records.
+        """
+        starts = [found.structure.without(key)]
+        with contextlib.suppress(*ASTRAY):
+            starts.append(self._faded(found, tuple(starts[0].priors)).without(key))
+        start = min(starts, key=lambda one: self._cost_of(one, found))
+        return self.finished(self.fitted(start, found.observer, found.colour))
+
+    def _faded(self, found: Fitted, kept: Sequence[str]) -> Structure:
+        """With an effect walked back to nothing, the others that are ``kept`` following it by linear models.
+
+        Where they can do the same, as a gain of a sensor and what it measures, this stays on the way from one to the
+        other; where they have to jump, a fit ends elsewhere.
+        """
+        structure, begun = found.structure, found.structure.standard
+        stays = np.array([name in kept for name in structure.priors])
+        for share in FADING:
+            errors, slopes = View(found.colour, {}).errors(
+                self.followed(structure, found.observer), self.observed.parts
+            )
+            move = np.where(stays, 0.0, structure.neutral + share * (begun - structure.neutral) - structure.standard)
+            others = replace(structure, priors={name: structure.priors[name] for name in kept})
+            move[stays] = bounded_step(others, errors + slopes @ move, slopes[:, stays], self.settings.reach)
+            structure = structure.at(structure.standard + move)
+        return structure
+
+    def _cost_of(self, structure: Structure, found: Fitted) -> float:
+        try:
+            return self.cost(structure, self._pass(structure, found.observer, ())[0], found.colour)
+        except ASTRAY:
+            return math.inf
 
     def followed(
         self, structure: Structure, observer: Observer, names: Sequence[str] | None = None, *, exact: bool = False
     ) -> Followed:
         """What the observer leaves of the records, with derivatives by some parameters, or by all that are unknown.
 
-        ``exact`` derivatives are those of the observer's own steps.
+        ``exact`` derivatives are those of the observer's own steps, or of the finest of equal length.
 
         Raises
         ------
@@ -156,17 +208,27 @@ class Fitter:
         """
         names = tuple(structure.priors if names is None else names)
         columns = [structure.model.index(name) for name in names]
-        steps = observer.steps if exact else fewest_steps(structure.model)
-        if steps >= observer.steps:
-            return Followed(structure, observer, names, *self._pass(structure, observer, columns))
-        residual, _ = self._pass(structure, observer, ())
-        _, jacobian = self._pass(structure, replace(observer, steps=steps), columns)
-        return Followed(structure, observer, names, residual, jacobian)
+        plain_steps = Observer(observer.band, FINEST if exact else fewest_steps(structure.model))
+        if observer.controlled or plain_steps.steps < observer.steps:
+            residual, _ = self._pass(structure, observer, ())
+            with contextlib.suppress(*ASTRAY):  # contacts may be too stiff for few steps
+                return Followed(structure, observer, names, residual, self._pass(structure, plain_steps, columns)[1])
+        return Followed(structure, observer, names, *self._pass(structure, observer, columns))
 
     def cost(self, structure: Structure, residual: Array, colour: Colour) -> float:
         """Negative logarithm of the posterior density but for a constant."""
         errors = colour.whitened(residual, self.observed.parts)
         return colour.cost(errors) + 0.5 * float(structure.standard @ structure.standard)
+
+    def _changed(self, found: Fitted, changes: Sequence[Change]) -> Fitted:
+        """Under other observers, one change after the other, as far as each is for the better."""
+        for change in changes:
+            while (observer := change(found.observer, self.settings)) is not None:
+                other = self._improved(found, observer)
+                if other is found:
+                    break
+                found = other
+        return found
 
     def _improved(self, found: Fitted, observer: Observer) -> Fitted:
         """Fitted under another observer, under the colour there, if that is better."""
@@ -179,7 +241,7 @@ class Fitter:
                 if not better.evidence > other.evidence + self.settings.tolerance:
                     break
                 other = better
-        except (VpmError, ArithmeticError):
+        except ASTRAY:
             return found
         return other if other.evidence > found.evidence + self.settings.tolerance else found
 
@@ -211,7 +273,7 @@ class Fitter:
             tried = now.structure.at(now.structure.standard + share * move)
             try:
                 residual, _ = self._pass(tried, now.observer, ())
-            except (VpmError, ArithmeticError):
+            except ASTRAY:
                 continue
             after = self.cost(tried, residual, colour)
             if after < before:
@@ -260,13 +322,18 @@ def _promised(structure: Structure, errors: Array, slopes: Array, move: Array) -
     return 0.5 * (gain + float(z @ z) - float((z + move) @ (z + move)))
 
 
-def _finer(observer: Observer, settings: Settings) -> Observer | None:
-    return Observer(observer.band, 2 * observer.steps) if 2 * observer.steps <= settings.finest else None
+def _finer(observer: Observer, _: Settings) -> Observer | None:
+    coarse = not observer.controlled and observer.steps < FINEST
+    return replace(observer, steps=2 * observer.steps) if coarse else None
+
+
+def _controlled(observer: Observer, _: Settings) -> Observer | None:
+    return None if observer.controlled else replace(observer, steps=1, controlled=True)
 
 
 def _wider(observer: Observer, settings: Settings) -> Observer | None:
-    return Observer(2.0 * observer.band, observer.steps) if 2.0 * observer.band <= settings.widest else None
+    return replace(observer, band=2.0 * observer.band) if 2.0 * observer.band <= settings.widest else None
 
 
 def _narrower(observer: Observer, settings: Settings) -> Observer | None:
-    return Observer(0.5 * observer.band, observer.steps) if 0.5 * observer.band >= settings.narrowest else None
+    return replace(observer, band=0.5 * observer.band) if 0.5 * observer.band >= settings.narrowest else None

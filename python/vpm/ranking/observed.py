@@ -24,6 +24,10 @@ Array = NDArray[np.float64]
 DAMPING = float(np.sqrt(0.5))
 #: Fewest steps of the integrator within a sample where a joint is split: contacts and gears ring fast.
 STEPS = 4
+#: Most steps of equal length within a sample; where these are too coarse, the integrator controls its error.
+FINEST = 8
+#: The integrator that does.
+CONTROLLED = "adaptive"
 
 
 @dataclass(frozen=True)
@@ -36,10 +40,13 @@ class Observer:
         Bandwidth, Hz.
     steps : int
         Steps of the integrator within a sample: its errors are errors of the model too.
+    controlled : bool
+        Whether it takes as many more as keep its error within a tolerance.
     """
 
     band: float
     steps: int = 1
+    controlled: bool = False
 
     @property
     def label(self) -> str:
@@ -122,7 +129,7 @@ class Observed:
             np.tile(gain.ravel(), (len(record.time), 1)),
             record.dt,
             self.setup.substeps * observer.steps,
-            self.setup.method(model),
+            CONTROLLED if observer.controlled else self.setup.method(model),
             list(columns),
             self.setup.hold,
         )

@@ -11,15 +11,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from vpm.catalogue import EFFECTS
 from vpm.catalogue.kinds import Side
 from vpm.discrepancy.candidates import Candidate, Key, candidates
 from vpm.discrepancy.side_by_side import Failure, SideBySide
-from vpm.errors import VpmError
 from vpm.identify import InverseDynamicsProblem
 from vpm.identify.reuse import SPLITTING
 from vpm.model import Model
 from vpm.ranking.colour import Colour, plain
-from vpm.ranking.fit import Fitted, Fitter, Followed, View, bounded_step
+from vpm.ranking.fit import ASTRAY, Fitted, Fitter, Followed, View, bounded_step
 from vpm.ranking.observed import Observer, fewest_steps
 from vpm.ranking.settings import Settings
 from vpm.ranking.sizes import Sizes
@@ -36,6 +36,7 @@ class Reference:
 
     Attributes
     ----------
+    fitted : Fitted
     followed : Followed
     view : View
         Derivatives by what is unknown already are taken as known for structures with an effect more.
@@ -43,8 +44,8 @@ class Reference:
         See `Fitter.cost`.
     """
 
-    def __init__(self, followed: Followed, colour: Colour, fitter: Fitter) -> None:
-        self.followed, parts = followed, fitter.observed.parts
+    def __init__(self, fitted: Fitted, followed: Followed, colour: Colour, fitter: Fitter) -> None:
+        self.fitted, self.followed, parts = fitted, followed, fitter.observed.parts
         self.view = View(colour, dict(zip(followed.names, colour.whitened(followed.jacobian, parts).T, strict=True)))
         self.cost = fitter.cost(followed.structure, followed.residual, colour)
         self._parts, self._reach = parts, fitter.settings.reach
@@ -107,7 +108,7 @@ def extended(
     """
     splits = candidate.effect.name in SPLITTING
     if splits and side == "link":
-        structure = structure.behind(candidate.site)
+        structure = structure.beside(candidate.site, side)
     side = "motor" if splits else side
     model = structure.model.with_effect(candidate.effect.name, candidate.site, side=side, **start)
     effect, carried = model.effect(*candidate.key, side), structure.carried(model)
@@ -138,7 +139,7 @@ def proposals(
     They are the best few by each observer and each way to look at what it leaves.
     """
     model = found.structure.model.with_parameters(found.structure.values)
-    plausible = candidates(model, data, data.evaluate(model, model.theta)[0])
+    plausible = candidates(model, data, data.evaluate(model, model.theta)[0], tuple(EFFECTS))
     listed = [started(candidate, model, sizes) for candidate in plausible]
     looks = [_references(one, fitter) for one in observers(found, fitter)]
     items = [
@@ -166,19 +167,19 @@ def proposals(
 
 def observers(found: Fitted, fitter: Fitter) -> list[Fitted]:
     """What was found, under its own observer first, and under those that search, unless one of them is like its own."""
-    own = found.observer
-    others = [band for band in fitter.settings.bands if not 0.5 < band / own.band < 2.0]
     references = [found]
-    for band in others:
-        with contextlib.suppress(VpmError):  # a slow observer may lose what hangs behind a contact
-            references.append(fitter.fitted(found.structure, Observer(band, own.steps)))
+    for band in fitter.settings.bands:
+        if not 0.5 < band / found.observer.band < 2.0:
+            with contextlib.suppress(*ASTRAY):  # a slow observer may lose what hangs behind a contact
+                references.append(fitter.fitted(found.structure, replace(found.observer, band=band)))
     return references
 
 
 def _references(found: Fitted, fitter: Fitter) -> list[Reference]:
     """Ways to look at it: as it is, where an effect of slow motion is large, and whitened, where a weak one is."""
     followed = fitter.followed(found.structure, found.observer)
-    return [Reference(followed, c, fitter) for c in (plain(followed.residual, fitter.observed.parts), found.colour)]
+    colours = plain(followed.residual, fitter.observed.parts), found.colour
+    return [Reference(found, followed, colour, fitter) for colour in colours]
 
 
 def _seen(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
@@ -11,13 +12,13 @@ from threadpoolctl import threadpool_limits
 
 from vpm.discrepancy.candidates import Key, slow_speeds
 from vpm.discrepancy.side_by_side import Failure, Progress, SideBySide
-from vpm.errors import DiagnosisError, VpmError
+from vpm.errors import DiagnosisError
 from vpm.experiment import Experiment, as_records
 from vpm.identify import InverseDynamicsProblem
 from vpm.model import Model
-from vpm.ranking.fit import Fitted, Fitter
+from vpm.ranking.fit import ASTRAY, Fitted, Fitter
 from vpm.ranking.observed import Observed, Observer
-from vpm.ranking.proposals import Proposal, proposals
+from vpm.ranking.proposals import SIDES, Proposal, proposals
 from vpm.ranking.result import Ranked, Ranking
 from vpm.ranking.settings import Settings
 from vpm.ranking.sizes import Sizes
@@ -106,50 +107,71 @@ class _Search:
     def run(self) -> Ranking:
         """See `rank`."""
         self.say("fitting what is uncertain")
-        found = self.fitter.settled(self.fitter.fitted(self.start, Observer(self.settings.bands[0])))
+        found = self.fitter.finished(self.fitter.fitted(self.start, Observer(self.settings.bands[0])))
+        self.bare = found.log_likelihood
         rounds: list[tuple[Ranked, ...]] = []
         effects: list[Ranked] = []
         while len(effects) < self.settings.effects:
-            found, tried = self._round(found)
-            rounds.append(tuple(self._ranked(one, found) for one in tried))
-            if not tried or rounds[-1][0].evidence < self.settings.odds:
+            found, best, others = self._round(found)
+            if best is None:
+                rounds.append(others)
                 break
-            best = rounds[-1][0]
-            close = [one for one in rounds[-1][1:] if best.evidence - one.evidence < self.settings.same]
-            rivals = tuple(f"{one.effect} at {one.site}" for one in close)
-            effects.append(replace(best, rivals=rivals))
-            self.say(f"{best.effect} at {best.site}: {best.evidence:.1f} nats")
-            found, needless = self._without_needless(tried[0])
+            one = self._ranked(best, found)
+            others = tuple(other for other in others if (other.effect, other.site) != (one.effect, one.site))
+            rounds.append((one, *others))
+            close = [other for other in others if one.evidence - other.evidence < self.settings.same]
+            effects.append(replace(one, rivals=tuple(f"{other.effect} at {other.site}" for other in close)))
+            self.say(f"{one.effect} at {one.site}: {one.evidence:.1f} nats")
+            found, needless = self._without_needless(best)
             effects = [one for one in effects if (one.effect, one.site) not in needless]
             if needless:
                 self.say("no longer needed: " + ", ".join(" at ".join(key) for key in needless))
         model = found.structure.model.with_parameters(found.structure.values)
         return Ranking(tuple(effects), tuple(rounds), model, found.observer.band, found.log_likelihood)
 
-    def _round(self, found: Fitted) -> tuple[Fitted, list[Fitted]]:
-        """What had been found, and structures with one effect more, the most probable first; each effect once.
+    def _round(self, found: Fitted) -> tuple[Fitted, Fitted | None, tuple[Ranked, ...]]:
+        """What had been found, with the best effect more if one pays, and all that were tried, the most probable first.
 
-        What the best of them makes of the parameters that had been found may be better without it too: a fit that had
-        not come to its end is no evidence for one effect more.
+        What an effect makes of the parameters that had been found may be better without it too: a fit that had not come
+        to its end is no evidence for one effect more.
         """
         while True:
-            tried = self._tried(found)
-            if not tried or tried[0].evidence - found.evidence < self.settings.odds:
-                return found, tried
-            other = self._settled_without(tried[0], tried[0].structure.effects[-1])
-            if other is None or other.evidence < found.evidence + self.settings.same:
-                return found, tried
-            found = other
+            coarse = self.fitter.equally_coarse(found)
+            tried = self._tried(coarse)
+            others = tuple(self._ranked(one, coarse) for one in tried)
+            for one in tried[: self.settings.finalists]:
+                if one.evidence - coarse.evidence < self._price(found):
+                    return found, None, others
+                best = self._turned(self.fitter.finished(one))
+                without = self._without(best, best.structure.effects[-1])
+                if without is not None and without.evidence > found.evidence + self.settings.same:
+                    found = without
+                    break
+                if best.evidence - found.evidence >= self._price(found):
+                    return found, best, others
+            else:
+                return found, None, others
+
+    def _price(self, found: Fitted) -> float:
+        """Evidence that another effect has to bring, nats.
+
+        No law is exact. Where those that were found explain a power P beside the noise, as by their log likelihood,
+        what they do otherwise has a share of it, and an effect that takes up no more than that is none.
+        """
+        samples = sum(int(part.stop - part.start) for part in self.fitter.observed.parts)
+        explained = max(found.log_likelihood - self.bare, 0.0)
+        power = float(np.expm1(min(2.0 * explained / samples, 700.0)))
+        return self.settings.odds + 0.5 * samples * float(np.log1p(self.settings.inexact**2 * power))
 
     def _tried(self, found: Fitted) -> list[Fitted]:
         chosen = proposals(found, self.fitter, self.data, self.sizes, self.each)
         trials = self.each("fitting", self._fitted, chosen, lambda one: " at ".join(one.key))
-        hopeful = {
-            id(trial)
-            for trial in trials
-            if isinstance(trial, Fitted) and trial.evidence + 2.0 * trial.promise > found.evidence
-        }
-        several = [[one for one in fits if id(one) in hopeful] for fits in _by_effect(trials)]
+        hopeful = [
+            trial
+            for trial, proposal in zip(trials, chosen, strict=True)
+            if isinstance(trial, Fitted) and trial.evidence + 2.0 * trial.promise > proposal.reference.fitted.evidence
+        ]
+        several = [_distinct(fits) for fits in _by_effect(hopeful)]
         last = [one for fits in several[: self.settings.finalists] for one in fits[: self.settings.optima]]
         ends = self.each("settling", self.fitter.settled, last, lambda one: " at ".join(one.structure.effects[-1]))
         return [fits[0] for fits in _by_effect([*ends, *trials])]
@@ -162,19 +184,32 @@ class _Search:
         """Without those of the earlier effects that a later one has made needless."""
         needless: list[Key] = []
         for key in found.structure.effects[:-1]:
-            other = self._settled_without(found, key)
+            other = self._without(found, key)
             if other is not None and found.evidence - other.evidence < self.settings.odds:
                 found = other
                 needless.append(key)
         return found, needless
 
-    def _settled_without(self, found: Fitted, key: Key) -> Fitted | None:
+    def _without(self, found: Fitted, key: Key) -> Fitted | None:
         """The same without an effect; None where that runs away or another one rests on it."""
         try:
-            structure = found.structure.without(key)
-            return self.fitter.settled(self.fitter.fitted(structure, found.observer, found.colour))
-        except (VpmError, ArithmeticError):
+            return self.fitter.without(found, key)
+        except ASTRAY:
             return None
+
+    def _turned(self, found: Fitted) -> Fitted:
+        """With what acts at the joint of the last effect on its other side, where it has two and that is better."""
+        model, joint = found.structure.model, found.structure.effects[-1][1]
+        sides = {effect.side for effect in model.effects if effect.at == joint and effect.type.has_sides}
+        if not sides or joint not in model.joints or not model.joint_behind(joint):
+            return found
+        turned = [found]
+        for side in SIDES:
+            with contextlib.suppress(*ASTRAY):
+                if sides != {side}:
+                    other = self.fitter.fitted(found.structure.beside(joint, side), found.observer, found.colour)
+                    turned.append(self.fitter.finished(other))
+        return max(turned, key=lambda one: one.evidence)
 
     @staticmethod
     def _ranked(one: Fitted, found: Fitted) -> Ranked:
@@ -190,6 +225,14 @@ def _by_effect(trials: Sequence[Fitted | Failure]) -> list[list[Fitted]]:
     for trial in sorted(whole, key=lambda one: -one.evidence):
         several.setdefault(trial.structure.effects[-1], []).append(trial)
     return list(several.values())
+
+
+def _distinct(fits: Sequence[Fitted]) -> list[Fitted]:
+    """Without those that ended where another one did."""
+    ends: dict[tuple[Observer, float], Fitted] = {}
+    for one in fits:
+        ends.setdefault((one.observer, round(one.evidence, 1)), one)
+    return list(ends.values())
 
 
 def known(model: Model, data: InverseDynamicsProblem) -> dict[str, Prior]:

@@ -16,8 +16,6 @@ class Settings:
         keeps a load behind a play in step.
     widest, narrowest : float
         Bandwidths among which a structure finds its own, Hz.
-    finest : int
-        Most steps of the integrator within a sample among which a structure finds its own.
     order : int
         Length of the autoregression that whitens what an observer leaves of a channel, samples.
     settling : float
@@ -42,6 +40,8 @@ class Settings:
         Deviations of its prior that a parameter may move in a step.
     odds : float
         Evidence, nats, that another effect has to bring.
+    inexact : float
+        By how much an effect differs from its law, as a share of what it does: another effect may take that up.
     same : float
         Effects within so many nats of the best cannot be told from it.
     effects : int
@@ -51,7 +51,6 @@ class Settings:
     bands: tuple[float, ...] = (1.0, 10.0)
     widest: float = 160.0
     narrowest: float = 0.25
-    finest: int = 8
     order: int = 12
     settling: float = 0.5
     seats: int = 5
@@ -64,5 +63,6 @@ class Settings:
     tolerance: float = 0.5
     reach: float = 6.0
     odds: float = 8.0
+    inexact: float = 0.05
     same: float = 3.0
     effects: int = 4

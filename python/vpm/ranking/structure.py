@@ -10,6 +10,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
+from vpm.catalogue.kinds import Side
 from vpm.discrepancy.candidates import Key
 from vpm.model import Model
 from vpm.weighing.priors import Prior
@@ -63,6 +64,21 @@ class Structure:
         return np.array([prior.standard(float(self.theta[column])) for prior, column in pairs])
 
     @cached_property
+    def neutral(self) -> Array:
+        """Where each of the unknown parameters does nothing, in deviations of the priors (k,); shapes stay."""
+        nothing = {
+            name: effect.type.parameter(short).neutral
+            for effect in self.model.effects
+            for short, name in effect.parameter_names.items()
+            if not effect.type.parameter(short).shape
+        }
+        values = [nothing.get(name) for name in self.priors]
+        pairs = zip(values, self.priors.values(), self.standard, strict=True)
+        return np.array(
+            [z if value is None or prior.logarithmic else prior.standard(value) for value, prior, z in pairs]
+        )
+
+    @cached_property
     def slopes(self) -> Array:
         """Change of each unknown parameter by a deviation (k,)."""
         pairs = zip(self.priors.values(), self.columns, strict=True)
@@ -92,12 +108,12 @@ class Structure:
         shown = tuple(kept[name] for name in self.shown if name in kept)
         return Structure(model, theta, priors, self.effects, shown)
 
-    def behind(self, joint: str) -> Structure:
-        """The same with what rubs, pulls or stops at a joint on its link side."""
+    def beside(self, joint: str, side: Side) -> Structure:
+        """The same with what rubs, pulls or stops at a joint on one of its sides."""
         content, renamed = self.model.to_dict(), {}
         for entry, effect in zip(content["effects"], self.model.effects, strict=True):
             if effect.at == joint and effect.type.has_sides:
-                entry["side"] = "link"
+                entry["side"] = side
         model = type(self.model)(content)
         for old, new in zip(self.model.effects, model.effects, strict=True):
             renamed.update({name: new.parameter_names[short] for short, name in old.parameter_names.items()})
