@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import deque
 from pathlib import Path
 
 import numpy as np
@@ -12,70 +11,13 @@ from scipy.stats import norm
 from scipy.stats import t as student
 
 import vpm
+from sledge import MASS, OIL, SLEDGE, pushed
 from vpm.errors import DiagnosisError
-from vpm.experiment import Experiment
 from vpm.model import Model
 from vpm.ranking.colour import Colour, colour_of, log_student, plain, scale_of
 from vpm.ranking.observed import DAMPING, observer_gain
 
 Array = NDArray[np.float64]
-
-#: A sledge that a motor pushes, with friction of oil; the file is a tenth off.
-SLEDGE = """
-name = "sledge"
-gravity = [0, 0, 0]
-[bodies.sledge]
-mass = { value = 3.3, uncertainty = 0.33 }
-[joints.way]
-type = "prismatic"
-parent = "world"
-child = "sledge"
-axis = [1, 0, 0]
-[actuators.motor]
-joint = "way"
-gain = 4.0
-[[effects]]
-type = "viscous_friction"
-at = "way"
-viscous = { value = 7.0, uncertainty = 1.5 }
-"""
-MASS, OIL, GAIN, STEP, FINE, READING = 3.0, 8.0, 4.0, 2e-3, 10, 5e-6
-
-
-def pushed(
-    *, dry: float = 0.0, lag: float = 0.0, late: float = 0.0, ends: float = np.inf, seed: int = 0, duration: float = 8.0
-) -> Experiment:
-    """The sledge by small explicit steps: dry friction as an impulse that at most stops it, a delay as a queue."""
-    random, samples, h = np.random.default_rng(seed), round(duration / STEP), STEP / FINE
-    time = STEP * np.arange(samples)
-    phases = random.uniform(0.0, 2.0 * np.pi, 3)
-    swing = (
-        np.sin(2.1 * time + phases[0]) + 0.6 * np.sin(5.3 * time + phases[1]) + 0.3 * np.sin(17.0 * time + phases[2])
-    )
-    command = 5.0 * swing * np.minimum(time, 1.0)
-    place, speed, force = 0.0, 0.0, 0.0
-    queue = deque([0.0] * round(late / h))
-    places = np.empty(samples)
-    for sample in range(samples):
-        places[sample] = place
-        for _ in range(FINE):
-            queue.append(command[sample])
-            asked, before = GAIN * queue.popleft(), speed
-            mean = asked + (force - asked) * (_mean_decay(h / lag) if lag else 0.0)
-            force = asked + (force - asked) * (np.exp(-h / lag) if lag else 0.0)
-            stop = -4e4 * (place - np.clip(place, -ends, ends))
-            speed = speed * np.exp(-h * OIL / MASS) + h * _mean_decay(h * OIL / MASS) * (mean + stop) / MASS
-            speed -= np.clip(speed, -h * dry / MASS, h * dry / MASS)
-            place += 0.5 * h * (before + speed)
-    readings = places + READING * random.standard_normal(samples)
-    return Experiment.from_arrays(
-        time, {"motor.command": command, "way.position": readings}, model=Model.from_toml(SLEDGE), name=f"push {seed}"
-    )
-
-
-def _mean_decay(turn: float) -> float:
-    """Mean of ``exp(-x)`` for x from 0 to ``turn``."""
-    return float(-np.expm1(-turn) / turn)
 
 
 def test_an_autoregression_is_found_again_and_its_density_is_the_exact_one() -> None:

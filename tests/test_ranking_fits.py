@@ -1,0 +1,138 @@
+"""Fits of a ranking: what is known while it searches, effects that fade, sides, steps, the price of one more."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sledge import MASS, OIL, SLEDGE, pushed
+from vpm.catalogue import EFFECTS
+from vpm.discrepancy.candidates import candidates
+from vpm.discrepancy.side_by_side import SideBySide
+from vpm.identify import InverseDynamicsProblem
+from vpm.model import Model
+from vpm.ranking.fit import Fitter, View
+from vpm.ranking.observed import Observed, Observer
+from vpm.ranking.rank import _Search
+from vpm.ranking.settings import Settings
+from vpm.ranking.structure import Structure
+from vpm.weighing import Prior
+
+#: The sledge with an encoder, which may show too much.
+SEEN = (
+    SLEDGE
+    + """
+[sensors.encoder]
+measures = "way.position"
+"""
+)
+
+
+def fitter_of(model: Model, settings: Settings | None = None) -> Fitter:
+    settings = settings or Settings()
+    return Fitter(Observed(model, [pushed(seed=1, duration=4.0), pushed(seed=2, duration=4.0)], settings), settings)
+
+
+def structure_of(model: Model, **priors: Prior) -> Structure:
+    known = {
+        p.name: Prior(p.value, p.uncertainty, p.minimum, p.maximum) for p in model.parameters.values() if p.uncertainty
+    }
+    return Structure(model, model.theta.copy(), {**known, **{name.replace("__", "."): p for name, p in priors.items()}})
+
+
+@pytest.mark.parametrize("effect", ["coulomb_friction", "spring", "quadratic_drag", "hysteresis", "bias_force"])
+def test_derivatives_by_what_is_known_stay_where_an_effect_does_nothing(effect: str) -> None:
+    model = Model.from_toml(SLEDGE)
+    shapes = {"hysteresis": {"displacement": 0.05}, "spring": {"rest": 0.1}}
+    fitter, observer = fitter_of(model), Observer(1.0)
+    without = structure_of(model)
+    beside = without.carried(model.with_effect(effect, "way", **shapes.get(effect, {})))
+    plain, more = fitter.followed(without, observer), fitter.followed(beside, observer)
+    scale = np.abs(plain.jacobian).max(axis=(0, 1))
+    assert np.abs(more.residual - plain.residual).max() < 1e-12
+    np.testing.assert_allclose(more.jacobian / scale, plain.jacobian / scale, atol=1e-9)
+
+
+def test_many_equal_steps_come_to_what_steps_of_controlled_error_say() -> None:
+    model = Model.from_toml(SLEDGE).with_effect("end_stop", "way", low=-0.5, high=0.5, stiffness=4e4, damping=0.01)
+    structure, fitter = structure_of(model), fitter_of(Model.from_toml(SLEDGE))
+    exact = fitter.followed(structure, Observer(1.0, 1, controlled=True), ()).residual
+    off = [np.abs(fitter.followed(structure, Observer(1.0, steps), ()).residual - exact).max() for steps in (1, 4, 16)]
+    assert off[0] > 4.0 * off[1] > 16.0 * off[2]
+
+
+def test_an_effect_that_parameters_can_do_is_walked_back_to_them() -> None:
+    model = Model.from_toml(SEEN).with_effect("sensor_gain", "encoder", value=1.25)
+    gain = "encoder.gain.value"
+    assert gain in model.parameter_names
+    # What the encoder shows a quarter too large moves as a sledge that is a quarter heavier.
+    heavy = model.with_parameters({"sledge.mass": 1.25 * MASS, "way.friction.viscous": 1.25 * OIL})
+    structure = replace(
+        structure_of(heavy),
+        priors={
+            "sledge.mass": Prior(3.3, 1.0, 0.1, 100.0),
+            "way.friction.viscous": Prior(7.0, 3.0, 0.0, 100.0),
+            gain: Prior(1.0, 0.2, 0.1, 10.0),
+        },
+        effects=(("sensor_gain", "encoder"),),
+    )
+    fitter = fitter_of(Model.from_toml(SEEN))
+    found = fitter.fitted(structure, Observer(1.0))
+    rest = fitter.without(found, ("sensor_gain", "encoder"))
+    assert rest.structure.effects == ()
+    assert rest.structure.values["sledge.mass"] == pytest.approx(MASS, rel=2e-3)
+    assert rest.structure.values["way.friction.viscous"] == pytest.approx(OIL, rel=5e-3)
+    faded = fitter._faded(found, ("sledge.mass", "way.friction.viscous"))
+    assert faded.values[gain] == pytest.approx(1.0)
+    assert faded.values["sledge.mass"] == pytest.approx(MASS, rel=2e-2)
+
+
+def test_friction_goes_to_the_other_side_of_a_backlash_and_back() -> None:
+    model = Model.from_toml(SLEDGE).with_effect("backlash", "way", gap=1e-3, stiffness=1e5, inertia=0.3)
+    structure = structure_of(model)
+    there = structure.beside("way", "link")
+    assert "way.link.friction.viscous" in there.priors
+    assert there.values["way.link.friction.viscous"] == structure.values["way.friction.viscous"]
+    back = there.beside("way", "motor")
+    assert back.model == structure.model
+    assert back.values == structure.values
+    assert structure.model.joint_behind("way") == "way_deflection"
+    assert Model.from_toml(SLEDGE).joint_behind("way") is None
+
+
+def test_another_effect_pays_for_what_laws_leave() -> None:
+    model = Model.from_toml(SLEDGE)
+    records = [pushed(seed=1, duration=4.0), pushed(seed=2, duration=4.0)]
+    search = _Search(model, records, Settings(), None, SideBySide(1, None), lambda _: None)
+    found = search.fitter.fitted(search.start, Observer(1.0))
+    search.bare = found.log_likelihood
+    assert search._price(found) == Settings().odds
+    samples = sum(part.stop - part.start for part in search.fitter.observed.parts)
+    explained = replace(found, log_likelihood=found.log_likelihood + 0.05 * samples)
+    # Little beside the noise: its share of the likelihood itself.
+    assert search._price(explained) == pytest.approx(Settings().odds + 0.05**2 * 0.05 * samples, rel=0.06)
+
+
+def test_effects_that_a_diagnosis_does_not_try_are_candidates_where_they_are_asked_for() -> None:
+    model = Model.from_toml(SLEDGE)
+    data = InverseDynamicsProblem(model, [pushed(seed=1, duration=4.0)])
+    residual = data.evaluate(model, model.theta)[0]
+    named = {one.effect.name for one in candidates(model, data, residual, tuple(EFFECTS))}
+    usual = {one.effect.name for one in candidates(model, data, residual)}
+    assert named > usual
+    assert {"quadratic_drag", "cubic_spring", "warming_friction", "load_dependent_friction"} <= named - usual
+
+
+def test_a_view_prefers_derivatives_that_are_there() -> None:
+    model = Model.from_toml(SLEDGE)
+    fitter, structure = fitter_of(model), structure_of(model)
+    found = fitter.fitted(structure, Observer(1.0))
+    followed, parts = fitter.followed(found.structure, Observer(1.0)), fitter.observed.parts
+    known = dict(zip(followed.names, found.colour.whitened(followed.jacobian, parts).T, strict=True))
+    bare = replace(followed, names=(), jacobian=followed.jacobian[:, :, :0])
+    for one, other in zip(
+        View(found.colour, known).errors(bare, parts), View(found.colour, {}).errors(followed, parts), strict=True
+    ):
+        np.testing.assert_allclose(one, other)
