@@ -27,8 +27,8 @@ SITE_KINDS: tuple[SiteKind, ...] = (
 
 JointKind = Literal["prismatic", "revolute", "helical"]
 
-#: Where at a joint that winds up or plays: before the spring or play, on the coordinate of the joint, or behind it, on
-#: the sum of that and the deflection.
+#: Where at a joint with a compliance or backlash: before the spring or gap, on the coordinate of the joint, or behind
+#: it, on the sum of that and the deflection.
 Side = Literal["motor", "link"]
 
 #: What in a record sets the natural size of a parameter; "one" means that the parameter is near 1 by nature.
@@ -155,7 +155,7 @@ class EffectType:
     formula : Formula or None
         Law of an entry that a user wrote, see `vpm.catalogue.register`.
     motor_side_alone : bool
-        Whether, at a joint that winds up or plays, it belongs to the motor side or to the spring itself.
+        Whether, at a joint with a compliance or backlash, it belongs to the motor side or to the spring itself.
     memory : str
         What the memory of its law, a state of the machine, is called at its site; "" if it has none.
     """
@@ -177,7 +177,7 @@ class EffectType:
 
     @property
     def has_sides(self) -> bool:
-        """Whether it may sit on either side of a joint that winds up or plays; the motor side if nothing is said."""
+        """Whether it may sit on either side of a compliance or backlash; the motor side if nothing is said."""
         return self.site == "joint" and not self.motor_side_alone
 
     @property

@@ -11,7 +11,7 @@ from vpm.catalogue.kinds import ABOVE_ZERO, ANY, NOT_NEGATIVE, EffectType, shape
 
 #: Way over which bristles bend where none is given: prismatic (m), revolute (rad).
 _PRESLIDING = (1e-5, 1e-4)
-#: Largest share of a load that the balance of effort has one solution for.
+#: Largest share of a load that inverse dynamics has one solution for.
 _SHARE = (0.0, 0.95)
 
 

@@ -26,7 +26,7 @@ class Effect:
     at : str
         Component that it sits at.
     side : {"motor", "link"}
-        Where at a joint that winds up or plays.
+        Where at a joint with a compliance or backlash.
     parameter_names : mapping of str to str
         Short name to dotted name of each parameter.
     """

@@ -198,7 +198,7 @@ class Model(Evaluations, Storable):
         return effects_of(self._checked.document)
 
     def effect(self, name: str, at: str, side: Side = "motor") -> Effect:
-        """The effect of one name at one site, on one side of what winds up or plays there.
+        """The effect of one name at one site, on one side of a compliance or backlash there.
 
         Raises
         ------
@@ -229,7 +229,7 @@ class Model(Evaluations, Storable):
         at : str
             Component that it sits at; ``"world"`` for a tilt of gravity.
         side : {"motor", "link"}
-            Where at a joint that winds up or plays; names of parameters on the link side begin with ``axis.link``.
+            Where at a joint with a compliance or backlash; names of parameters of the link side begin as ``axis.link``.
         **values : float
             SI values by short name. Sizes that are not given start where the effect does nothing, shape parameters at
             the start value of the catalogue. Sizes, and velocities and ways of friction laws that are not given, become

@@ -89,7 +89,7 @@ class EffectEntry(BaseModel):
     type : str
     at : str
     side : {"motor", "link"}
-        Where at a joint that winds up or plays.
+        Where at a joint with a compliance or backlash.
     """
 
     model_config = ConfigDict(extra="allow", frozen=True)

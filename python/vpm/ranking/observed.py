@@ -59,7 +59,7 @@ class Observed:
 
     The observer knows no noise: each measured joint is drawn to its encoder with the bandwidth, as by a soft spring
     with a damper between the machine and its log. All structures are compared under the same one. Where a joint is
-    split, the encoder sits at the motor and the motor alone is drawn; the load follows through its spring or its play.
+    split, the encoder sits at the motor and the motor alone is drawn; the load follows through its spring or backlash.
 
     Parameters
     ----------

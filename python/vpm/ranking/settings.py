@@ -13,7 +13,7 @@ class Settings:
     ----------
     bands : tuple of float
         Bandwidths of the observers that search, Hz: a slow one, whose residual is wide and easy to rank, and one that
-        keeps a load behind a play in step.
+        keeps a load behind a backlash in step.
     widest, narrowest : float
         Bandwidths among which a structure finds its own, Hz.
     order : int

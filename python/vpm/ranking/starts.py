@@ -21,15 +21,15 @@ def started(candidate: Candidate, model: Model, sizes: Sizes) -> Candidate:
     ends = {name: pair for name, pair in candidate.bounds.items() if name not in DETAILS}
     candidate = replace(candidate, bounds=ends)
     if candidate.effect.name == "backlash":
-        return replace(candidate, starts=tuple(_play(start) for start in candidate.starts), fixed=())
+        return replace(candidate, starts=tuple(_backlash(start) for start in candidate.starts), fixed=())
     if candidate.effect.name == "end_stop":
         starts = tuple(_stop(start, candidate.site, model, sizes) for start in candidate.starts)
         return replace(candidate, starts=starts, neutral=False)
     return candidate
 
 
-def _play(start: Mapping[str, float]) -> Mapping[str, float]:
-    """What rubs within the play is friction, not the contact."""
+def _backlash(start: Mapping[str, float]) -> Mapping[str, float]:
+    """What rubs within the gap is friction, not the contact."""
     return {**start, "contact_damping": start["damping"], "damping": 0.0}
 
 

@@ -51,7 +51,7 @@ class Reduction(Storable):
         Site of the effect, flexible link, drive; of velocity terms bodies and links, of coupling joints, with commas
         between them, or ``"the machine"``.
     side : {"motor", "link"}
-        Of an effect at a joint that winds up or plays.
+        Of an effect at a joint with a compliance or backlash.
     """
 
     kind: str

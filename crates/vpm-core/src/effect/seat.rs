@@ -1,4 +1,4 @@
-//! Where an effect of a joint sits: before or behind what winds up or plays there.
+//! Where an effect of a joint sits: before or behind a compliance or backlash there.
 
 use std::iter;
 
