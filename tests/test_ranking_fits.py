@@ -17,6 +17,8 @@ from vpm.ranking.fit import Fitter, View
 from vpm.ranking.observed import Observed, Observer
 from vpm.ranking.rank import _Search
 from vpm.ranking.settings import Settings
+from vpm.ranking.sizes import Sizes
+from vpm.ranking.starts import started
 from vpm.ranking.structure import Structure
 from vpm.weighing import Prior
 
@@ -136,3 +138,30 @@ def test_a_view_prefers_derivatives_that_are_there() -> None:
         View(found.colour, known).errors(bare, parts), View(found.colour, {}).errors(followed, parts), strict=True
     ):
         np.testing.assert_allclose(one, other)
+
+
+#: A pendulum that hangs on the sledge and that nobody measures.
+HANGING = (
+    SLEDGE.replace("[0, 0, 0]", "[0, 0, -9.81]")
+    + """
+[bodies.bob]
+mass = 0.4
+center_of_mass = [0, 0, -0.5]
+inertia = [0.01, 0.01, 0.001, 0, 0, 0]
+[joints.pivot]
+type = "revolute"
+parent = "sledge"
+child = "bob"
+axis = [0, 1, 0]
+"""
+)
+
+
+def test_nobody_guesses_where_a_joint_ends_that_nobody_sees() -> None:
+    model = Model.from_toml(HANGING)
+    data = InverseDynamicsProblem(model, [pushed(seed=1, duration=4.0)])
+    sizes = Sizes(model, data)
+    found = candidates(model, data, data.evaluate(model, model.theta)[0])
+    stops = {one.site: started(one, model, sizes).starts for one in found if one.effect.name == "end_stop"}
+    assert stops["pivot"] == ()
+    assert stops["way"]

@@ -23,7 +23,8 @@ def started(candidate: Candidate, model: Model, sizes: Sizes) -> Candidate:
     if candidate.effect.name == "backlash":
         return replace(candidate, starts=tuple(_backlash(start) for start in candidate.starts), fixed=())
     if candidate.effect.name == "end_stop":
-        starts = tuple(_stop(start, candidate.site, model, sizes) for start in candidate.starts)
+        seen = candidate.site in sizes.ways  # nobody knows where a joint ends that nobody sees
+        starts = tuple(_stop(start, candidate.site, model, sizes) for start in candidate.starts if seen)
         return replace(candidate, starts=starts, neutral=False)
     return candidate
 
