@@ -103,12 +103,12 @@ class _Search:
         self.fitter = Fitter(Observed(model, records, settings, setup), settings)
         self.sizes = Sizes(model, self.data)
         self.start = Structure(model, model.theta.copy(), known(model, self.data))
+        self.bare = 0.0  # log likelihood of the records without any effect
 
     def run(self) -> Ranking:
         """See `rank`."""
         self.say("fitting what is uncertain")
         found = self.fitter.finished(self.fitter.fitted(self.start, Observer(self.settings.bands[0])))
-        self.bare = found.log_likelihood
         rounds: list[tuple[Ranked, ...]] = []
         effects: list[Ranked] = []
         while len(effects) < self.settings.effects:
@@ -136,6 +136,8 @@ class _Search:
         to its end is no evidence for one effect more.
         """
         while True:
+            if not found.structure.effects:
+                self.bare = found.log_likelihood
             coarse = self.fitter.equally_coarse(found)
             tried = self._tried(coarse)
             others = tuple(self._ranked(one, coarse) for one in tried)
@@ -144,9 +146,10 @@ class _Search:
                     return found, None, others
                 best = self._turned(self.fitter.finished(one))
                 without = self._without(best, best.structure.effects[-1])
-                if without is not None and without.evidence > found.evidence + self.settings.same:
-                    found = without
-                    break
+                if without is not None and without.evidence > found.evidence:
+                    again, found = without.evidence > found.evidence + self.settings.odds, without
+                    if again:
+                        break
                 if best.evidence - found.evidence >= self._price(found):
                     return found, best, others
             else:
