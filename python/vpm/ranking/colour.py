@@ -99,7 +99,7 @@ def log_student(errors: Array, freedom: Array) -> Array:
 
 def scale_of(errors: Array, freedom: Array) -> float:
     """The most likely scale of errors with these degrees of freedom."""
-    size = max(float(np.sqrt(np.mean(errors**2))), 1e-300)
+    size = _deviation(errors)
     if not np.any(np.isfinite(freedom)):
         return size
     for _ in range(TURNS):

@@ -66,7 +66,7 @@ class Fitted:
         Of the records under that colour.
     evidence : float
         Logarithm of the probability density of the records under the structure, nats.
-    promise : float
+    predicted_gain : float
         What a bounded Gauss-Newton step would gain if all were linear, nats.
     """
 
@@ -75,7 +75,7 @@ class Fitted:
     colour: Colour
     log_likelihood: float
     evidence: float
-    promise: float
+    predicted_gain: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,15 +92,19 @@ class View:
     colour: Colour
     known: Mapping[str, Array]
 
-    def errors(self, followed: Followed, parts: Parts, roots: Array | None = None) -> tuple[Array, Array]:
-        """Prediction errors (n,) in roots of their weights, and their change by deviations of the priors (n, k)."""
+    def errors(self, followed: Followed, parts: Parts) -> tuple[Array, Array]:
+        """Prediction errors (n,), and their change by deviations of the priors (n, k)."""
         errors = self.colour.whitened(followed.residual, parts)
-        roots = self.colour.roots(errors) if roots is None else roots
         fresh = dict(zip(followed.names, self.colour.whitened(followed.jacobian, parts).T, strict=True))
         slopes = np.empty((len(errors), len(followed.structure.priors)))
         for place, (name, slope) in enumerate(zip(followed.structure.priors, followed.structure.slopes, strict=True)):
-            slopes[:, place] = (fresh[name] if name in fresh else self.known[name]) * (slope * roots)
-        return errors * roots, slopes
+            slopes[:, place] = (fresh[name] if name in fresh else self.known[name]) * slope
+        return errors, slopes
+
+    def weighted(self, followed: Followed, parts: Parts) -> tuple[Array, Array]:
+        """The same in roots of the weights of the errors."""
+        errors, slopes = self.errors(followed, parts)
+        return in_roots(errors, slopes, self.colour.roots(errors))
 
 
 class Fitter:
@@ -127,7 +131,7 @@ class Fitter:
     def searched(self, structure: Structure, observer: Observer, view: View, goal: float) -> Fitted:
         """The same with derivatives by some parameters as they are known.
 
-        It gives up where several times what a step promises would not bring the `cost` below a goal.
+        It gives up where several times the gain that a step predicts would not bring the `cost` below a goal.
 
         Raises
         ------
@@ -137,7 +141,9 @@ class Fitter:
         fresh = tuple(name for name in structure.priors if name not in view.known)
         begun = self.followed(structure.at(structure.standard), observer, fresh)
         ended = self._descended(begun, view, goal)
-        return self._weighed(self.followed(ended.structure, observer))
+        if len(fresh) < len(structure.priors):
+            ended = self.followed(ended.structure, observer, residual=ended.residual)
+        return self._weighed(ended)
 
     def settled(self, found: Fitted) -> Fitted:
         """At its own colour, bandwidth and number of equal steps, the effects being fitted anew at each."""
@@ -179,9 +185,8 @@ class Fitter:
         structure, begun = found.structure, found.structure.standard
         stays = np.array([name in kept for name in structure.priors])
         for share in FADING:
-            errors, slopes = View(found.colour, {}).errors(
-                self.followed(structure, found.observer), self.observed.parts
-            )
+            followed = self.followed(structure, found.observer)
+            errors, slopes = View(found.colour, {}).weighted(followed, self.observed.parts)
             move = np.where(stays, 0.0, structure.neutral + share * (begun - structure.neutral) - structure.standard)
             others = replace(structure, priors={name: structure.priors[name] for name in kept})
             move[stays] = bounded_step(others, errors + slopes @ move, slopes[:, stays], self.settings.reach)
@@ -195,11 +200,18 @@ class Fitter:
             return math.inf
 
     def followed(
-        self, structure: Structure, observer: Observer, names: Sequence[str] | None = None, *, exact: bool = False
+        self,
+        structure: Structure,
+        observer: Observer,
+        names: Sequence[str] | None = None,
+        *,
+        exact: bool = False,
+        residual: Array | None = None,
     ) -> Followed:
         """What the observer leaves of the records, with derivatives by some parameters, or by all that are unknown.
 
-        ``exact`` derivatives are those of the observer's own steps, or of the finest of equal length.
+        ``exact`` derivatives are those of the observer's own steps, or of the finest of equal length. A ``residual``
+        that is known need not be worked out where derivatives come from other steps.
 
         Raises
         ------
@@ -210,7 +222,8 @@ class Fitter:
         columns = [structure.model.index(name) for name in names]
         plain_steps = Observer(observer.band, FINEST if exact else fewest_steps(structure.model))
         if observer.controlled or plain_steps.steps < observer.steps:
-            residual, _ = self._pass(structure, observer, ())
+            if residual is None:
+                residual, _ = self._pass(structure, observer, ())
             with contextlib.suppress(*ASTRAY):  # contacts may be too stiff for few steps
                 return Followed(structure, observer, names, residual, self._pass(structure, plain_steps, columns)[1])
         return Followed(structure, observer, names, *self._pass(structure, observer, columns))
@@ -235,7 +248,7 @@ class Fitter:
         try:
             followed = self.followed(found.structure, observer, exact=True)
             other = self._weighed(followed)
-            while other.evidence + 2.0 * other.promise > found.evidence:
+            while other.evidence + 2.0 * other.predicted_gain > found.evidence:
                 followed = self._descended(followed, View(other.colour, {}), exact=True)
                 better = self._weighed(followed)
                 if not better.evidence > other.evidence + self.settings.tolerance:
@@ -247,28 +260,30 @@ class Fitter:
 
     def _descended(self, now: Followed, view: View, goal: float = math.inf, *, exact: bool = False) -> Followed:
         """The most probable values, as far as steps lead."""
+        before = self.cost(now.structure, now.residual, view.colour)
         for _ in range(self.settings.iterations if now.structure.priors else 0):
-            move, gain = self._step(now, view)
-            before = self.cost(now.structure, now.residual, view.colour)
+            move, gain = self._step(now.structure, *view.weighted(now, self.observed.parts))
             if gain < self.settings.tolerance or before - self.settings.patience * gain > goal:
                 break
             better = self._better(now, view.colour, move, before)
             if better is None:
                 break
-            structure, after = better
-            now = self.followed(structure, now.observer, now.names, exact=exact)
+            structure, residual, after = better
+            now = self.followed(structure, now.observer, now.names, exact=exact, residual=residual)
             if before - after < self.settings.tolerance:
                 break
+            before = after
         return now
 
-    def _step(self, followed: Followed, view: View) -> tuple[Array, float]:
-        """A bounded Gauss-Newton step, and what it promises, nats."""
-        errors, slopes = view.errors(followed, self.observed.parts)
-        move = bounded_step(followed.structure, errors, slopes, self.settings.reach)
-        return move, _promised(followed.structure, errors, slopes, move)
+    def _step(self, structure: Structure, errors: Array, slopes: Array) -> tuple[Array, float]:
+        """A bounded Gauss-Newton step, and the gain that it predicts, nats."""
+        move = bounded_step(structure, errors, slopes, self.settings.reach)
+        return move, _predicted_gain(structure, errors, slopes, move)
 
-    def _better(self, now: Followed, colour: Colour, move: Array, before: float) -> tuple[Structure, float] | None:
-        """The first of the shares of a step that is better, and its cost; it is looked for without derivatives."""
+    def _better(
+        self, now: Followed, colour: Colour, move: Array, before: float
+    ) -> tuple[Structure, Array, float] | None:
+        """The first of the shares of a step that is better, its residual and cost; no derivatives are asked for."""
         for share in SHARES:
             tried = now.structure.at(now.structure.standard + share * move)
             try:
@@ -277,7 +292,7 @@ class Fitter:
                 continue
             after = self.cost(tried, residual, colour)
             if after < before:
-                return tried, after
+                return tried, residual, after
         return None
 
     def _pass(self, structure: Structure, observer: Observer, columns: Sequence[int]) -> tuple[Array, Array]:
@@ -290,15 +305,20 @@ class Fitter:
         """Evidence under the structure's own colour, all derivatives being there."""
         structure, parts = followed.structure, self.observed.parts
         colour = colour_of(followed.residual, parts, self.settings.order)
-        errors = colour.whitened(followed.residual, parts)
+        errors, slopes = View(colour, {}).errors(followed, parts)
         likely = float(np.sum(colour.log_density(errors)))
         informed = np.repeat(np.sqrt(colour.information()), len(errors) // followed.residual.shape[1])
-        _, slopes = View(colour, {}).errors(followed, parts, informed)
+        known = slopes * informed[:, None]
         z = structure.standard
-        curvature = np.eye(len(z)) + slopes.T @ slopes
+        curvature = np.eye(len(z)) + known.T @ known
         evidence = likely - 0.5 * float(z @ z) - 0.5 * float(np.linalg.slogdet(curvature)[1])
-        _, promise = self._step(followed, View(colour, {}))
-        return Fitted(structure, followed.observer, colour, likely, evidence, promise)
+        _, predicted = self._step(structure, *in_roots(errors, slopes, colour.roots(errors)))
+        return Fitted(structure, followed.observer, colour, likely, evidence, predicted)
+
+
+def in_roots(errors: Array, slopes: Array, roots: Array) -> tuple[Array, Array]:
+    """Errors (n,) and their slopes (n, k) in roots of the weights of the errors (n,)."""
+    return errors * roots, slopes * roots[:, None]
 
 
 def bounded_step(structure: Structure, errors: Array, slopes: Array, reach: float) -> Array:
@@ -314,7 +334,7 @@ def bounded_step(structure: Structure, errors: Array, slopes: Array, reach: floa
     return np.asarray(lsq_linear(root, target, (low, high), method="bvls").x * sizes)
 
 
-def _promised(structure: Structure, errors: Array, slopes: Array, move: Array) -> float:
+def _predicted_gain(structure: Structure, errors: Array, slopes: Array, move: Array) -> float:
     """What a step gains if all is linear, nats, the scale of the errors being the most likely one before it."""
     z, scale = structure.standard, max(float(np.mean(errors**2)), 1e-300)
     after = float(np.sum((errors + slopes @ move) ** 2))

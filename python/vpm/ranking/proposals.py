@@ -19,12 +19,12 @@ from vpm.identify import InverseDynamicsProblem
 from vpm.identify.reuse import SPLITTING
 from vpm.model import Model
 from vpm.ranking.colour import Colour, plain
-from vpm.ranking.fit import ASTRAY, Fitted, Fitter, Followed, View, bounded_step
+from vpm.ranking.fit import ASTRAY, Fitted, Fitter, Followed, View, bounded_step, in_roots
 from vpm.ranking.observed import Observer, fewest_steps
 from vpm.ranking.settings import Settings
 from vpm.ranking.sizes import Sizes
 from vpm.ranking.starts import started
-from vpm.ranking.structure import Structure
+from vpm.ranking.structure import Structure, sides_taken
 
 Array = NDArray[np.float64]
 
@@ -53,9 +53,9 @@ class Reference:
         self._roots = colour.roots(errors)
         self._left = float(np.sum((errors * self._roots) ** 2))
 
-    def promised(self, other: Followed) -> float:
+    def predicted_gain(self, other: Followed) -> float:
         """What another structure gains by a step of a fit, or as it stands, nats."""
-        errors, slopes = self.view.errors(other, self._parts, self._roots)
+        errors, slopes = in_roots(*self.view.errors(other, self._parts), self._roots)
         move = bounded_step(other.structure, errors, slopes, self._reach)
         left = min(float(np.sum((errors + slopes @ move) ** 2)), float(errors @ errors))
         return 0.5 * len(errors) * math.log(self._left / max(left, 1e-300))
@@ -70,7 +70,7 @@ class Proposal:
     structure : Structure
     observer : Observer
     gain : float
-        What one step of a fit promises, nats.
+        What one step of a fit is predicted to gain, nats.
     neutral : bool
         The effect does nothing where it begins.
     reference : Reference
@@ -127,7 +127,7 @@ def sides_of(candidate: Candidate, model: Model) -> tuple[Side, ...]:
     """Sides of a joint on which an effect may sit, or what it splits there may stay."""
     site = candidate.site
     if candidate.effect.name in SPLITTING:
-        return SIDES if any(effect.at == site and effect.type.has_sides for effect in model.effects) else SIDES[:1]
+        return SIDES if sides_taken(model, site) else SIDES[:1]
     return SIDES if candidate.effect.has_sides and model.joint_behind(site) else SIDES[:1]
 
 
@@ -202,7 +202,7 @@ def _seen(
     observer = replace(without.observer, steps=max(without.observer.steps, fewest_steps(structure.model)))
     known = without.names if candidate.neutral else ()
     followed = fitter.followed(structure, observer, [name for name in structure.priors if name not in known])
-    return [Proposal(structure, observer, one.promised(followed), candidate.neutral, one) for one in references]
+    return [Proposal(structure, observer, one.predicted_gain(followed), candidate.neutral, one) for one in references]
 
 
 def _seated(seen: list[Proposal], settings: Settings) -> list[Proposal]:

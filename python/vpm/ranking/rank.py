@@ -22,7 +22,7 @@ from vpm.ranking.proposals import SIDES, Proposal, proposals
 from vpm.ranking.result import Ranked, Ranking
 from vpm.ranking.settings import Settings
 from vpm.ranking.sizes import Sizes
-from vpm.ranking.structure import Structure
+from vpm.ranking.structure import Structure, sides_taken
 from vpm.simulate import Setup
 from vpm.weighing import Prior
 
@@ -172,7 +172,8 @@ class _Search:
         hopeful = [
             trial
             for trial, proposal in zip(trials, chosen, strict=True)
-            if isinstance(trial, Fitted) and trial.evidence + 2.0 * trial.promise > proposal.reference.fitted.evidence
+            if isinstance(trial, Fitted)
+            and trial.evidence + 2.0 * trial.predicted_gain > proposal.reference.fitted.evidence
         ]
         several = [_distinct(fits) for fits in _by_effect(hopeful)]
         last = [one for fits in several[: self.settings.finalists] for one in fits[: self.settings.optima]]
@@ -203,8 +204,8 @@ class _Search:
     def _turned(self, found: Fitted) -> Fitted:
         """With what acts at the joint of the last effect on its other side, where it has two and that is better."""
         model, joint = found.structure.model, found.structure.effects[-1][1]
-        sides = {effect.side for effect in model.effects if effect.at == joint and effect.type.has_sides}
-        if not sides or joint not in model.joints or not model.joint_behind(joint):
+        sides = sides_taken(model, joint)
+        if not sides or not model.joint_behind(joint):
             return found
         turned = [found]
         for side in SIDES:

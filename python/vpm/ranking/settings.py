@@ -23,7 +23,7 @@ class Settings:
     seats : int
         Effects of a round that are fitted for each observer and each way to look at what it leaves.
     least : float
-        What a step has to promise, nats, for an effect to be fitted.
+        Gain that a step has to predict, nats, for an effect to be fitted.
     starts : int
         Start values that are fitted, of those that were screened, of an effect that is there at its start already.
     finalists : int
@@ -33,7 +33,7 @@ class Settings:
     iterations : int
         Steps of a fit.
     patience : float
-        By how much more than a step promises a fit may still gain before it is given up.
+        By how much more than a step predicts a fit may still gain before it is given up.
     tolerance : float
         Gain of a step, nats, below which a fit ends.
     reach : float

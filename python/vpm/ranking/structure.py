@@ -18,6 +18,11 @@ from vpm.weighing.priors import Prior
 Array = NDArray[np.float64]
 
 
+def sides_taken(model: Model, joint: str) -> set[Side]:
+    """Sides of a joint on which there are effects that may be on either."""
+    return {effect.side for effect in model.effects if effect.at == joint and effect.type.has_sides}
+
+
 @dataclass(frozen=True, eq=False)
 class Structure:
     """Effects in a model, the values of its parameters, and what is known of the unknown ones beforehand.
