@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from sledge import MASS, OIL, SLEDGE, pushed
 from vpm.catalogue import EFFECTS
 from vpm.discrepancy.candidates import candidates
 from vpm.discrepancy.side_by_side import SideBySide
+from vpm.experiment import Experiment
 from vpm.identify import InverseDynamicsProblem
 from vpm.model import Model
 from vpm.ranking.fit import Fitter, View
@@ -32,16 +34,20 @@ measures = "way.position"
 )
 
 
-def fitter_of(model: Model, settings: Settings | None = None) -> Fitter:
-    settings = settings or Settings()
-    return Fitter(Observed(model, [pushed(seed=1, duration=4.0), pushed(seed=2, duration=4.0)], settings), settings)
+@lru_cache
+def records() -> list[Experiment]:
+    return [pushed(seed=1, duration=4.0), pushed(seed=2, duration=4.0)]
 
 
-def structure_of(model: Model, **priors: Prior) -> Structure:
+def fitter_of(model: Model) -> Fitter:
+    return Fitter(Observed(model, records(), Settings()), Settings())
+
+
+def structure_of(model: Model) -> Structure:
     known = {
         p.name: Prior(p.value, p.uncertainty, p.minimum, p.maximum) for p in model.parameters.values() if p.uncertainty
     }
-    return Structure(model, model.theta.copy(), {**known, **{name.replace("__", "."): p for name, p in priors.items()}})
+    return Structure(model, model.theta.copy(), known)
 
 
 @pytest.mark.parametrize("effect", ["coulomb_friction", "spring", "quadratic_drag", "hysteresis", "bias_force"])
@@ -106,8 +112,7 @@ def test_friction_goes_to_the_other_side_of_a_backlash_and_back() -> None:
 
 def test_another_effect_pays_for_what_laws_leave() -> None:
     model = Model.from_toml(SLEDGE)
-    records = [pushed(seed=1, duration=4.0), pushed(seed=2, duration=4.0)]
-    search = _Search(model, records, Settings(), None, SideBySide(1, None), lambda _: None)
+    search = _Search(model, records(), Settings(), None, SideBySide(1, None), lambda _: None)
     found = search.fitter.fitted(search.start, Observer(1.0))
     search.bare = found.log_likelihood
     assert search._price(found) == Settings().odds
@@ -119,7 +124,7 @@ def test_another_effect_pays_for_what_laws_leave() -> None:
 
 def test_effects_that_a_diagnosis_does_not_try_are_candidates_where_they_are_asked_for() -> None:
     model = Model.from_toml(SLEDGE)
-    data = InverseDynamicsProblem(model, [pushed(seed=1, duration=4.0)])
+    data = InverseDynamicsProblem(model, records()[:1])
     residual = data.evaluate(model, model.theta)[0]
     named = {one.effect.name for one in candidates(model, data, residual, tuple(EFFECTS))}
     usual = {one.effect.name for one in candidates(model, data, residual)}
@@ -159,7 +164,7 @@ axis = [0, 1, 0]
 
 def test_nobody_guesses_where_a_joint_ends_that_nobody_sees() -> None:
     model = Model.from_toml(HANGING)
-    data = InverseDynamicsProblem(model, [pushed(seed=1, duration=4.0)])
+    data = InverseDynamicsProblem(model, records()[:1])
     sizes = Sizes(model, data)
     found = candidates(model, data, data.evaluate(model, model.theta)[0])
     stops = {one.site: started(one, model, sizes).starts for one in found if one.effect.name == "end_stop"}

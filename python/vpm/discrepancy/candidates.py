@@ -127,9 +127,10 @@ def left_out(model: Model, data: InverseDynamicsProblem, effects: Sequence[str] 
 def _absent(model: Model, effects: Sequence[str] | None) -> list[tuple[EffectType, str]]:
     """Effects of the catalogue that ``model`` does not have, with each of their sites."""
     present, by_key = {(effect.name, effect.at) for effect in model.effects}, {effect.key for effect in model.effects}
+    tried = {effect.name for effect in EFFECTS.values() if effect.screened} if effects is None else set(effects)
     found = []
     for effect in EFFECTS.values():
-        if effect.name not in effects if effects is not None else not effect.screened:
+        if effect.name not in tried:
             continue
         for site in sites_worth_trying(effect, model):
             needed = effect.requires is None or (effect.requires, site) in by_key
