@@ -110,6 +110,20 @@ pub trait Scalar:
         None
     }
 
+    /// Whether numbers are plain values with their first derivatives along some directions.
+    #[inline]
+    fn is_first_order() -> bool {
+        false
+    }
+    /// Whether it carries no derivative that is not zero.
+    #[inline]
+    fn is_constant(&self) -> bool {
+        true
+    }
+    /// Adds `slope` times the derivatives of `other` to its own; numbers that are not of first order stay as they are.
+    #[inline]
+    fn add_derivatives(&mut self, _other: &Self, _slope: f64) {}
+
     /// A constant: all derivatives zero.
     #[inline]
     fn from_f64(value: f64) -> Self {

@@ -26,23 +26,19 @@ pub(crate) trait Job: Sync {
     fn run<S: Scalar>(&self, theta: &[S]) -> Result<Pair<S>>;
 }
 
-/// Values of a job and, for each parameter index in `variables`, the derivative of `quantity` (one number per place of an array of
-/// `count`): place by place, derivative number k at `place * variables.len() + k`.
-pub(crate) fn differentiate<J: Job>(
-    job: &J,
-    theta: &[f64],
-    variables: &[usize],
-    quantity: impl Fn(&Pair<Dual<f64, LANES>>, usize) -> Dual<f64, LANES> + Sync,
-) -> Result<(Pair<f64>, Vec<f64>)> {
-    differentiate_by(job, theta, variables, quantity)
+/// Values of a job and, for each parameter index in `variables`, the derivative of the first array: place by place, derivative number k at
+/// `place * variables.len() + k`.
+pub(crate) fn differentiate<J: Job>(job: &J, theta: &[f64], variables: &[usize]) -> Result<(Pair<f64>, Vec<f64>)> {
+    differentiate_by::<J, LANES>(job, theta, variables, None)
 }
 
-/// As [`differentiate`], with `N` parameters per pass: where a pass is long, one that takes few parameters wants no more lanes.
+/// As [`differentiate`], of the numbers at some `places` of the first array alone, with `N` parameters per pass: where a pass is long, one
+/// that takes few parameters wants no more lanes.
 pub(crate) fn differentiate_by<J: Job, const N: usize>(
     job: &J,
     theta: &[f64],
     variables: &[usize],
-    quantity: impl Fn(&Pair<Dual<f64, N>>, usize) -> Dual<f64, N> + Sync,
+    places: Option<&[usize]>,
 ) -> Result<(Pair<f64>, Vec<f64>)> {
     check_variables(theta, variables)?;
     if variables.is_empty() {
@@ -54,26 +50,17 @@ pub(crate) fn differentiate_by<J: Job, const N: usize>(
     } else {
         variables.par_chunks(N).map(pass).collect::<Result<_>>()?
     };
-    let jacobian = interleave(&passes, variables.len(), quantity);
-    let values = |numbers: &[Dual<f64, N>]| numbers.iter().map(|number| number.value).collect();
-    let pair = passes.first().map(|pass| Pair { first: values(&pass.first), second: values(&pass.second) });
-    pair.map(|pair| (pair, jacobian)).ok_or(Error::Interrupted)
-}
-
-fn interleave<const N: usize>(
-    passes: &[Pair<Dual<f64, N>>],
-    variables: usize,
-    quantity: impl Fn(&Pair<Dual<f64, N>>, usize) -> Dual<f64, N>,
-) -> Vec<f64> {
-    let places = passes.first().map_or(0, |pass| pass.first.len());
-    let mut jacobian = vec![0.0; places * variables];
-    for (place, row) in jacobian.chunks_exact_mut(variables).enumerate() {
-        for (entries, pass) in row.chunks_mut(N).zip(passes) {
-            let gradient = quantity(pass, place).gradient;
-            entries.copy_from_slice(&gradient[..entries.len()]);
+    let Some(one) = passes.first() else { return Err(Error::Interrupted) };
+    let count = places.map_or(one.first.len(), <[usize]>::len);
+    let mut jacobian = vec![0.0; count * variables.len()];
+    for (number, row) in jacobian.chunks_exact_mut(variables.len()).enumerate() {
+        let place = places.map_or(number, |places| places[number]);
+        for (entries, pass) in row.chunks_mut(N).zip(&passes) {
+            entries.copy_from_slice(&pass.first[place].gradient[..entries.len()]);
         }
     }
-    jacobian
+    let values = |numbers: &[Dual<f64, N>]| numbers.iter().map(|number| number.value).collect();
+    Ok((Pair { first: values(&one.first), second: values(&one.second) }, jacobian))
 }
 
 /// Whether all that is asked for are parameters.

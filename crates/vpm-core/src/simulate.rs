@@ -29,7 +29,7 @@ use crate::description::Description;
 use crate::error::{Diverged, Error, Result};
 use crate::integrator::{Halt, Method};
 use crate::scalar::Scalar;
-use crate::sensitivity::{Interrupt, Job, Pair, differentiate};
+use crate::sensitivity::{Interrupt, Job, LANES, Pair, differentiate_by};
 use crate::system::Build;
 use crate::table::Table;
 use sampled::Astray;
@@ -79,7 +79,7 @@ pub struct Run {
     pub outputs: Vec<f64>,
     /// State of each sample.
     pub states: Vec<f64>,
-    /// Derivative of each output with respect to each requested parameter, of the discrete solution.
+    /// Derivative of each output, of an observer's measured ones alone, with respect to each requested parameter, of the discrete solution.
     pub jacobian: Vec<f64>,
 }
 
@@ -199,8 +199,13 @@ fn execute(setting: Setting<'_>, plan: Plan<'_>) -> Result<Run> {
         check_starts(setting, plan.initial)?;
     }
     let job = Simulation { setting, plan };
-    let output = |pass: &Pair<_>, place: usize| pass.first[place];
-    let (pair, jacobian) = differentiate(&job, setting.theta, setting.sensitivities, output)?;
+    let width = setting.description.n_outputs();
+    let measured = plan.gains.map(|gains| {
+        let places = |row: usize| gains.readings.channels.iter().map(move |channel| row * width + channel);
+        (0..plan.horizon).flat_map(places).collect::<Vec<_>>()
+    });
+    let (pair, jacobian) =
+        differentiate_by::<_, LANES>(&job, setting.theta, setting.sensitivities, measured.as_deref())?;
     Ok(Run { outputs: pair.first, states: pair.second, jacobian })
 }
 

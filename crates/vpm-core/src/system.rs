@@ -30,7 +30,7 @@ pub use memory::Memories;
 pub use ode::System;
 pub(crate) use recorded::Recording;
 pub use recorded::{Kind, Placed, Places};
-pub(crate) use routine::{Routine, code_pays};
+pub(crate) use routine::{Routine, code_pays, code_pays_in_fits};
 
 use std::sync::Arc;
 

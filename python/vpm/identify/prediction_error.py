@@ -91,7 +91,7 @@ class PredictionErrorProblem:
         places = [model.output_channels.index(name) for name in record.channels]
         outputs, slopes = self._observed(model, theta, columns, record, gains)
         innovations = record.readings - outputs[:, places]
-        return whitened(gains.covariances, innovations), whitened(gains.covariances, -slopes[:, places])
+        return whitened(gains.covariances, innovations), whitened(gains.covariances, -slopes)
 
     def outputs(self, model: Model) -> Array:
         """All outputs that are predicted along the records, one after the other, shape (N, outputs)."""
@@ -101,7 +101,7 @@ class PredictionErrorProblem:
     def _observed(
         self, model: Model, theta: Array, columns: list[int], record: Record, gains: Pass
     ) -> tuple[Array, Array]:
-        """Outputs (N, outputs) of one record and their derivative (N, outputs, k)."""
+        """Outputs (N, outputs) of one record, and the derivative of the measured ones (N, m, k)."""
         places = [model.output_channels.index(name) for name in record.channels]
         stepping = (record.dt, self._setup.substeps, self._setup.method(model), columns, self._setup.hold)
         table = gains.gains.reshape(len(record.time), -1)

@@ -8,6 +8,7 @@ use std::panic::Location;
 
 use super::known::Known;
 use super::operation::{Call, Function, Node, Operation};
+use super::program::Program;
 use crate::scalar::{Scalar, Search};
 
 /// Operations in the order in which they were recorded, each once: equal operations are merged, constants folded.
@@ -63,6 +64,20 @@ impl Graph {
         // Zero is number 0, the default of a recorded number.
         graph.constant(0.0);
         graph
+    }
+
+    /// The graph of a program, and the numbers of it that come out.
+    pub fn of(program: &Program) -> (Self, Vec<Node>) {
+        let mut graph = Self::default();
+        let mut places: Vec<Node> = Vec::with_capacity(program.operations().len());
+        for operation in program.operations() {
+            let mut calls = std::mem::take(&mut graph.calls);
+            let operation = operation.renamed((program.calls(), &mut calls), |argument| places[argument as usize]);
+            graph.calls = calls;
+            places.push(graph.make(operation));
+        }
+        let outputs = program.outputs().iter().map(|&output| places[output as usize]).collect();
+        (graph, outputs)
     }
 
     /// All operations; arguments stand before what is made of them.

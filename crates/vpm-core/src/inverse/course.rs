@@ -26,7 +26,7 @@ impl Course {
     pub(super) fn new(job: &impl Job, theta: &[f64], sensitivities: &[usize], own: &[usize]) -> Result<Self> {
         let by: Vec<usize> = (0..sensitivities.len()).filter(|&place| own.contains(&sensitivities[place])).collect();
         let chosen: Vec<usize> = by.iter().map(|&place| sensitivities[place]).collect();
-        let (pair, slopes) = differentiate(job, theta, &chosen, |pass: &Pair<_>, place| pass.first[place])?;
+        let (pair, slopes) = differentiate(job, theta, &chosen)?;
         Ok(Self { values: pair.first, by, slopes })
     }
 

@@ -116,7 +116,7 @@ impl<'a> Along<'a> {
         let function = functions.function(&Kind::Derived(Box::new(kind.clone()), by), theta)?;
         if function.directions.is_some() {
             let job = SampleBySample { record: self.record, kind, width };
-            let (pair, jacobian) = differentiate(&job, theta, self.sensitivities, |pass, place| pass.first[place])?;
+            let (pair, jacobian) = differentiate(&job, theta, self.sensitivities)?;
             return Ok(Numbers { values: pair.first, jacobian });
         }
         let code = self.code(|| Ok(function.clone()));

@@ -101,6 +101,20 @@ impl<S: Scalar, const N: usize> Scalar for Dual<S, N> {
         Self::constant(self.value)
     }
     #[inline]
+    fn is_first_order() -> bool {
+        S::plain(&[]).is_some()
+    }
+    #[inline]
+    fn is_constant(&self) -> bool {
+        self.value.is_constant() && self.gradient.iter().all(|part| part.re() == 0.0 && part.is_constant())
+    }
+    #[inline]
+    fn add_derivatives(&mut self, other: &Self, slope: f64) {
+        if let (Some(own), Some(other)) = (S::plain_mut(&mut self.gradient), S::plain(&other.gradient)) {
+            own.iter_mut().zip(other).for_each(|(own, other)| *own += slope * other);
+        }
+    }
+    #[inline]
     fn is_finite(self) -> bool {
         self.value.is_finite() && self.gradient.iter().all(|part| part.is_finite())
     }

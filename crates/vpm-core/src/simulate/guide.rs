@@ -40,8 +40,8 @@ impl Guide<'_> {
         let Setting { theta, sensitivities, .. } = self.setting;
         // Most questions are for a few parameters: lanes that nobody needs would be most of the work.
         let (pair, jacobian) = match sensitivities.len() {
-            1 | 2 => differentiate_by::<_, 2>(self, theta, sensitivities, |pass, place| pass.first[place])?,
-            _ => differentiate(self, theta, sensitivities, |pass, place| pass.first[place])?,
+            1 | 2 => differentiate_by::<_, 2>(self, theta, sensitivities, None)?,
+            _ => differentiate(self, theta, sensitivities)?,
         };
         Ok(Run { outputs: pair.first, states: pair.second, jacobian })
     }

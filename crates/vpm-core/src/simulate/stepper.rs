@@ -14,7 +14,7 @@ use crate::ode::Ode;
 use crate::scalar::Scalar;
 use crate::sensitivity::{Interrupt, Pair};
 use crate::sensor::Sensor;
-use crate::system::{Calls, Counted, Dynamics, Matrix, System, code_pays};
+use crate::system::{Calls, Counted, Dynamics, Matrix, System, code_pays, code_pays_in_fits};
 use crate::table::Table;
 
 /// Where the commands come from.
@@ -120,7 +120,8 @@ impl<'a, S: Scalar> Stepper<'a, S> {
     pub(crate) fn by_code(mut self) -> Self {
         let Stepping { substeps, method, .. } = self.stepping;
         let evaluations = self.plan.starts.len() * self.plan.horizon * substeps * method.evaluations();
-        if S::plain(&[]).is_some() && code_pays(evaluations) {
+        let (derived, corrected) = (S::plain(&[]).is_none(), self.plan.gains.is_some());
+        if code_pays(evaluations) || ((derived || corrected) && code_pays_in_fits(evaluations)) {
             // What has no code runs as it is.
             let _ = self.compile();
         }

@@ -7,8 +7,9 @@ use crate::error::Result;
 use crate::graph::{Evaluator, Lanes, Native, Program};
 
 /// Functions that are kept of a machine: its own, fourteen kinds, and those of the last lists of parameters and of followed joints. A fit
-/// asks for up to four of each list, again and again; what a search asked for and left, the next list puts out.
-const KEPT: usize = 48;
+/// asks for up to four of each list, again and again, and takes few parameters in a list; what a search asked for and left, the next list
+/// puts out.
+const KEPT: usize = 256;
 
 /// Who can record the functions of a machine.
 pub(crate) trait Recorder: std::fmt::Debug + Send + Sync {
@@ -49,7 +50,7 @@ pub(crate) struct Function {
     pub(crate) directions: Option<Program>,
     native: OnceLock<std::result::Result<Native, String>>,
     /// Whether it holds for the parameters of the recording alone.
-    of_values: bool,
+    pub(crate) of_values: bool,
 }
 
 /// Where a description keeps the functions of its machine. A copy of the description begins without.

@@ -89,6 +89,11 @@ impl<S: Scalar> System<S> {
     /// Runs samples and steps by `method` as machine code from now on, where they can; or says why they cannot.
     pub fn compile(&mut self, method: Method) -> std::result::Result<(), String> {
         self.ready = false;
+        if !Self::is_plain() {
+            // What has no code goes on operation by operation.
+            let kinds = [Some(Kind::Rates), Some(Kind::Sample), kind_of(method)].into_iter().flatten();
+            return kinds.map(|kind| self.routines.compile(&kind)).fold(Ok(()), std::result::Result::and);
+        }
         // An additive step begins with the rates of the sample before it.
         let rates = Some(Kind::Rates).filter(|_| method != Method::Additive);
         let needed: Vec<Kind> = rates.into_iter().chain([Kind::Sample]).collect();

@@ -95,7 +95,7 @@ pub enum Kind {
     Unbalance,
     /// A function of a machine some of whose joints follow a motion, of the state of what answers to it.
     Guided(Arc<Guidance>, Part),
-    /// What another kind gives first, then the entries of its derivatives by the inputs at these places, each named once.
+    /// All that another kind gives, then the entries of the derivatives of that by the inputs at these places, each named once.
     Derived(Box<Self>, Vec<u32>),
 }
 
@@ -105,6 +105,7 @@ impl Kind {
         match self {
             Self::Unbalance => Places { states: places.coordinates, inputs: 1, ..places },
             Self::Guided(guidance, _) => guidance.places(places),
+            Self::Derived(kind, _) => kind.places(places),
             _ => places,
         }
     }
@@ -215,7 +216,24 @@ impl Placed {
             }
         }
         let program = Program::new(&graph, &nodes, places.count());
-        Ok(Self { program, places, entries, directions, of_values: !graph.decisions().is_empty() })
+        let placed = Self { program, places, entries, directions, of_values: !graph.decisions().is_empty() };
+        Ok(match kind {
+            Kind::Derived(_, by) => placed.derived(by),
+            _ => placed,
+        })
+    }
+
+    /// All that it gives, then the entries of the derivatives of that by the inputs at these places; it says so where these are too many.
+    fn derived(self, by: &[u32]) -> Self {
+        if self.directions.is_some() {
+            return self;
+        }
+        let (mut graph, mut nodes) = Graph::of(&self.program);
+        let Some(derivative) = graph.derive_within(&nodes, by, MOST) else {
+            return Self { directions: Some(self.program.clone()), ..self };
+        };
+        nodes.extend(derivative.entries);
+        Self { program: Program::new(&graph, &nodes, self.places.count()), entries: derivative.places, ..self }
     }
 }
 
@@ -279,10 +297,7 @@ fn outputs(build: impl Build<Error = Error>, places: Places, parameters: &[Recor
             (rates, Some(Matrix::Entries(block, 2 * n)))
         }
         Kind::Additive => (dynamics.additive(&x, places), None),
-        Kind::Derived(kind, by) => {
-            let values = outputs(build, places, parameters, kind)?.values;
-            (values.clone(), Some(Matrix::Of(values, by.clone())))
-        }
+        Kind::Derived(kind, _) => return outputs(build, places, parameters, kind),
         Kind::Levers => {
             let mut levers = zeros(dynamics.layout().lines * n);
             dynamics.levers(motion.0, &mut levers);

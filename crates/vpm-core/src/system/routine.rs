@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::functions::{Function, Functions};
 use super::recorded::Kind;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::graph::{Evaluator, Program, Work};
 use crate::integrator::Method;
 use crate::scalar::{Dual, Scalar};
@@ -12,6 +12,8 @@ use crate::scalar::{Dual, Scalar};
 /// Evaluations of the rates from which on machine code pays in two runs: recording and compiling an operation takes some 10 us, and
 /// each evaluation saves about half a nanosecond of it.
 const PAYS: usize = 10_000;
+/// How often a run that is part of a fit comes again.
+const REPEATS: usize = 100;
 /// Directions that are taken at once.
 const LANES: usize = 8;
 
@@ -32,6 +34,22 @@ enum Engine<S> {
     Operations(Evaluator<S>),
     /// Machine code, of plain numbers.
     Code(Work),
+    /// The same of its derivatives, for numbers that carry some.
+    Derivatives(Derivatives),
+}
+
+/// Machine code of a function and its derivatives by all that may move.
+///
+/// Law: numbers with derivatives x' along some directions give those of what is made of them, `f'(x) x'` (Griewank & Walther 2008, chapter 3).
+#[derive(Clone, Debug)]
+struct Derivatives {
+    function: Arc<Function>,
+    inputs: Vec<f64>,
+    outputs: Vec<f64>,
+    work: Work,
+    /// How many derivatives each number has, and the inputs of all, row by row.
+    counts: Vec<usize>,
+    moving: Vec<usize>,
 }
 
 /// The numbers of which a matrix is the derivative, along N directions at once.
@@ -72,6 +90,21 @@ impl<S: Scalar> Routine<S> {
     pub(crate) fn compile(&mut self) -> std::result::Result<(), String> {
         self.engine = Engine::Code(self.function.native()?.work());
         Ok(())
+    }
+
+    /// Goes on by the machine code of a function that gives its derivatives too; or says why there is none.
+    fn differentiate_by(&mut self, derived: Arc<Function>, by: &[u32]) -> std::result::Result<(), String> {
+        self.engine = Engine::Derivatives(Derivatives::new(derived, by, &self.inputs, self.outputs.len())?);
+        Ok(())
+    }
+
+    /// The inputs that may carry derivatives: all but the parameters, and those of these that do.
+    fn moving(&self) -> Vec<u32> {
+        let (first, given) = (self.function.places.first_parameter(), self.function.places.count());
+        (0..given)
+            .filter(|&place| place < first || !self.inputs[place].is_constant())
+            .map(|place| place as u32)
+            .collect()
     }
 
     /// Puts numbers in from place `first` on.
@@ -123,6 +156,7 @@ impl<S: Scalar> Routine<S> {
                     debug_assert!(done.is_ok());
                 }
             }
+            Engine::Derivatives(derivatives) => derivatives.evaluate(&self.inputs, &mut self.outputs),
         }
         &self.outputs
     }
@@ -160,6 +194,45 @@ impl<S: Scalar> Routine<S> {
             *product = *along - along.frozen();
         }
         true
+    }
+}
+
+impl Derivatives {
+    /// Of a function of so many `outputs` with derivatives `by` these inputs, at the parameters among `inputs`.
+    fn new<S: Scalar>(
+        function: Arc<Function>,
+        by: &[u32],
+        inputs: &[S],
+        outputs: usize,
+    ) -> std::result::Result<Self, String> {
+        let (given, work) = (function.places.count(), function.native()?.work());
+        let mut values = vec![0.0; function.often.n_inputs()];
+        values.iter_mut().zip(&inputs[..given]).for_each(|(value, input)| *value = input.re());
+        let (known, constants) = values.split_at_mut(given);
+        Evaluator::new(&function.seldom).evaluate(known, constants);
+        let (mut counts, made) = (vec![0; outputs], vec![0.0; function.often.outputs().len()]);
+        function.entries.iter().for_each(|&(row, _)| counts[row] += 1);
+        let moving = function.entries.iter().map(|&(_, column)| by[column] as usize).collect();
+        Ok(Self { inputs: values, outputs: made, function, work, counts, moving })
+    }
+
+    /// All outputs at `inputs`, with what their derivatives make of those of the inputs.
+    #[inline]
+    fn evaluate<S: Scalar>(&mut self, inputs: &[S], outputs: &mut [S]) {
+        let moving = self.function.places.first_parameter();
+        self.inputs[..moving].iter_mut().zip(inputs).for_each(|(value, input)| *value = input.re());
+        if let Ok(native) = self.function.native() {
+            // The lengths are those of the function, so that this cannot fail.
+            let done = native.call(&self.inputs, &mut self.outputs, &mut self.work);
+            debug_assert!(done.is_ok());
+        }
+        let (values, slopes) = self.outputs.split_at(self.counts.len());
+        let mut slopes = slopes.iter().zip(&self.moving);
+        for ((output, &value), &count) in outputs.iter_mut().zip(values).zip(&self.counts) {
+            let mut number = S::from_f64(value);
+            slopes.by_ref().take(count).for_each(|(&slope, &input)| number.add_derivatives(&inputs[input], slope));
+            *output = number;
+        }
     }
 }
 
@@ -227,8 +300,25 @@ impl<S: Scalar> Routines<S> {
 
     /// Makes the function of that kind as machine code; or says why there is none.
     pub(crate) fn compile(&mut self, kind: &Kind) -> std::result::Result<(), String> {
-        self.make(kind).map_err(|error| error.to_string())?;
-        self.get(kind).map_or(Ok(()), Routine::compile)
+        let words = |error: Error| error.to_string();
+        self.make(kind).map_err(words)?;
+        if S::plain(&[]).is_some() {
+            return self.get(kind).map_or(Ok(()), Routine::compile);
+        }
+        if !S::is_first_order() {
+            return Err("no machine code is made for derivatives of derivatives".to_owned());
+        }
+        if self.get(kind).is_some_and(|routine| routine.function.of_values) {
+            return Err(
+                "the machine is another one at other parameters, so that its code would be made again and again"
+                    .to_owned(),
+            );
+        }
+        let values: Vec<f64> = self.theta.iter().map(Scalar::re).collect();
+        let by = self.get(kind).map_or_else(Vec::new, |routine| routine.moving());
+        let derived = self.functions.function(&Kind::Derived(Box::new(kind.clone()), by.clone()), &values);
+        let derived = derived.map_err(words)?;
+        self.get(kind).map_or(Ok(()), |routine| routine.differentiate_by(derived, &by))
     }
 
     /// Makes the functions of these kinds as machine code, all of them or none; or says why there is none.
@@ -293,6 +383,11 @@ impl<S: Scalar> Routines<S> {
 /// Whether machine code pays in a run of so many evaluations of the rates.
 pub(crate) fn code_pays(evaluations: usize) -> bool {
     evaluations >= PAYS
+}
+
+/// The same of a run that comes again and again, with other parameters.
+pub(crate) fn code_pays_in_fits(evaluations: usize) -> bool {
+    code_pays(REPEATS * evaluations)
 }
 
 /// The function that steps by `method` need beside the rates.

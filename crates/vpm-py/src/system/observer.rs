@@ -64,7 +64,7 @@ impl System {
     }
 
     /// Outputs (N, ny) that an observer with given gains (N, nx * m) predicts from the samples before, its states before they are corrected
-    /// (N, nx), and the derivatives of the outputs (N, ny, k).
+    /// (N, nx), and the derivatives of the measured outputs (N, m, k).
     #[pyo3(signature = (theta, initial_state, inputs, channels, readings, gains, time_step, substeps, integrator, sensitivities=vec![], hold="zero_order"))]
     #[expect(clippy::too_many_arguments, reason = "the arguments of the Python function")]
     fn observe<'py>(
@@ -93,6 +93,6 @@ impl System {
             let readings = Readings { channels: &channels, table: readings.as_table()? };
             observe(setting, initial.values(), inputs, Gains { readings, gains: gains.as_table()? })
         })?;
-        self.run(py, run, sensitivities.len())
+        self.run(py, run, [channels.len(), sensitivities.len()])
     }
 }

@@ -49,14 +49,14 @@ impl System {
         &self,
         py: Python<'py>,
         run: Run,
-        variables: usize,
+        [differentiated, variables]: [usize; 2],
     ) -> PyResult<(Table<'py>, Table<'py>, Cube<'py>)> {
         let (outputs, states) = (self.description.n_outputs(), self.description.n_states());
         let rows = run.states.len().checked_div(states).unwrap_or(0);
         Ok((
             matrix(py, run.outputs, [rows, outputs])?,
             matrix(py, run.states, [rows, states])?,
-            cube(py, run.jacobian, [rows, outputs, variables])?,
+            cube(py, run.jacobian, [rows, differentiated, variables])?,
         ))
     }
 }
@@ -86,7 +86,7 @@ impl System {
             let inputs = Inputs { table: inputs.as_table()?, hold };
             free_run(request.setting(&self.description, interrupt), initial.values(), inputs)
         })?;
-        self.run(py, run, sensitivities.len())
+        self.run(py, run, [self.description.n_outputs(), sensitivities.len()])
     }
 
     /// Makes the machine code of steps, as long runs do; or says why there is none.
@@ -144,7 +144,7 @@ impl System {
             let setting = request.setting(&self.description, interrupt);
             closed_loop(setting, initial.values(), references.as_table()?, disturbances.as_table()?)
         })?;
-        self.run(py, run, sensitivities.len())
+        self.run(py, run, [self.description.n_outputs(), sensitivities.len()])
     }
 
     /// Free runs of `horizon` samples from many samples: outputs (S, horizon, ny), derivatives (S, horizon, ny, k).
@@ -220,7 +220,7 @@ impl System {
             };
             observed(request.setting(&self.description, interrupt), motion, &passive, strains)
         })?;
-        self.run(py, run, sensitivities.len())
+        self.run(py, run, [self.description.n_outputs(), sensitivities.len()])
     }
 
     /// Joints follow a motion (N, n_joints) while drives and supplies answer to it and to `inputs`, from the states `internal`: outputs

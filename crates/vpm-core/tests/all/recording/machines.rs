@@ -266,7 +266,7 @@ const EFFECTS: [(&str, &[(&str, f64)]); 15] = [
 ];
 
 /// A tree of one to five joints with some effects, a payload and a drive.
-fn drawn(seed: u64) -> Machine {
+pub(super) fn drawn(seed: u64) -> Machine {
     let random = &mut Random::new(seed);
     let mut pick = |count: usize| (random.unit() * count as f64) as usize;
     let joints = 1 + pick(5);

@@ -37,15 +37,15 @@ fn steps_allocate_nothing() {
             let closed = |rows: usize| {
                 measure(|| drop(bench.closed(&START, &inputs[..2 * rows], &inputs[..2 * rows]))).count_total
             };
-            // What is recorded in the first run is kept.
-            free(20);
-            let (short, long) = (free(20), free(200));
+            // What is recorded in the first run is kept; both are long enough for machine code.
+            free(60);
+            let (short, long) = (free(60), free(200));
             assert_eq!(short, long, "free run, {}", method.name());
             let moving = |rows: usize| measure(|| drop(moving.free(&START, &inputs[..2 * rows]))).count_total;
-            moving(20);
-            assert_eq!(moving(20), moving(200), "moving inputs, {}", method.name());
-            closed(20);
-            let (short, long) = (closed(20), closed(200));
+            moving(60);
+            assert_eq!(moving(60), moving(200), "moving inputs, {}", method.name());
+            closed(60);
+            let (short, long) = (closed(60), closed(200));
             assert_eq!(short, long, "closed loop, {}", method.name());
             assert!(short > 0, "the counter sees nothing");
         }
@@ -78,9 +78,9 @@ fn drives_with_fewer_states_allocate_nothing() {
             for sensitivities in [&[][..], &[0, 3][..]] {
                 let bench = Bench { sensitivities: sensitivities.to_vec(), ..Bench::new(&machine, 1e-5, 2, method) };
                 let free = |rows: usize| measure(|| drop(bench.free(&start, &currents[..rows]))).count_total;
-                // What is recorded in the first run is kept.
-                free(20);
-                assert_eq!(free(20), free(200), "{name}, {}", method.name());
+                // What is recorded in the first run is kept; both are long enough for machine code.
+                free(60);
+                assert_eq!(free(60), free(200), "{name}, {}", method.name());
             }
         }
     }
