@@ -11,10 +11,11 @@ from scipy.stats import norm
 from scipy.stats import t as student
 
 import vpm
-from sledge import MASS, OIL, SLEDGE, pushed
-from vpm.errors import DiagnosisError
+from sledge import MASS, OIL, READING, SLEDGE, pushed
+from vpm.errors import DiagnosisError, ExperimentError
+from vpm.experiment import Experiment
 from vpm.model import Model
-from vpm.ranking.colour import Colour, colour_of, log_student, plain, scale_of
+from vpm.ranking.noise_model import NoiseModel, fitted_noise, log_student, scale_of, white_noise
 from vpm.ranking.observed import DAMPING, observer_gain
 
 Array = NDArray[np.float64]
@@ -27,10 +28,10 @@ def test_an_autoregression_is_found_again_and_its_density_is_the_exact_one() -> 
     for k in range(2, count):
         values[k] = first * values[k - 1] + second * values[k - 2] + errors[k]
     parts = [slice(100, 30_000), slice(30_500, count)]
-    colour = colour_of(values[:, None], parts, 2)
-    assert colour.filters[0] == pytest.approx([1.0, -first, -second], abs=0.01)
-    assert colour.deviations[0] == pytest.approx(size, rel=0.01)
-    told = colour.log_density(colour.whitened(values[:, None], parts))
+    noise = fitted_noise(values[:, None], parts, 2)
+    assert noise.filters[0] == pytest.approx([1.0, -first, -second], abs=0.01)
+    assert noise.deviations[0] == pytest.approx(size, rel=0.01)
+    told = noise.log_density(noise.whitened(values[:, None], parts))
     kept = np.concatenate([errors[part][2:] for part in parts])
     exact = np.sum(-0.5 * (kept / size) ** 2 - 0.5 * np.log(2.0 * np.pi * size**2))
     # The most likely values of three parameters are better than the true ones by 3/2 nats in the mean.
@@ -46,11 +47,11 @@ def test_the_density_of_errors_is_students_of_scipy() -> None:
 
 def test_errors_with_heavy_tails_are_known_as_such_and_outliers_weigh_little() -> None:
     errors = 0.02 * np.random.default_rng(3).standard_t(4.0, 20_000)
-    colour = colour_of(errors[:, None], [slice(0, len(errors))], 2)
-    assert colour.tails == (4.0,)
-    assert colour.deviations[0] == pytest.approx(0.02, rel=0.03)
+    noise = fitted_noise(errors[:, None], [slice(0, len(errors))], 2)
+    assert noise.tails == (4.0,)
+    assert noise.deviations[0] == pytest.approx(0.02, rel=0.03)
     assert scale_of(errors, np.full(len(errors), 4.0)) == pytest.approx(0.02, rel=0.03)
-    heavy = Colour((np.ones(1),), (1.0,), (4.0,)).roots(np.array([0.1] * 20 + [20.0]))
+    heavy = NoiseModel((np.ones(1),), (1.0,), (4.0,)).roots(np.array([0.1] * 20 + [20.0]))
     assert heavy[-1] < 0.3 * heavy[0]
 
 
@@ -58,22 +59,22 @@ def test_weights_give_the_slope_of_the_cost() -> None:
     """About any errors, at their own scale: the slope of the density is that of weighted squares."""
     errors = np.random.default_rng(4).standard_t(3.0, 400)
     errors /= scale_of(errors, np.full(400, 6.0))
-    colour, move = Colour((np.ones(1),), (1.0,), (6.0,)), np.cos(np.arange(400.0))
-    slope = (colour.cost(errors + 1e-5 * move) - colour.cost(errors - 1e-5 * move)) / 2e-5
-    assert slope == pytest.approx(float((colour.roots(errors) ** 2 * errors) @ move), rel=1e-6)
+    noise, move = NoiseModel((np.ones(1),), (1.0,), (6.0,)), np.cos(np.arange(400.0))
+    slope = (noise.cost(errors + 1e-5 * move) - noise.cost(errors - 1e-5 * move)) / 2e-5
+    assert slope == pytest.approx(float((noise.roots(errors) ** 2 * errors) @ move), rel=1e-6)
 
 
 def test_channels_are_whitened_each_by_its_own_past() -> None:
     random = np.random.default_rng(2)
     values = random.standard_normal((500, 2)) * [1.0, 1e-3]
     parts = [slice(0, 500)]
-    errors = plain(values, parts).whitened(values, parts)
+    errors = white_noise(values, parts).whitened(values, parts)
     assert np.mean(errors[:500] ** 2) == pytest.approx(1.0, rel=1e-12)
     assert np.mean(errors[500:] ** 2) == pytest.approx(1.0, rel=1e-12)
     slopes = random.standard_normal((500, 2, 3))
-    colour = colour_of(values, parts, 5)
-    direct = np.column_stack([colour.whitened(slopes[:, :, k], parts) for k in range(3)])
-    assert colour.whitened(slopes, parts) == pytest.approx(direct, abs=1e-12)
+    noise = fitted_noise(values, parts, 5)
+    direct = np.column_stack([noise.whitened(slopes[:, :, k], parts) for k in range(3)])
+    assert noise.whitened(slopes, parts) == pytest.approx(direct, abs=1e-12)
 
 
 @pytest.mark.parametrize("band", [0.5, 1.0, 10.0])
@@ -115,8 +116,13 @@ def test_one_missing_effect_is_named(hidden: dict[str, float], named: str, param
 
 
 def test_a_lag_of_the_drive_is_named_with_its_time() -> None:
-    ranking = vpm.rank(Model.from_toml(SLEDGE), pushed(seed=1, lag=0.008, duration=4.0))
+    held_out = pushed(seed=2, lag=0.008, duration=4.0)
+    ranking = vpm.rank(Model.from_toml(SLEDGE), pushed(seed=1, lag=0.008, duration=4.0), held_out)
     assert [(one.effect, one.site) for one in ranking.effects] == [("actuator_lag", "motor")]
+    gap = ranking.gaps["way.position"]
+    assert gap.unit == "m"
+    assert gap.before > gap.recalibrated > 20.0 * gap.after
+    assert gap.after < 3.0 * READING
     assert ranking.model.parameters["motor.lag.time_constant"].value == pytest.approx(0.008, rel=0.02)
 
 
@@ -135,6 +141,16 @@ def test_the_number_of_workers_changes_nothing_and_a_ranking_is_kept(tmp_path: P
     ]
     one.save(tmp_path / "ranking.npz")
     assert vpm.Ranking.load(tmp_path / "ranking.npz") == one
+
+
+def test_what_a_validation_record_lacks_is_said_before_the_search() -> None:
+    record = pushed(seed=1, duration=2.0)
+    places = {"way.position": record["way.position"]}
+    lacking = Experiment.from_arrays(record.time, places, model=Model.from_toml(SLEDGE), name="lacking")
+    told: list[str] = []
+    with pytest.raises(ExperimentError, match=r"motor\.command"):
+        vpm.rank(Model.from_toml(SLEDGE), record, lacking, tell=told.append)
+    assert told == []
 
 
 def test_a_ranking_without_a_record_says_so() -> None:

@@ -14,10 +14,13 @@ from vpm.discrepancy.candidates import candidates
 from vpm.discrepancy.side_by_side import SideBySide
 from vpm.experiment import Experiment
 from vpm.identify import InverseDynamicsProblem
+from vpm.initial import invertible
 from vpm.model import Model
 from vpm.ranking.fit import Fitter, View
 from vpm.ranking.observed import Observed, Observer
+from vpm.ranking.proposals import proposals
 from vpm.ranking.rank import _Search
+from vpm.ranking.result import Ranked
 from vpm.ranking.settings import Settings
 from vpm.ranking.sizes import Sizes
 from vpm.ranking.starts import started
@@ -103,6 +106,8 @@ def test_friction_goes_to_the_other_side_of_a_backlash_and_back() -> None:
     there = structure.beside("way", "link")
     assert "way.link.friction.viscous" in there.priors
     assert there.values["way.link.friction.viscous"] == structure.values["way.friction.viscous"]
+    assert (structure.side(("viscous_friction", "way")), there.side(("viscous_friction", "way"))) == ("motor", "link")
+    assert Ranked("viscous_friction", "way", 9.0, {}, side="link").place == "way, link side"
     back = there.beside("way", "motor")
     assert back.model == structure.model
     assert back.values == structure.values
@@ -137,10 +142,10 @@ def test_a_view_prefers_derivatives_that_are_there() -> None:
     fitter, structure = fitter_of(model), structure_of(model)
     found = fitter.fitted(structure, Observer(1.0))
     followed, parts = fitter.followed(found.structure, Observer(1.0)), fitter.observed.parts
-    known = dict(zip(followed.names, found.colour.whitened(followed.jacobian, parts).T, strict=True))
+    known = dict(zip(followed.names, found.noise.whitened(followed.jacobian, parts).T, strict=True))
     bare = replace(followed, names=(), jacobian=followed.jacobian[:, :, :0])
     for one, other in zip(
-        View(found.colour, known).errors(bare, parts), View(found.colour, {}).errors(followed, parts), strict=True
+        View(found.noise, known).errors(bare, parts), View(found.noise, {}).errors(followed, parts), strict=True
     ):
         np.testing.assert_allclose(one, other)
 
@@ -170,3 +175,31 @@ def test_nobody_guesses_where_a_joint_ends_that_nobody_sees() -> None:
     stops = {one.site: started(one, model, sizes).starts for one in found if one.effect.name == "end_stop"}
     assert stops["pivot"] == ()
     assert stops["way"]
+
+
+def test_what_remembers_behind_a_spring_begins_with_nothing_to_remember() -> None:
+    """At rest it pulls nothing: the spring hangs as without it, and another effect may be looked for beside it."""
+    bare = Model.from_toml(SLEDGE).with_effect("joint_compliance", "way", stiffness=1e5, inertia=0.3)
+    for side in ("motor", "link"):
+        model = bare.with_effect("hysteresis", "way", side=side, force=1.0, displacement=0.05)
+        fitter = fitter_of(model)
+        found = fitter.fitted(structure_of(Model.from_toml(SLEDGE)).carried(model), Observer(1.0))
+        rest, plain = (
+            observed._begun(one)[0] for one, observed in ((model, fitter.observed), (bare, fitter_of(bare).observed))
+        )
+        assert rest[: len(plain)] == pytest.approx(plain)
+        assert rest[len(plain) :] == pytest.approx(0.0)
+    data = InverseDynamicsProblem(Model.from_toml(SLEDGE), records())
+    settings = replace(Settings(), seats=1, starts=1)
+    listed = proposals(found, Fitter(fitter.observed, settings), data, Sizes(bare, data), SideBySide(1))
+    assert all(proposal.structure.model.effect("hysteresis", "way", "link") for proposal in listed)
+
+
+def test_a_split_joint_has_inverse_dynamics_without_what_remembers() -> None:
+    model = Model.from_toml(SLEDGE).with_effect("hysteresis", "way", force=1.0, displacement=0.05)
+    assert invertible(model) is model
+    friction = structure_of(model).beside("way", "link").model.with_effect("joint_compliance", "way", stiffness=1e5)
+    warm = friction.with_effect("warming_friction", "way", coulomb=1.0, time_constant=5.0)
+    assert [effect.name for effect in invertible(warm).effects] == ["viscous_friction", "joint_compliance"]
+    data = InverseDynamicsProblem(Model.from_toml(SLEDGE), records())
+    assert np.isfinite(data.evaluate(invertible(warm), invertible(warm).theta)[0]).all()

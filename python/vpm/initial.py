@@ -124,22 +124,39 @@ def _along(model: Model, theta: Array, given: tuple[Array, Array, Array], joints
     return outputs
 
 
-@lru_cache(maxsize=128)
 def _forgetful(model: Model, joints: tuple[str, ...]) -> tuple[Model, NDArray[np.int64]]:
     """A machine without what remembers at some joints, with its parameters among those that it had.
 
     One behind a spring moves what nobody measures, and stays.
     """
+    return _without_memories(model, tuple(name for name in model.joints if name not in joints))
+
+
+@lru_cache(maxsize=128)
+def _without_memories(model: Model, kept: tuple[str, ...] = ()) -> tuple[Model, NDArray[np.int64]]:
+    """A machine without what remembers, but for what moves the joints to keep; its parameters among those it had."""
     bare = model
     for effect in model.effects:
-        behind = effect.side == "link" and model.joint_behind(effect.at) is not None
-        if effect.type.memory and effect.at in joints and not behind:
+        behind = model.joint_behind(effect.at) if effect.side == "link" else None
+        if effect.type.memory and (behind or effect.at) not in kept:
             bare = bare.without_effect(*effect.key)
     return bare, np.array([model.index(name) for name in bare.parameter_names], dtype=np.int64)
 
 
+def invertible(model: Model) -> Model:
+    """A machine whose inverse dynamics is known: without what remembers, where effects have split a joint.
+
+    Parameters
+    ----------
+    model : Model
+    """
+    return _without_memories(model)[0] if model.added_joints else model
+
+
 def _settled(model: Model, theta: Array, positions: Array, dt: float) -> Array:
-    """Positions with those of joints that effects have split off as they rest under gravity."""
+    """Positions with those of joints that effects have split off as they rest under gravity, remembering nothing."""
+    model, places = _without_memories(model)
+    theta = theta[places]
     own = [place for place, name in enumerate(model.joints) if name not in model.added_joints]
     held = np.tile(positions[own], (2, 1))
     still = np.zeros_like(held)

@@ -1,7 +1,7 @@
 """What could be missing from a model, in the order of its evidence."""
 
 from vpm.ranking.rank import rank
-from vpm.ranking.result import Ranked, Ranking
+from vpm.ranking.result import Gap, Ranked, Ranking
 from vpm.ranking.settings import Settings
 
-__all__ = ["Ranked", "Ranking", "Settings", "rank"]
+__all__ = ["Gap", "Ranked", "Ranking", "Settings", "rank"]

@@ -13,7 +13,7 @@ from scipy.optimize import lsq_linear
 
 from vpm.discrepancy.candidates import Key
 from vpm.errors import VpmError
-from vpm.ranking.colour import Colour, Parts, colour_of, plain
+from vpm.ranking.noise_model import NoiseModel, Parts, fitted_noise, white_noise
 from vpm.ranking.observed import FINEST, Observed, Observer, fewest_steps
 from vpm.ranking.settings import Settings
 from vpm.ranking.structure import Structure
@@ -60,10 +60,10 @@ class Fitted:
     ----------
     structure : Structure
     observer : Observer
-    colour : Colour
+    noise : NoiseModel
         Of what the observer leaves.
     log_likelihood : float
-        Of the records under that colour.
+        Of the records under that noise model.
     evidence : float
         Logarithm of the probability density of the records under the structure, nats.
     predicted_gain : float
@@ -72,7 +72,7 @@ class Fitted:
 
     structure: Structure
     observer: Observer
-    colour: Colour
+    noise: NoiseModel
     log_likelihood: float
     evidence: float
     predicted_gain: float
@@ -80,22 +80,22 @@ class Fitted:
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """A way to look at residuals: their colour, and derivatives that are taken as known under it.
+    """A way to look at residuals: their noise model, and derivatives that are taken as known under it.
 
     Attributes
     ----------
-    colour : Colour
+    noise : NoiseModel
     known : mapping of str to ndarray, shape (n,)
         Prediction errors by a unit of parameters, which stay as they are while a structure is fitted.
     """
 
-    colour: Colour
+    noise: NoiseModel
     known: Mapping[str, Array]
 
     def errors(self, followed: Followed, parts: Parts) -> tuple[Array, Array]:
         """Prediction errors (n,), and their change by deviations of the priors (n, k)."""
-        errors = self.colour.whitened(followed.residual, parts)
-        fresh = dict(zip(followed.names, self.colour.whitened(followed.jacobian, parts).T, strict=True))
+        errors = self.noise.whitened(followed.residual, parts)
+        fresh = dict(zip(followed.names, self.noise.whitened(followed.jacobian, parts).T, strict=True))
         slopes = np.empty((len(errors), len(followed.structure.priors)))
         for place, (name, slope) in enumerate(zip(followed.structure.priors, followed.structure.slopes, strict=True)):
             slopes[:, place] = (fresh[name] if name in fresh else self.known[name]) * slope
@@ -104,7 +104,7 @@ class View:
     def weighted(self, followed: Followed, parts: Parts) -> tuple[Array, Array]:
         """The same in roots of the weights of the errors."""
         errors, slopes = self.errors(followed, parts)
-        return in_roots(errors, slopes, self.colour.roots(errors))
+        return in_roots(errors, slopes, self.noise.roots(errors))
 
 
 class Fitter:
@@ -116,8 +116,8 @@ class Fitter:
     def __init__(self, observed: Observed, settings: Settings) -> None:
         self.observed, self.settings = observed, settings
 
-    def fitted(self, structure: Structure, observer: Observer, colour: Colour | None = None) -> Fitted:
-        """Most probable values, by bounded Gauss-Newton steps; under a given colour, or else as the channels are.
+    def fitted(self, structure: Structure, observer: Observer, noise: NoiseModel | None = None) -> Fitted:
+        """Most probable values, by bounded Gauss-Newton steps; under a given noise model, or else as the channels are.
 
         Raises
         ------
@@ -125,8 +125,8 @@ class Fitter:
             The structure runs away from the records where it begins.
         """
         begun = self.followed(structure.at(structure.standard), observer)
-        colour = colour or plain(begun.residual, self.observed.parts)
-        return self._weighed(self._descended(begun, View(colour, {})))
+        noise = noise or white_noise(begun.residual, self.observed.parts)
+        return self._weighed(self._descended(begun, View(noise, {})))
 
     def searched(self, structure: Structure, observer: Observer, view: View, goal: float) -> Fitted:
         """The same with derivatives by some parameters as they are known.
@@ -145,13 +145,13 @@ class Fitter:
             ended = self.followed(ended.structure, observer, residual=ended.residual)
         return self._weighed(ended)
 
-    def settled(self, found: Fitted) -> Fitted:
-        """At its own colour, bandwidth and number of equal steps, the effects being fitted anew at each."""
+    def refined(self, found: Fitted) -> Fitted:
+        """At its own noise model, bandwidth and number of equal steps, the effects being fitted anew at each."""
         return self._changed(self._improved(found, found.observer), (_finer, _wider, _narrower))
 
     def finished(self, found: Fitted) -> Fitted:
         """The same, and where equal steps are still too coarse, under steps of controlled error."""
-        found = self.settled(found)
+        found = self.refined(found)
         if found.observer.controlled or found.observer.steps < FINEST:
             return found
         return self._changed(found, (_controlled, _wider, _narrower))
@@ -160,7 +160,7 @@ class Fitter:
         """What was found, under equal steps."""
         if not found.observer.controlled:
             return found
-        return self.fitted(found.structure, replace(found.observer, steps=FINEST, controlled=False), found.colour)
+        return self.fitted(found.structure, replace(found.observer, steps=FINEST, controlled=False), found.noise)
 
     def without(self, found: Fitted, key: Key) -> Fitted:
         """The same without one of its effects, whose part the others take over as far as they can.
@@ -174,7 +174,7 @@ class Fitter:
         with contextlib.suppress(*ASTRAY):
             starts.append(self._faded(found, tuple(starts[0].priors)).without(key))
         start = min(starts, key=lambda one: self._cost_of(one, found))
-        return self.finished(self.fitted(start, found.observer, found.colour))
+        return self.finished(self.fitted(start, found.observer, found.noise))
 
     def _faded(self, found: Fitted, kept: Sequence[str]) -> Structure:
         """With an effect walked back to nothing, the others that are ``kept`` following it by linear models.
@@ -186,7 +186,7 @@ class Fitter:
         stays = np.array([name in kept for name in structure.priors])
         for share in FADING:
             followed = self.followed(structure, found.observer)
-            errors, slopes = View(found.colour, {}).weighted(followed, self.observed.parts)
+            errors, slopes = View(found.noise, {}).weighted(followed, self.observed.parts)
             move = np.where(stays, 0.0, structure.neutral + share * (begun - structure.neutral) - structure.standard)
             others = replace(structure, priors={name: structure.priors[name] for name in kept})
             move[stays] = bounded_step(others, errors + slopes @ move, slopes[:, stays], self.settings.reach)
@@ -195,7 +195,7 @@ class Fitter:
 
     def _cost_of(self, structure: Structure, found: Fitted) -> float:
         try:
-            return self.cost(structure, self._pass(structure, found.observer, ())[0], found.colour)
+            return self.cost(structure, self._pass(structure, found.observer, ())[0], found.noise)
         except ASTRAY:
             return math.inf
 
@@ -219,7 +219,7 @@ class Fitter:
             The structure runs away from the records.
         """
         names = tuple(structure.priors if names is None else names)
-        columns = [structure.model.index(name) for name in names]
+        columns = [structure.place(name) for name in names]
         plain_steps = Observer(observer.band, FINEST if exact else fewest_steps(structure.model))
         if observer.controlled or plain_steps.steps < observer.steps:
             if residual is None:
@@ -228,10 +228,10 @@ class Fitter:
                 return Followed(structure, observer, names, residual, self._pass(structure, plain_steps, columns)[1])
         return Followed(structure, observer, names, *self._pass(structure, observer, columns))
 
-    def cost(self, structure: Structure, residual: Array, colour: Colour) -> float:
+    def cost(self, structure: Structure, residual: Array, noise: NoiseModel) -> float:
         """Negative logarithm of the posterior density but for a constant."""
-        errors = colour.whitened(residual, self.observed.parts)
-        return colour.cost(errors) + 0.5 * float(structure.standard @ structure.standard)
+        errors = noise.whitened(residual, self.observed.parts)
+        return noise.cost(errors) + 0.5 * float(structure.standard @ structure.standard)
 
     def _changed(self, found: Fitted, changes: Sequence[Change]) -> Fitted:
         """Under other observers, one change after the other, as far as each is for the better."""
@@ -244,12 +244,12 @@ class Fitter:
         return found
 
     def _improved(self, found: Fitted, observer: Observer) -> Fitted:
-        """Fitted under another observer, under the colour there, if that is better."""
+        """Fitted under another observer, with the noise model there, if that is better."""
         try:
             followed = self.followed(found.structure, observer, exact=True)
             other = self._weighed(followed)
             while other.evidence + 2.0 * other.predicted_gain > found.evidence:
-                followed = self._descended(followed, View(other.colour, {}), exact=True)
+                followed = self._descended(followed, View(other.noise, {}), exact=True)
                 better = self._weighed(followed)
                 if not better.evidence > other.evidence + self.settings.tolerance:
                     break
@@ -260,12 +260,12 @@ class Fitter:
 
     def _descended(self, now: Followed, view: View, goal: float = math.inf, *, exact: bool = False) -> Followed:
         """The most probable values, as far as steps lead."""
-        before = self.cost(now.structure, now.residual, view.colour)
+        before = self.cost(now.structure, now.residual, view.noise)
         for _ in range(self.settings.iterations if now.structure.priors else 0):
             move, gain = self._step(now.structure, *view.weighted(now, self.observed.parts))
             if gain < self.settings.tolerance or before - self.settings.patience * gain > goal:
                 break
-            better = self._better(now, view.colour, move, before)
+            better = self._better(now, view.noise, move, before)
             if better is None:
                 break
             structure, residual, after = better
@@ -281,7 +281,7 @@ class Fitter:
         return move, _predicted_gain(structure, errors, slopes, move)
 
     def _better(
-        self, now: Followed, colour: Colour, move: Array, before: float
+        self, now: Followed, noise: NoiseModel, move: Array, before: float
     ) -> tuple[Structure, Array, float] | None:
         """The first of the shares of a step that is better, its residual and cost; no derivatives are asked for."""
         for share in SHARES:
@@ -290,7 +290,7 @@ class Fitter:
                 residual, _ = self._pass(tried, now.observer, ())
             except ASTRAY:
                 continue
-            after = self.cost(tried, residual, colour)
+            after = self.cost(tried, residual, noise)
             if after < before:
                 return tried, residual, after
         return None
@@ -302,18 +302,18 @@ class Fitter:
         return residual, jacobian
 
     def _weighed(self, followed: Followed) -> Fitted:
-        """Evidence under the structure's own colour, all derivatives being there."""
+        """Evidence under the structure's own noise model, all derivatives being there."""
         structure, parts = followed.structure, self.observed.parts
-        colour = colour_of(followed.residual, parts, self.settings.order)
-        errors, slopes = View(colour, {}).errors(followed, parts)
-        likely = float(np.sum(colour.log_density(errors)))
-        informed = np.repeat(np.sqrt(colour.information()), len(errors) // followed.residual.shape[1])
+        noise = fitted_noise(followed.residual, parts, self.settings.order)
+        errors, slopes = View(noise, {}).errors(followed, parts)
+        likely = float(np.sum(noise.log_density(errors)))
+        informed = np.repeat(np.sqrt(noise.information()), len(errors) // followed.residual.shape[1])
         known = slopes * informed[:, None]
         z = structure.standard
         curvature = np.eye(len(z)) + known.T @ known
         evidence = likely - 0.5 * float(z @ z) - 0.5 * float(np.linalg.slogdet(curvature)[1])
-        _, predicted = self._step(structure, *in_roots(errors, slopes, colour.roots(errors)))
-        return Fitted(structure, followed.observer, colour, likely, evidence, predicted)
+        _, predicted = self._step(structure, *in_roots(errors, slopes, noise.roots(errors)))
+        return Fitted(structure, followed.observer, noise, likely, evidence, predicted)
 
 
 def in_roots(errors: Array, slopes: Array, roots: Array) -> tuple[Array, Array]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -14,7 +15,8 @@ from vpm.experiment import Experiment
 from vpm.initial import initial_state
 from vpm.model import Model
 from vpm.observer import Record
-from vpm.ranking.colour import Parts
+from vpm.ranking.firsts import STEP, Firsts, hidden_states
+from vpm.ranking.noise_model import Parts
 from vpm.ranking.settings import Settings
 from vpm.simulate import Setup
 
@@ -72,7 +74,7 @@ class Observed:
     def __init__(
         self, model: Model, experiments: Sequence[Experiment], settings: Settings, setup: Setup | None = None
     ) -> None:
-        self.setup = setup or Setup()
+        self.model, self.settings, self.setup = model, settings, setup or Setup()
         self.experiments = tuple(experiments)
         self.records = tuple(Record.of(model, record) for record in self.experiments)
         self._starts: WeakKeyDictionary[Model, list[Array]] = WeakKeyDictionary()
@@ -82,15 +84,49 @@ class Observed:
             for end, r in zip(ends, self.records, strict=True)
         ]
 
+    @cached_property
+    def firsts(self) -> Firsts:
+        """First states that nobody measures, as far as the model moves them; none where it runs away."""
+        states = hidden_states(self.model, self.records[0].channels)
+        if not states:
+            return Firsts()
+        observer, theta = Observer(self.settings.bands[0]), self.model.theta
+        try:
+            begun = zip(self.records, self._begun(self.model), strict=True)
+            motion = np.concatenate([self._run(self.model, theta, observer, (), *one)[1] for one in begun])
+        except (VpmError, ArithmeticError):
+            return Firsts()
+        sizes = np.std(motion[:, [self.model.state_names.index(state) for state in states]], axis=0)
+        moving = [(state, float(size)) for state, size in zip(states, sizes, strict=True) if 0.0 < size < np.inf]
+        return Firsts(tuple(state for state, _ in moving), tuple(size for _, size in moving), len(self.records))
+
     def follow(
         self, model: Model, theta: Array, observer: Observer, columns: Sequence[int] = ()
     ) -> tuple[Array, Array]:
-        """Readings less outputs (N, m) of all records, one after the other, and derivatives (N, m, len(columns))."""
-        residuals, slopes = [], []
-        for record, start in zip(self.records, self._begun(model), strict=True):
-            outputs, slope = self._followed(model, theta, observer, columns, record, start)
+        """Readings less outputs (N, m) of all records, one after the other, and derivatives (N, m, len(columns)).
+
+        ``theta`` are the parameters, then, if they are not those of balance, by how much the first states are others:
+        all of the first record, all of the second, and so on.
+        """
+        own = len(model.theta)
+        firsts = self.firsts if len(theta) > own else Firsts()
+        moves = theta[own:].reshape(len(self.records), len(firsts.states))
+        parameters = [column for column in columns if column < own]
+        residuals: list[Array] = []
+        slopes: list[Array] = []
+        for record, begun, move in zip(self.records, self._begun(model), moves, strict=True):
+            start = firsts.added(model, begun, move)
+            outputs, _, slope = self._run(model, theta[:own], observer, parameters, record, start)
+            whole = np.zeros((*outputs.shape, len(columns)))
+            whole[:, :, [place for place, column in enumerate(columns) if column < own]] = -slope
+            before = own + len(residuals) * len(firsts.states)
+            for number, size in enumerate(firsts.sizes):
+                if before + number in columns:
+                    moved = firsts.added(model, start, STEP * size * (np.arange(len(firsts.sizes)) == number))
+                    others, _, _ = self._run(model, theta[:own], observer, (), record, moved)
+                    whole[:, :, columns.index(before + number)] = (outputs - others) / (STEP * size)
             residuals.append(record.readings - outputs)
-            slopes.append(-slope)
+            slopes.append(whole)
         return np.concatenate(residuals), np.concatenate(slopes)
 
     def _begun(self, model: Model) -> list[Array]:
@@ -109,7 +145,7 @@ class Observed:
             self._starts[model] = starts
         return self._starts[model]
 
-    def _followed(
+    def _run(
         self,
         model: Model,
         theta: Array,
@@ -117,10 +153,11 @@ class Observed:
         columns: Sequence[int],
         record: Record,
         start: Array,
-    ) -> tuple[Array, Array]:
+    ) -> tuple[Array, Array, Array]:
+        """Outputs of the channels of a record (N, m), states (N, nx), derivatives of the outputs (N, m, columns)."""
         places = [model.output_channels.index(name) for name in record.channels]
         gain = observer_gain(model, record.channels, observer.band, record.dt)
-        outputs, _, slopes = model.core.observe(
+        outputs, states, slopes = model.core.observe(
             theta,
             start,
             record.inputs,
@@ -133,7 +170,7 @@ class Observed:
             list(columns),
             self.setup.hold,
         )
-        return outputs[:, places], slopes[:, places]
+        return outputs[:, places], states, slopes
 
 
 def fewest_steps(model: Model) -> int:

@@ -17,9 +17,10 @@ from vpm.discrepancy.candidates import Candidate, Key, candidates
 from vpm.discrepancy.side_by_side import Failure, SideBySide
 from vpm.identify import InverseDynamicsProblem
 from vpm.identify.reuse import SPLITTING
+from vpm.initial import invertible
 from vpm.model import Model
-from vpm.ranking.colour import Colour, plain
 from vpm.ranking.fit import ASTRAY, Fitted, Fitter, Followed, View, bounded_step, in_roots
+from vpm.ranking.noise_model import NoiseModel, white_noise
 from vpm.ranking.observed import Observer, fewest_steps
 from vpm.ranking.settings import Settings
 from vpm.ranking.sizes import Sizes
@@ -44,13 +45,13 @@ class Reference:
         See `Fitter.cost`.
     """
 
-    def __init__(self, fitted: Fitted, followed: Followed, colour: Colour, fitter: Fitter) -> None:
+    def __init__(self, fitted: Fitted, followed: Followed, noise: NoiseModel, fitter: Fitter) -> None:
         self.fitted, self.followed, parts = fitted, followed, fitter.observed.parts
-        self.view = View(colour, dict(zip(followed.names, colour.whitened(followed.jacobian, parts).T, strict=True)))
-        self.cost = fitter.cost(followed.structure, followed.residual, colour)
+        self.view = View(noise, dict(zip(followed.names, noise.whitened(followed.jacobian, parts).T, strict=True)))
+        self.cost = fitter.cost(followed.structure, followed.residual, noise)
         self._parts, self._reach = parts, fitter.settings.reach
-        errors = colour.whitened(followed.residual, parts)
-        self._roots = colour.roots(errors)
+        errors = noise.whitened(followed.residual, parts)
+        self._roots = noise.roots(errors)
         self._left = float(np.sum((errors * self._roots) ** 2))
 
     def predicted_gain(self, other: Followed) -> float:
@@ -86,7 +87,7 @@ class Proposal:
     @property
     def view(self) -> View:
         """How it is looked at; where an effect does nothing, derivatives by all others are those without it."""
-        return self.reference.view if self.neutral else View(self.reference.view.colour, {})
+        return self.reference.view if self.neutral else View(self.reference.view.noise, {})
 
     @property
     def key(self) -> Key:
@@ -119,8 +120,8 @@ def extended(
             continue
         if not parameter.shape or parameter.learnt or short in start:
             priors[name] = sizes.prior(candidate, parameter, model.parameters[name].value)
-    shown = (*carried.shown, *(effect.parameter_names[short] for short in start if short in candidate.bounds))
-    return replace(carried, priors=priors, effects=(*structure.effects, candidate.key), shown=shown)
+    limited = (*carried.range_limited, *(effect.parameter_names[short] for short in start if short in candidate.bounds))
+    return replace(carried, priors=priors, effects=(*structure.effects, candidate.key), range_limited=limited)
 
 
 def sides_of(candidate: Candidate, model: Model) -> tuple[Side, ...]:
@@ -138,8 +139,9 @@ def proposals(
 
     They are the best few by each observer and each way to look at what it leaves.
     """
-    model = found.structure.model.with_parameters(found.structure.values)
-    plausible = candidates(model, data, data.evaluate(model, model.theta)[0], tuple(EFFECTS))
+    model = found.structure.repaired
+    bare = invertible(model)
+    plausible = candidates(model, data, data.evaluate(bare, bare.theta)[0], tuple(EFFECTS))
     listed = [started(candidate, model, sizes) for candidate in plausible]
     looks = [_references(one, fitter) for one in observers(found, fitter)]
     items = [
@@ -152,16 +154,16 @@ def proposals(
     ]
     screened = each(
         "screening",
-        lambda item: _seen(*item, fitter, sizes),
+        lambda item: _screened(*item, fitter, sizes),
         items,
         lambda item: f"{item[1].label}, {item[0][0].followed.observer.label}",
     )
     chosen: list[Proposal] = []
     for several in looks:
-        seen = [one for one in screened if not isinstance(one, Failure) and one[0].reference is several[0]]
-        for alike in zip(*seen, strict=True):
+        mine = [one for one in screened if not isinstance(one, Failure) and one[0].reference is several[0]]
+        for alike in zip(*mine, strict=True):
             chosen += _seated([proposal for proposal in alike if proposal.neutral], fitter.settings)
-        chosen += _begun([max(one, key=_gain) for one in seen if not one[0].neutral], fitter.settings)
+        chosen += _begun([max(one, key=_gain) for one in mine if not one[0].neutral], fitter.settings)
     return chosen
 
 
@@ -178,11 +180,11 @@ def observers(found: Fitted, fitter: Fitter) -> list[Fitted]:
 def _references(found: Fitted, fitter: Fitter) -> list[Reference]:
     """Ways to look at it: as it is, where an effect of slow motion is large, and whitened, where a weak one is."""
     followed = fitter.followed(found.structure, found.observer)
-    colours = plain(followed.residual, fitter.observed.parts), found.colour
-    return [Reference(found, followed, colour, fitter) for colour in colours]
+    noises = white_noise(followed.residual, fitter.observed.parts), found.noise
+    return [Reference(found, followed, noise, fitter) for noise in noises]
 
 
-def _seen(
+def _screened(
     references: Sequence[Reference],
     candidate: Candidate,
     start: Mapping[str, float],
@@ -205,20 +207,20 @@ def _seen(
     return [Proposal(structure, observer, one.predicted_gain(followed), candidate.neutral, one) for one in references]
 
 
-def _seated(seen: list[Proposal], settings: Settings) -> list[Proposal]:
+def _seated(screened: list[Proposal], settings: Settings) -> list[Proposal]:
     """The best start of each of the best effects, of which a step of a fit says well what they are good for."""
     taken: dict[Key, Proposal] = {}
-    for proposal in sorted(seen, key=_gain, reverse=True):
+    for proposal in sorted(screened, key=_gain, reverse=True):
         if proposal.gain < settings.least or len(taken) == settings.seats:
             break
         taken.setdefault(proposal.key, proposal)
     return list(taken.values())
 
 
-def _begun(seen: list[Proposal], settings: Settings) -> list[Proposal]:
+def _begun(screened: list[Proposal], settings: Settings) -> list[Proposal]:
     """The best starts of each effect that is there at its start already: a step says little of where it ends."""
     taken: dict[Key, list[Proposal]] = defaultdict(list)
-    for proposal in sorted(seen, key=_gain, reverse=True):
+    for proposal in sorted(screened, key=_gain, reverse=True):
         if len(taken[proposal.key]) < settings.starts:
             taken[proposal.key].append(proposal)
     return [proposal for several in taken.values() for proposal in several]

@@ -23,6 +23,7 @@ from vpm.ranking.result import Ranked, Ranking
 from vpm.ranking.settings import Settings
 from vpm.ranking.sizes import Sizes
 from vpm.ranking.structure import Structure, sides_taken
+from vpm.ranking.validation import gaps
 from vpm.simulate import Setup
 from vpm.weighing import Prior
 
@@ -32,6 +33,7 @@ Array = NDArray[np.float64]
 def rank(
     model: Model,
     experiments: Experiment | Sequence[Experiment],
+    validate: Experiment | Sequence[Experiment] | None = None,
     *,
     settings: Settings | None = None,
     setup: Setup | None = None,
@@ -52,6 +54,8 @@ def rank(
         Its uncertain parameters are fitted with every structure.
     experiments : Experiment or sequence of Experiment
         Positions of joints and commands of actuators; all of them are fitted.
+    validate : Experiment or sequence of Experiment, optional
+        Records that decide nothing; `Ranking.gaps` is measured on them, once, when all is found.
     settings : Settings, optional
         The numbers that decide.
     setup : Setup, optional
@@ -83,7 +87,10 @@ def rank(
         raise DiagnosisError("no record was given; pass at least one experiment")
     with threadpool_limits(1, user_api="blas"):
         each = SideBySide(workers, progress)
-        return _Search(model, records, settings or Settings(), setup, each, tell or (lambda _: None)).run()
+        search = _Search(model, records, settings or Settings(), setup, each, tell or (lambda _: None))
+        # What a validation record lacks is said before the search.
+        held_out = Observed(model, [] if validate is None else as_records(validate), search.settings, setup)
+        return search.run(held_out)
 
 
 class _Search:
@@ -102,17 +109,20 @@ class _Search:
         self.data = InverseDynamicsProblem(model, records)
         self.fitter = Fitter(Observed(model, records, settings, setup), settings)
         self.sizes = Sizes(model, self.data)
-        self.start = Structure(model, model.theta.copy(), known(model, self.data))
+        firsts = self.fitter.observed.firsts.priors
+        values = np.append(model.theta, np.zeros(len(firsts)))
+        self.start = Structure(model, values, known(model, self.data) | firsts, firsts=tuple(firsts))
         self.bare = 0.0  # log likelihood of the records without any effect
 
-    def run(self) -> Ranking:
+    def run(self, held_out: Observed) -> Ranking:
         """See `rank`."""
         self.say("fitting what is uncertain")
-        found = self.fitter.finished(self.fitter.fitted(self.start, Observer(self.settings.bands[0])))
+        found = recalibrated = self.fitter.finished(self.fitter.fitted(self.start, Observer(self.settings.bands[0])))
         rounds: list[tuple[Ranked, ...]] = []
         effects: list[Ranked] = []
         while len(effects) < self.settings.effects:
             found, best, others = self._round(found)
+            recalibrated = found if not found.structure.effects else recalibrated
             if best is None:
                 rounds.append(others)
                 break
@@ -126,8 +136,17 @@ class _Search:
             effects = [one for one in effects if (one.effect, one.site) not in needless]
             if needless:
                 self.say("no longer needed: " + ", ".join(" at ".join(key) for key in needless))
-        model = found.structure.model.with_parameters(found.structure.values)
-        return Ranking(tuple(effects), tuple(rounds), model, found.observer.band, found.log_likelihood)
+        stages = (self.start.model, recalibrated.structure.repaired, found.structure.repaired)
+        left = gaps(held_out, stages, found.observer, self.settings.bands[0])
+        return Ranking(
+            tuple(replace(one, side=found.structure.side((one.effect, one.site))) for one in effects),
+            tuple(rounds),
+            stages[-1],
+            found.observer.band,
+            found.log_likelihood,
+            self._price(found),
+            left,
+        )
 
     def _round(self, found: Fitted) -> tuple[Fitted, Fitted | None, tuple[Ranked, ...]]:
         """What had been found, with the best effect more if one pays, and all that were tried, the most probable first.
@@ -177,7 +196,7 @@ class _Search:
         ]
         several = [_distinct(fits) for fits in _by_effect(hopeful)]
         last = [one for fits in several[: self.settings.finalists] for one in fits[: self.settings.optima]]
-        ends = self.each("settling", self.fitter.settled, last, lambda one: " at ".join(one.structure.effects[-1]))
+        ends = self.each("refining", self.fitter.refined, last, lambda one: " at ".join(one.structure.effects[-1]))
         return [fits[0] for fits in _by_effect([*ends, *trials])]
 
     def _fitted(self, proposal: Proposal) -> Fitted:
@@ -211,7 +230,7 @@ class _Search:
         for side in SIDES:
             with contextlib.suppress(*ASTRAY):
                 if sides != {side}:
-                    other = self.fitter.fitted(found.structure.beside(joint, side), found.observer, found.colour)
+                    other = self.fitter.fitted(found.structure.beside(joint, side), found.observer, found.noise)
                     turned.append(self.fitter.finished(other))
         return max(turned, key=lambda one: one.evidence)
 
@@ -219,13 +238,17 @@ class _Search:
     def _ranked(one: Fitted, found: Fitted) -> Ranked:
         effect, site = one.structure.effects[-1]
         values = {name: value for name, value in one.structure.values.items() if name not in found.structure.priors}
-        return Ranked(effect, site, one.evidence - found.evidence, values)
+        return Ranked(effect, site, one.evidence - found.evidence, values, side=one.structure.side((effect, site)))
 
 
 def _by_effect(trials: Sequence[Fitted | Failure]) -> list[list[Fitted]]:
     """The fits of each effect, the most probable first."""
     several: dict[Key, list[Fitted]] = {}
-    whole = [one for one in trials if isinstance(one, Fitted) and one.structure.seen and np.isfinite(one.evidence)]
+    whole = [
+        one
+        for one in trials
+        if isinstance(one, Fitted) and one.structure.within_excitation and np.isfinite(one.evidence)
+    ]
     for trial in sorted(whole, key=lambda one: -one.evidence):
         several.setdefault(trial.structure.effects[-1], []).append(trial)
     return list(several.values())

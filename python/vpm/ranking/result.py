@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
+from vpm.catalogue.kinds import Side
 from vpm.model import Model
 from vpm.results import Result, Storable
 
@@ -22,6 +23,8 @@ class Ranked(Storable):
         Its parameters, SI.
     rivals : tuple of str
         Effects that the records do not tell from it: within a few nats of its evidence.
+    side : {"motor", "link"}
+        Of a joint that is split.
     """
 
     effect: str
@@ -29,6 +32,29 @@ class Ranked(Storable):
     evidence: float
     values: dict[str, float]
     rivals: tuple[str, ...] = ()
+    side: Side = "motor"
+
+    @property
+    def place(self) -> str:
+        """Site and side in words."""
+        return self.site if self.side == "motor" else f"{self.site}, {self.side} side"
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class Gap(Storable):
+    """Root mean square of what a slow observer leaves of a channel of validation records, at each stage.
+
+    Attributes
+    ----------
+    before, recalibrated, after : float
+        Of the model as it was, with fitted parameters, and with what was found, in ``unit``; NaN where it runs away.
+    unit : str
+    """
+
+    before: float
+    recalibrated: float
+    after: float
+    unit: str
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -47,6 +73,10 @@ class Ranking(Result):
         Bandwidth of the observer under which the records are most probable, Hz: the smaller, the less is left.
     log_likelihood : float
         Of the records under ``model``.
+    needed : float
+        Evidence that one effect more would have had to bring, nats.
+    gaps : dict of str to Gap
+        By channel, on records that decided nothing; empty if there are none.
     """
 
     effects: tuple[Ranked, ...]
@@ -54,9 +84,11 @@ class Ranking(Result):
     model: Model
     band: float
     log_likelihood: float
+    needed: float
+    gaps: dict[str, Gap] = field(default_factory=dict)
 
     def _headline(self) -> Mapping[str, object]:
-        return {f"{one.effect} at {one.site}": one.evidence for one in self.effects} or {"effects": "none"}
+        return {f"{one.effect} at {one.place}": one.evidence for one in self.effects} or {"effects": "none"}
 
     def _frame_columns(self) -> Mapping[str, object]:
         tried = [(number + 1, one) for number, several in enumerate(self.rounds) for one in several]

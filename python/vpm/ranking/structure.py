@@ -30,32 +30,43 @@ class Structure:
     Attributes
     ----------
     model : Model
-    theta : ndarray, shape (p,)
-        Values; those of the model are its own.
+    theta : ndarray, shape (p + f,)
+        Values of the parameters, those of the model are its own, then of the unknown first states of the records.
     priors : mapping of str to Prior
-        Parameters that are unknown.
+        Parameters and first states that are unknown.
     effects : tuple of (str, str)
         What was added to the model of the user, in order.
-    shown : tuple of str
+    range_limited : tuple of str
         Shapes that records show between two ends alone: at one of these the effect is another one, or none.
+    firsts : tuple of str
+        Unknown first states, in their order.
     """
 
     model: Model
     theta: Array
     priors: Mapping[str, Prior]
     effects: tuple[Key, ...] = ()
-    shown: tuple[str, ...] = ()
+    range_limited: tuple[str, ...] = ()
+    firsts: tuple[str, ...] = ()
+
+    def place(self, name: str) -> int:
+        """Where a parameter, or a first state, stands among the values."""
+        if name in self.model.parameters:
+            return self.model.index(name)
+        return len(self.model.theta) + [other for other in self.priors if other not in self.model.parameters].index(
+            name
+        )
 
     @property
-    def seen(self) -> bool:
+    def within_excitation(self) -> bool:
         """Whether each of its shapes lies inside of what the records can show."""
-        pairs = [(self.priors[name], float(self.theta[self.model.index(name)])) for name in self.shown]
+        pairs = [(self.priors[name], float(self.theta[self.model.index(name)])) for name in self.range_limited]
         return all(prior.low < value < prior.high for prior, value in pairs)
 
     @cached_property
     def columns(self) -> list[int]:
-        """Places of the unknown parameters."""
-        return [self.model.index(name) for name in self.priors]
+        """Places of the unknown ones."""
+        return [self.place(name) for name in self.priors]
 
     @cached_property
     def ends(self) -> Array:
@@ -92,7 +103,13 @@ class Structure:
     @property
     def values(self) -> dict[str, float]:
         """Unknown parameters by name, SI."""
-        return {name: float(self.theta[column]) for name, column in zip(self.priors, self.columns, strict=True)}
+        own = zip(self.priors, self.columns, strict=True)
+        return {name: float(self.theta[column]) for name, column in own if name not in self.firsts}
+
+    @property
+    def repaired(self) -> Model:
+        """The model with its effects, at these values."""
+        return self.model.with_parameters(self.values)
 
     def at(self, standard: Array) -> Structure:
         """With unknown parameters at these deviations of their priors, as far as they are possible."""
@@ -106,12 +123,13 @@ class Structure:
         """The same in another model, as far as that has the parameters; some have new names there."""
         names = {name: renamed.get(name, name) for name in self.model.parameter_names}
         kept = {name: new for name, new in names.items() if new in model.parameters}
-        theta = model.theta.copy()
+        theta = np.concatenate([model.theta, self.theta[len(self.model.theta) :]])
         for name, new in kept.items():
             theta[model.index(new)] = self.theta[self.model.index(name)]
+        kept |= {name: name for name in self.firsts}
         priors = {kept[name]: prior for name, prior in self.priors.items() if name in kept}
-        shown = tuple(kept[name] for name in self.shown if name in kept)
-        return Structure(model, theta, priors, self.effects, shown)
+        range_limited = tuple(kept[name] for name in self.range_limited if name in kept)
+        return Structure(model, theta, priors, self.effects, range_limited, self.firsts)
 
     def beside(self, joint: str, side: Side) -> Structure:
         """The same with what rubs, pulls or stops at a joint on one of its sides."""
@@ -124,6 +142,10 @@ class Structure:
             renamed.update({name: new.parameter_names[short] for short, name in old.parameter_names.items()})
         return self.carried(model, renamed)
 
+    def side(self, key: Key) -> Side:
+        """On which side of its joint an effect is."""
+        return next(effect.side for effect in reversed(self.model.effects) if (effect.name, effect.at) == key)
+
     def without(self, key: Key) -> Structure:
         """The same without one of its effects.
 
@@ -132,6 +154,5 @@ class Structure:
         ModelError
             Another effect rests on it.
         """
-        effect = next(effect for effect in reversed(self.model.effects) if (effect.name, effect.at) == key)
-        rest = self.carried(self.model.without_effect(*key, effect.side))
+        rest = self.carried(self.model.without_effect(*key, self.side(key)))
         return replace(rest, effects=tuple(effect for effect in self.effects if effect != key))

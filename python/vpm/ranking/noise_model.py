@@ -26,7 +26,7 @@ FLOOR = 1e-9
 
 
 @dataclass(frozen=True)
-class Colour:
+class NoiseModel:
     """How the residual of each channel follows from its own past.
 
     Attributes
@@ -115,14 +115,14 @@ def _weights(errors: Array, freedom: Array) -> Array:
     return np.where(normal, 1.0, (nu + 1.0) / (nu + errors**2))
 
 
-def plain(residual: Array, parts: Parts) -> Colour:
+def white_noise(residual: Array, parts: Parts) -> NoiseModel:
     """Channels as they are, in their root mean squares."""
     one = np.ones(1)
     sizes = [_deviation(_filtered(residual[:, place], parts, one)) for place in range(residual.shape[1])]
-    return Colour(tuple(one for _ in sizes), tuple(sizes), tuple(np.inf for _ in sizes))
+    return NoiseModel(tuple(one for _ in sizes), tuple(sizes), tuple(np.inf for _ in sizes))
 
 
-def colour_of(residual: Array, parts: Parts, order: int) -> Colour:
+def fitted_noise(residual: Array, parts: Parts, order: int) -> NoiseModel:
     """The autoregression that predicts each channel best (Yule 1927, Walker 1931)."""
     taps, deviations, tails = [], [], []
     for place in range(residual.shape[1]):
@@ -136,7 +136,7 @@ def colour_of(residual: Array, parts: Parts, order: int) -> Colour:
         size, freedom = _bell(_filtered(residual[:, place], parts, taps[-1]))
         deviations.append(size)
         tails.append(freedom)
-    return Colour(tuple(taps), tuple(deviations), tuple(tails))
+    return NoiseModel(tuple(taps), tuple(deviations), tuple(tails))
 
 
 def _bell(errors: Array) -> tuple[float, float]:

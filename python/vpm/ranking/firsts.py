@@ -1,0 +1,56 @@
+"""First states that no channel shows: an observer draws what is measured, and friction may hold the rest for long."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vpm.model import Model
+from vpm.weighing.priors import Prior
+
+Array = NDArray[np.float64]
+
+#: By which share of its size a first state is moved for a derivative.
+STEP = 1e-3
+
+
+def hidden_states(model: Model, channels: Sequence[str]) -> tuple[str, ...]:
+    """Positions and velocities of joints of which these channels tell no position; not of those that effects add."""
+    hidden = [name for name in model.joints if name not in model.added_joints and f"{name}.position" not in channels]
+    names = [f"{name}.{what}" for what in ("position", "velocity") for name in hidden]
+    return tuple(name for name in names if name in model.state_names)
+
+
+@dataclass(frozen=True)
+class Firsts:
+    """Unknown first states, record by record: by how much they differ from those of balance.
+
+    Attributes
+    ----------
+    states : tuple of str
+    sizes : tuple of float
+        How far each of them moves in the records: it may begin as far from balance.
+    records : int
+    """
+
+    states: tuple[str, ...] = ()
+    sizes: tuple[float, ...] = ()
+    records: int = 0
+
+    @property
+    def priors(self) -> dict[str, Prior]:
+        """What is known of each in each record."""
+        return {
+            f"{state} where record {record + 1} begins": Prior(0.0, size, -np.inf, np.inf)
+            for record in range(self.records)
+            for state, size in zip(self.states, self.sizes, strict=True)
+        }
+
+    def added(self, model: Model, start: Array, moves: Array) -> Array:
+        """A first state (nx,) of a model with these moved by ``moves`` (len(states),)."""
+        start = start.copy()
+        start[[model.state_names.index(state) for state in self.states]] += moves
+        return start
