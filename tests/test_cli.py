@@ -13,11 +13,13 @@ from pathlib import Path
 import pytest
 
 from command_line import vpm
+from sledge import SLEDGE, pushed
 from vpm.demo import MODEL, TRAIN, VALIDATION
+from vpm.model import Model
 
 STEP = Path(__file__).resolve().parent.parent / "examples" / "emps" / "step.toml"
 COMMANDS = (
-    *("info", "simulate", "compare", "identify", "diagnose", "report"),
+    *("info", "simulate", "compare", "identify", "diagnose", "rank", "report"),
     *("climb", "simplify", "budget", "compile", "demo"),
 )
 
@@ -203,6 +205,19 @@ def test_diagnose_leaves_effects_out_and_stops_at_a_limit(tmp_path: Path) -> Non
     none = vpm("diagnose", MODEL, TRAIN, *words, "--limit", "0")
     assert none.returncode == 0, none.stderr
     assert json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))["effects"] == []
+
+
+def test_rank_names_what_is_missing_and_writes_the_model(tmp_path: Path) -> None:
+    (tmp_path / "sledge.toml").write_text(SLEDGE, encoding="utf-8")
+    for seed in (1, 2):
+        pushed(seed=seed, lag=0.008, duration=3.0).to_csv(tmp_path / f"push_{seed}.csv")
+    words = ("sledge.toml", "push_1.csv", "--validate", "push_2.csv", "--most", "1", "--out", "better.toml")
+    done = vpm("rank", *words, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith("1. actuator_lag at motor: ")
+    assert "way.position, validation" in done.stdout
+    better = Model.load(tmp_path / "better.toml")
+    assert better.parameters["motor.lag.time_constant"].value == pytest.approx(0.008, rel=0.05)
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of another kind")

@@ -1,4 +1,4 @@
-"""Command line: ``vpm demo``, ``simulate``, ``compare``, ``identify``, ``diagnose`` and the others."""
+"""Command line: ``vpm demo``, ``simulate``, ``compare``, ``identify``, ``diagnose``, ``rank`` and the others."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from typer.core import TyperGroup
 
-from vpm import __version__, detail_command, diagnose_command, identify_command, prove_command
+from vpm import __version__, detail_command, diagnose_command, identify_command, prove_command, rank_command
 from vpm.command import (
     BESIDE,
     FORMATS,
@@ -84,6 +84,7 @@ app = typer.Typer(
 app.add_typer(excite_app, name="excite")
 app.command(epilog=identify_command.EXAMPLES)(identify_command.identify)
 app.command(epilog=diagnose_command.EXAMPLES)(diagnose_command.diagnose)
+app.command(epilog=rank_command.EXAMPLES)(rank_command.rank)
 app.command(epilog=prove_command.EXAMPLES)(prove_command.prove)
 detail_command.add_to(app)
 Out = Annotated[Path, typer.Option(help="Folder for report.json, report.html and the repaired model.")]

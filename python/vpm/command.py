@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from vpm.errors import ValidityWarning, VpmError
 
@@ -58,7 +59,11 @@ Hold = Annotated[
         help="What commands of a log do between samples: zero_order (as of a digital controller), first_order or cubic."
     ),
 ]
+Workers = Annotated[int, typer.Option(min=0, help="Candidates at a time; 0 for one per core. The result is the same.")]
 Plot = Annotated[Path | None, typer.Option(help="Write the plot to this file (PNG, SVG or PDF).")]
+
+Tell = Callable[[str], None]
+Each = Callable[[str, str, int, int], None]
 
 
 def load_model(path: Path) -> Model:
@@ -95,6 +100,28 @@ def progress() -> Iterator[Callable[[str], None]]:
         return
     with errors.status("starting") as status:
         yield status.update
+
+
+@contextmanager
+def searching() -> Iterator[tuple[Tell, Each]]:
+    """A bar of the candidates of each round; a line each where the output goes to a file."""
+    if not errors.is_terminal:
+        yield (
+            lambda text: errors.print(text, markup=False),
+            lambda what, name, done, total: errors.print(f"{what} {done} of {total}: {name}", markup=False),
+        )
+        return
+    words = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[name]}"))
+    with Progress(*words, TimeElapsedColumn(), console=errors, transient=True) as bar:
+        task = bar.add_task("starting", total=None, name="")
+
+        def tell(text: str) -> None:
+            bar.update(task, description=text, completed=0, total=None, name="")
+
+        def each(what: str, name: str, done: int, total: int) -> None:
+            bar.update(task, description=what, completed=done, total=total, name=name)
+
+        yield tell, each
 
 
 @contextmanager

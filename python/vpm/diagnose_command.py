@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from vpm.command import (
     Channels,
@@ -19,10 +15,11 @@ from vpm.command import (
     Interpolate,
     Logs,
     ModelPath,
+    Workers,
     console,
-    errors,
     load_all,
     load_record,
+    searching,
 )
 
 EXAMPLES = (
@@ -39,12 +36,8 @@ Out = Annotated[Path, typer.Option(help="Folder for report.json, report.html and
 Effect = Annotated[Words, typer.Option(help="Try only these effects; repeat.")]
 Without = Annotated[Words, typer.Option(help="Try all effects but these; repeat.")]
 Limit = Annotated[int, typer.Option(min=0, help="Most effects to accept.")]
-Workers = Annotated[int, typer.Option(min=0, help="Candidates at a time; 0 for one per core. The result is the same.")]
 Substeps = Annotated[int, typer.Option(min=1, help="Integration steps per sample, in simulations of unseen records.")]
 Horizon = Annotated[float, typer.Option(help="Length of each restart, where unseen records are simulated so, s.")]
-
-Tell = Callable[[str], None]
-Each = Callable[[str, str, int, int], None]
 
 
 def diagnose(
@@ -75,7 +68,7 @@ def diagnose(
     names = _tried(effect, without)
     machine, records = load_all(model, logs, channels, interpolate)
     unseen = [load_record(path, machine, channels, interpolate) for path in validate or []]
-    with shown(errors) as (tell, each):
+    with searching() as (tell, each):
         diagnosis = find_missing(
             machine,
             records,
@@ -91,28 +84,6 @@ def diagnose(
     print_story(diagnosis, console)
     for path in write_report(diagnosis, out):
         console.print(f"wrote {path}", markup=False)
-
-
-@contextmanager
-def shown(console_of_errors: Console) -> Iterator[tuple[Tell, Each]]:
-    """A bar of the candidates of each round; a line each where the output goes to a file."""
-    if not console_of_errors.is_terminal:
-        yield (
-            lambda text: console_of_errors.print(text, markup=False),
-            lambda what, name, done, total: console_of_errors.print(f"{what} {done} of {total}: {name}", markup=False),
-        )
-        return
-    words = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[name]}"))
-    with Progress(*words, TimeElapsedColumn(), console=console_of_errors, transient=True) as bar:
-        task = bar.add_task("starting", total=None, name="")
-
-        def tell(text: str) -> None:
-            bar.update(task, description=text, completed=0, total=None, name="")
-
-        def each(what: str, name: str, done: int, total: int) -> None:
-            bar.update(task, description=what, completed=done, total=total, name=name)
-
-        yield tell, each
 
 
 def _tried(only: list[str] | None, without: list[str] | None) -> list[str] | None:

@@ -1,0 +1,109 @@
+"""Command line of a ranking: ``vpm rank``."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from vpm.command import (
+    Channels,
+    Hold,
+    Integrator,
+    Interpolate,
+    Logs,
+    ModelPath,
+    Workers,
+    console,
+    load_all,
+    load_record,
+    searching,
+)
+
+if TYPE_CHECKING:
+    from vpm.model import Model
+    from vpm.ranking import Ranked, Ranking
+
+EXAMPLES = (
+    "Example:  vpm rank model.toml train.csv --validate test.csv --out better.toml\n\n"
+    "Example:  vpm rank model.toml a.csv b.csv --most 1 --workers 1"
+)
+#: Effects that were tried and not taken, that are shown.
+SHOWN = 5
+
+Validate = Annotated[
+    list[Path] | None, typer.Option(help="Record that decides nothing; the gap is told on it; repeat.")
+]
+Most = Annotated[int, typer.Option(min=1, help="Most effects to add.")]
+Out = Annotated[Path | None, typer.Option(help="Write the model with what was found to this file (TOML).")]
+
+
+def rank(
+    model: ModelPath,
+    logs: Logs,
+    validate: Validate = None,
+    out: Out = None,
+    most: Most = 4,
+    channels: Channels = None,
+    interpolate: Interpolate = False,
+    integrator: Integrator = "auto",
+    hold: Hold = "zero_order",
+    workers: Workers = 0,
+) -> None:
+    """Order what a model could be missing by its evidence in logs, and add the best for as long as it pays.
+
+    For rigid machines. All logs are fitted; neither a controller nor a start at rest is asked for.
+    """
+    from vpm.ranking import Settings
+    from vpm.ranking import rank as ranked
+    from vpm.simulate import Setup
+
+    machine, records = load_all(model, logs, channels, interpolate)
+    held_out = [load_record(path, machine, channels, interpolate) for path in validate or []]
+    with searching() as (tell, each):
+        ranking = ranked(
+            machine,
+            records,
+            held_out,
+            settings=Settings(effects=most),
+            setup=Setup(integrator, hold=hold),
+            workers=workers or None,
+            tell=tell,
+            progress=each,
+        )
+    for line in lines_of(ranking):
+        console.print(line, markup=False)
+    if out is not None:
+        console.print(f"wrote {ranking.model.save(out)}", markup=False)
+
+
+def lines_of(ranking: Ranking) -> Iterator[str]:
+    """A ranking in lines: what was added, what was next, the gap on validation records."""
+    if not ranking.effects:
+        yield f"{ranking.model.name}: no effect has evidence enough to be added"
+    for number, one in enumerate(ranking.effects, 1):
+        yield f"{number}. {one.effect} at {one.place}: {one.evidence:.1f} nats"
+        yield f"     {_sentence(one, ranking.model)}"
+        if one.rivals:
+            yield f"     these records do not tell it from {', '.join(one.rivals)}"
+    taken = {(one.effect, one.site) for one in ranking.effects}
+    tried = ranking.rounds[-1] if ranking.rounds else ()
+    others = [other for other in tried if (other.effect, other.site) not in taken][:SHOWN]
+    if others:
+        yield f"next, with the evidence that each would add; {ranking.needed:.1f} nats are needed:"
+    yield from (f"  {other.effect} at {other.place}: {other.evidence:.1f} nats" for other in others)
+    for channel, gap in ranking.gaps.items():
+        levels = (
+            f"{gap.before:.4g} before, {gap.recalibrated:.4g} with fitted parameters, {gap.after:.4g} {gap.unit} now"
+        )
+        yield f"{channel}, validation, root mean square beside a slow observer: {levels}"
+
+
+def _sentence(one: Ranked, model: Model) -> str:
+    """What an effect of a model is, with its values."""
+    effect = next(own for own in model.effects if (own.name, own.at) == (one.effect, one.site))
+    values = {short: model.parameters[name] for short, name in effect.parameter_names.items()}
+    texts = {short: f"{parameter.value:.4g} {parameter.unit}" for short, parameter in values.items()}
+    return effect.type.sentence.format(at=one.place, **texts)
