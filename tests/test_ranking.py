@@ -90,6 +90,8 @@ def test_the_error_of_an_observer_dies_away_with_its_bandwidth(band: float) -> N
 def test_nothing_is_missing_where_the_model_is_right() -> None:
     ranking = vpm.rank(Model.from_toml(SLEDGE), [pushed(seed=4, duration=4.0), pushed(seed=5, duration=4.0)])
     assert ranking.effects == ()
+    assert ranking.complete > 0.5
+    assert ranking.complete + sum(one.probability for one in ranking.rounds[0]) == pytest.approx(1.0, abs=1e-12)
     assert ranking.model.parameters["sledge.mass"].value == pytest.approx(MASS, rel=4e-3)
     assert ranking.model.parameters["way.friction.viscous"].value == pytest.approx(OIL, rel=1e-2)
 
@@ -119,6 +121,8 @@ def test_a_lag_of_the_drive_is_named_with_its_time() -> None:
     held_out = pushed(seed=2, lag=0.008, duration=4.0)
     ranking = vpm.rank(Model.from_toml(SLEDGE), pushed(seed=1, lag=0.008, duration=4.0), held_out)
     assert [(one.effect, one.site) for one in ranking.effects] == [("actuator_lag", "motor")]
+    assert ranking.effects[0].probability > 0.9
+    assert ranking.effects[0].rivals == ()
     gap = ranking.gaps["way.position"]
     assert gap.unit == "m"
     assert gap.before > gap.recalibrated > 20.0 * gap.after

@@ -36,6 +36,23 @@ measures = "way.position"
 """
 )
 
+#: An arm on a vertical hinge, without friction.
+FLAT = """
+name = "flat"
+gravity = [0, 0, 0]
+[bodies.arm]
+mass = 1.0
+inertia = [0.1, 0.1, 0.15, 0, 0, 0]
+[joints.hinge]
+type = "revolute"
+parent = "world"
+child = "arm"
+axis = [0, 0, 1]
+[actuators.motor]
+joint = "hinge"
+gain = 1.0
+"""
+
 
 @lru_cache
 def records() -> list[Experiment]:
@@ -203,3 +220,17 @@ def test_a_split_joint_has_inverse_dynamics_without_what_remembers() -> None:
     assert [effect.name for effect in invertible(warm).effects] == ["viscous_friction", "joint_compliance"]
     data = InverseDynamicsProblem(Model.from_toml(SLEDGE), records())
     assert np.isfinite(data.evaluate(invertible(warm), invertible(warm).theta)[0]).all()
+
+
+def test_a_fit_stays_where_bodies_are_real() -> None:
+    """No body has more inertia about an axis than about the two others together, whatever records ask for."""
+    model = Model.from_toml(FLAT)
+    time = 2e-3 * np.arange(1500)
+    # A free inertia of 0.3 kg m^2 turns so under a torque of 2 cos 9t.
+    angle = 2.0 / 0.3 * (1.0 - np.cos(9.0 * time)) / 81.0
+    channels = {"motor.command": 2.0 * np.cos(9.0 * time), "hinge.position": angle}
+    record = Experiment.from_arrays(time, channels, model=model, name="swing")
+    fitter = Fitter(Observed(model, [record], Settings()), Settings())
+    known = {"arm.inertia.zz": Prior(0.15, 0.1, 0.0, np.inf)}
+    found = fitter.fitted(Structure(model, model.theta.copy(), known), Observer(2.0))
+    assert 0.17 < found.structure.values["arm.inertia.zz"] <= 0.2

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -84,10 +85,12 @@ def lines_of(ranking: Ranking) -> Iterator[str]:
     if not ranking.effects:
         yield f"{ranking.model.name}: no effect has evidence enough to be added"
     for number, one in enumerate(ranking.effects, 1):
-        yield f"{number}. {one.effect} at {one.place}: {one.evidence:.1f} nats"
+        yield f"{number}. {one.effect} at {one.place}: {one.evidence:.1f} nats, probability {one.probability:.2f}"
         yield f"     {_sentence(one, ranking.model)}"
         if one.rivals:
             yield f"     these records do not tell it from {', '.join(one.rivals)}"
+    if not math.isnan(ranking.complete):
+        yield f"nothing else is missing: probability {ranking.complete:.2f}"
     taken = {(one.effect, one.site) for one in ranking.effects}
     tried = ranking.rounds[-1] if ranking.rounds else ()
     others = [other for other in tried if (other.effect, other.site) not in taken][:SHOWN]

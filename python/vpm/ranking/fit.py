@@ -27,8 +27,8 @@ SHARES = (1.0, 0.3, 0.08)
 FADING = (0.75, 0.5, 0.25, 0.0)
 #: Residuals and derivatives that no record has; their squares are still numbers.
 RUNAWAY = 1e100
-#: What is raised of structures that the records contradict, or that cannot be computed.
-ASTRAY = (VpmError, ArithmeticError)
+#: What is raised of structures that the records contradict, that cannot be computed, or whose bodies are not real.
+ASTRAY = (ValueError, ArithmeticError)
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,8 +128,10 @@ class Fitter:
         noise = noise or white_noise(begun.residual, self.observed.parts)
         return self._weighed(self._descended(begun, View(noise, {})))
 
-    def searched(self, structure: Structure, observer: Observer, view: View, goal: float) -> Fitted:
-        """The same with derivatives by some parameters as they are known.
+    def searched(
+        self, structure: Structure, observer: Observer, view: View, goal: float, residual: Array | None = None
+    ) -> Fitted:
+        """The same with derivatives by some parameters, and the ``residual`` where it begins, as they are known.
 
         It gives up where several times the gain that a step predicts would not bring the `cost` below a goal.
 
@@ -139,7 +141,7 @@ class Fitter:
             The structure runs away from the records where it begins.
         """
         fresh = tuple(name for name in structure.priors if name not in view.known)
-        begun = self.followed(structure.at(structure.standard), observer, fresh)
+        begun = self.followed(structure.at(structure.standard), observer, fresh, residual=residual)
         ended = self._descended(begun, view, goal)
         if len(fresh) < len(structure.priors):
             ended = self.followed(ended.structure, observer, residual=ended.residual)
@@ -227,6 +229,11 @@ class Fitter:
             with contextlib.suppress(*ASTRAY):  # contacts may be too stiff for few steps
                 return Followed(structure, observer, names, residual, self._pass(structure, plain_steps, columns)[1])
         return Followed(structure, observer, names, *self._pass(structure, observer, columns))
+
+    def log_density(self, fitted: Fitted) -> Array:
+        """Logarithm of the density of each sample (n,)."""
+        residual, _ = self._pass(fitted.structure, fitted.observer, ())
+        return fitted.noise.log_density(fitted.noise.whitened(residual, self.observed.parts))
 
     def cost(self, structure: Structure, residual: Array, noise: NoiseModel) -> float:
         """Negative logarithm of the posterior density but for a constant."""

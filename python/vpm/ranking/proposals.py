@@ -90,6 +90,11 @@ class Proposal:
         return self.reference.view if self.neutral else View(self.reference.view.noise, {})
 
     @property
+    def residual(self) -> Array | None:
+        """What is left where the fit begins, if that is known: an effect that does nothing leaves it as it was."""
+        return self.reference.followed.residual if self.neutral else None
+
+    @property
     def key(self) -> Key:
         """Effect and site."""
         return self.structure.effects[-1]
@@ -133,16 +138,21 @@ def sides_of(candidate: Candidate, model: Model) -> tuple[Side, ...]:
 
 
 def proposals(
-    found: Fitted, fitter: Fitter, data: InverseDynamicsProblem, sizes: Sizes, each: SideBySide
+    found: Fitted,
+    fitter: Fitter,
+    data: InverseDynamicsProblem,
+    sizes: Sizes,
+    each: SideBySide,
+    only: Key | None = None,
 ) -> list[Proposal]:
-    """Effects of the catalogue that are worth a fit beside ``found``.
+    """Effects of the catalogue, or ``only`` one of them, that are worth a fit beside ``found``.
 
     They are the best few by each observer and each way to look at what it leaves.
     """
     model = found.structure.repaired
     bare = invertible(model)
     plausible = candidates(model, data, data.evaluate(bare, bare.theta)[0], tuple(EFFECTS))
-    listed = [started(candidate, model, sizes) for candidate in plausible]
+    listed = [started(candidate, model, sizes) for candidate in plausible if only in (None, candidate.key)]
     looks = [_references(one, fitter) for one in observers(found, fitter)]
     items = [
         (several, candidate, start, side)
@@ -194,6 +204,8 @@ def _screened(
 ) -> list[Proposal]:
     """One effect at start values under one observer, in each of the ways to look at what is left.
 
+    Derivatives by what was unknown without it are taken as they were: a prediction of a gain can do with these.
+
     Raises
     ------
     VpmError, ArithmeticError
@@ -202,8 +214,9 @@ def _screened(
     without = references[0].followed
     structure = extended(without.structure, candidate, start, side, sizes)
     observer = replace(without.observer, steps=max(without.observer.steps, fewest_steps(structure.model)))
-    known = without.names if candidate.neutral else ()
-    followed = fitter.followed(structure, observer, [name for name in structure.priors if name not in known])
+    fresh = [name for name in structure.priors if name not in without.names]
+    residual = without.residual if candidate.neutral else None
+    followed = fitter.followed(structure, observer, fresh, residual=residual)
     return [Proposal(structure, observer, one.predicted_gain(followed), candidate.neutral, one) for one in references]
 
 

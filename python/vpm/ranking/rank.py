@@ -18,6 +18,7 @@ from vpm.identify import InverseDynamicsProblem
 from vpm.model import Model
 from vpm.ranking.fit import ASTRAY, Fitted, Fitter
 from vpm.ranking.observed import Observed, Observer
+from vpm.ranking.posterior import alike, probabilities
 from vpm.ranking.proposals import SIDES, Proposal, proposals
 from vpm.ranking.result import Ranked, Ranking
 from vpm.ranking.settings import Settings
@@ -120,18 +121,17 @@ class _Search:
         found = recalibrated = self.fitter.finished(self.fitter.fitted(self.start, Observer(self.settings.bands[0])))
         rounds: list[tuple[Ranked, ...]] = []
         effects: list[Ranked] = []
+        complete = np.nan
         while len(effects) < self.settings.effects:
-            found, best, others = self._round(found)
+            found, best, tried = self._round(found)
             recalibrated = found if not found.structure.effects else recalibrated
+            listed, nothing = self._listed(found, best, tried)
+            rounds.append(listed)
             if best is None:
-                rounds.append(others)
+                complete = nothing
                 break
-            one = self._ranked(best, found)
-            others = tuple(other for other in others if (other.effect, other.site) != (one.effect, one.site))
-            rounds.append((one, *others))
-            close = [other for other in others if one.evidence - other.evidence < self.settings.same]
-            effects.append(replace(one, rivals=tuple(f"{other.effect} at {other.site}" for other in close)))
-            self.say(f"{one.effect} at {one.site}: {one.evidence:.1f} nats")
+            effects.append(listed[0])
+            self.say(f"{listed[0].effect} at {listed[0].site}: {listed[0].evidence:.1f} nats")
             found, needless = self._without_needless(best)
             effects = [one for one in effects if (one.effect, one.site) not in needless]
             if needless:
@@ -145,34 +145,58 @@ class _Search:
             found.observer.band,
             found.log_likelihood,
             self._price(found),
+            complete,
             left,
         )
 
-    def _round(self, found: Fitted) -> tuple[Fitted, Fitted | None, tuple[Ranked, ...]]:
+    def _listed(self, found: Fitted, best: Fitted | None, tried: Sequence[Fitted]) -> tuple[tuple[Ranked, ...], float]:
+        """All effects that were tried, the best first, with their probabilities; and that of nothing being missing."""
+        coarse = self.fitter.equally_coarse(found)
+        ranked = [self._ranked(one, coarse) for one in tried]
+        if best is not None:
+            place = [one.structure.effects[-1] for one in tried].index(best.structure.effects[-1])
+            others = [one for one in tried if one is not tried[place]]
+            close = [one for one in others if abs(one.evidence - tried[place].evidence) < self.settings.odds]
+            same = [one.structure.effects[-1] for one in alike(tried[place], close, self.fitter, self.settings.same)]
+            rivals = tuple(f"{effect} at {site}" for effect, site in same)
+            ranked = [replace(self._ranked(best, found), rivals=rivals), *ranked[:place], *ranked[place + 1 :]]
+        gains = [one.evidence for one in ranked]
+        *shares, nothing = probabilities(gains, self._price(found), self.settings.tempering).tolist()
+        return tuple(replace(one, probability=share) for one, share in zip(ranked, shares, strict=True)), nothing
+
+    def _round(self, found: Fitted) -> tuple[Fitted, Fitted | None, list[Fitted]]:
         """What had been found, with the best effect more if one pays, and all that were tried, the most probable first.
 
         What an effect makes of the parameters that had been found may be better without it too: a fit that had not come
-        to its end is no evidence for one effect more.
+        to its end is no evidence for one effect more, and if that takes all that it brought, all are tried again.
         """
         while True:
             if not found.structure.effects:
                 self.bare = found.log_likelihood
             coarse = self.fitter.equally_coarse(found)
             tried = self._tried(coarse)
-            others = tuple(self._ranked(one, coarse) for one in tried)
             for one in tried[: self.settings.finalists]:
                 if one.evidence - coarse.evidence < self._price(found):
-                    return found, None, others
-                best = self._turned(self.fitter.finished(one))
-                without = self._without(best, best.structure.effects[-1])
-                if without is not None and without.evidence > found.evidence:
-                    again, found = without.evidence > found.evidence + self.settings.odds, without
-                    if again:
-                        break
+                    return found, None, tried
+                key = one.structure.effects[-1]
+                best = self._turned(self.fitter.finished(one), key[1])
+                without, before = self._without(best, key), found
+                if without is not None and (without := self._turned(without, key[1])).evidence > found.evidence:
+                    found = without
+                again = found.evidence > before.evidence + self.settings.odds
                 if best.evidence - found.evidence >= self._price(found):
-                    return found, best, others
+                    return found, self._anew(best, found) if again else best, tried
+                if again:
+                    break
             else:
-                return found, None, others
+                return found, None, tried
+
+    def _anew(self, best: Fitted, found: Fitted) -> Fitted:
+        """The last effect fitted once more from its start values, beside a fit of all others that came further."""
+        key = best.structure.effects[-1]
+        tried = self._tried(self.fitter.equally_coarse(found), key)
+        ends = [self._turned(self.fitter.finished(one), key[1]) for one in tried]
+        return max([best, *ends], key=lambda one: one.evidence)
 
     def _price(self, found: Fitted) -> float:
         """Evidence that another effect has to bring, nats.
@@ -185,8 +209,8 @@ class _Search:
         power = float(np.expm1(min(2.0 * explained / samples, 700.0)))
         return self.settings.odds + 0.5 * samples * float(np.log1p(self.settings.inexact**2 * power))
 
-    def _tried(self, found: Fitted) -> list[Fitted]:
-        chosen = proposals(found, self.fitter, self.data, self.sizes, self.each)
+    def _tried(self, found: Fitted, only: Key | None = None) -> list[Fitted]:
+        chosen = proposals(found, self.fitter, self.data, self.sizes, self.each, only)
         trials = self.each("fitting", self._fitted, chosen, lambda one: " at ".join(one.key))
         hopeful = [
             trial
@@ -194,14 +218,26 @@ class _Search:
             if isinstance(trial, Fitted)
             and trial.evidence + 2.0 * trial.predicted_gain > proposal.reference.fitted.evidence
         ]
-        several = [_distinct(fits) for fits in _by_effect(hopeful)]
-        last = [one for fits in several[: self.settings.finalists] for one in fits[: self.settings.optima]]
-        ends = self.each("refining", self.fitter.refined, last, lambda one: " at ".join(one.structure.effects[-1]))
-        return [fits[0] for fits in _by_effect([*ends, *trials])]
+        several = [_distinct(fits)[: self.settings.optima] for fits in _by_effect(hopeful)]
+        return [fits[0] for fits in _by_effect([*self._refined(several[: self.settings.finalists]), *trials])]
+
+    def _refined(self, several: Sequence[Sequence[Fitted]]) -> list[Fitted]:
+        """Fits of the first of these effects refined, and those of the others that may come as far by as much."""
+        first = [one for fits in several[:1] for one in fits]
+        ends = self._each_refined(first)
+        lift = max((end.evidence - one.evidence for end, one in zip(ends, first, strict=True)), default=0.0)
+        best = max((end.evidence for end in ends), default=-np.inf)
+        others = [one for fits in several[1:] for one in fits if one.evidence + lift > best]
+        return ends + self._each_refined(others)
+
+    def _each_refined(self, fits: Sequence[Fitted]) -> list[Fitted]:
+        """Each refined, or as it was where that cannot be computed."""
+        ends = self.each("refining", self.fitter.refined, fits, lambda one: " at ".join(one.structure.effects[-1]))
+        return [end if isinstance(end, Fitted) else one for end, one in zip(ends, fits, strict=True)]
 
     def _fitted(self, proposal: Proposal) -> Fitted:
         goal = proposal.reference.cost
-        return self.fitter.searched(proposal.structure, proposal.observer, proposal.view, goal)
+        return self.fitter.searched(proposal.structure, proposal.observer, proposal.view, goal, proposal.residual)
 
     def _without_needless(self, found: Fitted) -> tuple[Fitted, list[Key]]:
         """Without those of the earlier effects that a later one has made needless."""
@@ -220,9 +256,9 @@ class _Search:
         except ASTRAY:
             return None
 
-    def _turned(self, found: Fitted) -> Fitted:
-        """With what acts at the joint of the last effect on its other side, where it has two and that is better."""
-        model, joint = found.structure.model, found.structure.effects[-1][1]
+    def _turned(self, found: Fitted, joint: str) -> Fitted:
+        """With what acts at a joint on its other side, where it has two and that is better."""
+        model = found.structure.model
         sides = sides_taken(model, joint)
         if not sides or not model.joint_behind(joint):
             return found

@@ -21,8 +21,10 @@ class Ranked(Storable):
         Nats that it adds to the evidence of the structure without it.
     values : dict
         Its parameters, SI.
+    probability : float
+        That this is what is missing beside what had been found before, and not another effect or none.
     rivals : tuple of str
-        Effects that the records do not tell from it: within a few nats of its evidence.
+        Effects that the records do not tell from it.
     side : {"motor", "link"}
         Of a joint that is split.
     """
@@ -31,6 +33,7 @@ class Ranked(Storable):
     site: str
     evidence: float
     values: dict[str, float]
+    probability: float = float("nan")
     rivals: tuple[str, ...] = ()
     side: Side = "motor"
 
@@ -75,6 +78,8 @@ class Ranking(Result):
         Of the records under ``model``.
     needed : float
         Evidence that one effect more would have had to bring, nats.
+    complete : float
+        Probability that nothing else of the catalogue is missing; NaN where the search ended at its most effects.
     gaps : dict of str to Gap
         By channel, on records that decided nothing; empty if there are none.
     """
@@ -85,6 +90,7 @@ class Ranking(Result):
     band: float
     log_likelihood: float
     needed: float
+    complete: float
     gaps: dict[str, Gap] = field(default_factory=dict)
 
     def _headline(self) -> Mapping[str, object]:
@@ -97,4 +103,5 @@ class Ranking(Result):
             "effect": [one.effect for _, one in tried],
             "site": [one.site for _, one in tried],
             "evidence": [one.evidence for _, one in tried],
+            "probability": [one.probability for _, one in tried],
         }

@@ -42,8 +42,10 @@ class Settings:
         Evidence, nats, that another effect has to bring.
     inexact : float
         By how much an effect differs from its law, as a share of what it does: another effect may take that up.
+    tempering : float
+        Power of evidence in probabilities: no model is exact.
     same : float
-        Effects within so many nats of the best cannot be told from it.
+        Effects between which the records decide by fewer nats than this, in the mean, are one class.
     effects : int
         Most effects of a structure.
     """
@@ -64,5 +66,6 @@ class Settings:
     reach: float = 6.0
     odds: float = 8.0
     inexact: float = 0.05
-    same: float = 3.0
+    tempering: float = 0.1
+    same: float = 1.0
     effects: int = 4

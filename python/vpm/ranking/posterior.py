@@ -1,0 +1,48 @@
+"""Probabilities of what is missing next, and effects that the records cannot tell apart."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vpm.ranking.fit import Fitted, Fitter
+
+Array = NDArray[np.float64]
+
+
+def probabilities(gains: Sequence[float], price: float, tempering: float) -> Array:
+    """Probabilities of each of several effects, and last that none of them is missing (k + 1,).
+
+    Law: the posterior of models in proportion to their prior odds and a power of their evidence, which is below one
+    where no model is exact (P. Grunwald, *Algorithmic Learning Theory*, 2012).
+
+    Parameters
+    ----------
+    gains : sequence of float
+        Evidence that each effect adds, nats.
+    price : float
+        Evidence at which an effect is as probable as none, nats.
+    tempering : float
+        The power.
+    """
+    logarithms = tempering * np.append(np.asarray(gains) - price, 0.0)
+    shares = np.exp(logarithms - np.max(logarithms))
+    return np.asarray(shares / np.sum(shares))
+
+
+def alike(one: Fitted, others: Sequence[Fitted], fitter: Fitter, nats: float) -> list[Fitted]:
+    """Those of the others that the records cannot tell from ``one``.
+
+    Law: where one of two models is exact, the logarithm of the ratio of their densities has half of its variance as
+    mean (Q. Vuong, *Econometrica* 57, 1989, for the variance). Below so many ``nats`` in the mean nobody can choose.
+
+    Raises
+    ------
+    VpmError
+        One of them runs away from the records.
+    """
+    mine = fitter.log_density(one)
+    apart = [0.5 * len(mine) * float(np.var(fitter.log_density(other) - mine)) for other in others]
+    return [other for other, far in zip(others, apart, strict=True) if far < nats]

@@ -1,0 +1,87 @@
+"""Probabilities of a ranking, and effects that records cannot tell apart."""
+
+from __future__ import annotations
+
+from typing import cast
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+from scipy.stats import norm
+
+from sledge import SLEDGE, pushed
+from vpm.model import Model
+from vpm.ranking.fit import Fitted, Fitter
+from vpm.ranking.observed import Observed, Observer
+from vpm.ranking.posterior import alike, probabilities
+from vpm.ranking.settings import Settings
+from vpm.ranking.structure import Structure
+from vpm.weighing import Prior
+
+Array = NDArray[np.float64]
+NATS = st.floats(-1e5, 1e5)
+
+
+def test_an_effect_that_brings_its_price_is_as_probable_as_none() -> None:
+    assert probabilities([8.0], 8.0, 0.3) == pytest.approx([0.5, 0.5], abs=1e-15)
+    odds = probabilities([30.0, 20.0], 8.0, 0.2)
+    assert odds[0] / odds[1] == pytest.approx(np.exp(2.0), rel=1e-12)
+    assert odds[0] / odds[2] == pytest.approx(np.exp(4.4), rel=1e-12)
+    assert probabilities([], 8.0, 0.2) == pytest.approx([1.0])
+
+
+@given(st.lists(NATS, max_size=6), st.floats(0.0, 1e3), st.floats(1e-3, 1.0))
+def test_probabilities_are_some_of_a_whole_in_the_order_of_the_evidence(
+    gains: list[float], price: float, tempering: float
+) -> None:
+    shares = probabilities(gains, price, tempering)
+    assert np.sum(shares) == pytest.approx(1.0, abs=1e-12)
+    assert np.all(shares >= 0.0)
+    order = np.argsort(gains)
+    assert np.all(np.diff(shares[:-1][order]) >= 0.0)
+
+
+class Densities:
+    """Stands for a fitter of models of which only the mean of a normal density differs."""
+
+    def __init__(self, data: Array) -> None:
+        self.data = data
+
+    def log_density(self, mean: float) -> Array:
+        return np.asarray(norm.logpdf(self.data, loc=mean))
+
+
+@pytest.mark.parametrize("distance", [0.5, 3.0])
+def test_models_are_alike_where_nobody_could_choose(distance: float) -> None:
+    """Of two means a distance apart, the better one is the true one in Phi(distance / 2) of all records."""
+    random, count, trials = np.random.default_rng(5), 400, 2000
+    means = [0.0, distance / np.sqrt(count)]
+    right, same = 0, 0
+    for _ in range(trials):
+        densities = Densities(random.standard_normal(count))
+        first, second = (np.sum(densities.log_density(mean)) for mean in means)
+        right += int(first > second)
+        same += bool(alike(cast("Fitted", means[0]), [cast("Fitted", means[1])], cast("Fitter", densities), 1.0))
+    assert right / trials == pytest.approx(norm.cdf(0.5 * distance), abs=0.03)
+    assert same == (trials if 0.5 * distance**2 < 1.0 else 0)
+
+
+def test_two_names_of_one_inertia_are_alike_and_a_lag_is_not() -> None:
+    """A payload on a sledge, and a rotor that turns with it, are both mass; a lag of the drive is not."""
+    bare = Model.from_toml(SLEDGE)
+    fitter = Fitter(Observed(bare, [pushed(seed=1, lag=0.008, duration=4.0)], Settings()), Settings())
+
+    def fitted(effect: str, at: str, name: str, size: float, value: float) -> Fitted:
+        model = bare.with_effect(effect, at, **{name: value})
+        priors = {"sledge.mass": Prior(3.3, 0.33, 0.0, np.inf), "way.friction.viscous": Prior(7.0, 1.5, 0.0, np.inf)}
+        priors[model.effect(effect, at).parameter_names[name]] = Prior(value, size, 1e-4, np.inf)
+        return fitter.fitted(Structure(model, model.theta.copy(), priors), Observer(5.0))
+
+    payload = fitted("payload", "sledge", "mass", 1.0, 0.01)
+    rotor = fitted("rotor_inertia", "way", "inertia", 1.0, 0.01)
+    lag = fitted("actuator_lag", "motor", "time_constant", 0.01, 0.004)
+    assert payload.evidence == pytest.approx(rotor.evidence, abs=1e-3)
+    assert alike(payload, [rotor, lag], fitter, 1.0) == [rotor]
+    assert alike(lag, [payload, rotor], fitter, 1.0) == []
