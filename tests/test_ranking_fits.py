@@ -137,11 +137,19 @@ def test_another_effect_pays_for_what_laws_leave() -> None:
     search = _Search(model, records(), Settings(), None, SideBySide(1, None), lambda _: None)
     found = search.fitter.fitted(search.start, Observer(1.0))
     search.bare = found.log_likelihood
-    assert search._price(found) == Settings().odds
+    spring, drag = ("spring", "way"), ("quadratic_drag", "way")
+    assert search._price(found, spring) == Settings().odds
     samples = sum(part.stop - part.start for part in search.fitter.observed.parts)
-    explained = replace(found, log_likelihood=found.log_likelihood + 0.05 * samples)
+    nats = 0.05 * samples
+    explained = replace(found, log_likelihood=found.log_likelihood + nats)
     # Little beside the noise: its share of the likelihood itself.
-    assert search._price(explained) == pytest.approx(Settings().odds + 0.05**2 * 0.05 * samples, rel=0.06)
+    anywhere = pytest.approx(Settings().odds + 0.05**2 * nats, rel=0.06)
+    assert search._price(explained, spring) == anywhere
+    # Drag and dry friction are two shapes of one curve over speed; a spring or another joint has another curve.
+    search.effects.append(Ranked("coulomb_friction", "way", nats, {}))
+    assert search._price(explained, drag) == pytest.approx(Settings().odds + 0.3**2 * nats, rel=0.06)
+    assert search._price(explained, spring) == anywhere
+    assert search._price(explained, ("quadratic_drag", "elbow")) == anywhere
 
 
 def test_effects_that_a_diagnosis_does_not_try_are_candidates_where_they_are_asked_for() -> None:
@@ -214,12 +222,12 @@ def test_what_remembers_behind_a_spring_begins_with_nothing_to_remember() -> Non
 
 def test_a_split_joint_has_inverse_dynamics_without_what_remembers() -> None:
     model = Model.from_toml(SLEDGE).with_effect("hysteresis", "way", force=1.0, displacement=0.05)
-    assert invertible(model) is model
+    assert invertible(model, ["way"]) is model
     friction = structure_of(model).beside("way", "link").model.with_effect("joint_compliance", "way", stiffness=1e5)
     warm = friction.with_effect("warming_friction", "way", coulomb=1.0, time_constant=5.0)
-    assert [effect.name for effect in invertible(warm).effects] == ["viscous_friction", "joint_compliance"]
+    assert [effect.name for effect in invertible(warm, ["way"]).effects] == ["viscous_friction", "joint_compliance"]
     data = InverseDynamicsProblem(Model.from_toml(SLEDGE), records())
-    assert np.isfinite(data.evaluate(invertible(warm), invertible(warm).theta)[0]).all()
+    assert np.isfinite(data.evaluate(invertible(warm, ["way"]), invertible(warm, ["way"]).theta)[0]).all()
 
 
 def test_a_fit_stays_where_bodies_are_real() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -143,14 +144,16 @@ def _without_memories(model: Model, kept: tuple[str, ...] = ()) -> tuple[Model, 
     return bare, np.array([model.index(name) for name in bare.parameter_names], dtype=np.int64)
 
 
-def invertible(model: Model) -> Model:
-    """A machine whose inverse dynamics is known: without what remembers, where effects have split a joint.
+def invertible(model: Model, measured: Sequence[str]) -> Model:
+    """A machine whose inverse dynamics is known: without what remembers, where joints move that nobody measures.
 
     Parameters
     ----------
     model : Model
+    measured : sequence of str
+        Joints whose motion is known.
     """
-    return _without_memories(model)[0] if model.added_joints else model
+    return model if set(model.joints) == set(measured) else _without_memories(model)[0]
 
 
 def _settled(model: Model, theta: Array, positions: Array, dt: float) -> Array:

@@ -91,12 +91,15 @@ def lines_of(ranking: Ranking) -> Iterator[str]:
             yield f"     these records do not tell it from {', '.join(one.rivals)}"
     if not math.isnan(ranking.complete):
         yield f"nothing else is missing: probability {ranking.complete:.2f}"
-    taken = {(one.effect, one.site) for one in ranking.effects}
+    taken = {one.key for one in ranking.effects}
     tried = ranking.rounds[-1] if ranking.rounds else ()
-    others = [other for other in tried if (other.effect, other.site) not in taken][:SHOWN]
+    others = [other for other in tried if other.key not in taken][:SHOWN]
     if others:
-        yield f"next, with the evidence that each would add; {ranking.needed:.1f} nats are needed:"
-    yield from (f"  {other.effect} at {other.place}: {other.evidence:.1f} nats" for other in others)
+        yield "next, with the evidence that each would add:"
+    yield from (
+        f"  {other.effect} at {other.place}: {other.evidence:.1f} nats of {other.needed:.1f} that are needed"
+        for other in others
+    )
     for channel, gap in ranking.gaps.items():
         levels = (
             f"{gap.before:.4g} before, {gap.recalibrated:.4g} with fitted parameters, {gap.after:.4g} {gap.unit} now"

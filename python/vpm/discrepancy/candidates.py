@@ -94,7 +94,12 @@ class Excitation:
 
 
 def candidates(
-    model: Model, data: InverseDynamicsProblem, residual: Array, effects: Sequence[str] | None = None
+    model: Model,
+    data: InverseDynamicsProblem,
+    residual: Array,
+    effects: Sequence[str] | None = None,
+    *,
+    simulated: bool = False,
 ) -> tuple[Candidate, ...]:
     """List what could be missing from ``model``.
 
@@ -108,11 +113,13 @@ def candidates(
         Residual of ``model`` on ``data``; periods of a ripple are read from it.
     effects : sequence of str, optional
         Restrict the search to these; to those that a diagnosis tries if not given.
+    simulated : bool
+        Whether what moves unseen is simulated with the memories of effects, and not balanced.
     """
     return tuple(
         _candidate(effect, site, model, data, residual)
         for effect, site in _absent(model, effects)
-        if not beyond(effect, site, model, data.joints)
+        if not beyond(effect, site, model, data.joints, simulated=simulated)
     )
 
 

@@ -72,16 +72,18 @@ def sites_worth_trying(effect: EffectType, model: Model) -> tuple[str, ...]:
     return sites
 
 
-def beyond(effect: EffectType, site: str, model: Model, measured: Sequence[str]) -> str:
+def beyond(effect: EffectType, site: str, model: Model, measured: Sequence[str], *, simulated: bool = False) -> str:
     """Why a model with one effect more could not be built, or balanced along the ``measured`` joints, or "".
 
-    A motion with joints that nobody measures is integrated, and there no effect carries its memory along; but it
-    does on the motor side of a joint that is split where that is measured, see `vpm.identify.reuse.parts_of`.
+    A motion with joints that nobody measures is integrated, and there no effect carries its memory along; but it does
+    on the motor side of a joint that is split where that is measured, see `vpm.identify.reuse.parts_of`, and where all
+    is ``simulated``.
     """
     remembering = [f"{entry.type.title} at {entry.at}" for entry in model.effects if entry.type.memory]
     split_off = {model.joint_behind(entry.at) for entry in model.effects if entry.name in SPLITTING}
     alone = tuple(joint for joint in model.joints if joint not in split_off) == tuple(measured)
-    known = alone and not has_own_drives(model) and not any(entry.name == "rotor_inertia" for entry in model.effects)
+    lone = alone and not has_own_drives(model) and not any(entry.name == "rotor_inertia" for entry in model.effects)
+    known = simulated or lone
     if effect.memory and tuple(model.joints) != tuple(measured) and not known:
         return "its memory cannot be balanced beside what moves unseen in this model"
     if effect.name not in HIDING:

@@ -12,7 +12,7 @@ from vpm.ranking.fit import Fitted, Fitter
 Array = NDArray[np.float64]
 
 
-def probabilities(gains: Sequence[float], price: float, tempering: float) -> Array:
+def probabilities(gains: Sequence[float], tempering: float) -> Array:
     """Probabilities of each of several effects, and last that none of them is missing (k + 1,).
 
     Law: the posterior of models in proportion to their prior odds and a power of their evidence, which is below one
@@ -21,13 +21,11 @@ def probabilities(gains: Sequence[float], price: float, tempering: float) -> Arr
     Parameters
     ----------
     gains : sequence of float
-        Evidence that each effect adds, nats.
-    price : float
-        Evidence at which an effect is as probable as none, nats.
+        Evidence that each effect adds beyond that at which it is as probable as none, nats.
     tempering : float
         The power.
     """
-    logarithms = tempering * np.append(np.asarray(gains) - price, 0.0)
+    logarithms = tempering * np.append(gains, 0.0)
     shares = np.exp(logarithms - np.max(logarithms))
     return np.asarray(shares / np.sum(shares))
 

@@ -150,8 +150,9 @@ def proposals(
     They are the best few by each observer and each way to look at what it leaves.
     """
     model = found.structure.repaired
-    bare = invertible(model)
-    plausible = candidates(model, data, data.evaluate(bare, bare.theta)[0], tuple(EFFECTS))
+    bare = invertible(model, data.joints)
+    residual = data.evaluate(bare, bare.theta)[0]
+    plausible = candidates(model, data, residual, tuple(EFFECTS), simulated=True)
     listed = [started(candidate, model, sizes) for candidate in plausible if only in (None, candidate.key)]
     looks = [_references(one, fitter) for one in observers(found, fitter)]
     items = [

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
+from vpm.catalogue import EFFECTS
 from vpm.discrepancy.candidates import Key, slow_speeds
 from vpm.discrepancy.side_by_side import Failure, Progress, SideBySide
 from vpm.errors import DiagnosisError
@@ -114,15 +115,15 @@ class _Search:
         values = np.append(model.theta, np.zeros(len(firsts)))
         self.start = Structure(model, values, known(model, self.data) | firsts, firsts=tuple(firsts))
         self.bare = 0.0  # log likelihood of the records without any effect
+        self.effects: list[Ranked] = []  # what was added
 
     def run(self, held_out: Observed) -> Ranking:
         """See `rank`."""
         self.say("fitting what is uncertain")
         found = recalibrated = self.fitter.finished(self.fitter.fitted(self.start, Observer(self.settings.bands[0])))
         rounds: list[tuple[Ranked, ...]] = []
-        effects: list[Ranked] = []
         complete = np.nan
-        while len(effects) < self.settings.effects:
+        while len(self.effects) < self.settings.effects:
             found, best, tried = self._round(found)
             recalibrated = found if not found.structure.effects else recalibrated
             listed, nothing = self._listed(found, best, tried)
@@ -130,21 +131,20 @@ class _Search:
             if best is None:
                 complete = nothing
                 break
-            effects.append(listed[0])
+            self.effects.append(listed[0])
             self.say(f"{listed[0].effect} at {listed[0].site}: {listed[0].evidence:.1f} nats")
             found, needless = self._without_needless(best)
-            effects = [one for one in effects if (one.effect, one.site) not in needless]
+            self.effects = [one for one in self.effects if one.key not in needless]
             if needless:
                 self.say("no longer needed: " + ", ".join(" at ".join(key) for key in needless))
         stages = (self.start.model, recalibrated.structure.repaired, found.structure.repaired)
         left = gaps(held_out, stages, found.observer, self.settings.bands[0])
         return Ranking(
-            tuple(replace(one, side=found.structure.side((one.effect, one.site))) for one in effects),
+            tuple(replace(one, side=found.structure.side(one.key)) for one in self.effects),
             tuple(rounds),
             stages[-1],
             found.observer.band,
             found.log_likelihood,
-            self._price(found),
             complete,
             left,
         )
@@ -160,8 +160,8 @@ class _Search:
             same = [one.structure.effects[-1] for one in alike(tried[place], close, self.fitter, self.settings.same)]
             rivals = tuple(f"{effect} at {site}" for effect, site in same)
             ranked = [replace(self._ranked(best, found), rivals=rivals), *ranked[:place], *ranked[place + 1 :]]
-        gains = [one.evidence for one in ranked]
-        *shares, nothing = probabilities(gains, self._price(found), self.settings.tempering).tolist()
+        gains = [one.evidence - one.needed for one in ranked]
+        *shares, nothing = probabilities(gains, self.settings.tempering).tolist()
         return tuple(replace(one, probability=share) for one, share in zip(ranked, shares, strict=True)), nothing
 
     def _round(self, found: Fitted) -> tuple[Fitted, Fitted | None, list[Fitted]]:
@@ -175,16 +175,17 @@ class _Search:
                 self.bare = found.log_likelihood
             coarse = self.fitter.equally_coarse(found)
             tried = self._tried(coarse)
-            for one in tried[: self.settings.finalists]:
-                if one.evidence - coarse.evidence < self._price(found):
-                    return found, None, tried
+            worth = sorted(tried, key=lambda one: self._price(found, one.structure.effects[-1]) - one.evidence)
+            for one in worth[: self.settings.finalists]:
                 key = one.structure.effects[-1]
+                if one.evidence - coarse.evidence < self._price(found, key):
+                    return found, None, tried
                 best = self._turned(self.fitter.finished(one), key[1])
                 without, before = self._without(best, key), found
                 if without is not None and (without := self._turned(without, key[1])).evidence > found.evidence:
                     found = without
                 again = found.evidence > before.evidence + self.settings.odds
-                if best.evidence - found.evidence >= self._price(found):
+                if best.evidence - found.evidence >= self._price(found, key):
                     return found, self._anew(best, found) if again else best, tried
                 if again:
                     break
@@ -198,16 +199,25 @@ class _Search:
         ends = [self._turned(self.fitter.finished(one), key[1]) for one in tried]
         return max([best, *ends], key=lambda one: one.evidence)
 
-    def _price(self, found: Fitted) -> float:
+    def _price(self, found: Fitted, key: Key) -> float:
         """Evidence that another effect has to bring, nats.
 
-        No law is exact. Where those that were found explain a power P beside the noise, as by their log likelihood,
-        what they do otherwise has a share of it, and an effect that takes up no more than that is none.
+        No law is exact. What those that were found do otherwise has a share of the power that they explain beside the
+        noise, and an effect that takes up no more than that is none. The share is larger for an effect at the same site
+        that shows over the same state: one curve with two shapes.
         """
-        samples = sum(int(part.stop - part.start) for part in self.fitter.observed.parts)
+        alike = (one for one in self.effects if one.site == key[1] and _states(one.key) & _states(key))
         explained = max(found.log_likelihood - self.bare, 0.0)
+        anywhere = self._otherwise(explained, self.settings.inexact)
+        return self.settings.odds + max(
+            anywhere, self._otherwise(sum(one.evidence for one in alike), self.settings.inexact_curve)
+        )
+
+    def _otherwise(self, explained: float, share: float) -> float:
+        """Nats in this share of a power, of which so many nats tell the ratio to the noise."""
+        samples = sum(int(part.stop - part.start) for part in self.fitter.observed.parts)
         power = float(np.expm1(min(2.0 * explained / samples, 700.0)))
-        return self.settings.odds + 0.5 * samples * float(np.log1p(self.settings.inexact**2 * power))
+        return 0.5 * samples * float(np.log1p(share**2 * power))
 
     def _tried(self, found: Fitted, only: Key | None = None) -> list[Fitted]:
         chosen = proposals(found, self.fitter, self.data, self.sizes, self.each, only)
@@ -270,11 +280,21 @@ class _Search:
                     turned.append(self.fitter.finished(other))
         return max(turned, key=lambda one: one.evidence)
 
-    @staticmethod
-    def _ranked(one: Fitted, found: Fitted) -> Ranked:
-        effect, site = one.structure.effects[-1]
+    def _ranked(self, one: Fitted, found: Fitted) -> Ranked:
+        key = one.structure.effects[-1]
         values = {name: value for name, value in one.structure.values.items() if name not in found.structure.priors}
-        return Ranked(effect, site, one.evidence - found.evidence, values, side=one.structure.side((effect, site)))
+        return Ranked(
+            *key,
+            one.evidence - found.evidence,
+            values,
+            needed=self._price(found, key),
+            side=one.structure.side(key),
+        )
+
+
+def _states(key: Key) -> set[str]:
+    """States over which an effect shows."""
+    return set(EFFECTS[key[0]].signature.lives_in)
 
 
 def _by_effect(trials: Sequence[Fitted | Failure]) -> list[list[Fitted]]:

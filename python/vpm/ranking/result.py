@@ -21,6 +21,8 @@ class Ranked(Storable):
         Nats that it adds to the evidence of the structure without it.
     values : dict
         Its parameters, SI.
+    needed : float
+        Evidence that it has to add to be believed, nats.
     probability : float
         That this is what is missing beside what had been found before, and not another effect or none.
     rivals : tuple of str
@@ -33,9 +35,15 @@ class Ranked(Storable):
     site: str
     evidence: float
     values: dict[str, float]
+    needed: float = 0.0
     probability: float = float("nan")
     rivals: tuple[str, ...] = ()
     side: Side = "motor"
+
+    @property
+    def key(self) -> tuple[str, str]:
+        """Effect and site."""
+        return self.effect, self.site
 
     @property
     def place(self) -> str:
@@ -76,8 +84,6 @@ class Ranking(Result):
         Bandwidth of the observer under which the records are most probable, Hz: the smaller, the less is left.
     log_likelihood : float
         Of the records under ``model``.
-    needed : float
-        Evidence that one effect more would have had to bring, nats.
     complete : float
         Probability that nothing else of the catalogue is missing; NaN where the search ended at its most effects.
     gaps : dict of str to Gap
@@ -89,7 +95,6 @@ class Ranking(Result):
     model: Model
     band: float
     log_likelihood: float
-    needed: float
     complete: float
     gaps: dict[str, Gap] = field(default_factory=dict)
 
@@ -103,5 +108,6 @@ class Ranking(Result):
             "effect": [one.effect for _, one in tried],
             "site": [one.site for _, one in tried],
             "evidence": [one.evidence for _, one in tried],
+            "needed": [one.needed for _, one in tried],
             "probability": [one.probability for _, one in tried],
         }

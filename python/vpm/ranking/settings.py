@@ -44,6 +44,8 @@ class Settings:
         By how much an effect differs from its law, as a share of what it does: another effect may take that up.
     tempering : float
         Power of evidence in probabilities: no model is exact.
+    inexact_curve : float
+        The same where the other effect shows over the same state at the same site.
     same : float
         Effects between which the records decide by fewer nats than this, in the mean, are one class.
     effects : int
@@ -64,8 +66,9 @@ class Settings:
     patience: float = 3.0
     tolerance: float = 0.5
     reach: float = 6.0
-    odds: float = 8.0
+    odds: float = 16.0
     inexact: float = 0.05
-    tempering: float = 0.1
+    inexact_curve: float = 0.3
+    tempering: float = 0.2
     same: float = 1.0
     effects: int = 4

@@ -17,8 +17,12 @@ DETAILS = frozenset({"transition_velocity", "width"})
 
 
 def started(candidate: Candidate, model: Model, sizes: Sizes) -> Candidate:
-    """A candidate whose contacts begin closed and stiff, where a fit can see them."""
+    """A candidate whose contacts begin closed and stiff, where a fit can see them, and whose waves may be long."""
     ends = {name: pair for name, pair in candidate.bounds.items() if name not in DETAILS}
+    if "period" in ends and candidate.site in sizes.ways:
+        # One wave on all of the way that is seen: a longer one is a slope.
+        (low, high), (first, last) = ends["period"], sizes.ways[candidate.site]
+        ends["period"] = low, max(high, last - first)
     candidate = replace(candidate, bounds=ends)
     if candidate.effect.name == "backlash":
         return replace(candidate, starts=tuple(_backlash(start) for start in candidate.starts), fixed=())
