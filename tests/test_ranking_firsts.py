@@ -9,12 +9,18 @@ import pytest
 
 import vpm
 from sledge import FINE, GAIN, MASS, OIL, READING, SLEDGE, STEP
+from vpm.catalogue import EFFECTS
+from vpm.discrepancy.candidates import candidates
 from vpm.experiment import Experiment
+from vpm.identify import InverseDynamicsProblem
+from vpm.initial import invertible
 from vpm.model import Model
 from vpm.ranking.firsts import hidden_states
 from vpm.ranking.fit import Fitter
 from vpm.ranking.observed import Observed, Observer
 from vpm.ranking.settings import Settings
+from vpm.ranking.sizes import Sizes
+from vpm.ranking.starts import started
 from vpm.ranking.structure import Structure
 
 LOAD, STIFFNESS, DAMPING, DRY = 1.0, 400.0, 6.0, 1.2
@@ -128,3 +134,28 @@ def test_friction_that_held_a_load_is_named_alone() -> None:
     ranking = vpm.rank(Model.from_toml(CARRYING), records())
     assert [(one.effect, one.site) for one in ranking.effects] == [("coulomb_friction", "tail")]
     assert ranking.model.parameters["tail.friction.coulomb"].value == pytest.approx(DRY, rel=0.03)
+
+
+def test_what_remembers_is_tried_beside_a_joint_that_nobody_measures() -> None:
+    """A run carries memories along; only a balance along measured joints cannot."""
+    model = Model.from_toml(CARRYING)
+    data = InverseDynamicsProblem(model, records()[:1])
+    residual = data.evaluate(model, model.theta)[0]
+    balanced = {one.key for one in candidates(model, data, residual, tuple(EFFECTS))}
+    simulated = {one.key for one in candidates(model, data, residual, tuple(EFFECTS), simulated=True)}
+    remembering = {name for name, effect in EFFECTS.items() if effect.memory}
+    assert simulated - balanced == {(name, joint) for name in remembering for joint in ("way", "tail")}
+    warm = model.with_effect("warming_friction", "way", coulomb=1.0, time_constant=5.0)
+    bare = invertible(warm, ["way"])
+    assert [effect.name for effect in bare.effects] == [effect.name for effect in model.effects]
+
+
+def test_a_wave_may_be_as_long_as_the_way_that_is_seen() -> None:
+    model = Model.from_toml(CARRYING)
+    data = InverseDynamicsProblem(model, records())
+    residual = data.evaluate(model, model.theta)[0]
+    sizes = Sizes(model, data)
+    (ripple,) = (one for one in candidates(model, data, residual, ("torque_ripple",)) if one.site == "way")
+    way = np.ptp(np.concatenate([record["way.position"] for record in records()]))
+    assert ripple.bounds["period"][1] < way
+    assert started(ripple, model, sizes).bounds["period"][1] == pytest.approx(way, rel=0.05)

@@ -77,6 +77,11 @@ class Fitted:
     evidence: float
     predicted_gain: float
 
+    @property
+    def key(self) -> Key:
+        """Effect and site of what was added last."""
+        return self.structure.effects[-1]
+
 
 @dataclass(frozen=True, eq=False)
 class View:

@@ -154,15 +154,17 @@ class _Search:
         coarse = self.fitter.equally_coarse(found)
         ranked = [self._ranked(one, coarse) for one in tried]
         if best is not None:
-            place = [one.structure.effects[-1] for one in tried].index(best.structure.effects[-1])
-            others = [one for one in tried if one is not tried[place]]
-            close = [one for one in others if abs(one.evidence - tried[place].evidence) < self.settings.odds]
-            same = [one.structure.effects[-1] for one in alike(tried[place], close, self.fitter, self.settings.same)]
-            rivals = tuple(f"{effect} at {site}" for effect, site in same)
-            ranked = [replace(self._ranked(best, found), rivals=rivals), *ranked[:place], *ranked[place + 1 :]]
+            others = [one for one in ranked if one.key != best.key]
+            ranked = [replace(self._ranked(best, found), rivals=self._rivals(best.key, tried)), *others]
         gains = [one.evidence - one.needed for one in ranked]
         *shares, nothing = probabilities(gains, self.settings.tempering).tolist()
         return tuple(replace(one, probability=share) for one, share in zip(ranked, shares, strict=True)), nothing
+
+    def _rivals(self, key: Key, tried: Sequence[Fitted]) -> tuple[str, ...]:
+        """Effects that the records cannot tell from one of those that were tried."""
+        own = next(one for one in tried if one.key == key)
+        close = [one for one in tried if one is not own and abs(one.evidence - own.evidence) < self.settings.odds]
+        return tuple(" at ".join(one.key) for one in alike(own, close, self.fitter, self.settings.same))
 
     def _round(self, found: Fitted) -> tuple[Fitted, Fitted | None, list[Fitted]]:
         """What had been found, with the best effect more if one pays, and all that were tried, the most probable first.
@@ -175,17 +177,17 @@ class _Search:
                 self.bare = found.log_likelihood
             coarse = self.fitter.equally_coarse(found)
             tried = self._tried(coarse)
-            worth = sorted(tried, key=lambda one: self._price(found, one.structure.effects[-1]) - one.evidence)
+            price = {one.key: self._price(found, one.key) for one in tried}
+            worth = sorted(tried, key=lambda one: price[one.key] - one.evidence)
             for one in worth[: self.settings.finalists]:
-                key = one.structure.effects[-1]
-                if one.evidence - coarse.evidence < self._price(found, key):
+                if one.evidence - coarse.evidence < price[one.key]:
                     return found, None, tried
-                best = self._turned(self.fitter.finished(one), key[1])
-                without, before = self._without(best, key), found
-                if without is not None and (without := self._turned(without, key[1])).evidence > found.evidence:
+                best = self._turned(self.fitter.finished(one), one.key[1])
+                without, before = self._without(best, one.key), found
+                if without is not None and (without := self._turned(without, one.key[1])).evidence > found.evidence:
                     found = without
                 again = found.evidence > before.evidence + self.settings.odds
-                if best.evidence - found.evidence >= self._price(found, key):
+                if best.evidence - found.evidence >= self._price(found, one.key):
                     return found, self._anew(best, found) if again else best, tried
                 if again:
                     break
@@ -194,9 +196,8 @@ class _Search:
 
     def _anew(self, best: Fitted, found: Fitted) -> Fitted:
         """The last effect fitted once more from its start values, beside a fit of all others that came further."""
-        key = best.structure.effects[-1]
-        tried = self._tried(self.fitter.equally_coarse(found), key)
-        ends = [self._turned(self.fitter.finished(one), key[1]) for one in tried]
+        tried = self._tried(self.fitter.equally_coarse(found), best.key)
+        ends = [self._turned(self.fitter.finished(one), one.key[1]) for one in tried]
         return max([best, *ends], key=lambda one: one.evidence)
 
     def _price(self, found: Fitted, key: Key) -> float:
@@ -206,12 +207,10 @@ class _Search:
         noise, and an effect that takes up no more than that is none. The share is larger for an effect at the same site
         that shows over the same state: one curve with two shapes.
         """
-        alike = (one for one in self.effects if one.site == key[1] and _states(one.key) & _states(key))
-        explained = max(found.log_likelihood - self.bare, 0.0)
-        anywhere = self._otherwise(explained, self.settings.inexact)
-        return self.settings.odds + max(
-            anywhere, self._otherwise(sum(one.evidence for one in alike), self.settings.inexact_curve)
-        )
+        curve = [one for one in self.effects if one.site == key[1] and _states(one.key) & _states(key)]
+        anywhere = self._otherwise(max(found.log_likelihood - self.bare, 0.0), self.settings.inexact)
+        along = self._otherwise(sum(one.evidence for one in curve), self.settings.inexact_curve)
+        return self.settings.odds + max(anywhere, along)
 
     def _otherwise(self, explained: float, share: float) -> float:
         """Nats in this share of a power, of which so many nats tell the ratio to the noise."""
@@ -242,7 +241,7 @@ class _Search:
 
     def _each_refined(self, fits: Sequence[Fitted]) -> list[Fitted]:
         """Each refined, or as it was where that cannot be computed."""
-        ends = self.each("refining", self.fitter.refined, fits, lambda one: " at ".join(one.structure.effects[-1]))
+        ends = self.each("refining", self.fitter.refined, fits, lambda one: " at ".join(one.key))
         return [end if isinstance(end, Fitted) else one for end, one in zip(ends, fits, strict=True)]
 
     def _fitted(self, proposal: Proposal) -> Fitted:
@@ -281,15 +280,9 @@ class _Search:
         return max(turned, key=lambda one: one.evidence)
 
     def _ranked(self, one: Fitted, found: Fitted) -> Ranked:
-        key = one.structure.effects[-1]
         values = {name: value for name, value in one.structure.values.items() if name not in found.structure.priors}
-        return Ranked(
-            *key,
-            one.evidence - found.evidence,
-            values,
-            needed=self._price(found, key),
-            side=one.structure.side(key),
-        )
+        needed, side = self._price(found, one.key), one.structure.side(one.key)
+        return Ranked(*one.key, one.evidence - found.evidence, values, needed=needed, side=side)
 
 
 def _states(key: Key) -> set[str]:
@@ -306,7 +299,7 @@ def _by_effect(trials: Sequence[Fitted | Failure]) -> list[list[Fitted]]:
         if isinstance(one, Fitted) and one.structure.within_excitation and np.isfinite(one.evidence)
     ]
     for trial in sorted(whole, key=lambda one: -one.evidence):
-        several.setdefault(trial.structure.effects[-1], []).append(trial)
+        several.setdefault(trial.key, []).append(trial)
     return list(several.values())
 
 
