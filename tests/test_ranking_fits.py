@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
 
@@ -16,7 +17,7 @@ from vpm.experiment import Experiment
 from vpm.identify import InverseDynamicsProblem
 from vpm.initial import invertible
 from vpm.model import Model
-from vpm.ranking.fit import Fitter, View
+from vpm.ranking.fit import Fitted, Fitter, View
 from vpm.ranking.observed import Observed, Observer
 from vpm.ranking.proposals import proposals
 from vpm.ranking.rank import _Search
@@ -150,6 +151,25 @@ def test_another_effect_pays_for_what_laws_leave() -> None:
     assert search._price(explained, drag) == pytest.approx(Settings().odds + 0.3**2 * nats, rel=0.06)
     assert search._price(explained, spring) == anywhere
     assert search._price(explained, ("quadratic_drag", "elbow")) == anywhere
+
+
+def test_effects_that_cannot_come_as_far_as_the_best_are_not_refined(monkeypatch: pytest.MonkeyPatch) -> None:
+    search = _Search(Model.from_toml(SLEDGE), records(), Settings(), None, SideBySide(1, None), lambda _: None)
+    found = search.fitter.fitted(search.start, Observer(1.0))
+    asked: list[list[float]] = []
+
+    def better(fits: Sequence[Fitted]) -> list[Fitted]:
+        asked.append([one.evidence for one in fits])
+        return [replace(one, evidence=one.evidence + 50.0) for one in fits]
+
+    monkeypatch.setattr(search, "_each_refined", better)
+    first, second, third = (
+        [replace(found, evidence=nats) for nats in several] for several in ((1000.0, 900.0), (1001.0, 999.0), (20.0,))
+    )
+    ends = search._refined([first, second, third])
+    assert asked == [[1000.0, 900.0], [1001.0]]
+    assert [one.evidence for one in ends] == [1050.0, 950.0, 1051.0]
+    assert search._refined([]) == []
 
 
 def test_effects_that_a_diagnosis_does_not_try_are_candidates_where_they_are_asked_for() -> None:
