@@ -109,7 +109,7 @@ def lines_of(ranking: Ranking) -> Iterator[str]:
 
 def _sentence(one: Ranked, model: Model) -> str:
     """What an effect of a model is, with its values."""
-    effect = next(own for own in model.effects if (own.name, own.at) == (one.effect, one.site))
+    effect = model.effect(one.effect, one.site, one.side)
     values = {short: model.parameters[name] for short, name in effect.parameter_names.items()}
     texts = {short: f"{parameter.value:.4g} {parameter.unit}" for short, parameter in values.items()}
     return effect.type.sentence.format(at=one.place, **texts)

@@ -6,6 +6,7 @@ import contextlib
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -120,6 +121,7 @@ class Fitter:
 
     def __init__(self, observed: Observed, settings: Settings) -> None:
         self.observed, self.settings = observed, settings
+        self._coarse: WeakKeyDictionary[Fitted, Fitted] = WeakKeyDictionary()
 
     def fitted(self, structure: Structure, observer: Observer, noise: NoiseModel | None = None) -> Fitted:
         """Most probable values, by bounded Gauss-Newton steps; under a given noise model, or else as the channels are.
@@ -164,10 +166,13 @@ class Fitter:
         return self._changed(found, (_controlled, _wider, _narrower))
 
     def equally_coarse(self, found: Fitted) -> Fitted:
-        """What was found, under equal steps."""
+        """What was found, under equal steps; fitted once, however often that is asked."""
         if not found.observer.controlled:
             return found
-        return self.fitted(found.structure, replace(found.observer, steps=FINEST, controlled=False), found.noise)
+        if found not in self._coarse:
+            equal = replace(found.observer, steps=FINEST, controlled=False)
+            self._coarse[found] = self.fitted(found.structure, equal, found.noise)
+        return self._coarse[found]
 
     def without(self, found: Fitted, key: Key) -> Fitted:
         """The same without one of its effects, whose part the others take over as far as they can.

@@ -22,7 +22,7 @@ class Ranked(Storable):
     values : dict
         Its parameters, SI.
     needed : float
-        Evidence that it has to add to be believed, nats.
+        Evidence that it has to add to be accepted, nats.
     probability : float
         That this is what is missing beside what had been found before, and not another effect or none.
     rivals : tuple of str

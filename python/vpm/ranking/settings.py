@@ -42,10 +42,10 @@ class Settings:
         Evidence, nats, that another effect has to bring.
     inexact : float
         By how much an effect differs from its law, as a share of what it does: another effect may take that up.
-    tempering : float
-        Power of evidence in probabilities: no model is exact.
     inexact_curve : float
         The same where the other effect shows over the same state at the same site.
+    tempering : float
+        Power of evidence in probabilities: no model is exact.
     same : float
         Effects between which the records decide by fewer nats than this, in the mean, are one class.
     effects : int

@@ -53,9 +53,7 @@ class Structure:
         """Where a parameter, or a first state, stands among the values."""
         if name in self.model.parameters:
             return self.model.index(name)
-        return len(self.model.theta) + [other for other in self.priors if other not in self.model.parameters].index(
-            name
-        )
+        return len(self.model.theta) + self.firsts.index(name)
 
     @property
     def within_excitation(self) -> bool:
