@@ -31,6 +31,12 @@ JointKind = Literal["prismatic", "revolute", "helical"]
 #: it, on the sum of that and the deflection.
 Side = Literal["motor", "link"]
 
+
+def in_words(at: str, side: Side) -> str:
+    """Component and side in words; of the motor side nothing is said."""
+    return at if side == "motor" else f"{at}, {side} side"
+
+
 #: What in a record sets the natural size of a parameter; "one" means that the parameter is near 1 by nature.
 Scale = Literal[
     "effort",

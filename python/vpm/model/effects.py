@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from vpm.catalogue import EFFECTS, EffectParameter, EffectType, Side
+from vpm.catalogue.kinds import in_words
 from vpm.errors import near_match
 from vpm.model.entry import Quantity
 from vpm.model.messages import Problem, place
@@ -44,7 +45,7 @@ class Effect:
     @property
     def place(self) -> str:
         """Component and side in words."""
-        return self.at if self.side == "motor" else f"{self.at}, {self.side} side"
+        return in_words(self.at, self.side)
 
     @property
     def type(self) -> EffectType:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from vpm.catalogue.kinds import Side
+from vpm.catalogue.kinds import Side, in_words
 from vpm.model import Model
 from vpm.results import Result, Storable
 
@@ -48,7 +48,7 @@ class Ranked(Storable):
     @property
     def place(self) -> str:
         """Site and side in words."""
-        return self.site if self.side == "motor" else f"{self.site}, {self.side} side"
+        return in_words(self.site, self.side)
 
 
 @dataclass(frozen=True, repr=False, eq=False)

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from vpm.catalogue import Side
+from vpm.catalogue.kinds import Side, in_words
 from vpm.errors import VpmError
 from vpm.model import Model
 from vpm.model.level import deforms_of, size_of
@@ -69,7 +69,7 @@ class Reduction(Storable):
                 return f"{self.at} with {self.name}"
             case "terms":
                 return f"{self.at} without {self.name} terms"
-        return f"{self.name} at {self.at}" + ("" if self.side == "motor" else f", {self.side} side")
+        return f"{self.name} at {in_words(self.at, self.side)}"
 
     @property
     def site(self) -> tuple[str, str]:
