@@ -41,8 +41,10 @@ def test_an_autoregression_is_found_again_and_its_density_is_the_exact_one() -> 
 def test_the_density_of_errors_is_students_of_scipy() -> None:
     errors = np.linspace(-6.0, 6.0, 50)
     for freedom in (3.0, 10.0):
-        assert log_student(errors, np.full(50, freedom)) == pytest.approx(student.logpdf(errors, freedom), abs=1e-12)
-    assert log_student(errors, np.full(50, np.inf)) == pytest.approx(norm.logpdf(errors), abs=1e-12)
+        told = log_student(errors[None], np.array([[freedom]]))[0]
+        assert told == pytest.approx(student.logpdf(errors, freedom), abs=1e-12)
+    both = log_student(np.tile(errors, (2, 1)), np.array([[np.inf], [3.0]]))
+    assert both == pytest.approx(np.array([norm.logpdf(errors), student.logpdf(errors, 3.0)]), abs=1e-12)
 
 
 def test_errors_with_heavy_tails_are_known_as_such_and_outliers_weigh_little() -> None:
@@ -50,7 +52,7 @@ def test_errors_with_heavy_tails_are_known_as_such_and_outliers_weigh_little() -
     noise = fitted_noise(errors[:, None], [slice(0, len(errors))], 2)
     assert noise.tails == (4.0,)
     assert noise.deviations[0] == pytest.approx(0.02, rel=0.03)
-    assert scale_of(errors, np.full(len(errors), 4.0)) == pytest.approx(0.02, rel=0.03)
+    assert scale_of(errors[None], np.array([[4.0]])) == pytest.approx(0.02, rel=0.03)
     heavy = NoiseModel((np.ones(1),), (1.0,), (4.0,)).roots(np.array([0.1] * 20 + [20.0]))
     assert heavy[-1] < 0.3 * heavy[0]
 
@@ -58,7 +60,7 @@ def test_errors_with_heavy_tails_are_known_as_such_and_outliers_weigh_little() -
 def test_weights_give_the_slope_of_the_cost() -> None:
     """About any errors, at their own scale: the slope of the density is that of weighted squares."""
     errors = np.random.default_rng(4).standard_t(3.0, 400)
-    errors /= scale_of(errors, np.full(400, 6.0))
+    errors /= scale_of(errors[None], np.array([[6.0]]))
     noise, move = NoiseModel((np.ones(1),), (1.0,), (6.0,)), np.cos(np.arange(400.0))
     slope = (noise.cost(errors + 1e-5 * move) - noise.cost(errors - 1e-5 * move)) / 2e-5
     assert slope == pytest.approx(float((noise.roots(errors) ** 2 * errors) @ move), rel=1e-6)

@@ -69,6 +69,8 @@ class Fitted:
         Logarithm of the probability density of the records under the structure, nats.
     predicted_gain : float
         What a bounded Gauss-Newton step would gain if all were linear, nats.
+    cost : float
+        See `Fitter.cost`; under the view of a search, and known after one alone.
     """
 
     structure: Structure
@@ -77,6 +79,7 @@ class Fitted:
     log_likelihood: float
     evidence: float
     predicted_gain: float
+    cost: float = math.nan
 
     @property
     def key(self) -> Key:
@@ -107,9 +110,8 @@ class View:
             slopes[:, place] = (fresh[name] if name in fresh else self.known[name]) * slope
         return errors, slopes
 
-    def weighted(self, followed: Followed, parts: Parts) -> tuple[Array, Array]:
+    def weighted(self, errors: Array, slopes: Array) -> tuple[Array, Array]:
         """The same in roots of the weights of the errors."""
-        errors, slopes = self.errors(followed, parts)
         return in_roots(errors, slopes, self.noise.roots(errors))
 
 
@@ -138,7 +140,7 @@ class Fitter:
     def searched(
         self, structure: Structure, observer: Observer, view: View, goal: float, residual: Array | None = None
     ) -> Fitted:
-        """The same with derivatives by some parameters, and the ``residual`` where it begins, as they are known.
+        """The same under a view, the ``residual`` where it begins being known or not.
 
         It gives up where several times the gain that a step predicts would not bring the `cost` below a goal.
 
@@ -149,10 +151,8 @@ class Fitter:
         """
         fresh = tuple(name for name in structure.priors if name not in view.known)
         begun = self.followed(structure.at(structure.standard), observer, fresh, residual=residual)
-        ended = self._descended(begun, view, goal)
-        if len(fresh) < len(structure.priors):
-            ended = self.followed(ended.structure, observer, residual=ended.residual)
-        return self._weighed(ended)
+        ended = self._descended(begun, view, goal, tuple(structure.priors))
+        return replace(self._weighed(ended), cost=self.cost(ended.structure, ended.residual, view.noise))
 
     def refined(self, found: Fitted) -> Fitted:
         """At its own noise model, bandwidth and number of equal steps, the effects being fitted anew at each."""
@@ -198,7 +198,8 @@ class Fitter:
         stays = np.array([name in kept for name in structure.priors])
         for share in FADING:
             followed = self.followed(structure, found.observer)
-            errors, slopes = View(found.noise, {}).weighted(followed, self.observed.parts)
+            view = View(found.noise, {})
+            errors, slopes = view.weighted(*view.errors(followed, self.observed.parts))
             move = np.where(stays, 0.0, structure.neutral + share * (begun - structure.neutral) - structure.standard)
             others = replace(structure, priors={name: structure.priors[name] for name in kept})
             move[stays] = bounded_step(others, errors + slopes @ move, slopes[:, stays], self.settings.reach)
@@ -275,22 +276,43 @@ class Fitter:
             return found
         return other if other.evidence > found.evidence + self.settings.tolerance else found
 
-    def _descended(self, now: Followed, view: View, goal: float = math.inf, *, exact: bool = False) -> Followed:
-        """The most probable values, as far as steps lead."""
-        before = self.cost(now.structure, now.residual, view.noise)
+    def _descended(
+        self,
+        now: Followed,
+        view: View,
+        goal: float = math.inf,
+        names: Sequence[str] | None = None,
+        *,
+        exact: bool = False,
+    ) -> Followed:
+        """The most probable values, as far as steps lead, with derivatives by ``names``, or those that it began with.
+
+        Derivatives cost many times what residuals do, so that secants correct them from step to step. Where a step by
+        these leads nowhere, they are worked out anew.
+        """
+        before, fresh = self.cost(now.structure, now.residual, view.noise), True
+        errors, slopes = view.errors(now, self.observed.parts)
         for _ in range(self.settings.iterations if now.structure.priors else 0):
-            move, gain = self._step(now.structure, *view.weighted(now, self.observed.parts))
-            if gain < self.settings.tolerance or before - self.settings.patience * gain > goal:
+            move, gain = self._step(now.structure, *view.weighted(errors, slopes))
+            hopeful = gain >= self.settings.tolerance and before - self.settings.patience * gain <= goal
+            better = self._better(now, view.noise, move, before) if hopeful else None
+            slow = better is None or before - better[2] < self.settings.tolerance
+            if better is not None:
+                move = better[0].standard - now.structure.standard
+                now, last, before = replace(now, structure=better[0], residual=better[1]), errors, better[2]
+                errors = view.noise.whitened(now.residual, self.observed.parts)
+                slopes = by_secant(slopes, errors - last, move)
+            if slow and fresh:
+                fresh = better is None
                 break
-            better = self._better(now, view.noise, move, before)
-            if better is None:
-                break
-            structure, residual, after = better
-            now = self.followed(structure, now.observer, now.names, exact=exact, residual=residual)
-            if before - after < self.settings.tolerance:
-                break
-            before = after
-        return now
+            fresh = slow
+            if fresh:
+                now = self.followed(now.structure, now.observer, now.names, exact=exact, residual=now.residual)
+                errors, slopes = view.errors(now, self.observed.parts)
+        names = now.names if names is None else tuple(names)
+        if fresh and names == now.names:
+            return now
+        return self.followed(now.structure, now.observer, names, exact=exact, residual=now.residual)
 
     def _step(self, structure: Structure, errors: Array, slopes: Array) -> tuple[Array, float]:
         """A bounded Gauss-Newton step, and the gain that it predicts, nats."""
@@ -336,6 +358,15 @@ class Fitter:
 def in_roots(errors: Array, slopes: Array, roots: Array) -> tuple[Array, Array]:
     """Errors (n,) and their slopes (n, k) in roots of the weights of the errors (n,)."""
     return errors * roots, slopes * roots[:, None]
+
+
+def by_secant(slopes: Array, change: Array, move: Array) -> Array:
+    """Slopes (n, k) that give the change of the errors (n,) by a move (k,), as near to those before as can be.
+
+    Law: C. Broyden, *Mathematics of Computation* 19, 1965.
+    """
+    missed = (change - slopes @ move) / max(float(move @ move), 1e-300)
+    return np.asarray(slopes + np.outer(missed, move))
 
 
 def bounded_step(structure: Structure, errors: Array, slopes: Array, reach: float) -> Array:

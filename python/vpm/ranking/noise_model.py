@@ -58,25 +58,29 @@ class NoiseModel:
         ]
         return np.concatenate(channels)
 
-    def freedom(self, errors: Array) -> Array:
-        """Degrees of freedom of each of the prediction errors (n,)."""
-        return np.asarray(np.repeat(self.tails, len(errors) // len(self.tails)))
+    @property
+    def freedom(self) -> Array:
+        """Degrees of freedom of the errors of each channel (m, 1)."""
+        return np.array(self.tails)[:, None]
 
     def log_density(self, errors: Array) -> Array:
         """Logarithm of the density of each sample (n,), the errors being in their scales."""
-        sizes = np.repeat(np.log(self.deviations), len(errors) // len(self.deviations))
-        return np.asarray(log_student(errors, self.freedom(errors)) - sizes)
+        channels = self._by_channel(errors)
+        return np.asarray(log_student(channels, self.freedom) - np.log(self.deviations)[:, None]).ravel()
 
     def cost(self, errors: Array) -> float:
         """Negative logarithm of the density but for a constant, the common scale being the most likely one."""
-        freedom = self.freedom(errors)
-        size = scale_of(errors, freedom)
-        return len(errors) * float(np.log(size)) - float(np.sum(log_student(errors / size, freedom)))
+        channels = self._by_channel(errors)
+        size = scale_of(channels, self.freedom)
+        return len(errors) * float(np.log(size)) - float(np.sum(log_student(channels / size, self.freedom)))
 
     def roots(self, errors: Array) -> Array:
         """Square roots of the weights (n,) under which squares of the errors stand for that density about them."""
-        freedom = self.freedom(errors)
-        return np.sqrt(_weights(errors / scale_of(errors, freedom), freedom))
+        channels = self._by_channel(errors)
+        return np.sqrt(_weights(channels / scale_of(channels, self.freedom), self.freedom)).ravel()
+
+    def _by_channel(self, errors: Array) -> Array:
+        return errors.reshape(len(self.tails), -1)
 
     def information(self) -> Array:
         """Information in a sample of each channel (m,), as a share of that of a normal one with the same scale."""
@@ -85,25 +89,27 @@ class NoiseModel:
 
 
 def log_student(errors: Array, freedom: Array) -> Array:
-    """Logarithm of Student's density of unit scale (n,)."""
+    """Logarithm of Student's density of unit scale of errors (m, n) with degrees of freedom (m, 1)."""
     normal = ~np.isfinite(freedom)
     nu = np.where(normal, 1.0, freedom)
-    student = (
-        gammaln(0.5 * (nu + 1.0))
-        - gammaln(0.5 * nu)
-        - 0.5 * np.log(np.pi * nu)
-        - 0.5 * (nu + 1.0) * np.log1p(errors**2 / nu)
-    )
-    return np.where(normal, -0.5 * (errors**2 + np.log(2.0 * np.pi)), student)
+    top = gammaln(0.5 * (nu + 1.0)) - gammaln(0.5 * nu) - 0.5 * np.log(np.pi * nu)
+    squares = errors**2
+    density = top - 0.5 * (nu + 1.0) * np.log1p(squares / nu)
+    return np.where(normal, -0.5 * (squares + np.log(2.0 * np.pi)), density) if np.any(normal) else density
 
 
-def scale_of(errors: Array, freedom: Array) -> float:
-    """The most likely scale of errors with these degrees of freedom."""
-    size = _deviation(errors)
+def scale_of(errors: Array, freedom: Array, near: float | None = None) -> float:
+    """The most likely scale of errors (m, n) with degrees of freedom (m, 1); it is searched from ``near``.
+
+    Law: the fixed point in which weights are shares of their sum is the same, and sooner found (J. Kent, D. Tyler and
+    Y. Vardi, *Communications in Statistics: Simulation* 23, 1994).
+    """
     if not np.any(np.isfinite(freedom)):
-        return size
+        return _deviation(errors)
+    size = near or _deviation(errors)
     for _ in range(TURNS):
-        last, size = size, max(float(np.sqrt(np.mean(_weights(errors / size, freedom) * errors**2))), 1e-300)
+        weights = _weights(errors / size, freedom)
+        last, size = size, max(float(np.sqrt(np.sum(weights * errors**2) / np.sum(weights))), 1e-300)
         if abs(size - last) < SAME * size:
             break
     return size
@@ -112,7 +118,8 @@ def scale_of(errors: Array, freedom: Array) -> float:
 def _weights(errors: Array, freedom: Array) -> Array:
     normal = ~np.isfinite(freedom)
     nu = np.where(normal, 1.0, freedom)
-    return np.where(normal, 1.0, (nu + 1.0) / (nu + errors**2))
+    weights = (nu + 1.0) / (nu + errors**2)
+    return np.where(normal, 1.0, weights) if np.any(normal) else weights
 
 
 def white_noise(residual: Array, parts: Parts) -> NoiseModel:
@@ -141,11 +148,12 @@ def fitted_noise(residual: Array, parts: Parts, order: int) -> NoiseModel:
 
 def _bell(errors: Array) -> tuple[float, float]:
     """The most likely scale and degrees of freedom."""
-    best = -np.inf, 1.0, np.inf
+    best, size = (-np.inf, 1.0, np.inf), None
+    channel = errors[None, :]
     for freedom in TAILS:
-        many = np.full(len(errors), freedom)
-        size = scale_of(errors, many)
-        likely = float(np.sum(log_student(errors / size, many))) - len(errors) * float(np.log(size))
+        nu = np.array([[freedom]])
+        size = scale_of(channel, nu, size)
+        likely = float(np.sum(log_student(channel / size, nu))) - len(errors) * float(np.log(size))
         best = max(best, (likely, size, freedom))
     return best[1], best[2]
 

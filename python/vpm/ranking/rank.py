@@ -12,7 +12,7 @@ from threadpoolctl import threadpool_limits
 
 from vpm.catalogue import EFFECTS
 from vpm.discrepancy.candidates import Key, slow_speeds
-from vpm.discrepancy.side_by_side import Failure, Progress, SideBySide
+from vpm.discrepancy.side_by_side import Progress, SideBySide
 from vpm.errors import DiagnosisError
 from vpm.experiment import Experiment, as_records
 from vpm.identify import InverseDynamicsProblem
@@ -20,7 +20,8 @@ from vpm.model import Model
 from vpm.ranking.fit import ASTRAY, Fitted, Fitter
 from vpm.ranking.observed import Observed, Observer
 from vpm.ranking.posterior import alike, probabilities
-from vpm.ranking.proposals import SIDES, Proposal, proposals
+from vpm.ranking.proposals import SIDES, proposals
+from vpm.ranking.race import raced
 from vpm.ranking.result import Ranked, Ranking
 from vpm.ranking.settings import Settings
 from vpm.ranking.sizes import Sizes
@@ -220,15 +221,16 @@ class _Search:
 
     def _tried(self, found: Fitted, only: Key | None = None) -> list[Fitted]:
         chosen = proposals(found, self.fitter, self.data, self.sizes, self.each, only)
-        trials = self.each("fitting", self._fitted, chosen, lambda one: " at ".join(one.key))
+        needed = [found.evidence + self._price(found, one.key) for one in chosen]
+        trials = raced(chosen, needed, self.fitter, self.each)
         hopeful = [
             trial
-            for trial, proposal in zip(trials, chosen, strict=True)
-            if isinstance(trial, Fitted)
-            and trial.evidence + 2.0 * trial.predicted_gain > proposal.reference.fitted.evidence
+            for trial, proposal in trials
+            if trial.evidence + 2.0 * trial.predicted_gain > proposal.reference.fitted.evidence
         ]
         several = [_distinct(fits)[: self.settings.optima] for fits in _by_effect(hopeful)]
-        return [fits[0] for fits in _by_effect([*self._refined(several[: self.settings.finalists]), *trials])]
+        refined = self._refined(several[: self.settings.finalists])
+        return [fits[0] for fits in _by_effect([*refined, *(trial for trial, _ in trials)])]
 
     def _refined(self, several: Sequence[Sequence[Fitted]]) -> list[Fitted]:
         """Fits of the first of these effects refined, and those of the others that may come as far by as much."""
@@ -243,10 +245,6 @@ class _Search:
         """Each refined, or as it was where that cannot be computed."""
         ends = self.each("refining", self.fitter.refined, fits, lambda one: " at ".join(one.key))
         return [end if isinstance(end, Fitted) else one for end, one in zip(ends, fits, strict=True)]
-
-    def _fitted(self, proposal: Proposal) -> Fitted:
-        goal = proposal.reference.cost
-        return self.fitter.searched(proposal.structure, proposal.observer, proposal.view, goal, proposal.residual)
 
     def _without_needless(self, found: Fitted) -> tuple[Fitted, list[Key]]:
         """Without those of the earlier effects that a later one has made needless."""
@@ -290,14 +288,10 @@ def _states(key: Key) -> set[str]:
     return set(EFFECTS[key[0]].signature.lives_in)
 
 
-def _by_effect(trials: Sequence[Fitted | Failure]) -> list[list[Fitted]]:
+def _by_effect(trials: Sequence[Fitted]) -> list[list[Fitted]]:
     """The fits of each effect, the most probable first."""
     several: dict[Key, list[Fitted]] = {}
-    whole = [
-        one
-        for one in trials
-        if isinstance(one, Fitted) and one.structure.within_excitation and np.isfinite(one.evidence)
-    ]
+    whole = [one for one in trials if one.structure.within_excitation and np.isfinite(one.evidence)]
     for trial in sorted(whole, key=lambda one: -one.evidence):
         several.setdefault(trial.key, []).append(trial)
     return list(several.values())

@@ -34,6 +34,8 @@ class Settings:
         Steps of a fit.
     patience : float
         By how much more than a step predicts a fit may still gain before it is given up.
+    share : float
+        Of the cost that the most promising fit of a look saves: another one that cannot save as much is given up.
     tolerance : float
         Gain of a step, nats, below which a fit ends.
     reach : float
@@ -64,6 +66,7 @@ class Settings:
     optima: int = 3
     iterations: int = 8
     patience: float = 3.0
+    share: float = 0.5
     tolerance: float = 0.5
     reach: float = 6.0
     odds: float = 16.0
