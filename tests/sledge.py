@@ -28,6 +28,14 @@ type = "viscous_friction"
 at = "way"
 viscous = { value = 7.0, uncertainty = 1.5 }
 """
+#: The sledge with an encoder, which may show too much.
+SEEN = (
+    SLEDGE
+    + """
+[sensors.encoder]
+measures = "way.position"
+"""
+)
 MASS, OIL, GAIN, STEP, FINE, READING = 3.0, 8.0, 4.0, 2e-3, 10, 5e-6
 
 

@@ -214,7 +214,7 @@ def test_rank_names_what_is_missing_and_writes_the_model(tmp_path: Path) -> None
     words = ("sledge.toml", "push_1.csv", "--validate", "push_2.csv", "--most", "1", "--out", "better.toml")
     done = vpm("rank", *words, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
-    assert done.stdout.startswith("1. actuator_lag at motor: ")
+    assert done.stdout.startswith("1. actuator_lag at motor removes ")
     assert "way.position, validation" in done.stdout
     better = Model.load(tmp_path / "better.toml")
     assert better.parameters["motor.lag.time_constant"].value == pytest.approx(0.008, rel=0.05)

@@ -16,7 +16,7 @@ from vpm.identify import InverseDynamicsProblem
 from vpm.initial import invertible
 from vpm.model import Model
 from vpm.ranking.firsts import hidden_states
-from vpm.ranking.fit import Fitter
+from vpm.ranking.fit import Fitter, View
 from vpm.ranking.observed import Observed, Observer
 from vpm.ranking.settings import Settings
 from vpm.ranking.sizes import Sizes
@@ -120,9 +120,10 @@ def test_a_fit_makes_as_much_of_balance_as_of_the_true_first_states() -> None:
         Structure(model, np.append(model.theta, moves), firsts, firsts=tuple(firsts))
         for moves in (np.zeros(4), np.array([BEGINS[0], 0.0, BEGINS[1], 0.0]))
     ]
-    known, found, true = (fitter.refined(fitter.fitted(one, Observer(1.0))) for one in (balanced, *begun))
-    assert found.evidence > known.evidence + 200.0
-    assert found.evidence == pytest.approx(true.evidence, abs=2.0)
+    view = View(fitter.noise_of(balanced, Observer(1.0)))
+    known, found, true = (fitter.finished(fitter.fitted(one, Observer(1.0), view), view) for one in (balanced, *begun))
+    assert found.cost < known.cost - 200.0
+    assert found.cost == pytest.approx(true.cost, abs=2.0)
     assert found.structure.values == {}
     rest = found.structure.carried(Model.from_toml(CARRYING))
     assert rest.theta[-4:] == pytest.approx(found.structure.theta[-4:])

@@ -1,41 +1,31 @@
-"""Fits of a ranking: what is known while it searches, effects that fade, sides, steps, the price of one more."""
+"""Fits of a ranking: what is known while it searches, secants, sides, steps, and what counts as an effect."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
 import pytest
 
-from sledge import MASS, OIL, SLEDGE, pushed
+from sledge import GAIN, MASS, OIL, SLEDGE, pushed
 from vpm.catalogue import EFFECTS
+from vpm.catalogue.kinds import in_words
 from vpm.discrepancy.candidates import candidates
 from vpm.discrepancy.side_by_side import SideBySide
 from vpm.experiment import Experiment
 from vpm.identify import InverseDynamicsProblem
 from vpm.initial import invertible
 from vpm.model import Model
-from vpm.ranking.fit import Fitted, Fitter, View
+from vpm.ranking.fit import Fitter, View, by_secant
+from vpm.ranking.look import Look
 from vpm.ranking.observed import Observed, Observer
 from vpm.ranking.proposals import proposals
-from vpm.ranking.rank import _Search
-from vpm.ranking.result import Ranked
 from vpm.ranking.settings import Settings
 from vpm.ranking.sizes import Sizes
 from vpm.ranking.starts import started
 from vpm.ranking.structure import Structure
 from vpm.weighing import Prior
-
-#: The sledge with an encoder, which may show too much.
-SEEN = (
-    SLEDGE
-    + """
-[sensors.encoder]
-measures = "way.position"
-"""
-)
 
 #: An arm on a vertical hinge, without friction.
 FLAT = """
@@ -78,44 +68,65 @@ def test_derivatives_by_what_is_known_stay_where_an_effect_does_nothing(effect: 
     fitter, observer = fitter_of(model), Observer(1.0)
     without = structure_of(model)
     beside = without.carried(model.with_effect(effect, "way", **shapes.get(effect, {})))
-    plain, more = fitter.followed(without, observer), fitter.followed(beside, observer)
+    plain, more = (fitter.followed(one, observer, tuple(one.priors)) for one in (without, beside))
     scale = np.abs(plain.jacobian).max(axis=(0, 1))
     assert np.abs(more.residual - plain.residual).max() < 1e-12
     np.testing.assert_allclose(more.jacobian / scale, plain.jacobian / scale, atol=1e-9)
 
 
-def test_many_equal_steps_come_to_what_steps_of_controlled_error_say() -> None:
+def test_structures_are_compared_by_steps_whose_errors_are_small() -> None:
     model = Model.from_toml(SLEDGE).with_effect("end_stop", "way", low=-0.5, high=0.5, stiffness=4e4, damping=0.01)
     structure, fitter = structure_of(model), fitter_of(Model.from_toml(SLEDGE))
-    exact = fitter.followed(structure, Observer(1.0, 1, controlled=True), ()).residual
-    off = [np.abs(fitter.followed(structure, Observer(1.0, steps), ()).residual - exact).max() for steps in (1, 4, 16)]
-    assert off[0] > 4.0 * off[1] > 16.0 * off[2]
+    exact = Fitter(Observed(Model.from_toml(SLEDGE), records(), Settings(longest_step=2e-5)), Settings())
+    truth = exact.followed(structure, Observer(1.0), ()).residual
+    off = [
+        np.abs(fitter.followed(structure, one, ()).residual - truth).max()
+        for one in (Observer(1.0).coarse, Observer(1.0))
+    ]
+    assert off[0] > 4.0 * off[1]
 
 
-def test_an_effect_that_parameters_can_do_is_walked_back_to_them() -> None:
-    model = Model.from_toml(SEEN).with_effect("sensor_gain", "encoder", value=1.25)
-    gain = "encoder.gain.value"
-    assert gain in model.parameter_names
-    # What the encoder shows a quarter too large moves as a sledge that is a quarter heavier.
-    heavy = model.with_parameters({"sledge.mass": 1.25 * MASS, "way.friction.viscous": 1.25 * OIL})
-    structure = replace(
-        structure_of(heavy),
-        priors={
-            "sledge.mass": Prior(3.3, 1.0, 0.1, 100.0),
-            "way.friction.viscous": Prior(7.0, 3.0, 0.0, 100.0),
-            gain: Prior(1.0, 0.2, 0.1, 10.0),
-        },
-        effects=(("sensor_gain", "encoder"),),
+def test_secants_make_derivatives_exact_where_all_is_linear() -> None:
+    random = np.random.default_rng(5)
+    true, slopes = random.standard_normal((20, 3)), random.standard_normal((20, 3))
+    for move in np.eye(3):
+        slopes = by_secant(slopes, true @ move, move)
+    np.testing.assert_allclose(slopes, true, atol=1e-12)
+
+
+def test_the_size_of_an_effect_is_its_amplitude_beside_all_effects() -> None:
+    """A force of which a tenth is missing: the rest of it does nine tenths of what there is to do."""
+    model = Model.from_toml(SLEDGE).with_parameters({"sledge.mass": MASS, "way.friction.viscous": OIL})
+    pulled = [
+        Experiment.from_arrays(
+            one.time,
+            {"motor.command": one["motor.command"] + 0.5, "way.position": one["way.position"]},
+            model=model,
+            name=one.name,
+        )
+        for one in records()
+    ]
+    fitter = Fitter(Observed(model, pulled, Settings()), Settings())
+    wrong, right = (
+        replace(structure_of(model.with_effect("bias_force", "way", force=share * 0.5 * GAIN)), priors={})
+        for share in (0.9, 1.0)
     )
-    fitter = fitter_of(Model.from_toml(SEEN))
-    found = fitter.fitted(structure, Observer(1.0))
-    rest = fitter.without(found, ("sensor_gain", "encoder"))
-    assert rest.structure.effects == ()
-    assert rest.structure.values["sledge.mass"] == pytest.approx(MASS, rel=2e-3)
-    assert rest.structure.values["way.friction.viscous"] == pytest.approx(OIL, rel=5e-3)
-    faded = fitter._faded(found, ("sledge.mass", "way.friction.viscous"))
-    assert faded.values[gain] == pytest.approx(1.0)
-    assert faded.values["sledge.mass"] == pytest.approx(MASS, rel=2e-2)
+    oily = model.effects[0]
+    assert wrong.bare([oily]).theta[model.index("way.friction.viscous")] == 0.0
+    view = View(fitter.noise_of(wrong, Observer(1.0)))
+    begun, better = (fitter.fitted(one, Observer(1.0), view) for one in (wrong, right))
+    look = Look(begun, fitter)
+    pulling = wrong.model.effect("bias_force", "way")
+    assert look._removed([pulling]) == pytest.approx(10.0**2 - 1.0, rel=0.01)
+    told = look.judged(replace(better, structure=replace(right, effects=(("bias_force", "way"),))))
+    assert told.shape == pytest.approx(0.1, rel=0.01)
+    assert told.size <= told.shape
+    assert told.least > 0.99
+    assert told.counts(Settings())
+    assert not replace(told, size=0.002).counts(Settings())
+    assert not replace(told, shape=0.01).counts(Settings())
+    assert not replace(told, score=2.0).counts(Settings())
+    assert not replace(told, least=0.01).counts(Settings())
 
 
 def test_friction_goes_to_the_other_side_of_a_backlash_and_back() -> None:
@@ -125,51 +136,12 @@ def test_friction_goes_to_the_other_side_of_a_backlash_and_back() -> None:
     assert "way.link.friction.viscous" in there.priors
     assert there.values["way.link.friction.viscous"] == structure.values["way.friction.viscous"]
     assert (structure.side(("viscous_friction", "way")), there.side(("viscous_friction", "way"))) == ("motor", "link")
-    assert Ranked("viscous_friction", "way", 9.0, {}, side="link").place == "way, link side"
+    assert in_words("way", there.side(("viscous_friction", "way"))) == "way, link side"
     back = there.beside("way", "motor")
     assert back.model == structure.model
     assert back.values == structure.values
     assert structure.model.joint_behind("way") == "way_deflection"
     assert Model.from_toml(SLEDGE).joint_behind("way") is None
-
-
-def test_another_effect_pays_for_what_laws_leave() -> None:
-    model = Model.from_toml(SLEDGE)
-    search = _Search(model, records(), Settings(), None, SideBySide(1, None), lambda _: None)
-    found = search.fitter.fitted(search.start, Observer(1.0))
-    search.bare = found.log_likelihood
-    spring, drag = ("spring", "way"), ("quadratic_drag", "way")
-    assert search._price(found, spring) == Settings().odds
-    samples = sum(part.stop - part.start for part in search.fitter.observed.parts)
-    nats = 0.05 * samples
-    explained = replace(found, log_likelihood=found.log_likelihood + nats)
-    # Little beside the noise: its share of the likelihood itself.
-    anywhere = pytest.approx(Settings().odds + 0.05**2 * nats, rel=0.06)
-    assert search._price(explained, spring) == anywhere
-    # Drag and dry friction are two shapes of one curve over speed; a spring or another joint has another curve.
-    search.effects.append(Ranked("coulomb_friction", "way", nats, {}))
-    assert search._price(explained, drag) == pytest.approx(Settings().odds + 0.3**2 * nats, rel=0.06)
-    assert search._price(explained, spring) == anywhere
-    assert search._price(explained, ("quadratic_drag", "elbow")) == anywhere
-
-
-def test_effects_that_cannot_come_as_far_as_the_best_are_not_refined(monkeypatch: pytest.MonkeyPatch) -> None:
-    search = _Search(Model.from_toml(SLEDGE), records(), Settings(), None, SideBySide(1, None), lambda _: None)
-    found = search.fitter.fitted(search.start, Observer(1.0))
-    asked: list[list[float]] = []
-
-    def better(fits: Sequence[Fitted]) -> list[Fitted]:
-        asked.append([one.evidence for one in fits])
-        return [replace(one, evidence=one.evidence + 50.0) for one in fits]
-
-    monkeypatch.setattr(search, "_each_refined", better)
-    first, second, third = (
-        [replace(found, evidence=nats) for nats in several] for several in ((1000.0, 900.0), (1001.0, 999.0), (20.0,))
-    )
-    ends = search._refined([first, second, third])
-    assert asked == [[1000.0, 900.0], [1001.0]]
-    assert [one.evidence for one in ends] == [1050.0, 950.0, 1051.0]
-    assert search._refined([]) == []
 
 
 def test_effects_that_a_diagnosis_does_not_try_are_candidates_where_they_are_asked_for() -> None:
@@ -183,15 +155,12 @@ def test_effects_that_a_diagnosis_does_not_try_are_candidates_where_they_are_ask
 
 
 def test_a_view_prefers_derivatives_that_are_there() -> None:
-    model = Model.from_toml(SLEDGE)
-    fitter, structure = fitter_of(model), structure_of(model)
-    found = fitter.fitted(structure, Observer(1.0))
-    followed, parts = fitter.followed(found.structure, Observer(1.0)), fitter.observed.parts
-    known = dict(zip(followed.names, found.noise.whitened(followed.jacobian, parts).T, strict=True))
+    fitter, structure = fitter_of(Model.from_toml(SLEDGE)), structure_of(Model.from_toml(SLEDGE))
+    followed = fitter.followed(structure, Observer(1.0), tuple(structure.priors))
+    noise, parts = fitter.noise_of(structure, Observer(1.0)), fitter.observed.parts
+    known = dict(zip(followed.names, noise.whitened(followed.jacobian, parts).T, strict=True))
     bare = replace(followed, names=(), jacobian=followed.jacobian[:, :, :0])
-    for one, other in zip(
-        View(found.noise, known).errors(bare, parts), View(found.noise, {}).errors(followed, parts), strict=True
-    ):
+    for one, other in zip(View(noise, known).errors(bare, parts), View(noise).errors(followed, parts), strict=True):
         np.testing.assert_allclose(one, other)
 
 
@@ -228,15 +197,16 @@ def test_what_remembers_behind_a_spring_begins_with_nothing_to_remember() -> Non
     for side in ("motor", "link"):
         model = bare.with_effect("hysteresis", "way", side=side, force=1.0, displacement=0.05)
         fitter = fitter_of(model)
-        found = fitter.fitted(structure_of(Model.from_toml(SLEDGE)).carried(model), Observer(1.0))
+        carried = structure_of(Model.from_toml(SLEDGE)).carried(model)
+        found = fitter.fitted(carried, Observer(1.0), View(fitter.noise_of(carried, Observer(1.0))))
         rest, plain = (
             observed._begun(one)[0] for one, observed in ((model, fitter.observed), (bare, fitter_of(bare).observed))
         )
         assert rest[: len(plain)] == pytest.approx(plain)
         assert rest[len(plain) :] == pytest.approx(0.0)
     data = InverseDynamicsProblem(Model.from_toml(SLEDGE), records())
-    settings = replace(Settings(), seats=1, starts=1)
-    listed = proposals(found, Fitter(fitter.observed, settings), data, Sizes(bare, data), SideBySide(1))
+    few = Fitter(fitter.observed, Settings(seats=1, starts=1))
+    listed = proposals([Look(found, few)], few, data, Sizes(bare, data), SideBySide(1), tuple(EFFECTS))
     assert all(proposal.structure.model.effect("hysteresis", "way", "link") for proposal in listed)
 
 
@@ -260,5 +230,6 @@ def test_a_fit_stays_where_bodies_are_real() -> None:
     record = Experiment.from_arrays(time, channels, model=model, name="swing")
     fitter = Fitter(Observed(model, [record], Settings()), Settings())
     known = {"arm.inertia.zz": Prior(0.15, 0.1, 0.0, np.inf)}
-    found = fitter.fitted(Structure(model, model.theta.copy(), known), Observer(2.0))
+    structure = Structure(model, model.theta.copy(), known)
+    found = fitter.fitted(structure, Observer(2.0), View(fitter.noise_of(structure, Observer(2.0))))
     assert 0.17 < found.structure.values["arm.inertia.zz"] <= 0.2

@@ -13,7 +13,8 @@ from scipy.stats import norm
 
 from sledge import SLEDGE, pushed
 from vpm.model import Model
-from vpm.ranking.fit import Fitted, Fitter
+from vpm.ranking.fit import Fitted, Fitter, View
+from vpm.ranking.noise_model import NoiseModel, fitted_noise
 from vpm.ranking.observed import Observed, Observer
 from vpm.ranking.posterior import alike, probabilities
 from vpm.ranking.settings import Settings
@@ -47,7 +48,7 @@ class Densities:
     def __init__(self, data: Array) -> None:
         self.data = data
 
-    def log_density(self, mean: float) -> Array:
+    def log_density(self, mean: float, _: NoiseModel | None) -> Array:
         return np.asarray(norm.logpdf(self.data, loc=mean))
 
 
@@ -59,9 +60,17 @@ def test_models_are_alike_where_nobody_could_choose(distance: float) -> None:
     right, same = 0, 0
     for _ in range(trials):
         densities = Densities(random.standard_normal(count))
-        first, second = (np.sum(densities.log_density(mean)) for mean in means)
+        first, second = (np.sum(densities.log_density(mean, None)) for mean in means)
         right += int(first > second)
-        same += bool(alike(cast("Fitted", means[0]), [cast("Fitted", means[1])], cast("Fitter", densities), 1.0))
+        same += bool(
+            alike(
+                cast("Fitted", means[0]),
+                [cast("Fitted", means[1])],
+                cast("Fitter", densities),
+                cast("NoiseModel", None),
+                1.0,
+            )
+        )
     assert right / trials == pytest.approx(norm.cdf(0.5 * distance), abs=0.03)
     assert same == (trials if 0.5 * distance**2 < 1.0 else 0)
 
@@ -75,11 +84,13 @@ def test_two_names_of_one_inertia_are_alike_and_a_lag_is_not() -> None:
         model = bare.with_effect(effect, at, **{name: value})
         priors = {"sledge.mass": Prior(3.3, 0.33, 0.0, np.inf), "way.friction.viscous": Prior(7.0, 1.5, 0.0, np.inf)}
         priors[model.effect(effect, at).parameter_names[name]] = Prior(value, size, 1e-4, np.inf)
-        return fitter.fitted(Structure(model, model.theta.copy(), priors), Observer(5.0))
+        structure, observer = Structure(model, model.theta.copy(), priors), Observer(5.0)
+        return fitter.fitted(structure, observer, View(fitter.noise_of(structure, observer)))
 
     payload = fitted("payload", "sledge", "mass", 1.0, 0.01)
     rotor = fitted("rotor_inertia", "way", "inertia", 1.0, 0.01)
     lag = fitted("actuator_lag", "motor", "time_constant", 0.01, 0.004)
-    assert payload.evidence == pytest.approx(rotor.evidence, abs=1e-3)
-    assert alike(payload, [rotor, lag], fitter, 1.0) == [rotor]
-    assert alike(lag, [payload, rotor], fitter, 1.0) == []
+    of_payload, of_lag = (fitted_noise(one.residual, fitter.observed.parts, 12) for one in (payload, lag))
+    assert fitter.evidence(payload, of_payload) == pytest.approx(fitter.evidence(rotor, of_payload), abs=1e-3)
+    assert alike(payload, [rotor, lag], fitter, of_payload, 1.0) == [rotor]
+    assert alike(lag, [payload, rotor], fitter, of_lag, 1.0) == []

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -53,9 +52,9 @@ def rank(
     hold: Hold = "zero_order",
     workers: Workers = 0,
 ) -> None:
-    """Order what a model could be missing by its evidence in logs, and add the best for as long as it pays.
+    """Order what a model could be missing by what it removes of the error, and add the best for as long as it counts.
 
-    For rigid machines. All logs are fitted; neither a controller nor a start at rest is asked for.
+    For rigid machines. A third of each log is held back; neither a controller nor a start at rest is asked for.
     """
     from vpm.ranking import Settings
     from vpm.ranking import rank as ranked
@@ -82,29 +81,31 @@ def rank(
 
 def lines_of(ranking: Ranking) -> Iterator[str]:
     """A ranking in lines: what was added, what was next, the gap on validation records."""
+    if ranking.interrupted:
+        yield "stopped before all was tried: this is what was known until then"
     if not ranking.effects:
-        yield f"{ranking.model.name}: no effect has evidence enough to be added"
+        yield f"{ranking.model.name}: no effect removes enough of the error to be added"
     for number, one in enumerate(ranking.effects, 1):
-        yield f"{number}. {one.effect} at {one.place}: {one.evidence:.1f} nats, probability {one.probability:.2f}"
+        yield f"{number}. {one.effect} at {one.place} removes {_percent(one.removed)} of the error power"
         yield f"     {_sentence(one, ranking.model)}"
         if one.rivals:
             yield f"     these records do not tell it from {', '.join(one.rivals)}"
-    if not math.isnan(ranking.complete):
-        yield f"nothing else is missing: probability {ranking.complete:.2f}"
     taken = {one.key for one in ranking.effects}
     tried = ranking.rounds[-1] if ranking.rounds else ()
     others = [other for other in tried if other.key not in taken][:SHOWN]
     if others:
-        yield "next, with the evidence that each would add:"
-    yield from (
-        f"  {other.effect} at {other.place}: {other.evidence:.1f} nats of {other.needed:.1f} that are needed"
-        for other in others
-    )
+        yield "next, with what each would remove of what is left, and its size beside all effects of the model:"
+    for other in others:
+        yield f"  {other.effect} at {other.place}: {_percent(other.least)}, size {_percent(other.size)}"
     for channel, gap in ranking.gaps.items():
         levels = (
             f"{gap.before:.4g} before, {gap.recalibrated:.4g} with fitted parameters, {gap.after:.4g} {gap.unit} now"
         )
         yield f"{channel}, validation, root mean square beside a slow observer: {levels}"
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.3g} %"
 
 
 def _sentence(one: Ranked, model: Model) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -26,10 +27,10 @@ Array = NDArray[np.float64]
 DAMPING = float(np.sqrt(0.5))
 #: Fewest steps of the integrator within a sample where a joint is split: contacts and gears ring fast.
 STEPS = 4
-#: Most steps of equal length within a sample; where these are too coarse, the integrator controls its error.
-FINEST = 8
-#: The integrator that does.
-CONTROLLED = "adaptive"
+#: Stretches into which a record is cut, each of which ends with a part that is held back.
+STRETCHES = 3
+#: That part.
+HELD_BACK = 1.0 / 3.0
 
 
 @dataclass(frozen=True)
@@ -40,15 +41,17 @@ class Observer:
     ----------
     band : float
         Bandwidth, Hz.
-    steps : int
-        Steps of the integrator within a sample: its errors are errors of the model too.
-    controlled : bool
-        Whether it takes as many more as keep its error within a tolerance.
+    fine : bool
+        Whether it takes steps that are short enough to compare structures by what they leave, or as few as it can.
     """
 
     band: float
-    steps: int = 1
-    controlled: bool = False
+    fine: bool = True
+
+    @property
+    def coarse(self) -> Observer:
+        """The same with as few steps as it can do with."""
+        return Observer(self.band, fine=False)
 
     @property
     def label(self) -> str:
@@ -79,10 +82,14 @@ class Observed:
         self.records = tuple(Record.of(model, record) for record in self.experiments)
         self._starts: WeakKeyDictionary[Model, list[Array]] = WeakKeyDictionary()
         ends = np.cumsum([len(record.time) for record in self.records])
-        self.parts: Parts = [
-            slice(int(end) - len(r.time) + int(settings.settling / r.dt), int(end))
+        cuts = [
+            int(end) - np.linspace(len(r.time) - int(settings.settling / r.dt), 0, STRETCHES + 1)
             for end, r in zip(ends, self.records, strict=True)
         ]
+        pairs = [pair for cut in cuts for pair in pairwise(cut)]
+        #: Samples that are fitted, and those that are held back.
+        self.parts: Parts = [slice(int(first), int(last - HELD_BACK * (last - first))) for first, last in pairs]
+        self.held_back: Parts = [slice(int(last - HELD_BACK * (last - first)), int(last)) for first, last in pairs]
 
     @cached_property
     def firsts(self) -> Firsts:
@@ -90,7 +97,7 @@ class Observed:
         states = hidden_states(self.model, self.records[0].channels)
         if not states:
             return Firsts()
-        observer, theta = Observer(self.settings.bands[0]), self.model.theta
+        observer, theta = Observer(self.settings.bands[0], fine=False), self.model.theta
         try:
             begun = zip(self.records, self._begun(self.model), strict=True)
             motion = np.concatenate([self._run(self.model, theta, observer, (), *one)[1] for one in begun])
@@ -129,6 +136,19 @@ class Observed:
             slopes.append(whole)
         return np.concatenate(residuals), np.concatenate(slopes)
 
+    def squares(self, residual: Array, sizes: Array) -> tuple[Array, Array]:
+        """Squares of a residual (N, m) in these sizes of the channels (m,), summed: of fitted and held-back samples."""
+        power = np.sum((residual / sizes) ** 2, axis=1)
+        parts = (self.parts, self.held_back)
+        fitted, held = (np.concatenate([power[part] for part in several]) for several in parts)
+        return fitted, held
+
+    def _steps(self, model: Model, observer: Observer, record: Record) -> int:
+        """Steps of the integrator within a sample."""
+        if observer.fine:
+            return max(STEPS, int(np.ceil(record.dt / self.settings.longest_step)))
+        return STEPS if model.added_joints else 1
+
     def _begun(self, model: Model) -> list[Array]:
         """First states, by a model's own values: an observer soon forgets them.
 
@@ -156,7 +176,7 @@ class Observed:
     ) -> tuple[Array, Array, Array]:
         """Outputs of the channels of a record (N, m), states (N, nx), derivatives of the outputs (N, m, columns)."""
         places = [model.output_channels.index(name) for name in record.channels]
-        gain = observer_gain(model, record.channels, observer.band, record.dt)
+        gain = observer_gain(model, record.channels, observer.band, record.dt, theta)
         outputs, states, slopes = model.core.observe(
             theta,
             start,
@@ -165,23 +185,19 @@ class Observed:
             record.readings,
             np.tile(gain.ravel(), (len(record.time), 1)),
             record.dt,
-            self.setup.substeps * observer.steps,
-            CONTROLLED if observer.controlled else self.setup.method(model),
+            self.setup.substeps * self._steps(model, observer, record),
+            self.setup.method(model),
             list(columns),
             self.setup.hold,
         )
         return outputs[:, places], states, slopes
 
 
-def fewest_steps(model: Model) -> int:
-    """Steps of the integrator within a sample that a model needs at least."""
-    return STEPS if model.added_joints else 1
-
-
-def observer_gain(model: Model, channels: Sequence[str], band: float, dt: float) -> Array:
+def observer_gain(model: Model, channels: Sequence[str], band: float, dt: float, theta: Array) -> Array:
     """By how much the reading of each channel moves each state at a sample (nx, m).
 
-    The gain of a mass without friction whose error dies away with the bandwidth (Hz) and `DAMPING`.
+    The gain of a mass without friction whose error dies away with the bandwidth (Hz) and `DAMPING`. A sensor that shows
+    a multiple of what it measures is corrected for it: else it would change the bandwidth, and pass for a better model.
     """
     gain = np.zeros((len(model.state_names), len(channels)))
     coordinates, turn = model.coordinates, 2.0 * np.pi * band * dt
@@ -190,9 +206,21 @@ def observer_gain(model: Model, channels: Sequence[str], band: float, dt: float)
         if quantity != "position" or joint not in coordinates:
             continue
         place, behind = coordinates.index(joint), model.joint_behind(joint)
-        moved = -np.expm1(-2.0 * DAMPING * turn), turn**2 / dt
+        moved = np.array([-np.expm1(-2.0 * DAMPING * turn), turn**2 / dt]) / _factor(model, channel, theta)
         for row, share in zip((place, len(coordinates) + place), moved, strict=True):
             gain[row, column] = share
             if behind is not None:
                 gain[row - place + coordinates.index(behind), column] = -share
     return gain
+
+
+def _factor(model: Model, channel: str, theta: Array) -> float:
+    """By what a sensor multiplies what it measures: its parameters that do nothing at one."""
+    sensor = model.sensor_of(channel)
+    factors = [
+        float(theta[model.index(name)])
+        for effect in model.effects
+        for short, name in effect.parameter_names.items()
+        if effect.at == sensor and effect.type.site == "sensor" and effect.type.parameter(short).neutral == 1.0
+    ]
+    return max(abs(float(np.prod(factors))), 1e-3)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.ranking.fit import Fitted, Fitter
+from vpm.ranking.noise_model import NoiseModel
 
 Array = NDArray[np.float64]
 
@@ -30,17 +31,12 @@ def probabilities(gains: Sequence[float], tempering: float) -> Array:
     return np.asarray(shares / np.sum(shares))
 
 
-def alike(one: Fitted, others: Sequence[Fitted], fitter: Fitter, nats: float) -> list[Fitted]:
-    """Those of the others that the records cannot tell from ``one``.
+def alike(one: Fitted, others: Sequence[Fitted], fitter: Fitter, noise: NoiseModel, nats: float) -> list[Fitted]:
+    """Those of the others that the records cannot tell from ``one`` under its noise model.
 
     Law: where one of two models is exact, the logarithm of the ratio of their densities has half of its variance as
     mean (Q. Vuong, *Econometrica* 57, 1989, for the variance). Below so many ``nats`` in the mean nobody can choose.
-
-    Raises
-    ------
-    VpmError
-        One of them runs away from the records.
     """
-    mine = fitter.log_density(one)
-    apart = [0.5 * len(mine) * float(np.var(fitter.log_density(other) - mine)) for other in others]
+    mine = fitter.log_density(one, noise)
+    apart = [0.5 * len(mine) * float(np.var(fitter.log_density(other, noise) - mine)) for other in others]
     return [other for other, far in zip(others, apart, strict=True) if far < nats]

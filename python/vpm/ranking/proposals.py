@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import math
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -11,7 +9,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from vpm.catalogue import EFFECTS
 from vpm.catalogue.kinds import Side
 from vpm.discrepancy.candidates import Candidate, Key, candidates
 from vpm.discrepancy.side_by_side import Failure, SideBySide
@@ -19,9 +16,8 @@ from vpm.identify import InverseDynamicsProblem
 from vpm.identify.reuse import SPLITTING
 from vpm.initial import invertible
 from vpm.model import Model
-from vpm.ranking.fit import ASTRAY, Fitted, Fitter, Followed, View, bounded_step, in_roots
-from vpm.ranking.noise_model import NoiseModel, white_noise
-from vpm.ranking.observed import Observer, fewest_steps
+from vpm.ranking.fit import Fitter, View
+from vpm.ranking.look import Look
 from vpm.ranking.settings import Settings
 from vpm.ranking.sizes import Sizes
 from vpm.ranking.starts import started
@@ -32,36 +28,6 @@ Array = NDArray[np.float64]
 SIDES: tuple[Side, Side] = ("motor", "link")
 
 
-class Reference:
-    """What there is without another effect, and one way to look at what an observer leaves of it.
-
-    Attributes
-    ----------
-    fitted : Fitted
-    followed : Followed
-    view : View
-        Derivatives by what is unknown already are taken as known for structures with an effect more.
-    cost : float
-        See `Fitter.cost`.
-    """
-
-    def __init__(self, fitted: Fitted, followed: Followed, noise: NoiseModel, fitter: Fitter) -> None:
-        self.fitted, self.followed, parts = fitted, followed, fitter.observed.parts
-        self.view = View(noise, dict(zip(followed.names, noise.whitened(followed.jacobian, parts).T, strict=True)))
-        self.cost = fitter.cost(followed.structure, followed.residual, noise)
-        self._parts, self._reach = parts, fitter.settings.reach
-        errors = noise.whitened(followed.residual, parts)
-        self._roots = noise.roots(errors)
-        self._left = float(np.sum((errors * self._roots) ** 2))
-
-    def predicted_gain(self, other: Followed) -> float:
-        """What another structure gains by a step of a fit, or as it stands, nats."""
-        errors, slopes = in_roots(*self.view.errors(other, self._parts), self._roots)
-        move = bounded_step(other.structure, errors, slopes, self._reach)
-        left = min(float(np.sum((errors + slopes @ move) ** 2)), float(errors @ errors))
-        return 0.5 * len(errors) * math.log(self._left / max(left, 1e-300))
-
-
 @dataclass(frozen=True, eq=False)
 class Proposal:
     """An effect at start values, as an observer sees it.
@@ -69,30 +35,28 @@ class Proposal:
     Attributes
     ----------
     structure : Structure
-    observer : Observer
     gain : float
         What one step of a fit is predicted to gain, nats.
     neutral : bool
         The effect does nothing where it begins.
-    reference : Reference
-        What there is without it, under the same bandwidth.
+    look : Look
+        What there is without it, under the same observer.
     """
 
     structure: Structure
-    observer: Observer
     gain: float
     neutral: bool
-    reference: Reference
+    look: Look
 
     @property
     def view(self) -> View:
         """How it is looked at; where an effect does nothing, derivatives by all others are those without it."""
-        return self.reference.view if self.neutral else View(self.reference.view.noise, {})
+        return self.look.view if self.neutral else View(self.look.view.noise)
 
     @property
     def residual(self) -> Array | None:
         """What is left where the fit begins, if that is known: an effect that does nothing leaves it as it was."""
-        return self.reference.followed.residual if self.neutral else None
+        return self.look.fitted.residual if self.neutral else None
 
     @property
     def key(self) -> Key:
@@ -138,72 +102,44 @@ def sides_of(candidate: Candidate, model: Model) -> tuple[Side, ...]:
 
 
 def proposals(
-    found: Fitted,
+    looks: Sequence[Look],
     fitter: Fitter,
     data: InverseDynamicsProblem,
     sizes: Sizes,
     each: SideBySide,
-    only: Key | None = None,
+    effects: Sequence[str],
 ) -> list[Proposal]:
-    """Effects of the catalogue, or ``only`` one of them, that are worth a fit beside ``found``.
-
-    They are the best few by each observer and each way to look at what it leaves.
-    """
-    model = found.structure.repaired
-    bare = invertible(model, data.joints)
+    """Those of these effects that are worth a fit beside what was found: the best few under each observer."""
+    found = looks[0].fitted.structure.repaired
+    bare = invertible(found, data.joints)
     residual = data.evaluate(bare, bare.theta)[0]
-    plausible = candidates(model, data, residual, tuple(EFFECTS), simulated=True)
-    listed = [started(candidate, model, sizes) for candidate in plausible if only in (None, candidate.key)]
-    looks = [_references(one, fitter) for one in observers(found, fitter)]
+    listed = [started(one, found, sizes) for one in candidates(found, data, residual, effects, simulated=True)]
     items = [
-        (several, candidate, start, side)
-        for place, several in enumerate(looks)
+        (look, candidate, start, side)
+        for look in looks
         for candidate in listed
-        if candidate.neutral or place > 0 or len(looks) <= len(fitter.settings.bands)
         for start in candidate.starts
-        for side in sides_of(candidate, model)
+        for side in sides_of(candidate, found)
     ]
     screened = each(
         "screening",
         lambda item: _screened(*item, fitter, sizes),
         items,
-        lambda item: f"{item[1].label}, {item[0][0].followed.observer.label}",
+        lambda item: f"{item[1].label}, {item[0].fitted.observer.label}",
     )
     chosen: list[Proposal] = []
-    for several in looks:
-        mine = [one for one in screened if not isinstance(one, Failure) and one[0].reference is several[0]]
-        for alike in zip(*mine, strict=True):
-            chosen += _seated([proposal for proposal in alike if proposal.neutral], fitter.settings)
-        chosen += _begun([max(one, key=_gain) for one in mine if not one[0].neutral], fitter.settings)
+    for look in looks:
+        mine = [one for one in screened if not isinstance(one, Failure) and one.look is look]
+        mine.sort(key=lambda one: -one.gain)
+        chosen += _seated([one for one in mine if one.neutral], fitter.settings)
+        chosen += _begun([one for one in mine if not one.neutral], fitter.settings)
     return chosen
 
 
-def observers(found: Fitted, fitter: Fitter) -> list[Fitted]:
-    """What was found, under its own observer first, and under those that search, unless one of them is like its own."""
-    references = [found]
-    for band in fitter.settings.bands:
-        if not 0.5 < band / found.observer.band < 2.0:
-            with contextlib.suppress(*ASTRAY):  # a slow observer may lose what hangs behind a contact
-                references.append(fitter.fitted(found.structure, replace(found.observer, band=band)))
-    return references
-
-
-def _references(found: Fitted, fitter: Fitter) -> list[Reference]:
-    """Ways to look at it: as it is, where an effect of slow motion is large, and whitened, where a weak one is."""
-    followed = fitter.followed(found.structure, found.observer)
-    noises = white_noise(followed.residual, fitter.observed.parts), found.noise
-    return [Reference(found, followed, noise, fitter) for noise in noises]
-
-
 def _screened(
-    references: Sequence[Reference],
-    candidate: Candidate,
-    start: Mapping[str, float],
-    side: Side,
-    fitter: Fitter,
-    sizes: Sizes,
-) -> list[Proposal]:
-    """One effect at start values under one observer, in each of the ways to look at what is left.
+    look: Look, candidate: Candidate, start: Mapping[str, float], side: Side, fitter: Fitter, sizes: Sizes
+) -> Proposal:
+    """One effect at start values under one observer.
 
     Derivatives by what was unknown without it are taken as they were: a prediction of a gain can do with these.
 
@@ -212,33 +148,26 @@ def _screened(
     VpmError, ArithmeticError
         It cannot be there, or runs away from the records.
     """
-    without = references[0].followed
-    structure = extended(without.structure, candidate, start, side, sizes)
-    observer = replace(without.observer, steps=max(without.observer.steps, fewest_steps(structure.model)))
-    fresh = [name for name in structure.priors if name not in without.names]
-    residual = without.residual if candidate.neutral else None
-    followed = fitter.followed(structure, observer, fresh, residual=residual)
-    return [Proposal(structure, observer, one.predicted_gain(followed), candidate.neutral, one) for one in references]
+    structure = extended(look.fitted.structure, candidate, start, side, sizes)
+    fresh = [name for name in structure.priors if name not in look.coarse.names]
+    followed = fitter.followed(structure, look.fitted.observer.coarse, fresh)
+    return Proposal(structure, look.predicted_gain(followed), candidate.neutral, look)
 
 
-def _seated(screened: list[Proposal], settings: Settings) -> list[Proposal]:
+def _seated(screened: Sequence[Proposal], settings: Settings) -> list[Proposal]:
     """The best start of each of the best effects, of which a step of a fit says well what they are good for."""
     taken: dict[Key, Proposal] = {}
-    for proposal in sorted(screened, key=_gain, reverse=True):
+    for proposal in screened:
         if proposal.gain < settings.least or len(taken) == settings.seats:
             break
         taken.setdefault(proposal.key, proposal)
     return list(taken.values())
 
 
-def _begun(screened: list[Proposal], settings: Settings) -> list[Proposal]:
+def _begun(screened: Sequence[Proposal], settings: Settings) -> list[Proposal]:
     """The best starts of each effect that is there at its start already: a step says little of where it ends."""
     taken: dict[Key, list[Proposal]] = defaultdict(list)
-    for proposal in sorted(screened, key=_gain, reverse=True):
+    for proposal in screened:
         if len(taken[proposal.key]) < settings.starts:
             taken[proposal.key].append(proposal)
     return [proposal for several in taken.values() for proposal in several]
-
-
-def _gain(proposal: Proposal) -> float:
-    return proposal.gain

@@ -1,21 +1,18 @@
-"""Fits of many proposals, of which those are given up that cannot bring what is needed."""
+"""Fits of many proposals, of which those are given up that cannot win."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from vpm.discrepancy.side_by_side import SideBySide
 from vpm.ranking.fit import Fitted, Fitter
-from vpm.ranking.proposals import Proposal, Reference
-
-#: A proposal with the cost that it has to come below.
-Entry = tuple[Proposal, float]
+from vpm.ranking.look import Look
+from vpm.ranking.proposals import Proposal
 
 
-def raced(
-    chosen: Sequence[Proposal], needed: Sequence[float], fitter: Fitter, each: SideBySide
-) -> list[tuple[Fitted, Proposal]]:
-    """Fits of proposals that may come to the evidence that is needed.
+def raced(chosen: Sequence[Proposal], fitter: Fitter, each: SideBySide) -> list[tuple[Fitted, Proposal]]:
+    """Fits of proposals that may win.
 
     Of each look the most promising one is fitted first. Another one has to save a share of the cost that this one saved
     (O. Maron and A. Moore, *Advances in Neural Information Processing Systems* 6, 1994: those that cannot win leave a
@@ -24,42 +21,28 @@ def raced(
     Parameters
     ----------
     chosen : sequence of Proposal
-    needed : sequence of float
-        Evidence that each has to come to, nats.
     fitter : Fitter
     each : SideBySide
     """
-    settings = fitter.settings
-    entries = [(one, _goal(one, evidence)) for one, evidence in zip(chosen, needed, strict=True)]
-    hopeful = [
-        (one, goal)
-        for one, goal in entries
-        if not one.neutral or one.reference.cost - settings.patience * one.gain < goal
-    ]
-    leaders: dict[Reference, Entry] = {}
-    for entry in sorted(hopeful, key=lambda entry: -entry[0].gain):
-        leaders.setdefault(entry[0].reference, entry)
-    first = _fitted(list(leaders.values()), fitter, each)
-    behind = {
-        one.reference: one.reference.cost - settings.share * (one.reference.cost - fitted.cost) for fitted, one in first
+    leaders: dict[Look, Proposal] = {}
+    for one in sorted(chosen, key=lambda one: -one.gain):
+        leaders.setdefault(one.look, one)
+    first = _fitted(list(leaders.values()), [math.inf] * len(leaders), fitter, each)
+    goals = {
+        one.look: one.look.fitted.cost - fitter.settings.share * max(one.look.fitted.cost - fitted.cost, 0.0)
+        for fitted, one in first
     }
-    others = [
-        (one, min(goal, behind.get(one.reference, goal)))
-        for one, goal in hopeful
-        if leaders[one.reference][0] is not one
-    ]
-    return first + _fitted(others, fitter, each)
+    others = [one for one in chosen if leaders[one.look] is not one]
+    return first + _fitted(others, [goals.get(one.look, math.inf) for one in others], fitter, each)
 
 
-def _goal(one: Proposal, needed: float) -> float:
-    """Cost at which it comes to the evidence that is needed, where one follows the other."""
-    return one.reference.cost - (needed - one.reference.fitted.evidence)
-
-
-def _fitted(entries: Sequence[Entry], fitter: Fitter, each: SideBySide) -> list[tuple[Fitted, Proposal]]:
-    def searched(entry: Entry) -> Fitted:
+def _fitted(
+    several: Sequence[Proposal], goals: Sequence[float], fitter: Fitter, each: SideBySide
+) -> list[tuple[Fitted, Proposal]]:
+    def one_fitted(entry: tuple[Proposal, float]) -> Fitted:
         one, goal = entry
-        return fitter.searched(one.structure, one.observer, one.view, goal, one.residual)
+        return fitter.fitted(one.structure, one.look.fitted.observer, one.view, goal, one.residual)
 
-    ends = each("fitting", searched, entries, lambda entry: " at ".join(entry[0].key))
-    return [(end, one) for end, (one, _) in zip(ends, entries, strict=True) if isinstance(end, Fitted)]
+    entries = list(zip(several, goals, strict=True))
+    ends = each("fitting", one_fitted, entries, lambda entry: " at ".join(entry[0].key))
+    return [(end, one) for end, one in zip(ends, several, strict=True) if isinstance(end, Fitted)]

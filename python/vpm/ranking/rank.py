@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,19 +13,21 @@ from threadpoolctl import threadpool_limits
 from vpm.catalogue import EFFECTS
 from vpm.discrepancy.candidates import Key, slow_speeds
 from vpm.discrepancy.side_by_side import Progress, SideBySide
-from vpm.errors import DiagnosisError
+from vpm.errors import DiagnosisError, VpmError
 from vpm.experiment import Experiment, as_records
 from vpm.identify import InverseDynamicsProblem
 from vpm.model import Model
-from vpm.ranking.fit import ASTRAY, Fitted, Fitter
+from vpm.ranking.fit import ASTRAY, Fitted, Fitter, View
+from vpm.ranking.look import Judgement, Look
+from vpm.ranking.noise_model import fitted_noise
 from vpm.ranking.observed import Observed, Observer
 from vpm.ranking.posterior import alike, probabilities
-from vpm.ranking.proposals import SIDES, proposals
+from vpm.ranking.proposals import proposals
 from vpm.ranking.race import raced
 from vpm.ranking.result import Ranked, Ranking
 from vpm.ranking.settings import Settings
 from vpm.ranking.sizes import Sizes
-from vpm.ranking.structure import Structure, sides_taken
+from vpm.ranking.structure import Structure
 from vpm.ranking.validation import gaps
 from vpm.simulate import Setup
 from vpm.weighing import Prior
@@ -38,27 +40,30 @@ def rank(
     experiments: Experiment | Sequence[Experiment],
     validate: Experiment | Sequence[Experiment] | None = None,
     *,
+    effects: Sequence[str] | None = None,
     settings: Settings | None = None,
     setup: Setup | None = None,
     workers: int | None = None,
     tell: Callable[[str], None] | None = None,
     progress: Progress | None = None,
 ) -> Ranking:
-    """Order what ``model`` could be missing by its evidence in records, and add the best for as long as it pays.
+    """Order what ``model`` could be missing by what it removes of the error, and add the best for as long as it counts.
 
-    Every structure, the model with some effects, is kept on the records by the same observer, and what is left of each
-    channel is whitened by an autoregression of its own. Evidence is the logarithm of the probability density of the
-    records, by Laplace's method about the most probable values (D. MacKay, *Neural Computation* 4, 1992). Nothing is
-    inverted or differentiated, and neither the controller nor a start at rest is asked for.
+    Every structure, the model with some effects, is kept on the records by a slow observer, and fitted to what that
+    leaves of two thirds of each record. What decides is the error power that an effect removes, there and from the
+    third that is held back. Nothing is inverted or differentiated, and neither the controller nor a start at rest is
+    asked for.
 
     Parameters
     ----------
     model : Model
         Its uncertain parameters are fitted with every structure.
     experiments : Experiment or sequence of Experiment
-        Positions of joints and commands of actuators; all of them are fitted.
+        Positions of joints and commands of actuators.
     validate : Experiment or sequence of Experiment, optional
         Records that decide nothing; `Ranking.gaps` is measured on them, once, when all is found.
+    effects : sequence of str, optional
+        Restrict the catalogue to these names.
     settings : Settings, optional
         The numbers that decide.
     setup : Setup, optional
@@ -72,6 +77,7 @@ def rank(
     Returns
     -------
     Ranking
+        Ctrl-C during the search gives what is known until then, with ``interrupted``; earlier it raises.
 
     Raises
     ------
@@ -83,17 +89,33 @@ def rank(
     Examples
     --------
     >>> rank(model, log).effects
-    (Ranked(effect='coulomb_friction', site='axis', evidence=2091.0),)
+    (Ranked(effect='coulomb_friction', site='axis', removed=0.97),)
     """
     records = as_records(experiments)
     if not records:
         raise DiagnosisError("no record was given; pass at least one experiment")
     with threadpool_limits(1, user_api="blas"):
         each = SideBySide(workers, progress)
-        search = _Search(model, records, settings or Settings(), setup, each, tell or (lambda _: None))
+        names = tuple(EFFECTS if effects is None else effects)
+        search = _Search(model, records, names, settings or Settings(), setup, each, tell or (lambda _: None))
         # What a validation record lacks is said before the search.
         held_out = Observed(model, [] if validate is None else as_records(validate), search.settings, setup)
         return search.run(held_out)
+
+
+@dataclass(frozen=True, eq=False)
+class _Trial:
+    """An effect beside what was found, under one observer."""
+
+    fitted: Fitted
+    look: Look
+    judgement: Judgement
+    evidence: float = float("nan")
+
+    @property
+    def left(self) -> float:
+        """Share of the error power that it leaves."""
+        return 1.0 - self.judgement.removed
 
 
 class _Search:
@@ -103,206 +125,179 @@ class _Search:
         self,
         model: Model,
         records: Sequence[Experiment],
+        names: Sequence[str],
         settings: Settings,
         setup: Setup | None,
         each: SideBySide,
         say: Callable[[str], None],
     ) -> None:
-        self.settings, self.each, self.say = settings, each, say
+        self.names, self.settings, self.each, self.say = names, settings, each, say
         self.data = InverseDynamicsProblem(model, records)
         self.fitter = Fitter(Observed(model, records, settings, setup), settings)
         self.sizes = Sizes(model, self.data)
         firsts = self.fitter.observed.firsts.priors
         values = np.append(model.theta, np.zeros(len(firsts)))
         self.start = Structure(model, values, known(model, self.data) | firsts, firsts=tuple(firsts))
-        self.bare = 0.0  # log likelihood of the records without any effect
-        self.effects: list[Ranked] = []  # what was added
+        self.first: dict[float, Look] = {}  # looks at the model as it was, by bandwidth
 
     def run(self, held_out: Observed) -> Ranking:
         """See `rank`."""
         self.say("fitting what is uncertain")
-        found = recalibrated = self.fitter.finished(self.fitter.fitted(self.start, Observer(self.settings.bands[0])))
+        looks = self._looks(self.start)
+        self.first = {look.fitted.observer.band: look for look in looks}
+        recalibrated = looks[0].fitted.structure.repaired
+        effects: list[Ranked] = []
         rounds: list[tuple[Ranked, ...]] = []
-        complete = np.nan
-        while len(self.effects) < self.settings.effects:
-            found, best, tried = self._round(found)
-            recalibrated = found if not found.structure.effects else recalibrated
-            listed, nothing = self._listed(found, best, tried)
-            rounds.append(listed)
-            if best is None:
-                complete = nothing
-                break
-            self.effects.append(listed[0])
-            self.say(f"{listed[0].effect} at {listed[0].site}: {listed[0].evidence:.1f} nats")
-            found, needless = self._without_needless(best)
-            self.effects = [one for one in self.effects if one.key not in needless]
-            if needless:
-                self.say("no longer needed: " + ", ".join(" at ".join(key) for key in needless))
-        stages = (self.start.model, recalibrated.structure.repaired, found.structure.repaired)
-        left = gaps(held_out, stages, found.observer, self.settings.bands[0])
-        return Ranking(
-            tuple(replace(one, side=found.structure.side(one.key)) for one in self.effects),
-            tuple(rounds),
-            stages[-1],
-            found.observer.band,
-            found.log_likelihood,
-            complete,
-            left,
-        )
-
-    def _listed(self, found: Fitted, best: Fitted | None, tried: Sequence[Fitted]) -> tuple[tuple[Ranked, ...], float]:
-        """All effects that were tried, the best first, with their probabilities; and that of nothing being missing."""
-        coarse = self.fitter.equally_coarse(found)
-        ranked = [self._ranked(one, coarse) for one in tried]
-        if best is not None:
-            others = [one for one in ranked if one.key != best.key]
-            ranked = [replace(self._ranked(best, found), rivals=self._rivals(best.key, tried)), *others]
-        gains = [one.evidence - one.needed for one in ranked]
-        *shares, nothing = probabilities(gains, self.settings.tempering).tolist()
-        return tuple(replace(one, probability=share) for one, share in zip(ranked, shares, strict=True)), nothing
-
-    def _rivals(self, key: Key, tried: Sequence[Fitted]) -> tuple[str, ...]:
-        """Effects that the records cannot tell from one of those that were tried."""
-        own = next(one for one in tried if one.key == key)
-        close = [one for one in tried if one is not own and abs(one.evidence - own.evidence) < self.settings.odds]
-        return tuple(" at ".join(one.key) for one in alike(own, close, self.fitter, self.settings.same))
-
-    def _round(self, found: Fitted) -> tuple[Fitted, Fitted | None, list[Fitted]]:
-        """What had been found, with the best effect more if one pays, and all that were tried, the most probable first.
-
-        What an effect makes of the parameters that had been found may be better without it too: a fit that had not come
-        to its end is no evidence for one effect more, and if that takes all that it brought, all are tried again.
-        """
-        while True:
-            if not found.structure.effects:
-                self.bare = found.log_likelihood
-            coarse = self.fitter.equally_coarse(found)
-            tried = self._tried(coarse)
-            price = {one.key: self._price(found, one.key) for one in tried}
-            worth = sorted(tried, key=lambda one: price[one.key] - one.evidence)
-            for one in worth[: self.settings.finalists]:
-                if one.evidence - coarse.evidence < price[one.key]:
-                    return found, None, tried
-                best = self._turned(self.fitter.finished(one), one.key[1])
-                without, before = self._without(best, one.key), found
-                if without is not None and (without := self._turned(without, one.key[1])).evidence > found.evidence:
-                    found = without
-                again = found.evidence > before.evidence + self.settings.odds
-                if best.evidence - found.evidence >= self._price(found, one.key):
-                    return found, self._anew(best, found) if again else best, tried
-                if again:
+        interrupted = False
+        try:
+            while len(effects) < self.settings.effects:
+                best, tried = self._round(looks)
+                rounds.append(self._listed(best, tried))
+                if best is None:
                     break
-            else:
-                return found, None, tried
+                effects.append(rounds[-1][0])
+                self.say(f"{effects[-1].effect} at {effects[-1].site} removes {100.0 * best.judgement.removed:.3g} %")
+                looks = self._looks(best.fitted.structure, best)
+                looks, needless = self._without_needless(looks)
+                effects = [one for one in effects if one.key not in needless]
+        except KeyboardInterrupt:
+            interrupted = True
+        found = looks[0].fitted.structure
+        stages = (self.start.model, recalibrated, found.repaired)
+        left = gaps(held_out, stages, self.settings.bands[0])
+        effects = [replace(one, side=found.side(one.key)) for one in effects]
+        return Ranking(tuple(effects), tuple(rounds), found.repaired, recalibrated, left, interrupted)
 
-    def _anew(self, best: Fitted, found: Fitted) -> Fitted:
-        """The last effect fitted once more from its start values, beside a fit of all others that came further."""
-        tried = self._tried(self.fitter.equally_coarse(found), best.key)
-        ends = [self._turned(self.fitter.finished(one), one.key[1]) for one in tried]
-        return max([best, *ends], key=lambda one: one.evidence)
+    def _looks(self, structure: Structure, best: _Trial | None = None) -> list[Look]:
+        """A structure under each observer that can follow it, that under which the last effect came in first.
 
-    def _price(self, found: Fitted, key: Key) -> float:
-        """Evidence that another effect has to bring, nats.
-
-        No law is exact. What those that were found do otherwise has a share of the power that they explain beside the
-        noise, and an effect that takes up no more than that is none. The share is larger for an effect at the same site
-        that shows over the same state: one curve with two shapes.
+        Raises
+        ------
+        VpmError
+            None of them can.
         """
-        curve = [one for one in self.effects if one.site == key[1] and _states(one.key) & _states(key)]
-        anywhere = self._otherwise(max(found.log_likelihood - self.bare, 0.0), self.settings.inexact)
-        along = self._otherwise(sum(one.evidence for one in curve), self.settings.inexact_curve)
-        return self.settings.odds + max(anywhere, along)
+        looks = [] if best is None else [self._look(best.fitted)]
+        reason: Exception = VpmError(f"{structure.model.name} runs away from the records")
+        for band in self.settings.bands:
+            if best is None or band != best.fitted.observer.band:
+                try:
+                    looks.append(self._look(self._fitted(structure, Observer(band))))
+                except ASTRAY as error:  # a slow observer may lose what hangs behind a contact
+                    reason = error
+        if not looks:
+            raise reason
+        return looks
 
-    def _otherwise(self, explained: float, share: float) -> float:
-        """Nats in this share of a power, of which so many nats tell the ratio to the noise."""
-        samples = sum(int(part.stop - part.start) for part in self.fitter.observed.parts)
-        power = float(np.expm1(min(2.0 * explained / samples, 700.0)))
-        return 0.5 * samples * float(np.log1p(share**2 * power))
+    def _look(self, fitted: Fitted) -> Look:
+        return Look(fitted, self.fitter, self.first.get(fitted.observer.band))
 
-    def _tried(self, found: Fitted, only: Key | None = None) -> list[Fitted]:
-        chosen = proposals(found, self.fitter, self.data, self.sizes, self.each, only)
-        needed = [found.evidence + self._price(found, one.key) for one in chosen]
-        trials = raced(chosen, needed, self.fitter, self.each)
+    def _fitted(self, structure: Structure, observer: Observer) -> Fitted:
+        """A structure fitted to the end, its channels in the sizes of what it leaves at first."""
+        view = View(self.fitter.noise_of(structure, observer))
+        return self.fitter.finished(self.fitter.fitted(structure, observer, view), view)
+
+    def _round(self, looks: Sequence[Look]) -> tuple[_Trial | None, list[_Trial]]:
+        """The best effect more, if one counts, and all that were tried."""
+        chosen = proposals(looks, self.fitter, self.data, self.sizes, self.each, self.names)
+        fits = raced(chosen, self.fitter, self.each)
+        tried = [_Trial(fitted, one.look, one.look.judged(fitted)) for fitted, one in fits]
+        counting = [trial for trial in self._finished(tried) if self._counts(trial)]
+        if not counting:
+            return None, tried
+        first = min(counting, key=lambda trial: trial.left)
+        equal = [trial for trial in counting if trial.look is first.look and self._as_good(trial, first)]
+        best = min(equal, key=lambda trial: (len(trial.fitted.structure.priors), trial.left))
+        several = {best.fitted.key: best}
+        for trial in sorted(counting, key=lambda trial: trial.left):
+            if trial.look is best.look:
+                several.setdefault(trial.fitted.key, trial)
+        weighed = self._weighed(list(several.values()))
+        return weighed[0], weighed + tried
+
+    def _counts(self, trial: _Trial) -> bool:
+        return trial.fitted.structure.within_excitation and trial.judgement.counts(self.settings)
+
+    def _as_good(self, trial: _Trial, first: _Trial) -> bool:
+        """Whether it leaves no more than what laws are wrong by."""
+        explained = first.look.explained + first.judgement.removed
+        return trial.left - first.left < self.settings.inexact**2 * explained
+
+    def _finished(self, tried: Sequence[_Trial]) -> list[_Trial]:
+        """Those that count and leave little, fitted to the end."""
+        counting = [trial for trial in tried if self._counts(trial)]
+        best: dict[Look, _Trial] = {}
+        for trial in sorted(counting, key=lambda trial: trial.left):
+            best.setdefault(trial.look, trial)
         hopeful = [
             trial
-            for trial, proposal in trials
-            if trial.evidence + 2.0 * trial.predicted_gain > proposal.reference.fitted.evidence
+            for trial in counting
+            if trial.left <= self.settings.finished * best[trial.look].left or self._as_good(trial, best[trial.look])
         ]
-        several = [_distinct(fits)[: self.settings.optima] for fits in _by_effect(hopeful)]
-        refined = self._refined(several[: self.settings.finalists])
-        return [fits[0] for fits in _by_effect([*refined, *(trial for trial, _ in trials)])]
 
-    def _refined(self, several: Sequence[Sequence[Fitted]]) -> list[Fitted]:
-        """Fits of the first of these effects refined, and those of the others that may come as far by as much."""
-        first = [one for fits in several[:1] for one in fits]
-        ends = self._each_refined(first)
-        lift = max((end.evidence - one.evidence for end, one in zip(ends, first, strict=True)), default=0.0)
-        best = max((end.evidence for end in ends), default=-np.inf)
-        others = [one for fits in several[1:] for one in fits if one.evidence + lift > best]
-        return ends + self._each_refined(others)
+        def one_finished(trial: _Trial) -> _Trial:
+            fitted = self.fitter.finished(trial.fitted, View(trial.look.view.noise))
+            return replace(trial, fitted=fitted, judgement=trial.look.judged(fitted))
 
-    def _each_refined(self, fits: Sequence[Fitted]) -> list[Fitted]:
-        """Each refined, or as it was where that cannot be computed."""
-        ends = self.each("refining", self.fitter.refined, fits, lambda one: " at ".join(one.key))
-        return [end if isinstance(end, Fitted) else one for end, one in zip(ends, fits, strict=True)]
+        ends = self.each("finishing", one_finished, hopeful, lambda trial: " at ".join(trial.fitted.key))
+        return [end for end in ends if isinstance(end, _Trial)]
 
-    def _without_needless(self, found: Fitted) -> tuple[Fitted, list[Key]]:
+    def _weighed(self, trials: Sequence[_Trial]) -> list[_Trial]:
+        """With the evidence that each adds, under the noise model of the first."""
+        observed = self.fitter.observed
+        noise = fitted_noise(trials[0].fitted.residual, observed.parts, self.settings.order)
+        without = self.fitter.evidence(trials[0].look.fitted, noise)
+        return [replace(trial, evidence=self.fitter.evidence(trial.fitted, noise) - without) for trial in trials]
+
+    def _without_needless(self, looks: list[Look]) -> tuple[list[Look], list[Key]]:
         """Without those of the earlier effects that a later one has made needless."""
         needless: list[Key] = []
-        for key in found.structure.effects[:-1]:
-            other = self._without(found, key)
-            if other is not None and found.evidence - other.evidence < self.settings.odds:
-                found = other
-                needless.append(key)
-        return found, needless
+        for key in looks[0].fitted.structure.effects[:-1]:
+            with contextlib.suppress(*ASTRAY):  # it runs away without, or another one rests on it
+                without = self._fitted(looks[0].fitted.structure.without(key), looks[0].fitted.observer)
+                look = self._look(without)
+                if not look.judged(looks[0].fitted).counts(self.settings):
+                    looks = [look, *self._looks(without.structure)[1:]]
+                    needless.append(key)
+                    self.say(f"no longer needed: {' at '.join(key)}")
+        return looks, needless
 
-    def _without(self, found: Fitted, key: Key) -> Fitted | None:
-        """The same without an effect; None where that runs away or another one rests on it."""
-        try:
-            return self.fitter.without(found, key)
-        except ASTRAY:
-            return None
+    def _listed(self, best: _Trial | None, tried: Sequence[_Trial]) -> tuple[Ranked, ...]:
+        """All effects that were tried, what was added first, then those that leave least."""
+        several: dict[Key, Ranked] = {}
+        weighed = [trial for trial in tried if np.isfinite(trial.evidence)]
+        *shares, _ = probabilities([trial.evidence - self.settings.odds for trial in weighed], self.settings.tempering)
+        probability = {id(trial): float(share) for trial, share in zip(weighed, shares, strict=True)}
+        for trial in sorted(tried, key=lambda trial: (trial is not best, trial.left)):
+            ranked = self._ranked(trial, probability.get(id(trial), np.nan))
+            several.setdefault(ranked.key, ranked)
+        listed = tuple(several.values())
+        if best is None:
+            return listed
+        return (replace(listed[0], rivals=self._rivals(best, weighed)), *listed[1:])
 
-    def _turned(self, found: Fitted, joint: str) -> Fitted:
-        """With what acts at a joint on its other side, where it has two and that is better."""
-        model = found.structure.model
-        sides = sides_taken(model, joint)
-        if not sides or not model.joint_behind(joint):
-            return found
-        turned = [found]
-        for side in SIDES:
-            with contextlib.suppress(*ASTRAY):
-                if sides != {side}:
-                    other = self.fitter.fitted(found.structure.beside(joint, side), found.observer, found.noise)
-                    turned.append(self.fitter.finished(other))
-        return max(turned, key=lambda one: one.evidence)
+    def _rivals(self, best: _Trial, weighed: Sequence[_Trial]) -> tuple[str, ...]:
+        """Effects that the records cannot tell from the best."""
+        noise = fitted_noise(best.fitted.residual, self.fitter.observed.parts, self.settings.order)
+        others = [trial.fitted for trial in weighed if trial.fitted.key != best.fitted.key]
+        close = alike(best.fitted, others, self.fitter, noise, self.settings.same)
+        return tuple(dict.fromkeys(" at ".join(one.key) for one in close))
 
-    def _ranked(self, one: Fitted, found: Fitted) -> Ranked:
-        values = {name: value for name, value in one.structure.values.items() if name not in found.structure.priors}
-        needed, side = self._price(found, one.key), one.structure.side(one.key)
-        return Ranked(*one.key, one.evidence - found.evidence, values, needed=needed, side=side)
-
-
-def _states(key: Key) -> set[str]:
-    """States over which an effect shows."""
-    return set(EFFECTS[key[0]].signature.lives_in)
-
-
-def _by_effect(trials: Sequence[Fitted]) -> list[list[Fitted]]:
-    """The fits of each effect, the most probable first."""
-    several: dict[Key, list[Fitted]] = {}
-    whole = [one for one in trials if one.structure.within_excitation and np.isfinite(one.evidence)]
-    for trial in sorted(whole, key=lambda one: -one.evidence):
-        several.setdefault(trial.key, []).append(trial)
-    return list(several.values())
-
-
-def _distinct(fits: Sequence[Fitted]) -> list[Fitted]:
-    """Without those that ended where another one did."""
-    ends: dict[tuple[Observer, float], Fitted] = {}
-    for one in fits:
-        ends.setdefault((one.observer, round(one.evidence, 1)), one)
-    return list(ends.values())
+    def _ranked(self, trial: _Trial, probability: float) -> Ranked:
+        structure, without, told = trial.fitted.structure, trial.look.fitted.structure, trial.judgement
+        values = {name: value for name, value in structure.values.items() if name not in without.priors}
+        side, band = structure.side(trial.fitted.key), trial.fitted.observer.band
+        return Ranked(
+            *trial.fitted.key,
+            values,
+            told.removed,
+            told.least,
+            told.score,
+            told.size,
+            band,
+            side,
+            trial.evidence,
+            probability,
+        )
 
 
 def known(model: Model, data: InverseDynamicsProblem) -> dict[str, Prior]:

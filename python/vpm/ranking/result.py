@@ -17,28 +17,39 @@ class Ranked(Storable):
     Attributes
     ----------
     effect, site : str
-    evidence : float
-        Nats that it adds to the evidence of the structure without it.
     values : dict
         Its parameters, SI.
-    needed : float
-        Evidence that it has to add to be accepted, nats.
-    probability : float
-        That this is what is missing beside what had been found before, and not another effect or none.
-    rivals : tuple of str
-        Effects that the records do not tell from it.
+    removed : float
+        Share of the error power that it removes under the observer of bandwidth ``band``, Hz.
+    least : float
+        The same of fitted and of held-back stretches of record, the smaller one.
+    score : float
+        How surely it removes that from pieces of the held-back stretches, in standard deviations.
+    size : float
+        Its amplitude as a share of that of all effects of the model.
+    band : float
     side : {"motor", "link"}
         Of a joint that is split.
+    evidence : float
+        Nats that it adds to the evidence of the structure without it; NaN of effects that were not fitted to the end.
+    probability : float
+        That this is what is missing next, and not another one that was fitted to the end, or none; NaN likewise.
+    rivals : tuple of str
+        Effects that the records do not tell from it.
     """
 
     effect: str
     site: str
-    evidence: float
     values: dict[str, float]
-    needed: float = 0.0
+    removed: float
+    least: float
+    score: float
+    size: float
+    band: float
+    side: Side = "motor"
+    evidence: float = float("nan")
     probability: float = float("nan")
     rivals: tuple[str, ...] = ()
-    side: Side = "motor"
 
     @property
     def key(self) -> tuple[str, str]:
@@ -80,34 +91,25 @@ class Ranking(Result):
         All that was fitted beside what had been found before, the best first.
     model : Model
         With what was added, at its most probable values.
-    band : float
-        Bandwidth of the observer under which the records are most probable, Hz: the smaller, the less is left.
-    log_likelihood : float
-        Of the records under ``model``.
-    complete : float
-        Probability that nothing else of the catalogue is missing; NaN where the search ended at its most effects.
+    recalibrated : Model
+        As it was, its uncertain parameters fitted.
     gaps : dict of str to Gap
         By channel, on records that decided nothing; empty if there are none.
+    interrupted : bool
+        Ctrl-C ended the search: there may be more.
     """
 
     effects: tuple[Ranked, ...]
     rounds: tuple[tuple[Ranked, ...], ...]
     model: Model
-    band: float
-    log_likelihood: float
-    complete: float
+    recalibrated: Model
     gaps: dict[str, Gap] = field(default_factory=dict)
+    interrupted: bool = False
 
     def _headline(self) -> Mapping[str, object]:
-        return {f"{one.effect} at {one.place}": one.evidence for one in self.effects} or {"effects": "none"}
+        return {f"{one.effect} at {one.place}": one.removed for one in self.effects} or {"effects": "none"}
 
     def _frame_columns(self) -> Mapping[str, object]:
         tried = [(number + 1, one) for number, several in enumerate(self.rounds) for one in several]
-        return {
-            "round": [number for number, _ in tried],
-            "effect": [one.effect for _, one in tried],
-            "site": [one.site for _, one in tried],
-            "evidence": [one.evidence for _, one in tried],
-            "needed": [one.needed for _, one in tried],
-            "probability": [one.probability for _, one in tried],
-        }
+        names = ("effect", "site", "removed", "least", "score", "size", "band", "evidence", "probability")
+        return {"round": [number for number, _ in tried], **{n: [getattr(one, n) for _, one in tried] for n in names}}

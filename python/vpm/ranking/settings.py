@@ -12,24 +12,34 @@ class Settings:
     Attributes
     ----------
     bands : tuple of float
-        Bandwidths of the observers that search, Hz: a slow one, whose residual is wide and easy to rank, and one that
-        keeps a load behind a backlash in step.
-    widest, narrowest : float
-        Bandwidths among which a structure finds its own, Hz.
-    order : int
-        Length of the autoregression that whitens what an observer leaves of a channel, samples.
+        Bandwidths of the observers, Hz: a slow one, whose error is wide and easy to rank, and one that keeps a load
+        behind a backlash in step.
+    longest_step : float
+        Of the integrator where structures are compared, s: its errors must not pass for an effect.
     settling : float
         Time at the beginning of each record that is left out, s: what an observer makes of the first state.
+    pieces : int
+        Pieces of the held-back stretches between which an effect has to repeat.
+    inexact : float
+        By how much a law differs from the machine, as a share of the amplitude that it explains. Another effect that
+        shows over the same states at the same place has to do more than that, and a richer one has to do better by it.
+    slight : float
+        An effect that does less than this share of the amplitude of all effects of the model is none.
+    worth : float
+        Share of the error power that another effect has to remove, of fitted and of held-back stretches.
+    score : float
+        Standard deviations between pieces by which that differs from nothing.
     seats : int
-        Effects of a round that are fitted for each observer and each way to look at what it leaves.
+        Effects that do nothing at their start, that are fitted under each observer.
     least : float
-        Gain that a step has to predict, nats, for an effect to be fitted.
+        Gain that a step has to predict, nats, for such an effect to be fitted.
     starts : int
         Start values that are fitted, of those that were screened, of an effect that is there at its start already.
-    finalists : int
-        Effects of a round that are fitted at every bandwidth that serves them.
-    optima : int
-        Fits of each of these that are pursued: contacts have several optima.
+    finished : float
+        Effects that leave up to so many times the error power of the best, or no more than laws are wrong by, are
+        fitted to the end.
+    turns : int
+        Fits that follow each other until nothing is gained any more.
     iterations : int
         Steps of a fit.
     patience : float
@@ -40,38 +50,38 @@ class Settings:
         Gain of a step, nats, below which a fit ends.
     reach : float
         Deviations of its prior that a parameter may move in a step.
+    order : int
+        Length of the autoregression that whitens the error of a channel where evidence is told, samples.
     odds : float
-        Evidence, nats, that another effect has to bring.
-    inexact : float
-        By how much an effect differs from its law, as a share of what it does: another effect may take that up.
-    inexact_curve : float
-        The same where the other effect shows over the same state at the same site.
+        Evidence, nats, at which an effect is as probable as none.
     tempering : float
         Power of evidence in probabilities: no model is exact.
     same : float
-        Effects between which the records decide by fewer nats than this, in the mean, are one class.
+        Effects between which the records decide by fewer nats than this, in the mean, are rivals.
     effects : int
         Most effects of a structure.
     """
 
     bands: tuple[float, ...] = (1.0, 10.0)
-    widest: float = 160.0
-    narrowest: float = 0.25
-    order: int = 12
+    longest_step: float = 6e-4
     settling: float = 0.5
-    seats: int = 5
+    pieces: int = 20
+    inexact: float = 0.015
+    slight: float = 0.003
+    worth: float = 0.06
+    score: float = 3.0
+    seats: int = 8
     least: float = 4.0
     starts: int = 3
-    finalists: int = 4
-    optima: int = 3
+    finished: float = 2.5
+    turns: int = 3
     iterations: int = 8
     patience: float = 3.0
     share: float = 0.5
     tolerance: float = 0.5
     reach: float = 6.0
+    order: int = 12
     odds: float = 16.0
-    inexact: float = 0.05
-    inexact_curve: float = 0.3
     tempering: float = 0.2
     same: float = 1.0
     effects: int = 4

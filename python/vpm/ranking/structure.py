@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from types import MappingProxyType
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from vpm.catalogue.kinds import Side
 from vpm.discrepancy.candidates import Key
-from vpm.model import Model
+from vpm.model import Effect, Model
 from vpm.weighing.priors import Prior
 
 Array = NDArray[np.float64]
@@ -78,21 +78,6 @@ class Structure:
         return np.array([prior.standard(float(self.theta[column])) for prior, column in pairs])
 
     @cached_property
-    def neutral(self) -> Array:
-        """Where each of the unknown parameters does nothing, in deviations of the priors (k,); shapes stay."""
-        nothing = {
-            name: effect.type.parameter(short).neutral
-            for effect in self.model.effects
-            for short, name in effect.parameter_names.items()
-            if not effect.type.parameter(short).shape
-        }
-        values = [nothing.get(name) for name in self.priors]
-        pairs = zip(values, self.priors.values(), self.standard, strict=True)
-        return np.array(
-            [z if value is None or prior.logarithmic else prior.standard(value) for value, prior, z in pairs]
-        )
-
-    @cached_property
     def slopes(self) -> Array:
         """Change of each unknown parameter by a deviation (k,)."""
         pairs = zip(self.priors.values(), self.columns, strict=True)
@@ -108,6 +93,16 @@ class Structure:
     def repaired(self) -> Model:
         """The model with its effects, at these values."""
         return self.model.with_parameters(self.values)
+
+    def bare(self, effects: Collection[Effect]) -> Structure:
+        """The same where none of these effects of the model does anything; shapes stay."""
+        theta = self.theta.copy()
+        for effect in effects:
+            for short, name in effect.parameter_names.items():
+                parameter = effect.type.parameter(short)
+                if not parameter.shape and parameter.neutral is not None:
+                    theta[self.model.index(name)] = parameter.neutral
+        return replace(self, theta=theta, priors={})
 
     def at(self, standard: Array) -> Structure:
         """With unknown parameters at these deviations of their priors, as far as they are possible."""

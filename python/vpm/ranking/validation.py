@@ -7,13 +7,13 @@ from numpy.typing import NDArray
 
 from vpm.model import Model
 from vpm.ranking.fit import ASTRAY
-from vpm.ranking.observed import Observed, Observer, fewest_steps
+from vpm.ranking.observed import Observed, Observer
 from vpm.ranking.result import Gap
 
 Array = NDArray[np.float64]
 
 
-def gaps(held_out: Observed, stages: tuple[Model, Model, Model], found: Observer, band: float) -> dict[str, Gap]:
+def gaps(held_out: Observed, stages: tuple[Model, Model, Model], band: float) -> dict[str, Gap]:
     """By channel what an observer of this bandwidth (Hz) leaves of validation records, of three stages of a model.
 
     Parameters
@@ -21,13 +21,11 @@ def gaps(held_out: Observed, stages: tuple[Model, Model, Model], found: Observer
     held_out : Observed
     stages : tuple of Model
         As the user wrote it, with its parameters fitted, with what was found.
-    found : Observer
-        Under which the last stage was found; its steps are taken.
     band : float
     """
     if not held_out.records:
         return {}
-    left = np.transpose([_left(held_out, model, band, found) for model in stages])
+    left = np.transpose([_left(held_out, model, band) for model in stages])
     units = map(stages[0].channel_unit, held_out.records[0].channels)
     return {
         channel: Gap(float(before), float(recalibrated), float(after), unit)
@@ -35,13 +33,12 @@ def gaps(held_out: Observed, stages: tuple[Model, Model, Model], found: Observer
     }
 
 
-def _left(observed: Observed, model: Model, band: float, found: Observer) -> Array:
+def _left(observed: Observed, model: Model, band: float) -> Array:
     """Root mean square of what is left of each channel (m,); NaN where the model runs away."""
-    observer = Observer(band, max(found.steps, fewest_steps(model)), found.controlled)
     try:
-        residual, _ = observed.follow(model, model.theta, observer)
+        residual, _ = observed.follow(model, model.theta, Observer(band))
     except ASTRAY:
         return np.full(len(observed.records[0].channels), np.nan)
-    told = np.concatenate([residual[part] for part in observed.parts])
+    told = np.concatenate([residual[part] for part in (*observed.parts, *observed.held_back)])
     level: Array = np.sqrt(np.mean(told**2, axis=0))
     return level

@@ -1,0 +1,135 @@
+"""What an observer leaves of the records, and how much of that another effect removes."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Collection
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vpm.catalogue import EFFECTS
+from vpm.model import Effect
+from vpm.ranking.fit import ASTRAY, Fitted, Fitter, Followed, View, bounded_step
+from vpm.ranking.noise_model import white_noise
+from vpm.ranking.settings import Settings
+
+Array = NDArray[np.float64]
+
+
+class Look:
+    """What was found, under one observer.
+
+    Attributes
+    ----------
+    fitted : Fitted
+    coarse : Followed
+        The same with few steps of the integrator, and derivatives by all that is unknown.
+    view : View
+        Channels in their root mean squares; derivatives are taken as known for effects that do nothing at first.
+    explained : float
+        Error power that all effects of the model remove, as a multiple of what is left.
+    """
+
+    def __init__(self, fitted: Fitted, fitter: Fitter, first: Look | None = None) -> None:
+        observed, self._fitter = fitter.observed, fitter
+        noise = white_noise(fitted.residual, observed.parts)
+        self.coarse = fitter.followed(fitted.structure, fitted.observer.coarse, tuple(fitted.structure.priors))
+        slopes = noise.whitened(self.coarse.jacobian, observed.parts).T
+        self.view = View(noise, dict(zip(self.coarse.names, slopes, strict=True)))
+        cost = fitter.cost(fitted.structure, fitted.residual, noise)
+        self.fitted = replace(fitted, cost=cost)
+        self.sizes = np.array(noise.deviations)
+        self.left = observed.squares(fitted.residual, self.sizes)
+        found = self._removed(fitted.structure.model.effects)
+        self.explained = found if first is None else max(found, self._beside(first.fitted.residual))
+        self._curves: dict[tuple[str, ...], float] = {}
+
+    def predicted_gain(self, other: Followed) -> float:
+        """What another structure gains by a step of a fit, or as it stands, with few steps of the integrator, nats."""
+        parts = self._fitter.observed.parts
+        before = self.view.noise.whitened(self.coarse.residual, parts)
+        errors, slopes = self.view.errors(other, parts)
+        move = bounded_step(other.structure, errors, slopes, self._fitter.settings.reach)
+        left = min(float(np.sum((errors + slopes @ move) ** 2)), float(errors @ errors))
+        return 0.5 * len(errors) * float(np.log(float(before @ before) / max(left, 1e-300)))
+
+    def judged(self, fitted: Fitted) -> Judgement:
+        """What another structure removes."""
+        observed, settings = self._fitter.observed, self._fitter.settings
+        left = observed.squares(fitted.residual, self.sizes)
+        shares = [1.0 - float(after.sum() / before.sum()) for after, before in zip(left, self.left, strict=True)]
+        removed = max(1.0 - self._sum(left) / self._sum(self.left), 1e-12)
+        size, shape = (float(np.sqrt(removed / (power + removed))) for power in (self.explained, self._curve(fitted)))
+        return Judgement(removed, min(shares), _repeated(self.left[1], left[1], settings.pieces), size, shape)
+
+    def _curve(self, fitted: Fitted) -> float:
+        """What those effects of the model remove that show over the same states at the same place as the last one."""
+        if not fitted.structure.effects:
+            return 0.0
+        name, site = fitted.structure.effects[-1]
+        states = set(EFFECTS[name].signature.lives_in)
+        present = self.fitted.structure.model.effects
+        alike = [one for one in present if one.at == site and states & set(one.type.signature.lives_in)]
+        key = tuple(f"{one.name} {one.side}" for one in alike)
+        if (site, *key) not in self._curves:
+            self._curves[site, *key] = self._removed(alike)
+        return self._curves[site, *key]
+
+    def _removed(self, effects: Collection[Effect]) -> float:
+        """Error power that these effects of the model remove; none where the rest runs away from the records."""
+        if effects:
+            with contextlib.suppress(*ASTRAY):
+                bare = self.coarse.structure.bare(effects)
+                return self._beside(self._fitter.followed(bare, self.fitted.observer.coarse, ()).residual)
+        return 0.0
+
+    def _beside(self, residual: Array) -> float:
+        """By how many times what is left the power of another residual is more."""
+        squares = self._fitter.observed.squares(residual, self.sizes)
+        return max(self._sum(squares) / self._sum(self.left) - 1.0, 0.0)
+
+    @staticmethod
+    def _sum(squares: tuple[Array, Array]) -> float:
+        return float(squares[0].sum() + squares[1].sum())
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """What an effect removes of the error that an observer leaves.
+
+    Attributes
+    ----------
+    removed : float
+        Share of the error power.
+    least : float
+        The same of fitted and of held-back stretches, the smaller one.
+    score : float
+        How surely it is removed from pieces of the held-back stretches, in standard deviations.
+    size : float
+        Its amplitude as a share of that of all effects of the model.
+    shape : float
+        The same of those that show over the same states at the same place: one curve with two shapes.
+    """
+
+    removed: float
+    least: float
+    score: float
+    size: float
+    shape: float
+
+    def counts(self, settings: Settings) -> bool:
+        """Whether that is more than chance, and more than what laws are wrong by."""
+        sure = self.least > settings.worth and self.score > settings.score
+        return sure and self.size > settings.slight and self.shape > settings.inexact
+
+
+def _repeated(before: Array, after: Array, pieces: int) -> float:
+    """How surely squares are smaller in all pieces, or their logarithms are, in standard deviations of the mean."""
+    pairs = [
+        (float(b.sum()), float(a.sum()))
+        for b, a in zip(*(np.array_split(x, pieces) for x in (before, after)), strict=True)
+    ]
+    changes = [[b - a for b, a in pairs], [np.log(max(b, 1e-300) / max(a, 1e-300)) for b, a in pairs]]
+    return max(float(np.mean(c) / max(np.std(c, ddof=1) / np.sqrt(pieces), 1e-300)) for c in changes)
