@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from synthetic import Truth, nominal, simulate_axis
-from vpm.discrepancy import diagnose
+from vpm.diagnosing import diagnose
 from vpm.discrepancy.diagnosis import RankedCandidate
 from vpm.discrepancy.floor import white_level
 from vpm.discrepancy.round import _promise

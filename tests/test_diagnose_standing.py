@@ -83,7 +83,7 @@ def test_a_rival_earns_its_additional_numbers_where_they_were_fitted(left: float
 
 def test_a_search_goes_on_beside_what_took_the_place_of_an_effect(monkeypatch: pytest.MonkeyPatch) -> None:
     """Beside the true name a second effect stands clear; the name that went out does not come back."""
-    diagnose = import_module("vpm.discrepancy.diagnose")
+    diagnose = import_module("vpm.diagnosing")
     model, free, data = balances(shared_case("axis_linear", ("spring", "viscous_friction"), 3))
     start, each = judge(model, free, data, {}), SideBySide(1)
     spring = search(start, data, ["spring"], 6, print, each)

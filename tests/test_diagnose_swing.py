@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from shared_cases import shared_case
-from vpm.discrepancy import diagnose
+from vpm.diagnosing import diagnose
 
 
 def test_a_swing_as_white_as_noise_is_named() -> None:

@@ -14,7 +14,8 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from vpm.discrepancy import Diagnosis, diagnose
+from vpm.diagnosing import diagnose
+from vpm.discrepancy import Diagnosis
 from vpm.discrepancy.candidates import candidates, left_out
 from vpm.experiment import Experiment
 from vpm.identify import InverseDynamicsProblem

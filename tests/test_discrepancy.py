@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from synthetic import Truth, nominal, simulate_axis
-from vpm.discrepancy import Diagnosis, diagnose
+from vpm.diagnosing import diagnose
+from vpm.discrepancy import Diagnosis
 from vpm.errors import DiagnosisError, ExperimentError
 
 SECONDS = 16.0

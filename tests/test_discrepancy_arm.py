@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 
 from two_link_arm import Arm, nominal, record
-from vpm.discrepancy import Diagnosis, diagnose
+from vpm.diagnosing import diagnose
+from vpm.discrepancy import Diagnosis
 
 
 def of(arm: Arm) -> Diagnosis:

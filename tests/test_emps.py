@@ -13,7 +13,8 @@ from pathlib import Path
 import pytest
 
 from command_line import vpm
-from vpm.discrepancy import Diagnosis, diagnose
+from vpm.diagnosing import diagnose
+from vpm.discrepancy import Diagnosis
 from vpm.experiment import Experiment
 from vpm.identify import identify
 from vpm.model import Model

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from vpm.discrepancy import diagnose
+from vpm.diagnosing import diagnose
 from vpm.experiment import Experiment
 from vpm.identify import InverseDynamicsProblem, identify
 from vpm.model import Model

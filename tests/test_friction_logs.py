@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from vpm.discrepancy import Diagnosis, diagnose
+from vpm.diagnosing import diagnose
+from vpm.discrepancy import Diagnosis
 from vpm.errors import DivergedError
 from vpm.experiment import Experiment
 from vpm.identify import identify

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from vpm import Experiment, Model, simulate
-from vpm.discrepancy import diagnose
+from vpm.diagnosing import diagnose
 from vpm.discrepancy.structural import logged_swing
 from vpm.errors import ModelError
 from vpm.identify import InverseDynamicsProblem, identify

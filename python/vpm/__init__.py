@@ -20,7 +20,8 @@ if TYPE_CHECKING:
     from vpm.catalogue import EFFECTS
     from vpm.climb import Climb, climb
     from vpm.compare import Comparison, compare
-    from vpm.discrepancy import Diagnosis, diagnose
+    from vpm.diagnosing import diagnose
+    from vpm.discrepancy import Diagnosis
     from vpm.errors import VpmError
     from vpm.experiment import Campaign, Experiment
     from vpm.identify import (
@@ -109,8 +110,8 @@ _HOMES = {
     "climb": "vpm.climb",
     "Comparison": "vpm.compare",
     "compare": "vpm.compare",
+    "diagnose": "vpm.diagnosing",
     "Diagnosis": "vpm.discrepancy",
-    "diagnose": "vpm.discrepancy",
     "VpmError": "vpm.errors",
     "Campaign": "vpm.experiment",
     "Experiment": "vpm.experiment",

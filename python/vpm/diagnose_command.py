@@ -61,7 +61,7 @@ def diagnose(
 
     Ctrl-C ends the search and reports what is known until then.
     """
-    from vpm.discrepancy import diagnose as find_missing
+    from vpm.diagnosing import diagnose as find_missing
     from vpm.report import print_story, write_report
     from vpm.simulate import Setup
 

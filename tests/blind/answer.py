@@ -175,7 +175,9 @@ def ranking(why: Diagnosis) -> tuple[Named, ...]:
     order = [(e.name, e.site) for e in why.effects]
     others = [c for c in why.candidates if not c.accepted]
     tried = sorted((c for c in others if np.isfinite(c.unseen)), key=lambda c: (c.round, -c.unseen))
-    screened = sorted((c for c in others if not np.isfinite(c.unseen)), key=lambda c: (c.round, -c.screened))
+    screened = sorted(
+        (c for c in others if not np.isfinite(c.unseen)), key=lambda c: (c.round, -np.nan_to_num(c.screened))
+    )
     order += [(c.name, c.site) for c in (*tried, *screened)]
     return tuple(Named(*pair) for pair in dict.fromkeys(order))
 

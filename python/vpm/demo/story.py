@@ -12,7 +12,8 @@ from vpm.catalogue import EFFECTS
 from vpm.compare import compare
 from vpm.demo.files import FOLDER, MODEL, TRAIN, TRUTH, VALIDATION
 from vpm.demo.hidden import HIDDEN, LISTED, REFUSED
-from vpm.discrepancy import Diagnosis, diagnose
+from vpm.diagnosing import diagnose
+from vpm.discrepancy import Diagnosis
 from vpm.errors import DiagnosisError, near_match
 from vpm.experiment import Experiment
 from vpm.model import Model

@@ -1,6 +1,5 @@
 """Discrepancy: where simulation and data disagree, and the name of what is missing."""
 
-from vpm.discrepancy.diagnose import diagnose
 from vpm.discrepancy.diagnosis import (
     AcceptedEffect,
     Ambiguity,
@@ -29,5 +28,4 @@ __all__ = [
     "RankedCandidate",
     "RefusedEffect",
     "Step",
-    "diagnose",
 ]

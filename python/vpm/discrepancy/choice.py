@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vpm.catalogue import EFFECTS
+from vpm.catalogue.kinds import Side
 from vpm.discrepancy.candidates import Candidate, Key
 from vpm.discrepancy.confirmation import Data, Trial
 from vpm.discrepancy.driven import ODDS, Runs, compare_driven
@@ -31,15 +32,31 @@ REFINED = 0.5
 
 @dataclass(frozen=True)
 class Accepted:
-    """An effect that came in, the trial that let it in, and those that would have done as well."""
+    """An effect that came in, the trial that let it in, and those that would have done as well.
+
+    Where a ranking named it, with its evidence in nats, its probability and its side of a joint that is split.
+    """
 
     trial: Trial
     rivals: tuple[str, ...]
+    evidence: float = float("nan")
+    probability: float = float("nan")
+    side: Side = "motor"
 
     @property
     def key(self) -> Key:
         """Effect and site."""
         return self.trial.probe.candidate.key
+
+    @property
+    def label(self) -> str:
+        """``effect at site``."""
+        return self.trial.probe.candidate.label
+
+    @property
+    def ranked(self) -> bool:
+        """Whether a ranking named it."""
+        return bool(np.isfinite(self.evidence))
 
 
 def choose(believed: Sequence[Trial], data: Data) -> Accepted:

@@ -29,7 +29,7 @@ from vpm.identify import (
     segments,
 )
 from vpm.identify.along import bends
-from vpm.identify.estimation import MOST_EVALUATIONS
+from vpm.identify.estimation import MOST_EVALUATIONS, standing
 from vpm.identify.identifiability import COPY_SHARE, closest_column, explained_share, is_alias
 from vpm.identify.tangent import Tangent, drives_on_tangent, estimate_on_tangent, has_tangent
 from vpm.model import Model
@@ -179,6 +179,20 @@ def judge(
     return Judged(fitted, free, fit, unseen, simulated, bounds)
 
 
+def unmoved(
+    model: Model, free: tuple[str, ...], data: Data, bounds: dict[str, tuple[float, float]]
+) -> tuple[Judged, str]:
+    """A model as it stands, with the uncertainty of ``free``, and why it cannot simulate the unseen records, or ""."""
+    fit = standing(model, data.training, free)
+    unseen, _ = data.unseen.evaluate(model, model.theta)
+    simulated, stopped = None, ""
+    try:
+        simulated = None if data.simulation is None else data.simulation.evaluate(model, model.theta)[0]
+    except DivergedError as error:
+        stopped = str(error)
+    return Judged(model, free, fit, unseen, simulated, bounds), stopped
+
+
 def confirm(current: Judged, data: Data, probe: Probe, rival: float = np.inf) -> Trial:
     """Refit with the candidate, release what has become visible, and measure the gain on unseen data.
 
@@ -201,17 +215,17 @@ def confirm(current: Judged, data: Data, probe: Probe, rival: float = np.inf) ->
         origin = start.theta if moved else origin
     cost = float(current.fit.residual @ current.fit.residual)
     worth = Worth(min((1.0 - SLOW_GAIN) * cost, HOPELESS * rival), SLOW_EVALUATIONS)
-    judged, diverged = _judged(start, free, data, bounds, origin, worth)
+    judged, diverged = judged_anyhow(start, free, data, bounds, origin, worth)
     doubtful = probe.held
     if seen := _seen_by_now(judged, data, probe):
         free, doubtful = (*free, *seen), tuple(alias for alias in doubtful if alias.parameter not in seen)
         origin = None if origin is None else judged.model.theta
-        judged, diverged = _judged(judged.model, free, data, bounds, origin, worth)
+        judged, diverged = judged_anyhow(judged.model, free, data, bounds, origin, worth)
     own = free[len(current.free) :]
     timed, alone = _timed(current, judged, data, probe)
     if timed is not None:
-        judged, diverged = _judged(judged.model, free, data, {**bounds, **timed.bounds}, origin)
-    trial = _trial(current, data, probe, judged, own, (*doubtful, *held), timed, diverged)
+        judged, diverged = judged_anyhow(judged.model, free, data, {**bounds, **timed.bounds}, origin)
+    trial = measured(current, data, probe, judged, own, (*doubtful, *held), timed, diverged)
     return _witnessed(trial, current, alone, data)
 
 
@@ -220,11 +234,11 @@ def finished(current: Judged, data: Data, trial: Trial) -> Trial:
     if not trial.judged.fit.early:
         return trial
     known = trial.judged
-    judged, diverged = _judged(known.model, known.free, data, dict(known.bounds))
-    return _trial(current, data, trial.probe, judged, trial.parameters, trial.held, None, diverged)
+    judged, diverged = judged_anyhow(known.model, known.free, data, dict(known.bounds))
+    return measured(current, data, trial.probe, judged, trial.parameters, trial.held, None, diverged)
 
 
-def _trial(
+def measured(
     current: Judged,
     data: Data,
     probe: Probe,
@@ -252,7 +266,7 @@ def _trial(
     )
 
 
-def _judged(
+def judged_anyhow(
     start: Model,
     free: tuple[str, ...],
     data: Data,

@@ -54,6 +54,10 @@ class AcceptedEffect(Storable):
         That gain in standard deviations between independent blocks.
     notes : tuple of str
         What was held, and what it cannot be told from.
+    probability : float
+        That this is what was missing beside the effects before it; NaN where no ranking named it.
+    evidence_nats : float
+        What it added to the evidence of the records; NaN where no ranking named it.
     """
 
     name: str
@@ -63,6 +67,8 @@ class AcceptedEffect(Storable):
     gain: float
     score: float
     notes: tuple[str, ...]
+    probability: float = float("nan")
+    evidence_nats: float = float("nan")
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -84,10 +90,12 @@ class RankedCandidate(Storable):
     round : int
         Round of the search, from 1.
     screened : float
-        Share of the training mean square that its regressor would take away.
+        Share of the training mean square that its regressor would take away; NaN in a ranking.
     unseen : float
         Share of the unseen mean square that it took away after refitting; NaN if it was not refitted.
     accepted : bool
+    evidence_nats, probability : float
+        What it added to the evidence, and that it is what is missing; NaN if no ranking tried it.
     """
 
     name: str
@@ -96,6 +104,8 @@ class RankedCandidate(Storable):
     screened: float
     unseen: float
     accepted: bool
+    evidence_nats: float = float("nan")
+    probability: float = float("nan")
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -286,7 +296,8 @@ class Diagnosis(Result):
     summary : str
         The verdict in a sentence or two.
     effects : tuple of AcceptedEffect
-        By what each adds to the prediction of unseen data given all the others, the most first.
+        By what each adds to the prediction of unseen data given all the others, the most first; in the order in which
+        they were found where a ranking named them.
     gap : dict of str to ChannelGap
         On unseen data.
     refused : tuple of RefusedEffect
@@ -315,6 +326,8 @@ class Diagnosis(Result):
         What is said of a residual that no effect explains.
     experiments : tuple of ProposedExperiment
         For each pair of effects that the data cannot tell apart, the experiment that would.
+    classes : tuple of tuple of str
+        Each accepted effect that has rivals, with these, as ``effect at site``: the records do not tell them apart.
     """
 
     verdict: str
@@ -337,6 +350,7 @@ class Diagnosis(Result):
     evidence: tuple[Evidence, ...] = ()
     empirical: Empirical | None = None
     experiments: tuple[ProposedExperiment, ...] = ()
+    classes: tuple[tuple[str, ...], ...] = ()
 
     def to_dict(self) -> dict[str, object]:
         """Content of ``report.json``: plain numbers and text, SI; what is not known is null."""
@@ -350,6 +364,8 @@ class Diagnosis(Result):
                 },
                 "gain": e.gain,
                 "score": e.score,
+                "probability": e.probability,
+                "evidence_nats": e.evidence_nats,
                 "notes": list(e.notes),
             }
             for e in self.effects
@@ -368,6 +384,7 @@ class Diagnosis(Result):
                 {"name": a.name, "site": a.site, "with": list(a.others), "reason": a.reason}
                 for a in self.ambiguous_with
             ],
+            "classes": [list(members) for members in self.classes],
             "where": {channel: list(sentences) for channel, sentences in self.where.items()},
             "steps": [_fields(step) for step in self.steps],
             "notes": list(self.notes),

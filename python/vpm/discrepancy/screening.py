@@ -207,7 +207,7 @@ def _probe_start(
     place = free_place(data, model, candidate, added, fresh)
     if place is not None:
         fresh[:, place.where] = place.column
-    keep, held, invisible = _sort_columns(
+    keep, held, invisible = sort_columns(
         added, fresh, known, base.free, residual, _sizes(model, candidate, base.free, added)
     )
     if place is not None and place.where in keep and place.size not in keep:
@@ -281,7 +281,7 @@ def _added(model: Model, candidate: Candidate) -> tuple[str, ...]:
     return ()
 
 
-def _sort_columns(
+def sort_columns(
     added: Sequence[str],
     fresh: Array,
     known: Array,
@@ -291,7 +291,8 @@ def _sort_columns(
 ) -> tuple[list[int], tuple[Alias, ...], tuple[str, ...]]:
     """Split the new columns into those the data see, those they confuse with others, and those without influence.
 
-    ``sizes`` are those of known and fresh parameters, without which SI units would decide what is small.
+    The first come by their places, the others by name. ``sizes`` are those of known and fresh parameters, without which
+    SI units would decide what is small.
     """
     lengths = np.linalg.norm(fresh, axis=0) * sizes[1]
     largest = float(np.max([*(np.linalg.norm(known, axis=0) * sizes[0]), *lengths], initial=0.0))

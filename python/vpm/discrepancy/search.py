@@ -160,6 +160,7 @@ def ambiguities(accepted: Sequence[Accepted]) -> tuple[Ambiguity, ...]:
         candidate = entry.trial.probe.candidate
         if entry.rivals:
             reason = "they predict the unseen data equally well"
+            reason = "the records do not tell them apart" if entry.ranked else reason
             found.append(Ambiguity(candidate.effect.name, candidate.site, entry.rivals, reason))
         for alias in entry.trial.held:
             reason = f"{alias.parameter} was held at its start: these data show it only together with {alias.partner}"

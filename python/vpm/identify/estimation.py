@@ -123,6 +123,15 @@ def estimate(
     )
 
 
+def standing(model: Model, data: AnyProblem | Problem, free: Sequence[str]) -> Estimate:
+    """What is said of ``free`` parameters where they stand: residual, derivatives and uncertainty, nothing moved."""
+    columns = [model.index(name) for name in free]
+    residual, jacobian = data.evaluate(model, model.theta, columns)
+    unseen = unseen_combinations(jacobian, free)
+    covariance = _covariance(data, residual, jacobian, unseen, free)
+    return Estimate(tuple(free), model.theta[columns], residual, jacobian, covariance, unseen, (), 1)
+
+
 @dataclass(frozen=True)
 class Worth:
     """What a fit has to reach to be worth its time.

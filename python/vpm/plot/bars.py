@@ -150,12 +150,12 @@ def plot_candidates(candidates: Sequence[CandidateLike]) -> Figure:
 
     first = min((c.round for c in candidates), default=1)
     chosen = [c for c in candidates if c.round == first or c.accepted]
-    chosen.sort(key=lambda c: (not c.accepted, c.round if c.accepted else 0, -c.screened))
+    chosen.sort(key=lambda c: (not c.accepted, c.round if c.accepted else 0, -np.nan_to_num(c.screened)))
     chosen = chosen[:MOST_CANDIDATES]
     figure, axes = panels(1, height=0.5 + 0.36 * max(1, len(chosen)))
     axis = axes[0][0]
     for row, each in enumerate(chosen):
-        axis.barh(row + 0.17, 100.0 * each.screened, height=0.3, color=LINE)
+        axis.barh(row + 0.17, 100.0 * np.nan_to_num(each.screened), height=0.3, color=LINE)
         axis.barh(row - 0.17, 100.0 * np.nan_to_num(each.unseen), height=0.3, color=GREEN if each.accepted else ORANGE)
         if not np.isfinite(each.unseen):
             axis.annotate(

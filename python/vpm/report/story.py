@@ -48,6 +48,8 @@ def _effects(d: Diagnosis) -> list[str]:
             f"  {number}. {effect.name} at {effect.site}: took {100 * effect.gain:.1f} % of the unseen mean square "
             f"({effect.score:.1f} standard deviations)"
         )
+        if not isnan(effect.evidence_nats):
+            lines.append(f"       evidence {effect.evidence_nats:.4g} nats, probability {effect.probability:.2f}")
         lines += [f"       {p.dotted} = {p.value:.5g} {_spread(p.std)}{p.unit}" for p in effect.parameters]
         lines += [f"       {note}" for note in effect.notes]
     return lines

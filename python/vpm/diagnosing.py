@@ -1,4 +1,4 @@
-"""Find what a model is missing: recalibrate, look, try the catalogue, and say what the data support."""
+"""Find what a model is missing: recalibrate, look, rank or search the catalogue, and say what the data support."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,8 @@ from vpm.catalogue import EFFECTS
 from vpm.compare import compare
 from vpm.discrepancy.ambiguity import Rivals, listed, rivals
 from vpm.discrepancy.beliefs import moved_far
+from vpm.discrepancy.by_ranking import notes as notes_of
+from vpm.discrepancy.by_ranking import searched, why_not_ranked
 from vpm.discrepancy.candidates import slow_speeds
 from vpm.discrepancy.choice import Accepted
 from vpm.discrepancy.confirmation import Data, Judged, is_clear, judge
@@ -43,12 +45,13 @@ from vpm.discrepancy.telling_apart import experiments as experiments_for
 from vpm.discrepancy.timing import in_time
 from vpm.discrepancy.told_apart import told_apart
 from vpm.discrepancy.verdict import is_negligible, verdict
-from vpm.errors import DiagnosisError, DivergedError, near_match
+from vpm.errors import DiagnosisError, DivergedError, VpmError, near_match
 from vpm.experiment import Experiment
 from vpm.identify import InverseDynamicsProblem, OutputErrorProblem, gaps
 from vpm.identify.fit import fit_of
 from vpm.identify.parallel import worker_count
 from vpm.model import Model
+from vpm.ranking import Settings, rank
 from vpm.simulate import Run, Setup, judging_mode
 
 Array = NDArray[np.float64]
@@ -57,6 +60,11 @@ Array = NDArray[np.float64]
 HELD_OUT = 0.3
 #: What an interrupted diagnosis says of itself.
 STOPPED = "stopped by Ctrl-C before every candidate was tried: this is what was known until then"
+#: Said of what would do in the place of an effect.
+ALIKE = "predicts the unseen data as well"
+#: Which way the names came.
+RANKED = "names come from a ranking by evidence in the training records"
+SEARCHED = "names come from a search on balances of effort, for {reason}"
 STOPPED_LATE = "stopped by Ctrl-C before what is left, and what else would do, was examined"
 #: Stated uncertainties, on a logarithmic scale, that a recalibration may move what the model is not linear in.
 REACH = 4.0
@@ -161,14 +169,7 @@ def _diagnosis(
     recalibrated = judge(model, (*free, *transitions), data, bounds)
     data.training.workers = 1  # candidates share the cores from here on
     notes.extend(moved_far(model, recalibrated))
-    found = search(recalibrated, data, effects, limit, say, each)
-    if found.interrupted:
-        notes.append(STOPPED)
-    say("looking for what else would do in the place of each effect")
-    nothing: tuple[Rivals, ...] = ()
-    (found, ambiguous), late = _until_stopped(
-        partial(_settled, found, data, effects, limit, say, each), (found, nothing)
-    )
+    found, ambiguous, late = _named(model, recalibrated, data, effects, setup, limit, say, each, notes)
     say("measuring the noise floor")
     floor = noise_floor(found.final.model, data.unseen, found.final.unseen, mode, setup)
     gap = _gaps(data, nominal, recalibrated, found.final, floor)
@@ -212,10 +213,82 @@ def _diagnosis(
         _pictures(data, nominal, recalibrated, final),
         time.perf_counter() - began,
         found.interrupted or stopped or late,
-        gather(found.final.model, [entry.key for entry in accepted], data.unseen, floor),
+        gather(found.final.model, [entry.key for entry in accepted if entry.side == "motor"], data.unseen, floor),
         empirical,
         experiments_for(found.final, ambiguous, data.training, noise),
+        _classes(accepted, ambiguous),
     )
+
+
+def _named(
+    model: Model,
+    recalibrated: Judged,
+    data: Data,
+    effects: Sequence[str] | None,
+    setup: Setup | None,
+    limit: int,
+    tell: Tell,
+    each: SideBySide,
+    notes: list[str],
+) -> tuple[Search, tuple[Rivals, ...], bool]:
+    """What is missing, what else would do, and whether Ctrl-C kept that from being examined.
+
+    A ranking names what is missing in every machine that it covers, see `why_not_ranked`; a search does in the others.
+    """
+    reason = why_not_ranked(recalibrated.model, data.training.experiments)
+    if not reason and not recalibrated.fit.interrupted:
+        ranked = _ranked(model, recalibrated, data, effects, setup, limit, tell, each, notes)
+        if not isinstance(ranked, str):
+            return *ranked, False
+        reason = ranked
+    notes.append(SEARCHED.format(reason=reason))
+    found = search(recalibrated, data, effects, limit, tell, each)
+    if found.interrupted:
+        notes.append(STOPPED)
+    tell("looking for what else would do in the place of each effect")
+    nothing: tuple[Rivals, ...] = ()
+    (found, ambiguous), late = _until_stopped(
+        partial(_settled, found, data, effects, limit, tell, each), (found, nothing)
+    )
+    return found, ambiguous, late
+
+
+def _ranked(
+    model: Model,
+    recalibrated: Judged,
+    data: Data,
+    effects: Sequence[str] | None,
+    setup: Setup | None,
+    limit: int,
+    tell: Tell,
+    each: SideBySide,
+    notes: list[str],
+) -> tuple[Search, tuple[Rivals, ...]] | str:
+    """What a ranking of the training records found, and what else would do; or why there is no ranking, in words."""
+    tell("ranking what could be missing")
+    only: dict[str, Any] = {} if effects is None else {"effects": effects}
+    try:
+        ranking = rank(
+            model,
+            data.training.experiments,
+            settings=Settings(effects=limit),
+            setup=setup,
+            workers=each.workers,
+            tell=tell,
+            progress=each.progress,
+            **only,
+        )
+    except KeyboardInterrupt:
+        notes.extend([RANKED, STOPPED])
+        return Search((Stage("recalibrated", "", "", recalibrated),), (), (), (), interrupted=True), ()
+    except (VpmError, ArithmeticError) as error:
+        return f"a ranking fails: {error}"
+    tell("measuring what was named on unseen records")
+    found, ambiguous = searched(ranking, recalibrated, data)
+    notes.extend([RANKED, *notes_of(ranking, found.accepted)])
+    if found.interrupted:
+        notes.append(STOPPED)
+    return found, ambiguous
 
 
 def _settled(
@@ -377,7 +450,7 @@ def _signal(problem: InverseDynamicsProblem | OutputErrorProblem, channel: str) 
 
 def _accepted_effect(entry: Accepted, final: Judged) -> AcceptedEffect:
     candidate = entry.trial.probe.candidate
-    effect = final.model.effect(*candidate.key)
+    effect = final.model.effect(*candidate.key, entry.side)
     estimates = []
     for short, dotted in effect.parameter_names.items():
         parameter = final.model.parameters[dotted]
@@ -387,7 +460,7 @@ def _accepted_effect(entry: Accepted, final: Judged) -> AcceptedEffect:
     notes = [f"{alias.parameter} held: not told from {alias.partner}" for alias in entry.trial.held]
     if entry.trial.alone:
         notes.append("told by runs of the model itself in closed loop; a balance of effort hardly shows it")
-    elif not is_clear(final, tuple(e.dotted for e in estimates if e.std > 0.0)):
+    elif not entry.ranked and not is_clear(final, tuple(e.dotted for e in estimates if e.std > 0.0)):
         notes.append("beside the effects that came later, its interval covers zero: one of them may be enough")
     return AcceptedEffect(
         candidate.effect.name,
@@ -396,8 +469,21 @@ def _accepted_effect(entry: Accepted, final: Judged) -> AcceptedEffect:
         tuple(estimates),
         entry.trial.unseen.relative,
         entry.trial.unseen.score,
-        (*notes, *(f"predicts the unseen data as well: {rival}" for rival in entry.rivals)),
+        (*notes, *(f"{'not told from it' if entry.ranked else ALIKE}: {rival}" for rival in entry.rivals)),
+        entry.probability,
+        entry.evidence,
     )
+
+
+def _classes(accepted: Sequence[Accepted], ambiguous: Sequence[Rivals]) -> tuple[tuple[str, ...], ...]:
+    """Each accepted effect with all that would do in its place, where something would."""
+    beside = {(rivals.effect, rivals.site): rivals.trials for rivals in ambiguous}
+    found = []
+    for entry in accepted:
+        others = (*entry.rivals, *(trial.probe.candidate.label for trial in beside.get(entry.key, ())))
+        if others:
+            found.append(tuple(dict.fromkeys((entry.label, *others))))
+    return tuple(found)
 
 
 def _step(data: Data, stage: Stage) -> Step:

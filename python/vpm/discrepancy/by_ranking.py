@@ -1,0 +1,324 @@
+"""Names from a ranking, as a diagnosis goes on with them: refitted on balances of effort, measured on unseen records.
+
+A ranking says what is missing and in which order. Nothing here takes a name away or adds one, but for a machine whose
+efforts cannot be balanced with it. The values that are reported are those of a balance wherever it shows them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from vpm.catalogue import EFFECTS
+from vpm.discrepancy.ambiguity import Rivals
+from vpm.discrepancy.candidates import Candidate, Key, candidates
+from vpm.discrepancy.choice import Accepted
+from vpm.discrepancy.confirmation import Data, Judged, Trial, judged_anyhow, measured, unmoved
+from vpm.discrepancy.diagnosis import RankedCandidate, RefusedEffect
+from vpm.discrepancy.elimination import Stage
+from vpm.discrepancy.refusal import LEAST_GAIN, NORMAL_95_ONE_SIDED
+from vpm.discrepancy.screening import Probe, sort_columns
+from vpm.discrepancy.search import Search
+from vpm.errors import VpmError
+from vpm.experiment import Experiment
+from vpm.identify import gain, segments
+from vpm.identify.along import SAMPLED_TYPES, bends
+from vpm.model import Effect, Model
+
+if TYPE_CHECKING:
+    from vpm.ranking import Ranked, Ranking
+
+#: Part of the name of a parameter that acts behind a joint that is split.
+BEHIND = ".link."
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settings:
+    """Numbers that decide how a diagnosis takes a ranking over.
+
+    Attributes
+    ----------
+    joints : int
+        Most joints of a machine that a ranking covers, beside those that effects split off.
+    worse : float
+        Share of the mean square of a simulation that a refit may add to that of the values of the ranking.
+    sure : float
+        Standard deviations by which it has to be worse to count as worse.
+    """
+
+    joints: int = 2
+    worse: float = LEAST_GAIN
+    sure: float = NORMAL_95_ONE_SIDED
+
+
+SETTINGS = Settings()
+
+
+def why_not_ranked(model: Model, experiments: Sequence[Experiment]) -> str:
+    """Why names do not come from a ranking, or "": it covers one or two joints, rigid links, and drives without oil.
+
+    Drives may not go by samples of their own either. A ranking does not read a deflection that a log holds.
+    """
+    if bends(model):
+        return "links bend"
+    for name in model.actuators:
+        if (kind := model.actuator_type(name)) in {"hydraulic", *SAMPLED_TYPES}:
+            return f"the actuator {name} has type {kind}"
+    own = set(model.joints) - set(model.added_joints)
+    if len(own) > SETTINGS.joints:
+        return f"there are {len(own)} joints, more than {SETTINGS.joints}"
+    held = [channel for channel in model.deflections if any(channel in record for record in experiments)]
+    return f"records hold {held[0]}" if held else ""
+
+
+def searched(ranking: Ranking, recalibrated: Judged, data: Data) -> tuple[Search, tuple[Rivals, ...]]:
+    """What a ranking found as a search, and the models in which a rival does the work of an effect.
+
+    Parameters
+    ----------
+    ranking : Ranking
+        Of the training records.
+    recalibrated : Judged
+        The model without effects.
+    data : Data
+
+    Ctrl-C gives the effects that were refitted until then.
+    """
+    stages, accepted = [Stage("recalibrated", "", "", recalibrated)], list[Accepted]()
+    outside: dict[Key, str] = {}
+    known: tuple[Rivals, ...] = ()
+    interrupted = False
+    try:
+        for place, one in enumerate(ranking.effects):
+            gone = [other for other in ranking.effects if other.key in outside] + list(ranking.effects[place + 1 :])
+            try:
+                trial = _beside(stages[-1].judged, _without(ranking.model, gone), one, data)
+            except VpmError as error:
+                outside[one.key] = f"it adds {one.evidence:.1f} nats, but no balance of effort can be computed: {error}"
+                continue
+            accepted.append(Accepted(trial, one.rivals, one.evidence, one.probability, one.side))
+            stages.append(Stage("added", *one.key, trial.judged))
+        known = _rivals(ranking, stages[-1].judged, accepted, data)
+    except KeyboardInterrupt:
+        interrupted = True
+    gains = {entry.key: entry.trial.unseen.relative for entry in accepted}
+    found = Search(tuple(stages), tuple(accepted), _refused(ranking, outside), _candidates(ranking, gains), interrupted)
+    return found, known
+
+
+def _without(model: Model, gone: Sequence[Ranked]) -> Model:
+    """A model without some of its effects, the last ones first: others may rest on the earlier ones."""
+    for one in reversed(gone):
+        model = model.without_effect(*one.key, one.side)
+    return model
+
+
+def _beside(current: Judged, model: Model, one: Ranked, data: Data) -> Trial:
+    """An effect in a model at the values of a ranking, refitted as far as a balance of effort shows them.
+
+    A parameter moves if the balance tells it from all others at these values, and stays where it is if not. The refit
+    counts if the training records are left no more and the unseen ones are simulated no worse than by those values.
+
+    Raises
+    ------
+    VpmError
+        Efforts cannot be balanced in this model.
+    """
+    candidate = _candidate(current, one, data)
+    own = _own(model, one)
+    known = tuple(_renamed(current.model, model).get(name, name) for name in current.free)
+    known = tuple(name for name in known if name in model.parameters)
+    residual, columns = data.training.evaluate(model, model.theta, [model.index(name) for name in (*known, *own)])
+    split = len(known)
+    sizes = np.array([abs(model.parameters[name].value) or 1.0 for name in (*known, *own)])
+    keep, held, blind = sort_columns(
+        own, columns[:, split:], columns[:, :split], known, residual, (sizes[:split], sizes[split:])
+    )
+    moving = tuple(own[place] for place in keep)
+    values = {name: model.parameters[name].value for name in own}
+    probe = Probe(candidate, model, moving, held, blind, values, dict.fromkeys(own, np.nan), np.nan)
+    free = (*known, *moving)
+    judged, diverged = _refitted(current, model, candidate, one, free, data)
+    return measured(current, data, probe, judged, moving, held, None, diverged)
+
+
+def _refitted(
+    current: Judged, model: Model, candidate: Candidate, one: Ranked, free: tuple[str, ...], data: Data
+) -> tuple[Judged, str]:
+    """The refit, or the values of the ranking where that predicts worse; with what stopped its simulation, if any."""
+    bounds = _bounds(current, model, candidate, one)
+    still, stopped = unmoved(model, free, data, bounds)
+    judged, diverged = judged_anyhow(model, free, data, bounds)
+    if judged.simulated is None and still.simulated is not None:
+        return still, stopped
+    if _power(judged) > _power(still):
+        return still, stopped
+    if data.simulation is not None and judged.simulated is not None and still.simulated is not None:
+        told = gain(still.simulated, judged.simulated, segments(data.simulation))
+        if told.relative < -SETTINGS.worse and told.harm > SETTINGS.sure:
+            return still, stopped
+    return judged, diverged
+
+
+def _candidate(current: Judged, one: Ranked, data: Data) -> Candidate:
+    """The effect as a search would try it, with the bounds that data give its shape; none where it would not."""
+    listed = candidates(current.model, data.training, current.fit.residual, [one.effect], simulated=True)
+    plain = Candidate(EFFECTS[one.effect], one.site, ({},))
+    return next((each for each in listed if each.key == one.key), plain)
+
+
+def _own(model: Model, one: Ranked) -> tuple[str, ...]:
+    """Parameters of an effect that the ranking fitted, by their names in this model."""
+    fitted = {_anywhere(name) for name in one.values}
+    names = model.effect(*one.key, one.side).parameter_names.values()
+    return tuple(name for name in names if _anywhere(name) in fitted)
+
+
+def _anywhere(name: str) -> str:
+    """A dotted name on either side of a joint."""
+    return name.replace(BEHIND, ".")
+
+
+def _renamed(old: Model, new: Model) -> dict[str, str]:
+    """New names of the parameters of effects that are on the other side of their joint in another model."""
+    names: dict[str, str] = {}
+    there: dict[Key, list[Effect]] = {}
+    for effect in new.effects:
+        there.setdefault((effect.name, effect.at), []).append(effect)
+    for effect in old.effects:
+        places = there.get((effect.name, effect.at), [])
+        same = next((one for one in places if one.side == effect.side), next(iter(places), None))
+        if same is not None:
+            names.update({dotted: same.parameter_names[short] for short, dotted in effect.parameter_names.items()})
+    return names
+
+
+def _bounds(current: Judged, model: Model, candidate: Candidate, one: Ranked) -> dict[str, tuple[float, float]]:
+    """Bounds of shapes that the data give, wide enough for the values of the ranking."""
+    renamed = _renamed(current.model, model)
+    given = {renamed.get(name, name): pair for name, pair in current.bounds.items()}
+    names = model.effect(*one.key, one.side).parameter_names
+    given.update({names[short]: pair for short, pair in candidate.bounds.items() if short in names})
+    found = {}
+    for name, (low, high) in given.items():
+        if name in model.parameters:
+            value = model.parameters[name].value
+            found[name] = min(low, value), max(high, value)
+    return found
+
+
+def _power(judged: Judged) -> float:
+    return float(judged.fit.residual @ judged.fit.residual)
+
+
+# ---- what else would do ----------------------------------------------------------------------------------------------
+
+
+def _rivals(ranking: Ranking, final: Judged, accepted: Sequence[Accepted], data: Data) -> tuple[Rivals, ...]:
+    """Each effect that has rivals, with the models in which these do its work."""
+    found = []
+    for entry in accepted:
+        trials = []
+        for label in entry.rivals:
+            try:
+                trials.append(_placed(_tried(ranking, entry.key, label), final, entry, data))
+            except (VpmError, StopIteration):
+                continue  # it is said, but there is no balance to plan an experiment by
+        if trials:
+            found.append(Rivals(*entry.key, tuple(trials)))
+    return tuple(found)
+
+
+def _tried(ranking: Ranking, key: Key, label: str) -> Ranked:
+    """A rival as it was tried in the round in which an effect came in."""
+    several = next(listed for listed in ranking.rounds if listed and listed[0].key == key)
+    return next(one for one in several if f"{one.effect} at {one.site}" == label)
+
+
+def _placed(rival: Ranked, final: Judged, entry: Accepted, data: Data) -> Trial:
+    """A rival in the place of an effect, beside all others.
+
+    Raises
+    ------
+    VpmError
+        It cannot stand there.
+    """
+    model = final.model.without_effect(*entry.key, entry.side)
+    free = tuple(name for name in final.free if name in model.parameters)
+    bounds = {name: pair for name, pair in final.bounds.items() if name in free}
+    without, _ = judged_anyhow(model, free, replace(data, simulation=None), bounds)
+    model = without.model.with_effect(*rival.key, side=rival.side)
+    names = {_anywhere(name): name for name in model.effect(*rival.key, rival.side).parameter_names.values()}
+    values = {names[_anywhere(name)]: value for name, value in rival.values.items() if _anywhere(name) in names}
+    return _beside(without, model.with_parameters(values), rival, data)
+
+
+# ---- what was tried --------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Last:
+    """An effect as it was tried for the last time: what it added, and what came in then, if anything did."""
+
+    one: Ranked
+    winner: Ranked | None
+    came_in: bool
+
+
+def _refused(ranking: Ranking, outside: Mapping[Key, str]) -> tuple[RefusedEffect, ...]:
+    """Effects that did not come in, or went out again, with the reason; the most hopeful of the last round first."""
+    last: dict[Key, _Last] = {}
+    for number, several in enumerate(ranking.rounds):
+        for one in several:
+            winner = several[0] if _accepts(ranking, number) else None
+            last[one.key] = _Last(one, winner, winner is one)
+    kept = {one.key for one in ranking.effects}
+    refused = [RefusedEffect(*key, reason) for key, reason in outside.items()]
+    for key, told in last.items():
+        if key not in kept:
+            refused.append(RefusedEffect(*key, _reason(told)))
+    return tuple(refused)
+
+
+def _accepts(ranking: Ranking, number: int) -> bool:
+    """Whether the first effect of a round came in: only the last round, after which nothing more is said, has none."""
+    return number + 1 < len(ranking.rounds) or math.isnan(ranking.complete)
+
+
+def _reason(told: _Last) -> str:
+    one, winner = told.one, told.winner
+    if told.came_in:
+        return "it is not needed any more beside what came in after it"
+    if one.evidence < one.needed:
+        return f"it adds {one.evidence:.1f} nats of {one.needed:.1f} that are needed"
+    if winner is None:
+        return f"it adds {one.evidence:.1f} nats, but other parameters do as much when it is walked back to nothing"
+    return (
+        f"it adds {one.evidence:.1f} nats where {winner.effect} at {winner.site} adds {winner.evidence:.1f}, "
+        "and was not tried again beside that"
+    )
+
+
+def _candidates(ranking: Ranking, gains: Mapping[Key, float]) -> tuple[RankedCandidate, ...]:
+    """All that was tried, round by round, the most probable first."""
+    found = []
+    for number, several in enumerate(ranking.rounds):
+        for place, one in enumerate(several):
+            accepted = place == 0 and _accepts(ranking, number) and one.key in gains
+            unseen = gains[one.key] if accepted else np.nan
+            found.append(RankedCandidate(*one.key, number + 1, np.nan, unseen, accepted, one.evidence, one.probability))
+    return tuple(found)
+
+
+def notes(ranking: Ranking, accepted: Sequence[Accepted]) -> list[str]:
+    """What else a ranking says: how probable it is that nothing else is missing, and what it alone knows."""
+    said = []
+    if np.isfinite(ranking.complete):
+        said.append(f"probability that nothing else of the catalogue is missing: {ranking.complete:.2f}")
+    blind = [", ".join(entry.trial.probe.invisible) for entry in accepted if entry.trial.probe.invisible]
+    said.extend(f"{names}: as the ranking fitted it, for a balance of effort does not show it" for names in blind)
+    return said

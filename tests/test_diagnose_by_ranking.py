@@ -1,0 +1,146 @@
+"""A diagnosis that takes its names from a ranking: which machines, what is refitted, what is said of the others."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import vpm
+from blind import make_case
+from synthetic import Truth, nominal, simulate_axis
+from vpm import diagnosing
+from vpm.diagnosing import diagnose
+from vpm.discrepancy import by_ranking
+from vpm.discrepancy.by_ranking import why_not_ranked
+from vpm.errors import VpmError
+from vpm.experiment import Experiment
+from vpm.model import Model
+from vpm.ranking import Ranked, Ranking
+from vpm.ranking import Settings as Asked
+
+EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
+
+COULOMB = {"axis.friction.coulomb": 8.8, "axis.friction.transition_velocity": 1e-3}
+BIAS = {"axis.bias.force": 4.5}
+
+
+def ranking(*effects: Ranked, model: Model | None = None, others: tuple[Ranked, ...] = ()) -> Ranking:
+    """What a ranking says that found these, one in each round, and the ``others`` in all of them in vain."""
+    whole = nominal() if model is None else model
+    for one in effects if model is None else ():
+        whole = whole.with_effect(one.effect, one.site).with_parameters(one.values)
+    rounds = (*((one, *others) for one in effects), others)
+    return Ranking(effects, rounds, whole, 1.0, 0.0, 0.9)
+
+
+def two() -> Ranking:
+    """Dry friction, which has a rival, and a constant force."""
+    rival = Ranked("spring", "axis", 3.0, {"axis.spring.stiffness": 1.0}, needed=16.0)
+    first = Ranked("coulomb_friction", "axis", 900.0, COULOMB, 16.0, 0.99, ("spring at axis",))
+    return ranking(first, Ranked("bias_force", "axis", 80.0, BIAS, 16.0, 0.95), others=(rival,))
+
+
+@pytest.fixture(scope="module")
+def records() -> list[Experiment]:
+    return list(simulate_axis(Truth(coulomb=9.0, bias=5.0), 2, 12.0, first_seed=7))
+
+
+@pytest.fixture
+def named(monkeypatch: pytest.MonkeyPatch, records: list[Experiment]) -> vpm.Diagnosis:
+    monkeypatch.setattr(diagnosing, "rank", lambda *_, **__: two())
+    return diagnose(nominal(), records[0], records[1], workers=1)
+
+
+def test_names_and_their_order_are_those_of_the_ranking(named: vpm.Diagnosis) -> None:
+    assert named.verdict == "effect_found"
+    assert [(e.name, e.evidence_nats, e.probability) for e in named.effects] == [
+        ("coulomb_friction", 900.0, 0.99),
+        ("bias_force", 80.0, 0.95),
+    ]
+    assert [step.effect for step in named.steps] == ["", "coulomb_friction", "bias_force"]
+    assert all(e.gain > 0.1 and e.score > 2.0 for e in named.effects)
+    assert any(note.startswith("names come from a ranking") for note in named.notes)
+
+
+def test_values_are_those_of_the_balance(named: vpm.Diagnosis) -> None:
+    assert named.model.parameters["axis.friction.coulomb"].value == pytest.approx(9.0, rel=0.02)
+    assert named.model.parameters["axis.bias.force"].value == pytest.approx(5.0, rel=0.02)
+    assert named.effects[0].parameters[0].std > 0.0
+
+
+def test_what_was_tried_in_vain_is_refused_with_its_numbers(named: vpm.Diagnosis) -> None:
+    (refused,) = named.refused
+    assert (refused.name, refused.reason) == ("spring", "it adds 3.0 nats of 16.0 that are needed")
+    assert [(c.name, c.round, c.accepted) for c in named.candidates if c.accepted] == [
+        ("coulomb_friction", 1, True),
+        ("bias_force", 2, True),
+    ]
+
+
+def test_what_is_not_told_apart_is_one_class(named: vpm.Diagnosis, tmp_path: Path) -> None:
+    assert named.classes == (("coulomb_friction at axis", "spring at axis"),)
+    (told,) = [a for a in named.ambiguous_with if "spring at axis" in a.others]
+    assert told.reason == "the records do not tell them apart"
+    assert [e.rival for e in named.experiments] == ["spring at axis"]
+    report = json.loads(named.save_json(tmp_path / "report.json").read_text(encoding="utf-8"))
+    assert report["classes"] == [["coulomb_friction at axis", "spring at axis"]]
+    assert [e["evidence_nats"] for e in report["effects"]] == [900.0, 80.0]
+    assert [e["probability"] for e in report["effects"]] == [0.99, 0.95]
+
+
+def test_a_ranking_sees_the_training_records_alone(monkeypatch: pytest.MonkeyPatch, records: list[Experiment]) -> None:
+    seen: list[list[str]] = []
+
+    def asked(_: Model, given: list[Experiment], *none: object, settings: Asked, **__: object) -> Ranking:
+        assert not none
+        assert settings.effects == 3
+        seen.append([record.name for record in given])
+        return ranking()
+
+    monkeypatch.setattr(diagnosing, "rank", asked)
+    diagnose(nominal(), records[0], records[1], limit=3, workers=1)
+    assert seen == [[records[0].name]]
+
+
+def test_ctrl_c_in_the_ranking_gives_what_is_known(monkeypatch: pytest.MonkeyPatch, records: list[Experiment]) -> None:
+    def stopped(*_: object, **__: object) -> Ranking:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(diagnosing, "rank", stopped)
+    why = diagnose(nominal(), records[0], records[1], workers=1)
+    assert why.interrupted
+    assert why.effects == ()
+    assert any(note.startswith("stopped by Ctrl-C") for note in why.notes)
+
+
+def test_where_a_ranking_fails_a_search_names(monkeypatch: pytest.MonkeyPatch, records: list[Experiment]) -> None:
+    def failed(_: Model, __: list[Experiment], **___: object) -> Ranking:
+        raise VpmError("the axis runs away from the records")
+
+    monkeypatch.setattr(diagnosing, "rank", failed)
+    # Without a restriction to effects, which a ranking is told of in its own words.
+    why = diagnose(nominal(), records[0], records[1], limit=1, workers=1)
+    assert [e.name for e in why.effects] == ["coulomb_friction"]
+    assert np.isnan(why.effects[0].evidence_nats)
+    (note,) = [note for note in why.notes if note.startswith("names come from a search")]
+    assert "runs away" in note
+
+
+def test_machines_that_a_ranking_does_not_cover_say_why() -> None:
+    assert why_not_ranked(nominal(), ()) == ""
+    servo, arm = (make_case(name, "bias_force", 1, recalibrate=False).model() for name in ("servo_cylinder", "arm2r"))
+    assert "type hydraulic" in why_not_ranked(servo, ())
+    assert why_not_ranked(arm, ()) == ""
+
+
+def test_a_refit_that_simulates_worse_is_not_kept(monkeypatch: pytest.MonkeyPatch, records: list[Experiment]) -> None:
+    monkeypatch.setattr(diagnosing, "rank", lambda *_, **__: two())
+    never = replace(by_ranking.SETTINGS, worse=-np.inf, sure=-np.inf)
+    monkeypatch.setattr(by_ranking, "SETTINGS", never)
+    why = diagnose(nominal(), records[0], records[1], workers=1)
+    assert why.model.parameters["axis.friction.coulomb"].value == pytest.approx(8.8)
+    assert why.effects[0].parameters[0].std > 0.0
