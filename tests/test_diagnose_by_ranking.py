@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -34,14 +35,20 @@ def ranking(*effects: Ranked, model: Model | None = None, others: tuple[Ranked, 
     for one in effects if model is None else ():
         whole = whole.with_effect(one.effect, one.site).with_parameters(one.values)
     rounds = (*((one, *others) for one in effects), others)
-    return Ranking(effects, rounds, whole, 1.0, 0.0, 0.9)
+    return Ranking(effects, rounds, whole, whole)
+
+
+def tried(effect: str, values: dict[str, float], least: float, **more: Any) -> Ranked:
+    """An effect that removes so much, clearly."""
+    return Ranked(effect, "axis", values, least, least, 9.0, 0.1, 1.0, 1.0, **more)
 
 
 def two() -> Ranking:
     """Dry friction, which has a rival, and a constant force."""
-    rival = Ranked("spring", "axis", 3.0, {"axis.spring.stiffness": 1.0}, needed=16.0)
-    first = Ranked("coulomb_friction", "axis", 900.0, COULOMB, 16.0, 0.99, ("spring at axis",))
-    return ranking(first, Ranked("bias_force", "axis", 80.0, BIAS, 16.0, 0.95), others=(rival,))
+    rival = tried("spring", {"axis.spring.stiffness": 1.0}, 0.03)
+    first = tried("coulomb_friction", COULOMB, 0.9, evidence=900.0, probability=0.99, rivals=("spring at axis",))
+    second = tried("bias_force", BIAS, 0.8, evidence=80.0, probability=0.95)
+    return ranking(first, second, others=(rival,))
 
 
 @pytest.fixture(scope="module")
@@ -74,11 +81,26 @@ def test_values_are_those_of_the_balance(named: vpm.Diagnosis) -> None:
 
 def test_what_was_tried_in_vain_is_refused_with_its_numbers(named: vpm.Diagnosis) -> None:
     (refused,) = named.refused
-    assert (refused.name, refused.reason) == ("spring", "it adds 3.0 nats of 16.0 that are needed")
+    assert (refused.name, refused.reason) == ("spring", "it removes 3 % of the error power; 6 % are needed")
     assert [(c.name, c.round, c.accepted) for c in named.candidates if c.accepted] == [
         ("coulomb_friction", 1, True),
         ("bias_force", 2, True),
     ]
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "said"),
+    [
+        ("score", 2.0, "2 standard deviations, 3 are needed"),
+        ("size", 0.001, "0.1 % of what all effects of the model do"),
+        ("shape", 0.01, "1 % of what effects over the same states do at axis"),
+        ("least", 0.5, "its shape ends where the records do"),
+    ],
+)
+def test_each_reason_is_one_sentence(name: str, value: float, said: str) -> None:
+    one = tried("spring", {}, 0.5)
+    object.__setattr__(one, name, value)
+    assert said in by_ranking._reason(by_ranking._Last(one, None, came_in=False), Asked())
 
 
 def test_what_is_not_told_apart_is_one_class(named: vpm.Diagnosis, tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,7 +63,7 @@ STOPPED = "stopped by Ctrl-C before every candidate was tried: this is what was 
 #: Said of what would do in the place of an effect.
 ALIKE = "predicts the unseen data as well"
 #: Which way the names came.
-RANKED = "names come from a ranking by evidence in the training records"
+RANKED = "names come from a ranking of the training records"
 SEARCHED = "names come from a search on balances of effort, for {reason}"
 STOPPED_LATE = "stopped by Ctrl-C before what is left, and what else would do, was examined"
 #: Stated uncertainties, on a logarithmic scale, that a recalibration may move what the model is not linear in.
@@ -266,17 +266,17 @@ def _ranked(
 ) -> tuple[Search, tuple[Rivals, ...]] | str:
     """What a ranking of the training records found, and what else would do; or why there is no ranking, in words."""
     tell("ranking what could be missing")
-    only: dict[str, Any] = {} if effects is None else {"effects": effects}
+    settings = Settings(effects=limit)
     try:
         ranking = rank(
             model,
             data.training.experiments,
-            settings=Settings(effects=limit),
+            effects=effects,
+            settings=settings,
             setup=setup,
             workers=each.workers,
             tell=tell,
             progress=each.progress,
-            **only,
         )
     except KeyboardInterrupt:
         notes.extend([RANKED, STOPPED])
@@ -284,8 +284,10 @@ def _ranked(
     except (VpmError, ArithmeticError) as error:
         return f"a ranking fails: {error}"
     tell("measuring what was named on unseen records")
-    found, ambiguous = searched(ranking, recalibrated, data)
-    notes.extend([RANKED, *notes_of(ranking, found.accepted)])
+    found, ambiguous = searched(ranking, recalibrated, data, settings)
+    notes.extend([RANKED, *notes_of(found.accepted)])
+    if ranking.interrupted:
+        found = replace(found, interrupted=True)
     if found.interrupted:
         notes.append(STOPPED)
     return found, ambiguous

@@ -31,6 +31,7 @@ from vpm.model import Effect, Model
 
 if TYPE_CHECKING:
     from vpm.ranking import Ranked, Ranking
+    from vpm.ranking import Settings as RankingSettings
 
 #: Part of the name of a parameter that acts behind a joint that is split.
 BEHIND = ".link."
@@ -75,7 +76,9 @@ def why_not_ranked(model: Model, experiments: Sequence[Experiment]) -> str:
     return f"records hold {held[0]}" if held else ""
 
 
-def searched(ranking: Ranking, recalibrated: Judged, data: Data) -> tuple[Search, tuple[Rivals, ...]]:
+def searched(
+    ranking: Ranking, recalibrated: Judged, data: Data, settings: RankingSettings
+) -> tuple[Search, tuple[Rivals, ...]]:
     """What a ranking found as a search, and the models in which a rival does the work of an effect.
 
     Parameters
@@ -85,6 +88,8 @@ def searched(ranking: Ranking, recalibrated: Judged, data: Data) -> tuple[Search
     recalibrated : Judged
         The model without effects.
     data : Data
+    settings : vpm.ranking.Settings
+        Of the ranking.
 
     Ctrl-C gives the effects that were refitted until then.
     """
@@ -98,7 +103,7 @@ def searched(ranking: Ranking, recalibrated: Judged, data: Data) -> tuple[Search
             try:
                 trial = _beside(stages[-1].judged, _without(ranking.model, gone), one, data)
             except VpmError as error:
-                outside[one.key] = f"it adds {one.evidence:.1f} nats, but no balance of effort can be computed: {error}"
+                outside[one.key] = f"it {_removes(one)}, but no balance of effort can be computed: {error}"
                 continue
             accepted.append(Accepted(trial, one.rivals, one.evidence, one.probability, one.side))
             stages.append(Stage("added", *one.key, trial.judged))
@@ -106,7 +111,9 @@ def searched(ranking: Ranking, recalibrated: Judged, data: Data) -> tuple[Search
     except KeyboardInterrupt:
         interrupted = True
     gains = {entry.key: entry.trial.unseen.relative for entry in accepted}
-    found = Search(tuple(stages), tuple(accepted), _refused(ranking, outside), _candidates(ranking, gains), interrupted)
+    found = Search(
+        tuple(stages), tuple(accepted), _refused(ranking, outside, settings), _candidates(ranking, gains), interrupted
+    )
     return found, known
 
 
@@ -269,36 +276,52 @@ class _Last:
     came_in: bool
 
 
-def _refused(ranking: Ranking, outside: Mapping[Key, str]) -> tuple[RefusedEffect, ...]:
+def _refused(ranking: Ranking, outside: Mapping[Key, str], settings: RankingSettings) -> tuple[RefusedEffect, ...]:
     """Effects that did not come in, or went out again, with the reason; the most hopeful of the last round first."""
     last: dict[Key, _Last] = {}
-    for number, several in enumerate(ranking.rounds):
+    for several in ranking.rounds:
         for one in several:
-            winner = several[0] if _accepts(ranking, number) else None
+            winner = several[0] if _accepts(several) else None
             last[one.key] = _Last(one, winner, winner is one)
     kept = {one.key for one in ranking.effects}
     refused = [RefusedEffect(*key, reason) for key, reason in outside.items()]
     for key, told in last.items():
         if key not in kept:
-            refused.append(RefusedEffect(*key, _reason(told)))
+            refused.append(RefusedEffect(*key, _reason(told, settings)))
     return tuple(refused)
 
 
-def _accepts(ranking: Ranking, number: int) -> bool:
-    """Whether the first effect of a round came in: only the last round, after which nothing more is said, has none."""
-    return number + 1 < len(ranking.rounds) or math.isnan(ranking.complete)
+def _accepts(several: Sequence[Ranked]) -> bool:
+    """Whether the first effect of a round came in: evidence is told of effects that count, and of no others."""
+    return bool(several) and not math.isnan(several[0].evidence)
 
 
-def _reason(told: _Last) -> str:
+def _removes(one: Ranked) -> str:
+    return f"removes {100.0 * one.least:.3g} % of the error power"
+
+
+def _reason(told: _Last, settings: RankingSettings) -> str:
     one, winner = told.one, told.winner
     if told.came_in:
         return "it is not needed any more beside what came in after it"
-    if one.evidence < one.needed:
-        return f"it adds {one.evidence:.1f} nats of {one.needed:.1f} that are needed"
+    if one.least <= settings.worth:
+        return f"it {_removes(one)}; {100.0 * settings.worth:g} % are needed"
+    if one.score <= settings.score:
+        return (
+            f"it {_removes(one)}, but not from piece after piece: {one.score:.2g} standard deviations, "
+            f"{settings.score:g} are needed"
+        )
+    if one.size <= settings.slight:
+        return f"it does {100.0 * one.size:.2g} % of what all effects of the model do, and no law is as exact as that"
+    if one.shape <= settings.inexact:
+        return (
+            f"it does {100.0 * one.shape:.2g} % of what effects over the same states do at {one.site}, "
+            "and no law is as exact as that"
+        )
     if winner is None:
-        return f"it adds {one.evidence:.1f} nats, but other parameters do as much when it is walked back to nothing"
+        return f"it {_removes(one)}, but its shape ends where the records do"
     return (
-        f"it adds {one.evidence:.1f} nats where {winner.effect} at {winner.site} adds {winner.evidence:.1f}, "
+        f"it {_removes(one)} where {winner.effect} at {winner.site} {_removes(winner)}, "
         "and was not tried again beside that"
     )
 
@@ -308,17 +331,15 @@ def _candidates(ranking: Ranking, gains: Mapping[Key, float]) -> tuple[RankedCan
     found = []
     for number, several in enumerate(ranking.rounds):
         for place, one in enumerate(several):
-            accepted = place == 0 and _accepts(ranking, number) and one.key in gains
+            accepted = place == 0 and _accepts(several) and one.key in gains
             unseen = gains[one.key] if accepted else np.nan
-            found.append(RankedCandidate(*one.key, number + 1, np.nan, unseen, accepted, one.evidence, one.probability))
+            found.append(
+                RankedCandidate(*one.key, number + 1, one.removed, unseen, accepted, one.evidence, one.probability)
+            )
     return tuple(found)
 
 
-def notes(ranking: Ranking, accepted: Sequence[Accepted]) -> list[str]:
-    """What else a ranking says: how probable it is that nothing else is missing, and what it alone knows."""
-    said = []
-    if np.isfinite(ranking.complete):
-        said.append(f"probability that nothing else of the catalogue is missing: {ranking.complete:.2f}")
+def notes(accepted: Sequence[Accepted]) -> list[str]:
+    """Parameters that the ranking alone knows."""
     blind = [", ".join(entry.trial.probe.invisible) for entry in accepted if entry.trial.probe.invisible]
-    said.extend(f"{names}: as the ranking fitted it, for a balance of effort does not show it" for names in blind)
-    return said
+    return [f"{names}: as the ranking fitted it, for a balance of effort does not show it" for names in blind]

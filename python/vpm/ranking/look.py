@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.catalogue import EFFECTS
+from vpm.identify.reuse import SPLITTING
 from vpm.model import Effect
 from vpm.ranking.fit import ASTRAY, Fitted, Fitter, Followed, View, bounded_step
 from vpm.ranking.noise_model import white_noise
@@ -65,13 +66,17 @@ class Look:
         return Judgement(removed, min(shares), _repeated(self.left[1], left[1], settings.pieces), size, shape)
 
     def _curve(self, fitted: Fitted) -> float:
-        """What those effects of the model remove that show over the same states at the same place as the last one."""
+        """What those effects of the model remove that show over the same states at the same place as the last one.
+
+        All that acts at a joint reaches a spring or play that splits it.
+        """
         if not fitted.structure.effects:
             return 0.0
         name, site = fitted.structure.effects[-1]
         states = set(EFFECTS[name].signature.lives_in)
         present = self.fitted.structure.model.effects
-        alike = [one for one in present if one.at == site and states & set(one.type.signature.lives_in)]
+        there = [one for one in present if one.at == site]
+        alike = [one for one in there if name in SPLITTING or states & set(one.type.signature.lives_in)]
         key = tuple(f"{one.name} {one.side}" for one in alike)
         if (site, *key) not in self._curves:
             self._curves[site, *key] = self._removed(alike)

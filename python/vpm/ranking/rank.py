@@ -293,6 +293,7 @@ class _Search:
             told.least,
             told.score,
             told.size,
+            told.shape,
             band,
             side,
             trial.evidence,

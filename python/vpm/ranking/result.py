@@ -27,6 +27,8 @@ class Ranked(Storable):
         How surely it removes that from pieces of the held-back stretches, in standard deviations.
     size : float
         Its amplitude as a share of that of all effects of the model.
+    shape : float
+        The same of those that show over the same states at the same place.
     band : float
     side : {"motor", "link"}
         Of a joint that is split.
@@ -45,6 +47,7 @@ class Ranked(Storable):
     least: float
     score: float
     size: float
+    shape: float
     band: float
     side: Side = "motor"
     evidence: float = float("nan")
@@ -111,5 +114,5 @@ class Ranking(Result):
 
     def _frame_columns(self) -> Mapping[str, object]:
         tried = [(number + 1, one) for number, several in enumerate(self.rounds) for one in several]
-        names = ("effect", "site", "removed", "least", "score", "size", "band", "evidence", "probability")
+        names = ("effect", "site", "removed", "least", "score", "size", "shape", "band", "evidence", "probability")
         return {"round": [number for number, _ in tried], **{n: [getattr(one, n) for _, one in tried] for n in names}}
