@@ -284,7 +284,7 @@ def _ranked(
     except (VpmError, ArithmeticError) as error:
         return f"a ranking fails: {error}"
     tell("measuring what was named on unseen records")
-    found, ambiguous = searched(ranking, recalibrated, data)
+    found, ambiguous = searched(ranking, recalibrated, data, effects)
     notes.extend([RANKED, *notes_of(ranking, found.accepted)])
     if found.interrupted:
         notes.append(STOPPED)

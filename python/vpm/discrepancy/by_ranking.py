@@ -75,7 +75,9 @@ def why_not_ranked(model: Model, experiments: Sequence[Experiment]) -> str:
     return f"records hold {held[0]}" if held else ""
 
 
-def searched(ranking: Ranking, recalibrated: Judged, data: Data) -> tuple[Search, tuple[Rivals, ...]]:
+def searched(
+    ranking: Ranking, recalibrated: Judged, data: Data, effects: Sequence[str] | None = None
+) -> tuple[Search, tuple[Rivals, ...]]:
     """What a ranking found as a search, and the models in which a rival does the work of an effect.
 
     Parameters
@@ -85,13 +87,15 @@ def searched(ranking: Ranking, recalibrated: Judged, data: Data) -> tuple[Search
     recalibrated : Judged
         The model without effects.
     data : Data
+    effects : sequence of str, optional
+        Names to which the catalogue was restricted.
 
     Ctrl-C gives the effects that were refitted until then.
     """
     stages, accepted = [Stage("recalibrated", "", "", recalibrated)], list[Accepted]()
     outside: dict[Key, str] = {}
     known: tuple[Rivals, ...] = ()
-    interrupted = False
+    interrupted = bool(getattr(ranking, "interrupted", False))  # a ranking may say that Ctrl-C ended it
     try:
         for place, one in enumerate(ranking.effects):
             gone = [other for other in ranking.effects if other.key in outside] + list(ranking.effects[place + 1 :])
@@ -106,8 +110,9 @@ def searched(ranking: Ranking, recalibrated: Judged, data: Data) -> tuple[Search
     except KeyboardInterrupt:
         interrupted = True
     gains = {entry.key: entry.trial.unseen.relative for entry in accepted}
-    found = Search(tuple(stages), tuple(accepted), _refused(ranking, outside), _candidates(ranking, gains), interrupted)
-    return found, known
+    outside |= _unpromising(ranking, stages[-1].judged, data, effects)
+    refused, tried = _refused(ranking, outside), _candidates(ranking, gains)
+    return Search(tuple(stages), tuple(accepted), refused, tried, interrupted), known
 
 
 def _without(model: Model, gone: Sequence[Ranked]) -> Model:
@@ -269,19 +274,25 @@ class _Last:
     came_in: bool
 
 
-def _refused(ranking: Ranking, outside: Mapping[Key, str]) -> tuple[RefusedEffect, ...]:
-    """Effects that did not come in, or went out again, with the reason; the most hopeful of the last round first."""
+def _refused(ranking: Ranking, outside: dict[Key, str]) -> tuple[RefusedEffect, ...]:
+    """Effects that did not come in, or went out again, with the reason; those that were fitted first."""
     last: dict[Key, _Last] = {}
     for number, several in enumerate(ranking.rounds):
         for one in several:
             winner = several[0] if _accepts(ranking, number) else None
             last[one.key] = _Last(one, winner, winner is one)
     kept = {one.key for one in ranking.effects}
-    refused = [RefusedEffect(*key, reason) for key, reason in outside.items()]
-    for key, told in last.items():
-        if key not in kept:
-            refused.append(RefusedEffect(*key, _reason(told)))
-    return tuple(refused)
+    reasons = {key: _reason(told) for key, told in last.items() if key not in kept} | outside
+    return tuple(RefusedEffect(*key, reason) for key, reason in reasons.items())
+
+
+def _unpromising(ranking: Ranking, final: Judged, data: Data, effects: Sequence[str] | None) -> dict[Key, str]:
+    """Effects that could be there and that no round of a ranking fitted, with the reason."""
+    names = tuple(EFFECTS) if effects is None else effects
+    offered = candidates(final.model, data.training, final.fit.residual, names, simulated=True)
+    tried = {one.key for several in ranking.rounds for one in several}
+    reason = "the first step of a fit promised less evidence than others did, or too little for a fit"
+    return {candidate.key: reason for candidate in offered if candidate.key not in tried}
 
 
 def _accepts(ranking: Ranking, number: int) -> bool:
