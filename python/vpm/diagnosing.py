@@ -284,7 +284,7 @@ def _ranked(
     except (VpmError, ArithmeticError) as error:
         return f"a ranking fails: {error}"
     tell("measuring what was named on unseen records")
-    found, ambiguous = searched(ranking, recalibrated, data, settings)
+    found, ambiguous = searched(ranking, recalibrated, data, settings, effects)
     notes.extend([RANKED, *notes_of(found.accepted)])
     if ranking.interrupted:
         found = replace(found, interrupted=True)

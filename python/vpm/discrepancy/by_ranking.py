@@ -77,7 +77,11 @@ def why_not_ranked(model: Model, experiments: Sequence[Experiment]) -> str:
 
 
 def searched(
-    ranking: Ranking, recalibrated: Judged, data: Data, settings: RankingSettings
+    ranking: Ranking,
+    recalibrated: Judged,
+    data: Data,
+    settings: RankingSettings,
+    effects: Sequence[str] | None = None,
 ) -> tuple[Search, tuple[Rivals, ...]]:
     """What a ranking found as a search, and the models in which a rival does the work of an effect.
 
@@ -96,7 +100,7 @@ def searched(
     stages, accepted = [Stage("recalibrated", "", "", recalibrated)], list[Accepted]()
     outside: dict[Key, str] = {}
     known: tuple[Rivals, ...] = ()
-    interrupted = False
+    interrupted = bool(getattr(ranking, "interrupted", False))  # a ranking may say that Ctrl-C ended it
     try:
         for place, one in enumerate(ranking.effects):
             gone = [other for other in ranking.effects if other.key in outside] + list(ranking.effects[place + 1 :])
@@ -111,10 +115,9 @@ def searched(
     except KeyboardInterrupt:
         interrupted = True
     gains = {entry.key: entry.trial.unseen.relative for entry in accepted}
-    found = Search(
-        tuple(stages), tuple(accepted), _refused(ranking, outside, settings), _candidates(ranking, gains), interrupted
-    )
-    return found, known
+    outside |= _unpromising(ranking, stages[-1].judged, data, effects)
+    refused, tried = _refused(ranking, outside, settings), _candidates(ranking, gains)
+    return Search(tuple(stages), tuple(accepted), refused, tried, interrupted), known
 
 
 def _without(model: Model, gone: Sequence[Ranked]) -> Model:
@@ -284,11 +287,17 @@ def _refused(ranking: Ranking, outside: Mapping[Key, str], settings: RankingSett
             winner = several[0] if _accepts(several) else None
             last[one.key] = _Last(one, winner, winner is one)
     kept = {one.key for one in ranking.effects}
-    refused = [RefusedEffect(*key, reason) for key, reason in outside.items()]
-    for key, told in last.items():
-        if key not in kept:
-            refused.append(RefusedEffect(*key, _reason(told, settings)))
-    return tuple(refused)
+    reasons = {**{key: _reason(told, settings) for key, told in last.items() if key not in kept}, **outside}
+    return tuple(RefusedEffect(*key, reason) for key, reason in reasons.items())
+
+
+def _unpromising(ranking: Ranking, final: Judged, data: Data, effects: Sequence[str] | None) -> dict[Key, str]:
+    """Effects that could be there and that no round of a ranking fitted, with the reason."""
+    names = tuple(EFFECTS) if effects is None else effects
+    offered = candidates(final.model, data.training, final.fit.residual, names, simulated=True)
+    tried = {one.key for several in ranking.rounds for one in several}
+    reason = "the first step of a fit promised less evidence than others did, or too little for a fit"
+    return {candidate.key: reason for candidate in offered if candidate.key not in tried}
 
 
 def _accepts(several: Sequence[Ranked]) -> bool:
