@@ -40,7 +40,7 @@ def ranking(*effects: Ranked, model: Model | None = None, others: tuple[Ranked, 
 
 def tried(effect: str, values: dict[str, float], least: float, **more: Any) -> Ranked:
     """An effect that removes so much, clearly."""
-    return Ranked(effect, "axis", values, least, least, 9.0, 0.1, 1.0, 1.0, **more)
+    return Ranked(effect, "axis", values, least, least, 9.0, 0.1, 1.0, 1.0, 1.0, **more)
 
 
 def two() -> Ranking:
@@ -95,6 +95,7 @@ def test_what_was_tried_in_vain_is_refused_with_its_numbers(named: vpm.Diagnosis
     [
         ("score", 2.0, "2 standard deviations, 3 are needed"),
         ("size", 0.001, "0.1 % of what all effects of the model do"),
+        ("beside", 0.04, "4 % of what the effects that were found do"),
         ("shape", 0.01, "1 % of what effects over the same states do at axis"),
         ("least", 0.5, "its shape ends where the records do"),
     ],

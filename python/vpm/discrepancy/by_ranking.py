@@ -322,6 +322,11 @@ def _reason(told: _Last, settings: RankingSettings) -> str:
         )
     if one.size <= settings.slight:
         return f"it does {100.0 * one.size:.2g} % of what all effects of the model do, and no law is as exact as that"
+    if one.beside <= settings.second:
+        return (
+            f"it does {100.0 * one.beside:.2g} % of what the effects that were found do, "
+            f"and {100.0 * settings.second:g} % may be what their laws are wrong by"
+        )
     if one.shape <= settings.inexact:
         return (
             f"it does {100.0 * one.shape:.2g} % of what effects over the same states do at {one.site}, "

@@ -31,6 +31,8 @@ class Look:
         Channels in their root mean squares; derivatives are taken as known for effects that do nothing at first.
     explained : float
         Error power that all effects of the model remove, as a multiple of what is left.
+    added : float
+        The same of those that were added.
     """
 
     def __init__(self, fitted: Fitted, fitter: Fitter, first: Look | None = None) -> None:
@@ -43,8 +45,8 @@ class Look:
         self.fitted = replace(fitted, cost=cost)
         self.sizes = np.array(noise.deviations)
         self.left = observed.squares(fitted.residual, self.sizes)
-        found = self._removed(fitted.structure.model.effects)
-        self.explained = found if first is None else max(found, self._beside(first.fitted.residual))
+        self.added = 0.0 if first is None else self._beside(first.fitted.residual)
+        self.explained = max(self._removed(fitted.structure.model.effects), self.added)
         self._curves: dict[tuple[str, ...], float] = {}
 
     def predicted_gain(self, other: Followed) -> float:
@@ -62,8 +64,9 @@ class Look:
         left = observed.squares(fitted.residual, self.sizes)
         shares = [1.0 - float(after.sum() / before.sum()) for after, before in zip(left, self.left, strict=True)]
         removed = max(1.0 - self._sum(left) / self._sum(self.left), 1e-12)
-        size, shape = (float(np.sqrt(removed / (power + removed))) for power in (self.explained, self._curve(fitted)))
-        return Judgement(removed, min(shares), _repeated(self.left[1], left[1], settings.pieces), size, shape)
+        powers = (self.explained, self.added, self._curve(fitted))
+        sizes = (float(np.sqrt(removed / (power + removed))) for power in powers)
+        return Judgement(removed, min(shares), _repeated(self.left[1], left[1], settings.pieces), *sizes)
 
     def _curve(self, fitted: Fitted) -> float:
         """What those effects of the model remove that show over the same states at the same place as the last one.
@@ -114,6 +117,8 @@ class Judgement:
         How surely it is removed from pieces of the held-back stretches, in standard deviations.
     size : float
         Its amplitude as a share of that of all effects of the model.
+    beside : float
+        The same of those that were added before.
     shape : float
         The same of those that show over the same states at the same place: one curve with two shapes.
     """
@@ -122,12 +127,14 @@ class Judgement:
     least: float
     score: float
     size: float
+    beside: float
     shape: float
 
     def counts(self, settings: Settings) -> bool:
         """Whether that is more than chance, and more than what laws are wrong by."""
         sure = self.least > settings.worth and self.score > settings.score
-        return sure and self.size > settings.slight and self.shape > settings.inexact
+        large = self.size > settings.slight and self.beside > settings.second
+        return sure and large and self.shape > settings.inexact
 
 
 def _repeated(before: Array, after: Array, pieces: int) -> float:

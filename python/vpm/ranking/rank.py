@@ -293,6 +293,7 @@ class _Search:
             told.least,
             told.score,
             told.size,
+            told.beside,
             told.shape,
             band,
             side,

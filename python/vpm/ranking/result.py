@@ -27,6 +27,8 @@ class Ranked(Storable):
         How surely it removes that from pieces of the held-back stretches, in standard deviations.
     size : float
         Its amplitude as a share of that of all effects of the model.
+    beside : float
+        The same of those that were added before.
     shape : float
         The same of those that show over the same states at the same place.
     band : float
@@ -47,6 +49,7 @@ class Ranked(Storable):
     least: float
     score: float
     size: float
+    beside: float
     shape: float
     band: float
     side: Side = "motor"
@@ -114,5 +117,17 @@ class Ranking(Result):
 
     def _frame_columns(self) -> Mapping[str, object]:
         tried = [(number + 1, one) for number, several in enumerate(self.rounds) for one in several]
-        names = ("effect", "site", "removed", "least", "score", "size", "shape", "band", "evidence", "probability")
+        names = (
+            "effect",
+            "site",
+            "removed",
+            "least",
+            "score",
+            "size",
+            "beside",
+            "shape",
+            "band",
+            "evidence",
+            "probability",
+        )
         return {"round": [number for number, _ in tried], **{n: [getattr(one, n) for _, one in tried] for n in names}}

@@ -25,6 +25,8 @@ class Settings:
         shows over the same states at the same place has to do more than that, and a richer one has to do better by it.
     slight : float
         An effect that does less than this share of the amplitude of all effects of the model is none.
+    second : float
+        The same of the amplitude of effects that were added, of whose laws less is known.
     worth : float
         Share of the error power that another effect has to remove, of fitted and of held-back stretches.
     score : float
@@ -68,6 +70,7 @@ class Settings:
     pieces: int = 20
     inexact: float = 0.02
     slight: float = 0.003
+    second: float = 0.05
     worth: float = 0.06
     score: float = 3.0
     seats: int = 8
