@@ -32,14 +32,16 @@ pub trait Ode<S> {
         self.rhs(x, rates);
     }
 
-    /// Writes what the derivatives that are missing in the matrix of the last [`Ode::linearise`] or [`Ode::prepare`] make of the values of
-    /// `k`: their product, of value zero; tells whether any are missing.
+    /// Whether derivatives are missing in the matrix of the last [`Ode::linearise`] or [`Ode::prepare`].
+    fn turns(&self) -> bool {
+        false
+    }
+
+    /// Writes what the missing derivatives make of the values of `k`: their product, of value zero.
     ///
     /// Law: of `(1 - r A) k = b` the derivatives are `k' = (1 - r A)^-1 (b' + r A' k)`: they take the factors of the matrix of values, and
     /// of A' its product alone.
-    fn turned(&mut self, _k: &[S], _product: &mut [S]) -> bool {
-        false
-    }
+    fn turned(&mut self, _k: &[S], _product: &mut [S]) {}
 
     /// Writes what constant linear stiffness K and damping D add to the accelerations by coordinates and rates, `[-M^-1 K, -M^-1 D]`:
     /// with n coordinates, n rows of 2 n entries each; tells whether there is any. Without it nothing is written.
@@ -59,6 +61,13 @@ pub trait Ode<S> {
     /// The stages of a step come in their order; at the first, where there is no reach, the two states are the same.
     fn additive_rates(&mut self, explicit: &[S], _implicit: &[S], _reach: f64, rates: &mut [S]) -> bool {
         self.rhs(explicit, rates);
+        false
+    }
+
+    /// Moves `x` on by one linearly implicit `step` (s) as a whole; tells whether it did. What does not, leaves `x` as it is.
+    ///
+    /// Law: [`crate::integrator::LinearlyImplicit`].
+    fn linearly_implicit_step(&mut self, _x: &mut [S], _step: f64) -> bool {
         false
     }
 

@@ -17,6 +17,7 @@ mod routine;
 mod settle;
 mod slopes;
 mod stages;
+mod step;
 mod stiff;
 
 pub use connections::Connections;
@@ -35,7 +36,7 @@ pub(crate) use routine::{Routine, code_pays, code_pays_in_fits};
 use std::sync::Arc;
 
 use crate::actuator::hydraulic::Supply;
-use crate::actuator::{Actuator, Target};
+use crate::actuator::{Actuator, Drive, Target};
 use crate::contact::ContactFriction;
 use crate::data::Data;
 use crate::dynamics::articulated::articulated;
@@ -187,6 +188,12 @@ impl<S: Scalar> Dynamics<S> {
             let (law, q, v, u) = (effect.law(), seat.of(q), seat.of(v), self.efforts[seat.joint]);
             *resistance = law.resistance(q, v) + law.resistance_per_load(v, u) * u.abs();
         }
+    }
+
+    /// Whether the states have units of like size: no pressures, beside which rates are small, and no elastic coordinates.
+    fn is_well_scaled(&self) -> bool {
+        let hydraulic = |actuator: &Actuator<S>| matches!(actuator.drive, Drive::Hydraulic(_));
+        self.model.n_elastic() == 0 && self.supplies.is_empty() && !self.actuators.iter().any(hydraulic)
     }
 
     /// Whether beams are all that is stiff in it.

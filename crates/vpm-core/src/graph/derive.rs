@@ -12,6 +12,26 @@ pub struct Derivative {
     pub entries: Vec<Node>,
 }
 
+/// By what is differentiated.
+#[derive(Clone, Copy)]
+enum Variables<'a> {
+    /// Inputs, by their numbers.
+    Inputs(&'a [u32]),
+    /// Numbers of the graph, whatever they are made of; what is frozen moves with what it is.
+    Numbers(&'a [Node]),
+}
+
+impl Variables<'_> {
+    /// Which of them a number is.
+    fn place(self, node: Node, operation: Operation) -> Option<usize> {
+        match (self, operation) {
+            (Self::Inputs(inputs), Operation::Input(number)) => inputs.iter().position(|&input| input == number),
+            (Self::Inputs(_), _) => None,
+            (Self::Numbers(numbers), _) => numbers.iter().position(|&number| number == node),
+        }
+    }
+}
+
 /// Derivatives of one number: column and number, columns ascending.
 type Gradient = Vec<(u32, Node)>;
 
@@ -24,13 +44,22 @@ impl Graph {
         self.derive_within(outputs, inputs, usize::MAX).unwrap_or_default()
     }
 
+    /// As [`Graph::derive`], by numbers of the graph as if they were inputs; what is frozen moves with what it is.
+    pub fn derive_by(&mut self, outputs: &[Node], variables: &[Node]) -> Derivative {
+        self.derive_to(outputs, Variables::Numbers(variables), usize::MAX).unwrap_or_default()
+    }
+
     /// As [`Graph::derive`]; none as soon as the graph has more than `most` operations.
     pub fn derive_within(&mut self, outputs: &[Node], inputs: &[u32], most: usize) -> Option<Derivative> {
+        self.derive_to(outputs, Variables::Inputs(inputs), most)
+    }
+
+    fn derive_to(&mut self, outputs: &[Node], variables: Variables<'_>, most: usize) -> Option<Derivative> {
         let count = outputs.iter().max().map_or(0, |&most| most as usize + 1);
         let needed = self.needed(outputs, count);
         let mut gradients: Vec<Gradient> = Vec::with_capacity(count);
         for (node, needed) in (0..).zip(needed) {
-            let gradient = if needed { self.gradient(node, &gradients, inputs) } else { Gradient::new() };
+            let gradient = if needed { self.gradient(node, &gradients, variables) } else { Gradient::new() };
             gradients.push(gradient);
             if self.operations().len() > most {
                 return None;
@@ -59,15 +88,19 @@ impl Graph {
         needed
     }
 
-    fn gradient(&mut self, node: Node, known: &[Gradient], inputs: &[u32]) -> Gradient {
+    fn gradient(&mut self, node: Node, known: &[Gradient], variables: Variables<'_>) -> Gradient {
         let of = |argument: Node| known[argument as usize].as_slice();
-        match self.operations()[node as usize] {
+        let operation = self.operations()[node as usize];
+        if let Some(place) = variables.place(node, operation) {
+            return vec![(place as u32, self.constant(1.0))];
+        }
+        match operation {
+            Operation::Apply(Function::Frozen, a) if matches!(variables, Variables::Numbers(_)) => of(a).to_vec(),
             // What a search finds is a constant to what refines it.
-            Operation::Constant(_) | Operation::Apply(Function::Frozen, _) | Operation::Search(_) => Gradient::new(),
-            Operation::Input(number) => {
-                let place = inputs.iter().position(|&input| input == number);
-                place.map(|place| (place as u32, self.constant(1.0))).into_iter().collect()
-            }
+            Operation::Constant(_)
+            | Operation::Input(_)
+            | Operation::Apply(Function::Frozen, _)
+            | Operation::Search(_) => Gradient::new(),
             Operation::Add(a, b) => join(of(a), of(b), |da, db| match (da, db) {
                 (Some(da), Some(db)) => self.add(da, db),
                 (one, other) => one.or(other).unwrap_or_default(),

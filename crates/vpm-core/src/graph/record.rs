@@ -6,6 +6,7 @@ use std::iter::Sum;
 use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
 use std::panic::Location;
 
+use super::derive::Derivative;
 use super::known::Known;
 use super::operation::{Call, Function, Node, Operation};
 use super::program::Program;
@@ -295,6 +296,24 @@ pub fn record<R>(first_parameter: u32, work: impl FnOnce() -> R) -> (R, Graph) {
 /// Input `number` of the recording under way, at its reference `value`.
 pub fn input(number: usize, value: f64) -> Recorded {
     Recorded(on(|graph| graph.input(number as u32, value)))
+}
+
+/// The derivatives of `numbers` of the recording under way by the inputs at these places, those that are not zero: row (number), column
+/// (place among the inputs), and the derivative.
+pub fn derivatives(numbers: &[Recorded], by: &[u32]) -> Vec<((usize, usize), Recorded)> {
+    let nodes: Vec<Node> = numbers.iter().map(|number| number.0).collect();
+    entries_of(on(|graph| graph.derive(&nodes, by)))
+}
+
+/// The derivatives of `numbers` of the recording under way by `variables`, themselves numbers of it, as if they were inputs: likewise.
+/// Numbers that are frozen move with what they are.
+pub fn slopes(numbers: &[Recorded], variables: &[Recorded]) -> Vec<((usize, usize), Recorded)> {
+    let nodes = |numbers: &[Recorded]| numbers.iter().map(|number| number.0).collect::<Vec<_>>();
+    entries_of(on(|graph| graph.derive_by(&nodes(numbers), &nodes(variables))))
+}
+
+fn entries_of(derivative: Derivative) -> Vec<((usize, usize), Recorded)> {
+    derivative.places.into_iter().zip(derivative.entries.into_iter().map(Recorded)).collect()
 }
 
 fn on<R>(work: impl FnOnce(&mut Graph) -> R) -> R {

@@ -1,5 +1,8 @@
 //! A Rosenbrock method: implicit stability for two linear solves a step.
 
+use std::ops::Mul;
+
+use super::Length;
 use super::stage::Stage;
 use crate::ode::Ode;
 use crate::scalar::Scalar;
@@ -16,14 +19,14 @@ const GAMMA: f64 = 1.0 - std::f64::consts::FRAC_1_SQRT_2;
 /// SIAM J. Sci. Comput. 20(4), equation 3.3; theory in Hairer & Wanner 1996, "Solving Ordinary Differential Equations II",
 /// section IV.7. Checked: order 2; a stiff decay is damped at steps far beyond its time constant.
 #[derive(Clone, Debug)]
-pub struct LinearlyImplicit<S> {
-    left: Stage<S>,
+pub struct LinearlyImplicit<S, L = f64> {
+    left: Stage<S, L>,
     first: Vec<S>,
     second: Vec<S>,
     stage: Vec<S>,
 }
 
-impl<S: Scalar> LinearlyImplicit<S> {
+impl<S: Scalar + Mul<L, Output = S>, L: Length> LinearlyImplicit<S, L> {
     /// Buffers for systems of `dim` states.
     pub fn new(dim: usize) -> Self {
         let zero = vec![S::zero(); dim];
@@ -31,9 +34,9 @@ impl<S: Scalar> LinearlyImplicit<S> {
     }
 
     /// Moves `x` on by `step` (s).
-    pub fn step(&mut self, ode: &mut impl Ode<S>, x: &mut [S], step: f64) {
+    pub fn step(&mut self, ode: &mut impl Ode<S>, x: &mut [S], step: L) {
         ode.prepare(x, self.left.matrix(), &mut self.first);
-        self.left.factorise(ode.coordinates(), GAMMA * step);
+        self.left.factorise(ode.coordinates(), step * GAMMA);
         self.left.solve(ode, &mut self.first);
         for ((stage, &start), &rate) in self.stage.iter_mut().zip(&*x).zip(&self.first) {
             *stage = start + rate * step;
@@ -44,7 +47,13 @@ impl<S: Scalar> LinearlyImplicit<S> {
         }
         self.left.solve(ode, &mut self.second);
         for ((state, &first), &second) in x.iter_mut().zip(&self.first).zip(&self.second) {
-            *state += first * (1.5 * step) + second * (0.5 * step);
+            *state += first * (step * 1.5) + second * (step * 0.5);
         }
+    }
+
+    /// The largest factor of the elimination in the last step: where it is large in numbers that do not tell how they compare, so that
+    /// rows stay where they are, the step is not exact.
+    pub(crate) fn largest_factor(&self) -> S {
+        self.left.largest_factor()
     }
 }

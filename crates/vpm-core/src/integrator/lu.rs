@@ -83,6 +83,14 @@ impl<S: Scalar> Lu<S> {
         }
     }
 
+    /// The largest entry of L below its diagonal, by its size: at most one where rows were exchanged for the largest pivot.
+    pub(super) fn largest_factor(&self) -> S {
+        let columns = self.columns.chunks_exact(self.dim.max(1)).enumerate();
+        columns
+            .flat_map(|(column, entries)| &entries[column + 1..])
+            .fold(S::zero(), |largest, factor| largest.max(factor.abs()))
+    }
+
     /// In which order the factors take the rows of the matrix.
     pub(super) fn order(&self) -> &[usize] {
         &self.order

@@ -36,6 +36,7 @@ pub use rosenbrock::{RODAS4P2, Rosenbrock, Tableau};
 pub use semi_implicit::SemiImplicit;
 
 use std::fmt;
+use std::ops::{Mul, Neg};
 
 use crate::error::{Error, Result};
 use crate::ode::Ode;
@@ -45,6 +46,11 @@ use crate::scalar::Scalar;
 const PATIENCE: usize = 256;
 /// What `adaptive` alone stands for.
 const TOLERANCE: f64 = 1e-6;
+
+/// The length of a step, s: a number, or one that records what is done with it.
+pub trait Length: Copy + Default + Neg<Output = Self> + Mul<Output = Self> + Mul<f64, Output = Self> {}
+
+impl<L: Copy + Default + Neg<Output = Self> + Mul<Output = Self> + Mul<f64, Output = Self>> Length for L {}
 
 /// Asked now and then whether to stop.
 pub type Ask<'a> = &'a (dyn Fn() -> bool + Sync);
@@ -178,7 +184,11 @@ impl<S: Scalar> Integrator<S> {
         match &mut self.scheme {
             Scheme::SemiImplicit(method) => method.step(ode, x, step),
             Scheme::Rk4(method) => method.step(ode, x, step),
-            Scheme::LinearlyImplicit(method) => method.step(ode, x, step),
+            Scheme::LinearlyImplicit(method) => {
+                if !ode.linearly_implicit_step(x, step) {
+                    method.step(ode, x, step);
+                }
+            }
             Scheme::Rosenbrock(method) => method.step(ode, x, step),
             Scheme::Additive(method) => method.step(ode, x, step),
             Scheme::Adaptive(method) => {

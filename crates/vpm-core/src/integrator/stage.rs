@@ -1,5 +1,8 @@
 //! The linear system of an implicit stage.
 
+use std::ops::Mul;
+
+use super::Length;
 use super::lu::{Lu, take};
 use crate::ode::Ode;
 use crate::scalar::Scalar;
@@ -11,7 +14,7 @@ use crate::scalar::Scalar;
 /// costs the factors of m - n rows, an eighth of the work where there is nothing but coordinates and rates.
 /// Source: elimination by blocks, Golub & Van Loan 2013, "Matrix Computations", section 3.2.9. Checked: against the whole system.
 #[derive(Clone, Debug)]
-pub(super) struct Stage<S> {
+pub(super) struct Stage<S, L = f64> {
     /// A, row by row.
     matrix: Vec<S>,
     /// -r B, column by column, its rows in the order of the factors.
@@ -19,16 +22,27 @@ pub(super) struct Stage<S> {
     lu: Lu<S>,
     /// What derivatives missing in A make of a solution.
     missing: Vec<S>,
+    /// The derivatives of a right-hand side, where they are solved for apart.
+    derivatives: Vec<S>,
     coordinates: usize,
     dim: usize,
-    reach: f64,
+    reach: L,
 }
 
-impl<S: Scalar> Stage<S> {
+impl<S: Scalar + Mul<L, Output = S>, L: Length> Stage<S, L> {
     /// Buffers for systems of `dim` states.
     pub(super) fn new(dim: usize) -> Self {
-        let (matrix, coupling) = (vec![S::zero(); dim * dim], vec![S::zero(); dim * dim]);
-        Self { matrix, coupling, lu: Lu::new(dim), missing: vec![S::zero(); dim], coordinates: 0, dim, reach: 0.0 }
+        let (square, line) = (vec![S::zero(); dim * dim], vec![S::zero(); dim]);
+        Self {
+            matrix: square.clone(),
+            coupling: square,
+            lu: Lu::new(dim),
+            missing: line.clone(),
+            derivatives: line,
+            coordinates: 0,
+            dim,
+            reach: L::default(),
+        }
     }
 
     /// Where A has to be written, row by row, before it is factorised; it stays there.
@@ -37,7 +51,7 @@ impl<S: Scalar> Stage<S> {
     }
 
     /// Prepares `1 - reach A`, where that many coordinates lead the state.
-    pub(super) fn factorise(&mut self, coordinates: usize, reach: f64) {
+    pub(super) fn factorise(&mut self, coordinates: usize, reach: L) {
         (self.coordinates, self.reach) = (coordinates, reach);
         let left = self.dim - coordinates;
         if self.lu.dim() != left {
@@ -73,16 +87,30 @@ impl<S: Scalar> Stage<S> {
         }
     }
 
+    /// The largest factor of the elimination, see [`Lu::largest_factor`].
+    pub(super) fn largest_factor(&self) -> S {
+        self.lu.largest_factor()
+    }
+
     /// Replaces `b` by the solution x of `(1 - reach A) x = b`, A the last matrix of that system.
     pub(super) fn solve(&mut self, ode: &mut impl Ode<S>, b: &mut [S]) {
-        for_size!(self.lu.dim(), N => self.solve_of::<N>(b));
-        if ode.turned(b, &mut self.missing) {
-            let mut missing = std::mem::take(&mut self.missing);
-            missing.iter_mut().for_each(|entry| *entry = *entry * self.reach);
-            for_size!(self.lu.dim(), N => self.solve_of::<N>(&mut missing));
-            b.iter_mut().zip(&missing).for_each(|(entry, &missing)| *entry += missing);
-            self.missing = missing;
+        if !ode.turns() {
+            for_size!(self.lu.dim(), N => self.solve_of::<N>(b));
+            return;
         }
+        // Values first: derivatives need them, and take one solution then.
+        let mut missing = std::mem::take(&mut self.missing);
+        self.derivatives.copy_from_slice(b);
+        b.iter_mut().for_each(|entry| *entry = entry.frozen());
+        self.derivatives.iter_mut().zip(&*b).for_each(|(entry, &value)| *entry -= value);
+        for_size!(self.lu.dim(), N => self.solve_of::<N>(b));
+        ode.turned(b, &mut missing);
+        for (missing, &own) in missing.iter_mut().zip(&self.derivatives) {
+            *missing = *missing * self.reach + own;
+        }
+        for_size!(self.lu.dim(), N => self.solve_of::<N>(&mut missing));
+        b.iter_mut().zip(&missing).for_each(|(entry, &missing)| *entry += missing);
+        self.missing = missing;
     }
 
     fn solve_of<const N: usize>(&mut self, b: &mut [S]) {

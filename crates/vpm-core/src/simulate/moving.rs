@@ -150,10 +150,14 @@ impl<S: Scalar> Ode<S> for Moving<'_, S> {
         self.matrix(x, matrix, rates, |system, x, matrix, rates| system.prepare(x, matrix, rates));
     }
 
-    fn turned(&mut self, k: &[S], product: &mut [S]) -> bool {
+    fn turns(&self) -> bool {
+        self.system.turns()
+    }
+
+    fn turned(&mut self, k: &[S], product: &mut [S]) {
         let dim = self.system.dim();
         product[dim] = S::zero();
-        self.system.turned(&k[..dim], &mut product[..dim])
+        self.system.turned(&k[..dim], &mut product[..dim]);
     }
 
     fn elasticity(&mut self, x: &[S], block: &mut [S]) -> bool {

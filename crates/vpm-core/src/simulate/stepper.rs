@@ -123,7 +123,10 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         let (derived, corrected) = (S::plain(&[]).is_none(), self.plan.gains.is_some());
         if code_pays(evaluations) || ((derived || corrected) && code_pays_in_fits(evaluations)) {
             // What has no code runs as it is.
-            let _ = self.compile();
+            let _ = match self.courses {
+                Some(_) => self.compile(),
+                None => self.system.compile_steps(method),
+            };
         }
         self
     }

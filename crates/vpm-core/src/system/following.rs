@@ -213,8 +213,12 @@ impl<S: Scalar> Ode<S> for Following<S> {
         }
     }
 
-    fn turned(&mut self, k: &[S], product: &mut [S]) -> bool {
-        self.routines.turned(k, product)
+    fn turns(&self) -> bool {
+        self.routines.turns()
+    }
+
+    fn turned(&mut self, k: &[S], product: &mut [S]) {
+        self.routines.turned(k, product);
     }
 
     fn elasticity(&mut self, y: &[S], block: &mut [S]) -> bool {

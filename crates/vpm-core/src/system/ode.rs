@@ -12,6 +12,11 @@ use crate::integrator::Method;
 use crate::ode::Ode;
 use crate::scalar::Scalar;
 
+/// The largest code of a whole step, in operations. Each takes some 3 us to compile; larger steps gain little.
+const MOST_OF_STEP: usize = 3_000;
+/// By how much a whole step is larger than the matrix that it asks for, at least: in plain numbers, and with derivatives.
+const LARGER: [usize; 2] = [2, 6];
+
 /// The machine as an [`Ode`] in numbers `S`.
 ///
 /// Plain numbers go through the laws themselves, or through machine code where it pays. Numbers with derivatives, and exact derivatives of
@@ -32,6 +37,8 @@ pub struct System<S> {
     rates: Vec<S>,
     /// Whether these are the rates where the next step begins.
     ready: bool,
+    /// Whether linearly implicit steps run as a whole.
+    whole: bool,
 }
 
 impl<S: Scalar> System<S> {
@@ -51,6 +58,7 @@ impl<S: Scalar> System<S> {
             column: vec![0.0; dynamics.coordinates()],
             rates: vec![S::zero(); dynamics.dim()],
             ready: false,
+            whole: false,
             dynamics,
         };
         if !Self::is_plain() {
@@ -104,6 +112,25 @@ impl<S: Scalar> System<S> {
             self.routines.forget(&kind);
         }
         Ok(())
+    }
+
+    /// The same, for a run whose inputs stand still within steps: these run as a whole where that is worth its code.
+    pub(crate) fn compile_steps(&mut self, method: Method) -> std::result::Result<(), String> {
+        if method == Method::LinearlyImplicit && self.dynamics.is_well_scaled() && self.has_small_steps() {
+            let made = self.routines.compile_within(&Kind::Step, MOST_OF_STEP);
+            if made.and_then(|()| self.routines.compile(&Kind::Sample)).is_ok() {
+                (self.ready, self.whole) = (false, true);
+                return Ok(());
+            }
+            self.routines.forget(&Kind::Step);
+        }
+        self.compile(method)
+    }
+
+    /// Whether it is worth while to record a whole step: the matrix, which is at hand, tells about how large it is.
+    fn has_small_steps(&mut self) -> bool {
+        let larger = LARGER[usize::from(!Self::is_plain())];
+        self.routines.get(&Kind::Prepared).is_some_and(|routine| larger * routine.size() <= MOST_OF_STEP)
     }
 
     /// Whether its functions run as machine code.
@@ -307,8 +334,12 @@ impl<S: Scalar> Ode<S> for System<S> {
         self.routines.matrix(&Kind::Prepared, x, matrix, x.len(), rates);
     }
 
-    fn turned(&mut self, k: &[S], product: &mut [S]) -> bool {
-        self.routines.turned(k, product)
+    fn turns(&self) -> bool {
+        self.routines.turns()
+    }
+
+    fn turned(&mut self, k: &[S], product: &mut [S]) {
+        self.routines.turned(k, product);
     }
 
     /// As df/dx, but with chords from rest in the place of the tangents of friction laws; of a machine with elastic beams and ideal drives,
@@ -362,6 +393,19 @@ impl<S: Scalar> Ode<S> for System<S> {
         motion[..n].fill(1e-2);
         motion[n..].fill(1.0);
         self.dynamics.drive_scales(internal);
+    }
+
+    /// By machine code of the whole step, if there is some.
+    #[inline]
+    fn linearly_implicit_step(&mut self, x: &mut [S], step: f64) -> bool {
+        if !self.whole {
+            return false;
+        }
+        let next = self.routines.get(&Kind::Step).and_then(|routine| routine.step(x, step));
+        next.map(|next| x.copy_from_slice(next)).is_some_and(|()| {
+            self.ready = false;
+            true
+        })
     }
 
     /// Memories move on exactly along the way of their joints.

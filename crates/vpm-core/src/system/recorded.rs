@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::additive::{Split, Stage};
 use super::guided::{Guidance, Guided, Part};
-use super::{Build, Dynamics, stiff};
+use super::{Build, Dynamics, step, stiff};
 use crate::contact::ContactFriction;
 use crate::effect::{JointEffect, MemoryChords, Seat};
 use crate::error::{Error, Result};
@@ -16,7 +16,7 @@ use crate::sensor::Sensor;
 const MOST: usize = 200_000;
 
 /// Where the inputs of a recorded machine's programs stand: state, inputs of drives and supplies, the implicit state and the reach of an
-/// additive step with the rates where the stage before ended, parameters.
+/// additive step with the rates where the stage before ended, parameters. The length of a whole step takes the place of the reach.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Places {
     /// Number of coordinates.
@@ -85,6 +85,8 @@ pub enum Kind {
     Elasticity,
     /// The rates of a stage of an additive step, see [`crate::ode::Ode::additive_rates`].
     Additive,
+    /// The state after a linearly implicit step, then whether it is exact: one, or zero where the elimination would have to exchange rows.
+    Step,
     /// Lever arms of all lines, line by line.
     Levers,
     /// Efforts that the accelerations need, those of the effects taken off.
@@ -218,7 +220,7 @@ impl Placed {
         let program = Program::new(&graph, &nodes, places.count());
         let placed = Self { program, places, entries, directions, of_values: !graph.decisions().is_empty() };
         Ok(match kind {
-            Kind::Derived(_, by) => placed.derived(by),
+            Kind::Derived(kind, by) if **kind != Kind::Step => placed.derived(by),
             _ => placed,
         })
     }
@@ -297,6 +299,11 @@ fn outputs(build: impl Build<Error = Error>, places: Places, parameters: &[Recor
             (rates, Some(Matrix::Entries(block, 2 * n)))
         }
         Kind::Additive => (dynamics.additive(&x, places), None),
+        Kind::Step => (step::linearly_implicit(&mut dynamics, places), None),
+        Kind::Derived(kind, by) if **kind == Kind::Step => {
+            let (values, matrix) = step::linearly_implicit_derived(&mut dynamics, places, by);
+            (values, Some(matrix))
+        }
         Kind::Derived(kind, _) => return outputs(build, places, parameters, kind),
         Kind::Levers => {
             let mut levers = zeros(dynamics.layout().lines * n);
@@ -355,7 +362,7 @@ impl Dynamics<Recorded> {
 
     /// What an iteration matrix is, at the state of the last [`Dynamics::rhs`]: with chords in the place of friction laws; of a machine of
     /// which beams are all that is stiff, the matrix itself.
-    fn prepared(&mut self, x: &[Recorded]) -> Matrix {
+    pub(super) fn prepared(&mut self, x: &[Recorded]) -> Matrix {
         let (n, dim) = (self.coordinates(), x.len());
         let (q, v) = x[..2 * n].split_at(n);
         let mut memories = vec![None; self.memories.len()];

@@ -98,11 +98,17 @@ impl<S: Scalar> Routine<S> {
         Ok(())
     }
 
-    /// The inputs that may carry derivatives: all but the parameters, and those of these that do.
+    /// How many operations an evaluation takes without machine code.
+    pub(crate) fn size(&self) -> usize {
+        self.function.often.size()
+    }
+
+    /// The inputs that may carry derivatives: all but lengths of steps and parameters, and those of these that do.
     fn moving(&self) -> Vec<u32> {
+        let reach = self.function.places.reach();
         let (first, given) = (self.function.places.first_parameter(), self.function.places.count());
         (0..given)
-            .filter(|&place| place < first || !self.inputs[place].is_constant())
+            .filter(|&place| place != reach && (place < first || !self.inputs[place].is_constant()))
             .map(|place| place as u32)
             .collect()
     }
@@ -123,6 +129,14 @@ impl<S: Scalar> Routine<S> {
     #[inline]
     pub(crate) fn put_accelerations(&mut self, a: &[S]) {
         self.put(self.function.places.accelerations(), a);
+    }
+
+    /// The state after a whole step of this length from `x`, if that is exact.
+    #[inline]
+    pub(crate) fn step(&mut self, x: &[S], step: f64) -> Option<&[S]> {
+        self.put(self.function.places.reach(), &[S::from_f64(step)]);
+        let (next, exact) = self.at(x).split_at(x.len());
+        (exact[0].re() == 1.0).then_some(next)
     }
 
     /// Begins an additive step at the rates `v` of all coordinates.
@@ -180,11 +194,16 @@ impl<S: Scalar> Routine<S> {
         }
     }
 
+    /// Whether its last matrix lacks derivatives.
+    fn turns(&self) -> bool {
+        self.directions.as_ref().is_some_and(|all| all.product.is_some())
+    }
+
     /// What the derivatives that the last matrix lacks make of the values of `k`, see [`crate::ode::Ode::turned`].
-    fn turned(&mut self, k: &[S], product: &mut [S]) -> bool {
+    fn turned(&mut self, k: &[S], product: &mut [S]) {
         let Some(Along { evaluator, inputs, outputs }) = self.directions.as_mut().and_then(|all| all.product.as_mut())
         else {
-            return false;
+            return;
         };
         for (input, k) in inputs.iter_mut().zip(k) {
             input.gradient = [S::from_f64(k.re())];
@@ -193,7 +212,6 @@ impl<S: Scalar> Routine<S> {
         for (product, Dual { gradient: [along], .. }) in product.iter_mut().zip(outputs) {
             *product = *along - along.frozen();
         }
-        true
     }
 }
 
@@ -300,8 +318,18 @@ impl<S: Scalar> Routines<S> {
 
     /// Makes the function of that kind as machine code; or says why there is none.
     pub(crate) fn compile(&mut self, kind: &Kind) -> std::result::Result<(), String> {
+        self.compile_within(kind, usize::MAX)
+    }
+
+    /// The same, of so many operations at most.
+    pub(crate) fn compile_within(&mut self, kind: &Kind, most: usize) -> std::result::Result<(), String> {
         let words = |error: Error| error.to_string();
+        let fits = |function: &Function| match function.often.size() {
+            size if size <= most => Ok(()),
+            size => Err(format!("{size} operations are more than {most}, up to which their code is worth its time")),
+        };
         self.make(kind).map_err(words)?;
+        self.get(kind).map_or(Ok(()), |routine| fits(&routine.function))?;
         if S::plain(&[]).is_some() {
             return self.get(kind).map_or(Ok(()), Routine::compile);
         }
@@ -318,6 +346,7 @@ impl<S: Scalar> Routines<S> {
         let by = self.get(kind).map_or_else(Vec::new, |routine| routine.moving());
         let derived = self.functions.function(&Kind::Derived(Box::new(kind.clone()), by.clone()), &values);
         let derived = derived.map_err(words)?;
+        fits(&derived)?;
         self.get(kind).map_or(Ok(()), |routine| routine.differentiate_by(derived, &by))
     }
 
@@ -348,11 +377,18 @@ impl<S: Scalar> Routines<S> {
         self.last = self.made.iter().position(|(own, _)| own == kind);
     }
 
-    /// See [`crate::ode::Ode::turned`].
+    /// See [`crate::ode::Ode::turns`].
     #[inline]
-    pub(crate) fn turned(&mut self, k: &[S], product: &mut [S]) -> bool {
+    pub(crate) fn turns(&self) -> bool {
         S::plain(&[]).is_none()
-            && self.last.and_then(|last| self.made.get_mut(last)).is_some_and(|(_, routine)| routine.turned(k, product))
+            && self.last.and_then(|last| self.made.get(last)).is_some_and(|(_, routine)| routine.turns())
+    }
+
+    /// See [`crate::ode::Ode::turned`].
+    pub(crate) fn turned(&mut self, k: &[S], product: &mut [S]) {
+        if let Some((_, routine)) = self.last.and_then(|last| self.made.get_mut(last)) {
+            routine.turned(k, product);
+        }
     }
 
     /// The function of that kind, made now if it was not yet.

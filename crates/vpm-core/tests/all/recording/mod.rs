@@ -6,4 +6,5 @@ mod code;
 mod machines;
 mod native;
 mod searches;
+mod steps;
 mod zero_parameters;
