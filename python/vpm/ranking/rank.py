@@ -206,7 +206,7 @@ class _Search:
             return None, tried
         first = min(counting, key=lambda trial: trial.left)
         equal = [trial for trial in counting if trial.look is first.look and self._as_good(trial, first)]
-        best = min(equal, key=lambda trial: (len(trial.fitted.structure.priors), trial.left))
+        best = min(equal, key=_plainness)
         several = {best.fitted.key: best}
         for trial in sorted(counting, key=lambda trial: trial.left):
             if trial.look is best.look:
@@ -300,6 +300,12 @@ class _Search:
             trial.evidence,
             probability,
         )
+
+
+def _plainness(trial: _Trial) -> tuple[bool, int, float]:
+    """Orders what removes the same: the machine before its instruments, then fewer numbers."""
+    name, _ = trial.fitted.key
+    return EFFECTS[name].site == "sensor", len(trial.fitted.structure.priors), trial.left
 
 
 def known(model: Model, data: InverseDynamicsProblem) -> dict[str, Prior]:
