@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+import two_link_arm
 import vpm
-from blind import make_case
 from synthetic import Truth, nominal, simulate_axis
 from vpm import diagnosing
 from vpm.diagnosing import diagnose
@@ -157,9 +157,9 @@ def test_where_a_ranking_fails_a_search_names(monkeypatch: pytest.MonkeyPatch, r
 
 def test_machines_that_a_ranking_does_not_cover_say_why() -> None:
     assert why_not_ranked(nominal(), ()) == ""
-    servo, arm = (make_case(name, "bias_force", 1, recalibrate=False).model() for name in ("servo_cylinder", "arm2r"))
-    assert "type hydraulic" in why_not_ranked(servo, ())
-    assert why_not_ranked(arm, ()) == ""
+    assert why_not_ranked(two_link_arm.nominal(), ()) == ""
+    assert "type hydraulic" in why_not_ranked(Model.load(EXAMPLES / "servo_cylinder" / "rig.toml"), ())
+    assert why_not_ranked(Model.load(EXAMPLES / "flexible_pendulum" / "flexible_pendulum.toml"), ()) == "links bend"
 
 
 def test_a_refit_that_simulates_worse_is_not_kept(monkeypatch: pytest.MonkeyPatch, records: list[Experiment]) -> None:
