@@ -156,7 +156,8 @@ class _Search:
                 if best is None:
                     break
                 effects.append(rounds[-1][0])
-                self.say(f"{effects[-1].effect} at {effects[-1].site} removes {100.0 * best.judgement.removed:.3g} %")
+                share = 100.0 * best.judgement.removed
+                self.say(f"{effects[-1].effect} at {effects[-1].site}: removes {share:.3g} % of the error power")
                 looks = self._looks(best.fitted.structure, best)
                 looks, needless = self._without_needless(looks)
                 effects = [one for one in effects if one.key not in needless]
