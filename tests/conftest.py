@@ -30,12 +30,6 @@ if "PYTEST_XDIST_WORKER" not in os.environ:
 ROOT = Path(__file__).resolve().parent.parent
 
 
-@pytest.fixture
-def by_search(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Diagnoses take their names from the search on balances, whatever the machine."""
-    monkeypatch.setattr("vpm.diagnosing.why_not_ranked", lambda *_: "the test is one of the search")
-
-
 @pytest.fixture(scope="session")
 def emps() -> Model:
     """The model of the example EMPS drive."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ from vpm import diagnosing
 from vpm.diagnosing import diagnose
 from vpm.discrepancy import by_ranking
 from vpm.discrepancy.by_ranking import why_not_ranked
-from vpm.errors import VpmError
+from vpm.errors import DiagnosisError, VpmError
 from vpm.experiment import Experiment
 from vpm.model import Model
 from vpm.ranking import Ranked, Ranking
@@ -59,7 +59,7 @@ def records() -> list[Experiment]:
 @pytest.fixture
 def named(monkeypatch: pytest.MonkeyPatch, records: list[Experiment]) -> vpm.Diagnosis:
     monkeypatch.setattr(diagnosing, "rank", lambda *_, **__: two())
-    return diagnose(nominal(), records[0], records[1], workers=1)
+    return diagnose(nominal(), records[0], records[1], names="ranking", workers=1)
 
 
 def test_names_and_their_order_are_those_of_the_ranking(named: vpm.Diagnosis) -> None:
@@ -127,7 +127,7 @@ def test_a_ranking_sees_the_training_records_alone(monkeypatch: pytest.MonkeyPat
         return ranking()
 
     monkeypatch.setattr(diagnosing, "rank", asked)
-    diagnose(nominal(), records[0], records[1], limit=3, workers=1)
+    diagnose(nominal(), records[0], records[1], limit=3, names="ranking", workers=1)
     assert seen == [[records[0].name]]
 
 
@@ -136,7 +136,7 @@ def test_ctrl_c_in_the_ranking_gives_what_is_known(monkeypatch: pytest.MonkeyPat
         raise KeyboardInterrupt
 
     monkeypatch.setattr(diagnosing, "rank", stopped)
-    why = diagnose(nominal(), records[0], records[1], workers=1)
+    why = diagnose(nominal(), records[0], records[1], names="ranking", workers=1)
     assert why.interrupted
     assert why.effects == ()
     assert any(note.startswith("stopped by Ctrl-C") for note in why.notes)
@@ -148,7 +148,7 @@ def test_where_a_ranking_fails_a_search_names(monkeypatch: pytest.MonkeyPatch, r
 
     monkeypatch.setattr(diagnosing, "rank", failed)
     # Without a restriction to effects, which a ranking is told of in its own words.
-    why = diagnose(nominal(), records[0], records[1], limit=1, workers=1)
+    why = diagnose(nominal(), records[0], records[1], limit=1, names="ranking", workers=1)
     assert [e.name for e in why.effects] == ["coulomb_friction"]
     assert np.isnan(why.effects[0].evidence_nats)
     (note,) = [note for note in why.notes if note.startswith("names come from a search")]
@@ -166,7 +166,12 @@ def test_a_refit_that_simulates_worse_is_not_kept(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(diagnosing, "rank", lambda *_, **__: two())
     never = replace(by_ranking.SETTINGS, worse=-np.inf, sure=-np.inf)
     monkeypatch.setattr(by_ranking, "SETTINGS", never)
-    why = diagnose(nominal(), records[0], records[1], workers=1)
+    why = diagnose(nominal(), records[0], records[1], names="ranking", workers=1)
     step = why.steps[1]
     assert step.values["axis.friction.coulomb"] == pytest.approx(8.8)
     assert step.std["axis.friction.coulomb"] > 0.0
+
+
+def test_names_come_from_one_of_two_places(records: list[Experiment]) -> None:
+    with pytest.raises(DiagnosisError, match='from a "search" or a "ranking", not from "luck"'):
+        diagnose(nominal(), records[0], records[1], names=cast("Any", "luck"))

@@ -15,7 +15,6 @@ from vpm.discrepancy.confirmation import Data, Trial
 from vpm.discrepancy.round import Round
 
 
-@pytest.mark.usefixtures("by_search")
 def test_a_force_and_a_tilt_that_a_balance_takes_for_each_other_are_told_apart() -> None:
     """They differ by a cosine of the angle: 4 % of what the balance leaves, eighty deviations of the noise in runs."""
     case = shared_case("axis_rotary", ("gravity_tilt", "stribeck_friction"), 102)

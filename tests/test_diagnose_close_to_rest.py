@@ -12,7 +12,6 @@ from vpm.discrepancy.sticking import CLOSE_TO_REST
 from vpm.simulate import Setup
 
 
-@pytest.mark.usefixtures("by_search")
 def test_what_a_balance_hardly_sees_is_told_by_runs() -> None:
     """It fades below 1.5 % of the speed: fitted to the balance, it predicts unseen efforts worse than nothing does."""
     case = shared_case("axis_linear", "stribeck_friction", 18)
@@ -34,7 +33,6 @@ def test_what_runs_tell_need_not_close_the_balance() -> None:
     assert why.verdict == "effect_found"
 
 
-@pytest.mark.usefixtures("by_search")
 @pytest.mark.parametrize(
     ("machine", "hidden", "seed"),
     [("axis_linear", "none", 3), ("axis_linear", "friction_drift", 9)],

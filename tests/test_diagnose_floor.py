@@ -82,11 +82,11 @@ def test_a_name_that_leaves_most_open_is_no_explanation() -> None:
 
 
 def test_interrupted_search_gives_what_is_known() -> None:
-    """Ctrl-C when the first effect is named: it stands."""
+    """Ctrl-C in the second round: the effect of the first one stands."""
     train, test = simulate_axis(Truth(coulomb=9.0, bias=5.0), 2, 12.0, first_seed=7)
 
     def tell(sentence: str) -> None:
-        if sentence.startswith("coulomb_friction at axis: "):
+        if sentence.startswith("round 2: screening"):
             raise KeyboardInterrupt
 
     effects = ["coulomb_friction", "bias_force"]

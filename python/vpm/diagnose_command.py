@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -36,6 +36,10 @@ Out = Annotated[Path, typer.Option(help="Folder for report.json, report.html and
 Effect = Annotated[Words, typer.Option(help="Try only these effects; repeat.")]
 Without = Annotated[Words, typer.Option(help="Try all effects but these; repeat.")]
 Limit = Annotated[int, typer.Option(min=0, help="Most effects to accept.")]
+Names = Annotated[
+    Literal["search", "ranking"],
+    typer.Option(help="Where names come from; a ranking covers rigid machines of one or two joints."),
+]
 Substeps = Annotated[int, typer.Option(min=1, help="Integration steps per sample, in simulations of unseen records.")]
 Horizon = Annotated[float, typer.Option(help="Length of each restart, where unseen records are simulated so, s.")]
 
@@ -48,6 +52,7 @@ def diagnose(
     effect: Effect = None,
     without: Without = None,
     limit: Limit = 6,
+    names: Names = "search",
     channels: Channels = None,
     interpolate: Interpolate = False,
     cutoff: Cutoff = None,
@@ -65,7 +70,7 @@ def diagnose(
     from vpm.report import print_story, write_report
     from vpm.simulate import Setup
 
-    names = _tried(effect, without)
+    tried = _tried(effect, without)
     machine, records = load_all(model, logs, channels, interpolate)
     unseen = [load_record(path, machine, channels, interpolate) for path in validate or []]
     with searching() as (tell, each):
@@ -73,10 +78,11 @@ def diagnose(
             machine,
             records,
             unseen or None,
-            effects=names,
+            effects=tried,
             cutoff=cutoff,
             setup=Setup(integrator, substeps, horizon, hold=hold),
             limit=limit,
+            names=names,
             workers=workers or None,
             tell=tell,
             progress=each,

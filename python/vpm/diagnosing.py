@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import TypeVar
+from typing import Literal, TypeVar, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,6 +70,8 @@ STOPPED_LATE = "stopped by Ctrl-C before what is left, and what else would do, w
 REACH = 4.0
 
 Tell = Callable[[str], None]
+#: Where names come from.
+Names = Literal["search", "ranking"]
 Found = TypeVar("Found")
 _Records = tuple[tuple[Experiment, ...], tuple[Experiment, ...], list[str]]
 
@@ -83,6 +85,7 @@ def diagnose(
     cutoff: float | None = None,
     setup: Setup | None = None,
     limit: int = 6,
+    names: Names = "search",
     workers: int | None = None,
     tell: Tell | None = None,
     progress: Progress | None = None,
@@ -110,6 +113,9 @@ def diagnose(
         Integrator, substeps and horizon of the simulations.
     limit : int
         Most effects to accept.
+    names : {"search", "ranking"}
+        Where names come from: from rounds of screening on balances of effort, or from `vpm.rank` where that covers the
+        machine.
     workers : int, optional
         Candidates that are worked on at a time; one per core if not given. The result does not depend on it.
     tell : callable, optional
@@ -128,16 +134,19 @@ def diagnose(
     Raises
     ------
     DiagnosisError
-        No record was given or an effect name is unknown.
+        No record was given, or an effect name or the source of names is unknown.
     ExperimentError
         A channel is missing.
     """
     _check_effects(effects)
+    if names not in get_args(Names):
+        raise DiagnosisError(f'names come from a "search" or a "ranking", not from "{names}"')
     worker_count(workers)
     # Its linear algebra is small: with threads of its own it would only take the cores from candidates side by side.
     with threadpool_limits(1, user_api="blas"):
         records = _records(experiments, validate)
-        return _diagnosis(model, records, effects, cutoff, setup, limit, SideBySide(workers, progress), tell)
+        each = SideBySide(workers, progress)
+        return _diagnosis(model, records, effects, cutoff, setup, limit, names, each, tell)
 
 
 def _diagnosis(
@@ -147,6 +156,7 @@ def _diagnosis(
     cutoff: float | None,
     setup: Setup | None,
     limit: int,
+    names: Names,
     each: SideBySide,
     tell: Tell | None,
 ) -> Diagnosis:
@@ -169,7 +179,8 @@ def _diagnosis(
     recalibrated = judge(model, (*free, *transitions), data, bounds)
     data.training.workers = 1  # candidates share the cores from here on
     notes.extend(moved_far(model, recalibrated))
-    found, ambiguous, late = _named(model, recalibrated, data, effects, setup, limit, say, each, notes)
+    by = (names, effects, limit)
+    found, ambiguous, late = _named(model, recalibrated, data, by, setup, say, each, notes)
     say("measuring the noise floor")
     floor = noise_floor(found.final.model, data.unseen, found.final.unseen, mode, setup)
     gap = _gaps(data, nominal, recalibrated, found.final, floor)
@@ -224,24 +235,27 @@ def _named(
     model: Model,
     recalibrated: Judged,
     data: Data,
-    effects: Sequence[str] | None,
+    by: tuple[Names, Sequence[str] | None, int],
     setup: Setup | None,
-    limit: int,
     tell: Tell,
     each: SideBySide,
     notes: list[str],
 ) -> tuple[Search, tuple[Rivals, ...], bool]:
     """What is missing, what else would do, and whether Ctrl-C kept that from being examined.
 
-    A ranking names what is missing in every machine that it covers, see `why_not_ranked`; a search does in the others.
+    ``by`` says where names come from, of which effects, and how many at most. A ranking that was asked for names what
+    is missing in every machine that it covers, see `why_not_ranked`; a search does in the others.
     """
-    reason = why_not_ranked(recalibrated.model, data.training.experiments)
-    if not reason and not recalibrated.fit.interrupted:
+    names, effects, limit = by
+    asked = names == "ranking" and not recalibrated.fit.interrupted
+    reason = why_not_ranked(recalibrated.model, data.training.experiments) if asked else ""
+    if asked and not reason:
         ranked = _ranked(model, recalibrated, data, effects, setup, limit, tell, each, notes)
         if not isinstance(ranked, str):
             return *ranked, False
         reason = ranked
-    notes.append(SEARCHED.format(reason=reason))
+    if asked:
+        notes.append(SEARCHED.format(reason=reason))
     found = search(recalibrated, data, effects, limit, tell, each)
     if found.interrupted:
         notes.append(STOPPED)
