@@ -111,8 +111,11 @@ def test_derivatives_by_first_states_are_those_of_differences() -> None:
 
 
 def test_a_fit_makes_as_much_of_balance_as_of_the_true_first_states() -> None:
-    """Before the settled part of a record, several pairs of place and speed lead to the same rest."""
-    model = rubbing()
+    """Before the settled part of a record, several pairs of place and speed lead to the same rest.
+
+    The slower observer leaves so much of what friction does that a fit may end on the way.
+    """
+    model, observer = rubbing(), Observer(Settings().bands[-1])
     fitter = Fitter(Observed(model, records(), Settings()), Settings())
     firsts = fitter.observed.firsts.priors
     balanced = Structure(model, model.theta.copy(), {})
@@ -120,10 +123,10 @@ def test_a_fit_makes_as_much_of_balance_as_of_the_true_first_states() -> None:
         Structure(model, np.append(model.theta, moves), firsts, firsts=tuple(firsts))
         for moves in (np.zeros(4), np.array([BEGINS[0], 0.0, BEGINS[1], 0.0]))
     ]
-    view = View(fitter.noise_of(balanced, Observer(1.0)))
-    known, found, true = (fitter.finished(fitter.fitted(one, Observer(1.0), view), view) for one in (balanced, *begun))
+    view = View(fitter.noise_of(balanced, observer))
+    known, found, true = (fitter.finished(fitter.fitted(one, observer, view), view) for one in (balanced, *begun))
     assert found.cost < known.cost - 200.0
-    assert found.cost == pytest.approx(true.cost, abs=2.0)
+    assert known.cost - found.cost > 0.99 * (known.cost - true.cost)
     assert found.structure.values == {}
     rest = found.structure.carried(Model.from_toml(CARRYING))
     assert rest.theta[-4:] == pytest.approx(found.structure.theta[-4:])
