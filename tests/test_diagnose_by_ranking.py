@@ -20,7 +20,7 @@ from vpm.discrepancy.by_ranking import why_not_ranked
 from vpm.errors import DiagnosisError, VpmError
 from vpm.experiment import Experiment
 from vpm.model import Model
-from vpm.ranking import Ranked, Ranking
+from vpm.ranking import Judgement, Ranked, Ranking
 from vpm.ranking import Settings as Asked
 
 EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
@@ -40,7 +40,7 @@ def ranking(*effects: Ranked, model: Model | None = None, others: tuple[Ranked, 
 
 def tried(effect: str, values: dict[str, float], least: float, **more: Any) -> Ranked:
     """An effect that removes so much, clearly."""
-    return Ranked(effect, "axis", values, least, least, 9.0, 0.1, 1.0, 1.0, 1.0, **more)
+    return Ranked(effect, "axis", values, Judgement(least, least, 9.0, 0.1, 1.0, 1.0), 1.0, **more)
 
 
 def two() -> Ranking:
@@ -96,13 +96,13 @@ def test_what_was_tried_in_vain_is_refused_with_its_numbers(named: vpm.Diagnosis
         ("score", 2.0, "2 standard deviations, 3 are needed"),
         ("size", 0.001, "0.1 % of what all effects of the model do"),
         ("beside", 0.04, "4 % of what the effects that were found do"),
-        ("shape", 0.01, "1 % of what effects over the same states do at axis"),
+        ("shape", 0.01, "1 % of what effects over the same states do there"),
         ("least", 0.5, "its shape ends where the records do"),
     ],
 )
 def test_each_reason_is_one_sentence(name: str, value: float, said: str) -> None:
     one = tried("spring", {}, 0.5)
-    object.__setattr__(one, name, value)
+    object.__setattr__(one.judgement, name, value)
     assert said in by_ranking._reason(by_ranking._Last(one, None, came_in=False), Asked())
 
 

@@ -103,7 +103,7 @@ def test_what_a_sensor_multiplies_leaves_the_bandwidth_as_it_is() -> None:
 def test_nothing_is_missing_where_the_model_is_right() -> None:
     ranking = vpm.rank(Model.from_toml(SLEDGE), [pushed(seed=4, duration=4.0), pushed(seed=5, duration=4.0)])
     assert ranking.effects == ()
-    assert all(one.size < Settings().inexact for one in ranking.rounds[0] if one.score > Settings().score)
+    assert not any(one.judgement.counts(Settings()) for one in ranking.rounds[0])
     assert ranking.model.parameters["sledge.mass"].value == pytest.approx(MASS, rel=4e-3)
     assert ranking.model.parameters["way.friction.viscous"].value == pytest.approx(OIL, rel=1e-2)
 
@@ -152,8 +152,8 @@ def test_two_missing_effects_are_named_one_after_the_other() -> None:
 def test_the_number_of_workers_changes_nothing_and_a_ranking_is_kept(tmp_path: Path) -> None:
     record = pushed(seed=3, lag=0.008, duration=2.0)
     one, two = (vpm.rank(Model.from_toml(SLEDGE), record, workers=workers) for workers in (1, 2))
-    assert [[r.removed for r in several] for several in one.rounds] == [
-        [r.removed for r in several] for several in two.rounds
+    assert [[r.judgement.removed for r in several] for several in one.rounds] == [
+        [r.judgement.removed for r in several] for several in two.rounds
     ]
     one.save(tmp_path / "ranking.npz")
     assert vpm.Ranking.load(tmp_path / "ranking.npz") == one

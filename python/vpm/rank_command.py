@@ -86,7 +86,7 @@ def lines_of(ranking: Ranking) -> Iterator[str]:
     if not ranking.effects:
         yield f"{ranking.model.name}: no effect removes enough of the error to be added"
     for number, one in enumerate(ranking.effects, 1):
-        yield f"{number}. {one.effect} at {one.place} removes {_percent(one.removed)} of the error power"
+        yield f"{number}. {one.effect} at {one.place} removes {_percent(one.judgement.removed)} of the error power"
         yield f"     {_sentence(one, ranking.model)}"
         if one.rivals:
             yield f"     these records do not tell it from {', '.join(one.rivals)}"
@@ -96,7 +96,8 @@ def lines_of(ranking: Ranking) -> Iterator[str]:
     if others:
         yield "next, with what each would remove of what is left, and its size beside all effects of the model:"
     for other in others:
-        yield f"  {other.effect} at {other.place}: {_percent(other.least)}, size {_percent(other.size)}"
+        told = other.judgement
+        yield f"  {other.effect} at {other.place}: {_percent(told.least)}, size {_percent(told.size)}"
     for channel, gap in ranking.gaps.items():
         levels = (
             f"{gap.before:.4g} before, {gap.recalibrated:.4g} with fitted parameters, {gap.after:.4g} {gap.unit} now"

@@ -306,32 +306,15 @@ def _accepts(several: Sequence[Ranked]) -> bool:
 
 
 def _removes(one: Ranked) -> str:
-    return f"removes {100.0 * one.least:.3g} % of the error power"
+    return f"removes {100.0 * one.judgement.least:.3g} % of the error power"
 
 
 def _reason(told: _Last, settings: RankingSettings) -> str:
     one, winner = told.one, told.winner
     if told.came_in:
         return "it is not needed any more beside what came in after it"
-    if one.least <= settings.worth:
-        return f"it {_removes(one)}; {100.0 * settings.worth:g} % are needed"
-    if one.score <= settings.score:
-        return (
-            f"it {_removes(one)}, but not from piece after piece: {one.score:.2g} standard deviations, "
-            f"{settings.score:g} are needed"
-        )
-    if one.size <= settings.slight:
-        return f"it does {100.0 * one.size:.2g} % of what all effects of the model do, and no law is as exact as that"
-    if one.beside <= settings.second:
-        return (
-            f"it does {100.0 * one.beside:.2g} % of what the effects that were found do, "
-            f"and {100.0 * settings.second:g} % may be what their laws are wrong by"
-        )
-    if one.shape <= settings.inexact:
-        return (
-            f"it does {100.0 * one.shape:.2g} % of what effects over the same states do at {one.site}, "
-            "and no law is as exact as that"
-        )
+    if lacks := one.judgement.lacks(settings):
+        return lacks
     if winner is None:
         return f"it {_removes(one)}, but its shape ends where the records do"
     return (
@@ -348,7 +331,9 @@ def _candidates(ranking: Ranking, gains: Mapping[Key, float]) -> tuple[RankedCan
             accepted = place == 0 and _accepts(several) and one.key in gains
             unseen = gains[one.key] if accepted else np.nan
             found.append(
-                RankedCandidate(*one.key, number + 1, one.removed, unseen, accepted, one.evidence, one.probability)
+                RankedCandidate(
+                    *one.key, number + 1, one.judgement.removed, unseen, accepted, one.evidence, one.probability
+                )
             )
     return tuple(found)
 

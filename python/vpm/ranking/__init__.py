@@ -1,7 +1,8 @@
 """What could be missing from a model, in the order of its evidence."""
 
+from vpm.ranking.judgement import Judgement
 from vpm.ranking.rank import rank
 from vpm.ranking.result import Gap, Ranked, Ranking
 from vpm.ranking.settings import Settings
 
-__all__ = ["Gap", "Ranked", "Ranking", "Settings", "rank"]
+__all__ = ["Gap", "Judgement", "Ranked", "Ranking", "Settings", "rank"]

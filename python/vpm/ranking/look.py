@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Collection
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,8 +13,8 @@ from vpm.catalogue import EFFECTS
 from vpm.identify.reuse import SPLITTING
 from vpm.model import Effect
 from vpm.ranking.fit import ASTRAY, Fitted, Fitter, Followed, View, bounded_step
+from vpm.ranking.judgement import Judgement
 from vpm.ranking.noise_model import white_noise
-from vpm.ranking.settings import Settings
 
 Array = NDArray[np.float64]
 
@@ -101,40 +101,6 @@ class Look:
     @staticmethod
     def _sum(squares: tuple[Array, Array]) -> float:
         return float(squares[0].sum() + squares[1].sum())
-
-
-@dataclass(frozen=True)
-class Judgement:
-    """What an effect removes of the error that an observer leaves.
-
-    Attributes
-    ----------
-    removed : float
-        Share of the error power.
-    least : float
-        The same of fitted and of held-back stretches, the smaller one.
-    score : float
-        How surely it is removed from pieces of the held-back stretches, in standard deviations.
-    size : float
-        Its amplitude as a share of that of all effects of the model.
-    beside : float
-        The same of those that were added before.
-    shape : float
-        The same of those that show over the same states at the same place: one curve with two shapes.
-    """
-
-    removed: float
-    least: float
-    score: float
-    size: float
-    beside: float
-    shape: float
-
-    def counts(self, settings: Settings) -> bool:
-        """Whether that is more than chance, and more than what laws are wrong by."""
-        sure = self.least > settings.worth and self.score > settings.score
-        large = self.size > settings.slight and self.beside > settings.second
-        return sure and large and self.shape > settings.inexact
 
 
 def _repeated(before: Array, after: Array, pieces: int) -> float:

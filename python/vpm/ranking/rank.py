@@ -18,7 +18,8 @@ from vpm.experiment import Experiment, as_records
 from vpm.identify import InverseDynamicsProblem
 from vpm.model import Model
 from vpm.ranking.fit import ASTRAY, Fitted, Fitter, View
-from vpm.ranking.look import Judgement, Look
+from vpm.ranking.judgement import Judgement
+from vpm.ranking.look import Look
 from vpm.ranking.noise_model import fitted_noise
 from vpm.ranking.observed import Observed, Observer
 from vpm.ranking.posterior import alike, probabilities
@@ -89,7 +90,7 @@ def rank(
     Examples
     --------
     >>> rank(model, log).effects
-    (Ranked(effect='coulomb_friction', site='axis', removed=0.97),)
+    (Ranked(effect='coulomb_friction', site='axis', judgement=Judgement(removed=0.97)),)
     """
     records = as_records(experiments)
     if not records:
@@ -284,18 +285,13 @@ class _Search:
         return tuple(dict.fromkeys(" at ".join(one.key) for one in close))
 
     def _ranked(self, trial: _Trial, probability: float) -> Ranked:
-        structure, without, told = trial.fitted.structure, trial.look.fitted.structure, trial.judgement
+        structure, without = trial.fitted.structure, trial.look.fitted.structure
         values = {name: value for name, value in structure.values.items() if name not in without.priors}
         side, band = structure.side(trial.fitted.key), trial.fitted.observer.band
         return Ranked(
             *trial.fitted.key,
             values,
-            told.removed,
-            told.least,
-            told.score,
-            told.size,
-            told.beside,
-            told.shape,
+            trial.judgement,
             band,
             side,
             trial.evidence,

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 from vpm.catalogue.kinds import Side, in_words
 from vpm.model import Model
+from vpm.ranking.judgement import Judgement
 from vpm.results import Result, Storable
 
 
@@ -19,19 +20,10 @@ class Ranked(Storable):
     effect, site : str
     values : dict
         Its parameters, SI.
-    removed : float
-        Share of the error power that it removes under the observer of bandwidth ``band``, Hz.
-    least : float
-        The same of fitted and of held-back stretches of record, the smaller one.
-    score : float
-        How surely it removes that from pieces of the held-back stretches, in standard deviations.
-    size : float
-        Its amplitude as a share of that of all effects of the model.
-    beside : float
-        The same of those that were added before.
-    shape : float
-        The same of those that show over the same states at the same place.
+    judgement : Judgement
+        What it removes of the error.
     band : float
+        Bandwidth of the observer under which it does so, Hz.
     side : {"motor", "link"}
         Of a joint that is split.
     evidence : float
@@ -45,12 +37,7 @@ class Ranked(Storable):
     effect: str
     site: str
     values: dict[str, float]
-    removed: float
-    least: float
-    score: float
-    size: float
-    beside: float
-    shape: float
+    judgement: Judgement
     band: float
     side: Side = "motor"
     evidence: float = float("nan")
@@ -113,21 +100,14 @@ class Ranking(Result):
     interrupted: bool = False
 
     def _headline(self) -> Mapping[str, object]:
-        return {f"{one.effect} at {one.place}": one.removed for one in self.effects} or {"effects": "none"}
+        return {f"{one.effect} at {one.place}": one.judgement.removed for one in self.effects} or {"effects": "none"}
 
     def _frame_columns(self) -> Mapping[str, object]:
         tried = [(number + 1, one) for number, several in enumerate(self.rounds) for one in several]
-        names = (
-            "effect",
-            "site",
-            "removed",
-            "least",
-            "score",
-            "size",
-            "beside",
-            "shape",
-            "band",
-            "evidence",
-            "probability",
-        )
-        return {"round": [number for number, _ in tried], **{n: [getattr(one, n) for _, one in tried] for n in names}}
+        own = ("effect", "site", "band", "evidence", "probability")
+        told = ("removed", "least", "score", "size", "beside", "shape")
+        return {
+            "round": [number for number, _ in tried],
+            **{name: [getattr(one, name) for _, one in tried] for name in own},
+            **{name: [getattr(one.judgement, name) for _, one in tried] for name in told},
+        }

@@ -1,0 +1,67 @@
+"""How much of the error an effect removes, and whether that counts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from vpm.ranking.settings import Settings
+from vpm.results import Storable
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class Judgement(Storable):
+    """What an effect removes of the error that an observer leaves.
+
+    Attributes
+    ----------
+    removed : float
+        Share of the error power.
+    least : float
+        The same of fitted and of held-back stretches of record, the smaller one.
+    score : float
+        How surely it is removed from pieces of the held-back stretches, in standard deviations.
+    size : float
+        Its amplitude as a share of that of all effects of the model.
+    beside : float
+        The same of those that were added before.
+    shape : float
+        The same of those that show over the same states at the same place: one curve with two shapes.
+    """
+
+    removed: float
+    least: float
+    score: float
+    size: float
+    beside: float
+    shape: float
+
+    def counts(self, settings: Settings) -> bool:
+        """Whether that is more than chance, and more than what laws are wrong by."""
+        return not self.lacks(settings)
+
+    def lacks(self, settings: Settings) -> str:
+        """What is missing to that, in words; "" where it counts."""
+        if self.least <= settings.worth:
+            return f"it removes {_percent(self.least)} of the error power; {_percent(settings.worth)} are needed"
+        if self.score <= settings.score:
+            return (
+                f"it removes {_percent(self.least)} of the error power, but not from piece after piece: "
+                f"{self.score:.2g} standard deviations, {settings.score:g} are needed"
+            )
+        if self.size <= settings.slight:
+            return f"it does {_percent(self.size)} of what all effects of the model do, and no law is as exact as that"
+        if self.beside <= settings.second:
+            return (
+                f"it does {_percent(self.beside)} of what the effects that were found do, "
+                f"and {_percent(settings.second)} may be what their laws are wrong by"
+            )
+        if self.shape <= settings.inexact:
+            return (
+                f"it does {_percent(self.shape)} of what effects over the same states do there, "
+                "and no law is as exact as that"
+            )
+        return ""
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.3g} %"
