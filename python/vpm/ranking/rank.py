@@ -220,9 +220,9 @@ class _Search:
         return trial.fitted.structure.within_excitation and trial.judgement.counts(self.settings)
 
     def _as_good(self, trial: _Trial, first: _Trial) -> bool:
-        """Whether it leaves no more than what laws are wrong by."""
-        explained = first.look.explained + first.judgement.removed
-        return trial.left - first.left < self.settings.inexact**2 * explained
+        """Whether it leaves no more than what the laws of the curves that either is a part of are wrong by."""
+        told = (trial.judgement, first.judgement)
+        return trial.left - first.left < max(one.removed * (self.settings.inexact / one.shape) ** 2 for one in told)
 
     def _finished(self, tried: Sequence[_Trial]) -> list[_Trial]:
         """Those that count and leave little, fitted to the end."""
