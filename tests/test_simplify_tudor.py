@@ -9,6 +9,7 @@ import pytest
 
 import vpm
 from vpm.simplify import Ladder, simplify
+from vpm.simulate import FIXED_STEP
 
 TUDOR = Path(__file__).resolve().parent.parent / "examples" / "tudor"
 GAUGES = ("gauge_1.strain", "gauge_2.strain")
@@ -73,13 +74,11 @@ def test_the_coarsest_come_first_and_what_is_dear_is_not_fitted(ladder: Ladder, 
     assert all(" terms take " in line and " % of the " in line for line in told[1:first])
     assert told[first + 1] == "strip_1 as rigid, strip_2 as rigid"
     assert ladder.cut > 0
-    # Four-stage steps of a model that is as good as the full one take several times as long as its linear ones.
     stepped = {
         rung.integrator for rung in ladder.rungs if rung.removed == ("strip_1 as bezier(3)", "strip_2 as bezier(3)")
     }
-    # Which of the two quick ones is tried first is a matter of measured times.
-    assert stepped
-    assert stepped <= {"linearly_implicit", "semi_implicit"}
+    # Which of them are tried is a matter of measured times, but two that err alike show the error of the model.
+    assert 0 < len(stepped) < len(FIXED_STEP)
     assert not any("elements" in change for rung in ladder.rungs for change in rung.removed)
 
 
