@@ -300,8 +300,6 @@ def _ranked(
     tell("measuring what was named on unseen records")
     found, ambiguous = searched(ranking, recalibrated, data, settings, effects)
     notes.extend([RANKED, *notes_of(found.accepted)])
-    if ranking.interrupted:
-        found = replace(found, interrupted=True)
     if found.interrupted:
         notes.append(STOPPED)
     return found, ambiguous

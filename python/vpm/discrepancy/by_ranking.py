@@ -100,7 +100,7 @@ def searched(
     stages, accepted = [Stage("recalibrated", "", "", recalibrated)], list[Accepted]()
     outside: dict[Key, str] = {}
     known: tuple[Rivals, ...] = ()
-    interrupted = bool(getattr(ranking, "interrupted", False))  # a ranking may say that Ctrl-C ended it
+    interrupted = ranking.interrupted
     try:
         for place, one in enumerate(ranking.effects):
             gone = [other for other in ranking.effects if other.key in outside] + list(ranking.effects[place + 1 :])

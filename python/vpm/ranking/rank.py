@@ -159,7 +159,7 @@ class _Search:
                 effects.append(rounds[-1][0])
                 share = 100.0 * best.judgement.removed
                 self.say(f"{effects[-1].effect} at {effects[-1].site}: removes {share:.3g} % of the error power")
-                looks = self._looks(best.fitted.structure, best)
+                looks = self._looks(best.fitted.structure, best.fitted)
                 looks, needless = self._without_needless(looks)
                 effects = [one for one in effects if one.key not in needless]
         except KeyboardInterrupt:
@@ -170,18 +170,18 @@ class _Search:
         effects = [replace(one, side=found.side(one.key)) for one in effects]
         return Ranking(tuple(effects), tuple(rounds), found.repaired, recalibrated, left, interrupted)
 
-    def _looks(self, structure: Structure, best: _Trial | None = None) -> list[Look]:
-        """A structure under each observer that can follow it, that under which the last effect came in first.
+    def _looks(self, structure: Structure, fitted: Fitted | None = None) -> list[Look]:
+        """A structure under each observer that can follow it, that under which it was ``fitted`` first.
 
         Raises
         ------
         VpmError
             None of them can.
         """
-        looks = [] if best is None else [self._look(best.fitted)]
+        looks = [] if fitted is None else [self._look(fitted)]
         reason: Exception = VpmError(f"{structure.model.name} runs away from the records")
         for band in self.settings.bands:
-            if best is None or band != best.fitted.observer.band:
+            if fitted is None or band != fitted.observer.band:
                 try:
                     looks.append(self._look(self._fitted(structure, Observer(band))))
                 except ASTRAY as error:  # a slow observer may lose what hangs behind a contact
@@ -256,9 +256,8 @@ class _Search:
         for key in looks[0].fitted.structure.effects[:-1]:
             with contextlib.suppress(*ASTRAY):  # it runs away without, or another one rests on it
                 without = self._fitted(looks[0].fitted.structure.without(key), looks[0].fitted.observer)
-                look = self._look(without)
-                if not look.judged(looks[0].fitted).counts(self.settings):
-                    looks = [look, *self._looks(without.structure)[1:]]
+                if not self._look(without).judged(looks[0].fitted).counts(self.settings):
+                    looks = self._looks(without.structure, without)
                     needless.append(key)
                     self.say(f"no longer needed: {' at '.join(key)}")
         return looks, needless
