@@ -177,6 +177,17 @@ def test_a_search_may_be_limited_to_some_effects_and_ended_early() -> None:
     assert ranking.model.parameters["sledge.mass"].value == ranking.recalibrated.parameters["sledge.mass"].value
 
 
+def test_no_effect_comes_in_that_makes_no_sample_more_probable() -> None:
+    """Whatever error power it removes; it is listed with its evidence, and said to lack it."""
+    record = pushed(seed=1, lag=0.008, duration=2.0)
+    strict = Settings(odds=1e9)
+    ranking = vpm.rank(Model.from_toml(SLEDGE), record, effects=["actuator_lag"], settings=strict)
+    assert ranking.effects == ()
+    (told,) = (one for one in ranking.rounds[0] if np.isfinite(one.evidence))
+    assert told.judgement.counts(strict)
+    assert 0.0 < told.evidence < strict.odds
+
+
 def test_what_a_validation_record_lacks_is_said_before_the_search() -> None:
     record = pushed(seed=1, duration=2.0)
     places = {"way.position": record["way.position"]}

@@ -16,7 +16,7 @@ from vpm.model import Model
 from vpm.ranking.fit import Fitted, Fitter, View
 from vpm.ranking.noise_model import NoiseModel, fitted_noise
 from vpm.ranking.observed import Observed, Observer
-from vpm.ranking.posterior import alike, probabilities
+from vpm.ranking.posterior import apart, probabilities
 from vpm.ranking.settings import Settings
 from vpm.ranking.structure import Structure
 from vpm.weighing import Prior
@@ -53,26 +53,19 @@ class Densities:
 
 
 @pytest.mark.parametrize("distance", [0.5, 3.0])
-def test_models_are_alike_where_nobody_could_choose(distance: float) -> None:
+def test_nats_between_models_tell_how_often_anybody_could_choose(distance: float) -> None:
     """Of two means a distance apart, the better one is the true one in Phi(distance / 2) of all records."""
     random, count, trials = np.random.default_rng(5), 400, 2000
     means = [0.0, distance / np.sqrt(count)]
-    right, same = 0, 0
+    right, nats = 0, []
     for _ in range(trials):
         densities = Densities(random.standard_normal(count))
         first, second = (np.sum(densities.log_density(mean, None)) for mean in means)
         right += int(first > second)
-        same += bool(
-            alike(
-                cast("Fitted", means[0]),
-                [cast("Fitted", means[1])],
-                cast("Fitter", densities),
-                cast("NoiseModel", None),
-                1.0,
-            )
-        )
+        first_mean, second_mean = (cast("Fitted", mean) for mean in means)
+        nats += apart(first_mean, [second_mean], cast("Fitter", densities), cast("NoiseModel", None))
     assert right / trials == pytest.approx(norm.cdf(0.5 * distance), abs=0.03)
-    assert same == (trials if 0.5 * distance**2 < 1.0 else 0)
+    assert np.mean(nats) == pytest.approx(0.5 * distance**2, rel=0.01)
 
 
 def test_two_names_of_one_inertia_are_alike_and_a_lag_is_not() -> None:
@@ -92,5 +85,6 @@ def test_two_names_of_one_inertia_are_alike_and_a_lag_is_not() -> None:
     lag = fitted("actuator_lag", "motor", "time_constant", 0.01, 0.004)
     of_payload, of_lag = (fitted_noise(one.residual, fitter.observed.parts, 12) for one in (payload, lag))
     assert fitter.evidence(payload, of_payload) == pytest.approx(fitter.evidence(rotor, of_payload), abs=1e-3)
-    assert alike(payload, [rotor, lag], fitter, of_payload, 1.0) == [rotor]
-    assert alike(lag, [payload, rotor], fitter, of_lag, 1.0) == []
+    of_rotor, from_payload = apart(payload, [rotor, lag], fitter, of_payload)
+    assert of_rotor < 1.0 < from_payload
+    assert min(apart(lag, [payload, rotor], fitter, of_lag)) > 1.0

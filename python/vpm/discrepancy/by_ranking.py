@@ -6,7 +6,6 @@ efforts cannot be balanced with it. The values that are reported are those of a 
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
@@ -116,7 +115,7 @@ def searched(
         interrupted = True
     gains = {entry.key: entry.trial.unseen.relative for entry in accepted}
     outside |= _unpromising(ranking, stages[-1].judged, data, effects)
-    refused, tried = _refused(ranking, outside, settings), _candidates(ranking, gains)
+    refused, tried = _refused(ranking, outside, settings), _candidates(ranking, gains, settings)
     return Search(tuple(stages), tuple(accepted), refused, tried, interrupted), known
 
 
@@ -284,7 +283,7 @@ def _refused(ranking: Ranking, outside: Mapping[Key, str], settings: RankingSett
     last: dict[Key, _Last] = {}
     for several in ranking.rounds:
         for one in several:
-            winner = several[0] if _accepts(several) else None
+            winner = several[0] if _accepts(several, settings) else None
             last[one.key] = _Last(one, winner, winner is one)
     kept = {one.key for one in ranking.effects}
     reasons = {**{key: _reason(told, settings) for key, told in last.items() if key not in kept}, **outside}
@@ -300,9 +299,9 @@ def _unpromising(ranking: Ranking, final: Judged, data: Data, effects: Sequence[
     return {candidate.key: reason for candidate in offered if candidate.key not in tried}
 
 
-def _accepts(several: Sequence[Ranked]) -> bool:
+def _accepts(several: Sequence[Ranked], settings: RankingSettings) -> bool:
     """Whether the first effect of a round came in: evidence is told of effects that count, and of no others."""
-    return bool(several) and not math.isnan(several[0].evidence)
+    return bool(several) and several[0].evidence > settings.odds
 
 
 def _removes(one: Ranked) -> str:
@@ -315,6 +314,8 @@ def _reason(told: _Last, settings: RankingSettings) -> str:
         return "it is not needed any more beside what came in after it"
     if lacks := one.judgement.lacks(settings):
         return lacks
+    if one.evidence <= settings.odds:
+        return f"it {_removes(one)}, but adds {one.evidence:.3g} nats to the evidence; {settings.odds:g} are needed"
     if winner is None:
         return f"it {_removes(one)}, but its shape ends where the records do"
     return (
@@ -323,12 +324,12 @@ def _reason(told: _Last, settings: RankingSettings) -> str:
     )
 
 
-def _candidates(ranking: Ranking, gains: Mapping[Key, float]) -> tuple[RankedCandidate, ...]:
+def _candidates(ranking: Ranking, gains: Mapping[Key, float], settings: RankingSettings) -> tuple[RankedCandidate, ...]:
     """All that was tried, round by round, the most probable first."""
     found = []
     for number, several in enumerate(ranking.rounds):
         for place, one in enumerate(several):
-            accepted = place == 0 and _accepts(several) and one.key in gains
+            accepted = place == 0 and _accepts(several, settings) and one.key in gains
             unseen = gains[one.key] if accepted else np.nan
             found.append(
                 RankedCandidate(

@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
-from vpm.discrepancy.candidates import Key
 from vpm.errors import VpmError
 from vpm.ranking.noise_model import NoiseModel, Parts, white_noise
 from vpm.ranking.observed import Observed, Observer
@@ -65,11 +64,6 @@ class Fitted:
     observer: Observer
     residual: Array
     cost: float
-
-    @property
-    def key(self) -> Key:
-        """Effect and site of what was added last."""
-        return self.structure.effects[-1]
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.catalogue import EFFECTS
-from vpm.identify.reuse import SPLITTING
+from vpm.discrepancy.candidates import Key
 from vpm.model import Effect
 from vpm.ranking.fit import ASTRAY, Fitted, Fitter, Followed, View, bounded_step
 from vpm.ranking.judgement import Judgement
@@ -58,32 +58,37 @@ class Look:
         left = min(float(np.sum((errors + slopes @ move) ** 2)), float(errors @ errors))
         return 0.5 * len(errors) * float(np.log(float(before @ before) / max(left, 1e-300)))
 
-    def judged(self, fitted: Fitted) -> Judgement:
-        """What another structure removes."""
+    @property
+    def needed(self) -> float:
+        """What an effect has to gain to be worth it, nats."""
+        samples = self.fitted.residual.shape[1] * sum(part.stop - part.start for part in self._fitter.observed.parts)
+        return float(-0.5 * samples * np.log1p(-self._fitter.settings.worth))
+
+    def has_room(self, removed: float = 0.0) -> bool:
+        """Whether any effect could still count if so much of what is left were removed before it."""
+        size, beside = (float(np.sqrt((1.0 - removed) / (power + 1.0))) for power in (self.explained, self.added))
+        return Judgement(1.0, 1.0, np.inf, size, beside, 1.0).counts(self._fitter.settings)
+
+    def judged(self, fitted: Fitted, key: Key) -> Judgement:
+        """What another structure removes by one of its effects."""
         observed, settings = self._fitter.observed, self._fitter.settings
         left = observed.squares(fitted.residual, self.sizes)
         shares = [1.0 - float(after.sum() / before.sum()) for after, before in zip(left, self.left, strict=True)]
         removed = max(1.0 - self._sum(left) / self._sum(self.left), 1e-12)
-        powers = (self.explained, self.added, self._curve(fitted))
+        powers = (self.explained, self.added, self._curve(key))
         sizes = (float(np.sqrt(removed / (power + removed))) for power in powers)
         return Judgement(removed, min(shares), _repeated(self.left[1], left[1], settings.pieces), *sizes)
 
-    def _curve(self, fitted: Fitted) -> float:
-        """What those effects of the model remove that show over the same states at the same place as the last one.
-
-        All that acts at a joint reaches a spring or play that splits it.
-        """
-        if not fitted.structure.effects:
-            return 0.0
-        name, site = fitted.structure.effects[-1]
+    def _curve(self, key: Key) -> float:
+        """What those effects of the model remove that show over the same states at the same place as another one."""
+        name, site = key
         states = set(EFFECTS[name].signature.lives_in)
         present = self.fitted.structure.model.effects
-        there = [one for one in present if one.at == site]
-        alike = [one for one in there if name in SPLITTING or states & set(one.type.signature.lives_in)]
-        key = tuple(f"{one.name} {one.side}" for one in alike)
-        if (site, *key) not in self._curves:
-            self._curves[site, *key] = self._removed(alike)
-        return self._curves[site, *key]
+        alike = [one for one in present if one.at == site and states & set(one.type.signature.lives_in)]
+        several = (site, *(f"{one.name} {one.side}" for one in alike))
+        if several not in self._curves:
+            self._curves[several] = self._removed(alike)
+        return self._curves[several]
 
     def _removed(self, effects: Collection[Effect]) -> float:
         """Error power that these effects of the model remove; none where the rest runs away from the records."""

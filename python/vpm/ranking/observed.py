@@ -64,7 +64,8 @@ class Observed:
 
     The observer knows no noise: each measured joint is drawn to its encoder with the bandwidth, as by a soft spring
     with a damper between the machine and its log. All structures are compared under the same one. Where a joint is
-    split, the encoder sits at the motor and the motor alone is drawn; the load follows through its spring or backlash.
+    split, what hangs behind its spring or backlash is drawn along with the motor: else both would answer to noise, and
+    to what is missing elsewhere, otherwise than a rigid joint does.
 
     Parameters
     ----------
@@ -205,12 +206,9 @@ def observer_gain(model: Model, channels: Sequence[str], band: float, dt: float,
         joint, _, quantity = channel.rpartition(".")
         if quantity != "position" or joint not in coordinates:
             continue
-        place, behind = coordinates.index(joint), model.joint_behind(joint)
+        place = coordinates.index(joint)
         moved = np.array([-np.expm1(-2.0 * DAMPING * turn), turn**2 / dt]) / _factor(model, channel, theta)
-        for row, share in zip((place, len(coordinates) + place), moved, strict=True):
-            gain[row, column] = share
-            if behind is not None:
-                gain[row - place + coordinates.index(behind), column] = -share
+        gain[[place, len(coordinates) + place], column] = moved
     return gain
 
 

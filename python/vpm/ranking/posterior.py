@@ -31,12 +31,11 @@ def probabilities(gains: Sequence[float], tempering: float) -> Array:
     return np.asarray(shares / np.sum(shares))
 
 
-def alike(one: Fitted, others: Sequence[Fitted], fitter: Fitter, noise: NoiseModel, nats: float) -> list[Fitted]:
-    """Those of the others that the records cannot tell from ``one`` under its noise model.
+def apart(one: Fitted, others: Sequence[Fitted], fitter: Fitter, noise: NoiseModel) -> list[float]:
+    """By how many nats, in the mean, the records decide between each of the others and ``one``, under its noise model.
 
     Law: where one of two models is exact, the logarithm of the ratio of their densities has half of its variance as
-    mean (Q. Vuong, *Econometrica* 57, 1989, for the variance). Below so many ``nats`` in the mean nobody can choose.
+    mean (Q. Vuong, *Econometrica* 57, 1989, for the variance). Below a nat or so nobody can choose.
     """
     mine = fitter.log_density(one, noise)
-    apart = [0.5 * len(mine) * float(np.var(fitter.log_density(other, noise) - mine)) for other in others]
-    return [other for other, far in zip(others, apart, strict=True) if far < nats]
+    return [0.5 * len(mine) * float(np.var(fitter.log_density(other, noise) - mine)) for other in others]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 from vpm.discrepancy.side_by_side import SideBySide
@@ -11,38 +10,32 @@ from vpm.ranking.look import Look
 from vpm.ranking.proposals import Proposal
 
 
-def raced(chosen: Sequence[Proposal], fitter: Fitter, each: SideBySide) -> list[tuple[Fitted, Proposal]]:
+def raced(chosen: Sequence[Proposal], look: Look, fitter: Fitter, each: SideBySide) -> list[Fitted]:
     """Fits of proposals that may win.
 
-    Of each look the most promising one is fitted first. Another one has to save a share of the cost that this one saved
-    (O. Maron and A. Moore, *Advances in Neural Information Processing Systems* 6, 1994: those that cannot win leave a
-    race early). The outcome does not depend on how many are fitted at a time.
+    Each has to gain what makes it worth while. The most promising one is fitted first, and another one has to save a
+    share of the cost that this one saved (O. Maron and A. Moore, *Advances in Neural Information Processing Systems* 6,
+    1994: those that cannot win leave a race early). The outcome does not depend on how many are fitted at a time.
 
     Parameters
     ----------
     chosen : sequence of Proposal
+    look : Look
+        What there is without them.
     fitter : Fitter
     each : SideBySide
     """
-    leaders: dict[Look, Proposal] = {}
-    for one in sorted(chosen, key=lambda one: -one.gain):
-        leaders.setdefault(one.look, one)
-    first = _fitted(list(leaders.values()), [math.inf] * len(leaders), fitter, each)
-    goals = {
-        one.look: one.look.fitted.cost - fitter.settings.share * max(one.look.fitted.cost - fitted.cost, 0.0)
-        for fitted, one in first
-    }
-    others = [one for one in chosen if leaders[one.look] is not one]
-    return first + _fitted(others, [goals.get(one.look, math.inf) for one in others], fitter, each)
+    ordered = sorted(chosen, key=lambda one: -one.gain)
+    first = _fitted(ordered[:1], look.needed, look, fitter, each)
+    saved = [look.fitted.cost - fitted.cost for fitted in first]
+    wanted = max([look.needed, *(fitter.settings.share * nats for nats in saved)])
+    return first + _fitted(ordered[1:], wanted, look, fitter, each)
 
 
-def _fitted(
-    several: Sequence[Proposal], goals: Sequence[float], fitter: Fitter, each: SideBySide
-) -> list[tuple[Fitted, Proposal]]:
-    def one_fitted(entry: tuple[Proposal, float]) -> Fitted:
-        one, goal = entry
-        return fitter.fitted(one.structure, one.look.fitted.observer, one.view, goal, one.residual)
+def _fitted(several: Sequence[Proposal], wanted: float, look: Look, fitter: Fitter, each: SideBySide) -> list[Fitted]:
+    def one_fitted(one: Proposal) -> Fitted:
+        view, residual = one.seen_in(look)
+        return fitter.fitted(one.structure, look.fitted.observer, view, look.fitted.cost - wanted, residual)
 
-    entries = list(zip(several, goals, strict=True))
-    ends = each("fitting", one_fitted, entries, lambda entry: " at ".join(entry[0].key))
-    return [(end, one) for end, one in zip(ends, several, strict=True) if isinstance(end, Fitted)]
+    ends = each("fitting", one_fitted, several, lambda one: " at ".join(one.structure.effects[-1]))
+    return [end for end in ends if isinstance(end, Fitted)]

@@ -17,12 +17,13 @@ from vpm.errors import DiagnosisError, VpmError
 from vpm.experiment import Experiment, as_records
 from vpm.identify import InverseDynamicsProblem
 from vpm.model import Model
+from vpm.ranking.extensions import Extensions
 from vpm.ranking.fit import ASTRAY, Fitted, Fitter, View
 from vpm.ranking.judgement import Judgement
 from vpm.ranking.look import Look
 from vpm.ranking.noise_model import fitted_noise
 from vpm.ranking.observed import Observed, Observer
-from vpm.ranking.posterior import alike, probabilities
+from vpm.ranking.posterior import apart, probabilities
 from vpm.ranking.proposals import proposals
 from vpm.ranking.race import raced
 from vpm.ranking.result import Ranked, Ranking
@@ -108,10 +109,18 @@ def rank(
 class _Trial:
     """An effect beside what was found, under one observer."""
 
+    key: Key
     fitted: Fitted
     look: Look
     judgement: Judgement
     evidence: float = float("nan")
+    rivals: tuple[str, ...] = ()
+
+    @classmethod
+    def of(cls, fitted: Fitted, look: Look, key: Key | None = None) -> _Trial:
+        """One of the effects of a structure, the last one if not told."""
+        key = key or fitted.structure.effects[-1]
+        return cls(key, fitted, look, look.judged(fitted, key))
 
     @property
     def left(self) -> float:
@@ -135,11 +144,12 @@ class _Search:
         self.names, self.settings, self.each, self.say = names, settings, each, say
         self.data = InverseDynamicsProblem(model, records)
         self.fitter = Fitter(Observed(model, records, settings, setup), settings)
-        self.sizes = Sizes(model, self.data)
+        self.extensions = Extensions(Sizes(model, self.data))
         firsts = self.fitter.observed.firsts.priors
         values = np.append(model.theta, np.zeros(len(firsts)))
         self.start = Structure(model, values, known(model, self.data) | firsts, firsts=tuple(firsts))
         self.first: dict[float, Look] = {}  # looks at the model as it was, by bandwidth
+        self.others: dict[Key, list[Structure]] = {}  # what counted as well when an effect came in
 
     def run(self, held_out: Observed) -> Ranking:
         """See `rank`."""
@@ -147,47 +157,58 @@ class _Search:
         looks = self._looks(self.start)
         self.first = {look.fitted.observer.band: look for look in looks}
         recalibrated = looks[0].fitted.structure.repaired
-        effects: list[Ranked] = []
+        named: dict[Key, Ranked] = {}
         rounds: list[tuple[Ranked, ...]] = []
         interrupted = False
         try:
-            while len(effects) < self.settings.effects:
+            while len(looks[0].fitted.structure.effects) < self.settings.effects:
                 best, tried = self._round(looks)
                 rounds.append(self._listed(best, tried))
                 if best is None:
                     break
-                effects.append(rounds[-1][0])
-                share = 100.0 * best.judgement.removed
-                self.say(f"{effects[-1].effect} at {effects[-1].site}: removes {share:.3g} % of the error power")
-                looks = self._looks(best.fitted.structure, best.fitted)
-                looks, needless = self._without_needless(looks)
-                effects = [one for one in effects if one.key not in needless]
+                named[best.key] = rounds[-1][0]
+                self.say(f"{_told(best)} removes {100.0 * best.judgement.removed:.3g} % of the error power")
+                looks = [self._look(best.fitted)]  # known, should the next fits be interrupted
+                looks = self._all_looks(looks[0])
+                for key in looks[0].fitted.structure.effects[:-1]:
+                    looks, several = self._reconsidered(key, looks)
+                    if several:
+                        rounds.append(several)
+                        named[several[0].key] = several[0]
         except KeyboardInterrupt:
             interrupted = True
         found = looks[0].fitted.structure
         stages = (self.start.model, recalibrated, found.repaired)
         left = gaps(held_out, stages, self.settings.bands[0])
-        effects = [replace(one, side=found.side(one.key)) for one in effects]
-        return Ranking(tuple(effects), tuple(rounds), found.repaired, recalibrated, left, interrupted)
+        effects = tuple(replace(named[key], side=found.side(key)) for key in found.effects)
+        return Ranking(effects, tuple(rounds), found.repaired, recalibrated, left, interrupted)
 
-    def _looks(self, structure: Structure, fitted: Fitted | None = None) -> list[Look]:
-        """A structure under each observer that can follow it, that under which it was ``fitted`` first.
+    def _looks(self, structure: Structure) -> list[Look]:
+        """A structure under each observer that can follow it.
 
         Raises
         ------
         VpmError
             None of them can.
         """
-        looks = [] if fitted is None else [self._look(fitted)]
+        looks = []
         reason: Exception = VpmError(f"{structure.model.name} runs away from the records")
         for band in self.settings.bands:
-            if fitted is None or band != fitted.observer.band:
-                try:
-                    looks.append(self._look(self._fitted(structure, Observer(band))))
-                except ASTRAY as error:  # a slow observer may lose what hangs behind a contact
-                    reason = error
+            try:
+                looks.append(self._look(self._fitted(structure, Observer(band))))
+            except ASTRAY as error:  # a slow observer may lose what hangs behind a contact
+                reason = error
         if not looks:
             raise reason
+        return looks
+
+    def _all_looks(self, look: Look) -> list[Look]:
+        """A look, then those at the same structure under the other observers that can follow it."""
+        looks = [look]
+        for band in self.settings.bands:
+            if band != look.fitted.observer.band:
+                with contextlib.suppress(*ASTRAY):
+                    looks.append(self._look(self._fitted(look.fitted.structure, Observer(band))))
         return looks
 
     def _look(self, fitted: Fitted) -> Look:
@@ -200,24 +221,42 @@ class _Search:
 
     def _round(self, looks: Sequence[Look]) -> tuple[_Trial | None, list[_Trial]]:
         """The best effect more, if one counts, and all that were tried."""
-        chosen = proposals(looks, self.fitter, self.data, self.sizes, self.each, self.names)
-        fits = raced(chosen, self.fitter, self.each)
-        tried = [_Trial(fitted, one.look, one.look.judged(fitted)) for fitted, one in fits]
-        counting = [trial for trial in self._finished(tried) if self._counts(trial)]
-        if not counting:
-            return None, tried
+        tried: list[_Trial] = []
+        counting: list[_Trial] = []
+        for look in (look for look in looks if look.has_room()):
+            seen = self._tried(look)
+            tried += seen
+            counting += [trial for trial in self._finished(seen) if self._counts(trial)]
+            if any(not trial.look.has_room(trial.judgement.removed) for trial in counting):
+                break  # nothing could be missing beside it
+        told: list[_Trial] = []
+        while counting:
+            weighed = self._weighed(self._chosen(counting))
+            if weighed[0].evidence > self.settings.odds:
+                self.others[weighed[0].key] = [trial.fitted.structure for trial in weighed[1:]]
+                return weighed[0], weighed + told + tried
+            # It leaves less error because it answers to noise otherwise; no sample is more probable by it.
+            told.append(weighed[0])
+            counting = [trial for trial in counting if trial.fitted is not weighed[0].fitted]
+        return None, told + tried
+
+    def _chosen(self, counting: Sequence[_Trial]) -> list[_Trial]:
+        """The best of those that count, then one trial of each other effect under the same observer."""
         first = min(counting, key=lambda trial: trial.left)
-        equal = [trial for trial in counting if trial.look is first.look and self._as_good(trial, first)]
-        best = min(equal, key=_plainness)
-        several = {best.fitted.key: best}
-        for trial in sorted(counting, key=lambda trial: trial.left):
-            if trial.look is best.look:
-                several.setdefault(trial.fitted.key, trial)
-        weighed = self._weighed(list(several.values()))
-        return weighed[0], weighed + tried
+        here = sorted((trial for trial in counting if trial.look is first.look), key=lambda trial: trial.left)
+        best = min((trial for trial in here if self._as_good(trial, first)), key=_plainness)
+        several = {best.key: best}
+        for trial in here:
+            several.setdefault(trial.key, trial)
+        return list(several.values())
+
+    def _tried(self, look: Look) -> list[_Trial]:
+        """The most promising effects, fitted under one observer."""
+        chosen = proposals(look, self.fitter, self.data, self.extensions, self.each, self.names)
+        return [_Trial.of(fitted, look) for fitted in raced(chosen, look, self.fitter, self.each)]
 
     def _counts(self, trial: _Trial) -> bool:
-        return trial.fitted.structure.within_excitation and trial.judgement.counts(self.settings)
+        return trial.fitted.structure.shows(trial.key) and trial.judgement.counts(self.settings)
 
     def _as_good(self, trial: _Trial, first: _Trial) -> bool:
         """Whether it leaves no more than what the laws of the curves that either is a part of are wrong by."""
@@ -225,42 +264,71 @@ class _Search:
         return trial.left - first.left < max(one.removed * (self.settings.inexact / one.shape) ** 2 for one in told)
 
     def _finished(self, tried: Sequence[_Trial]) -> list[_Trial]:
-        """Those that count and leave little, fitted to the end."""
-        counting = [trial for trial in tried if self._counts(trial)]
-        best: dict[Look, _Trial] = {}
-        for trial in sorted(counting, key=lambda trial: trial.left):
-            best.setdefault(trial.look, trial)
-        hopeful = [
-            trial
-            for trial in counting
-            if trial.left <= self.settings.finished * best[trial.look].left or self._as_good(trial, best[trial.look])
-        ]
+        """Those of one observer that are worth it and leave little, fitted to the end."""
+        worth = [t for t in tried if t.judgement.removed > self.settings.worth and t.fitted.structure.shows(t.key)]
+        if not worth:
+            return []
+        best = min(worth, key=lambda trial: trial.left)
+        most = self.settings.finished * best.left
+        hopeful = [trial for trial in worth if trial.left <= most or self._as_good(trial, best)]
 
         def one_finished(trial: _Trial) -> _Trial:
             fitted = self.fitter.finished(trial.fitted, View(trial.look.view.noise))
-            return replace(trial, fitted=fitted, judgement=trial.look.judged(fitted))
+            return _Trial.of(fitted, trial.look)
 
-        ends = self.each("finishing", one_finished, hopeful, lambda trial: " at ".join(trial.fitted.key))
+        ends = self.each("finishing", one_finished, hopeful, _told)
         return [end for end in ends if isinstance(end, _Trial)]
 
     def _weighed(self, trials: Sequence[_Trial]) -> list[_Trial]:
-        """With the evidence that each adds, under the noise model of the first."""
-        observed = self.fitter.observed
-        noise = fitted_noise(trials[0].fitted.residual, observed.parts, self.settings.order)
-        without = self.fitter.evidence(trials[0].look.fitted, noise)
-        return [replace(trial, evidence=self.fitter.evidence(trial.fitted, noise) - without) for trial in trials]
+        """With the evidence that each adds under the noise model of the first, and what nobody can tell from that.
 
-    def _without_needless(self, looks: list[Look]) -> tuple[list[Look], list[Key]]:
-        """Without those of the earlier effects that a later one has made needless."""
-        needless: list[Key] = []
-        for key in looks[0].fitted.structure.effects[:-1]:
-            with contextlib.suppress(*ASTRAY):  # it runs away without, or another one rests on it
-                without = self._fitted(looks[0].fitted.structure.without(key), looks[0].fitted.observer)
-                if not self._look(without).judged(looks[0].fitted).counts(self.settings):
-                    looks = self._looks(without.structure, without)
-                    needless.append(key)
-                    self.say(f"no longer needed: {' at '.join(key)}")
-        return looks, needless
+        Of these a part of the machine comes before an instrument, and then what is most probable.
+        """
+        observed, first = self.fitter.observed, trials[0]
+        noise = fitted_noise(first.fitted.residual, observed.parts, self.settings.order)
+        without = self.fitter.evidence(first.look.fitted, noise)
+        weighed = [replace(trial, evidence=self.fitter.evidence(trial.fitted, noise) - without) for trial in trials]
+        nats = apart(first.fitted, [trial.fitted for trial in trials], self.fitter, noise)
+        alike = [trial for trial, far in zip(weighed, nats, strict=True) if far < self.settings.same]
+        best = min(alike, key=lambda trial: (_is_instrument(trial), -trial.evidence))
+        rivals = tuple(_told(trial) for trial in alike if trial is not best)
+        return [replace(best, rivals=rivals), *(trial for trial in weighed if trial is not best)]
+
+    def _reconsidered(self, key: Key, looks: list[Look]) -> tuple[list[Look], tuple[Ranked, ...]]:
+        """Without an earlier effect that a later one has made needless, or with a better one in its place.
+
+        What was found before the others came in was fitted to what they leave, too.
+        """
+        whole = looks[0].fitted
+        try:
+            look = self._look(self._fitted(whole.structure.without(key), whole.observer))
+        except ASTRAY:  # it runs away without, or another one rests on it
+            return looks, ()
+        now = _Trial.of(whole, look, key)
+        trials = [now, *self._in_its_place(look, self.others.get(key, ()))]
+        counting = [trial for trial in trials if self._counts(trial)]
+        if not counting:
+            self.say(f"no longer needed: {' at '.join(key)}")
+            return self._all_looks(look), ()
+        chosen = self._chosen(counting)
+        if chosen[0] is now:
+            return looks, ()
+        weighed = self._weighed(chosen)
+        if weighed[0].key == key:
+            return looks, ()
+        self.say(f"{_told(weighed[0])} does better than {' at '.join(key)}")
+        return self._all_looks(self._look(weighed[0].fitted)), self._listed(weighed[0], weighed)
+
+    def _in_its_place(self, look: Look, others: Sequence[Structure]) -> list[_Trial]:
+        """The last effects of other structures here; those that leave little, fitted to the end."""
+
+        def one_fitted(other: Structure) -> _Trial:
+            structure, view = look.fitted.structure.with_last_of(other), View(look.view.noise)
+            fitted = self.fitter.fitted(structure, look.fitted.observer, view)
+            return _Trial.of(fitted, look)
+
+        ends = self.each("exchanging", one_fitted, others, lambda other: " at ".join(other.effects[-1]))
+        return self._finished([end for end in ends if isinstance(end, _Trial)])
 
     def _listed(self, best: _Trial | None, tried: Sequence[_Trial]) -> tuple[Ranked, ...]:
         """All effects that were tried, what was added first, then those that leave least."""
@@ -271,37 +339,35 @@ class _Search:
         for trial in sorted(tried, key=lambda trial: (trial is not best, trial.left)):
             ranked = self._ranked(trial, probability.get(id(trial), np.nan))
             several.setdefault(ranked.key, ranked)
-        listed = tuple(several.values())
-        if best is None:
-            return listed
-        return (replace(listed[0], rivals=self._rivals(best, weighed)), *listed[1:])
-
-    def _rivals(self, best: _Trial, weighed: Sequence[_Trial]) -> tuple[str, ...]:
-        """Effects that the records cannot tell from the best."""
-        noise = fitted_noise(best.fitted.residual, self.fitter.observed.parts, self.settings.order)
-        others = [trial.fitted for trial in weighed if trial.fitted.key != best.fitted.key]
-        close = alike(best.fitted, others, self.fitter, noise, self.settings.same)
-        return tuple(dict.fromkeys(" at ".join(one.key) for one in close))
+        return tuple(several.values())
 
     def _ranked(self, trial: _Trial, probability: float) -> Ranked:
         structure, without = trial.fitted.structure, trial.look.fitted.structure
         values = {name: value for name, value in structure.values.items() if name not in without.priors}
-        side, band = structure.side(trial.fitted.key), trial.fitted.observer.band
+        side, band = structure.side(trial.key), trial.fitted.observer.band
         return Ranked(
-            *trial.fitted.key,
+            *trial.key,
             values,
             trial.judgement,
             band,
             side,
             trial.evidence,
             probability,
+            trial.rivals,
         )
 
 
-def _plainness(trial: _Trial) -> tuple[bool, int, float]:
+def _told(trial: _Trial) -> str:
+    return " at ".join(trial.key)
+
+
+def _is_instrument(trial: _Trial) -> bool:
+    return EFFECTS[trial.key[0]].site == "sensor"
+
+
+def _plainness(trial: _Trial) -> tuple[bool, int]:
     """Orders what removes the same: the machine before its instruments, then fewer numbers."""
-    name, _ = trial.fitted.key
-    return EFFECTS[name].site == "sensor", len(trial.fitted.structure.priors), trial.left
+    return _is_instrument(trial), len(trial.fitted.structure.priors)
 
 
 def known(model: Model, data: InverseDynamicsProblem) -> dict[str, Prior]:

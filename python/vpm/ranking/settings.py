@@ -33,10 +33,8 @@ class Settings:
         Standard deviations between pieces by which that differs from nothing.
     seats : int
         Effects that do nothing at their start, that are fitted under each observer.
-    least : float
-        Gain that a step has to predict, nats, for such an effect to be fitted.
     starts : int
-        Start values that are fitted, of those that were screened, of an effect that is there at its start already.
+        Start values that are fitted, of those that were screened, of each effect.
     finished : float
         Effects that leave up to so many times the error power of the best, or no more than laws are wrong by, are
         fitted to the end.
@@ -74,7 +72,6 @@ class Settings:
     worth: float = 0.06
     score: float = 3.0
     seats: int = 8
-    least: float = 4.0
     starts: int = 3
     finished: float = 2.5
     turns: int = 3

@@ -6,24 +6,25 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from vpm.discrepancy.candidates import Candidate
+from vpm.discrepancy.place import ANYWHERE
 from vpm.discrepancy.structural import moved
 from vpm.model import Model
 from vpm.ranking.sizes import Sizes
 
 #: Share of its force by which a stop is stronger against the fastest impact, to begin with.
 LOSS = 0.1
-#: How sharply a law bends: a detail that need not be seen.
-DETAILS = frozenset({"transition_velocity", "width"})
+#: Where a place that may lie anywhere begins, as multiples of half of the way that is seen, from its middle.
+PLACES = (0.0, -2.0, 2.0, -8.0, 8.0)
 
 
 def started(candidate: Candidate, model: Model, sizes: Sizes) -> Candidate:
     """A candidate whose contacts begin closed and stiff, where a fit can see them, and whose waves may be long."""
-    ends = {name: pair for name, pair in candidate.bounds.items() if name not in DETAILS}
+    ends = dict(candidate.bounds)
     if "period" in ends and candidate.site in sizes.ways:
         # One wave on all of the way that is seen: a longer one is a slope.
         (low, high), (first, last) = ends["period"], sizes.ways[candidate.site]
         ends["period"] = low, max(high, last - first)
-    candidate = replace(candidate, bounds=ends)
+    candidate = _placed(replace(candidate, bounds=ends), sizes)
     if candidate.effect.name == "backlash":
         return replace(candidate, starts=tuple(_backlash(start) for start in candidate.starts), fixed=())
     if candidate.effect.name == "end_stop":
@@ -31,6 +32,21 @@ def started(candidate: Candidate, model: Model, sizes: Sizes) -> Candidate:
         starts = tuple(_stop(start, candidate.site, model, sizes) for start in candidate.starts if seen)
         return replace(candidate, starts=starts, neutral=False)
     return candidate
+
+
+def _placed(candidate: Candidate, sizes: Sizes) -> Candidate:
+    """With several starts of its place where an effect has one that may lie anywhere, such as where a spring rests.
+
+    An effect without size does not feel its place, so that a first step gives it a size and leaves the place: a spring
+    that rests far away pulls nearly the same everywhere.
+    """
+    anywhere = [one.name for one in candidate.effect.parameters if one.shape and tuple(one.physical) == ANYWHERE]
+    if not candidate.neutral or len(anywhere) != 1 or len(candidate.starts) != 1 or candidate.site not in sizes.ways:
+        return candidate
+    (start,), (place,) = candidate.starts, anywhere
+    low, high = sizes.ways[candidate.site]
+    starts = tuple({**start, place: 0.5 * (low + high + share * (high - low))} for share in PLACES)
+    return replace(candidate, starts=starts)
 
 
 def _backlash(start: Mapping[str, float]) -> Mapping[str, float]:

@@ -55,11 +55,11 @@ class Structure:
             return self.model.index(name)
         return len(self.model.theta) + self.firsts.index(name)
 
-    @property
-    def within_excitation(self) -> bool:
-        """Whether each of its shapes lies inside of what the records can show."""
-        pairs = [(self.priors[name], float(self.theta[self.model.index(name)])) for name in self.range_limited]
-        return all(prior.low < value < prior.high for prior, value in pairs)
+    def shows(self, key: Key) -> bool:
+        """Whether each shape of an effect lies inside of what the records can show."""
+        own = set(self.model.effect(*key, self.side(key)).parameter_names.values())
+        values = {name: float(self.theta[self.model.index(name)]) for name in self.range_limited if name in own}
+        return all(self.priors[name].low < value < self.priors[name].high for name, value in values.items())
 
     @cached_property
     def columns(self) -> list[int]:
@@ -149,3 +149,20 @@ class Structure:
         """
         rest = self.carried(self.model.without_effect(*key, self.side(key)))
         return replace(rest, effects=tuple(effect for effect in self.effects if effect != key))
+
+    def with_last_of(self, other: Structure) -> Structure:
+        """The same with the last effect of another structure, as it is there.
+
+        Raises
+        ------
+        VpmError
+            It cannot stand here.
+        """
+        key = (name, site) = other.effects[-1]
+        there = other.model.effect(name, site, other.side(key))
+        values = {short: float(other.theta[other.model.index(own)]) for short, own in there.parameter_names.items()}
+        carried = self.carried(self.model.with_effect(name, site, side=there.side, **values))
+        own = set(there.parameter_names.values()) - set(self.model.parameters)
+        priors = {**carried.priors, **{name: prior for name, prior in other.priors.items() if name in own}}
+        limited = (*carried.range_limited, *(name for name in other.range_limited if name in own))
+        return replace(carried, priors=priors, effects=(*self.effects, key), range_limited=limited)
