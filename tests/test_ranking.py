@@ -11,7 +11,7 @@ from scipy.stats import norm
 from scipy.stats import t as student
 
 import vpm
-from sledge import MASS, OIL, READING, SEEN, SLEDGE, pushed
+from sledge import GAIN, MASS, OIL, READING, SEEN, SLEDGE, pushed
 from vpm.errors import DiagnosisError, ExperimentError
 from vpm.experiment import Experiment
 from vpm.model import Model
@@ -186,6 +186,67 @@ def test_no_effect_comes_in_that_makes_no_sample_more_probable() -> None:
     (told,) = (one for one in ranking.rounds[0] if np.isfinite(one.evidence))
     assert told.judgement.counts(strict)
     assert 0.0 < told.evidence < strict.odds
+
+
+def swung(seed: int) -> Experiment:
+    """The sledge from rest under a force that is read and not sent: ``m v' = f sin wt - c v``, summed over three w."""
+    random, time = np.random.default_rng(seed), 5e-3 * np.arange(1200)
+    command, place = np.zeros_like(time), np.zeros_like(time)
+    for turn in random.uniform((2.0, 6.0, 20.0), (4.0, 12.0, 40.0)):
+        force, slow = 5.0 * GAIN, MASS * turn
+        decay = MASS / OIL * -np.expm1(-OIL / MASS * time)
+        swing = OIL / turn * (1.0 - np.cos(turn * time)) - MASS * np.sin(turn * time) + slow * decay
+        command += 5.0 * np.sin(turn * time)
+        place += force / (OIL**2 + slow**2) * swing
+    readings = place + READING * random.standard_normal(len(time))
+    channels = {"motor.command": command, "way.position": readings}
+    return Experiment.from_arrays(time, channels, model=Model.from_toml(SLEDGE), name=f"swing {seed}")
+
+
+def test_commands_that_were_read_and_not_sent_hide_no_effect() -> None:
+    """Held for a sample they come half a sample late, which a spring in the drive takes back in part."""
+    model, effects = Model.from_toml(SLEDGE), ["joint_compliance", "actuator_lag"]
+    ranking = vpm.rank(model, swung(1), swung(2), effects=effects)
+    assert ranking.effects == ()
+    assert ranking.hold == "first_order"
+    assert ranking.model.parameters["sledge.mass"].value == pytest.approx(MASS, rel=4e-3)
+    stated = vpm.rank(model, swung(1), swung(2), effects=effects, setup=vpm.Setup())
+    assert stated.hold == "zero_order"
+    assert stated.gaps["way.position"].before > 5.0 * ranking.gaps["way.position"].after
+    assert vpm.rank(model, pushed(seed=1, duration=2.0), effects=[]).hold == "zero_order"
+
+
+#: A rod without a mass to speak of, that a press moves through a damper.
+ROD = """
+name = "rod"
+gravity = [0, 0, 0]
+[bodies.rod]
+mass = 1e-3
+[joints.way]
+type = "prismatic"
+parent = "world"
+child = "rod"
+axis = [1, 0, 0]
+[actuators.press]
+joint = "way"
+gain = 1.0
+[[effects]]
+type = "viscous_friction"
+at = "way"
+viscous = { value = 1000.0, uncertainty = 10000.0, min = 0.0 }
+"""
+
+
+def test_dry_friction_is_seen_where_nothing_has_inertia() -> None:
+    """Without its oil the rod flies off; that is no measure of what its effects do."""
+    model, time = Model.from_toml(ROD), 5e-3 * np.arange(2400)
+    place, speed = 0.02 * np.sin(2.0 * time), 0.04 * np.cos(2.0 * time)
+    force = 2e4 * speed + 300.0 * np.tanh(speed / 2e-3)
+    record = Experiment.from_arrays(time, {"press.command": force, "way.position": place}, model=model, name="press")
+    ranking = vpm.rank(model, record, effects=["coulomb_friction"])
+    assert [one.effect for one in ranking.effects] == ["coulomb_friction"]
+    assert ranking.model.parameters["way.friction.coulomb"].value == pytest.approx(300.0, rel=0.05)
+    assert ranking.model.parameters["way.friction.viscous"].value == pytest.approx(2e4, rel=0.02)
 
 
 def test_what_a_validation_record_lacks_is_said_before_the_search() -> None:

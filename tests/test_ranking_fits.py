@@ -21,7 +21,7 @@ from vpm.ranking.extensions import Extensions
 from vpm.ranking.fit import Fitter, View, by_secant
 from vpm.ranking.look import Look
 from vpm.ranking.observed import Observed, Observer
-from vpm.ranking.proposals import proposals
+from vpm.ranking.proposals import Proposal, _seated, proposals
 from vpm.ranking.settings import Settings
 from vpm.ranking.sizes import Sizes
 from vpm.ranking.starts import started
@@ -264,6 +264,20 @@ def test_an_effect_takes_the_place_of_another_one_as_it_was_fitted() -> None:
     stuck = both.at(np.where(np.array(list(both.priors)) == name, both.ends[:, 0], both.standard))
     assert not stuck.shows(("input_delay", "motor"))
     assert stuck.shows(("coulomb_friction", "way"))
+
+
+def test_seats_go_to_starts_that_promise_a_gain() -> None:
+    """What is there at its start already has one fit in any case."""
+    structure = structure_of(Model.from_toml(SLEDGE))
+
+    def one(name: str, gain: float, neutral: bool) -> Proposal:
+        return Proposal(replace(structure, effects=((name, "way"),)), gain, neutral)
+
+    ordered = [one("spring", 90.0, True), one("backlash", 80.0, False), one("spring", 70.0, True)]
+    ordered += [one("bias_force", 60.0, True), one("backlash", 9.0, False), one("hysteresis", 8.0, True)]
+    ordered += [one("end_stop", -50.0, False), one("end_stop", -60.0, False)]
+    seated = [(each.key[0], each.gain) for each in _seated(ordered, 10.0, Settings(seats=1))]
+    assert seated == [("spring", 90.0), ("spring", 70.0), ("backlash", 80.0), ("end_stop", -50.0)]
 
 
 def test_a_split_joint_has_inverse_dynamics_without_what_remembers() -> None:

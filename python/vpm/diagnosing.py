@@ -287,7 +287,7 @@ def _ranked(
             data.training.experiments,
             effects=effects,
             settings=settings,
-            setup=setup,
+            setup=setup or Setup(),
             workers=each.workers,
             tell=tell,
             progress=each.progress,

@@ -10,7 +10,6 @@ import typer
 
 from vpm.command import (
     Channels,
-    Hold,
     Integrator,
     Interpolate,
     Logs,
@@ -37,6 +36,13 @@ Validate = Annotated[
     list[Path] | None, typer.Option(help="Record that decides nothing; the gap is told on it; repeat.")
 ]
 Most = Annotated[int, typer.Option(min=1, help="Most effects to add.")]
+RankedHold = Annotated[
+    str | None,
+    typer.Option(
+        help="What commands do between samples: zero_order (sent by a controller), first_order or cubic (read back); "
+        "found from the logs where neither this nor the integrator is given."
+    ),
+]
 Out = Annotated[Path | None, typer.Option(help="Write the model with what was found to this file (TOML).")]
 
 
@@ -49,7 +55,7 @@ def rank(
     channels: Channels = None,
     interpolate: Interpolate = False,
     integrator: Integrator = "auto",
-    hold: Hold = "zero_order",
+    hold: RankedHold = None,
     workers: Workers = 0,
 ) -> None:
     """Order what a model could be missing by what it removes of the error, and add the best for as long as it counts.
@@ -59,6 +65,7 @@ def rank(
     from vpm.ranking import Settings
     from vpm.ranking import rank as ranked
     from vpm.simulate import Setup
+    from vpm.simulate.setup import HOLDS
 
     machine, records = load_all(model, logs, channels, interpolate)
     held_out = [load_record(path, machine, channels, interpolate) for path in validate or []]
@@ -68,7 +75,7 @@ def rank(
             records,
             held_out,
             settings=Settings(effects=most),
-            setup=Setup(integrator, hold=hold),
+            setup=None if hold is None and integrator == "auto" else Setup(integrator, hold=hold or HOLDS[0]),
             workers=workers or None,
             tell=tell,
             progress=each,
@@ -83,6 +90,8 @@ def lines_of(ranking: Ranking) -> Iterator[str]:
     """A ranking in lines: what was added, what was next, the gap on validation records."""
     if ranking.interrupted:
         yield "stopped before all was tried: this is what was known until then"
+    if ranking.hold != "zero_order":
+        yield f"commands run from sample to sample ({ranking.hold}); simulate with this hold too"
     if not ranking.effects:
         yield f"{ranking.model.name}: no effect removes enough of the error to be added"
     for number, one in enumerate(ranking.effects, 1):

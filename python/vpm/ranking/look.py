@@ -69,13 +69,13 @@ class Look:
         size, beside = (float(np.sqrt((1.0 - removed) / (power + 1.0))) for power in (self.explained, self.added))
         return Judgement(1.0, 1.0, np.inf, size, beside, 1.0).counts(self._fitter.settings)
 
-    def judged(self, fitted: Fitted, key: Key) -> Judgement:
-        """What another structure removes by one of its effects."""
+    def judged(self, fitted: Fitted, key: Key | None = None) -> Judgement:
+        """What another structure removes by one of its effects, or by what is none."""
         observed, settings = self._fitter.observed, self._fitter.settings
         left = observed.squares(fitted.residual, self.sizes)
         shares = [1.0 - float(after.sum() / before.sum()) for after, before in zip(left, self.left, strict=True)]
         removed = max(1.0 - self._sum(left) / self._sum(self.left), 1e-12)
-        powers = (self.explained, self.added, self._curve(key))
+        powers = (self.explained, self.added, 0.0 if key is None else self._curve(key))
         sizes = (float(np.sqrt(removed / (power + removed))) for power in powers)
         return Judgement(removed, min(shares), _repeated(self.left[1], left[1], settings.pieces), *sizes)
 
@@ -91,11 +91,15 @@ class Look:
         return self._curves[several]
 
     def _removed(self, effects: Collection[Effect]) -> float:
-        """Error power that these effects of the model remove; none where the rest runs away from the records."""
+        """Error power that these effects of the model remove; none where the rest runs away from the records.
+
+        No more than that of the motion itself: a rod without mass and friction is carried off by any force.
+        """
         if effects:
             with contextlib.suppress(*ASTRAY):
                 bare = self.coarse.structure.bare(effects)
-                return self._beside(self._fitter.followed(bare, self.fitted.observer.coarse, ()).residual)
+                left = self._fitter.followed(bare, self.fitted.observer.coarse, ()).residual
+                return min(self._beside(left), self._beside(self._fitter.observed.motion))
         return 0.0
 
     def _beside(self, residual: Array) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 from weakref import WeakKeyDictionary
@@ -92,6 +92,12 @@ class Observed:
         self.parts: Parts = [slice(int(first), int(last - HELD_BACK * (last - first))) for first, last in pairs]
         self.held_back: Parts = [slice(int(last - HELD_BACK * (last - first)), int(last)) for first, last in pairs]
 
+    def with_hold(self, hold: str) -> Observed:
+        """The same with commands that do this between samples."""
+        if hold == self.setup.hold:
+            return self
+        return Observed(self.model, self.experiments, self.settings, replace(self.setup, hold=hold))
+
     @cached_property
     def firsts(self) -> Firsts:
         """First states that nobody measures, as far as the model moves them; none where it runs away."""
@@ -107,6 +113,11 @@ class Observed:
         sizes = np.std(motion[:, [self.model.state_names.index(state) for state in states]], axis=0)
         moving = [(state, float(size)) for state, size in zip(states, sizes, strict=True) if 0.0 < size < np.inf]
         return Firsts(tuple(state for state, _ in moving), tuple(size for _, size in moving), len(self.records))
+
+    @cached_property
+    def motion(self) -> Array:
+        """What a model that never moves leaves of the records (N, m): readings less their means."""
+        return np.concatenate([record.readings - np.mean(record.readings, axis=0) for record in self.records])
 
     def follow(
         self, model: Model, theta: Array, observer: Observer, columns: Sequence[int] = ()

@@ -77,9 +77,7 @@ def proposals(
         lambda item: f"{item[0].label}, {look.fitted.observer.label}",
     )
     ordered = sorted((one for one in screened if not isinstance(one, Failure)), key=lambda one: -one.gain)
-    least = look.needed / fitter.settings.patience
-    seated = _seated([one for one in ordered if one.neutral and one.gain >= least], fitter.settings)
-    return seated + _few_starts([one for one in ordered if not one.neutral], fitter.settings)
+    return _seated(ordered, look.needed / fitter.settings.patience, fitter.settings)
 
 
 def _screened(
@@ -100,17 +98,17 @@ def _screened(
     return Proposal(structure, look.predicted_gain(followed), candidate.neutral)
 
 
-def _seated(screened: Sequence[Proposal], settings: Settings) -> list[Proposal]:
-    """The best starts of each of the best effects, of which a step of a fit says well what they are good for."""
-    taken = _few_starts(screened, settings)
-    seats = list(dict.fromkeys(proposal.key for proposal in screened))[: settings.seats]
-    return [proposal for proposal in taken if proposal.key in seats]
+def _seated(ordered: Sequence[Proposal], promising: float, settings: Settings) -> list[Proposal]:
+    """The few best starts of each effect that promise a gain, for as many effects as there are seats.
 
-
-def _few_starts(screened: Sequence[Proposal], settings: Settings) -> list[Proposal]:
-    """The best starts of each effect: where one has several, a step says little of where it ends."""
-    taken: dict[Key, list[Proposal]] = defaultdict(list)
-    for proposal in screened:
-        if len(taken[proposal.key]) < settings.starts:
-            taken[proposal.key].append(proposal)
-    return [proposal for several in taken.values() for proposal in several]
+    An effect that is there at its start already has one fit in any case: a step may say little of where it ends.
+    """
+    seated: dict[Key, list[Proposal]] = defaultdict(list)
+    for proposal in ordered:
+        several = seated[proposal.key]
+        first = not several and not proposal.neutral
+        if first or (proposal.gain >= promising and len(several) < settings.starts):
+            several.append(proposal)
+    neutral = [several for several in seated.values() if several and several[0].neutral][: settings.seats]
+    others = [several for several in seated.values() if several and not several[0].neutral]
+    return [proposal for several in neutral + others for proposal in several]

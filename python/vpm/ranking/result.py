@@ -9,6 +9,7 @@ from vpm.catalogue.kinds import Side, in_words
 from vpm.model import Model
 from vpm.ranking.judgement import Judgement
 from vpm.results import Result, Storable
+from vpm.simulate.setup import HOLDS
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -90,6 +91,8 @@ class Ranking(Result):
         By channel, on records that decided nothing; empty if there are none.
     interrupted : bool
         Ctrl-C ended the search: there may be more.
+    hold : str
+        What commands were taken to do between samples, see `Setup.hold`; pass it on to simulate the model.
     """
 
     effects: tuple[Ranked, ...]
@@ -98,6 +101,7 @@ class Ranking(Result):
     recalibrated: Model
     gaps: dict[str, Gap] = field(default_factory=dict)
     interrupted: bool = False
+    hold: str = HOLDS[0]
 
     def _headline(self) -> Mapping[str, object]:
         return {f"{one.effect} at {one.place}": one.judgement.removed for one in self.effects} or {"effects": "none"}

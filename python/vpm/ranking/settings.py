@@ -66,7 +66,7 @@ class Settings:
     longest_step: float = 6e-4
     settling: float = 0.5
     pieces: int = 20
-    inexact: float = 0.02
+    inexact: float = 0.01
     slight: float = 0.003
     second: float = 0.05
     worth: float = 0.06
