@@ -1,4 +1,4 @@
-"""What is known of the parameters of an effect before the records: natural sizes, read off the records."""
+"""What is known of parameters before the fit: as the model file says, and in natural sizes read off the records."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.catalogue import EffectParameter
-from vpm.discrepancy.candidates import Candidate
+from vpm.discrepancy.candidates import Candidate, slow_speeds
 from vpm.identify import InverseDynamicsProblem
 from vpm.model import Model
 from vpm.weighing.priors import FACTOR, NATURAL, NEAR, SHARE, Prior, natural_sizes
@@ -79,3 +79,25 @@ class Sizes:
 
 def _strength(values: Array) -> float:
     return float(np.sqrt(np.mean(values**2)))
+
+
+def known(model: Model, data: InverseDynamicsProblem) -> dict[str, Prior]:
+    """What the model file says of its parameters, and the speeds at which its dry friction turns round.
+
+    Nobody knows these, and a wrong one leaves a gap at every reversal, where the finer effects live.
+    """
+    priors = {
+        p.name: Prior(p.value, p.uncertainty, p.minimum, p.maximum)
+        for p in model.parameters.values()
+        if p.adjustable and p.uncertainty and np.isfinite(p.uncertainty)
+    }
+    for effect in model.effects:
+        name = effect.parameter_names.get("transition_velocity")
+        if name is None or name in priors or effect.at not in data.joints:
+            continue
+        joint = data.joints.index(effect.at)
+        speeds = np.concatenate([np.abs(data.state(record)[1][:, joint]) for record in range(len(data.motions))])
+        low, high = slow_speeds(float(np.quantile(speeds, 0.999)))
+        spread = 0.25 * float(np.log(high / low))
+        priors[name] = Prior(float(np.sqrt(low * high)), spread, low, high, logarithmic=True)
+    return priors
