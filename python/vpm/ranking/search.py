@@ -70,8 +70,10 @@ class Search:
             for _ in range(2 * self.settings.effects):  # effects may replace each other, but not for ever
                 if len(looks[0].fitted.structure.effects) == self.settings.effects:
                     break
-                looks = self._held(looks)
                 best, tried = self._round(looks)
+                if smooth := self._held(looks, best):
+                    looks = smooth
+                    continue
                 rounds.append(self._listed(best, tried))
                 if best is None:
                     break
@@ -94,28 +96,27 @@ class Search:
         effects = tuple(replace(named[key], side=found.side(key)) for key in found.effects)
         return Ranking(effects, tuple(rounds), found.repaired, recalibrated, left, interrupted, hold)
 
-    def _held(self, looks: list[Look]) -> list[Look]:
-        """The same under commands that run straight from sample to sample, if that counts as an effect would.
+    def _held(self, looks: list[Look], best: Trial | None) -> list[Look]:
+        """The same under commands that run straight from sample to sample, where no effect does as well; else none.
 
-        Commands that are held for a sample come half a sample late. No effect takes that back.
+        Commands that are held for a sample come half a sample late, and no effect takes all of that back.
         """
         if self.hold_known:
-            return looks
+            return []
         now, observed = looks[0], self.fitter.observed
         smooth = Fitter(observed.with_hold(STRAIGHT), self.settings)
         view = View(now.view.noise)
         try:
             fitted = smooth.finished(smooth.fitted(now.fitted.structure, now.fitted.observer, view), view)
         except ASTRAY:
-            return looks
-        noise = fitted_noise(fitted.residual, observed.parts, self.settings.order)
-        gain = smooth.evidence(fitted, noise) - self.fitter.evidence(now.fitted, noise)
+            return []
         judgement = now.judged(fitted)
-        if gain <= self.settings.odds or not judgement.counts(self.settings):
-            return looks
-        self.say(
-            f"commands that run straight from sample to sample remove {100.0 * judgement.removed:.3g} % of the error"
-        )
+        if not judgement.counts(self.settings) or (best and best.judgement.removed >= judgement.removed):
+            return []
+        noise = fitted_noise(fitted.residual, observed.parts, self.settings.order)
+        if smooth.evidence(fitted, noise) - self.fitter.evidence(now.fitted, noise) <= self.settings.odds:
+            return []
+        self.say(f"commands that run from sample to sample remove {100.0 * judgement.removed:.3g} % of the error power")
         self.fitter, self.hold_known = smooth, True
         self.first = {look.fitted.observer.band: look for look in self._looks(self.start)}
         return self._all_looks(self._look(fitted))
