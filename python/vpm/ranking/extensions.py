@@ -21,7 +21,7 @@ _Kind = tuple[Key, Side, frozenset[str]]
 
 
 class Extensions:
-    """Structures with an effect more, in models that are made and compiled once for all start values of an effect.
+    """Structures with an effect more, in models that are made and checked once for all start values of an effect.
 
     Parameters
     ----------

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
@@ -121,33 +120,28 @@ class Search:
         self.first = {look.fitted.observer.band: look for look in self._looks(self.start)}
         return self._all_looks(self._look(fitted))
 
-    def _looks(self, structure: Structure) -> list[Look]:
-        """A structure under each observer that can follow it.
+    def _looks(self, structure: Structure, known: Look | None = None) -> list[Look]:
+        """A structure under each observer that can follow it, that which is known first.
 
         Raises
         ------
         VpmError
             None of them can.
         """
-        looks = []
+        looks = [] if known is None else [known]
         reason: Exception = VpmError(f"{structure.model.name} runs away from the records")
         for band in self.settings.bands:
-            try:
-                looks.append(self._look(self._fitted(structure, Observer(band))))
-            except ASTRAY as error:  # a slow observer may lose what hangs behind a contact
-                reason = error
+            if known is None or band != known.fitted.observer.band:
+                try:
+                    looks.append(self._look(self._fitted(structure, Observer(band))))
+                except ASTRAY as error:  # a slow observer may lose what hangs behind a contact
+                    reason = error
         if not looks:
             raise reason
         return looks
 
     def _all_looks(self, look: Look) -> list[Look]:
-        """A look, then those at the same structure under the other observers that can follow it."""
-        looks = [look]
-        for band in self.settings.bands:
-            if band != look.fitted.observer.band:
-                with contextlib.suppress(*ASTRAY):
-                    looks.append(self._look(self._fitted(look.fitted.structure, Observer(band))))
-        return looks
+        return self._looks(look.fitted.structure, look)
 
     def _look(self, fitted: Fitted) -> Look:
         return Look(fitted, self.fitter, self.first.get(fitted.observer.band))

@@ -160,7 +160,8 @@ class Structure:
         """
         key = (name, site) = other.effects[-1]
         there = other.model.effect(name, site, other.side(key))
-        values = {short: float(other.theta[other.model.index(own)]) for short, own in there.parameter_names.items()}
+        places = {short: other.model.index(dotted) for short, dotted in there.parameter_names.items()}
+        values = {short: float(other.theta[place]) for short, place in places.items()}
         carried = self.carried(self.model.with_effect(name, site, side=there.side, **values))
         own = set(there.parameter_names.values()) - set(self.model.parameters)
         priors = {**carried.priors, **{name: prior for name, prior in other.priors.items() if name in own}}
