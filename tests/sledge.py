@@ -36,13 +36,36 @@ SEEN = (
 measures = "way.position"
 """
 )
+#: The sledge with dry friction.
+DRY = (
+    SLEDGE
+    + """
+[[effects]]
+type = "coulomb_friction"
+at = "way"
+coulomb = { value = 3.4, uncertainty = 0.4 }
+"""
+)
+#: Way after which dry friction repeats, m.
+WAVE = 1.5
 MASS, OIL, GAIN, STEP, FINE, READING = 3.0, 8.0, 4.0, 2e-3, 10, 5e-6
 
 
 def pushed(
-    *, dry: float = 0.0, lag: float = 0.0, late: float = 0.0, ends: float = np.inf, seed: int = 0, duration: float = 8.0
+    *,
+    dry: float = 0.0,
+    uneven: float = 0.0,
+    wavy: float = 0.0,
+    lag: float = 0.0,
+    late: float = 0.0,
+    ends: float = np.inf,
+    seed: int = 0,
+    duration: float = 8.0,
 ) -> Experiment:
-    """The sledge by small explicit steps: dry friction as an impulse that at most stops it, a delay as a queue."""
+    """The sledge by small explicit steps: dry friction as an impulse that at most stops it, a delay as a queue.
+
+    Dry friction may differ between the two directions by ``uneven``, and from place to place by ``wavy`` either way.
+    """
     random, samples, h = np.random.default_rng(seed), round(duration / STEP), STEP / FINE
     time = STEP * np.arange(samples)
     phases = random.uniform(0.0, 2.0 * np.pi, 3)
@@ -62,7 +85,8 @@ def pushed(
             force = asked + (force - asked) * (np.exp(-h / lag) if lag else 0.0)
             stop = -4e4 * (place - np.clip(place, -ends, ends))
             speed = speed * np.exp(-h * OIL / MASS) + h * _mean_decay(h * OIL / MASS) * (mean + stop) / MASS
-            speed -= np.clip(speed, -h * dry / MASS, h * dry / MASS)
+            level = dry + 0.5 * uneven * np.sign(speed) + wavy * np.cos(2.0 * np.pi * place / WAVE)
+            speed -= np.clip(speed, -h * level / MASS, h * level / MASS)
             place += 0.5 * h * (before + speed)
     readings = places + READING * random.standard_normal(samples)
     return Experiment.from_arrays(

@@ -11,7 +11,7 @@ from scipy.stats import norm
 from scipy.stats import t as student
 
 import vpm
-from sledge import GAIN, MASS, OIL, READING, SEEN, SLEDGE, pushed
+from sledge import DRY, GAIN, MASS, OIL, READING, SEEN, SLEDGE, WAVE, pushed
 from vpm.errors import DiagnosisError, ExperimentError
 from vpm.experiment import Experiment
 from vpm.model import Model
@@ -140,6 +140,23 @@ def test_a_lag_of_the_drive_is_named_with_its_time() -> None:
     assert gap.before > gap.recalibrated > 20.0 * gap.after
     assert gap.after < 3.0 * READING
     assert ranking.model.parameters["motor.lag.time_constant"].value == pytest.approx(0.008, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("hidden", "named", "parameter", "value"),
+    [
+        ({"uneven": 2.0}, "asymmetric_friction", "way.friction.coulomb_difference", 2.0),
+        ({"wavy": 1.5}, "position_dependent_friction", "way.friction.position_period", WAVE),
+    ],
+)
+def test_dry_friction_is_told_from_what_pushes_as_much(
+    hidden: dict[str, float], named: str, parameter: str, value: float
+) -> None:
+    """A constant force does nearly the same, with a number less; a wave is longer than half of the way."""
+    records = [pushed(seed=seed, dry=3.0, duration=4.0, **hidden) for seed in (1, 2)]
+    ranking = vpm.rank(Model.from_toml(DRY), records)
+    assert [one.effect for one in ranking.effects] == [named]
+    assert ranking.model.parameters[parameter].value == pytest.approx(value, rel=0.05)
 
 
 @pytest.mark.nightly

@@ -1,5 +1,7 @@
 //! A pure delay acting on a sampled signal.
 
+use std::ops::RangeInclusive;
+
 use crate::scalar::Scalar;
 
 /// A delay counted in samples: a whole number and the fraction beyond it.
@@ -30,6 +32,12 @@ impl<S: Scalar> SampleDelay<S> {
     pub fn delayed(&self, k: usize, at: impl Fn(usize) -> S) -> S {
         let newer = k.saturating_sub(self.whole);
         at(newer) * (S::one() - self.fraction) + at(newer.saturating_sub(1)) * self.fraction
+    }
+
+    /// Samples up to `k` of which something arrives after it.
+    #[inline]
+    pub fn arriving(&self, k: usize) -> RangeInclusive<usize> {
+        k.saturating_sub(self.whole)..=k
     }
 
     /// The inverse view: the sample that arrives this delay after sample `k`, in a record whose last sample is `last`.

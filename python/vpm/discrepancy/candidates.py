@@ -154,22 +154,23 @@ def _candidate(effect: EffectType, site: str, model: Model, data: InverseDynamic
         fixed = ("damping", "width") if effect.name == "backlash" else ()
         return Candidate(effect, site, *found, fixed, neutral=False)
     if effect.name == "end_stop":
-        where = _over_way(data, model.joints[joint], residual)
-        return Candidate(effect, site, *stop_starts(*where, seen.middle, seen.travel, softest(model, site)))
+        where, _, values = _over_way(data, model.joints[joint], residual)
+        return Candidate(effect, site, *stop_starts(where, values, seen.middle, seen.travel, softest(model, site)))
     if effect.name == "coulomb_friction":
         return Candidate(effect, site, _grid("transition_velocity", TRANSITION_SHARES, seen.speed), _slow(seen))
     if effect.name == "asymmetric_friction":
         # What was fitted of the dry friction without it may be far too wide: it makes up for what is missing.
         velocities = {_known_transition(model, site, seen), slow_speeds(seen.speed)[0]}
         starts = tuple({"transition_velocity": velocity} for velocity in sorted(velocities, reverse=True))
-        return Candidate(effect, site, starts, fixed=("transition_velocity",))
+        return Candidate(effect, site, starts, _slow(seen), fixed=("transition_velocity",))
     if effect.name == "stribeck_friction":
         velocity = _known_transition(model, site, seen)
         starts = tuple({"stribeck_velocity": s * seen.speed, "transition_velocity": velocity} for s in STRIBECK_SHARES)
-        bounds = {"stribeck_velocity": (2e-3 * seen.speed, HIGHEST_STRIBECK * seen.speed)}
+        bounds = {"stribeck_velocity": (2e-3 * seen.speed, HIGHEST_STRIBECK * seen.speed), **_slow(seen)}
         return Candidate(effect, site, starts, bounds, fixed=("transition_velocity",))
     if effect.name in {"torque_ripple", "position_dependent_friction"}:
-        periods = _ripple_periods(data, model, joint, residual)
+        rubs = effect.name == "position_dependent_friction"
+        periods = _ripple_periods(*_over_way(data, model.joints[joint], residual), rubs=rubs)
         bounds = {"period": (min(periods) / 1.5, max(periods) * 1.5)}
         return Candidate(effect, site, tuple({"period": p} for p in periods), bounds)
     if effect.name in {"spring", "cubic_spring"}:
@@ -271,31 +272,31 @@ def _excitation(data: InverseDynamicsProblem, model: Model, joint: int, actuator
     )
 
 
-def _ripple_periods(data: InverseDynamicsProblem, model: Model, joint: int, residual: Array) -> list[float]:
-    """Periods in position at which the residual is strongest: peaks of its least-squares periodogram.
+def _ripple_periods(position: Array, velocity: Array, values: Array, *, rubs: bool) -> list[float]:
+    """Periods in position at which a residual is strongest: peaks of its least-squares periodogram.
 
-    Evenly spaced frequencies from two periods per travel up to what the decimated samples resolve; N. Lomb,
-    *Astrophysics and Space Science* 39, 1976.
+    Evenly spaced frequencies up to what the decimated samples resolve, from two periods per travel; what ``rubs`` turns
+    round with the motion, and is told from the rest of the machine over half a period already; N. Lomb, *Astrophysics
+    and Space Science* 39, 1976.
     """
-    position, values = _over_way(data, model.joints[joint], residual)
     thin = max(1, len(values) // 4000)
-    position, values = position[::thin], values[::thin]
+    position, values = position[::thin], (values * np.sign(velocity) if rubs else values)[::thin]
     travel = max(float(np.ptp(position)), 1e-12)
     step = float(np.median(np.abs(np.diff(position)))) or travel / 1e3
     highest = min(1.0 / (2.5 * step), 400.0 / travel)
-    frequencies = np.arange(2.0, max(highest * travel, 4.0), 0.25) / travel
+    frequencies = np.arange(0.5 if rubs else 2.0, max(highest * travel, 4.0), 0.25) / travel
     phase = 2.0 * np.pi * np.outer(frequencies, position - position.mean())
     centred = values - values.mean()
     power = (np.cos(phase) @ centred) ** 2 + (np.sin(phase) @ centred) ** 2
-    peaks = [i for i in range(1, len(power) - 1) if power[i] >= power[i - 1] and power[i] > power[i + 1]]
+    peaks = [i for i in range(len(power) - 1) if power[i] >= power[max(i - 1, 0)] and power[i] > power[i + 1]]
     best = sorted(peaks or [int(np.argmax(power))], key=lambda i: -power[i])[:PERIODS]
     return [float(1.0 / frequencies[i]) for i in best]
 
 
-def _over_way(data: InverseDynamicsProblem, joint: str, residual: Array) -> tuple[Array, Array]:
-    """Position and residual of one joint, or of the first one that is measured, at all samples."""
+def _over_way(data: InverseDynamicsProblem, joint: str, residual: Array) -> tuple[Array, Array, Array]:
+    """Position, velocity and residual of one joint, or of the first one that is measured, at all samples."""
     column = data.joints.index(joint) if joint in data.joints else 0
     records = range(len(data.motions))
-    position = np.concatenate([data.state(r)[0][:, column] for r in records])
+    position, velocity = (np.concatenate([data.state(r)[which][:, column] for r in records]) for which in (0, 1))
     values = np.concatenate([residual[data.efforts(r)[column].samples] for r in records])
-    return position, values
+    return position, velocity, values

@@ -58,7 +58,8 @@ class Extensions:
                 continue
             parameter, place = candidate.effect.parameter(short), carried.model.index(name)
             carried.theta[place] = start.get(short, carried.theta[place])
-            free = short not in candidate.fixed and (not parameter.shape or parameter.learnt or short in start)
+            shown = short not in candidate.fixed or short in candidate.bounds
+            free = shown and (not parameter.shape or parameter.learnt or short in start)
             if free:
                 priors[name] = self.sizes.prior(candidate, parameter, float(carried.theta[place]))
         shapes = set(start) & set(candidate.bounds) - DETAILS

@@ -81,11 +81,9 @@ class Look:
 
     def _curve(self, key: Key) -> float:
         """What those effects of the model remove that show over the same states at the same place as another one."""
-        name, site = key
-        states = set(EFFECTS[name].signature.lives_in)
         present = self.fitted.structure.model.effects
-        alike = [one for one in present if one.at == site and states & set(one.type.signature.lives_in)]
-        several = (site, *(f"{one.name} {one.side}" for one in alike))
+        alike = [one for one in present if same_curve(key, (one.name, one.at))]
+        several = (key[1], *(f"{one.name} {one.side}" for one in alike))
         if several not in self._curves:
             self._curves[several] = self._removed(alike)
         return self._curves[several]
@@ -110,6 +108,12 @@ class Look:
     @staticmethod
     def _sum(squares: tuple[Array, Array]) -> float:
         return float(squares[0].sum() + squares[1].sum())
+
+
+def same_curve(one: Key, other: Key) -> bool:
+    """Whether two effects show over the same states at the same place."""
+    states = (set(EFFECTS[name].signature.lives_in) for name, _ in (one, other))
+    return one[1] == other[1] and bool(set.intersection(*states))
 
 
 def _repeated(before: Array, after: Array, pieces: int) -> float:

@@ -15,7 +15,7 @@ from vpm.identify import InverseDynamicsProblem
 from vpm.model import Model
 from vpm.ranking.extensions import Extensions
 from vpm.ranking.fit import ASTRAY, Fitted, Fitter, View
-from vpm.ranking.look import Look
+from vpm.ranking.look import Look, same_curve
 from vpm.ranking.noise_model import fitted_noise
 from vpm.ranking.observed import Observed, Observer
 from vpm.ranking.posterior import apart, probabilities
@@ -163,7 +163,7 @@ class Search:
                 break  # nothing could be missing beside it
         told: list[Trial] = []
         while counting:
-            weighed = self._weighed(self._chosen(counting))
+            weighed = self._weighed(counting)
             if weighed[0].evidence > self.settings.odds:
                 self.others[weighed[0].key] = [trial.fitted.structure for trial in weighed[1:]]
                 return weighed[0], weighed + told + tried
@@ -172,15 +172,21 @@ class Search:
             counting = [trial for trial in counting if trial.fitted is not weighed[0].fitted]
         return None, told + tried
 
-    def _chosen(self, counting: Sequence[Trial]) -> list[Trial]:
-        """The best of those that count, then one trial of each other effect under the same observer."""
+    def _rivals(self, counting: Sequence[Trial]) -> tuple[list[Trial], list[Trial]]:
+        """Those that leave as little as the best of those that count, then one of each other effect beside it.
+
+        Of several that draw the same curve, the plainest one alone: a richer one fits what laws are wrong by.
+        """
         first = min(counting, key=lambda trial: trial.left)
         here = sorted((trial for trial in counting if trial.look is first.look), key=lambda trial: trial.left)
-        best = min((trial for trial in here if self._as_good(trial, first)), key=lambda trial: trial.plainness)
-        several = {best.key: best}
-        for trial in here:
-            several.setdefault(trial.key, trial)
-        return list(several.values())
+        plain: list[Trial] = []
+        for trial in sorted((one for one in here if self._as_good(one, first)), key=lambda one: one.plainness):
+            if not any(same_curve(trial.key, other.key) for other in plain):
+                plain.append(trial)
+        others = {trial.key: trial for trial in reversed(here)}
+        for trial in plain:
+            del others[trial.key]
+        return plain, list(others.values())[::-1]
 
     def _tried(self, look: Look) -> list[Trial]:
         """The most promising effects, fitted under one observer."""
@@ -211,16 +217,20 @@ class Search:
         ends = self.each("finishing", one_finished, hopeful, lambda trial: trial.label)
         return [end for end in ends if isinstance(end, Trial)]
 
-    def _weighed(self, trials: Sequence[Trial]) -> list[Trial]:
-        """With the evidence that each adds under the noise model of the first, and what nobody can tell from that.
+    def _weighed(self, counting: Sequence[Trial]) -> list[Trial]:
+        """The best of those that count, then the others, with the evidence that each adds under one noise model.
 
-        Of these a part of the machine comes before an instrument, and then what is most probable.
+        It is the most probable one of those that leave as little. Of what nobody can tell from it a part of the machine
+        comes before an instrument.
         """
-        observed, first = self.fitter.observed, trials[0]
+        plain, others = self._rivals(counting)
+        observed, first = self.fitter.observed, min(plain, key=lambda trial: trial.left)
         noise = fitted_noise(first.fitted.residual, observed.parts, self.settings.order)
         without = self.fitter.evidence(first.look.fitted, noise)
+        trials = [*plain, *others]
         weighed = [replace(trial, evidence=self.fitter.evidence(trial.fitted, noise) - without) for trial in trials]
-        nats = apart(first.fitted, [trial.fitted for trial in trials], self.fitter, noise)
+        likely = max(weighed[: len(plain)], key=lambda trial: trial.evidence)
+        nats = apart(likely.fitted, [trial.fitted for trial in trials], self.fitter, noise)
         alike = [trial for trial, far in zip(weighed, nats, strict=True) if far < self.settings.same]
         best = min(alike, key=lambda trial: (trial.is_instrument, -trial.evidence))
         rivals = tuple(trial.label for trial in alike if trial is not best)
@@ -242,10 +252,7 @@ class Search:
         if not counting:
             self.say(f"no longer needed: {' at '.join(key)}")
             return self._all_looks(look), ()
-        chosen = self._chosen(counting)
-        if chosen[0] is now:
-            return looks, ()
-        weighed = self._weighed(chosen)
+        weighed = self._weighed(counting)
         if weighed[0].key == key:
             return looks, ()
         self.say(f"{weighed[0].label} does better than {' at '.join(key)}")

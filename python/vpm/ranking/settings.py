@@ -22,7 +22,8 @@ class Settings:
         Pieces of the held-back stretches between which an effect has to repeat.
     inexact : float
         By how much a law differs from the machine, as a share of the amplitude that it explains. Another effect that
-        shows over the same states at the same place has to do more than that, and a richer one has to do better by it.
+        shows over the same states at the same place has to do more than that, and a richer one has to do better by it
+        than a plainer one; between effects over other states evidence decides.
     slight : float
         An effect that does less than this share of the amplitude of all effects of the model is none.
     second : float

@@ -3,7 +3,8 @@
 //! Law: `e_k = y_k - h(x_k)`, `x_k <- x_k + K_k e_k`, `x_(k+1) = f(x_k, u_k)`: the innovations of an observer. Its gains are those of an
 //! extended Kalman filter (Jazwinski 1970, chapter 8; Kristensen, Madsen & Jorgensen 2004): forces that nobody knows of move the machine,
 //! and sensors err. They follow the machine's own linearisation at every sample, so that they know by themselves what a joint that sticks, a
-//! play that is open or a contact lets through. What is left of the log is white where model and noise are right.
+//! play that is open or a contact lets through. What is left of the log is white where model and noise are right. Positions on their way
+//! to a late sensor are moved as those of the machine: the readings that come next will show them.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
@@ -194,7 +195,9 @@ impl<'a> Filter<'a> {
             self.predict(row)?;
             let innovation = DVector::from_column_slice(self.readings.table.row(row)) - &self.predicted;
             let (gain, spread) = self.gain(row)?;
-            self.state += &gain * &innovation;
+            let moved = &gain * &innovation;
+            self.state += &moved;
+            self.stepper.correct_arriving(row, |place| Number::constant(moved[place]));
             self.correct(&gain);
             innovations.extend(innovation.iter());
             covariances.extend(spread.iter());

@@ -1,5 +1,7 @@
 //! The loop over samples: what happens at a sample, and between two.
 
+use std::mem::take;
+
 use super::control::{Control, reading};
 use super::hold::{Course, Hold, Inputs};
 use super::moving::Courses;
@@ -7,13 +9,14 @@ use super::names::{output_name, state_name};
 use super::observer::Gains;
 use super::sampled::{Astray, SampledDrives};
 use super::{Setting, Stepping, diverged, halted, leapt, strayed};
+use crate::delay::SampleDelay;
 use crate::description::Description;
 use crate::error::Result;
 use crate::integrator::{Integrator, Method};
 use crate::ode::Ode;
 use crate::scalar::Scalar;
 use crate::sensitivity::{Interrupt, Pair};
-use crate::sensor::Sensor;
+use crate::sensor::{Channel, Sensor};
 use crate::system::{Calls, Counted, Dynamics, Matrix, System, code_pays, code_pays_in_fits};
 use crate::table::Table;
 
@@ -77,6 +80,8 @@ pub(crate) struct Stepper<'a, S> {
     states: Vec<S>,
     /// Channels of the piece as the sensors show them, row by row.
     outputs: Vec<S>,
+    /// What the readings of a sample are more than its outputs.
+    missed: Vec<S>,
 }
 
 impl<'a, S: Scalar> Stepper<'a, S> {
@@ -113,6 +118,7 @@ impl<'a, S: Scalar> Stepper<'a, S> {
             truth: vec![zero; rows * description.n_outputs()],
             states: vec![zero; rows * dim],
             outputs: vec![zero; rows * description.n_outputs()],
+            missed: Vec::with_capacity(plan.gains.map_or(0, |gains| gains.readings.channels.len())),
         })
     }
 
@@ -222,13 +228,31 @@ impl<'a, S: Scalar> Stepper<'a, S> {
     fn correct(&mut self, row: usize) {
         let Some(Gains { readings, gains }) = self.plan.gains else { return };
         let outputs = &self.outputs[row * self.description.n_outputs()..];
-        let count = readings.channels.len();
-        for (state, gains) in self.state.iter_mut().zip(gains.row(row).chunks_exact(count.max(1))) {
-            for ((&channel, &measured), &gain) in readings.channels.iter().zip(readings.table.row(row)).zip(gains) {
-                *state += (S::from_f64(measured) - outputs[channel]) * gain;
+        let measured = readings.channels.iter().zip(readings.table.row(row));
+        let mut missed = take(&mut self.missed);
+        missed.clear();
+        missed.extend(measured.map(|(&channel, &reading)| S::from_f64(reading) - outputs[channel]));
+        let moved = |place: usize| {
+            let gains = &gains.row(row)[place * missed.len()..];
+            missed.iter().zip(gains).fold(S::zero(), |sum, (&missed, &gain)| sum + missed * gain)
+        };
+        self.state.iter_mut().enumerate().for_each(|(place, state)| *state += moved(place));
+        self.correct_arriving(row, moved);
+        self.missed = missed;
+        self.system.forget();
+    }
+
+    /// Moves positions that have not arrived at a late sensor by sample `row` as an observer has `moved` those of the machine: else it
+    /// would answer that much later, and a late sensor would not be the same as a late command.
+    pub(crate) fn correct_arriving(&mut self, row: usize, moved: impl Fn(usize) -> S) {
+        let (width, Self { sensors, truth, stepping, .. }) = (self.description.n_outputs(), self);
+        for (column, sensor) in &*sensors {
+            if let (Channel::Position { joint }, Some(delay)) = (sensor.channel, sensor.delay) {
+                for sample in SampleDelay::new(delay, stepping.time_step).arriving(row) {
+                    truth[sample * width + column] += moved(joint);
+                }
             }
         }
-        self.system.forget();
     }
 
     /// Puts the machine into another state.

@@ -168,3 +168,36 @@ fn noise_that_is_none_is_refused() {
         assert!(found.contains(said), "{found}");
     }
 }
+
+/// One command and one position: what an observer leaves does not depend on whether the command or the reading is late. Its speed is
+/// drawn while a position is under way, so that both agree as far as that is short.
+#[test]
+fn a_late_sensor_is_observed_as_a_late_command() {
+    let rows = 600;
+    let command: Vec<f64> = (0..rows).map(|k| (0.05 * k as f64).sin() - 0.4 * (0.31 * k as f64).sin()).collect();
+    let readings: Vec<f64> = (0..rows).map(|k| 1e-3 * (0.11 * k as f64).sin()).collect();
+    let left = |gain: [f64; 2], late: &[(&str, f64)], read: &[(&str, f64)]| -> Vec<f64> {
+        let mut machine = Machine::new(&slider(2.0));
+        machine.actuator(0, &[&[("gain", 1.0)], late].concat());
+        machine.sensor(serde_json::json!({"kind": "position", "joint": 0}), &[&[("gain", 1.0)], read].concat());
+        let bench = Bench::new(&machine, 1e-3, 4, Method::SemiImplicit);
+        let table = Table::new("readings", &readings, rows, 1).unwrap();
+        let gains = [gain; 600].concat();
+        let gains = Gains {
+            readings: Readings { channels: &[0], table },
+            gains: Table::new("gains", &gains, rows, 2).unwrap(),
+        };
+        let inputs = Table::new("inputs", &command, rows, 1).unwrap();
+        let run = observe(bench.setting(), &[0.0, 0.0], inputs, gains).unwrap();
+        run.outputs.chunks_exact(bench.description.n_outputs()).zip(&readings).map(|(row, y)| y - row[0]).collect()
+    };
+    let power = |values: &[f64]| values.iter().map(|value| value * value).sum::<f64>().sqrt();
+    let gap = |late: &[f64], read: &[f64]| {
+        let difference: Vec<f64> = late.iter().zip(read).map(|(a, b)| a - b).collect();
+        power(&difference) / power(late)
+    };
+    let delay = [("delay", 3.4e-3)];
+    // A position that is drawn alone is drawn at once.
+    assert!(gap(&left([0.2, 0.0], &delay, &[]), &left([0.2, 0.0], &[], &delay)) < 1e-3);
+    assert!(gap(&left([0.05, 1.4], &delay, &[]), &left([0.05, 1.4], &[], &delay)) < 0.06);
+}
