@@ -288,7 +288,7 @@ def _ripple_periods(position: Array, velocity: Array, values: Array, *, rubs: bo
     phase = 2.0 * np.pi * np.outer(frequencies, position - position.mean())
     centred = values - values.mean()
     power = (np.cos(phase) @ centred) ** 2 + (np.sin(phase) @ centred) ** 2
-    peaks = [i for i in range(len(power) - 1) if power[i] >= power[max(i - 1, 0)] and power[i] > power[i + 1]]
+    peaks = [i for i in range(1, len(power) - 1) if power[i] >= power[i - 1] and power[i] > power[i + 1]]
     best = sorted(peaks or [int(np.argmax(power))], key=lambda i: -power[i])[:PERIODS]
     return [float(1.0 / frequencies[i]) for i in best]
 
