@@ -180,7 +180,7 @@ class Search:
         first = min(counting, key=lambda trial: trial.left)
         here = sorted((trial for trial in counting if trial.look is first.look), key=lambda trial: trial.left)
         plain: list[Trial] = []
-        for trial in sorted((one for one in here if self._as_good(one, first)), key=lambda one: one.plainness):
+        for trial in sorted((one for one in here if self._as_good(one, first)), key=lambda one: one.numbers):
             if not any(same_curve(trial.key, other.key) for other in plain):
                 plain.append(trial)
         others = {trial.key: trial for trial in reversed(here)}
@@ -252,6 +252,8 @@ class Search:
         if not counting:
             self.say(f"no longer needed: {' at '.join(key)}")
             return self._all_looks(look), ()
+        if counting == [now]:
+            return looks, ()
         weighed = self._weighed(counting)
         if weighed[0].key == key:
             return looks, ()

@@ -44,6 +44,6 @@ class Trial:
         return EFFECTS[self.key[0]].site == "sensor"
 
     @property
-    def plainness(self) -> tuple[bool, int]:
-        """Orders what removes the same: the machine before its instruments, then fewer numbers."""
-        return self.is_instrument, len(self.fitted.structure.priors)
+    def numbers(self) -> int:
+        """How many are unknown in it."""
+        return len(self.fitted.structure.priors)
