@@ -1,9 +1,9 @@
-"""What a residual is like where nothing is missing: an autoregression for each channel, and its likelihood."""
+"""What a residual is like where nothing is missing: the spectrum of each channel, and its likelihood."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,59 @@ SAME = 1e-7
 
 #: Relative noise on the diagonal of the normal equations, so that a residual of a few lines can be predicted.
 FLOOR = 1e-9
+#: Bands in an octave of the spectrum, and fewest lines of a band.
+PER_OCTAVE, LINES = 3, 12
+
+
+@dataclass(frozen=True)
+class Colour:
+    """Amplitude of a signal by frequency, the same within a band, its geometric mean over all frequencies being one.
+
+    Law: P. Whittle, *Arkiv for Matematik* 2, 1953: lines of the spectrum are independent, whatever the spectrum is. A
+    short autoregression does not see what is slow beside its length, but goes first, so that no line leaks into others
+    (R. Blackman and J. Tukey, *Bell System Technical Journal* 37, 1958).
+
+    Attributes
+    ----------
+    edges : ndarray, shape (b - 1,)
+        Where the next band begins, cycles per sample.
+    sizes : ndarray, shape (b,)
+    """
+
+    edges: Array = field(default_factory=lambda: np.zeros(0))
+    sizes: Array = field(default_factory=lambda: np.ones(1))
+
+    @classmethod
+    def of(cls, pieces: Sequence[Array]) -> Colour:
+        """That of a signal in pieces (n,)."""
+        places = np.concatenate([np.fft.rfftfreq(len(piece)) for piece in pieces])
+        powers = np.concatenate([np.abs(np.fft.rfft(piece)) ** 2 / len(piece) for piece in pieces])
+        order = np.argsort(places, kind="stable")
+        places, powers = places[order], powers[order]
+        begins = _begins(places)
+        bands = np.split(powers, begins)
+        sizes = np.sqrt(np.maximum([np.mean(band) for band in bands], FLOOR * np.mean(powers) + 1e-300))
+        mean = np.average(np.log(sizes), weights=[len(band) for band in bands])
+        return cls(places[begins], sizes / np.exp(mean))
+
+    def removed(self, piece: Array) -> Array:
+        """A piece of a signal (n,), or of derivatives of it (n, k), with all frequencies in one size."""
+        if len(self.sizes) == 1:
+            return piece
+        sizes = self.sizes[np.searchsorted(self.edges, np.fft.rfftfreq(len(piece)), side="right")]
+        lines = np.fft.rfft(piece, axis=0)
+        return np.asarray(np.fft.irfft((lines.T / sizes).T, len(piece), axis=0))
+
+
+def _begins(places: Array) -> list[int]:
+    """Where bands of sorted frequencies begin, but for the first: a share of an octave each, and some lines."""
+    begins, last = [], 0
+    for place in range(LINES, len(places) - LINES + 1):
+        wide = places[place] >= places[last] * 2.0 ** (1.0 / PER_OCTAVE) and places[place] > places[place - 1]
+        if wide and place - last >= LINES:
+            begins.append(place)
+            last = place
+    return begins
 
 
 @dataclass(frozen=True)
@@ -33,6 +86,8 @@ class NoiseModel:
     ----------
     filters : tuple of ndarray
         Coefficients of the prediction error, the first one 1.
+    colours : tuple of Colour
+        Of these errors.
     deviations : tuple of float
         Scales of these errors.
     tails : tuple of float
@@ -41,6 +96,7 @@ class NoiseModel:
     """
 
     filters: tuple[Array, ...]
+    colours: tuple[Colour, ...]
     deviations: tuple[float, ...]
     tails: tuple[float, ...]
 
@@ -53,8 +109,10 @@ class NoiseModel:
             In scales of the errors.
         """
         channels = [
-            _filtered(values[:, place], parts, taps) / deviation
-            for place, (taps, deviation) in enumerate(zip(self.filters, self.deviations, strict=True))
+            _joined(values[:, place], parts, taps, colour) / deviation
+            for place, (taps, colour, deviation) in enumerate(
+                zip(self.filters, self.colours, self.deviations, strict=True)
+            )
         ]
         return np.concatenate(channels)
 
@@ -125,13 +183,15 @@ def _weights(errors: Array, freedom: Array) -> Array:
 def white_noise(residual: Array, parts: Parts) -> NoiseModel:
     """Channels as they are, in their root mean squares."""
     one = np.ones(1)
-    sizes = [_deviation(_filtered(residual[:, place], parts, one)) for place in range(residual.shape[1])]
-    return NoiseModel(tuple(one for _ in sizes), tuple(sizes), tuple(np.inf for _ in sizes))
+    sizes = [_deviation(_joined(residual[:, place], parts, one, Colour())) for place in range(residual.shape[1])]
+    return NoiseModel(
+        tuple(one for _ in sizes), tuple(Colour() for _ in sizes), tuple(sizes), tuple(np.inf for _ in sizes)
+    )
 
 
 def fitted_noise(residual: Array, parts: Parts, order: int) -> NoiseModel:
-    """The autoregression that predicts each channel best (Yule 1927, Walker 1931)."""
-    taps, deviations, tails = [], [], []
+    """The autoregression that predicts each channel best (Yule 1927, Walker 1931), and the colour of its errors."""
+    taps, colours, deviations, tails = [], [], [], []
     for place in range(residual.shape[1]):
         products = np.zeros(order + 1)
         for part in parts:
@@ -140,10 +200,11 @@ def fitted_noise(residual: Array, parts: Parts, order: int) -> NoiseModel:
             products += np.fft.irfft(np.abs(spectrum) ** 2)[: order + 1]
         products[0] = products[0] * (1.0 + FLOOR) + 1e-300
         taps.append(np.concatenate([[1.0], solve_toeplitz(products[:-1], -products[1:])]))
-        size, freedom = _bell(_filtered(residual[:, place], parts, taps[-1]))
+        colours.append(Colour.of(_filtered(residual[:, place], parts, taps[-1])))
+        size, freedom = _bell(_joined(residual[:, place], parts, taps[-1], colours[-1]))
         deviations.append(size)
         tails.append(freedom)
-    return NoiseModel(tuple(taps), tuple(deviations), tuple(tails))
+    return NoiseModel(tuple(taps), tuple(colours), tuple(deviations), tuple(tails))
 
 
 def _bell(errors: Array) -> tuple[float, float]:
@@ -158,7 +219,12 @@ def _bell(errors: Array) -> tuple[float, float]:
     return best[1], best[2]
 
 
-def _filtered(values: Array, parts: Parts, taps: Array) -> Array:
+def _joined(values: Array, parts: Parts, taps: Array, colour: Colour) -> Array:
+    """Prediction errors of all parts, one after the other, without their colour."""
+    return np.concatenate([colour.removed(piece) for piece in _filtered(values, parts, taps)])
+
+
+def _filtered(values: Array, parts: Parts, taps: Array) -> list[Array]:
     """Prediction errors of each part, without its first samples, of which the past is unknown."""
     past = len(taps) - 1
     pieces = []
@@ -168,7 +234,7 @@ def _filtered(values: Array, parts: Parts, taps: Array) -> Array:
         for lag in range(1, past + 1):
             errors += taps[lag] * piece[past - lag : len(piece) - lag]
         pieces.append(errors)
-    return np.asarray(np.concatenate(pieces))
+    return pieces
 
 
 def _deviation(errors: Array) -> float:
