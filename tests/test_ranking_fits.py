@@ -7,6 +7,8 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from sledge import GAIN, MASS, OIL, SLEDGE, pushed
 from vpm.catalogue import EFFECTS
@@ -303,3 +305,28 @@ def test_a_fit_stays_where_bodies_are_real() -> None:
     structure = Structure(model, model.theta.copy(), known)
     found = fitter.fitted(structure, Observer(2.0), View(fitter.noise_of(structure, Observer(2.0))))
     assert 0.17 < found.structure.values["arm.inertia.zz"] <= 0.2
+
+
+@given(st.floats(0.1, 10.0), st.floats(-5.0, 5.0), st.floats(-0.5, 5.0), st.floats(-3.0, 3.0))
+def test_a_spring_keeps_its_pull_where_a_step_moves_its_rest(
+    size: float, rest: float, stiffer: float, further: float
+) -> None:
+    """Of a spring that rests far away records tell the pull, so that its product with the stiffness moves straight."""
+    model = Model.from_toml(SLEDGE).with_effect("spring", "way", stiffness=size, rest=rest)
+    names = ("way.spring.stiffness", "way.spring.rest")
+    prior = Prior(0.0, 2.0, -np.inf, np.inf)
+    structure = Structure(model, model.theta.copy(), dict.fromkeys(names, prior))
+    change = size * stiffer
+    moved = structure.moved(np.array([0.5 * change, 0.5 * further]))
+    stiffness, place = (moved.values[name] for name in names)
+    assert stiffness == pytest.approx(size + change, rel=1e-9)
+    assert stiffness * place == pytest.approx(size * (rest + further) + change * rest, rel=1e-6, abs=1e-9)
+
+
+def test_a_place_is_moved_as_it_is_where_nothing_pulls() -> None:
+    model = Model.from_toml(SLEDGE).with_effect("spring", "way", stiffness=0.0, rest=0.1)
+    names = ("way.spring.stiffness", "way.spring.rest")
+    prior = Prior(0.0, 1.0, -np.inf, np.inf)
+    structure = Structure(model, model.theta.copy(), dict.fromkeys(names, prior))
+    assert structure.leaning == []
+    assert list(structure.moved(np.array([3.0, 0.5])).values.values()) == pytest.approx([3.0, 0.6])

@@ -20,6 +20,8 @@ from vpm.ranking.structure import Structure
 Array = NDArray[np.float64]
 #: Shares of a step that are tried, the largest first.
 SHARES = (1.0, 0.3, 0.08)
+#: Weight of the prior of a place in a step beside a size, see `Structure.leaning`: it leads elsewhere than it points.
+FAINT = 1e-6
 #: Residuals and derivatives that no record has; their squares are still numbers.
 RUNAWAY = 1e100
 #: What is raised of structures that the records contradict, that cannot be computed, or whose bodies are not real.
@@ -217,7 +219,7 @@ class Fitter:
     ) -> tuple[Structure, Array, float] | None:
         """The first of the shares of a step that is better, its residual and cost; no derivatives are asked for."""
         for share in SHARES:
-            tried = now.structure.at(now.structure.standard + share * move)
+            tried = now.structure.moved(share * move)
             try:
                 residual, _ = self._pass(tried, now.observer, ())
             except ASTRAY:
@@ -251,13 +253,16 @@ def by_secant(slopes: Array, change: Array, move: Array) -> Array:
 def bounded_step(structure: Structure, errors: Array, slopes: Array, reach: float) -> Array:
     """Gauss-Newton step in deviations of the priors, within what is possible (bounded least squares)."""
     z, scale = structure.standard, max(float(np.mean(errors**2)), 1e-300)
-    normal = slopes.T @ slopes / scale + np.eye(len(z))
+    known = np.ones(len(z))
+    known[[place for _, place in structure.leaning]] = FAINT
+    far = known == FAINT
+    normal = slopes.T @ slopes / scale + np.diag(known)
     sizes = 1.0 / np.sqrt(np.diag(normal))
     root = np.linalg.cholesky(normal * np.outer(sizes, sizes) + 1e-12 * np.eye(len(z))).T
-    pull = -(slopes.T @ errors / scale + z) * sizes
+    pull = -(slopes.T @ errors / scale + known * z) * sizes
     target = np.linalg.solve(root.T, pull)
-    low = np.minimum(np.maximum(structure.ends[:, 0] - z, -reach), -1e-12) / sizes
-    high = np.maximum(np.minimum(structure.ends[:, 1] - z, reach), 1e-12) / sizes
+    low = np.where(far, -np.inf, np.minimum(np.maximum(structure.ends[:, 0] - z, -reach), -1e-12)) / sizes
+    high = np.where(far, np.inf, np.maximum(np.minimum(structure.ends[:, 1] - z, reach), 1e-12)) / sizes
     return np.asarray(lsq_linear(root, target, (low, high), method="bvls").x * sizes)
 
 

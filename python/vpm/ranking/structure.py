@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from vpm.catalogue.kinds import Side
 from vpm.discrepancy.candidates import Key
+from vpm.discrepancy.place import ANYWHERE
 from vpm.model import Effect, Model
 from vpm.weighing.priors import Prior
 
@@ -111,6 +112,32 @@ class Structure:
         for prior, column, z in zip(self.priors.values(), self.columns, inside, strict=True):
             theta[column] = prior.value(float(z))
         return replace(self, theta=theta)
+
+    @cached_property
+    def leaning(self) -> list[tuple[int, int]]:
+        """Sizes of effects that do something, and the places beside them that may lie anywhere, among the unknown.
+
+        Of a spring records tell the stiffness, and the product of that and the place where it rests.
+        """
+        names, found = list(self.priors), []
+        for effect in self.model.effects:
+            own = [(effect.type.parameter(short), name) for short, name in effect.parameter_names.items()]
+            places = [name for one, name in own if one.shape and tuple(one.physical) == ANYWHERE and name in names]
+            sizes = [name for one, name in own if not one.shape and name in names]
+            if len(places) == len(sizes) == 1 and self.theta[self.place(sizes[0])] != 0.0:
+                found.append((names.index(sizes[0]), names.index(places[0])))
+        return found
+
+    def moved(self, move: Array) -> Structure:
+        """With unknown parameters moved by deviations of their priors; products of sizes and places move straight."""
+        to = self.at(self.standard + move)
+        for size, place in self.leaning:
+            change = move * self.slopes
+            before, where = (float(self.theta[self.columns[one]]) for one in (size, place))
+            after = float(to.theta[self.columns[size]])
+            if after * before > 0.0:
+                to.theta[self.columns[place]] = (before * (where + change[place]) + where * (after - before)) / after
+        return to
 
     def carried(self, model: Model, renamed: Mapping[str, str] = MappingProxyType({})) -> Structure:
         """The same in another model, as far as that has the parameters; some have new names there."""
