@@ -164,6 +164,8 @@ class EffectType:
         Whether, at a joint with a compliance or backlash, it belongs to the motor side or to the spring itself.
     memory : str
         What the memory of its law, a state of the machine, is called at its site; "" if it has none.
+    contains : tuple of str
+        Plainer effects that it is at some values of its parameters.
     """
 
     name: str
@@ -180,6 +182,7 @@ class EffectType:
     formula: Formula | None = None
     motor_side_alone: bool = False
     memory: str = ""
+    contains: tuple[str, ...] = ()
 
     @property
     def has_sides(self) -> bool:

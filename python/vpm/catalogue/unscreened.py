@@ -191,6 +191,7 @@ LUGRE_FRICTION = EffectType(
     confused_with={},
     screened=False,
     memory="lugre.memory",
+    contains=("coulomb_friction",),
 )
 
 WARMING_FRICTION = EffectType(

@@ -26,7 +26,7 @@ class Look:
     ----------
     fitted : Fitted
     coarse : Followed
-        The same with few steps of the integrator, and derivatives by all that is unknown.
+        The same with few steps of the integrator where these do, and derivatives by all that is unknown.
     view : View
         Channels in their root mean squares; derivatives are taken as known for effects that do nothing at first.
     explained : float
@@ -38,7 +38,7 @@ class Look:
     def __init__(self, fitted: Fitted, fitter: Fitter, first: Look | None = None) -> None:
         observed, self._fitter = fitter.observed, fitter
         noise = white_noise(fitted.residual, observed.parts)
-        self.coarse = fitter.followed(fitted.structure, fitted.observer.coarse, tuple(fitted.structure.priors))
+        self.coarse = self._followed(fitted)
         slopes = noise.whitened(self.coarse.jacobian, observed.parts).T
         self.view = View(noise, dict(zip(self.coarse.names, slopes, strict=True)))
         cost = fitter.cost(fitted.structure, fitted.residual, noise)
@@ -46,8 +46,15 @@ class Look:
         self.sizes = np.array(noise.deviations)
         self.left = observed.squares(fitted.residual, self.sizes)
         self.added = 0.0 if first is None else self._beside(first.fitted.residual)
-        self.explained = max(self._removed(fitted.structure.model.effects), self.added)
+        self.explained = max(self._explained(fitted.structure.model.effects), self.added)
         self._curves: dict[tuple[str, ...], float] = {}
+
+    def _followed(self, fitted: Fitted) -> Followed:
+        """With all derivatives if few steps give them; contacts may be too stiff for that."""
+        names = tuple(fitted.structure.priors)
+        with contextlib.suppress(*ASTRAY):
+            return self._fitter.followed(fitted.structure, fitted.observer.coarse, names)
+        return self._fitter.followed(fitted.structure, fitted.observer, names, fitted.residual)
 
     def predicted_gain(self, other: Followed) -> float:
         """What another structure gains by a step of a fit, or as it stands, with few steps of the integrator, nats."""
@@ -85,8 +92,18 @@ class Look:
         alike = [one for one in present if same_curve(key, (one.name, one.at))]
         several = (key[1], *(f"{one.name} {one.side}" for one in alike))
         if several not in self._curves:
-            self._curves[several] = self._removed(alike)
+            self._curves[several] = self._explained(alike)
         return self._curves[several]
+
+    def _explained(self, effects: Collection[Effect]) -> float:
+        """Error power that these effects of the model remove, those that were added no more than all of these did.
+
+        What is left without a play or a spring that holds a load, and is not fitted anew, may be anything.
+        """
+        added = self.fitted.structure.effects
+        given = [one for one in effects if (one.name, one.at) not in added]
+        power = self._removed(effects)
+        return power if len(given) == len(effects) else min(power, self._removed(given) + self.added)
 
     def _removed(self, effects: Collection[Effect]) -> float:
         """Error power that these effects of the model remove; none where the rest runs away from the records.

@@ -157,9 +157,8 @@ class Observed:
 
     def _steps(self, model: Model, observer: Observer, record: Record) -> int:
         """Steps of the integrator within a sample."""
-        if observer.fine:
-            return max(STEPS, int(np.ceil(record.dt / self.settings.longest_step)))
-        return STEPS if model.added_joints else 1
+        fewest = STEPS if model.added_joints else 1
+        return max(fewest, int(np.ceil(record.dt / self.settings.longest_step))) if observer.fine else fewest
 
     def _begun(self, model: Model) -> list[Array]:
         """First states, by a model's own values: an observer soon forgets them.

@@ -65,26 +65,31 @@ class Search:
         named: dict[Key, Ranked] = {}
         rounds: list[tuple[Ranked, ...]] = []
         interrupted = False
+        before: list[frozenset[Key]] = []
         try:
             for _ in range(2 * self.settings.effects):  # effects may replace each other, but not for ever
-                if len(looks[0].fitted.structure.effects) == self.settings.effects:
+                present = looks[0].fitted.structure.effects
+                if len(present) == self.settings.effects or frozenset(present) in before:
                     break
                 best, tried = self._round(looks)
                 if smooth := self._held(looks, best):
                     looks = smooth
                     continue
+                before.append(frozenset(present))
                 rounds.append(self._listed(best, tried))
                 if best is None:
                     break
                 named[best.key] = rounds[-1][0]
-                self.say(f"{best.label} removes {100.0 * best.judgement.removed:.3g} % of the error power")
                 looks = [self._look(best.fitted)]  # known, should the next fits be interrupted
+                self.say(f"{best.label} removes {100.0 * best.judgement.removed:.3g} % of the error power")
                 looks = self._all_looks(looks[0])
-                for key in looks[0].fitted.structure.effects[:-1]:
+                for key in present:
                     looks, several = self._reconsidered(key, looks)
                     if several:
                         rounds.append(several)
                         named[several[0].key] = several[0]
+                if present:
+                    looks = self._out_of_a_dead_end(best, looks)
         except KeyboardInterrupt:
             interrupted = True
         found = looks[0].fitted.structure
@@ -173,20 +178,23 @@ class Search:
         return None, told + tried
 
     def _rivals(self, counting: Sequence[Trial]) -> tuple[list[Trial], list[Trial]]:
-        """Those that leave as little as the best of those that count, then one of each other effect beside it.
+        """Those that count under the observer of the best of them, the best first, and richer ones of the same curve.
 
-        Of several that draw the same curve, the plainest one alone: a richer one fits what laws are wrong by.
+        A richer one fits what the laws of a plainer one are wrong by, so that its evidence says nothing.
         """
-        first = min(counting, key=lambda trial: trial.left)
-        here = sorted((trial for trial in counting if trial.look is first.look), key=lambda trial: trial.left)
-        plain: list[Trial] = []
-        for trial in sorted((one for one in here if self._as_good(one, first)), key=lambda one: one.numbers):
-            if not any(same_curve(trial.key, other.key) for other in plain):
-                plain.append(trial)
-        others = {trial.key: trial for trial in reversed(here)}
-        for trial in plain:
-            del others[trial.key]
-        return plain, list(others.values())[::-1]
+        look = min(counting, key=lambda trial: trial.left).look
+        here = sorted((trial for trial in counting if trial.look is look), key=lambda trial: trial.left)
+        richer = [trial for trial in here if any(self._is_richer(trial, other) for other in here)]
+        several: dict[Key, Trial] = {}
+        for trial in here:
+            if trial not in richer:
+                several.setdefault(trial.key, trial)
+        return list(several.values()), richer
+
+    def _is_richer(self, trial: Trial, other: Trial) -> bool:
+        """Whether an effect does the work of another one of the same curve with more numbers, and hardly better."""
+        alike = same_curve(trial.key, other.key) and trial.numbers > other.numbers
+        return alike and self._as_good(other, trial)
 
     def _tried(self, look: Look) -> list[Trial]:
         """The most promising effects, fitted under one observer."""
@@ -208,56 +216,113 @@ class Search:
             return []
         best = min(worth, key=lambda trial: trial.left)
         most = self.settings.finished * best.left
-        hopeful = [trial for trial in worth if trial.left <= most or self._as_good(trial, best)]
+        hopeful = [t for t in worth if t.left <= most or self._as_good(t, best) or best.contains(t)]
 
         def one_finished(trial: Trial) -> Trial:
-            fitted = self.fitter.finished(trial.fitted, View(trial.look.view.noise))
-            return Trial.of(fitted, trial.look)
+            view = View(trial.look.view.noise)
+            fitted = self.fitter.finished(trial.fitted, view)
+            splits = len(trial.fitted.structure.model.added_joints) > len(
+                trial.look.fitted.structure.model.added_joints
+            )
+            ends = [fitted, *self._detours(fitted, view)] if splits else [fitted]
+            return Trial.of(min(ends, key=lambda one: one.cost), trial.look)
 
         ends = self.each("finishing", one_finished, hopeful, lambda trial: trial.label)
         return [end for end in ends if isinstance(end, Trial)]
 
+    def _detours(self, fitted: Fitted, view: View) -> list[Fitted]:
+        """Where a fit of an effect that splits a joint ends if it goes on from where a faster observer leads it.
+
+        A slow observer lets what hangs behind a play go its own way, so that few of its impacts are in step with those
+        of the record, and fits end in many places. A fast one holds it in step (H. Abarbanel, *Predicting the Future*,
+        Springer 2013).
+        """
+        detour = Observer(max(self.settings.bands))
+        if detour == fitted.observer:
+            return []
+        try:
+            quick = self._fitted(fitted.structure, detour).structure
+            return [self.fitter.finished(self.fitter.fitted(quick, fitted.observer, view), view)]
+        except ASTRAY:
+            return []
+
     def _weighed(self, counting: Sequence[Trial]) -> list[Trial]:
         """The best of those that count, then the others, with the evidence that each adds under one noise model.
 
-        It is the most probable one of those that leave as little. Of what nobody can tell from it a part of the machine
-        comes before an instrument.
+        What nobody can tell from each other is probable together. The best is the plainest one of the most probable
+        class; a part of the machine comes before an instrument, and what a law contains before the law: it will be
+        judged again beside what comes after it.
         """
-        plain, others = self._rivals(counting)
-        observed, first = self.fitter.observed, min(plain, key=lambda trial: trial.left)
-        noise = fitted_noise(first.fitted.residual, observed.parts, self.settings.order)
-        without = self.fitter.evidence(first.look.fitted, noise)
-        trials = [*plain, *others]
-        weighed = [replace(trial, evidence=self.fitter.evidence(trial.fitted, noise) - without) for trial in trials]
-        likely = max(weighed[: len(plain)], key=lambda trial: trial.evidence)
-        nats = apart(likely.fitted, [trial.fitted for trial in trials], self.fitter, noise)
-        alike = [trial for trial, far in zip(weighed, nats, strict=True) if far < self.settings.same]
-        best = min(alike, key=lambda trial: (trial.is_instrument, -trial.evidence))
-        rivals = tuple(trial.label for trial in alike if trial is not best)
-        return [replace(best, rivals=rivals), *(trial for trial in weighed if trial is not best)]
+        several, richer = self._rivals(counting)
+        noise = fitted_noise(several[0].fitted.residual, self.fitter.observed.parts, self.settings.order)
+
+        def likely_values(fitted: Fitted) -> Fitted:
+            """Those under the noise, about which evidence is told; others leave least power."""
+            cost = self.fitter.cost(fitted.structure, fitted.residual, noise)
+            return self.fitter.finished(replace(fitted, cost=cost), View(noise))
+
+        fits = [likely_values(trial.fitted) for trial in several]
+        without = self.fitter.evidence(likely_values(several[0].look.fitted), noise)
+        told = [
+            replace(trial, evidence=self.fitter.evidence(fit, noise) - without)
+            for trial, fit in zip(several, fits, strict=True)
+        ]
+        *shares, _ = probabilities([trial.evidence for trial in told], self.settings.tempering)
+        classes = [
+            [place for place, far in enumerate(apart(one, fits, self.fitter, noise)) if far < self.settings.same]
+            for one in fits
+        ]
+        head = max(range(len(told)), key=lambda place: (sum(shares[other] for other in classes[place]), shares[place]))
+        likely = [told[place] for place in classes[head]]
+        best = min(likely, key=lambda trial: trial.order)
+        if within := [trial for trial in told if best.contains(trial)]:
+            best, likely = within[0], within[:1]
+            told = [replace(trial, evidence=np.nan) if trial.contains(best) else trial for trial in told]
+        rivals = tuple(trial.label for trial in likely if trial is not best)
+        return [replace(best, rivals=rivals), *(trial for trial in told if trial is not best), *richer]
+
+    def _out_of_a_dead_end(self, last: Trial, looks: list[Look]) -> list[Look]:
+        """Without the last effect, if all that it did was to help a fit of the others out of a dead end."""
+        whole = looks[0].fitted
+        try:
+            bare = self._look(self._fitted(whole.structure.without(last.key), whole.observer))
+        except ASTRAY:
+            return looks
+        if last.look.judged(bare.fitted).least <= self.settings.worth or self._counts(Trial.of(whole, bare, last.key)):
+            return looks
+        self.say(f"no longer needed: {last.label}")
+        return self._all_looks(bare)
 
     def _reconsidered(self, key: Key, looks: list[Look]) -> tuple[list[Look], tuple[Ranked, ...]]:
         """Without an earlier effect that a later one has made needless, or with a better one in its place.
 
-        What was found before the others came in was fitted to what they leave, too.
+        What was found before the others came in was fitted to what they leave, too. A fast observer hides what a slow
+        one shows: an effect that counts under any of them stays.
         """
-        whole = looks[0].fitted
-        try:
-            look = self._look(self._fitted(whole.structure.without(key), whole.observer))
-        except ASTRAY:  # it runs away without, or another one rests on it
+        bare: list[Look] = []
+        for look in looks:
+            whole = look.fitted
+            try:
+                bare.append(self._look(self._fitted(whole.structure.without(key), whole.observer)))
+            except ASTRAY:  # it runs away without, or another one rests on it
+                return looks, ()
+            now = Trial.of(whole, bare[-1], key)
+            counting = [
+                trial for trial in (now, *self._in_its_place(bare[-1], self.others.get(key, ()))) if self._counts(trial)
+            ]
+            if counting:
+                return self._exchanged(now, counting, looks)
+        self.say(f"no longer needed: {' at '.join(key)}")
+        return self._all_looks(bare[0]), ()
+
+    def _exchanged(
+        self, now: Trial, counting: Sequence[Trial], looks: list[Look]
+    ) -> tuple[list[Look], tuple[Ranked, ...]]:
+        """With the best of those that count in the place of an effect, which may be that one itself."""
+        weighed = [now] if list(counting) == [now] else self._weighed(counting)
+        if weighed[0].key == now.key:
             return looks, ()
-        now = Trial.of(whole, look, key)
-        trials = [now, *self._in_its_place(look, self.others.get(key, ()))]
-        counting = [trial for trial in trials if self._counts(trial)]
-        if not counting:
-            self.say(f"no longer needed: {' at '.join(key)}")
-            return self._all_looks(look), ()
-        if counting == [now]:
-            return looks, ()
-        weighed = self._weighed(counting)
-        if weighed[0].key == key:
-            return looks, ()
-        self.say(f"{weighed[0].label} does better than {' at '.join(key)}")
+        self.say(f"{weighed[0].label} does better than {now.label}")
         return self._all_looks(self._look(weighed[0].fitted)), self._listed(weighed[0], weighed)
 
     def _in_its_place(self, look: Look, others: Sequence[Structure]) -> list[Trial]:

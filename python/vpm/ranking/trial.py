@@ -43,6 +43,18 @@ class Trial:
         """Whether it is a fault of a sensor, and none of the machine."""
         return EFFECTS[self.key[0]].site == "sensor"
 
+    def contains(self, other: Trial) -> bool:
+        """Whether it is the other effect at some values of its parameters."""
+        return self.key[1] == other.key[1] and other.key[0] in EFFECTS[self.key[0]].contains
+
+    @property
+    def order(self) -> tuple[bool, int, int]:
+        """Which comes first where records cannot tell: parts of the machine, then the plainest, then the commonest.
+
+        The catalogue lists commoner effects first.
+        """
+        return self.is_instrument, self.numbers, list(EFFECTS).index(self.key[0])
+
     @property
     def numbers(self) -> int:
         """How many are unknown in it."""
