@@ -175,3 +175,9 @@ def test_a_refit_that_simulates_worse_is_not_kept(monkeypatch: pytest.MonkeyPatc
 def test_names_come_from_one_of_two_places(records: list[Experiment]) -> None:
     with pytest.raises(DiagnosisError, match='from a "search" or a "ranking", not from "luck"'):
         diagnose(nominal(), records[0], records[1], names=cast("Any", "luck"))
+
+
+def test_a_parameter_without_a_derivative_along_the_motion_is_not_told_by_a_balance() -> None:
+    """Behind a play two motions part ever faster, and squares of derivatives overflow."""
+    columns = np.array([[1.0, 1e200, np.inf], [0.0, 1e200, 0.0]])
+    assert by_ranking._told(columns).tolist() == [True, False, False]

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vpm.catalogue import EFFECTS
 from vpm.discrepancy.ambiguity import Rivals
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
     from vpm.ranking import Ranked, Ranking
     from vpm.ranking import Settings as RankingSettings
 
+Array = NDArray[np.float64]
 #: Part of the name of a parameter that acts behind a joint that is split.
 BEHIND = ".link."
 
@@ -141,18 +143,29 @@ def _beside(current: Judged, model: Model, one: Ranked, data: Data) -> Trial:
     own = _own(model, one)
     known = tuple(_renamed(current.model, model).get(name, name) for name in current.free)
     known = tuple(name for name in known if name in model.parameters)
-    residual, columns = data.training.evaluate(model, model.theta, [model.index(name) for name in (*known, *own)])
+    every = (*known, *own)
+    residual, columns = data.training.evaluate(model, model.theta, [model.index(name) for name in every])
+    told = _told(columns)
+    lost = {name for name, seen in zip(every, told, strict=True) if not seen}
+    columns, known = columns[:, told], tuple(name for name in known if name not in lost)
+    values = {name: model.parameters[name].value for name in own}
+    own, blurred = tuple(name for name in own if name not in lost), tuple(name for name in own if name in lost)
     split = len(known)
     sizes = np.array([abs(model.parameters[name].value) or 1.0 for name in (*known, *own)])
     keep, held, blind = sort_columns(
         own, columns[:, split:], columns[:, :split], known, residual, (sizes[:split], sizes[split:])
     )
     moving = tuple(own[place] for place in keep)
-    values = {name: model.parameters[name].value for name in own}
-    probe = Probe(candidate, model, moving, held, blind, values, dict.fromkeys(own, np.nan), np.nan)
+    probe = Probe(candidate, model, moving, held, (*blind, *blurred), values, dict.fromkeys(values, np.nan), np.nan)
     free = (*known, *moving)
     judged, diverged = _refitted(current, model, candidate, one, free, data)
     return measured(current, data, probe, judged, moving, held, None, diverged)
+
+
+def _told(columns: Array) -> NDArray[np.bool_]:
+    """Whether a balance has derivatives by each parameter: what is behind a play may part from its way ever faster."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        return np.asarray(np.isfinite(np.sum(columns**2, axis=0)))
 
 
 def _refitted(
