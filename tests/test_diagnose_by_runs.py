@@ -19,7 +19,7 @@ def test_a_force_and_a_tilt_that_a_balance_takes_for_each_other_are_told_apart()
     """They differ by a cosine of the angle: 4 % of what the balance leaves, eighty deviations of the noise in runs."""
     case = shared_case("axis_rotary", ("gravity_tilt", "stribeck_friction"), 102)
     tried = ["bias_force", "gravity_tilt", "stribeck_friction"]
-    why = vpm.diagnose(case.model(), case.train, case.validate, effects=tried, workers=1)
+    why = vpm.diagnose(case.model(), case.train, case.validate, effects=tried, names="search", workers=1)
     assert {effect.name for effect in why.effects} == {"gravity_tilt", "stribeck_friction"}
     assert any("runs of the model itself ask for" in r.reason for r in why.refused if r.name == "bias_force")
 
@@ -27,7 +27,7 @@ def test_a_force_and_a_tilt_that_a_balance_takes_for_each_other_are_told_apart()
 def test_a_late_drive_is_named_for_a_force_where_one_reversal_outweighs_all_else() -> None:
     case = shared_case("axis_rotary", ("asymmetric_friction", "input_delay"), 7009)
     tried = ["asymmetric_friction", "bias_force", "input_delay"]
-    why = vpm.diagnose(case.model(), case.train, case.validate, effects=tried, workers=1)
+    why = vpm.diagnose(case.model(), case.train, case.validate, effects=tried, names="search", workers=1)
     assert {effect.name for effect in why.effects} == {"asymmetric_friction", "input_delay"}
 
 
@@ -35,7 +35,7 @@ def test_an_effect_of_a_modest_part_is_named_if_runs_ask_for_all_of_it() -> None
     """A dead zone takes a quarter of what a ripple leaves of the balance: seven deviations of the ten it would need."""
     case = shared_case("axis_rotary", ("dead_zone", "torque_ripple"), 102)
     tried = ["dead_zone", "torque_ripple", "hysteresis"]
-    why = vpm.diagnose(case.model(), case.train, case.validate, effects=tried, workers=1)
+    why = vpm.diagnose(case.model(), case.train, case.validate, effects=tried, names="search", workers=1)
     assert {effect.name for effect in why.effects} == {"dead_zone", "torque_ripple"}
     hidden = next(h for h in case.truth.hidden if h.name == "dead_zone")
     width = next(effect for effect in why.effects if effect.name == "dead_zone").parameters[0]
@@ -45,7 +45,7 @@ def test_an_effect_of_a_modest_part_is_named_if_runs_ask_for_all_of_it() -> None
 def test_runs_ask_for_nothing_where_nothing_is_missing() -> None:
     case = shared_case("axis_rotary", "parameters", 100)
     tried = ["torque_ripple", "dead_zone", "stribeck_friction"]
-    why = vpm.diagnose(case.model(), case.train, case.validate, effects=tried, workers=1)
+    why = vpm.diagnose(case.model(), case.train, case.validate, effects=tried, names="search", workers=1)
     assert not why.effects
 
 
@@ -53,7 +53,7 @@ def test_a_spring_that_swings_above_the_band_of_a_balance_is_found_in_runs(monke
     """Where a balance believes nothing; nothing was accepted before it, and it is examined as any other."""
     monkeypatch.setattr(Round, "best", lambda _: None)
     case = shared_case("axis_rotary", "joint_compliance", 101)
-    why = vpm.diagnose(case.model(), case.train, case.validate, effects=["joint_compliance"], workers=1)
+    why = vpm.diagnose(case.model(), case.train, case.validate, effects=["joint_compliance"], names="search", workers=1)
     assert [effect.name for effect in why.effects] == ["joint_compliance"]
     values = {p.name: p.value for p in why.effects[0].parameters}
     assert values["stiffness"] == pytest.approx(case.truth.hidden[0].parameters["stiffness"], rel=0.1)

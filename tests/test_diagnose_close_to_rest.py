@@ -15,7 +15,7 @@ from vpm.simulate import Setup
 def test_what_a_balance_hardly_sees_is_told_by_runs() -> None:
     """It fades below 1.5 % of the speed: fitted to the balance, it predicts unseen efforts worse than nothing does."""
     case = shared_case("axis_linear", "stribeck_friction", 18)
-    why = vpm.diagnose(case.model(), case.train, case.validate, effects=[CLOSE_TO_REST], workers=1)
+    why = vpm.diagnose(case.model(), case.train, case.validate, effects=[CLOSE_TO_REST], names="search", workers=1)
     (found,) = why.effects
     (true,) = case.truth.hidden
     assert (found.name, found.site) == (true.name, true.site)
@@ -28,7 +28,7 @@ def test_what_a_balance_hardly_sees_is_told_by_runs() -> None:
 def test_what_runs_tell_need_not_close_the_balance() -> None:
     """Of what the runs leave nine tenths go, of the balance nothing: a fit without physics finds more there."""
     case = shared_case("axis_rotary", "stribeck_friction", 3001)
-    why = vpm.diagnose(case.model(), case.train, case.validate, effects=[CLOSE_TO_REST], workers=1)
+    why = vpm.diagnose(case.model(), case.train, case.validate, effects=[CLOSE_TO_REST], names="search", workers=1)
     assert [effect.name for effect in why.effects] == [CLOSE_TO_REST]
     assert why.verdict == "effect_found"
 
@@ -40,7 +40,7 @@ def test_what_runs_tell_need_not_close_the_balance() -> None:
 )
 def test_runs_ask_for_nothing_that_is_not_there(machine: str, hidden: str, seed: int) -> None:
     case = shared_case(machine, hidden, seed)
-    why = vpm.diagnose(case.model(), case.train, case.validate, effects=[CLOSE_TO_REST], workers=1)
+    why = vpm.diagnose(case.model(), case.train, case.validate, effects=[CLOSE_TO_REST], names="search", workers=1)
     assert not why.effects
     (refused,) = why.refused
     assert "runs of the model itself" in refused.reason

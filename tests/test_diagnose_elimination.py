@@ -11,7 +11,9 @@ from shared_cases import shared_case
 def test_a_spring_that_may_rest_elsewhere_needs_no_constant_force_beside_it() -> None:
     case = shared_case("axis_rotary", "spring", 2)
     (hidden,) = case.truth.hidden
-    why = vpm.diagnose(case.model(), case.train, case.validate, effects=["bias_force", "spring"], workers=1)
+    why = vpm.diagnose(
+        case.model(), case.train, case.validate, effects=["bias_force", "spring"], names="search", workers=1
+    )
     assert [step.change for step in why.steps] == ["recalibrated", "added", "added", "removed"]
     assert [(effect.name, effect.site) for effect in why.effects] == [("spring", "axis")]
     values = {parameter.name: parameter for parameter in why.effects[0].parameters}
@@ -25,7 +27,7 @@ def test_a_difference_of_friction_with_a_size_of_its_own_needs_no_constant_force
     case = shared_case("axis_rotary", "asymmetric_friction", 2)
     (hidden,) = case.truth.hidden
     tried = ["bias_force", "asymmetric_friction"]
-    why = vpm.diagnose(case.model(), case.train, case.validate, effects=tried, workers=1)
+    why = vpm.diagnose(case.model(), case.train, case.validate, effects=tried, names="search", workers=1)
     changes = [(step.change, step.effect) for step in why.steps]
     assert ("added", "bias_force") in changes
     assert ("removed", "bias_force") in changes

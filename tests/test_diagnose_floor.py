@@ -90,7 +90,7 @@ def test_interrupted_search_gives_what_is_known() -> None:
             raise KeyboardInterrupt
 
     effects = ["coulomb_friction", "bias_force"]
-    diagnosis = diagnose(nominal(), train, test, effects=effects, tell=tell)
+    diagnosis = diagnose(nominal(), train, test, effects=effects, names="search", tell=tell)
     assert diagnosis.interrupted
     assert len(diagnosis.effects) == 1
     assert any(note.startswith("stopped by Ctrl-C") for note in diagnosis.notes)

@@ -29,7 +29,9 @@ from vpm.identify import Gain, InverseDynamicsProblem, estimate
 def test_a_spring_takes_the_place_of_the_constant_force_that_was_the_plainer_name() -> None:
     case = shared_case("axis_rotary", "spring", 7)
     (hidden,) = case.truth.hidden
-    why = vpm.diagnose(case.model(), case.train, case.validate, effects=["bias_force", "spring"], workers=1)
+    why = vpm.diagnose(
+        case.model(), case.train, case.validate, effects=["bias_force", "spring"], names="search", workers=1
+    )
     assert [(s.change, s.effect) for s in why.steps][-2:] == [("removed", "bias_force"), ("added", "spring")]
     assert [(effect.name, effect.site) for effect in why.effects] == [("spring", "axis")]
     assert [c.name for c in why.candidates if c.accepted] == ["spring"]
@@ -42,14 +44,16 @@ def test_a_spring_takes_the_place_of_the_constant_force_that_was_the_plainer_nam
 def test_a_constant_force_keeps_its_name_where_finer_laws_know_nothing_more() -> None:
     case = shared_case("axis_rotary", "bias_force", 2)
     tried = ["bias_force", "spring", "asymmetric_friction"]
-    why = vpm.diagnose(case.model(), case.train, case.validate, effects=tried, workers=1)
+    why = vpm.diagnose(case.model(), case.train, case.validate, effects=tried, names="search", workers=1)
     assert [effect.name for effect in why.effects] == ["bias_force"]
 
 
 def test_a_spring_that_looked_like_a_shifted_centre_of_mass_is_found_beside_the_constant_force() -> None:
     case = shared_case("axis_rotary", "spring", 106)
     (hidden,) = case.truth.hidden
-    why = vpm.diagnose(case.model(), case.train, case.validate, effects=["bias_force", "spring"], workers=1)
+    why = vpm.diagnose(
+        case.model(), case.train, case.validate, effects=["bias_force", "spring"], names="search", workers=1
+    )
     assert [(s.change, s.effect) for s in why.steps][1:] == [
         ("added", "bias_force"),
         ("removed", "bias_force"),

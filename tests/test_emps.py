@@ -41,7 +41,7 @@ TRIED = ("coulomb_friction", "bias_force", "asymmetric_friction", "torque_ripple
 def diagnosis() -> Diagnosis:
     model = Model.load(MODEL)
     train, test = (Experiment.load(DATA / f"emps_{name}.csv", model=model) for name in ("train", "pulses_test"))
-    return diagnose(model, train, test)
+    return diagnose(model, train, test, names="search")
 
 
 def test_names_the_effects_in_order(diagnosis: Diagnosis) -> None:
@@ -86,7 +86,9 @@ def test_asymmetry_and_bias_are_said_to_be_confusable(diagnosis: Diagnosis) -> N
 def test_command_line(tmp_path: Path) -> None:
     tried = [word for name in TRIED for word in ("--effect", name)]
     unseen = DATA / "emps_pulses_test.csv"
-    done = vpm("diagnose", MODEL, DATA / "emps_train.csv", "--validate", unseen, *tried, "--out", tmp_path)
+    done = vpm(
+        "diagnose", MODEL, DATA / "emps_train.csv", "--validate", unseen, *tried, "--names", "search", "--out", tmp_path
+    )
     assert done.returncode == 0, done.stderr
     assert "torque_ripple at axis: it helps the training record" in done.stdout
     report = json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))

@@ -38,10 +38,11 @@ def test_one_core_and_four_find_the_same(diagnosis: vpm.Diagnosis) -> None:
         why = vpm.diagnose(model, train, test, workers=workers, progress=lambda *each: told.append(each))
         documents.append(repr({**why.to_dict(), "seconds": 0.0}))  # to the last digit
     assert documents[0] == documents[1] == repr({**diagnosis.to_dict(), "seconds": 0.0})
-    # Every candidate is told once, and the count goes up to the number of them.
-    first = [each for each in told[: len(told) // 2] if each[0] == "round 1: screening"]
-    assert [each[2] for each in first] == list(range(1, first[0][3] + 1))
-    assert len({each[1] for each in first}) == len(first) > 5
+    # Every start of a candidate is told once, and the count goes up to the number of them.
+    screened = [each for each in told if each[0] == "screening"]
+    count = screened[0][3]
+    assert [each[2] for each in screened[:count]] == list(range(1, count + 1))
+    assert len({each[1] for each in screened[:count]}) > 5
 
 
 def test_each_finding_has_its_evidence_on_unseen_data(diagnosis: vpm.Diagnosis) -> None:

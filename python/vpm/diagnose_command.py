@@ -37,8 +37,8 @@ Effect = Annotated[Words, typer.Option(help="Try only these effects; repeat.")]
 Without = Annotated[Words, typer.Option(help="Try all effects but these; repeat.")]
 Limit = Annotated[int, typer.Option(min=0, help="Most effects to accept.")]
 Names = Annotated[
-    Literal["search", "ranking"],
-    typer.Option(help="Where names come from; a ranking covers rigid machines of one or two joints."),
+    Literal["ranking", "search"],
+    typer.Option(help="Where names come from; a ranking covers rigid machines of one or two joints, a search others."),
 ]
 Substeps = Annotated[int, typer.Option(min=1, help="Integration steps per sample, in simulations of unseen records.")]
 Horizon = Annotated[float, typer.Option(help="Length of each restart, where unseen records are simulated so, s.")]
@@ -52,7 +52,7 @@ def diagnose(
     effect: Effect = None,
     without: Without = None,
     limit: Limit = 6,
-    names: Names = "search",
+    names: Names = "ranking",
     channels: Channels = None,
     interpolate: Interpolate = False,
     cutoff: Cutoff = None,

@@ -71,7 +71,7 @@ REACH = 4.0
 
 Tell = Callable[[str], None]
 #: Where names come from.
-Names = Literal["search", "ranking"]
+Names = Literal["ranking", "search"]
 Found = TypeVar("Found")
 _Records = tuple[tuple[Experiment, ...], tuple[Experiment, ...], list[str]]
 
@@ -85,7 +85,7 @@ def diagnose(
     cutoff: float | None = None,
     setup: Setup | None = None,
     limit: int = 6,
-    names: Names = "search",
+    names: Names = "ranking",
     workers: int | None = None,
     tell: Tell | None = None,
     progress: Progress | None = None,
@@ -93,9 +93,10 @@ def diagnose(
     """Name the physics that ``model`` is missing, with evidence on data that were not fitted.
 
     The parameters that the model file calls uncertain are fitted first, for a wrong parameter is not a missing
-    effect. Then every effect of the catalogue is screened at every site by its regressor; the promising ones are
-    refitted together with the model and have to predict unseen records, both as a balance of effort and in
-    simulation. One is accepted at a time, the one with the largest unseen gain per fitted number.
+    effect. Where links are rigid and one or two joints move, a ranking of the training records names what is missing,
+    see `vpm.rank`, and unseen records decide nothing. Elsewhere every effect is screened at every site by its
+    regressor; the promising ones are refitted together with the model and have to predict unseen records, both as a
+    balance of effort and in simulation. One is accepted at a time, the one with the largest unseen gain per number.
 
     Parameters
     ----------
@@ -113,9 +114,9 @@ def diagnose(
         Integrator, substeps and horizon of the simulations.
     limit : int
         Most effects to accept.
-    names : {"search", "ranking"}
-        Where names come from: from rounds of screening on balances of effort, or from `vpm.rank` where that covers the
-        machine.
+    names : {"ranking", "search"}
+        Where names come from: from `vpm.rank` where that covers the machine and from rounds of screening on balances of
+        effort elsewhere, or from these in any case.
     workers : int, optional
         Candidates that are worked on at a time; one per core if not given. The result does not depend on it.
     tell : callable, optional
@@ -287,7 +288,7 @@ def _ranked(
             data.training.experiments,
             effects=effects,
             settings=settings,
-            setup=setup or Setup(),
+            setup=setup,
             workers=each.workers,
             tell=tell,
             progress=each.progress,
