@@ -25,6 +25,7 @@ class Look:
     Attributes
     ----------
     fitted : Fitted
+    settings : Settings
     coarse : Followed
         The same with few steps of the integrator where these do, and derivatives by all that is unknown.
     view : View
@@ -36,7 +37,7 @@ class Look:
     """
 
     def __init__(self, fitted: Fitted, fitter: Fitter, first: Look | None = None) -> None:
-        observed, self._fitter = fitter.observed, fitter
+        observed, self._fitter, self.settings = fitter.observed, fitter, fitter.settings
         noise = white_noise(fitted.residual, observed.parts)
         self.coarse = self._followed(fitted)
         slopes = noise.whitened(self.coarse.jacobian, observed.parts).T
@@ -61,7 +62,7 @@ class Look:
         parts = self._fitter.observed.parts
         before = self.view.noise.whitened(self.coarse.residual, parts)
         errors, slopes = self.view.errors(other, parts)
-        move = bounded_step(other.structure, errors, slopes, self._fitter.settings.reach)
+        move = bounded_step(other.structure, errors, slopes, self.settings.reach)
         left = min(float(np.sum((errors + slopes @ move) ** 2)), float(errors @ errors))
         return 0.5 * len(errors) * float(np.log(float(before @ before) / max(left, 1e-300)))
 
@@ -69,22 +70,22 @@ class Look:
     def needed(self) -> float:
         """What an effect has to gain to be worth it, nats."""
         samples = self.fitted.residual.shape[1] * sum(part.stop - part.start for part in self._fitter.observed.parts)
-        return float(-0.5 * samples * np.log1p(-self._fitter.settings.worth))
+        return float(-0.5 * samples * np.log1p(-self.settings.worth))
 
     def has_room(self, removed: float = 0.0) -> bool:
         """Whether any effect could still count if so much of what is left were removed before it."""
         size, beside = (float(np.sqrt((1.0 - removed) / (power + 1.0))) for power in (self.explained, self.added))
-        return Judgement(1.0, 1.0, np.inf, size, beside, 1.0).counts(self._fitter.settings)
+        return Judgement(1.0, 1.0, np.inf, size, beside, 1.0).counts(self.settings)
 
     def judged(self, fitted: Fitted, key: Key | None = None) -> Judgement:
         """What another structure removes by one of its effects, or by what is none."""
-        observed, settings = self._fitter.observed, self._fitter.settings
+        observed = self._fitter.observed
         left = observed.squares(fitted.residual, self.sizes)
         shares = [1.0 - float(after.sum() / before.sum()) for after, before in zip(left, self.left, strict=True)]
         removed = max(1.0 - self._sum(left) / self._sum(self.left), 1e-12)
         powers = (self.explained, self.added, 0.0 if key is None else self._curve(key))
         sizes = (float(np.sqrt(removed / (power + removed))) for power in powers)
-        return Judgement(removed, min(shares), _repeated(self.left[1], left[1], settings.pieces), *sizes)
+        return Judgement(removed, min(shares), _repeated(self.left[1], left[1], self.settings.pieces), *sizes)
 
     def _curve(self, key: Key) -> float:
         """What those effects of the model remove that show over the same states at the same place as another one."""

@@ -13,12 +13,13 @@ from vpm.errors import VpmError
 from vpm.experiment import Experiment
 from vpm.identify import InverseDynamicsProblem
 from vpm.model import Model
+from vpm.ranking.choice import as_good, weighed
 from vpm.ranking.extensions import Extensions
 from vpm.ranking.fit import ASTRAY, Fitted, Fitter, View
-from vpm.ranking.look import Look, same_curve
+from vpm.ranking.look import Look
 from vpm.ranking.noise_model import fitted_noise
 from vpm.ranking.observed import Observed, Observer
-from vpm.ranking.posterior import apart, probabilities
+from vpm.ranking.posterior import probabilities
 from vpm.ranking.proposals import proposals
 from vpm.ranking.race import raced
 from vpm.ranking.result import Ranked, Ranking
@@ -163,51 +164,24 @@ class Search:
         for look in (look for look in looks if look.has_room()):
             seen = self._tried(look)
             tried += seen
-            counting += [trial for trial in self._finished(seen) if self._counts(trial)]
+            counting += [trial for trial in self._finished(seen) if trial.counts]
             if any(not trial.look.has_room(trial.judgement.removed) for trial in counting):
                 break  # nothing could be missing beside it
         told: list[Trial] = []
         while counting:
-            weighed = self._weighed(counting)
-            if weighed[0].evidence > self.settings.odds:
-                self.others[weighed[0].key] = [trial.fitted.structure for trial in weighed[1:]]
-                return weighed[0], weighed + told + tried
+            best, *others = weighed(counting, self.fitter)
+            if best.evidence > self.settings.odds:
+                self.others[best.key] = [trial.fitted.structure for trial in others]
+                return best, [best, *others, *told, *tried]
             # It leaves less error because it answers to noise otherwise; no sample is more probable by it.
-            told.append(weighed[0])
-            counting = [trial for trial in counting if trial.fitted is not weighed[0].fitted]
+            told.append(best)
+            counting = [trial for trial in counting if trial.fitted is not best.fitted]
         return None, told + tried
-
-    def _rivals(self, counting: Sequence[Trial]) -> tuple[list[Trial], list[Trial]]:
-        """Those that count under the observer of the best of them, the best first, and richer ones of the same curve.
-
-        A richer one fits what the laws of a plainer one are wrong by, so that its evidence says nothing.
-        """
-        look = min(counting, key=lambda trial: trial.left).look
-        here = sorted((trial for trial in counting if trial.look is look), key=lambda trial: trial.left)
-        richer = [trial for trial in here if any(self._is_richer(trial, other) for other in here)]
-        several: dict[Key, Trial] = {}
-        for trial in here:
-            if trial not in richer:
-                several.setdefault(trial.key, trial)
-        return list(several.values()), richer
-
-    def _is_richer(self, trial: Trial, other: Trial) -> bool:
-        """Whether an effect does the work of another one of the same curve with more numbers, and hardly better."""
-        alike = same_curve(trial.key, other.key) and trial.numbers > other.numbers
-        return alike and self._as_good(other, trial)
 
     def _tried(self, look: Look) -> list[Trial]:
         """The most promising effects, fitted under one observer."""
         chosen = proposals(look, self.fitter, self.data, self.extensions, self.each, self.names)
         return [Trial.of(fitted, look) for fitted in raced(chosen, look, self.fitter, self.each)]
-
-    def _counts(self, trial: Trial) -> bool:
-        return trial.fitted.structure.shows(trial.key) and trial.judgement.counts(self.settings)
-
-    def _as_good(self, trial: Trial, first: Trial) -> bool:
-        """Whether it leaves no more than what the laws of the curves that either is a part of are wrong by."""
-        told = (trial.judgement, first.judgement)
-        return trial.left - first.left < max(one.removed * (self.settings.inexact / one.shape) ** 2 for one in told)
 
     def _finished(self, tried: Sequence[Trial]) -> list[Trial]:
         """Those of one observer that are worth it and leave little, fitted to the end."""
@@ -216,15 +190,12 @@ class Search:
             return []
         best = min(worth, key=lambda trial: trial.left)
         most = self.settings.finished * best.left
-        hopeful = [t for t in worth if t.left <= most or self._as_good(t, best) or best.contains(t)]
+        hopeful = [t for t in worth if t.left <= most or as_good(t, best, self.settings) or best.contains(t)]
 
         def one_finished(trial: Trial) -> Trial:
             view = View(trial.look.view.noise)
             fitted = self.fitter.finished(trial.fitted, view)
-            splits = len(trial.fitted.structure.model.added_joints) > len(
-                trial.look.fitted.structure.model.added_joints
-            )
-            ends = [fitted, *self._detours(fitted, view)] if splits else [fitted]
+            ends = [fitted, *self._detours(fitted, view)] if trial.splits else [fitted]
             return Trial.of(min(ends, key=lambda one: one.cost), trial.look)
 
         ends = self.each("finishing", one_finished, hopeful, lambda trial: trial.label)
@@ -246,41 +217,6 @@ class Search:
         except ASTRAY:
             return []
 
-    def _weighed(self, counting: Sequence[Trial]) -> list[Trial]:
-        """The best of those that count, then the others, with the evidence that each adds under one noise model.
-
-        What nobody can tell from each other is probable together. The best is the plainest one of the most probable
-        class; a part of the machine comes before an instrument, and what a law contains before the law: it will be
-        judged again beside what comes after it.
-        """
-        several, richer = self._rivals(counting)
-        noise = fitted_noise(several[0].fitted.residual, self.fitter.observed.parts, self.settings.order)
-
-        def likely_values(fitted: Fitted) -> Fitted:
-            """Those under the noise, about which evidence is told; others leave least power."""
-            cost = self.fitter.cost(fitted.structure, fitted.residual, noise)
-            return self.fitter.finished(replace(fitted, cost=cost), View(noise))
-
-        fits = [likely_values(trial.fitted) for trial in several]
-        without = self.fitter.evidence(likely_values(several[0].look.fitted), noise)
-        told = [
-            replace(trial, evidence=self.fitter.evidence(fit, noise) - without)
-            for trial, fit in zip(several, fits, strict=True)
-        ]
-        *shares, _ = probabilities([trial.evidence for trial in told], self.settings.tempering)
-        classes = [
-            [place for place, far in enumerate(apart(one, fits, self.fitter, noise)) if far < self.settings.same]
-            for one in fits
-        ]
-        head = max(range(len(told)), key=lambda place: (sum(shares[other] for other in classes[place]), shares[place]))
-        likely = [told[place] for place in classes[head]]
-        best = min(likely, key=lambda trial: trial.order)
-        if within := [trial for trial in told if best.contains(trial)]:
-            best, likely = within[0], within[:1]
-            told = [replace(trial, evidence=np.nan) if trial.contains(best) else trial for trial in told]
-        rivals = tuple(trial.label for trial in likely if trial is not best)
-        return [replace(best, rivals=rivals), *(trial for trial in told if trial is not best), *richer]
-
     def _out_of_a_dead_end(self, last: Trial, looks: list[Look]) -> list[Look]:
         """Without the last effect, if all that it did was to help a fit of the others out of a dead end."""
         whole = looks[0].fitted
@@ -288,7 +224,7 @@ class Search:
             bare = self._look(self._fitted(whole.structure.without(last.key), whole.observer))
         except ASTRAY:
             return looks
-        if last.look.judged(bare.fitted).least <= self.settings.worth or self._counts(Trial.of(whole, bare, last.key)):
+        if last.look.judged(bare.fitted).least <= self.settings.worth or Trial.of(whole, bare, last.key).counts:
             return looks
         self.say(f"no longer needed: {last.label}")
         return self._all_looks(bare)
@@ -308,7 +244,7 @@ class Search:
                 return looks, ()
             now = Trial.of(whole, bare[-1], key)
             counting = [
-                trial for trial in (now, *self._in_its_place(bare[-1], self.others.get(key, ()))) if self._counts(trial)
+                trial for trial in (now, *self._in_its_place(bare[-1], self.others.get(key, ()))) if trial.counts
             ]
             if counting:
                 return self._exchanged(now, counting, looks)
@@ -319,11 +255,11 @@ class Search:
         self, now: Trial, counting: Sequence[Trial], looks: list[Look]
     ) -> tuple[list[Look], tuple[Ranked, ...]]:
         """With the best of those that count in the place of an effect, which may be that one itself."""
-        weighed = [now] if list(counting) == [now] else self._weighed(counting)
-        if weighed[0].key == now.key:
+        ordered = [now] if list(counting) == [now] else weighed(counting, self.fitter)
+        if ordered[0].key == now.key:
             return looks, ()
-        self.say(f"{weighed[0].label} does better than {now.label}")
-        return self._all_looks(self._look(weighed[0].fitted)), self._listed(weighed[0], weighed)
+        self.say(f"{ordered[0].label} does better than {now.label}")
+        return self._all_looks(self._look(ordered[0].fitted)), self._listed(ordered[0], ordered)
 
     def _in_its_place(self, look: Look, others: Sequence[Structure]) -> list[Trial]:
         """The last effects of other structures here; those that leave little, fitted to the end."""
@@ -339,9 +275,9 @@ class Search:
     def _listed(self, best: Trial | None, tried: Sequence[Trial]) -> tuple[Ranked, ...]:
         """All effects that were tried, what was added first, then those that leave least."""
         several: dict[Key, Ranked] = {}
-        weighed = [trial for trial in tried if np.isfinite(trial.evidence)]
-        *shares, _ = probabilities([trial.evidence - self.settings.odds for trial in weighed], self.settings.tempering)
-        probability = {id(trial): float(share) for trial, share in zip(weighed, shares, strict=True)}
+        told = [trial for trial in tried if np.isfinite(trial.evidence)]
+        *shares, _ = probabilities([trial.evidence - self.settings.odds for trial in told], self.settings.tempering)
+        probability = {id(trial): float(share) for trial, share in zip(told, shares, strict=True)}
         for trial in sorted(tried, key=lambda trial: (trial is not best, trial.left)):
             ranked = self._ranked(trial, probability.get(id(trial), np.nan))
             several.setdefault(ranked.key, ranked)

@@ -29,6 +29,17 @@ class Trial:
         return cls(key, fitted, look, look.judged(fitted, key))
 
     @property
+    def counts(self) -> bool:
+        """Whether it is shown, and does more than chance and more than what laws are wrong by."""
+        return self.fitted.structure.shows(self.key) and self.judgement.counts(self.look.settings)
+
+    @property
+    def splits(self) -> bool:
+        """Whether it splits a joint."""
+        now, before = (one.structure.model.added_joints for one in (self.fitted, self.look.fitted))
+        return len(now) > len(before)
+
+    @property
     def left(self) -> float:
         """Share of the error power that it leaves."""
         return 1.0 - self.judgement.removed

@@ -1,0 +1,82 @@
+"""Which of several effects that count comes in: they are weighed under one noise model, at their likely values."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from vpm.discrepancy.candidates import Key
+from vpm.ranking.fit import Fitted, Fitter, View
+from vpm.ranking.look import same_curve
+from vpm.ranking.noise_model import NoiseModel, fitted_noise
+from vpm.ranking.posterior import apart, probabilities
+from vpm.ranking.settings import Settings
+from vpm.ranking.trial import Trial
+
+
+def weighed(counting: Sequence[Trial], fitter: Fitter) -> list[Trial]:
+    """The best of those that count, then the others, with the evidence that each adds under one noise model.
+
+    What nobody can tell from each other is probable together. The best is the plainest one of the most probable class;
+    a part of the machine comes before an instrument, and what a law contains before the law: it will be judged again
+    beside what comes after it.
+    """
+    several, richer = _rivals(counting, fitter.settings)
+    noise = fitted_noise(several[0].fitted.residual, fitter.observed.parts, fitter.settings.order)
+    fits = [_likely(trial.fitted, fitter, noise) for trial in several]
+    without = fitter.evidence(_likely(several[0].look.fitted, fitter, noise), noise)
+    gains = [fitter.evidence(fit, noise) - without for fit in fits]
+    told = [replace(trial, evidence=gain) for trial, gain in zip(several, gains, strict=True)]
+    same = [told[place] for place in _most_probable(gains, fits, fitter, noise)]
+    best = min(same, key=lambda trial: trial.order)
+    if within := [trial for trial in told if best.contains(trial)]:
+        best, same = within[0], within[:1]
+        told = [replace(trial, evidence=np.nan) if trial.contains(best) else trial for trial in told]
+    rivals = tuple(trial.label for trial in same if trial is not best)
+    return [replace(best, rivals=rivals), *(trial for trial in told if trial is not best), *richer]
+
+
+def as_good(trial: Trial, first: Trial, settings: Settings) -> bool:
+    """Whether it leaves no more than what the laws of the curves that either is a part of are wrong by."""
+    told = (trial.judgement, first.judgement)
+    return trial.left - first.left < max(one.removed * (settings.inexact / one.shape) ** 2 for one in told)
+
+
+def _rivals(counting: Sequence[Trial], settings: Settings) -> tuple[list[Trial], list[Trial]]:
+    """Those that count under the observer of the best of them, the best first, and richer ones of the same curve.
+
+    A richer one fits what the laws of a plainer one are wrong by, so that its evidence says nothing.
+    """
+    look = min(counting, key=lambda trial: trial.left).look
+    here = sorted((trial for trial in counting if trial.look is look), key=lambda trial: trial.left)
+    richer = [trial for trial in here if any(_is_richer(trial, other, settings) for other in here)]
+    several: dict[Key, Trial] = {}
+    for trial in here:
+        if trial not in richer:
+            several.setdefault(trial.key, trial)
+    return list(several.values()), richer
+
+
+def _is_richer(trial: Trial, other: Trial, settings: Settings) -> bool:
+    """Whether an effect does the work of another one of the same curve with more numbers, and hardly better."""
+    alike = same_curve(trial.key, other.key) and trial.numbers > other.numbers
+    return alike and as_good(other, trial, settings)
+
+
+def _likely(fitted: Fitted, fitter: Fitter, noise: NoiseModel) -> Fitted:
+    """At the values that are most likely under the noise, about which evidence is told; others leave least power."""
+    cost = fitter.cost(fitted.structure, fitted.residual, noise)
+    return fitter.finished(replace(fitted, cost=cost), View(noise))
+
+
+def _most_probable(gains: Sequence[float], fits: Sequence[Fitted], fitter: Fitter, noise: NoiseModel) -> list[int]:
+    """Places of the most probable class of what the records do not tell apart."""
+    settings = fitter.settings
+    *shares, _ = probabilities(gains, settings.tempering)
+    classes = [
+        [place for place, far in enumerate(apart(one, fits, fitter, noise)) if far < settings.same] for one in fits
+    ]
+    head = max(range(len(fits)), key=lambda place: (sum(shares[other] for other in classes[place]), shares[place]))
+    return classes[head]
