@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import cast
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -14,7 +12,7 @@ from scipy.stats import norm
 from sledge import SLEDGE, pushed
 from vpm.model import Model
 from vpm.ranking.fit import Fitted, Fitter, View
-from vpm.ranking.noise_model import NoiseModel, fitted_noise
+from vpm.ranking.noise_model import fitted_noise
 from vpm.ranking.observed import Observed, Observer
 from vpm.ranking.posterior import apart, probabilities
 from vpm.ranking.settings import Settings
@@ -42,16 +40,6 @@ def test_probabilities_are_some_of_a_whole_in_the_order_of_the_evidence(gains: l
     assert np.all(np.diff(shares[:-1][order]) >= 0.0)
 
 
-class Densities:
-    """Stands for a fitter of models of which only the mean of a normal density differs."""
-
-    def __init__(self, data: Array) -> None:
-        self.data = data
-
-    def log_density(self, mean: float, _: NoiseModel | None) -> Array:
-        return np.asarray(norm.logpdf(self.data, loc=mean))
-
-
 @pytest.mark.parametrize("distance", [0.5, 3.0])
 def test_nats_between_models_tell_how_often_anybody_could_choose(distance: float) -> None:
     """Of two means a distance apart, the better one is the true one in Phi(distance / 2) of all records."""
@@ -59,11 +47,10 @@ def test_nats_between_models_tell_how_often_anybody_could_choose(distance: float
     means = [0.0, distance / np.sqrt(count)]
     right, nats = 0, []
     for _ in range(trials):
-        densities = Densities(random.standard_normal(count))
-        first, second = (np.sum(densities.log_density(mean, None)) for mean in means)
-        right += int(first > second)
-        first_mean, second_mean = (cast("Fitted", mean) for mean in means)
-        nats += apart(first_mean, [second_mean], cast("Fitter", densities), cast("NoiseModel", None))
+        data = random.standard_normal(count)
+        first, second = (np.asarray(norm.logpdf(data, loc=mean)) for mean in means)
+        right += int(np.sum(first) > np.sum(second))
+        nats.append(apart(first, second))
     assert right / trials == pytest.approx(norm.cdf(0.5 * distance), abs=0.03)
     assert np.mean(nats) == pytest.approx(0.5 * distance**2, rel=0.01)
 
@@ -85,6 +72,9 @@ def test_two_names_of_one_inertia_are_alike_and_a_lag_is_not() -> None:
     lag = fitted("actuator_lag", "motor", "time_constant", 0.01, 0.004)
     of_payload, of_lag = (fitted_noise(one.residual, fitter.observed.parts, 12) for one in (payload, lag))
     assert fitter.evidence(payload, of_payload) == pytest.approx(fitter.evidence(rotor, of_payload), abs=1e-3)
-    of_rotor, from_payload = apart(payload, [rotor, lag], fitter, of_payload)
+    of_rotor, from_payload = (
+        apart(fitter.log_density(payload, of_payload), fitter.log_density(other, of_payload)) for other in (rotor, lag)
+    )
     assert of_rotor < 1.0 < from_payload
-    assert min(apart(lag, [payload, rotor], fitter, of_lag)) > 1.0
+    mine = fitter.log_density(lag, of_lag)
+    assert min(apart(mine, fitter.log_density(other, of_lag)) for other in (payload, rotor)) > 1.0

@@ -75,8 +75,7 @@ def _most_probable(gains: Sequence[float], fits: Sequence[Fitted], fitter: Fitte
     """Places of the most probable class of what the records do not tell apart."""
     settings = fitter.settings
     *shares, _ = probabilities(gains, settings.tempering)
-    classes = [
-        [place for place, far in enumerate(apart(one, fits, fitter, noise)) if far < settings.same] for one in fits
-    ]
+    told = [fitter.log_density(fit, noise) for fit in fits]
+    classes = [[place for place, other in enumerate(told) if apart(one, other) < settings.same] for one in told]
     head = max(range(len(fits)), key=lambda place: (sum(shares[other] for other in classes[place]), shares[place]))
     return classes[head]
