@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import compress
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -143,20 +144,16 @@ def _beside(current: Judged, model: Model, one: Ranked, data: Data) -> Trial:
     own = _own(model, one)
     known = tuple(_renamed(current.model, model).get(name, name) for name in current.free)
     known = tuple(name for name in known if name in model.parameters)
-    every = (*known, *own)
-    residual, columns = data.training.evaluate(model, model.theta, [model.index(name) for name in every])
+    residual, columns = data.training.evaluate(model, model.theta, [model.index(name) for name in (*known, *own)])
     told = _told(columns)
-    lost = {name for name, seen in zip(every, told, strict=True) if not seen}
-    columns, known = columns[:, told], tuple(name for name in known if name not in lost)
-    values = {name: model.parameters[name].value for name in own}
-    own, blurred = tuple(name for name in own if name not in lost), tuple(name for name in own if name in lost)
+    beside, fresh = columns[:, : len(known)][:, told[: len(known)]], np.where(told, columns, 0.0)[:, len(known) :]
+    known = tuple(compress(known, told))
     split = len(known)
     sizes = np.array([abs(model.parameters[name].value) or 1.0 for name in (*known, *own)])
-    keep, held, blind = sort_columns(
-        own, columns[:, split:], columns[:, :split], known, residual, (sizes[:split], sizes[split:])
-    )
+    keep, held, blind = sort_columns(own, fresh, beside, known, residual, (sizes[:split], sizes[split:]))
     moving = tuple(own[place] for place in keep)
-    probe = Probe(candidate, model, moving, held, (*blind, *blurred), values, dict.fromkeys(values, np.nan), np.nan)
+    values = {name: model.parameters[name].value for name in own}
+    probe = Probe(candidate, model, moving, held, blind, values, dict.fromkeys(own, np.nan), np.nan)
     free = (*known, *moving)
     judged, diverged = _refitted(current, model, candidate, one, free, data)
     return measured(current, data, probe, judged, moving, held, None, diverged)

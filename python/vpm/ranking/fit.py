@@ -253,9 +253,8 @@ def by_secant(slopes: Array, change: Array, move: Array) -> Array:
 def bounded_step(structure: Structure, errors: Array, slopes: Array, reach: float) -> Array:
     """Gauss-Newton step in deviations of the priors, within what is possible (bounded least squares)."""
     z, scale = structure.standard, max(float(np.mean(errors**2)), 1e-300)
-    known = np.ones(len(z))
-    known[[place for _, place in structure.leaning]] = FAINT
-    far = known == FAINT
+    far = np.isin(np.arange(len(z)), [place for _, place in structure.leaning])
+    known = np.where(far, FAINT, 1.0)
     normal = slopes.T @ slopes / scale + np.diag(known)
     sizes = 1.0 / np.sqrt(np.diag(normal))
     root = np.linalg.cholesky(normal * np.outer(sizes, sizes) + 1e-12 * np.eye(len(z))).T

@@ -219,12 +219,12 @@ class Search:
 
     def _out_of_a_dead_end(self, last: Trial, looks: list[Look]) -> list[Look]:
         """Without the last effect, if all that it did was to help a fit of the others out of a dead end."""
-        whole = looks[0].fitted
         try:
-            bare = self._look(self._fitted(whole.structure.without(last.key), whole.observer))
+            bare = self._without(last.key, looks[0])
         except ASTRAY:
             return looks
-        if last.look.judged(bare.fitted).least <= self.settings.worth or Trial.of(whole, bare, last.key).counts:
+        now = Trial.of(looks[0].fitted, bare, last.key)
+        if last.look.judged(bare.fitted).least <= self.settings.worth or now.counts:
             return looks
         self.say(f"no longer needed: {last.label}")
         return self._all_looks(bare)
@@ -237,19 +237,20 @@ class Search:
         """
         bare: list[Look] = []
         for look in looks:
-            whole = look.fitted
             try:
-                bare.append(self._look(self._fitted(whole.structure.without(key), whole.observer)))
+                bare.append(self._without(key, look))
             except ASTRAY:  # it runs away without, or another one rests on it
                 return looks, ()
-            now = Trial.of(whole, bare[-1], key)
-            counting = [
-                trial for trial in (now, *self._in_its_place(bare[-1], self.others.get(key, ()))) if trial.counts
-            ]
-            if counting:
+            now = Trial.of(look.fitted, bare[-1], key)
+            trials = (now, *self._in_its_place(bare[-1], self.others.get(key, ())))
+            if counting := [trial for trial in trials if trial.counts]:
                 return self._exchanged(now, counting, looks)
         self.say(f"no longer needed: {' at '.join(key)}")
         return self._all_looks(bare[0]), ()
+
+    def _without(self, key: Key, look: Look) -> Look:
+        """The same without one of its effects, fitted anew under its observer."""
+        return self._look(self._fitted(look.fitted.structure.without(key), look.fitted.observer))
 
     def _exchanged(
         self, now: Trial, counting: Sequence[Trial], looks: list[Look]

@@ -130,9 +130,8 @@ class Structure:
 
     def moved(self, move: Array) -> Structure:
         """With unknown parameters moved by deviations of their priors; products of sizes and places move straight."""
-        to = self.at(self.standard + move)
+        to, change = self.at(self.standard + move), move * self.slopes
         for size, place in self.leaning:
-            change = move * self.slopes
             before, where = (float(self.theta[self.columns[one]]) for one in (size, place))
             after = float(to.theta[self.columns[size]])
             if after * before > 0.0:
