@@ -97,3 +97,18 @@ def pushed(
 def _mean_decay(turn: float) -> float:
     """Mean of ``exp(-x)`` for x from 0 to ``turn``."""
     return float(-np.expm1(-turn) / turn)
+
+
+def swung(seed: int) -> Experiment:
+    """The sledge from rest under a force that is read and not sent: ``m v' = f sin wt - c v``, summed over three w."""
+    random, time = np.random.default_rng(seed), 5e-3 * np.arange(1200)
+    command, place = np.zeros_like(time), np.zeros_like(time)
+    for turn in random.uniform((2.0, 6.0, 20.0), (4.0, 12.0, 40.0)):
+        force, slow = 5.0 * GAIN, MASS * turn
+        decay = MASS / OIL * -np.expm1(-OIL / MASS * time)
+        swing = OIL / turn * (1.0 - np.cos(turn * time)) - MASS * np.sin(turn * time) + slow * decay
+        command += 5.0 * np.sin(turn * time)
+        place += force / (OIL**2 + slow**2) * swing
+    readings = place + READING * random.standard_normal(len(time))
+    channels = {"motor.command": command, "way.position": readings}
+    return Experiment.from_arrays(time, channels, model=Model.from_toml(SLEDGE), name=f"swing {seed}")

@@ -12,6 +12,7 @@ import pytest
 
 import two_link_arm
 import vpm
+from sledge import MASS, SLEDGE, swung
 from synthetic import Truth, nominal, simulate_axis
 from vpm import diagnosing
 from vpm.diagnosing import diagnose
@@ -181,3 +182,17 @@ def test_a_parameter_without_a_derivative_along_the_motion_is_not_told_by_a_bala
     """Behind a play two motions part ever faster, and squares of derivatives overflow."""
     columns = np.array([[1.0, 1e200, np.inf], [0.0, 1e200, 0.0]])
     assert by_ranking._told(columns).tolist() == [True, False, False]
+
+
+def test_what_commands_do_between_samples_is_found_and_holds_for_balances_and_runs() -> None:
+    """Held for a sample, efforts that were read back come half a sample late: a spring would take that back."""
+    model, effects = Model.from_toml(SLEDGE), ["joint_compliance", "actuator_lag"]
+    why = diagnose(model, swung(1), swung(2), effects=effects, setup=vpm.Setup(horizon=0.1), workers=1)
+    assert why.verdict == "parameters_only"
+    assert why.model.parameters["sledge.mass"].value == pytest.approx(MASS, rel=0.01)
+    assert any("simulate with hold first_order" in note for note in why.notes)
+    held = vpm.Setup(horizon=0.1, hold="zero_order")
+    other = diagnose(model, swung(1), swung(2), effects=effects, setup=held, workers=1)
+    assert not any("simulate with hold" in note for note in other.notes)
+    for channel in why.gap:
+        assert why.gap[channel].recalibrated < 0.2 * other.gap[channel].recalibrated

@@ -13,7 +13,7 @@ from scipy.stats import norm
 from scipy.stats import t as student
 
 import vpm
-from sledge import DRY, GAIN, MASS, OIL, READING, SEEN, SLEDGE, WAVE, pushed
+from sledge import DRY, MASS, OIL, READING, SEEN, SLEDGE, WAVE, pushed, swung
 from vpm.errors import DiagnosisError, ExperimentError
 from vpm.experiment import Experiment
 from vpm.model import Model
@@ -228,21 +228,6 @@ def test_no_effect_comes_in_that_makes_no_sample_more_probable() -> None:
     assert 0.0 < told.evidence < strict.odds
 
 
-def swung(seed: int) -> Experiment:
-    """The sledge from rest under a force that is read and not sent: ``m v' = f sin wt - c v``, summed over three w."""
-    random, time = np.random.default_rng(seed), 5e-3 * np.arange(1200)
-    command, place = np.zeros_like(time), np.zeros_like(time)
-    for turn in random.uniform((2.0, 6.0, 20.0), (4.0, 12.0, 40.0)):
-        force, slow = 5.0 * GAIN, MASS * turn
-        decay = MASS / OIL * -np.expm1(-OIL / MASS * time)
-        swing = OIL / turn * (1.0 - np.cos(turn * time)) - MASS * np.sin(turn * time) + slow * decay
-        command += 5.0 * np.sin(turn * time)
-        place += force / (OIL**2 + slow**2) * swing
-    readings = place + READING * random.standard_normal(len(time))
-    channels = {"motor.command": command, "way.position": readings}
-    return Experiment.from_arrays(time, channels, model=Model.from_toml(SLEDGE), name=f"swing {seed}")
-
-
 def test_commands_that_were_read_and_not_sent_hide_no_effect() -> None:
     """Held for a sample they come half a sample late, which a spring in the drive takes back in part."""
     model, effects = Model.from_toml(SLEDGE), ["joint_compliance", "actuator_lag"]
@@ -250,7 +235,7 @@ def test_commands_that_were_read_and_not_sent_hide_no_effect() -> None:
     assert ranking.effects == ()
     assert ranking.hold == "first_order"
     assert ranking.model.parameters["sledge.mass"].value == pytest.approx(MASS, rel=4e-3)
-    stated = vpm.rank(model, swung(1), swung(2), effects=effects, setup=vpm.Setup())
+    stated = vpm.rank(model, swung(1), swung(2), effects=effects, setup=vpm.Setup(hold="zero_order"))
     assert stated.hold == "zero_order"
     assert stated.gaps["way.position"].before > 5.0 * ranking.gaps["way.position"].after
     assert vpm.rank(model, pushed(seed=1, duration=2.0), effects=[]).hold == "zero_order"

@@ -14,7 +14,7 @@ from vpm.model import Model
 from vpm.ranking.fit import Fitted, Fitter, View
 from vpm.ranking.noise_model import fitted_noise
 from vpm.ranking.observed import Observed, Observer
-from vpm.ranking.posterior import apart, probabilities
+from vpm.ranking.posterior import apart, log_volume, probabilities
 from vpm.ranking.settings import Settings
 from vpm.ranking.structure import Structure
 from vpm.weighing import Prior
@@ -38,6 +38,21 @@ def test_probabilities_are_some_of_a_whole_in_the_order_of_the_evidence(gains: l
     assert np.all(shares >= 0.0)
     order = np.argsort(gains)
     assert np.all(np.diff(shares[:-1][order]) >= 0.0)
+
+
+@given(st.integers(0, 4), st.floats(0.0, 1e3), st.integers(0, 99))
+def test_what_records_shrink_is_the_determinant_of_their_information(count: int, size: float, seed: int) -> None:
+    slopes = size * np.random.default_rng(seed).standard_normal((30, count))
+    exact = np.linalg.slogdet(np.eye(count) + slopes.T @ slopes)[1]
+    assert log_volume(slopes) == pytest.approx(exact, rel=1e-9, abs=1e-9)
+
+
+@given(st.floats(1e8, 1e90), st.floats(0.1, 10.0))
+def test_derivatives_that_are_large_and_alike_never_make_records_probable(size: float, ratio: float) -> None:
+    """Of two columns that are one but for their size, one direction is known, and the other one is not at all."""
+    column = np.random.default_rng(3).standard_normal(50)
+    volume = log_volume(size * np.stack([column, ratio * column], axis=1))
+    assert volume >= 2.0 * np.log(size * np.hypot(1.0, ratio) * np.linalg.norm(column)) - 1e-9
 
 
 @pytest.mark.parametrize("distance", [0.5, 3.0])

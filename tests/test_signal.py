@@ -19,6 +19,7 @@ from vpm.experiment import (
     parallel_filter,
     quantisation_step,
 )
+from vpm.experiment.motion import Motion
 from vpm.experiment.signal import anti_alias, differentiator_gain, interpolate, settling_samples
 
 Array = NDArray[np.float64]
@@ -314,3 +315,16 @@ def test_a_motionless_record_still_has_a_cutoff() -> None:
     assert choice.cutoff < 1.2 * 12 * RATE / 2000  # all of it is noise: next to the lowest that is offered
     assert choice.band == (0.0,)
     assert np.isfinite(choose_cutoff(np.zeros((2000, 1)), RATE).cutoff)
+
+
+@pytest.mark.parametrize(("hold", "order"), [("first_order", 1), ("cubic", 2)])
+def test_inputs_that_run_on_are_their_means_until_the_next_sample(hold: str, order: int) -> None:
+    """Exact of polynomials: the integral of each over an interval, by its antiderivative; the last one stands."""
+    time, dt = clock(40, 10.0), 0.1
+    curve = np.polynomial.Polynomial([0.3, -1.2, 2.0][: order + 1])
+    rest, inputs = np.zeros((40, 1)), curve(time)[:, None]
+    m = Motion(("q",), ("drive.command",), rest, rest, rest, inputs, time, dt, 2.0, 4, 1, ())
+    whole = np.diff(curve.integ()(time)) / dt
+    assert m.held_as(hold).inputs[:-1, 0] == pytest.approx(whole, abs=1e-12)
+    assert m.held_as(hold).inputs[-1, 0] == curve(time[-1])
+    assert m.held_as("zero_order") is m

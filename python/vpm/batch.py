@@ -170,7 +170,7 @@ def _one(model: Model, trial: Trial, mode: str, setup: Setup, cutoff: float | No
         horizon=setup.horizon,
         cutoff=cutoff,
         initial_state=state,
-        hold=setup.hold,
+        hold=setup.course,
     )
 
 

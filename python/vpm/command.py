@@ -59,6 +59,13 @@ Hold = Annotated[
         help="What commands of a log do between samples: zero_order (as of a digital controller), first_order or cubic."
     ),
 ]
+FoundHold = Annotated[
+    str,
+    typer.Option(
+        help="What commands of a log do between samples: zero_order (sent by a controller), first_order or cubic (read "
+        "back); auto finds out from the logs of machines that a ranking covers."
+    ),
+]
 Workers = Annotated[int, typer.Option(min=0, help="Candidates at a time; 0 for one per core. The result is the same.")]
 Plot = Annotated[Path | None, typer.Option(help="Write the plot to this file (PNG, SVG or PDF).")]
 

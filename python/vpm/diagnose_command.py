@@ -10,7 +10,7 @@ import typer
 from vpm.command import (
     Channels,
     Cutoff,
-    Hold,
+    FoundHold,
     Integrator,
     Interpolate,
     Logs,
@@ -57,7 +57,7 @@ def diagnose(
     interpolate: Interpolate = False,
     cutoff: Cutoff = None,
     integrator: Integrator = "auto",
-    hold: Hold = "zero_order",
+    hold: FoundHold = "auto",
     substeps: Substeps = 1,
     horizon: Horizon = 0.25,
     workers: Workers = 0,

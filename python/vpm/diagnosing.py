@@ -51,7 +51,7 @@ from vpm.identify import InverseDynamicsProblem, OutputErrorProblem, gaps
 from vpm.identify.fit import fit_of
 from vpm.identify.parallel import worker_count
 from vpm.model import Model
-from vpm.ranking import Settings, rank
+from vpm.ranking import Ranking, Settings, rank
 from vpm.simulate import Run, Setup, judging_mode
 
 Array = NDArray[np.float64]
@@ -62,6 +62,8 @@ HELD_OUT = 0.3
 STOPPED = "stopped by Ctrl-C before every candidate was tried: this is what was known until then"
 #: Said of what would do in the place of an effect.
 ALIKE = "predicts the unseen data as well"
+#: Said where the logs tell what commands do between samples.
+FOUND_HOLD = "commands run from sample to sample, as readings of a drive do; simulate with hold {hold} too"
 #: Which way the names came.
 RANKED = "names come from a ranking of the training records"
 SEARCHED = "names come from a search on balances of effort, for {reason}"
@@ -167,6 +169,11 @@ def _diagnosis(
     training, unseen, notes = records
     # A record cut off in the middle of a motion does not say what its controller remembers.
     mode = "restarts" if notes else judging_mode(model, unseen)
+    by = (names, effects, limit)
+    ranking = _ranking(model, training, by, setup, say, each, notes)
+    if ranking is not None and ranking.hold != (setup or Setup()).course:
+        notes.append(FOUND_HOLD.format(hold=ranking.hold))
+        setup = replace(setup or Setup(), hold=ranking.hold)
     data = _data(model, training, unseen, mode, cutoff, setup, notes)
     say("comparing the nominal model with the data")
     nominal = _nominal(model, data, notes)
@@ -180,8 +187,7 @@ def _diagnosis(
     recalibrated = judge(model, (*free, *transitions), data, bounds)
     data.training.workers = 1  # candidates share the cores from here on
     notes.extend(moved_far(model, recalibrated))
-    by = (names, effects, limit)
-    found, ambiguous, late = _named(model, recalibrated, data, by, setup, say, each, notes)
+    found, ambiguous, late = _named(ranking, recalibrated, data, by, say, each, notes)
     say("measuring the noise floor")
     floor = noise_floor(found.final.model, data.unseen, found.final.unseen, mode, setup)
     gap = _gaps(data, nominal, recalibrated, found.final, floor)
@@ -232,31 +238,60 @@ def _diagnosis(
     )
 
 
-def _named(
+def _ranking(
     model: Model,
-    recalibrated: Judged,
-    data: Data,
+    training: Sequence[Experiment],
     by: tuple[Names, Sequence[str] | None, int],
     setup: Setup | None,
     tell: Tell,
     each: SideBySide,
     notes: list[str],
-) -> tuple[Search, tuple[Rivals, ...], bool]:
-    """What is missing, what else would do, and whether Ctrl-C kept that from being examined.
+) -> Ranking | None:
+    """A ranking of the training records where names are to come from one and it covers the machine.
 
-    ``by`` says where names come from, of which effects, and how many at most. A ranking that was asked for names what
-    is missing in every machine that it covers, see `why_not_ranked`; a search does in the others.
+    ``by`` says where names come from, of which effects, and how many at most. What keeps it from that is noted.
     """
     names, effects, limit = by
-    asked = names == "ranking" and not recalibrated.fit.interrupted
-    reason = why_not_ranked(recalibrated.model, data.training.experiments) if asked else ""
-    if asked and not reason:
-        ranked = _ranked(model, recalibrated, data, effects, setup, limit, tell, each, notes)
-        if not isinstance(ranked, str):
-            return *ranked, False
-        reason = ranked
-    if asked:
-        notes.append(SEARCHED.format(reason=reason))
+    if names != "ranking":
+        return None
+    reason = why_not_ranked(model, training)
+    if not reason:
+        tell("ranking what could be missing")
+        try:
+            return rank(
+                model,
+                training,
+                effects=effects,
+                settings=Settings(effects=limit),
+                setup=setup,
+                workers=each.workers,
+                tell=tell,
+                progress=each.progress,
+            )
+        except KeyboardInterrupt:
+            return Ranking((), (), model, model, interrupted=True)
+        except (VpmError, ArithmeticError) as error:
+            reason = f"a ranking fails: {error}"
+    notes.append(SEARCHED.format(reason=reason))
+    return None
+
+
+def _named(
+    ranking: Ranking | None,
+    recalibrated: Judged,
+    data: Data,
+    by: tuple[Names, Sequence[str] | None, int],
+    tell: Tell,
+    each: SideBySide,
+    notes: list[str],
+) -> tuple[Search, tuple[Rivals, ...], bool]:
+    """What is missing by a ranking or else by a search, what else would do, and whether Ctrl-C left that open."""
+    _, effects, limit = by
+    if ranking is not None:
+        tell("measuring what was named on unseen records")
+        found, ambiguous = searched(ranking, recalibrated, data, Settings(effects=limit), effects)
+        notes.extend([RANKED, *notes_of(found.accepted), *([STOPPED] if found.interrupted else [])])
+        return found, ambiguous, False
     found = search(recalibrated, data, effects, limit, tell, each)
     if found.interrupted:
         notes.append(STOPPED)
@@ -266,44 +301,6 @@ def _named(
         partial(_settled, found, data, effects, limit, tell, each), (found, nothing)
     )
     return found, ambiguous, late
-
-
-def _ranked(
-    model: Model,
-    recalibrated: Judged,
-    data: Data,
-    effects: Sequence[str] | None,
-    setup: Setup | None,
-    limit: int,
-    tell: Tell,
-    each: SideBySide,
-    notes: list[str],
-) -> tuple[Search, tuple[Rivals, ...]] | str:
-    """What a ranking of the training records found, and what else would do; or why there is no ranking, in words."""
-    tell("ranking what could be missing")
-    settings = Settings(effects=limit)
-    try:
-        ranking = rank(
-            model,
-            data.training.experiments,
-            effects=effects,
-            settings=settings,
-            setup=setup,
-            workers=each.workers,
-            tell=tell,
-            progress=each.progress,
-        )
-    except KeyboardInterrupt:
-        notes.extend([RANKED, STOPPED])
-        return Search((Stage("recalibrated", "", "", recalibrated),), (), (), (), interrupted=True), ()
-    except (VpmError, ArithmeticError) as error:
-        return f"a ranking fails: {error}"
-    tell("measuring what was named on unseen records")
-    found, ambiguous = searched(ranking, recalibrated, data, settings, effects)
-    notes.extend([RANKED, *notes_of(found.accepted)])
-    if found.interrupted:
-        notes.append(STOPPED)
-    return found, ambiguous
 
 
 def _settled(
@@ -376,12 +373,13 @@ def _data(
     setup: Setup | None,
     notes: list[str],
 ) -> Data:
-    fitted = InverseDynamicsProblem(model, training, cutoff=cutoff)
+    balance = partial(InverseDynamicsProblem, model, hold=(setup or Setup()).course)
+    fitted = balance(training, cutoff=cutoff)
     states, bands = filters(model, fitted, cutoff)
     if states != tuple(m.cutoff for m in fitted.motions):
-        fitted = InverseDynamicsProblem(model, training, cutoff=states, band=bands)
+        fitted = balance(training, cutoff=states, band=bands)
     # One filter for all unseen records: a gap that is measured in another band is another gap.
-    predicted = InverseDynamicsProblem(model, unseen, cutoff=min(states), band=min(bands))
+    predicted = balance(unseen, cutoff=min(states), band=min(bands))
     for problem in (fitted, predicted):
         problem.take_long_steps()
         for number, (record, m) in enumerate(zip(problem.experiments, problem.motions, strict=True)):

@@ -10,6 +10,7 @@ import typer
 
 from vpm.command import (
     Channels,
+    FoundHold,
     Integrator,
     Interpolate,
     Logs,
@@ -36,13 +37,6 @@ Validate = Annotated[
     list[Path] | None, typer.Option(help="Record that decides nothing; the gap is told on it; repeat.")
 ]
 Most = Annotated[int, typer.Option(min=1, help="Most effects to add.")]
-RankedHold = Annotated[
-    str | None,
-    typer.Option(
-        help="What commands do between samples: zero_order (sent by a controller), first_order or cubic (read back); "
-        "found from the logs where neither this nor the integrator is given."
-    ),
-]
 Out = Annotated[Path | None, typer.Option(help="Write the model with what was found to this file (TOML).")]
 
 
@@ -55,7 +49,7 @@ def rank(
     channels: Channels = None,
     interpolate: Interpolate = False,
     integrator: Integrator = "auto",
-    hold: RankedHold = None,
+    hold: FoundHold = "auto",
     workers: Workers = 0,
 ) -> None:
     """Order what a model could be missing by what it removes of the error, and add the best for as long as it counts.
@@ -65,7 +59,6 @@ def rank(
     from vpm.ranking import Settings
     from vpm.ranking import rank as ranked
     from vpm.simulate import Setup
-    from vpm.simulate.setup import HOLDS
 
     machine, records = load_all(model, logs, channels, interpolate)
     held_out = [load_record(path, machine, channels, interpolate) for path in validate or []]
@@ -75,7 +68,7 @@ def rank(
             records,
             held_out,
             settings=Settings(effects=most),
-            setup=None if hold is None and integrator == "auto" else Setup(integrator, hold=hold or HOLDS[0]),
+            setup=Setup(integrator, hold=hold),
             workers=workers or None,
             tell=tell,
             progress=each,

@@ -102,7 +102,7 @@ def searched(
     stages, accepted = [Stage("recalibrated", "", "", recalibrated)], list[Accepted]()
     outside: dict[Key, str] = {}
     known: tuple[Rivals, ...] = ()
-    interrupted = ranking.interrupted
+    interrupted = ranking.interrupted or recalibrated.fit.interrupted
     try:
         for place, one in enumerate(ranking.effects):
             gone = [other for other in ranking.effects if other.key in outside] + list(ranking.effects[place + 1 :])
@@ -117,7 +117,8 @@ def searched(
     except KeyboardInterrupt:
         interrupted = True
     gains = {entry.key: entry.trial.unseen.relative for entry in accepted}
-    outside |= _unpromising(ranking, stages[-1].judged, data, effects)
+    if ranking.rounds:
+        outside |= _unpromising(ranking, stages[-1].judged, data, effects)
     refused, tried = _refused(ranking, outside, settings), _candidates(ranking, gains, settings)
     return Search(tuple(stages), tuple(accepted), refused, tried, interrupted), known
 

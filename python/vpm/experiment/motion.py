@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -65,7 +65,7 @@ class Motion(Result):
     position, velocity, acceleration : ndarray, shape (N, n)
         m or rad, per second, per second squared.
     inputs : ndarray, shape (N, nu)
-        Commands and pressures of supplies as logged, each held from its sample to the next.
+        Commands and pressures of supplies as logged, each held from its sample to the next, see `held_as`.
     time : ndarray, shape (N,)
         s.
     dt : float
@@ -92,6 +92,20 @@ class Motion(Result):
     edge: int
     decimation: int
     notes: tuple[str, ...]
+
+    def held_as(self, hold: str) -> Motion:
+        """The same of inputs that do this between samples, see `vpm.Setup`: each is its mean until the next sample.
+
+        Held inputs are that already. A cubic lies off the straight line by a twelfth of what its slopes differ by.
+        """
+        if hold == "zero_order" or len(self.inputs) < 3:
+            return self
+        ahead = np.concatenate([self.inputs[1:], self.inputs[-1:]])
+        means = 0.5 * (self.inputs + ahead)
+        if hold == "cubic":
+            slopes = np.gradient(self.inputs, axis=0, edge_order=2)
+            means[:-1] -= np.diff(slopes, axis=0) / 12.0
+        return replace(self, inputs=means)
 
     @property
     def kept(self) -> slice:

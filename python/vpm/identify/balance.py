@@ -22,6 +22,7 @@ from vpm.identify.reuse import Kept, parts_of
 from vpm.initial import joint_motion
 from vpm.model import Model
 from vpm.simulate import AUTOMATIC
+from vpm.simulate.setup import HOLDS
 
 Array = NDArray[np.float64]
 
@@ -56,6 +57,8 @@ class InverseDynamicsProblem:
         Highest frequency that is compared, Hz; without it what the motion filter leaves alone.
     integrator : str
         How drives with states of their own are run along the motion, as `vpm.simulate.Setup` names it.
+    hold : str
+        What inputs do between samples, as the same names it.
     """
 
     mode = "inverse_dynamics"
@@ -68,12 +71,13 @@ class InverseDynamicsProblem:
         cutoff: float | Sequence[float] | None = None,
         band: float | Sequence[float] | None = None,
         integrator: str = AUTOMATIC,
+        hold: str = HOLDS[0],
     ) -> None:
         self.experiments = tuple(experiments)
         #: What was given: the model before any fit.
         self.nominal = model
         self.motions: tuple[Motion, ...] = tuple(
-            joint_motion(e, model, one, commanded=True, band=other)
+            joint_motion(e, model, one, commanded=True, band=other).held_as(hold)
             for e, one, other in zip(experiments, _each(cutoff, experiments), _each(band, experiments), strict=True)
         )
         for m in self.motions:

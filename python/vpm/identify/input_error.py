@@ -172,7 +172,7 @@ class InputErrorProblem:
         ``z`` (S, m + nx) corrects commands and first states, in units of their sizes.
         """
         setup, m = self._setup, len(self._commands)
-        stepping = (stretches.time_step, setup.substeps, setup.method(model), columns, setup.hold)
+        stepping = (stretches.time_step, setup.substeps, setup.method(model), columns, setup.course)
         inputs = stretches.inputs.copy()
         inputs[:, self._commands] += np.repeat(z[:, :m] * self._sizes[:m], stretches.length, axis=0)
         states = stretches.states.copy()
@@ -211,7 +211,7 @@ class InputErrorProblem:
         begun = initial_state(model, experiment, model.theta)
         try:
             run = model.core.simulate(
-                model.theta, begun, inputs, experiment.dt, setup.substeps, setup.method(model), [], setup.hold
+                model.theta, begun, inputs, experiment.dt, setup.substeps, setup.method(model), [], setup.course
             )[1]
         except ValueError:  # the machine runs away in a free run: settled on the command, as at any restart
             return

@@ -103,7 +103,7 @@ class PredictionErrorProblem:
     ) -> tuple[Array, Array]:
         """Outputs (N, outputs) of one record, and the derivative of the measured ones (N, m, k)."""
         places = [model.output_channels.index(name) for name in record.channels]
-        stepping = (record.dt, self._setup.substeps, self._setup.method(model), columns, self._setup.hold)
+        stepping = (record.dt, self._setup.substeps, self._setup.method(model), columns, self._setup.course)
         table = gains.gains.reshape(len(record.time), -1)
         first, inputs, readings = record.first, record.inputs, record.readings
         outputs, _, slopes = model.core.observe(theta, first, inputs, places, readings, table, *stepping)

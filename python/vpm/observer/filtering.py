@@ -154,7 +154,7 @@ def filtered(model: Model, record: Record, noise: Noise, *, setup: Setup | None 
             record.dt,
             setup.substeps,
             setup.method(model),
-            setup.hold,
+            setup.course,
         )
     except Diverged as error:
         raise DivergedError(f"{record.name}: {error}", run=None, time=float(record.time[len(error.outputs)])) from None

@@ -14,6 +14,7 @@ from scipy.optimize import lsq_linear
 from vpm.errors import VpmError
 from vpm.ranking.noise_model import NoiseModel, Parts, white_noise
 from vpm.ranking.observed import Observed, Observer
+from vpm.ranking.posterior import log_volume
 from vpm.ranking.settings import Settings
 from vpm.ranking.structure import Structure
 
@@ -200,9 +201,8 @@ class Fitter:
         informed = np.repeat(np.sqrt(noise.information()), len(errors) // fitted.residual.shape[1])
         known = slopes * informed[:, None]
         z = structure.standard
-        curvature = np.eye(len(z)) + known.T @ known
         likely = float(np.sum(noise.log_density(errors)))
-        return likely - 0.5 * float(z @ z) - 0.5 * float(np.linalg.slogdet(curvature)[1])
+        return likely - 0.5 * float(z @ z) - 0.5 * log_volume(known)
 
     def cost(self, structure: Structure, residual: Array, noise: NoiseModel) -> float:
         """Negative logarithm of the posterior density but for a constant."""

@@ -94,7 +94,7 @@ class Observed:
 
     def with_hold(self, hold: str) -> Observed:
         """The same with commands that do this between samples."""
-        if hold == self.setup.hold:
+        if hold == self.setup.course:
             return self
         return Observed(self.model, self.experiments, self.settings, replace(self.setup, hold=hold))
 
@@ -199,7 +199,7 @@ class Observed:
             self.setup.substeps * self._steps(model, observer, record),
             self.setup.method(model),
             list(columns),
-            self.setup.hold,
+            self.setup.course,
         )
         return outputs[:, places], states, slopes
 

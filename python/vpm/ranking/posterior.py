@@ -28,6 +28,15 @@ def probabilities(gains: Sequence[float], tempering: float) -> Array:
     return np.asarray(shares / np.sum(shares))
 
 
+def log_volume(slopes: Array) -> float:
+    """Logarithm of the determinant of ``1 + K' K`` of derivatives K (n, k): by what records shrink what is unknown.
+
+    It is never below zero, however large derivatives are and however alike. Products of them would lose the one.
+    """
+    widths = np.linalg.svd(np.linalg.qr(slopes, mode="r"), compute_uv=False)
+    return float(2.0 * np.sum(np.log(np.hypot(1.0, widths))))
+
+
 def apart(one: Array, other: Array) -> float:
     """By how many nats, in the mean, records decide between two models, of logarithms of the density of each sample.
 

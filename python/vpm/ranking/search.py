@@ -29,6 +29,7 @@ from vpm.ranking.structure import Structure
 from vpm.ranking.trial import Trial
 from vpm.ranking.validation import gaps
 from vpm.simulate import Setup
+from vpm.simulate.setup import AUTOMATIC
 
 #: What commands do between samples that were read, and not sent.
 STRAIGHT = "first_order"
@@ -49,7 +50,7 @@ class Search:
     ) -> None:
         self.names, self.settings, self.each, self.say = names, settings, each, say
         self.data = InverseDynamicsProblem(model, records)
-        self.hold_known = setup is not None
+        self.hold_known = (setup or Setup()).hold != AUTOMATIC
         self.fitter = Fitter(Observed(model, records, settings, setup), settings)
         self.extensions = Extensions(Sizes(model, self.data))
         firsts = self.fitter.observed.firsts.priors
@@ -96,7 +97,7 @@ class Search:
         found = looks[0].fitted.structure
         recalibrated = next(iter(self.first.values())).fitted.structure.repaired
         stages = (self.start.model, recalibrated, found.repaired)
-        hold = self.fitter.observed.setup.hold
+        hold = self.fitter.observed.setup.course
         left = gaps(held_out.with_hold(hold), stages, self.settings.bands[0])
         effects = tuple(replace(named[key], side=found.side(key)) for key in found.effects)
         return Ranking(effects, tuple(rounds), found.repaired, recalibrated, left, interrupted, hold)

@@ -86,7 +86,7 @@ def simulate(
     if mode == "inverse_dynamics":
         return _inverse_dynamics_run(model, experiment, cutoff)
     setup = Setup(integrator, substeps, horizon, hold=hold)
-    if hold != HOLDS[0] and mode not in LOGGED:
+    if setup.course != HOLDS[0] and mode not in LOGGED:
         raise SimulationError(
             f"hold '{hold}' is for commands of a log, and mode '{mode}' takes none; leave it out, or use the mode "
             f"{' or '.join(LOGGED)}"
@@ -178,7 +178,7 @@ def _dispatch(
     if mode == "free_run":
         inputs = held_inputs(model, experiment, mode)
         state = start(model, experiment, theta) if initial_state is None else initial_state
-        outputs, states, jacobian = model.core.simulate(theta, state, inputs, *stepping, setup.hold)
+        outputs, states, jacobian = model.core.simulate(theta, state, inputs, *stepping, setup.course)
         return SimulatedArrays(outputs, jacobian, rows, begin, states)
     if mode == "closed_loop":
         check_controllers(model)
@@ -190,7 +190,7 @@ def _dispatch(
         inputs = held_inputs(model, experiment, mode)
         starts, length = restart_grid(experiment, setup.horizon)
         states = measured_states(model, experiment, theta, starts, cutoff)
-        outputs, jacobian = model.core.restart(theta, states, starts, length, inputs, *stepping, setup.hold)
+        outputs, jacobian = model.core.restart(theta, states, starts, length, inputs, *stepping, setup.course)
         flat = outputs.reshape(-1, outputs.shape[-1])
         return SimulatedArrays(flat, jacobian.reshape(len(flat), flat.shape[1], -1), rows, starts)
     raise SimulationError(f"unknown mode '{mode}'; choose one of {', '.join(MODES)}")

@@ -142,8 +142,8 @@ def run_of(model: Model, experiment: Experiment, mode: str, arrays: SimulatedArr
     }
     if mode == "restarts":
         settings["horizon"] = setup.horizon
-    if setup.hold != HOLDS[0]:
-        settings["hold"] = setup.hold
+    if setup.course != HOLDS[0]:
+        settings["hold"] = setup.course
     return Run(
         model.name,
         experiment.name,

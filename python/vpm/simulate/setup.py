@@ -44,18 +44,20 @@ class Setup(Storable):
     settling : float
         Time at the beginning of each record, s, that a fit simulates but does not compare: until what nobody knows of
         the first state, such as vibrations, has died away. Restarts have none.
-    hold : {"zero_order", "first_order", "cubic"}
-        What commands and logged pressures do between samples of a log, in free runs and restarts. ``zero_order`` keeps
-        each until the next sample, as the output of a digital controller does. ``first_order`` goes straight to the
-        next sample, ``cubic`` smoothly: for signals that are continuous and were sampled, such as an analog reference
-        or a command of a far faster controller. What controllers of the model command is always held.
+    hold : {"auto", "zero_order", "first_order", "cubic"}
+        What commands and logged pressures do between samples of a log, in free runs, restarts and balances.
+        ``zero_order`` keeps each until the next sample, as the output of a digital controller does. ``first_order``
+        goes straight to the next sample, ``cubic`` smoothly: for signals that are continuous and were sampled, such as
+        an analog reference or a command of a far faster controller. What controllers of the model command is always
+        held.
+        ``auto`` is ``zero_order``, but where a ranking finds out from the logs, see `vpm.rank`.
     """
 
     integrator: str = AUTOMATIC
     substeps: int = 1
     horizon: float = 0.25
     settling: float = 0.0
-    hold: str = HOLDS[0]
+    hold: str = AUTOMATIC
 
     def __post_init__(self) -> None:
         """Check the choices."""
@@ -66,8 +68,13 @@ class Setup(Storable):
             raise SimulationError(f"horizon is {self.horizon} s; give a positive time")
         if not self.settling >= 0.0:
             raise SimulationError(f"settling is {self.settling} s; give a time that is not negative")
-        if self.hold not in HOLDS:
-            raise SimulationError(f"unknown hold '{self.hold}'; choose one of {', '.join(HOLDS)}")
+        if self.hold not in (AUTOMATIC, *HOLDS):
+            raise SimulationError(f"unknown hold '{self.hold}'; choose one of {', '.join((AUTOMATIC, *HOLDS))}")
+
+    @property
+    def course(self) -> str:
+        """What commands do between samples, as the core names it."""
+        return HOLDS[0] if self.hold == AUTOMATIC else self.hold
 
     def method(self, model: Model, *, bounded: bool = False, guided: bool = False) -> str:
         """Integrator for a model, as the core names it.
