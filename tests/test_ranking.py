@@ -189,6 +189,15 @@ def test_two_missing_effects_are_named_one_after_the_other() -> None:
     assert {one.effect for one in ranking.effects} == {"coulomb_friction", "actuator_lag"}
 
 
+def test_a_large_payload_hides_no_small_friction() -> None:
+    """Mechanics alone gives its law: what is left beside it is none of its shape, however much it has removed."""
+    light = Model.from_toml(SLEDGE.replace("{ value = 3.3, uncertainty = 0.33 }", "1.2"))
+    effects = ["payload", "coulomb_friction", "spring", "actuator_lag", "bias_force"]
+    ranking = vpm.rank(light, pushed(dry=0.4, seed=1, duration=4.0), effects=effects)
+    assert [one.effect for one in ranking.effects] == ["payload", "coulomb_friction"]
+    assert ranking.effects[0].values["sledge.payload.mass"] == pytest.approx(MASS - 1.2, rel=0.1)
+
+
 def test_the_number_of_workers_changes_nothing_and_a_ranking_is_kept(tmp_path: Path) -> None:
     record = pushed(seed=3, lag=0.008, duration=2.0)
     one, two = (vpm.rank(Model.from_toml(SLEDGE), record, workers=workers) for workers in (1, 2))

@@ -149,6 +149,7 @@ ROTOR_INERTIA = EffectType(
         "sensor_gain": "both scale the effort that an acceleration needs; a record with a known load parts them",
         "joint_compliance": "far below the resonance only the inertias show; faster motion parts them",
     },
+    exact=True,
 )
 
 END_STOP = EffectType(

@@ -55,6 +55,7 @@ PAYLOAD = EffectType(
         "torque_ripple": "gravity on a revolute joint repeats once per turn; a vertical axis or fast motion parts them",
         "sensor_gain": "both scale the effort that an acceleration needs; a record with a known load parts them",
     },
+    exact=True,
 )
 
 INPUT_DELAY = EffectType(

@@ -166,6 +166,8 @@ class EffectType:
         What the memory of its law, a state of the machine, is called at its site; "" if it has none.
     contains : tuple of str
         Plainer effects that it is at some values of its parameters.
+    exact : bool
+        Whether mechanics alone gives its law, so that no machine differs from it by its shape.
     """
 
     name: str
@@ -183,6 +185,7 @@ class EffectType:
     motor_side_alone: bool = False
     memory: str = ""
     contains: tuple[str, ...] = ()
+    exact: bool = False
 
     @property
     def has_sides(self) -> bool:

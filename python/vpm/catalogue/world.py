@@ -27,6 +27,7 @@ GRAVITY_TILT = EffectType(
         "payload": "both change the load of gravity; fast motion shows the payload's inertia",
         "sensor_offset": "a shifted zero of an angle turns gravity for all that hangs on it; other poses part them",
     },
+    exact=True,
 )
 
 WORLD_EFFECTS = (GRAVITY_TILT,)

@@ -21,7 +21,7 @@ class Judgement(Storable):
     score : float
         How surely it is removed from pieces of the held-back stretches, in standard deviations.
     size : float
-        Its amplitude as a share of that of all effects of the model.
+        Its amplitude as a share of that of all effects of the model whose laws are not exact.
     beside : float
         The same of those that were added before.
     shape : float

@@ -31,7 +31,7 @@ class Look:
     view : View
         Channels in their root mean squares; derivatives are taken as known for effects that do nothing at first.
     explained : float
-        Error power that all effects of the model remove, as a multiple of what is left.
+        Error power that all effects of the model remove that are not exact, as a multiple of what is left.
     added : float
         The same of those that were added.
     """
@@ -46,8 +46,9 @@ class Look:
         self.fitted = replace(fitted, cost=cost)
         self.sizes = np.array(noise.deviations)
         self.left = observed.squares(fitted.residual, self.sizes)
-        self.added = 0.0 if first is None else self._beside(first.fitted.residual)
-        self.explained = max(self._explained(fitted.structure.model.effects), self.added)
+        self.added = 0.0 if first is None else self._added(first.fitted.residual)
+        approximate = [one for one in fitted.structure.model.effects if not one.type.exact]
+        self.explained = max(self._explained(approximate), self.added)
         self._curves: dict[tuple[str, ...], float] = {}
 
     def _followed(self, fitted: Fitted) -> Followed:
@@ -95,6 +96,16 @@ class Look:
         if several not in self._curves:
             self._curves[several] = self._explained(alike)
         return self._curves[several]
+
+    def _added(self, before: Array) -> float:
+        """Error power that effects remove that were added and are not exact, of what was left ``before`` them."""
+        added = [
+            self.fitted.structure.model.effect(*key, self.fitted.structure.side(key))
+            for key in self.fitted.structure.effects
+        ]
+        approximate = [one for one in added if not one.type.exact]
+        power = self._beside(before)
+        return power if len(approximate) == len(added) else min(power, self._removed(approximate))
 
     def _explained(self, effects: Collection[Effect]) -> float:
         """Error power that these effects of the model remove, those that were added no more than all of these did.

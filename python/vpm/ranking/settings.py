@@ -25,7 +25,8 @@ class Settings:
         shows over the same states at the same place has to do more than that, and a richer one has to do better by it
         than a plainer one; between effects over other states evidence decides.
     slight : float
-        An effect that does less than this share of the amplitude of all effects of the model is none.
+        An effect that does less than this share of the amplitude of all effects of the model is none. Those whose law
+        is exact do not count here, see `EffectType.exact`.
     second : float
         The same of the amplitude of effects that were added, of whose laws less is known.
     worth : float
