@@ -72,7 +72,7 @@ def test_a_fit_follows_the_hold(mode: str) -> None:
 
 
 def test_a_hold_that_cannot_be_is_refused(record: Experiment) -> None:
-    with pytest.raises(SimulationError, match="unknown hold 'linear'; choose one of zero_order, first_order, cubic"):
+    with pytest.raises(SimulationError, match="unknown hold 'linear'; choose one of auto, zero_order, first_order"):
         Setup(hold="linear")
     with pytest.raises(SimulationError, match="hold 'cubic' is for commands of a log, and mode 'closed_loop' takes"):
         simulate(nominal(), record, "closed_loop", hold="cubic")
