@@ -137,10 +137,12 @@ def test_ctrl_c_in_the_ranking_gives_what_is_known(monkeypatch: pytest.MonkeyPat
         raise KeyboardInterrupt
 
     monkeypatch.setattr(diagnosing, "rank", stopped)
-    why = diagnose(nominal(), records[0], records[1], names="ranking", workers=1)
+    stated = vpm.Setup(hold="first_order")
+    why = diagnose(nominal(), records[0], records[1], names="ranking", setup=stated, workers=1)
     assert why.interrupted
     assert why.effects == ()
     assert any(note.startswith("stopped by Ctrl-C") for note in why.notes)
+    assert not any("simulate with hold" in note for note in why.notes)  # nothing was found out: what was stated stands
 
 
 def test_where_a_ranking_fails_a_search_names(monkeypatch: pytest.MonkeyPatch, records: list[Experiment]) -> None:

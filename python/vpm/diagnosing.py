@@ -149,7 +149,7 @@ def diagnose(
     with threadpool_limits(1, user_api="blas"):
         records = _records(experiments, validate)
         each = SideBySide(workers, progress)
-        return _diagnosis(model, records, effects, cutoff, setup, limit, names, each, tell)
+        return _diagnosis(model, records, effects, cutoff, setup or Setup(), limit, names, each, tell)
 
 
 def _diagnosis(
@@ -157,7 +157,7 @@ def _diagnosis(
     records: _Records,
     effects: Sequence[str] | None,
     cutoff: float | None,
-    setup: Setup | None,
+    setup: Setup,
     limit: int,
     names: Names,
     each: SideBySide,
@@ -171,9 +171,9 @@ def _diagnosis(
     mode = "restarts" if notes else judging_mode(model, unseen)
     by = (names, effects, limit)
     ranking = _ranking(model, training, by, setup, say, each, notes)
-    if ranking is not None and ranking.hold != (setup or Setup()).course:
+    if ranking is not None and ranking.hold != setup.course:
         notes.append(FOUND_HOLD.format(hold=ranking.hold))
-        setup = replace(setup or Setup(), hold=ranking.hold)
+        setup = replace(setup, hold=ranking.hold)
     data = _data(model, training, unseen, mode, cutoff, setup, notes)
     say("comparing the nominal model with the data")
     nominal = _nominal(model, data, notes)
@@ -242,7 +242,7 @@ def _ranking(
     model: Model,
     training: Sequence[Experiment],
     by: tuple[Names, Sequence[str] | None, int],
-    setup: Setup | None,
+    setup: Setup,
     tell: Tell,
     each: SideBySide,
     notes: list[str],
@@ -269,7 +269,7 @@ def _ranking(
                 progress=each.progress,
             )
         except KeyboardInterrupt:
-            return Ranking((), (), model, model, interrupted=True)
+            return Ranking((), (), model, model, interrupted=True, hold=setup.course)
         except (VpmError, ArithmeticError) as error:
             reason = f"a ranking fails: {error}"
     notes.append(SEARCHED.format(reason=reason))
@@ -370,10 +370,10 @@ def _data(
     unseen: Sequence[Experiment],
     mode: str,
     cutoff: float | None,
-    setup: Setup | None,
+    setup: Setup,
     notes: list[str],
 ) -> Data:
-    balance = partial(InverseDynamicsProblem, model, hold=(setup or Setup()).course)
+    balance = partial(InverseDynamicsProblem, model, hold=setup.course)
     fitted = balance(training, cutoff=cutoff)
     states, bands = filters(model, fitted, cutoff)
     if states != tuple(m.cutoff for m in fitted.motions):

@@ -98,7 +98,7 @@ class Motion(Result):
 
         Held inputs are that already. A cubic lies off the straight line by a twelfth of what its slopes differ by.
         """
-        if hold == "zero_order" or len(self.inputs) < 3:
+        if hold == "zero_order":
             return self
         ahead = np.concatenate([self.inputs[1:], self.inputs[-1:]])
         means = 0.5 * (self.inputs + ahead)

@@ -99,10 +99,8 @@ class Look:
 
     def _added(self, before: Array) -> float:
         """Error power that effects remove that were added and are not exact, of what was left ``before`` them."""
-        added = [
-            self.fitted.structure.model.effect(*key, self.fitted.structure.side(key))
-            for key in self.fitted.structure.effects
-        ]
+        structure = self.fitted.structure
+        added = [structure.model.effect(*key, structure.side(key)) for key in structure.effects]
         approximate = [one for one in added if not one.type.exact]
         power = self._beside(before)
         return power if len(approximate) == len(added) else min(power, self._removed(approximate))

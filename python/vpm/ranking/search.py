@@ -50,7 +50,6 @@ class Search:
     ) -> None:
         self.names, self.settings, self.each, self.say = names, settings, each, say
         self.data = InverseDynamicsProblem(model, records)
-        self.hold_known = (setup or Setup()).hold != AUTOMATIC
         self.fitter = Fitter(Observed(model, records, settings, setup), settings)
         self.extensions = Extensions(Sizes(model, self.data))
         firsts = self.fitter.observed.firsts.priors
@@ -107,9 +106,9 @@ class Search:
 
         Commands that are held for a sample come half a sample late, and no effect takes all of that back.
         """
-        if self.hold_known:
-            return []
         now, observed = looks[0], self.fitter.observed
+        if observed.setup.hold != AUTOMATIC:
+            return []
         smooth = Fitter(observed.with_hold(STRAIGHT), self.settings)
         view = View(now.view.noise)
         try:
@@ -123,7 +122,7 @@ class Search:
         if smooth.evidence(fitted, noise) - self.fitter.evidence(now.fitted, noise) <= self.settings.odds:
             return []
         self.say(f"commands that run from sample to sample remove {100.0 * judgement.removed:.3g} % of the error power")
-        self.fitter, self.hold_known = smooth, True
+        self.fitter = smooth
         self.first = {look.fitted.observer.band: look for look in self._looks(self.start)}
         return self._all_looks(self._look(fitted))
 

@@ -68,8 +68,8 @@ class Setup(Storable):
             raise SimulationError(f"horizon is {self.horizon} s; give a positive time")
         if not self.settling >= 0.0:
             raise SimulationError(f"settling is {self.settling} s; give a time that is not negative")
-        if self.hold not in (AUTOMATIC, *HOLDS):
-            raise SimulationError(f"unknown hold '{self.hold}'; choose one of {', '.join((AUTOMATIC, *HOLDS))}")
+        if self.hold not in (choices := (AUTOMATIC, *HOLDS)):
+            raise SimulationError(f"unknown hold '{self.hold}'; choose one of {', '.join(choices)}")
 
     @property
     def course(self) -> str:
