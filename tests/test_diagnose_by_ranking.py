@@ -12,6 +12,7 @@ import pytest
 
 import two_link_arm
 import vpm
+from hopper import HOPPER
 from sledge import MASS, SLEDGE, swung
 from synthetic import Truth, nominal, simulate_axis
 from vpm import diagnosing
@@ -161,6 +162,7 @@ def test_where_a_ranking_fails_a_search_names(monkeypatch: pytest.MonkeyPatch, r
 def test_machines_that_a_ranking_does_not_cover_say_why() -> None:
     assert why_not_ranked(nominal(), ()) == ""
     assert why_not_ranked(two_link_arm.nominal(), ()) == ""
+    assert why_not_ranked(Model.from_toml(HOPPER), ()) == ""
     assert "type hydraulic" in why_not_ranked(Model.load(EXAMPLES / "servo_cylinder" / "rig.toml"), ())
     assert why_not_ranked(Model.load(EXAMPLES / "flexible_pendulum" / "flexible_pendulum.toml"), ()) == "links bend"
 
@@ -192,7 +194,7 @@ def test_what_commands_do_between_samples_is_found_and_holds_for_balances_and_ru
     why = diagnose(model, swung(1), swung(2), effects=effects, setup=vpm.Setup(horizon=0.1), workers=1)
     assert why.verdict == "parameters_only"
     assert why.model.parameters["sledge.mass"].value == pytest.approx(MASS, rel=0.01)
-    assert any("simulate with hold first_order" in note for note in why.notes)
+    assert any("simulate with hold cubic" in note for note in why.notes)
     held = vpm.Setup(horizon=0.1, hold="zero_order")
     other = diagnose(model, swung(1), swung(2), effects=effects, setup=held, workers=1)
     assert not any("simulate with hold" in note for note in other.notes)

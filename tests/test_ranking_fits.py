@@ -48,6 +48,42 @@ gain = 1.0
 """
 
 
+#: A rod that stands on its end, on a hinge that a motor turns.
+STANDING = """
+name = "rod"
+gravity = [0, 0, -9.81]
+[bodies.rod]
+mass = 1.0
+center_of_mass = [0, 0, 0.15]
+inertia = [0.002, 0.002, 0.001, 0, 0, 0]
+[joints.hinge]
+type = "revolute"
+parent = "world"
+child = "rod"
+axis = [0, 1, 0]
+[actuators.motor]
+joint = "hinge"
+gain = 1.0
+"""
+
+
+def stood() -> Experiment:
+    """The rod held up by a motor that feels a constant pull beside, which its model does not know."""
+    step, fine, inertia, weight = 2e-3, 10, 0.002 + 0.15**2, 9.81 * 0.15
+    angle, speed, pull = 0.0, 0.0, 0.3
+    told = []
+    for sample in range(2000):
+        wanted = 0.2 * np.sin(3.0 * sample * step)
+        torque = 8.0 * (wanted - angle) - 0.8 * speed - pull
+        told.append((torque, angle))
+        for _ in range(fine):
+            speed += step / fine * (weight * np.sin(angle) + torque + pull) / inertia
+            angle += step / fine * speed
+    torques, angles = np.array(told).T
+    motion = {"motor.command": torques, "hinge.position": angles}
+    return Experiment.from_arrays(step * np.arange(2000), motion, model=Model.from_toml(STANDING), name="stood")
+
+
 @lru_cache
 def records() -> list[Experiment]:
     return [pushed(seed=1, duration=4.0), pushed(seed=2, duration=4.0)]
@@ -269,7 +305,6 @@ def test_an_effect_takes_the_place_of_another_one_as_it_was_fitted() -> None:
 
 
 def test_seats_go_to_starts_that_promise_a_gain() -> None:
-    """What is there at its start already has one fit in any case."""
     structure = structure_of(Model.from_toml(SLEDGE))
 
     def one(name: str, gain: float, neutral: bool) -> Proposal:
@@ -279,7 +314,93 @@ def test_seats_go_to_starts_that_promise_a_gain() -> None:
     ordered += [one("bias_force", 60.0, True), one("backlash", 9.0, False), one("hysteresis", 8.0, True)]
     ordered += [one("end_stop", -50.0, False), one("end_stop", -60.0, False)]
     seated = [(each.key[0], each.gain) for each in _seated(ordered, 10.0, Settings(seats=1))]
-    assert seated == [("spring", 90.0), ("spring", 70.0), ("backlash", 80.0), ("end_stop", -50.0)]
+    assert seated == [("spring", 90.0), ("spring", 70.0), ("backlash", 80.0)]
+
+
+def test_effects_that_do_nothing_share_a_pass_and_promise_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nothing changes but the number of passes: none of them moves what the others add."""
+    model = Model.from_toml(SLEDGE)
+    pulled = [pushed(seed=1, dry=1.0, late=0.004, duration=2.0)]
+    data = InverseDynamicsProblem(model, pulled)
+    fitter = Fitter(Observed(model, pulled, Settings()), Settings(seats=99, patience=1e9))
+    structure = structure_of(model)
+    view = View(fitter.noise_of(structure, Observer(1.0)))
+    look = Look(fitter.fitted(structure, Observer(1.0), view), fitter)
+    effects = ("bias_force", "coulomb_friction", "quadratic_drag", "spring", "hysteresis", "input_delay", "payload")
+    promised, passes = [], []
+    follow = Observed.follow
+
+    def counted(*given: object) -> object:
+        passes[-1] += 1
+        return follow(*given)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(Observed, "follow", counted)
+    for at_once in (1, 4, 12):
+        monkeypatch.setattr("vpm.ranking.proposals.AT_ONCE", at_once)
+        passes.append(0)
+        listed = proposals(look, fitter, data, Extensions(Sizes(model, data)), SideBySide(1), effects)
+        promised.append({(one.key, *sorted(one.structure.values.items())): one.gain for one in listed})
+    assert passes[0] > passes[1] > passes[2]
+    for others in promised[1:]:
+        assert others == pytest.approx(promised[0], rel=1e-6, abs=1e-6)
+
+
+def test_more_or_less_of_an_effect_promises_what_it_would_gain() -> None:
+    """Where all is linear: half of a force leaves a quarter of its power, and points to all of it."""
+    model = Model.from_toml(SLEDGE).with_parameters({"sledge.mass": MASS, "way.friction.viscous": OIL})
+    motion = {"motor.command": records()[0]["motor.command"] + 0.5, "way.position": records()[0]["way.position"]}
+    pulled = Experiment.from_arrays(records()[0].time, motion, model=model, name="pulled")
+    fitter = Fitter(Observed(model, [pulled], Settings()), Settings())
+    fixed = replace(structure_of(model), priors={})
+    look = Look(fitter.fitted(fixed, Observer(1.0), View(fitter.noise_of(fixed, Observer(1.0)))), fitter)
+    left = {}
+    for share in (-0.5, 0.5, 1.0):
+        pulls = replace(structure_of(model.with_effect("bias_force", "way", force=share * 0.5 * GAIN)), priors={})
+        left[share] = fitter.followed(pulls, Observer(1.0).coarse, ()).residual
+    whole = look.gain_along(left[1.0])
+    assert whole > 100.0 * look.promising
+    assert look.gain_along(left[0.5]) == pytest.approx(whole, rel=0.05)
+    assert look.gain_along(left[-0.5]) < 0.0
+
+
+#: Two sledges that have nothing to do with each other.
+TWO = SLEDGE + SLEDGE.partition("[bodies.sledge]")[1] + SLEDGE.partition("[bodies.sledge]")[2]
+TWO = TWO[: len(SLEDGE)] + TWO[len(SLEDGE) :].replace("sledge", "other").replace("way", "road").replace(
+    "motor", "engine"
+)
+
+
+def test_an_effect_counts_as_much_on_one_of_two_machines() -> None:
+    """Shares of error power that are left multiply: channels that it does not touch take nothing away from it."""
+    pulled = pushed(seed=1, dry=0.5, duration=4.0)
+    beside = records()[0]
+    alone, two = Model.from_toml(SLEDGE), Model.from_toml(TWO)
+    motion = {name: pulled[name] for name in ("motor.command", "way.position")}
+    both = motion | {"engine.command": beside["motor.command"], "road.position": beside["way.position"]}
+    told = []
+    for model, channels in ((alone, motion), (two, both)):
+        record = Experiment.from_arrays(pulled.time, channels, model=model, name="record")
+        fitter = Fitter(Observed(model, [record], Settings()), Settings())
+        one, dry = structure_of(model), model.with_effect("coulomb_friction", "way", coulomb=0.5)
+        rubbed = replace(one.carried(dry), priors={**one.priors, "way.friction.coulomb": Prior(0.0, 1.0, 0.0, np.inf)})
+        view = View(fitter.noise_of(one, Observer(1.0)))
+        look = Look(fitter.fitted(one, Observer(1.0), view), fitter)
+        told.append(look.judged(fitter.fitted(rubbed, Observer(1.0), view), ("coulomb_friction", "way")))
+    for number in ("removed", "least", "size", "beside", "shape"):
+        assert getattr(told[1], number) == pytest.approx(getattr(told[0], number), rel=0.02)
+
+
+def test_an_observer_that_lets_a_machine_fall_is_not_looked_at() -> None:
+    """A rod that stands on its end: at 1 Hz it falls over and leaves more than a rod at rest would."""
+    model = Model.from_toml(STANDING)
+    record = stood()
+    fitter = Fitter(Observed(model, [record], Settings()), Settings())
+    structure = replace(structure_of(model), priors={})
+    looks = {}
+    for band in Settings().bands:
+        view = View(fitter.noise_of(structure, Observer(band)))
+        looks[band] = Look(fitter.fitted(structure, Observer(band), view), fitter)
+    assert {band: look.follows for band, look in looks.items()} == {1.0: False, 10.0: True}
 
 
 def test_a_split_joint_has_inverse_dynamics_without_what_remembers() -> None:

@@ -38,7 +38,7 @@ Without = Annotated[Words, typer.Option(help="Try all effects but these; repeat.
 Limit = Annotated[int, typer.Option(min=0, help="Most effects to accept.")]
 Names = Annotated[
     Literal["ranking", "search"],
-    typer.Option(help="Where names come from; a ranking covers rigid machines of one or two joints, a search others."),
+    typer.Option(help="Where names come from; a ranking covers rigid machines of up to three joints, a search others."),
 ]
 Substeps = Annotated[int, typer.Option(min=1, help="Integration steps per sample, in simulations of unseen records.")]
 Horizon = Annotated[float, typer.Option(help="Length of each restart, where unseen records are simulated so, s.")]

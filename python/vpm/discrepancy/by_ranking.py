@@ -53,7 +53,7 @@ class Settings:
         Standard deviations by which it has to be worse to count as worse.
     """
 
-    joints: int = 2
+    joints: int = 3
     worse: float = LEAST_GAIN
     sure: float = NORMAL_95_ONE_SIDED
 
@@ -62,7 +62,7 @@ SETTINGS = Settings()
 
 
 def why_not_ranked(model: Model, experiments: Sequence[Experiment]) -> str:
-    """Why names do not come from a ranking, or "": it covers one or two joints, rigid links, and drives without oil.
+    """Why names do not come from a ranking, or "": it covers up to three joints, rigid links, and drives without oil.
 
     Drives may not go by samples of their own either. A ranking does not read a deflection that a log holds.
     """

@@ -25,8 +25,8 @@ def weighed(counting: Sequence[Trial], fitter: Fitter) -> list[Trial]:
     """
     several, richer = _rivals(counting, fitter.settings)
     noise = fitted_noise(several[0].fitted.residual, fitter.observed.parts, fitter.settings.order)
-    fits = [_likely(trial.fitted, fitter, noise) for trial in several]
-    without = fitter.evidence(_likely(several[0].look.fitted, fitter, noise), noise)
+    fits = [likely(trial.fitted, fitter, noise) for trial in several]
+    without = fitter.evidence(likely(several[0].look.fitted, fitter, noise), noise)
     gains = [fitter.evidence(fit, noise) - without for fit in fits]
     told = [replace(trial, evidence=gain) for trial, gain in zip(several, gains, strict=True)]
     same = [told[place] for place in _most_probable(gains, fits, fitter, noise)]
@@ -65,7 +65,7 @@ def _is_richer(trial: Trial, other: Trial, settings: Settings) -> bool:
     return alike and as_good(other, trial, settings)
 
 
-def _likely(fitted: Fitted, fitter: Fitter, noise: NoiseModel) -> Fitted:
+def likely(fitted: Fitted, fitter: Fitter, noise: NoiseModel) -> Fitted:
     """At the values that are most likely under the noise, about which evidence is told; others leave least power."""
     cost = fitter.cost(fitted.structure, fitted.residual, noise)
     return fitter.finished(replace(fitted, cost=cost), View(noise))

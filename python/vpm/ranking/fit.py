@@ -130,7 +130,7 @@ class Fitter:
         before, fresh = self.cost(now.structure, now.residual, view.noise), True
         errors, slopes = view.errors(now, self.observed.parts)
         for _ in range(self.settings.iterations if structure.priors else 0):
-            move, gain = self._step(now.structure, *view.weighted(errors, slopes))
+            move, gain = self._step(now.structure, view, errors, slopes)
             hopeful = gain >= self.settings.tolerance and before - self.settings.patience * gain <= goal
             better = self._better(now, view.noise, move, before) if hopeful else None
             slow = better is None or before - better[2] < self.settings.tolerance
@@ -209,10 +209,11 @@ class Fitter:
         errors = noise.whitened(residual, self.observed.parts)
         return noise.cost(errors) + 0.5 * float(structure.standard @ structure.standard)
 
-    def _step(self, structure: Structure, errors: Array, slopes: Array) -> tuple[Array, float]:
-        """A bounded Gauss-Newton step, and the gain that it predicts, nats."""
-        move = bounded_step(structure, errors, slopes, self.settings.reach)
-        return move, _predicted_gain(structure, errors, slopes, move)
+    def _step(self, structure: Structure, view: View, errors: Array, slopes: Array) -> tuple[Array, float]:
+        """A bounded Gauss-Newton step, and the gain that it predicts if all is linear, nats."""
+        move = bounded_step(structure, *view.weighted(errors, slopes), self.settings.reach)
+        gain, z = view.noise.cost(errors) - view.noise.cost(errors + slopes @ move), structure.standard
+        return move, gain + 0.5 * (float(z @ z) - float((z + move) @ (z + move)))
 
     def _better(
         self, now: Followed, noise: NoiseModel, move: Array, before: float
@@ -263,11 +264,3 @@ def bounded_step(structure: Structure, errors: Array, slopes: Array, reach: floa
     low = np.where(far, -np.inf, np.minimum(np.maximum(structure.ends[:, 0] - z, -reach), -1e-12)) / sizes
     high = np.where(far, np.inf, np.maximum(np.minimum(structure.ends[:, 1] - z, reach), 1e-12)) / sizes
     return np.asarray(lsq_linear(root, target, (low, high), method="bvls").x * sizes)
-
-
-def _predicted_gain(structure: Structure, errors: Array, slopes: Array, move: Array) -> float:
-    """What a step gains if all is linear, nats, the scale of the errors being the most likely one."""
-    z = structure.standard
-    left = max(float(np.sum((errors + slopes @ move) ** 2)), 1e-300)
-    gain = 0.5 * len(errors) * float(np.log(max(float(errors @ errors), 1e-300) / left))
-    return gain + 0.5 * (float(z @ z) - float((z + move) @ (z + move)))

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,9 +31,10 @@ class Look:
         The same with few steps of the integrator where these do, and derivatives by all that is unknown.
     view : View
         Channels in their root mean squares; derivatives are taken as known for effects that do nothing at first.
-    explained : float
-        Error power that all effects of the model remove that are not exact, as a multiple of what is left.
-    added : float
+    explained : ndarray, shape (m,)
+        Error power of each channel that all effects of the model remove that are not exact, as a multiple of what is
+        left.
+    added : ndarray, shape (m,)
         The same of those that were added.
     """
 
@@ -46,10 +48,10 @@ class Look:
         self.fitted = replace(fitted, cost=cost)
         self.sizes = np.array(noise.deviations)
         self.left = observed.squares(fitted.residual, self.sizes)
-        self.added = 0.0 if first is None else self._added(first.fitted.residual)
+        self.added = np.zeros(len(self.sizes)) if first is None else self._added(first.fitted.residual)
         approximate = [one for one in fitted.structure.model.effects if not one.type.exact]
-        self.explained = max(self._explained(approximate), self.added)
-        self._curves: dict[tuple[str, ...], float] = {}
+        self.explained = np.maximum(self._explained(approximate), self.added)
+        self._curves: dict[tuple[str, ...], Array] = {}
 
     def _followed(self, fitted: Fitted) -> Followed:
         """With all derivatives if few steps give them; contacts may be too stiff for that."""
@@ -59,36 +61,88 @@ class Look:
         return self._fitter.followed(fitted.structure, fitted.observer, names, fitted.residual)
 
     def predicted_gain(self, other: Followed) -> float:
-        """What another structure gains by a step of a fit, or as it stands, with few steps of the integrator, nats."""
-        parts = self._fitter.observed.parts
-        before = self.view.noise.whitened(self.coarse.residual, parts)
-        errors, slopes = self.view.errors(other, parts)
-        move = bounded_step(other.structure, errors, slopes, self.settings.reach)
-        left = min(float(np.sum((errors + slopes @ move) ** 2)), float(errors @ errors))
-        return 0.5 * len(errors) * float(np.log(float(before @ before) / max(left, 1e-300)))
+        """What another structure gains by a step of a fit, or as it stands, with few steps of the integrator, nats.
+
+        None where it does most in a channel in which no effect could count any more.
+        """
+        return self._gain(self._after_a_step(other))
+
+    def gain_along(self, residual: Array) -> float:
+        """What another structure, which leaves this with few steps, promises if more or less of it changes the same.
+
+        All that is unknown without it gives way, and stays within what is known of it.
+        """
+        parts, noise = self._fitter.observed.parts, self.view.noise
+        before, slopes = self.view.errors(self.coarse, parts)
+        after = noise.whitened(residual, parts)
+        along, z = after - before, self.coarse.structure.standard
+        columns = np.column_stack([slopes, along])
+        size = max(float(along @ along), 1e-300)
+        normal = columns.T @ columns + np.diag([*np.ones(len(z)), 1e-9 * size])
+        move = -np.linalg.solve(normal, columns.T @ before + np.append(z, 0.0))
+        moved = before + columns @ move if move[-1] > 0.0 else after
+        return self._gain(min(after, moved, key=noise.cost))
+
+    def _gain(self, left: Array) -> float:
+        noise, alone = self.view.noise, self._alone
+        powers = (np.sum(noise.by_channel(errors) ** 2, axis=1) for errors in (left, alone))
+        place = int(np.argmin(np.divide(*powers)))
+        return noise.cost(alone) - noise.cost(left) if self._rooms()[place] else 0.0
+
+    @cached_property
+    def _alone(self) -> Array:
+        """Errors after such a step of what was found alone: few steps of the integrator ask for other values."""
+        return self._after_a_step(self.coarse)
+
+    def _after_a_step(self, followed: Followed) -> Array:
+        errors, slopes = self.view.errors(followed, self._fitter.observed.parts)
+        move = bounded_step(followed.structure, *self.view.weighted(errors, slopes), self.settings.reach)
+        return min(errors, errors + slopes @ move, key=self.view.noise.cost)
+
+    @property
+    def promising(self) -> float:
+        """What a step has to promise for a fit, nats."""
+        return self.needed / self.settings.patience
+
+    @property
+    def follows(self) -> bool:
+        """Whether it leaves less of the records than a machine at rest would, in the mean of the channels."""
+        still = self._fitter.observed.squares(self._fitter.observed.motion, self.sizes)
+        return float(np.sum(np.log(_ratio(still, self.left)))) < 0.0
 
     @property
     def needed(self) -> float:
         """What an effect has to gain to be worth it, nats."""
-        samples = self.fitted.residual.shape[1] * sum(part.stop - part.start for part in self._fitter.observed.parts)
+        samples = sum(part.stop - part.start for part in self._fitter.observed.parts)
         return float(-0.5 * samples * np.log1p(-self.settings.worth))
 
     def has_room(self, removed: float = 0.0) -> bool:
         """Whether any effect could still count if so much of what is left were removed before it."""
-        size, beside = (float(np.sqrt((1.0 - removed) / (power + 1.0))) for power in (self.explained, self.added))
-        return Judgement(1.0, 1.0, np.inf, size, beside, 1.0).counts(self.settings)
+        return any(self._rooms(removed))
+
+    def _rooms(self, removed: float = 0.0) -> list[bool]:
+        """The same of effects that do most in each of the channels."""
+        size, beside = (np.sqrt((1.0 - removed) / (power + 1.0)) for power in (self.explained, self.added))
+        told = (Judgement(1.0, 1.0, np.inf, float(a), float(b), 1.0) for a, b in zip(size, beside, strict=True))
+        return [judgement.counts(self.settings) for judgement in told]
 
     def judged(self, fitted: Fitted, key: Key | None = None) -> Judgement:
-        """What another structure removes by one of its effects, or by what is none."""
+        """What another structure removes by one of its effects, or by what is none.
+
+        Nobody knows how exact a model can be in each channel. So the errors of all have scales of their own, of which
+        each is the most likely one, and shares of error power that are left multiply.
+        """
         observed = self._fitter.observed
         left = observed.squares(fitted.residual, self.sizes)
-        shares = [1.0 - float(after.sum() / before.sum()) for after, before in zip(left, self.left, strict=True)]
-        removed = max(1.0 - self._sum(left) / self._sum(self.left), 1e-12)
-        powers = (self.explained, self.added, 0.0 if key is None else self._curve(key))
-        sizes = (float(np.sqrt(removed / (power + removed))) for power in powers)
+        shares = [1.0 - float(np.prod(_ratio([b], [a]))) for b, a in zip(self.left, left, strict=True)]
+        ratio = _ratio(self.left, left)
+        removed, place = max(1.0 - float(np.prod(ratio)), 1e-12), int(np.argmin(ratio))
+        there = max(1.0 - float(ratio[place]), 1e-12)
+        curve = np.zeros(len(ratio)) if key is None else self._curve(key)
+        sizes = (float(np.sqrt(there / (power[place] + there))) for power in (self.explained, self.added, curve))
         return Judgement(removed, min(shares), _repeated(self.left[1], left[1], self.settings.pieces), *sizes)
 
-    def _curve(self, key: Key) -> float:
+    def _curve(self, key: Key) -> Array:
         """What those effects of the model remove that show over the same states at the same place as another one."""
         present = self.fitted.structure.model.effects
         alike = [one for one in present if same_curve(key, (one.name, one.at))]
@@ -97,15 +151,15 @@ class Look:
             self._curves[several] = self._explained(alike)
         return self._curves[several]
 
-    def _added(self, before: Array) -> float:
+    def _added(self, before: Array) -> Array:
         """Error power that effects remove that were added and are not exact, of what was left ``before`` them."""
         structure = self.fitted.structure
         added = [structure.model.effect(*key, structure.side(key)) for key in structure.effects]
         approximate = [one for one in added if not one.type.exact]
         power = self._beside(before)
-        return power if len(approximate) == len(added) else min(power, self._removed(approximate))
+        return power if len(approximate) == len(added) else np.minimum(power, self._removed(approximate))
 
-    def _explained(self, effects: Collection[Effect]) -> float:
+    def _explained(self, effects: Collection[Effect]) -> Array:
         """Error power that these effects of the model remove, those that were added no more than all of these did.
 
         What is left without a play or a spring that holds a load, and is not fitted anew, may be anything.
@@ -113,9 +167,9 @@ class Look:
         added = self.fitted.structure.effects
         given = [one for one in effects if (one.name, one.at) not in added]
         power = self._removed(effects)
-        return power if len(given) == len(effects) else min(power, self._removed(given) + self.added)
+        return power if len(given) == len(effects) else np.minimum(power, self._removed(given) + self.added)
 
-    def _removed(self, effects: Collection[Effect]) -> float:
+    def _removed(self, effects: Collection[Effect]) -> Array:
         """Error power that these effects of the model remove; none where the rest runs away from the records.
 
         No more than that of the motion itself: a rod without mass and friction is carried off by any force.
@@ -124,17 +178,13 @@ class Look:
             with contextlib.suppress(*ASTRAY):
                 bare = self.coarse.structure.bare(effects)
                 left = self._fitter.followed(bare, self.fitted.observer.coarse, ()).residual
-                return min(self._beside(left), self._beside(self._fitter.observed.motion))
-        return 0.0
+                return np.minimum(self._beside(left), self._beside(self._fitter.observed.motion))
+        return np.zeros(len(self.sizes))
 
-    def _beside(self, residual: Array) -> float:
-        """By how many times what is left the power of another residual is more."""
+    def _beside(self, residual: Array) -> Array:
+        """By how many times what is left of each channel the power of another residual is more (m,)."""
         squares = self._fitter.observed.squares(residual, self.sizes)
-        return max(self._sum(squares) / self._sum(self.left) - 1.0, 0.0)
-
-    @staticmethod
-    def _sum(squares: tuple[Array, Array]) -> float:
-        return float(squares[0].sum() + squares[1].sum())
+        return np.maximum(1.0 / _ratio(squares, self.left) - 1.0, 0.0)
 
 
 def same_curve(one: Key, other: Key) -> bool:
@@ -143,11 +193,17 @@ def same_curve(one: Key, other: Key) -> bool:
     return one[1] == other[1] and bool(set.intersection(*states))
 
 
+def _ratio(before: Sequence[Array], after: Sequence[Array]) -> Array:
+    """Squares after, as shares of those before, channel by channel (m,)."""
+    sums = [np.maximum(sum(np.sum(part, axis=0) for part in several), 1e-300) for several in (before, after)]
+    return np.asarray(sums[1] / sums[0])
+
+
 def _repeated(before: Array, after: Array, pieces: int) -> float:
     """How surely squares are smaller in all pieces, or their logarithms are, in standard deviations of the mean."""
     pairs = [
-        (float(b.sum()), float(a.sum()))
-        for b, a in zip(*(np.array_split(x, pieces) for x in (before, after)), strict=True)
+        [np.maximum(np.sum(piece, axis=0), 1e-300) for piece in pair]
+        for pair in zip(*(np.array_split(x, pieces) for x in (before, after)), strict=True)
     ]
-    changes = [[b - a for b, a in pairs], [np.log(max(b, 1e-300) / max(a, 1e-300)) for b, a in pairs]]
+    changes = [[float(np.sum(b - a)) for b, a in pairs], [float(np.sum(np.log(b / a))) for b, a in pairs]]
     return max(float(np.mean(c) / max(np.std(c, ddof=1) / np.sqrt(pieces), 1e-300)) for c in changes)

@@ -123,21 +123,29 @@ class NoiseModel:
 
     def log_density(self, errors: Array) -> Array:
         """Logarithm of the density of each sample (n,), the errors being in their scales."""
-        channels = self._by_channel(errors)
+        channels = self.by_channel(errors)
         return np.asarray(log_student(channels, self.freedom) - np.log(self.deviations)[:, None]).ravel()
 
     def cost(self, errors: Array) -> float:
-        """Negative logarithm of the density but for a constant, the common scale being the most likely one."""
-        channels = self._by_channel(errors)
-        size = scale_of(channels, self.freedom)
-        return len(errors) * float(np.log(size)) - float(np.sum(log_student(channels / size, self.freedom)))
+        """Negative logarithm of the density but for a constant, the scale of each channel being the most likely one."""
+        channels = self.by_channel(errors)
+        sizes = self._scales(channels)
+        likely = float(np.sum(log_student(channels / sizes, self.freedom)))
+        return float(channels.shape[1] * np.sum(np.log(sizes))) - likely
 
     def roots(self, errors: Array) -> Array:
         """Square roots of the weights (n,) under which squares of the errors stand for that density about them."""
-        channels = self._by_channel(errors)
-        return np.sqrt(_weights(channels / scale_of(channels, self.freedom), self.freedom)).ravel()
+        channels = self.by_channel(errors)
+        sizes = self._scales(channels)
+        return np.asarray(np.sqrt(_weights(channels / sizes, self.freedom)) / sizes).ravel()
 
-    def _by_channel(self, errors: Array) -> Array:
+    def _scales(self, channels: Array) -> Array:
+        """The most likely scale of the errors of each channel (m, 1)."""
+        pairs = zip(channels, self.freedom, strict=True)
+        return np.array([[scale_of(channel[None, :], freedom[None, :])] for channel, freedom in pairs])
+
+    def by_channel(self, errors: Array) -> Array:
+        """Errors (n,) of all channels as rows (m, n / m)."""
         return errors.reshape(len(self.tails), -1)
 
     def information(self) -> Array:

@@ -149,8 +149,8 @@ class Observed:
         return np.concatenate(residuals), np.concatenate(slopes)
 
     def squares(self, residual: Array, sizes: Array) -> tuple[Array, Array]:
-        """Squares of a residual (N, m) in these sizes of the channels (m,), summed: of fitted and held-back samples."""
-        power = np.sum((residual / sizes) ** 2, axis=1)
+        """Squares of a residual (N, m) in these sizes of the channels (m,): of fitted and of held-back samples."""
+        power = (residual / sizes) ** 2
         parts = (self.parts, self.held_back)
         fitted, held = (np.concatenate([power[part] for part in several]) for several in parts)
         return fitted, held

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,13 +17,16 @@ from vpm.discrepancy.side_by_side import Failure, SideBySide
 from vpm.identify import InverseDynamicsProblem
 from vpm.initial import invertible
 from vpm.ranking.extensions import Extensions, sides_of
-from vpm.ranking.fit import Fitter, View
+from vpm.ranking.fit import ASTRAY, Fitter, Followed, View
 from vpm.ranking.look import Look
 from vpm.ranking.settings import Settings
 from vpm.ranking.starts import started
 from vpm.ranking.structure import Structure
 
 Array = NDArray[np.float64]
+
+#: Derivatives that a pass works out at a time.
+AT_ONCE = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,45 +74,111 @@ def proposals(
     listed = [
         started(one, found, extensions.sizes) for one in candidates(found, data, residual, effects, simulated=True)
     ]
-    items = [(one, start, side) for one in listed for start in one.starts for side in sides_of(one, found)]
+    extended = _extended(look.fitted.structure, listed, extensions)
+    groups = _side_by_side([one for one in extended if one.candidate.neutral], look)
+    groups += [[one] for one in _hopeful([one for one in extended if not one.candidate.neutral], look, fitter, each)]
     screened = each(
         "screening",
-        lambda item: _screened(look, *item, fitter, extensions),
-        items,
-        lambda item: f"{item[0].label}, {look.fitted.observer.label}",
+        lambda several: _screened(look, several, fitter, extensions),
+        groups,
+        lambda several: f"{several[0].candidate.label}, {look.fitted.observer.label}",
     )
-    ordered = sorted((one for one in screened if not isinstance(one, Failure)), key=lambda one: -one.gain)
-    return _seated(ordered, look.needed / fitter.settings.patience, fitter.settings)
+    told = [one for several in screened if not isinstance(several, Failure) for one in several]
+    return _seated(sorted(told, key=lambda one: -one.gain), look.promising, fitter.settings)
 
 
-def _screened(
-    look: Look, candidate: Candidate, start: Mapping[str, float], side: Side, fitter: Fitter, extensions: Extensions
-) -> Proposal:
-    """One effect at start values under one observer.
+@dataclass(frozen=True, eq=False)
+class _Extended:
+    """A structure with an effect more, and what it was made of."""
 
-    Derivatives by what was unknown without it are taken as they were: a prediction of a gain can do with these.
+    structure: Structure
+    candidate: Candidate
+    start: Mapping[str, float]
+    side: Side
 
-    Raises
-    ------
-    VpmError, ArithmeticError
-        It cannot be there, or runs away from the records.
+    def fresh(self, look: Look) -> list[str]:
+        """What is unknown in it beside what was."""
+        return [name for name in self.structure.priors if name not in look.coarse.names]
+
+
+def _extended(structure: Structure, listed: Sequence[Candidate], extensions: Extensions) -> list[_Extended]:
+    """Structures with one effect more each, without those that cannot be."""
+    found = []
+    for candidate in listed:
+        for start, side in product(candidate.starts, sides_of(candidate, structure.model)):
+            with contextlib.suppress(*ASTRAY):
+                one = extensions.extended(structure, candidate, start, side)
+                found.append(_Extended(one, candidate, start, side))
+    return found
+
+
+def _hopeful(several: Sequence[_Extended], look: Look, fitter: Fitter, each: SideBySide) -> list[_Extended]:
+    """The few best starts of each effect that does something where it begins, if more of it or less promises a gain.
+
+    This asks for no derivatives, which cost many times what a pass does where a joint is split.
     """
-    structure = extensions.extended(look.fitted.structure, candidate, start, side)
-    fresh = [name for name in structure.priors if name not in look.coarse.names]
-    followed = fitter.followed(structure, look.fitted.observer.coarse, fresh)
-    return Proposal(structure, look.predicted_gain(followed), candidate.neutral)
+
+    def promised(one: _Extended) -> float:
+        residual = fitter.followed(one.structure, look.fitted.observer.coarse, ()).residual
+        return look.gain_along(residual)
+
+    gains = each("trying", promised, several, lambda one: f"{one.candidate.label}, {look.fitted.observer.label}")
+    hopes: dict[Key, list[tuple[float, _Extended]]] = defaultdict(list)
+    for one, gain in zip(several, gains, strict=True):
+        if not isinstance(gain, Failure) and gain >= look.promising:
+            hopes[one.candidate.key].append((gain, one))
+    ordered = [sorted(found, key=lambda pair: -pair[0]) for found in hopes.values()]
+    return [one for found in ordered for _, one in found[: fitter.settings.starts]]
+
+
+def _side_by_side(neutral: Sequence[_Extended], look: Look) -> list[list[_Extended]]:
+    """Effects that do nothing where they begin, by so many as a pass has derivatives for; no effect is there twice."""
+    groups: list[list[_Extended]] = []
+    taken: list[int] = []
+    for one in neutral:
+        count = len(one.fresh(look))
+        for place, several in enumerate(groups):
+            if taken[place] + count <= AT_ONCE and all(one.candidate.key != other.candidate.key for other in several):
+                several.append(one)
+                taken[place] += count
+                break
+        else:
+            groups.append([one])
+            taken.append(count)
+    return groups
+
+
+def _screened(look: Look, several: Sequence[_Extended], fitter: Fitter, extensions: Extensions) -> list[Proposal]:
+    """Effects at start values under one observer; several in one pass where none of them does anything there.
+
+    Derivatives by what was unknown without them are taken as they were: a prediction of a gain can do with these.
+    """
+    together = several[0].structure
+    with contextlib.suppress(*ASTRAY):
+        for one in several[1:]:
+            together = extensions.extended(together, one.candidate, one.start, one.side)
+        names = [name for one in several for name in one.fresh(look)]
+        followed = fitter.followed(together, look.fitted.observer.coarse, names)
+        return [Proposal(one.structure, _gain(look, followed, one), one.candidate.neutral) for one in several]
+    if len(several) == 1:
+        return []  # it runs away from the records
+    return [proposal for one in several for proposal in _screened(look, [one], fitter, extensions)]
+
+
+def _gain(look: Look, followed: Followed, one: _Extended) -> float:
+    """What a step of a fit of an effect is predicted to gain, of a pass that has its derivatives among others, nats."""
+    names = one.fresh(look)
+    columns = [followed.names.index(name) for name in names]
+    own = replace(followed, structure=one.structure, names=tuple(names), jacobian=followed.jacobian[:, :, columns])
+    return look.predicted_gain(own)
 
 
 def _seated(ordered: Sequence[Proposal], promising: float, settings: Settings) -> list[Proposal]:
-    """The few best starts of each effect that promise a gain, for as many effects as there are seats.
-
-    An effect that is there at its start already has one fit in any case: a step may say little of where it ends.
-    """
+    """The few best starts of each effect that promise a gain; of those that do nothing there so many as have seats."""
     seated: dict[Key, list[Proposal]] = defaultdict(list)
     for proposal in ordered:
         several = seated[proposal.key]
-        first = not several and not proposal.neutral
-        if first or (proposal.gain >= promising and len(several) < settings.starts):
+        if proposal.gain >= promising and len(several) < settings.starts:
             several.append(proposal)
     neutral = [several for several in seated.values() if several and several[0].neutral][: settings.seats]
     others = [several for several in seated.values() if several and not several[0].neutral]

@@ -50,8 +50,9 @@ def rank(
     settings : Settings, optional
         The numbers that decide.
     setup : Setup, optional
-        Integrator and hold. Where the hold is ``auto``, commands run straight from sample to sample, as readings of a
-        drive do, where that counts as an effect would; else they are held, as those of a digital controller are.
+        Integrator and hold. Where the hold is ``auto``, commands run on from sample to sample, straight or as a cubic,
+        as readings of a drive do, where that counts as an effect would; else they are held, as those of a digital
+        controller are.
     workers : int, optional
         Structures that are fitted at a time; one per core if not given. The result does not depend on it.
     tell, progress : callable, optional

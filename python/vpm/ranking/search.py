@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
@@ -13,7 +14,7 @@ from vpm.errors import VpmError
 from vpm.experiment import Experiment
 from vpm.identify import InverseDynamicsProblem
 from vpm.model import Model
-from vpm.ranking.choice import as_good, weighed
+from vpm.ranking.choice import as_good, likely, weighed
 from vpm.ranking.extensions import Extensions
 from vpm.ranking.fit import ASTRAY, Fitted, Fitter, View
 from vpm.ranking.look import Look
@@ -32,7 +33,7 @@ from vpm.simulate import Setup
 from vpm.simulate.setup import AUTOMATIC
 
 #: What commands do between samples that were read, and not sent.
-STRAIGHT = "first_order"
+SMOOTH = ("first_order", "cubic")
 
 
 class Search:
@@ -102,26 +103,36 @@ class Search:
         return Ranking(effects, tuple(rounds), found.repaired, recalibrated, left, interrupted, hold)
 
     def _held(self, looks: list[Look], best: Trial | None) -> list[Look]:
-        """The same under commands that run straight from sample to sample, where no effect does as well; else none.
+        """The same under commands that run on from sample to sample, where no effect does as well; else none.
 
-        Commands that are held for a sample come half a sample late, and no effect takes all of that back.
+        Commands that are held for a sample come half a sample late. A spring takes nearly all of that back, with three
+        numbers more, and may leave less because it answers to noise otherwise: samples have to be more probable by it.
         """
-        now, observed = looks[0], self.fitter.observed
-        if observed.setup.hold != AUTOMATIC:
+        now, settings = looks[0] if best is None else best.look, self.settings
+        if self.fitter.observed.setup.hold != AUTOMATIC:
             return []
-        smooth = Fitter(observed.with_hold(STRAIGHT), self.settings)
-        view = View(now.view.noise)
-        try:
-            fitted = smooth.finished(smooth.fitted(now.fitted.structure, now.fitted.observer, view), view)
-        except ASTRAY:
+        ways: list[tuple[Fitter, Fitted]] = []
+        for course in SMOOTH:
+            smooth, view = Fitter(self.fitter.observed.with_hold(course), settings), View(now.view.noise)
+            with contextlib.suppress(*ASTRAY):
+                fitted = smooth.finished(smooth.fitted(now.fitted.structure, now.fitted.observer, view), view)
+                if now.judged(fitted).counts(settings):
+                    ways.append((smooth, fitted))
+            if not ways:
+                return []  # if straight lines are no better, no curve is
+        least = max(ways, key=lambda way: now.judged(way[1]).removed)[1]
+        noise = fitted_noise(least.residual, self.fitter.observed.parts, settings.order)
+
+        def evidence(fitted: Fitted, fitter: Fitter) -> float:
+            return fitter.evidence(likely(fitted, fitter, noise), noise)
+
+        smooth, fitted = max(ways, key=lambda way: evidence(way[1], way[0]))
+        rivals = [(now.fitted, settings.odds)] + ([] if best is None else [(best.fitted, 0.0)])
+        told = evidence(fitted, smooth)
+        if any(told - evidence(one, self.fitter) <= more for one, more in rivals):
             return []
-        judgement = now.judged(fitted)
-        if not judgement.counts(self.settings) or (best and best.judgement.removed >= judgement.removed):
-            return []
-        noise = fitted_noise(fitted.residual, observed.parts, self.settings.order)
-        if smooth.evidence(fitted, noise) - self.fitter.evidence(now.fitted, noise) <= self.settings.odds:
-            return []
-        self.say(f"commands that run from sample to sample remove {100.0 * judgement.removed:.3g} % of the error power")
+        removed = 100.0 * now.judged(fitted).removed
+        self.say(f"commands that run on from sample to sample remove {removed:.3g} % of the error power")
         self.fitter = smooth
         self.first = {look.fitted.observer.band: look for look in self._looks(self.start)}
         return self._all_looks(self._look(fitted))
@@ -129,10 +140,12 @@ class Search:
     def _looks(self, structure: Structure, known: Look | None = None) -> list[Look]:
         """A structure under each observer that can follow it, that which is known first.
 
+        A slow observer may lose what hangs behind a contact, or let a leg fall over. What it leaves then says nothing.
+
         Raises
         ------
         VpmError
-            None of them can.
+            All of them run away.
         """
         looks = [] if known is None else [known]
         reason: Exception = VpmError(f"{structure.model.name} runs away from the records")
@@ -140,11 +153,11 @@ class Search:
             if known is None or band != known.fitted.observer.band:
                 try:
                     looks.append(self._look(self._fitted(structure, Observer(band))))
-                except ASTRAY as error:  # a slow observer may lose what hangs behind a contact
+                except ASTRAY as error:
                     reason = error
         if not looks:
             raise reason
-        return looks
+        return [look for look in looks if look.follows] or looks[-1:]
 
     def _all_looks(self, look: Look) -> list[Look]:
         return self._looks(look.fitted.structure, look)
