@@ -87,7 +87,7 @@ class Look:
         noise, alone = self.view.noise, self._alone
         powers = (np.sum(noise.by_channel(errors) ** 2, axis=1) for errors in (left, alone))
         place = int(np.argmin(np.divide(*powers)))
-        return noise.cost(alone) - noise.cost(left) if self._rooms()[place] else 0.0
+        return noise.cost(alone) - noise.cost(left) if self._rooms(np.ones(len(self.sizes)))[place] else 0.0
 
     @cached_property
     def _alone(self) -> Array:
@@ -116,13 +116,18 @@ class Look:
         samples = sum(part.stop - part.start for part in self._fitter.observed.parts)
         return float(-0.5 * samples * np.log1p(-self.settings.worth))
 
-    def has_room(self, removed: float = 0.0) -> bool:
-        """Whether any effect could still count if so much of what is left were removed before it."""
-        return any(self._rooms(removed))
+    def has_room(self, beside: Fitted | None = None) -> bool:
+        """Whether any effect could still count, or could if another structure had removed before what it does."""
+        left = np.ones(len(self.sizes)) if beside is None else self._left_by(beside)
+        return any(self._rooms(left))
 
-    def _rooms(self, removed: float = 0.0) -> list[bool]:
-        """The same of effects that do most in each of the channels."""
-        size, beside = (np.sqrt((1.0 - removed) / (power + 1.0)) for power in (self.explained, self.added))
+    def _left_by(self, fitted: Fitted) -> Array:
+        """What another structure leaves of each channel, as a share (m,)."""
+        return _ratio(self.left, self._fitter.observed.squares(fitted.residual, self.sizes))
+
+    def _rooms(self, left: Array) -> list[bool]:
+        """Whether effects could count that do most in each of the channels, of which so much is left."""
+        size, beside = (np.sqrt(left / (power + 1.0)) for power in (self.explained, self.added))
         told = (Judgement(1.0, 1.0, np.inf, float(a), float(b), 1.0) for a, b in zip(size, beside, strict=True))
         return [judgement.counts(self.settings) for judgement in told]
 
@@ -135,7 +140,7 @@ class Look:
         observed = self._fitter.observed
         left = observed.squares(fitted.residual, self.sizes)
         shares = [1.0 - float(np.prod(_ratio([b], [a]))) for b, a in zip(self.left, left, strict=True)]
-        ratio = _ratio(self.left, left)
+        ratio = self._left_by(fitted)
         removed, place = max(1.0 - float(np.prod(ratio)), 1e-12), int(np.argmin(ratio))
         there = max(1.0 - float(ratio[place]), 1e-12)
         curve = np.zeros(len(ratio)) if key is None else self._curve(key)

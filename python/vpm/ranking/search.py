@@ -178,7 +178,7 @@ class Search:
             seen = self._tried(look)
             tried += seen
             counting += [trial for trial in self._finished(seen) if trial.counts]
-            if any(not trial.look.has_room(trial.judgement.removed) for trial in counting):
+            if any(not trial.look.has_room(trial.fitted) for trial in counting):
                 break  # nothing could be missing beside it
         told: list[Trial] = []
         while counting:
