@@ -327,7 +327,8 @@ def test_effects_that_do_nothing_share_a_pass_and_promise_the_same(monkeypatch: 
     view = View(fitter.noise_of(structure, Observer(1.0)))
     look = Look(fitter.fitted(structure, Observer(1.0), view), fitter)
     effects = ("bias_force", "coulomb_friction", "quadratic_drag", "spring", "hysteresis", "input_delay", "payload")
-    promised, passes = [], []
+    promised: list[dict[object, float]] = []
+    passes: list[int] = []
     follow = Observed.follow
 
     def counted(*given: object) -> object:
