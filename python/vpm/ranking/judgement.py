@@ -15,13 +15,14 @@ class Judgement(Storable):
     Attributes
     ----------
     removed : float
-        Share of the error power.
+        Share of the error power; the shares that are left of several channels multiply.
     least : float
         The same of fitted and of held-back stretches of record, the smaller one.
     score : float
         How surely it is removed from pieces of the held-back stretches, in standard deviations.
     size : float
-        Its amplitude as a share of that of all effects of the model whose laws are not exact.
+        Its amplitude in the channel in which it removes most, as a share of that of all effects of the model whose laws
+        are not exact.
     beside : float
         The same of those that were added before.
     shape : float
