@@ -16,6 +16,7 @@ from vpm.model import Effect
 from vpm.ranking.fit import ASTRAY, Fitted, Fitter, Followed, View, bounded_step
 from vpm.ranking.judgement import Judgement
 from vpm.ranking.noise_model import white_noise
+from vpm.ranking.structure import Structure
 
 Array = NDArray[np.float64]
 
@@ -65,16 +66,15 @@ class Look:
 
         None where it does most in a channel in which no effect could count any more.
         """
-        return self._gain(self._after_a_step(other))
+        return self._gain(self._after_a_step(other.structure, *self.view.errors(other, self._fitter.observed.parts)))
 
     def gain_along(self, residual: Array) -> float:
         """What another structure, which leaves this with few steps, promises if more or less of it changes the same.
 
         All that is unknown without it gives way, and stays within what is known of it.
         """
-        parts, noise = self._fitter.observed.parts, self.view.noise
-        before, slopes = self.view.errors(self.coarse, parts)
-        after = noise.whitened(residual, parts)
+        noise, (before, slopes) = self.view.noise, self._errors
+        after = noise.whitened(residual, self._fitter.observed.parts)
         along, z = after - before, self.coarse.structure.standard
         columns = np.column_stack([slopes, along])
         size = max(float(along @ along), 1e-300)
@@ -87,16 +87,20 @@ class Look:
         noise, alone = self.view.noise, self._alone
         powers = (np.sum(noise.by_channel(errors) ** 2, axis=1) for errors in (left, alone))
         place = int(np.argmin(np.divide(*powers)))
-        return noise.cost(alone) - noise.cost(left) if self._rooms(np.ones(len(self.sizes)))[place] else 0.0
+        return noise.cost(alone) - noise.cost(left) if self._rooms()[place] else 0.0
+
+    @cached_property
+    def _errors(self) -> tuple[Array, Array]:
+        """Of what was found alone, with few steps of the integrator, and their slopes; all trials ask for them."""
+        return self.view.errors(self.coarse, self._fitter.observed.parts)
 
     @cached_property
     def _alone(self) -> Array:
         """Errors after such a step of what was found alone: few steps of the integrator ask for other values."""
-        return self._after_a_step(self.coarse)
+        return self._after_a_step(self.coarse.structure, *self._errors)
 
-    def _after_a_step(self, followed: Followed) -> Array:
-        errors, slopes = self.view.errors(followed, self._fitter.observed.parts)
-        move = bounded_step(followed.structure, *self.view.weighted(errors, slopes), self.settings.reach)
+    def _after_a_step(self, structure: Structure, errors: Array, slopes: Array) -> Array:
+        move = bounded_step(structure, *self.view.weighted(errors, slopes), self.settings.reach)
         return min(errors, errors + slopes @ move, key=self.view.noise.cost)
 
     @property
@@ -118,14 +122,11 @@ class Look:
 
     def has_room(self, beside: Fitted | None = None) -> bool:
         """Whether any effect could still count, or could if another structure had removed before what it does."""
-        left = np.ones(len(self.sizes)) if beside is None else self._left_by(beside)
-        return any(self._rooms(left))
+        if beside is None:
+            return any(self._rooms())
+        return any(self._rooms(_ratio(self.left, self._fitter.observed.squares(beside.residual, self.sizes))))
 
-    def _left_by(self, fitted: Fitted) -> Array:
-        """What another structure leaves of each channel, as a share (m,)."""
-        return _ratio(self.left, self._fitter.observed.squares(fitted.residual, self.sizes))
-
-    def _rooms(self, left: Array) -> list[bool]:
+    def _rooms(self, left: Array | float = 1.0) -> list[bool]:
         """Whether effects could count that do most in each of the channels, of which so much is left."""
         size, beside = (np.sqrt(left / (power + 1.0)) for power in (self.explained, self.added))
         told = (Judgement(1.0, 1.0, np.inf, float(a), float(b), 1.0) for a, b in zip(size, beside, strict=True))
@@ -140,7 +141,7 @@ class Look:
         observed = self._fitter.observed
         left = observed.squares(fitted.residual, self.sizes)
         shares = [1.0 - float(np.prod(_ratio([b], [a]))) for b, a in zip(self.left, left, strict=True)]
-        ratio = self._left_by(fitted)
+        ratio = _ratio(self.left, left)
         removed, place = max(1.0 - float(np.prod(ratio)), 1e-12), int(np.argmin(ratio))
         there = max(1.0 - float(ratio[place]), 1e-12)
         curve = np.zeros(len(ratio)) if key is None else self._curve(key)

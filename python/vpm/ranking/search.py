@@ -17,6 +17,7 @@ from vpm.model import Model
 from vpm.ranking.choice import as_good, likely, weighed
 from vpm.ranking.extensions import Extensions
 from vpm.ranking.fit import ASTRAY, Fitted, Fitter, View
+from vpm.ranking.judgement import Judgement
 from vpm.ranking.look import Look
 from vpm.ranking.noise_model import fitted_noise
 from vpm.ranking.observed import Observed, Observer
@@ -108,32 +109,32 @@ class Search:
         Commands that are held for a sample come half a sample late. A spring takes nearly all of that back, with three
         numbers more, and may leave less because it answers to noise otherwise: samples have to be more probable by it.
         """
-        now, settings = looks[0] if best is None else best.look, self.settings
         if self.fitter.observed.setup.hold != AUTOMATIC:
             return []
-        ways: list[tuple[Fitter, Fitted]] = []
+        now, settings = looks[0] if best is None else best.look, self.settings
+        ways: list[tuple[Judgement, Fitter, Fitted]] = []
         for course in SMOOTH:
             smooth, view = Fitter(self.fitter.observed.with_hold(course), settings), View(now.view.noise)
             with contextlib.suppress(*ASTRAY):
                 fitted = smooth.finished(smooth.fitted(now.fitted.structure, now.fitted.observer, view), view)
-                if now.judged(fitted).counts(settings):
-                    ways.append((smooth, fitted))
+                if (judgement := now.judged(fitted)).counts(settings):
+                    ways.append((judgement, smooth, fitted))
             if not ways:
                 return []  # if straight lines are no better, no curve is
-        least = max(ways, key=lambda way: now.judged(way[1]).removed)[1]
+        *_, least = max(ways, key=lambda way: way[0].removed)
         noise = fitted_noise(least.residual, self.fitter.observed.parts, settings.order)
 
         def evidence(fitted: Fitted, fitter: Fitter) -> float:
             return fitter.evidence(likely(fitted, fitter, noise), noise)
 
-        smooth, fitted = max(ways, key=lambda way: evidence(way[1], way[0]))
+        told = [evidence(fitted, smooth) for _, smooth, fitted in ways]
         rivals = [(now.fitted, settings.odds)] + ([] if best is None else [(best.fitted, 0.0)])
-        told = evidence(fitted, smooth)
-        if any(told - evidence(one, self.fitter) <= more for one, more in rivals):
+        if any(max(told) - evidence(one, self.fitter) <= more for one, more in rivals):
             return []
-        removed = 100.0 * now.judged(fitted).removed
-        self.say(f"commands that run on from sample to sample remove {removed:.3g} % of the error power")
-        self.fitter = smooth
+        judgement, self.fitter, fitted = ways[told.index(max(told))]
+        self.say(
+            f"commands that run on from sample to sample remove {100 * judgement.removed:.3g} % of the error power"
+        )
         self.first = {look.fitted.observer.band: look for look in self._looks(self.start)}
         return self._all_looks(self._look(fitted))
 
