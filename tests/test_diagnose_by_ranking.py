@@ -119,18 +119,19 @@ def test_what_is_not_told_apart_is_one_class(named: vpm.Diagnosis, tmp_path: Pat
     assert [e["probability"] for e in report["effects"]] == [0.99, 0.95]
 
 
-def test_a_ranking_sees_the_training_records_alone(monkeypatch: pytest.MonkeyPatch, records: list[Experiment]) -> None:
+def test_a_ranking_learns_from_the_training_records_alone(monkeypatch: pytest.MonkeyPatch, records: list[Experiment]) -> None:
     seen: list[list[str]] = []
 
-    def asked(_: Model, given: list[Experiment], *none: object, settings: Asked, **__: object) -> Ranking:
-        assert not none
+    def asked(
+        _: Model, given: list[Experiment], unseen: list[Experiment], *, settings: Asked, **__: object
+    ) -> Ranking:
         assert settings.effects == 3
-        seen.append([record.name for record in given])
+        seen.append([record.name for record in (*given, *unseen)])
         return ranking()
 
     monkeypatch.setattr(diagnosing, "rank", asked)
     diagnose(nominal(), records[0], records[1], limit=3, names="ranking", workers=1)
-    assert seen == [[records[0].name]]
+    assert seen == [[records[0].name, records[1].name]]
 
 
 def test_ctrl_c_in_the_ranking_gives_what_is_known(monkeypatch: pytest.MonkeyPatch, records: list[Experiment]) -> None:
@@ -147,7 +148,7 @@ def test_ctrl_c_in_the_ranking_gives_what_is_known(monkeypatch: pytest.MonkeyPat
 
 
 def test_where_a_ranking_fails_a_search_names(monkeypatch: pytest.MonkeyPatch, records: list[Experiment]) -> None:
-    def failed(_: Model, __: list[Experiment], **___: object) -> Ranking:
+    def failed(*_: object, **__: object) -> Ranking:
         raise VpmError("the axis runs away from the records")
 
     monkeypatch.setattr(diagnosing, "rank", failed)

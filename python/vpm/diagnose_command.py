@@ -35,7 +35,9 @@ Validate = Annotated[
 Out = Annotated[Path, typer.Option(help="Folder for report.json, report.html and the repaired model.")]
 Effect = Annotated[Words, typer.Option(help="Try only these effects; repeat.")]
 Without = Annotated[Words, typer.Option(help="Try all effects but these; repeat.")]
-Limit = Annotated[int, typer.Option(min=0, help="Most effects to accept.")]
+Limit = Annotated[
+    int | None, typer.Option(min=0, help="Most effects to accept. Default: two for each joint, but at least six.")
+]
 Names = Annotated[
     Literal["ranking", "search"],
     typer.Option(help="Where names come from; a ranking covers rigid machines of up to three joints, a search others."),
@@ -51,7 +53,7 @@ def diagnose(
     out: Out = Path("report"),
     effect: Effect = None,
     without: Without = None,
-    limit: Limit = 6,
+    limit: Limit = None,
     names: Names = "ranking",
     channels: Channels = None,
     interpolate: Interpolate = False,

@@ -15,6 +15,7 @@ from threadpoolctl import threadpool_limits
 from vpm.catalogue import EFFECTS
 from vpm.compare import compare
 from vpm.discrepancy.ambiguity import Rivals, listed, rivals
+from vpm.discrepancy.apart import only_where_closed
 from vpm.discrepancy.beliefs import moved_far
 from vpm.discrepancy.by_ranking import notes as notes_of
 from vpm.discrepancy.by_ranking import searched, why_not_ranked
@@ -40,7 +41,7 @@ from vpm.discrepancy.remainder import Remainder, remainder
 from vpm.discrepancy.search import Search, ambiguities, further, search
 from vpm.discrepancy.side_by_side import Progress, SideBySide
 from vpm.discrepancy.standing import in_order, replaced, timed_again
-from vpm.discrepancy.structure import structure
+from vpm.discrepancy.structure import Structure, structure
 from vpm.discrepancy.telling_apart import experiments as experiments_for
 from vpm.discrepancy.timing import in_time
 from vpm.discrepancy.told_apart import told_apart
@@ -58,6 +59,8 @@ Array = NDArray[np.float64]
 
 #: Share of each record that is kept out of the fit when no validation record is given.
 HELD_OUT = 0.3
+#: Most effects to accept, if not given, of machines with few joints.
+LEAST_LIMIT = 6
 #: What an interrupted diagnosis says of itself.
 STOPPED = "stopped by Ctrl-C before every candidate was tried: this is what was known until then"
 #: Said of what would do in the place of an effect.
@@ -86,7 +89,7 @@ def diagnose(
     effects: Sequence[str] | None = None,
     cutoff: float | None = None,
     setup: Setup | None = None,
-    limit: int = 6,
+    limit: int | None = None,
     names: Names = "ranking",
     workers: int | None = None,
     tell: Tell | None = None,
@@ -114,8 +117,8 @@ def diagnose(
         Cut-off frequency of the motion filter, Hz; chosen from each record if not given.
     setup : Setup, optional
         Integrator, substeps and horizon of the simulations.
-    limit : int
-        Most effects to accept.
+    limit : int, optional
+        Most effects to accept; two for each joint, but at least six, if not given.
     names : {"ranking", "search"}
         Where names come from: from `vpm.rank` where that covers the machine and from rounds of screening on balances of
         effort elsewhere, or from these in any case.
@@ -149,7 +152,8 @@ def diagnose(
     with threadpool_limits(1, user_api="blas"):
         records = _records(experiments, validate)
         each = SideBySide(workers, progress)
-        return _diagnosis(model, records, effects, cutoff, setup or Setup(), limit, names, each, tell)
+        most = max(LEAST_LIMIT, 2 * len(model.joints)) if limit is None else limit
+        return _diagnosis(model, records, effects, cutoff, setup or Setup(), most, names, each, tell)
 
 
 def _diagnosis(
@@ -170,7 +174,7 @@ def _diagnosis(
     # A record cut off in the middle of a motion does not say what its controller remembers.
     mode = "restarts" if notes else judging_mode(model, unseen)
     by = (names, effects, limit)
-    ranking = _ranking(model, training, by, setup, say, each, notes)
+    ranking = _ranking(model, (training, unseen), by, setup, say, each, notes)
     if ranking is not None and ranking.hold != setup.course:
         notes.append(FOUND_HOLD.format(hold=ranking.hold))
         setup = replace(setup, hold=ranking.hold)
@@ -189,11 +193,11 @@ def _diagnosis(
     notes.extend(moved_far(model, recalibrated))
     found, ambiguous, late = _named(ranking, recalibrated, data, by, say, each, notes)
     say("measuring the noise floor")
-    floor = noise_floor(found.final.model, data.unseen, found.final.unseen, mode, setup)
-    gap = _gaps(data, nominal, recalibrated, found.final, floor)
+    measure = partial(_examined, nominal, recalibrated, data, setup)
+    floor, gap, left = measure(found.final)
+    if (kept := only_where_closed(found, data, gap, left)) is not found:
+        found, (floor, gap, left) = kept, measure(kept.final)
     say("examining what is left")
-    timed = in_time(found.final, data)
-    left = structure(found.final.model, data.training, data.unseen, timed.fitted, timed.unseen)
     rest, stopped = _until_stopped(
         lambda: _rest(recalibrated, found, data, each) if found.accepted or not is_negligible(gap) else None, None
     )
@@ -240,7 +244,7 @@ def _diagnosis(
 
 def _ranking(
     model: Model,
-    training: Sequence[Experiment],
+    records: tuple[Sequence[Experiment], Sequence[Experiment]],
     by: tuple[Names, Sequence[str] | None, int],
     setup: Setup,
     tell: Tell,
@@ -249,9 +253,12 @@ def _ranking(
 ) -> Ranking | None:
     """A ranking of the training records where names are to come from one and it covers the machine.
 
+    Unseen records only say, at the end, how much of their error what was found leaves.
+
     ``by`` says where names come from, of which effects, and how many at most. What keeps it from that is noted.
     """
     names, effects, limit = by
+    training, unseen = records
     if names != "ranking":
         return None
     reason = why_not_ranked(model, training)
@@ -261,6 +268,7 @@ def _ranking(
             return rank(
                 model,
                 training,
+                unseen,
                 effects=effects,
                 settings=Settings(effects=limit),
                 setup=setup,
@@ -439,13 +447,13 @@ def _rest(recalibrated: Judged, found: Search, data: Data, each: SideBySide) -> 
 def _gaps(
     data: Data, nominal: Judged, recalibrated: Judged, final: Judged, floor: dict[str, float]
 ) -> dict[str, ChannelGap]:
-    stages = [gaps(data.unseen, stage.unseen) for stage in (nominal, recalibrated, final)]
+    judged = (nominal, recalibrated, final)
+    stages = [gaps(data.unseen, stage.unseen) for stage in judged]
     result = {}
     for channel, (_, _, unit) in stages[0].items():
         before, known, after = (stage[channel][0] for stage in stages)
         signal = _signal(data.unseen, channel)
         result[channel] = ChannelGap(before, known, after, floor.get(channel, np.nan), unit, signal, data.unseen.mode)
-    judged = (nominal, recalibrated, final)
     if data.simulation is not None and nominal.simulated is not None:
         simulated = [gaps(data.simulation, j.simulated) for j in judged if j.simulated is not None]
         for channel, (_, _, unit) in simulated[0].items():
@@ -454,6 +462,17 @@ def _gaps(
             key = f"{channel} ({data.simulation.mode})"
             result[key] = ChannelGap(before, known, after, np.nan, unit, signal, data.simulation.mode)
     return result
+
+
+def _examined(
+    nominal: Judged, recalibrated: Judged, data: Data, setup: Setup, final: Judged
+) -> tuple[dict[str, float], dict[str, ChannelGap], Structure]:
+    """Noise floor of each channel, gaps at all stages, and what is left of the last one."""
+    mode = data.simulation.mode if data.simulation is not None else "restarts"
+    floor = noise_floor(final.model, data.unseen, final.unseen, mode, setup)
+    timed = in_time(final, data)
+    left = structure(final.model, data.training, data.unseen, timed.fitted, timed.unseen)
+    return floor, _gaps(data, nominal, recalibrated, final, floor), left
 
 
 def _signal(problem: InverseDynamicsProblem | OutputErrorProblem, channel: str) -> float:

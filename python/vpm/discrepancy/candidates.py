@@ -245,6 +245,16 @@ def _known_transition(model: Model, site: str, seen: Excitation) -> float:
     return model.parameters[name].value if name in model.parameters else 0.01 * seen.speed
 
 
+def joint_at(model: Model, site: str) -> str:
+    """The joint at which an effect acts, its drive or its sensor; "" if it acts on a body or on all."""
+    if site in model.joints:
+        return site
+    if site in model.actuators:
+        return model.joints_of_actuator(site)[0]
+    read = (name.rpartition(".")[0] for name in model.output_channels if model.sensor_of(name) == site)
+    return next((owner for owner in read if owner in model.joints), "")
+
+
 def _joint_of(kind: str, site: str, model: Model) -> int:
     if kind == "joint":
         return model.joints.index(site)

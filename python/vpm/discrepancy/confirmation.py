@@ -329,15 +329,19 @@ def _origin(data: InverseDynamicsProblem, probe: Probe, start: Model) -> Array |
     return probe.model.theta if alike or probe.candidate.neutral else None
 
 
-def shrinkage(problem: InverseDynamicsProblem, current: Judged, judged: Judged) -> float:
-    """How much weaker the actuators have become, at least 1.
+def shrinkage(problem: InverseDynamicsProblem, current: Judged, judged: Judged) -> Array:
+    """How much weaker the actuators of the joint of each residual have become, at least 1 (n,).
 
     An effect that swallows the command leaves a small gap between two small efforts; errors are compared relative to
-    the effort, so that nothing is won that way.
+    the effort, so that nothing is won that way. One drive may do so where others are stronger.
     """
-    after = problem.strength(judged.model)
-    before = problem.strength(current.model)
-    return max(1.0, before / max(after, 1e-6 * before)) if before > 0.0 else 1.0
+    after, before = (problem.strengths(one.model) for one in (judged, current))
+    weaker = np.maximum(1.0, before / np.maximum(after, np.maximum(1e-6 * before, 1e-300)))
+    factors = np.ones(max(block.samples.stop for block in problem.blocks))
+    for record in range(len(problem.motions)):
+        for block, factor in zip(problem.efforts(record), weaker, strict=True):
+            factors[block.samples] = factor
+    return factors
 
 
 def _simulated_gain(current: Judged, judged: Judged, data: Data) -> Gain | None:

@@ -8,7 +8,7 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from vpm.discrepancy.candidates import Candidate, Key, candidates, left_out
+from vpm.discrepancy.candidates import Candidate, Key, candidates, joint_at, left_out
 from vpm.discrepancy.choice import Accepted, choose
 from vpm.discrepancy.confirmation import Data, Judged, Trial, confirm, finished
 from vpm.discrepancy.diagnosis import RankedCandidate
@@ -50,8 +50,9 @@ Tell = Callable[[str], None]
 class Round:
     """One round of the search."""
 
-    def __init__(self, current: Judged, data: Data, number: int, tell: Tell, each: SideBySide) -> None:
+    def __init__(self, current: Judged, data: Data, number: int, tell: Tell, each: SideBySide, tried: int = 0) -> None:
         self.current, self.data, self.number, self.tell, self.each = current, data, number, tell, each
+        self._chosen_from = tried
         self.refused: dict[Key, str] = {}
         self._ranking: dict[Key, RankedCandidate] = {}
         self._promising: list[Probe] = []
@@ -112,6 +113,25 @@ class Round:
         self.mark(best.key)
         return best
 
+    def again(self, several: set[Key]) -> Accepted | None:
+        """The best of a few that were believed before another one came in, if any still is."""
+        self.screen([name for name, _ in several], set(), heavy=False, only=several)
+        self.confirm()
+        return self.best()
+
+    @property
+    def tried(self) -> int:
+        """Candidates from which those were chosen that were refitted."""
+        return max(len(self._ranking), self._chosen_from)
+
+    def elsewhere(self, best: Accepted) -> set[Key]:
+        """What is believed, too, at other joints than what comes in, and has no motion of its own."""
+        model = self.current.model
+        here = joint_at(model, best.key[1])
+        believed = [trial.probe.candidate for trial in self._believed]
+        light = [one for one in believed if not self._is_heavy(one) and joint_at(model, one.site)]
+        return {one.key for one in light if here and joint_at(model, one.site) != here}
+
     def weak(self, best: Accepted) -> bool:
         """Whether what would come in leaves most of the unseen gap, so that it may only imitate what moves by itself.
 
@@ -126,13 +146,16 @@ class Round:
         """Whether the probes of a motion of its own take long on this machine."""
         return bends(self.current.model) or has_own_drives(self.current.model)
 
-    def screen(self, effects: Sequence[str] | None, without: set[Key], *, heavy: bool) -> None:
-        """Probe every candidate and set aside those that cannot be."""
+    def screen(
+        self, effects: Sequence[str] | None, without: set[Key], *, heavy: bool, only: set[Key] | None = None
+    ) -> None:
+        """Probe every candidate, or only some, and set aside those that cannot be."""
         current, data = self.current, self.data
         self._promising = []
         found = candidates(current.model, data.training, current.fit.residual, effects)
         self.refused.update(left_out(current.model, data.training, effects))
         listed = [c for c in found if c.key not in without and self._is_heavy(c) == heavy]
+        listed = listed if only is None else [c for c in listed if c.key in only]
         self.tell(f"round {self.number}: screening {len(listed)} candidates")
         screen = partial(probe, prepare(current.baseline, data.training, listed), data.training)
         results = self.each(f"round {self.number}: screening", screen, listed, lambda c: c.label, screening_effort)
@@ -244,8 +267,7 @@ class Round:
 
     def thresholds(self) -> Thresholds:
         """What is asked of an effect when so many have been tried."""
-        tried = len(self._ranking) * self.number
-        return Thresholds(tried, min(m.dt for m in self.data.training.motions))
+        return Thresholds(self.tried * self.number, min(m.dt for m in self.data.training.motions))
 
     @cached_property
     def timed(self) -> InTime:

@@ -13,7 +13,7 @@ from vpm.discrepancy.elimination import Stage, drop_replaced, drop_springs, sett
 from vpm.discrepancy.round import Round, Tell
 from vpm.discrepancy.screening import Probe
 from vpm.discrepancy.side_by_side import SideBySide
-from vpm.discrepancy.together import together
+from vpm.discrepancy.together import Pair, together
 from vpm.identify.tangent import has_tangent
 
 
@@ -50,7 +50,7 @@ class Search:
     """Outcome of the whole search, or of what was done of it when Ctrl-C was pressed.
 
     ``last`` is given if nothing has changed since the last effect came in; ``over`` is the last round, if it accepted
-    nothing.
+    nothing; ``left`` is told by a ranking, see `Ranking.left`.
     """
 
     stages: tuple[Stage, ...]
@@ -60,6 +60,7 @@ class Search:
     interrupted: bool = False
     last: Tried | None = None
     over: Over = field(default_factory=Over)
+    left: float = float("nan")
 
     @property
     def gone(self) -> set[Key]:
@@ -96,16 +97,19 @@ def further(
     over = Over()
     interrupted = False
     first = 1 + max((candidate.round for candidate in ranking), default=0)
+    waiting, tried = set[Key](), 0  # what was believed at other joints, too, when the last effect came in, of how many
     for number in range(first, 2 * limit + 2):
-        outcome = Round(stages[-1].judged, data, number, tell, each)
-        best, pair = None, None
+        outcome = Round(stages[-1].judged, data, number, tell, each, tried)
+        best, pair, again = None, None, False
         try:
             if len(accepted) < limit and not (accepted and outcome.done()):
-                best = outcome.light(effects, set(dropped))
-                if best is None or outcome.weak(best):
-                    best = outcome.heavy(effects, set(dropped)) or best
-                pair = together(outcome, best, data, effects, set(dropped)) if len(accepted) + 1 < limit else None
-                best = best or (outcome.alone(set(dropped)) if pair is None else None)
+                best = outcome.again(waiting - set(dropped)) if waiting else None
+                again = best is not None
+                if not again:
+                    outcome = Round(stages[-1].judged, data, number, tell, each)
+                    best, pair = _whole(outcome, effects, set(dropped), several=len(accepted) + 1 < limit)
+                waiting = outcome.elsewhere(best) if best is not None and pair is None else set()
+                tried = outcome.tried
         except KeyboardInterrupt:
             interrupted = True
         ranking += outcome.ranked()
@@ -121,26 +125,41 @@ def further(
             break
         if has_tangent(best.trial.judged.model, data.training):
             best = settled(best, data)
-        # Beside the first of a pair little else was tried.
+        # Beside the first of a pair, and in a round of a few, little else was tried.
         known = Tried(best.key, outcome.current, tuple(outcome.probes), tuple(outcome.trials))
-        last = known if pair is None else None
+        last = known if pair is None and not again else None
         accepted.append(best)
         stages.append(Stage("added", *best.key, best.trial.judged))
         tell(f"round {number}: accepted {best.trial.probe.candidate.label}")
-        if best.trial.judged.fit.interrupted:
-            interrupted = True
-            break
-        try:
-            drop_replaced(stages, accepted, data, dropped)
-            drop_springs(stages, accepted, data, dropped)
-        except KeyboardInterrupt:
-            interrupted = True
+        interrupted = best.trial.judged.fit.interrupted or not _dropped(stages, accepted, data, dropped)
+        if interrupted:
             break
     if not interrupted:
         stages[-1], same = _loosened(stages[-1], data)
         last = last if same and not dropped else None
     listed = _listed({**dropped, **refused})
     return Search(tuple(stages), tuple(accepted), listed, tuple(ranking), interrupted, last, over)
+
+
+def _dropped(stages: list[Stage], accepted: list[Accepted], data: Data, dropped: dict[Key, str]) -> bool:
+    """Drop what the last effect has made needless; whether that was done before Ctrl-C."""
+    try:
+        drop_replaced(stages, accepted, data, dropped)
+        drop_springs(stages, accepted, data, dropped)
+    except KeyboardInterrupt:
+        return False
+    return True
+
+
+def _whole(
+    outcome: Round, effects: Sequence[str] | None, without: set[Key], *, several: bool
+) -> tuple[Accepted | None, Pair | None]:
+    """The best of all candidates, and the pair that comes in for it where ``several`` may and only two together do."""
+    best = outcome.light(effects, without)
+    if best is None or outcome.weak(best):
+        best = outcome.heavy(effects, without) or best
+    pair = together(outcome, best, outcome.data, effects, without) if several else None
+    return best or (outcome.alone(without) if pair is None else None), pair
 
 
 def _loosened(stage: Stage, data: Data) -> tuple[Stage, bool]:

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from scipy.special import ndtri
 
+from vpm.discrepancy.apart import FLOOR_FACTOR, MOSTLY_OPEN, Joints
 from vpm.discrepancy.beliefs import driven_away
 from vpm.discrepancy.confirmation import Data, Judged
 from vpm.discrepancy.diagnosis import ChannelGap
@@ -16,13 +17,10 @@ from vpm.discrepancy.search import Search
 from vpm.discrepancy.structure import Structure
 from vpm.identify import gain, segments
 
-#: A residual within this factor of the noise floor has nothing left to explain, unless it repeats.
-FLOOR_FACTOR = 1.3
-#: Where so much of what could be explained remains, what was found is not the explanation.
-MOSTLY_OPEN = 0.15
-
 #: Said of what stays after effects were found.
 _REST = " A structured residual above the noise remains."
+#: The same where effects explain what is missing at other joints.
+_OPEN = " What is left at {joints} is structured, and no effect of the catalogue explains it."
 
 
 def main_gaps(gap: Mapping[str, ChannelGap]) -> list[ChannelGap]:
@@ -72,12 +70,10 @@ def verdict(
     # A channel far above its noise that is nothing beside its signal says nothing of one that is not.
     structured = left.present and _above([g for g in main if not _is_nothing(g)]) > FLOOR_FACTOR
     remaining = structured or (rest is not None and rest.repeats and not small)
-    worst = max(main, key=lambda g: g.recalibrated / g.signal if g.signal else 0.0)
+    worst = max(main, key=_clear_of_noise)
     numbers = f"{_percent(worst.before, worst)} before, {_percent(worst.recalibrated, worst)} recalibrated"
     names = ", then ".join(e.trial.probe.candidate.label for e in found.accepted)
     share_left = (worst.after / worst.recalibrated) ** 2 if worst.recalibrated > 0.0 else 0.0
-    mostly_open = structured and share_left > MOSTLY_OPEN
-    mostly_open = mostly_open or (rest is not None and (rest.open > MOSTLY_OPEN or rest.instead))
     away = driven_away(nominal.model, recalibrated, found.final) if found.accepted else {}
     if found.accepted and away and not found.interrupted:
         return (
@@ -86,11 +82,15 @@ def verdict(
             f"{names}, {_farthest(away)}. Error on unseen data: {numbers}, {_percent(worst.after, worst)} after.",
             True,
         )
-    if found.accepted and mostly_open and not _told_by_runs(found):
+    mostly_open = (structured and share_left > MOSTLY_OPEN) or _is_described_better(rest)
+    joints = Joints.of(gap, left)
+    apart = joints.differ and not any(joints.has(entry, found.final.model) for entry in found.accepted)
+    if found.accepted and not apart and not _is_explanation(found, mostly_open):
+        leave = f"leave {100.0 * (found.left if found.left >= 1.0 else share_left):.0f} % of its mean square"
         return (
             "unexplained",
             f"The residual is structured and {above:.2g} times the noise floor. The effects of the catalogue that come "
-            f"closest, {names}, leave {100.0 * share_left:.0f} % of its mean square: they are not the explanation. "
+            f"closest, {names}, {leave}: they are not the explanation. "
             f"Error on unseen data: {numbers}, {_percent(worst.after, worst)} after.",
             True,
         )
@@ -98,7 +98,7 @@ def verdict(
         return (
             "effect_found",
             f"Missing: {names}. Error on unseen data: {numbers}, {_percent(worst.after, worst)} after."
-            + (_REST if remaining else ""),
+            + (_OPEN.format(joints=", ".join(joints.open)) if apart else _REST if remaining else ""),
             remaining,
         )
     if remaining:
@@ -109,6 +109,27 @@ def verdict(
             True,
         )
     return (*_nothing_missing(data, nominal, recalibrated, main, numbers), False)
+
+
+def _clear_of_noise(gap: ChannelGap) -> float:
+    """How far what was left before effects stands above the noise, as a share of the signal."""
+    floor = gap.noise_floor if np.isfinite(gap.noise_floor) else 0.0
+    return float(np.sqrt(max(gap.recalibrated**2 - floor**2, 0.0))) / gap.signal if gap.signal else 0.0
+
+
+def _is_described_better(rest: Remainder | None) -> bool:
+    return rest is not None and (rest.open > MOSTLY_OPEN or rest.instead)
+
+
+def _is_explanation(found: Search, mostly_open: bool) -> bool:
+    """Whether what was found explains the gap, where a balance of effort is said to leave it mostly open or not.
+
+    A machine that an observer keeps beside unseen records tells it where it is clear: effects that leave little in a
+    channel are the explanation of what is missing there, and those that leave more everywhere predict nothing.
+    """
+    if np.isnan(found.left):
+        return _told_by_runs(found) or not mostly_open
+    return found.left <= MOSTLY_OPEN or (found.left < 1.0 and not mostly_open)
 
 
 def _farthest(away: Mapping[str, float]) -> str:

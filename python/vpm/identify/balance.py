@@ -215,15 +215,15 @@ class InverseDynamicsProblem:
             model, theta, whole, experiment, columns, self.shown, memory, kept=self._kept[record], origin=origin
         )
 
-    def strength(self, model: Model) -> float:
-        """Root mean square of the weighted applied effort over all records: what a relative error is relative to."""
-        power, count = 0.0, 0.0
+    def strengths(self, model: Model) -> Array:
+        """Root mean square of the applied effort on each joint over all records: what its errors are relative to."""
+        power, count = np.zeros(len(self.joints)), np.zeros(len(self.joints))
         for record in range(len(self.motions)):
             _, applied, _ = self.effort(model, model.theta, record)
-            for block, column in zip(self.efforts(record), applied.T, strict=True):
-                power += float(np.sum((column * block.weight * block.moving) ** 2))
-                count += float(block.moving.sum())
-        return float(np.sqrt(power / count))
+            for joint, (block, column) in enumerate(zip(self.efforts(record), applied.T, strict=True)):
+                power[joint] += float(np.sum((column * block.moving) ** 2))
+                count[joint] += float(block.moving.sum())
+        return np.asarray(np.sqrt(power / np.maximum(count, 1.0)))
 
     def standstill(self, record: int) -> float:
         """Share of the samples of one record that do not count because a joint stands still."""

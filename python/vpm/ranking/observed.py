@@ -84,7 +84,7 @@ class Observed:
         self._starts: WeakKeyDictionary[Model, list[Array]] = WeakKeyDictionary()
         ends = np.cumsum([len(record.time) for record in self.records])
         cuts = [
-            int(end) - np.linspace(len(r.time) - int(settings.settling / r.dt), 0, STRETCHES + 1)
+            int(end) - np.linspace(len(r.time) - min(int(settings.settling / r.dt), len(r.time) // 2), 0, STRETCHES + 1)
             for end, r in zip(ends, self.records, strict=True)
         ]
         pairs = [pair for cut in cuts for pair in pairwise(cut)]

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from vpm.catalogue.kinds import Side, in_words
 from vpm.model import Model
 from vpm.ranking.judgement import Judgement
@@ -72,6 +74,11 @@ class Gap(Storable):
     after: float
     unit: str
 
+    @property
+    def left(self) -> float:
+        """Share of the error power of the recalibrated model that is left with what was found; NaN if not known."""
+        return (self.after / self.recalibrated) ** 2 if self.recalibrated > 0.0 else float("nan")
+
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Ranking(Result):
@@ -102,6 +109,12 @@ class Ranking(Result):
     gaps: dict[str, Gap] = field(default_factory=dict)
     interrupted: bool = False
     hold: str = HOLDS[0]
+
+    @property
+    def left(self) -> float:
+        """Share of the error power of validation records that effects leave, of the channel that they explain best."""
+        shares = [gap.left for gap in self.gaps.values() if np.isfinite(gap.left)]
+        return min(shares, default=float("nan"))
 
     def _headline(self) -> Mapping[str, object]:
         return {f"{one.effect} at {one.place}": one.judgement.removed for one in self.effects} or {"effects": "none"}

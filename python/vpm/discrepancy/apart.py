@@ -1,0 +1,98 @@
+"""Joints at which no effect explains what is left, told apart from those at which effects do."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+from vpm.discrepancy.candidates import joint_at
+from vpm.discrepancy.choice import Accepted
+from vpm.discrepancy.confirmation import Data, judged_anyhow
+from vpm.discrepancy.diagnosis import ChannelGap, RefusedEffect
+from vpm.discrepancy.elimination import Stage
+from vpm.discrepancy.refusal import NEGLIGIBLE
+from vpm.discrepancy.search import Search
+from vpm.discrepancy.structure import Structure
+from vpm.errors import VpmError
+from vpm.model import Model
+
+#: A residual within this factor of the noise floor has nothing left to explain, unless it repeats.
+FLOOR_FACTOR = 1.3
+#: Where so much of what could be explained remains, what was found is not the explanation.
+MOSTLY_OPEN = 0.15
+
+
+@dataclass(frozen=True)
+class Joints:
+    """What effects make of the gap at each joint that has one.
+
+    Attributes
+    ----------
+    open : mapping of str to float
+        Joints at which most of the gap is left, and the share of its mean square that is.
+    closed : tuple of str
+        Joints at which they explain it.
+    """
+
+    open: Mapping[str, float]
+    closed: tuple[str, ...]
+
+    @classmethod
+    def of(cls, gap: Mapping[str, ChannelGap], left: Structure) -> Joints:
+        """Of the balance of effort, with what is left there."""
+        told = {channel.rpartition(".")[0]: g for channel, g in gap.items() if _is_effort(channel, g)}
+        shares = {joint: (g.after / g.recalibrated) ** 2 for joint, g in told.items() if _is_clear(g.recalibrated, g)}
+        still = {joint: share for joint, share in shares.items() if share > MOSTLY_OPEN}
+        still = {
+            joint: share for joint, share in still.items() if left.present and _is_clear(told[joint].after, told[joint])
+        }
+        return cls(still, tuple(joint for joint, share in shares.items() if share <= MOSTLY_OPEN))
+
+    @property
+    def differ(self) -> bool:
+        """Whether there are both."""
+        return bool(self.open and self.closed)
+
+    def has(self, entry: Accepted, model: Model) -> bool:
+        """Whether an effect acts at an open joint; what acts on all may explain the others."""
+        return joint_at(model, entry.key[1]) in self.open
+
+
+def _is_effort(channel: str, gap: ChannelGap) -> bool:
+    return channel.endswith(".effort") and gap.mode == "inverse_dynamics"
+
+
+def _is_clear(value: float, gap: ChannelGap) -> bool:
+    """Whether a gap stands clear of the noise, and is something beside the effort."""
+    return value > FLOOR_FACTOR * gap.noise_floor and value > NEGLIGIBLE * gap.signal
+
+
+def only_where_closed(found: Search, data: Data, gap: Mapping[str, ChannelGap], left: Structure) -> Search:
+    """Without the effects at joints that stay open, where there are others that do not.
+
+    What happens at one joint says nothing of effects at another one. All is fitted again without them.
+    """
+    joints, model = Joints.of(gap, left), found.final.model
+    gone = [entry for entry in found.accepted if joints.has(entry, model)]
+    if not joints.differ or not 0 < len(gone) < len(found.accepted):
+        return found
+    try:
+        for entry in reversed(gone):
+            model = model.without_effect(*entry.key, entry.side)
+        free = tuple(name for name in found.final.free if name in model.parameters)
+        bounds = {name: pair for name, pair in found.final.bounds.items() if name in free}
+        judged, _ = judged_anyhow(model, free, data, bounds)
+    except VpmError:
+        return found  # another one rests on it
+    return replace(
+        found,
+        stages=(*found.stages, *(Stage("removed", *entry.key, judged) for entry in gone)),
+        accepted=tuple(entry for entry in found.accepted if entry not in gone),
+        refused=(*(_refused(entry, joints, found.final.model) for entry in gone), *found.refused),
+    )
+
+
+def _refused(entry: Accepted, joints: Joints, model: Model) -> RefusedEffect:
+    joint = joint_at(model, entry.key[1])
+    share = 100.0 * joints.open[joint]
+    return RefusedEffect(*entry.key, f"{share:.0f} % of the mean square of the gap at {joint} is left with it")
