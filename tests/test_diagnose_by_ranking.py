@@ -24,6 +24,7 @@ from vpm.experiment import Experiment
 from vpm.model import Model
 from vpm.ranking import Judgement, Ranked, Ranking
 from vpm.ranking import Settings as Asked
+from vpm.ranking.result import Gap
 
 EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
 
@@ -119,12 +120,12 @@ def test_what_is_not_told_apart_is_one_class(named: vpm.Diagnosis, tmp_path: Pat
     assert [e["probability"] for e in report["effects"]] == [0.99, 0.95]
 
 
-def test_a_ranking_learns_from_the_training_records_alone(monkeypatch: pytest.MonkeyPatch, records: list[Experiment]) -> None:
+def test_a_ranking_learns_from_the_training_records_alone(
+    monkeypatch: pytest.MonkeyPatch, records: list[Experiment]
+) -> None:
     seen: list[list[str]] = []
 
-    def asked(
-        _: Model, given: list[Experiment], unseen: list[Experiment], *, settings: Asked, **__: object
-    ) -> Ranking:
+    def asked(_: Model, given: list[Experiment], unseen: list[Experiment], *, settings: Asked, **__: object) -> Ranking:
         assert settings.effects == 3
         seen.append([record.name for record in (*given, *unseen)])
         return ranking()
@@ -132,6 +133,29 @@ def test_a_ranking_learns_from_the_training_records_alone(monkeypatch: pytest.Mo
     monkeypatch.setattr(diagnosing, "rank", asked)
     diagnose(nominal(), records[0], records[1], limit=3, names="ranking", workers=1)
     assert seen == [[records[0].name, records[1].name]]
+
+
+@pytest.mark.parametrize(("after", "word"), [(0.2, "effect_found"), (1.1, "unexplained")])
+def test_names_that_leave_more_of_unseen_records_are_no_explanation(
+    after: float, word: str, monkeypatch: pytest.MonkeyPatch, records: list[Experiment]
+) -> None:
+    seen = replace(two(), gaps={"axis.position": Gap(2.0, 1.0, after, "m"), "tip.position": Gap(1.0, 0.0, 0.0, "m")})
+    assert seen.left == pytest.approx(after**2)
+    monkeypatch.setattr(diagnosing, "rank", lambda *_, **__: seen)
+    assert diagnose(nominal(), records[0], records[1], names="ranking", workers=1).verdict == word
+
+
+def test_names_that_explain_unseen_records_stand_whatever_the_balance_leaves(
+    monkeypatch: pytest.MonkeyPatch, records: list[Experiment]
+) -> None:
+    """A play is hardly seen in a balance. Here only a trifle is named, and half of the gap is left there."""
+    small = ranking(tried("bias_force", BIAS, 0.9, evidence=900.0, probability=0.99))
+    words = []
+    for left in (float("nan"), 0.1):
+        seen = replace(small, gaps={"axis.position": Gap(1.0, 1.0, left, "m")})
+        monkeypatch.setattr(diagnosing, "rank", lambda *_, seen=seen, **__: seen)
+        words.append(diagnose(nominal(), records[0], records[1], names="ranking", workers=1).verdict)
+    assert words == ["unexplained", "effect_found"]
 
 
 def test_ctrl_c_in_the_ranking_gives_what_is_known(monkeypatch: pytest.MonkeyPatch, records: list[Experiment]) -> None:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from vpm.discrepancy.candidates import joint_at
 from vpm.discrepancy.late import gain_alone, timed_alone
 from vpm.discrepancy.motion_only import CREEPING, Timed, is_dry, is_late
 from vpm.discrepancy.own_run import OwnRun
@@ -256,7 +257,7 @@ def measured(
         own,
         held,
         gain(current.fit.residual, fitted, segments(data.training)),
-        gain(current.unseen, judged.unseen * shrinkage(data.unseen, current, judged), segments(data.unseen)),
+        _where_it_acts(current, judged, data.unseen, probe.candidate.site),
         _simulated_gain(current, judged, data),
         timed.unseen if timed is not None else _away_gain(current, judged, data.unseen, probe),
         diverged,
@@ -342,6 +343,21 @@ def shrinkage(problem: InverseDynamicsProblem, current: Judged, judged: Judged) 
         for block, factor in zip(problem.efforts(record), weaker, strict=True):
             factors[block.samples] = factor
     return factors
+
+
+def _where_it_acts(current: Judged, judged: Judged, problem: InverseDynamicsProblem, site: str) -> Gain:
+    """What a refit gains, of the effort on the joint where the effect acts if that is more and nothing is lost by it.
+
+    What is missing at other joints says nothing of it.
+    """
+    shrunk = judged.unseen * shrinkage(problem, current, judged)
+    whole, joint = gain(current.unseen, shrunk, segments(problem)), joint_at(current.model, site)
+    if joint not in problem.joints or len(problem.joints) == 1 or whole.relative < 0.0:
+        return whole
+    here = np.zeros(len(shrunk))
+    for record in range(len(problem.motions)):
+        here[problem.efforts(record)[problem.joints.index(joint)].samples] = 1.0
+    return max(whole, gain(here * current.unseen, here * shrunk, segments(problem)), key=lambda one: one.relative)
 
 
 def _simulated_gain(current: Judged, judged: Judged, data: Data) -> Gain | None:

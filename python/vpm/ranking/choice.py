@@ -29,13 +29,16 @@ def weighed(counting: Sequence[Trial], fitter: Fitter) -> list[Trial]:
     without = fitter.evidence(likely(several[0].look.fitted, fitter, noise), noise)
     gains = [fitter.evidence(fit, noise) - without for fit in fits]
     told = [replace(trial, evidence=gain) for trial, gain in zip(several, gains, strict=True)]
-    same = [told[place] for place in _most_probable(gains, fits, fitter, noise)]
+    *shares, _ = probabilities(gains, fitter.settings.tempering)
+    same = [told[place] for place in _most_probable(shares, fits, fitter, noise)]
+    probable = [told[place] for place in _credible(shares, fitter.settings.sure)]
     best = min(same, key=lambda trial: trial.order)
     if within := [trial for trial in told if best.contains(trial)]:
         best, same = within[0], within[:1]
         told = [replace(trial, evidence=np.nan) if trial.contains(best) else trial for trial in told]
-    rivals = tuple(trial.label for trial in same if trial is not best)
-    return [replace(best, rivals=rivals), *(trial for trial in told if trial is not best), *richer]
+    rivals = [trial.label for trial in (*same, *probable) if trial.key != best.key and not trial.contains(best)]
+    others = (trial for trial in told if trial.key != best.key)
+    return [replace(best, rivals=tuple(dict.fromkeys(rivals))), *others, *richer]
 
 
 def as_good(trial: Trial, first: Trial, settings: Settings) -> bool:
@@ -71,10 +74,16 @@ def likely(fitted: Fitted, fitter: Fitter, noise: NoiseModel) -> Fitted:
     return fitter.finished(replace(fitted, cost=cost), View(noise))
 
 
-def _most_probable(gains: Sequence[float], fits: Sequence[Fitted], fitter: Fitter, noise: NoiseModel) -> list[int]:
+def _credible(shares: Sequence[float], sure: float) -> list[int]:
+    """Places of the most probable ones that are as probable together, the credible set."""
+    ordered = sorted(range(len(shares)), key=lambda place: -shares[place])
+    before = np.cumsum([0.0, *(shares[place] for place in ordered)])
+    return [place for place, sum_before in zip(ordered, before, strict=False) if sum_before < sure]
+
+
+def _most_probable(shares: Sequence[float], fits: Sequence[Fitted], fitter: Fitter, noise: NoiseModel) -> list[int]:
     """Places of the most probable class of what the records do not tell apart."""
     settings = fitter.settings
-    *shares, _ = probabilities(gains, settings.tempering)
     told = [fitter.log_density(fit, noise) for fit in fits]
     classes = [[place for place, other in enumerate(told) if apart(one, other) < settings.same] for one in told]
     head = max(range(len(fits)), key=lambda place: (sum(shares[other] for other in classes[place]), shares[place]))

@@ -60,6 +60,8 @@ class Settings:
         Power of evidence in probabilities: no model is exact.
     same : float
         Effects between which the records decide by fewer nats than this, in the mean, are rivals.
+    sure : float
+        The most probable effects that are as probable together are rivals, too.
     effects : int
         Most effects of a structure.
     """
@@ -86,4 +88,5 @@ class Settings:
     odds: float = 16.0
     tempering: float = 0.2
     same: float = 1.0
+    sure: float = 0.95
     effects: int = 4

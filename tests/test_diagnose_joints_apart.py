@@ -1,0 +1,59 @@
+"""Joints at which effects explain the gap, and others at which they do not."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+from second_suite.cases import make_case
+from vpm.discrepancy.apart import Joints
+from vpm.discrepancy.confirmation import Judged, shrinkage
+from vpm.discrepancy.diagnosis import ChannelGap
+from vpm.identify import InverseDynamicsProblem
+
+STRUCTURED: Any = SimpleNamespace(present=True)
+
+
+def gap(recalibrated: float, after: float) -> ChannelGap:
+    """Of an effort of 1 N m with a noise of 0.01 N m."""
+    return ChannelGap(recalibrated, recalibrated, after, 0.01, "N m", 1.0, "inverse_dynamics")
+
+
+def test_joints_are_told_apart_by_what_is_left_there() -> None:
+    told = Joints.of(
+        {
+            "first.effort": gap(0.5, 0.02),  # explained
+            "second.effort": gap(0.5, 0.4),  # most of it is left
+            "third.effort": gap(0.011, 0.011),  # nothing was missing
+            "first.position (restarts)": ChannelGap(1.0, 1.0, 1.0, np.nan, "rad", 1.0, "restarts"),
+        },
+        STRUCTURED,
+    )
+    assert told.closed == ("first",)
+    assert told.open == {"second": pytest.approx(0.64)}
+    assert told.differ
+
+
+def test_noise_alone_leaves_no_joint_open() -> None:
+    quiet: Any = SimpleNamespace(present=False)
+    told = Joints.of({"first.effort": gap(0.5, 0.02), "second.effort": gap(0.5, 0.4)}, quiet)
+    assert not told.open
+
+
+def test_a_drive_that_swallows_its_commands_is_weaker_at_its_own_joint_alone() -> None:
+    case = make_case("scara", "none", 3)
+    model, records = case.model(), case.train
+    problem = InverseDynamicsProblem(model, records)
+    drive = next(name for name in model.actuators if model.joints_of_actuator(name) == ("elbow",))
+    commands = np.concatenate([record[f"{drive}.command"] for record in records])
+    deaf = model.with_effect("dead_zone", at=drive, width=float(np.quantile(np.abs(commands), 0.9)))
+    one, other = (cast("Judged", SimpleNamespace(model=each)) for each in (model, deaf))
+    factors = shrinkage(problem, one, other)
+    for record in range(len(records)):
+        at = dict(zip(problem.joints, problem.efforts(record), strict=True))
+        assert np.all(factors[at["elbow"].samples] > 3.0)
+        assert np.all(factors[at["shoulder"].samples] == 1.0)
+    assert np.all(shrinkage(problem, other, one) == 1.0)
