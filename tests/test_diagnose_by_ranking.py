@@ -140,7 +140,7 @@ def test_names_that_leave_more_of_unseen_records_are_no_explanation(
     after: float, word: str, monkeypatch: pytest.MonkeyPatch, records: list[Experiment]
 ) -> None:
     seen = replace(two(), gaps={"axis.position": Gap(2.0, 1.0, after, "m"), "tip.position": Gap(1.0, 0.0, 0.0, "m")})
-    assert seen.left == pytest.approx(after**2)
+    assert seen.left == {"axis": pytest.approx(after**2)}
     monkeypatch.setattr(diagnosing, "rank", lambda *_, **__: seen)
     assert diagnose(nominal(), records[0], records[1], names="ranking", workers=1).verdict == word
 

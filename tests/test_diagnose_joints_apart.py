@@ -22,25 +22,30 @@ def gap(recalibrated: float, after: float) -> ChannelGap:
     return ChannelGap(recalibrated, recalibrated, after, 0.01, "N m", 1.0, "inverse_dynamics")
 
 
+GAPS = {
+    "first.effort": gap(0.5, 0.02),  # explained
+    "second.effort": gap(0.6, 0.48),  # most of it is left
+    "third.effort": gap(0.011, 0.011),  # nothing was missing
+    "first.position (restarts)": ChannelGap(1.0, 1.0, 1.0, np.nan, "rad", 1.0, "restarts"),
+}
+
+
 def test_joints_are_told_apart_by_what_is_left_there() -> None:
-    told = Joints.of(
-        {
-            "first.effort": gap(0.5, 0.02),  # explained
-            "second.effort": gap(0.5, 0.4),  # most of it is left
-            "third.effort": gap(0.011, 0.011),  # nothing was missing
-            "first.position (restarts)": ChannelGap(1.0, 1.0, 1.0, np.nan, "rad", 1.0, "restarts"),
-        },
-        STRUCTURED,
-    )
+    told = Joints.of(GAPS, STRUCTURED, {})
     assert told.closed == ("first",)
     assert told.open == {"second": pytest.approx(0.64)}
     assert told.differ
+    assert told.worst == "second"
+
+
+def test_what_an_observer_explains_is_closed_whatever_a_balance_leaves() -> None:
+    assert Joints.of(GAPS, STRUCTURED, {"second": 0.05}).closed == ("first", "second")
+    assert Joints.of(GAPS, STRUCTURED, {"second": 0.9}).open == {"second": pytest.approx(0.64)}
 
 
 def test_noise_alone_leaves_no_joint_open() -> None:
     quiet: Any = SimpleNamespace(present=False)
-    told = Joints.of({"first.effort": gap(0.5, 0.02), "second.effort": gap(0.5, 0.4)}, quiet)
-    assert not told.open
+    assert not Joints.of(GAPS, quiet, {}).open
 
 
 def test_a_drive_that_swallows_its_commands_is_weaker_at_its_own_joint_alone() -> None:

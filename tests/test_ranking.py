@@ -15,9 +15,6 @@ from scipy.stats import t as student
 import vpm
 from hopper import HOPPER, hopped
 from sledge import DRY, MASS, OIL, READING, SEEN, SLEDGE, WAVE, pushed, swung
-from vpm.demo import MODEL
-from vpm.demo.generate import record, train_reference
-from vpm.demo.machine import Machine
 from vpm.errors import DiagnosisError, ExperimentError
 from vpm.experiment import Experiment
 from vpm.model import Model
@@ -200,19 +197,6 @@ def test_a_large_payload_hides_no_small_friction() -> None:
     ranking = vpm.rank(light, pushed(dry=0.4, seed=1, duration=4.0), effects=effects)
     assert [one.effect for one in ranking.effects] == ["payload", "coulomb_friction"]
     assert ranking.effects[0].values["sledge.payload.mass"] == pytest.approx(MASS - 1.2, rel=0.1)
-
-
-def test_a_load_beside_the_axis_of_one_link_is_a_tilt_of_gravity_or_a_load() -> None:
-    """Both turn gravity by an angle, and the link knows its inertia only roughly: nobody can tell them apart."""
-    model, random = vpm.Model.load(MODEL), np.random.default_rng(5)
-    rows = record(Machine(payload=0.2, payload_place=(0.2, -0.1)), train_reference, 12.0, random)
-    log = Experiment.from_arrays(
-        rows[:, 0],
-        {"shoulder.position": rows[:, 1], "motor.command": rows[:, 2], "motor.reference": rows[:, 3]},
-        model=model,
-    )
-    (found,) = vpm.rank(model, log, effects=["gravity_tilt", "payload", "bias_force", "spring"]).effects
-    assert {found.effect, *(rival.split()[0] for rival in found.rivals)} == {"gravity_tilt", "payload"}
 
 
 @pytest.mark.nightly

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from vpm.discrepancy.candidates import joint_at
 from vpm.discrepancy.choice import Accepted
 from vpm.discrepancy.confirmation import Data, judged_anyhow
@@ -32,21 +34,26 @@ class Joints:
         Joints at which most of the gap is left, and the share of its mean square that is.
     closed : tuple of str
         Joints at which they explain it.
+    worst : str
+        The joint with the largest gap beside its effort, "" without any.
     """
 
     open: Mapping[str, float]
     closed: tuple[str, ...]
+    worst: str
 
     @classmethod
-    def of(cls, gap: Mapping[str, ChannelGap], left: Structure) -> Joints:
-        """Of the balance of effort, with what is left there."""
+    def of(cls, gap: Mapping[str, ChannelGap], left: Structure, observed: Mapping[str, float]) -> Joints:
+        """Of a balance of effort, with what is left there, and what an observer says of a joint, see `Search.left`."""
         told = {channel.rpartition(".")[0]: g for channel, g in gap.items() if _is_effort(channel, g)}
-        shares = {joint: (g.after / g.recalibrated) ** 2 for joint, g in told.items() if _is_clear(g.recalibrated, g)}
-        still = {joint: share for joint, share in shares.items() if share > MOSTLY_OPEN}
+        told = {joint: g for joint, g in told.items() if _is_clear(g.recalibrated, g)}
+        shares = {joint: min((g.after / g.recalibrated) ** 2, observed.get(joint, np.inf)) for joint, g in told.items()}
+        most = {joint: share for joint, share in shares.items() if share > MOSTLY_OPEN}
         still = {
-            joint: share for joint, share in still.items() if left.present and _is_clear(told[joint].after, told[joint])
+            joint: share for joint, share in most.items() if left.present and _is_clear(told[joint].after, told[joint])
         }
-        return cls(still, tuple(joint for joint, share in shares.items() if share <= MOSTLY_OPEN))
+        worst = max(told, key=lambda joint: told[joint].recalibrated / told[joint].signal, default="")
+        return cls(still, tuple(joint for joint in shares if joint not in most), worst)
 
     @property
     def differ(self) -> bool:
@@ -54,8 +61,8 @@ class Joints:
         return bool(self.open and self.closed)
 
     def has(self, entry: Accepted, model: Model) -> bool:
-        """Whether an effect acts at an open joint; what acts on all may explain the others."""
-        return joint_at(model, entry.key[1]) in self.open
+        """Whether an effect acts at an open joint; what acts on all of them has to explain the worst."""
+        return (joint_at(model, entry.key[1]) or self.worst) in self.open
 
 
 def _is_effort(channel: str, gap: ChannelGap) -> bool:
@@ -72,7 +79,7 @@ def only_where_closed(found: Search, data: Data, gap: Mapping[str, ChannelGap], 
 
     What happens at one joint says nothing of effects at another one. All is fitted again without them.
     """
-    joints, model = Joints.of(gap, left), found.final.model
+    joints, model = Joints.of(gap, left, found.left), found.final.model
     gone = [entry for entry in found.accepted if joints.has(entry, model)]
     if not joints.differ or not 0 < len(gone) < len(found.accepted):
         return found
@@ -93,6 +100,6 @@ def only_where_closed(found: Search, data: Data, gap: Mapping[str, ChannelGap], 
 
 
 def _refused(entry: Accepted, joints: Joints, model: Model) -> RefusedEffect:
-    joint = joint_at(model, entry.key[1])
+    joint = joint_at(model, entry.key[1]) or joints.worst
     share = 100.0 * joints.open[joint]
     return RefusedEffect(*entry.key, f"{share:.0f} % of the mean square of the gap at {joint} is left with it")

@@ -123,6 +123,8 @@ class Trial:
         Largest share of its signal that the model without the effect leaves of an unseen channel.
     asked : bool
         Whether runs of the model itself ask for it too, so that little that is sure is enough.
+    here : Gain or None
+        The unseen gain of the effort on the joint where the effect acts, if nothing is lost elsewhere.
     """
 
     probe: Probe
@@ -139,6 +141,12 @@ class Trial:
     alone: bool = False
     gap: float = 0.0
     asked: bool = False
+    here: Gain | None = None
+
+    @property
+    def there(self) -> Gain:
+        """The unseen gain where the effect does most of it: what is missing at other joints says nothing of it."""
+        return self.unseen if self.here is None else max(self.unseen, self.here, key=lambda one: one.relative)
 
     @property
     def score(self) -> float:
@@ -257,13 +265,14 @@ def measured(
         own,
         held,
         gain(current.fit.residual, fitted, segments(data.training)),
-        _where_it_acts(current, judged, data.unseen, probe.candidate.site),
+        gain(current.unseen, judged.unseen * shrinkage(data.unseen, current, judged), segments(data.unseen)),
         _simulated_gain(current, judged, data),
         timed.unseen if timed is not None else _away_gain(current, judged, data.unseen, probe),
         diverged,
         is_clear(judged, own),
         _slow_gain(current, judged, data.unseen),
         gap=max(share for _, share, _ in gaps(data.unseen, current.unseen).values()),
+        here=_where_it_acts(current, judged, data.unseen, probe.candidate.site),
     )
 
 
@@ -345,19 +354,15 @@ def shrinkage(problem: InverseDynamicsProblem, current: Judged, judged: Judged) 
     return factors
 
 
-def _where_it_acts(current: Judged, judged: Judged, problem: InverseDynamicsProblem, site: str) -> Gain:
-    """What a refit gains, of the effort on the joint where the effect acts if that is more and nothing is lost by it.
-
-    What is missing at other joints says nothing of it.
-    """
-    shrunk = judged.unseen * shrinkage(problem, current, judged)
-    whole, joint = gain(current.unseen, shrunk, segments(problem)), joint_at(current.model, site)
-    if joint not in problem.joints or len(problem.joints) == 1 or whole.relative < 0.0:
-        return whole
+def _where_it_acts(current: Judged, judged: Judged, problem: InverseDynamicsProblem, site: str) -> Gain | None:
+    """What a refit gains of the effort on the joint where an effect acts; None without one or if something is lost."""
+    joint, shrunk = joint_at(current.model, site), judged.unseen * shrinkage(problem, current, judged)
+    if joint not in problem.joints or float(shrunk @ shrunk) > float(current.unseen @ current.unseen):
+        return None
     here = np.zeros(len(shrunk))
     for record in range(len(problem.motions)):
         here[problem.efforts(record)[problem.joints.index(joint)].samples] = 1.0
-    return max(whole, gain(here * current.unseen, here * shrunk, segments(problem)), key=lambda one: one.relative)
+    return gain(here * current.unseen, here * shrunk, segments(problem))
 
 
 def _simulated_gain(current: Judged, judged: Judged, data: Data) -> Gain | None:

@@ -316,7 +316,7 @@ def slow_shows_it(trial: Trial, thresholds: Thresholds) -> bool:
 
 
 def _too_little(trial: Trial, thresholds: Thresholds) -> str:
-    unseen = trial.unseen
+    unseen = trial.there
     if slow_shows_it(trial, thresholds):
         return ""
     if unseen.relative < WORTH_A_NAME:

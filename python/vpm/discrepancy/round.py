@@ -140,7 +140,7 @@ class Round:
         take long, and come after all others.
         """
         tried = any(name in HEAVY[:1] for name, _ in self._ranking)
-        return best.trial.unseen.relative < CLEAR_GAIN and not tried and not self._takes_long()
+        return best.trial.there.relative < CLEAR_GAIN and not tried and not self._takes_long()
 
     def _takes_long(self) -> bool:
         """Whether the probes of a motion of its own take long on this machine."""

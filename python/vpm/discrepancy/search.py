@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from vpm.discrepancy.candidates import Key
@@ -50,7 +50,7 @@ class Search:
     """Outcome of the whole search, or of what was done of it when Ctrl-C was pressed.
 
     ``last`` is given if nothing has changed since the last effect came in; ``over`` is the last round, if it accepted
-    nothing; ``left`` is told by a ranking, see `Ranking.left`.
+    nothing. ``left`` is told by a ranking: by joint the share of the error power of unseen records that effects leave.
     """
 
     stages: tuple[Stage, ...]
@@ -60,7 +60,7 @@ class Search:
     interrupted: bool = False
     last: Tried | None = None
     over: Over = field(default_factory=Over)
-    left: float = float("nan")
+    left: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def gone(self) -> set[Key]:

@@ -74,7 +74,10 @@ def verdict(
     numbers = f"{_percent(worst.before, worst)} before, {_percent(worst.recalibrated, worst)} recalibrated"
     names = ", then ".join(e.trial.probe.candidate.label for e in found.accepted)
     share_left = (worst.after / worst.recalibrated) ** 2 if worst.recalibrated > 0.0 else 0.0
-    away = driven_away(nominal.model, recalibrated, found.final) if found.accepted else {}
+    # A balance that sees some joints alone may drive away what an observer of all of them leaves where it was.
+    observed = min(found.left.values(), default=np.nan)
+    asked = found.accepted and not observed <= MOSTLY_OPEN
+    away = driven_away(nominal.model, recalibrated, found.final) if asked else {}
     if found.accepted and away and not found.interrupted:
         return (
             "unexplained",
@@ -83,10 +86,10 @@ def verdict(
             True,
         )
     mostly_open = (structured and share_left > MOSTLY_OPEN) or _is_described_better(rest)
-    joints = Joints.of(gap, left)
+    joints = Joints.of(gap, left, found.left)
     apart = joints.differ and not any(joints.has(entry, found.final.model) for entry in found.accepted)
-    if found.accepted and not apart and not _is_explanation(found, mostly_open):
-        leave = f"leave {100.0 * (found.left if found.left >= 1.0 else share_left):.0f} % of its mean square"
+    if found.accepted and not apart and not _is_explanation(found, observed, mostly_open):
+        leave = f"leave {100.0 * (observed if observed >= 1.0 else share_left):.0f} % of its mean square"
         return (
             "unexplained",
             f"The residual is structured and {above:.2g} times the noise floor. The effects of the catalogue that come "
@@ -121,15 +124,15 @@ def _is_described_better(rest: Remainder | None) -> bool:
     return rest is not None and (rest.open > MOSTLY_OPEN or rest.instead)
 
 
-def _is_explanation(found: Search, mostly_open: bool) -> bool:
+def _is_explanation(found: Search, observed: float, mostly_open: bool) -> bool:
     """Whether what was found explains the gap, where a balance of effort is said to leave it mostly open or not.
 
-    A machine that an observer keeps beside unseen records tells it where it is clear: effects that leave little in a
-    channel are the explanation of what is missing there, and those that leave more everywhere predict nothing.
+    A machine that an observer keeps beside unseen records tells it where it is clear: effects that leave little in the
+    channel ``observed`` best are the explanation of what is missing there, those that leave more than all none.
     """
-    if np.isnan(found.left):
+    if np.isnan(observed):
         return _told_by_runs(found) or not mostly_open
-    return found.left <= MOSTLY_OPEN or (found.left < 1.0 and not mostly_open)
+    return observed <= MOSTLY_OPEN or (observed < 1.0 and not mostly_open)
 
 
 def _farthest(away: Mapping[str, float]) -> str:

@@ -111,10 +111,17 @@ class Ranking(Result):
     hold: str = HOLDS[0]
 
     @property
-    def left(self) -> float:
-        """Share of the error power of validation records that effects leave, of the channel that they explain best."""
-        shares = [gap.left for gap in self.gaps.values() if np.isfinite(gap.left)]
-        return min(shares, default=float("nan"))
+    def left(self) -> dict[str, float]:
+        """By joint, or what else has a channel, the share of the error power of validation records that effects leave.
+
+        Of its channel that they explain best.
+        """
+        found: dict[str, float] = {}
+        for channel, gap in self.gaps.items():
+            owner = channel.rpartition(".")[0]
+            if np.isfinite(gap.left):
+                found[owner] = min(gap.left, found.get(owner, np.inf))
+        return found
 
     def _headline(self) -> Mapping[str, object]:
         return {f"{one.effect} at {one.place}": one.judgement.removed for one in self.effects} or {"effects": "none"}

@@ -5,9 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-import numpy as np
-from scipy.linalg import null_space
-
 from vpm.discrepancy.candidates import Candidate
 from vpm.discrepancy.place import ANYWHERE
 from vpm.discrepancy.structural import moved
@@ -28,8 +25,6 @@ def started(candidate: Candidate, model: Model, sizes: Sizes) -> Candidate:
         (low, high), (first, last) = ends["period"], sizes.ways[candidate.site]
         ends["period"] = low, max(high, last - first)
     candidate = _placed(replace(candidate, bounds=ends), sizes)
-    if candidate.effect.name == "payload":
-        return replace(candidate, starts=(*candidate.starts, *_beside(candidate.site, model)))
     if candidate.effect.name == "backlash":
         return replace(candidate, starts=tuple(_backlash(start) for start in candidate.starts), fixed=())
     if candidate.effect.name == "end_stop":
@@ -52,17 +47,6 @@ def _placed(candidate: Candidate, sizes: Sizes) -> Candidate:
     low, high = sizes.ways[candidate.site]
     starts = tuple({**start, place: 0.5 * (low + high + share * (high - low))} for share in PLACES)
     return replace(candidate, starts=starts)
-
-
-def _beside(body: str, model: Model) -> list[Mapping[str, float]]:
-    """Places beside the line to the centre of mass of a body, as far out: a load on that line may be a part of it."""
-    if body in model.beams:
-        return []
-    centre = np.array([model.parameters[f"{body}.center_of_mass.{axis}"].value for axis in "xyz"])
-    across = null_space(centre[None, :]).T if np.any(centre) else np.zeros((0, 3))
-    far = float(np.linalg.norm(centre))
-    places = (centre + side * far * direction for direction in across for side in (-1.0, 1.0))
-    return [dict(zip("xyz", map(float, place), strict=True)) for place in places]
 
 
 def _backlash(start: Mapping[str, float]) -> Mapping[str, float]:
