@@ -45,6 +45,16 @@ def test_a_parameter_counts_that_effects_alone_and_surely_drive_away(
     assert found == ({} if times is None else {MASS: pytest.approx(times)})
 
 
+def test_what_a_balance_of_some_joints_drives_away_may_be_known_better() -> None:
+    model = vpm.Model.from_toml(AXIS)
+    off: Any = SimpleNamespace(
+        model=model.with_parameters({MASS: 1.5}), free=(MASS,), fit=SimpleNamespace(std=np.array([0.01]))
+    )
+    before: Any = SimpleNamespace(model=model)
+    assert driven_away(model, before, off, ranked=model.with_parameters({MASS: 1.1})) == {}
+    assert driven_away(model, before, off, ranked=off.model) == {MASS: pytest.approx(5.0)}
+
+
 def test_a_spring_that_turns_a_pendulum_upside_down_is_no_explanation() -> None:
     """A spring that hardens is, to fifth order, a linear one beside a centre of mass above the axis."""
     case = shared_case("axis_rotary", "cubic_spring", 43)

@@ -120,7 +120,7 @@ def test_what_takes_little_has_to_meet_motions_of_their_own_once(
     unused: Any = None
     outcome = Round(current, unused, 1, lambda _: None, unused)
     outcome._ranking = {("joint_compliance", site): unused for site in others}
-    best: Any = SimpleNamespace(trial=SimpleNamespace(unseen=SimpleNamespace(relative=taken)))
+    best: Any = SimpleNamespace(trial=SimpleNamespace(there=SimpleNamespace(relative=taken)))
     assert outcome.weak(best) == meets
 
 

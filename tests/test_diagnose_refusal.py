@@ -40,6 +40,7 @@ def trial(value: float) -> Trial:
             judged=judged,
             parameters=("encoder.gain.value",),
             unseen=gained(),
+            there=gained(),
             training=gained(),
             simulated=None,
             diverged="",
@@ -72,7 +73,7 @@ def test_a_gain_that_shows_magnified_in_a_balance_is_one(gap: float, after: floa
 
 def test_a_gain_that_explains_as_little_as_an_imitation_blames_no_instrument() -> None:
     little = Gain(before=1.0, after=0.88, weight=1.0, score=50.0, pieces=40)
-    one = cast("Trial", SimpleNamespace(**{**vars(trial(1.02)), "unseen": little}))
+    one = cast("Trial", SimpleNamespace(**{**vars(trial(1.02)), "unseen": little, "there": little}))
     assert "an instrument is blamed" in refuse_trial(one, Thresholds(30, 1e-3))
 
 
@@ -113,7 +114,8 @@ def beside_play(whole: Gain, slow: Gain) -> str:
     """What is said of a trial beside a play, with these gains of the whole unseen residual and of its slow part."""
     one = trial(1.1)
     return refuse_trial(
-        cast("Trial", SimpleNamespace(**{**vars(one), "unseen": whole, "slow": slow})), Thresholds(30, 1e-3)
+        cast("Trial", SimpleNamespace(**{**vars(one), "unseen": whole, "there": whole, "slow": slow})),
+        Thresholds(30, 1e-3),
     )
 
 

@@ -105,8 +105,11 @@ def test_a_diagnosis_of_the_rigid_hub_names_its_dry_friction() -> None:
     train, test = halves(False)
     found = diagnose(hub(False), train, test, effects=["coulomb_friction", "bias_force", "spring", "stribeck_friction"])
     assert found.steps[1].effect == "coulomb_friction"
-    # It leaves more than a quarter of the mean square, so that it is not called the explanation.
-    assert found.verdict == "unexplained"
+    # It explains where the hub goes, and leaves a fifth of the mean square of the torque.
+    assert found.verdict == "effect_found"
+    assert "A structured residual above the noise remains." in found.summary
+    torque = found.gap["hub.effort"]
+    assert (torque.after / torque.recalibrated) ** 2 > 0.15
 
 
 def test_with_the_gauge_a_diagnosis_names_the_flexible_link_and_then_dry_friction() -> None:

@@ -67,6 +67,7 @@ JOINT_COMPLIANCE = EffectType(
         "rotor_inertia": "far below the resonance only the inertias show; faster motion parts them",
         "actuator_lag": "both delay the motion of the link; free vibration after a stop shows the spring alone",
     },
+    contains=("rotor_inertia",),
 )
 
 BACKLASH = EffectType(
@@ -124,6 +125,7 @@ BACKLASH = EffectType(
     confused_with={
         "joint_compliance": "they agree where the load never changes its sign; reversals and small motion part them",
     },
+    contains=("rotor_inertia",),
 )
 
 ROTOR_INERTIA = EffectType(

@@ -123,6 +123,7 @@ ASYMMETRIC_FRICTION = EffectType(
             " starts from rest part them"
         ),
     },
+    contains=("bias_force",),
 )
 
 STRIBECK_FRICTION = EffectType(

@@ -54,6 +54,7 @@ LINK_FLEXIBILITY = EffectType(
     confused_with={
         "joint_compliance": "behind one motor both are a spring; a strain gauge or the motion of the tip parts them",
     },
+    contains=("rotor_inertia",),
 )
 
 STRUCTURAL_DAMPING = EffectType(

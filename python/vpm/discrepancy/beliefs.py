@@ -30,7 +30,7 @@ def moved_far(model: Model, recalibrated: Judged) -> list[str]:
     return notes
 
 
-def driven_away(nominal: Model, recalibrated: Judged, final: Judged) -> dict[str, float]:
+def driven_away(nominal: Model, recalibrated: Judged, final: Judged, ranked: Model | None = None) -> dict[str, float]:
     """Parameters that effects surely drive far from what the model file says of them.
 
     Parameters
@@ -39,6 +39,8 @@ def driven_away(nominal: Model, recalibrated: Judged, final: Judged) -> dict[str
         As the file has it.
     recalibrated, final : Judged
         Without the effects, and with them.
+    ranked : Model, optional
+        With the effects, as an observer of all joints knows it: a balance may see some of them alone.
 
     Returns
     -------
@@ -55,6 +57,8 @@ def driven_away(nominal: Model, recalibrated: Judged, final: Judged) -> dict[str
         after = final.model.parameters[name].value
         away = abs(after - told.value) - NORMAL_95 * float(std)
         moved = abs(after - recalibrated.model.parameters[name].value)
+        if ranked is not None and abs(ranked.parameters[name].value - told.value) <= FAR * spread:
+            continue
         if min(away, moved) > FAR * spread:
             found[name] = abs(after - told.value) / spread
     return dict(sorted(found.items(), key=lambda item: -item[1]))

@@ -120,7 +120,8 @@ def searched(
     if ranking.rounds:
         outside |= _unpromising(ranking, stages[-1].judged, data, effects)
     refused, tried = _refused(ranking, outside, settings), _candidates(ranking, gains, settings)
-    return Search(tuple(stages), tuple(accepted), refused, tried, interrupted, left=ranking.left), known
+    found = Search(tuple(stages), tuple(accepted), refused, tried, interrupted, left=ranking.left, ranked=ranking.model)
+    return found, known
 
 
 def _without(model: Model, gone: Sequence[Ranked]) -> Model:

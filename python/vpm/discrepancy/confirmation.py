@@ -347,7 +347,8 @@ def shrinkage(problem: InverseDynamicsProblem, current: Judged, judged: Judged) 
     """
     after, before = (problem.strengths(one.model) for one in (judged, current))
     weaker = np.maximum(1.0, before / np.maximum(after, np.maximum(1e-6 * before, 1e-300)))
-    factors = np.ones(max(block.samples.stop for block in problem.blocks))
+    # What else is logged is shown by the machine as a whole.
+    factors = np.full(max(block.samples.stop for block in problem.blocks), np.max(weaker))
     for record in range(len(problem.motions)):
         for block, factor in zip(problem.efforts(record), weaker, strict=True):
             factors[block.samples] = factor
@@ -357,7 +358,8 @@ def shrinkage(problem: InverseDynamicsProblem, current: Judged, judged: Judged) 
 def _where_it_acts(current: Judged, judged: Judged, problem: InverseDynamicsProblem, site: str) -> Gain | None:
     """What a refit gains of the effort on the joint where an effect acts; None without one or if something is lost."""
     joint, shrunk = joint_at(current.model, site), judged.unseen * shrinkage(problem, current, judged)
-    if joint not in problem.joints or float(shrunk @ shrunk) > float(current.unseen @ current.unseen):
+    lost = float(shrunk @ shrunk) > float(current.unseen @ current.unseen)
+    if len(problem.joints) == 1 or joint not in problem.joints or lost:
         return None
     here = np.zeros(len(shrunk))
     for record in range(len(problem.motions)):

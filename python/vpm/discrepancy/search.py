@@ -15,6 +15,7 @@ from vpm.discrepancy.screening import Probe
 from vpm.discrepancy.side_by_side import SideBySide
 from vpm.discrepancy.together import Pair, together
 from vpm.identify.tangent import has_tangent
+from vpm.model import Model
 
 
 @dataclass(frozen=True)
@@ -50,7 +51,8 @@ class Search:
     """Outcome of the whole search, or of what was done of it when Ctrl-C was pressed.
 
     ``last`` is given if nothing has changed since the last effect came in; ``over`` is the last round, if it accepted
-    nothing. ``left`` is told by a ranking: by joint the share of the error power of unseen records that effects leave.
+    nothing. ``left`` is told by a ranking: by joint the share of the error power of unseen records that effects leave;
+    ``ranked`` is its model.
     """
 
     stages: tuple[Stage, ...]
@@ -61,6 +63,7 @@ class Search:
     last: Tried | None = None
     over: Over = field(default_factory=Over)
     left: Mapping[str, float] = field(default_factory=dict)
+    ranked: Model | None = None
 
     @property
     def gone(self) -> set[Key]:

@@ -74,10 +74,7 @@ def verdict(
     numbers = f"{_percent(worst.before, worst)} before, {_percent(worst.recalibrated, worst)} recalibrated"
     names = ", then ".join(e.trial.probe.candidate.label for e in found.accepted)
     share_left = (worst.after / worst.recalibrated) ** 2 if worst.recalibrated > 0.0 else 0.0
-    # A balance that sees some joints alone may drive away what an observer of all of them leaves where it was.
-    observed = min(found.left.values(), default=np.nan)
-    asked = found.accepted and not observed <= MOSTLY_OPEN
-    away = driven_away(nominal.model, recalibrated, found.final) if asked else {}
+    away = driven_away(nominal.model, recalibrated, found.final, found.ranked) if found.accepted else {}
     if found.accepted and away and not found.interrupted:
         return (
             "unexplained",
@@ -85,6 +82,7 @@ def verdict(
             f"{names}, {_farthest(away)}. Error on unseen data: {numbers}, {_percent(worst.after, worst)} after.",
             True,
         )
+    observed = min(found.left.values(), default=np.nan)
     mostly_open = (structured and share_left > MOSTLY_OPEN) or _is_described_better(rest)
     joints = Joints.of(gap, left, found.left)
     apart = joints.differ and not any(joints.has(entry, found.final.model) for entry in found.accepted)

@@ -182,6 +182,10 @@ class Components(DriveComponents):
             raise ModelError(f"actuator {actuator} {rest}", where=actuator)
         return entry.joint
 
+    def joint_of_body(self, body: str) -> str:
+        """Joint that carries a body; "" if no joint does."""
+        return next((name for name, joint in self._checked.document.joints.items() if joint.child == body), "")
+
     def line_of_actuator(self, actuator: str) -> str | None:
         """Line that an actuator drives; None if it drives a joint."""
         return self._checked.document.actuators[self._known(actuator, self.actuators, "actuator")].line

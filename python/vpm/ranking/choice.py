@@ -20,8 +20,8 @@ def weighed(counting: Sequence[Trial], fitter: Fitter) -> list[Trial]:
     """The best of those that count, then the others, with the evidence that each adds under one noise model.
 
     What nobody can tell from each other is probable together. The best is the plainest one of the most probable class;
-    a part of the machine comes before an instrument, and what a law contains before the law: it will be judged again
-    beside what comes after it.
+    a part of the machine comes before an instrument, and what a law contains before the law, if that may be enough or
+    is a curve of the same shape: it will be judged again beside what comes after it.
     """
     several, richer = _rivals(counting, fitter.settings)
     noise = fitted_noise(several[0].fitted.residual, fitter.observed.parts, fitter.settings.order)
@@ -33,7 +33,9 @@ def weighed(counting: Sequence[Trial], fitter: Fitter) -> list[Trial]:
     same = [told[place] for place in _most_probable(shares, fits, fitter, noise)]
     probable = [told[place] for place in _credible(shares, fitter.settings.sure)]
     best = min(same, key=lambda trial: trial.order)
-    if within := [trial for trial in told if best.contains(trial)]:
+    enough = best.left / (1.0 - fitter.settings.worth)  # beside what leaves no more, the best would not count
+    alike = [one for one in told if one in probable or one.left < enough or same_curve(one.key, best.key)]
+    if within := [one for one in alike if best.contains(one)]:
         best, same = within[0], within[:1]
         told = [replace(trial, evidence=np.nan) if trial.contains(best) else trial for trial in told]
     rivals = [trial.label for trial in (*same, *probable) if trial.key != best.key and not trial.contains(best)]

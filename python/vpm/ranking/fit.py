@@ -147,10 +147,10 @@ class Fitter:
                 errors, slopes = view.errors(now, self.observed.parts)
         return Fitted(now.structure, observer, now.residual, before)
 
-    def finished(self, found: Fitted, view: View, goal: float = math.inf) -> Fitted:
-        """Fitted on, by all derivatives, until nothing is gained any more, or the `cost` will not get below a goal."""
+    def finished(self, found: Fitted, view: View) -> Fitted:
+        """Fitted on, by all derivatives, until nothing is gained any more."""
         for _ in range(self.settings.turns):
-            more = self.fitted(found.structure, found.observer, view, goal, found.residual)
+            more = self.fitted(found.structure, found.observer, view, residual=found.residual)
             if found.cost - more.cost < self.settings.tolerance:
                 break
             found = more

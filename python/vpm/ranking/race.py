@@ -8,6 +8,7 @@ from vpm.discrepancy.side_by_side import SideBySide
 from vpm.ranking.fit import Fitted, Fitter
 from vpm.ranking.look import Look
 from vpm.ranking.proposals import Proposal
+from vpm.ranking.trial import is_part
 
 
 def raced(chosen: Sequence[Proposal], look: Look, fitter: Fitter, each: SideBySide) -> list[Fitted]:
@@ -15,7 +16,8 @@ def raced(chosen: Sequence[Proposal], look: Look, fitter: Fitter, each: SideBySi
 
     Each has to gain what makes it worth while. The most promising one is fitted first, and another one has to save a
     share of the cost that this one saved (O. Maron and A. Moore, *Advances in Neural Information Processing Systems* 6,
-    1994: those that cannot win leave a race early). The outcome does not depend on how many are fitted at a time.
+    1994: those that cannot win leave a race early), unless it is a part of another one: a rotor may seem to gain little
+    where a spring takes it along. The outcome does not depend on how many are fitted at a time.
 
     Parameters
     ----------
@@ -29,7 +31,10 @@ def raced(chosen: Sequence[Proposal], look: Look, fitter: Fitter, each: SideBySi
     first = _fitted(ordered[:1], look.needed, look, fitter, each)
     saved = [look.fitted.cost - fitted.cost for fitted in first]
     wanted = max([look.needed, *(fitter.settings.share * nats for nats in saved)])
-    return first + _fitted(ordered[1:], wanted, look, fitter, each)
+    model, keys = look.fitted.structure.model, {one.key for one in chosen}
+    parts = [one for one in ordered[1:] if any(is_part(model, one.key, key) for key in keys)]
+    others = [one for one in ordered[1:] if one not in parts]
+    return first + _fitted(others, wanted, look, fitter, each) + _fitted(parts, look.needed, look, fitter, each)
 
 
 def _fitted(several: Sequence[Proposal], wanted: float, look: Look, fitter: Fitter, each: SideBySide) -> list[Fitted]:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import math
-from collections import defaultdict
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
@@ -208,22 +206,14 @@ class Search:
         most = self.settings.finished * best.left
         hopeful = [t for t in worth if t.left <= most or as_good(t, best, self.settings) or best.contains(t)]
 
-        several: dict[Key, list[Trial]] = defaultdict(list)
-        for trial in sorted(hopeful, key=lambda trial: trial.left):
-            several[trial.key].append(trial)
-        ends = self.each("finishing", self._best_end, list(several.values()), lambda starts: starts[0].label)
-        return [end for end in ends if isinstance(end, Trial)]
+        def one_finished(trial: Trial) -> Trial:
+            view = View(trial.look.view.noise)
+            fitted = self.fitter.finished(trial.fitted, view)
+            ends = [fitted, *self._detours(fitted, view)] if trial.splits else [fitted]
+            return Trial.of(min(ends, key=lambda one: one.cost), trial.look)
 
-    def _best_end(self, starts: Sequence[Trial]) -> Trial:
-        """Where the best fit of an effect ends; one from another start goes on for as long as it may end better."""
-        first, view = starts[0], View(starts[0].look.view.noise)
-        best, goal = first.fitted, math.inf
-        for trial in starts:
-            fitted = self.fitter.finished(trial.fitted, view, goal)
-            best = min(best, fitted, key=lambda one: one.cost)
-            goal = best.cost
-        ends = [best, *self._detours(best, view)] if first.splits else [best]
-        return Trial.of(min(ends, key=lambda one: one.cost), first.look)
+        ends = self.each("finishing", one_finished, hopeful, lambda trial: trial.label)
+        return [end for end in ends if isinstance(end, Trial)]
 
     def _detours(self, fitted: Fitted, view: View) -> list[Fitted]:
         """Where a fit of an effect that splits a joint ends if it goes on from where a faster observer leads it.

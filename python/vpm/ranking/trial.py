@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from vpm.catalogue import EFFECTS
 from vpm.discrepancy.candidates import Key
+from vpm.model import Model
 from vpm.ranking.fit import Fitted
 from vpm.ranking.judgement import Judgement
 from vpm.ranking.look import Look
@@ -56,7 +57,7 @@ class Trial:
 
     def contains(self, other: Trial) -> bool:
         """Whether it is the other effect at some values of its parameters."""
-        return self.key[1] == other.key[1] and other.key[0] in EFFECTS[self.key[0]].contains
+        return is_part(self.look.fitted.structure.model, other.key, self.key)
 
     @property
     def order(self) -> tuple[bool, int, int]:
@@ -70,3 +71,9 @@ class Trial:
     def numbers(self) -> int:
         """How many are unknown in it."""
         return len(self.fitted.structure.priors)
+
+
+def is_part(model: Model, plainer: Key, richer: Key) -> bool:
+    """Whether an effect is what a richer one is at some values of its parameters, at its joint or that of its body."""
+    (name, site), (other, place) = plainer, richer
+    return name in EFFECTS[other].contains and (site == place or model.joint_of_body(place) == site)
