@@ -13,6 +13,7 @@ import pytest
 import two_link_arm
 import vpm
 from hopper import HOPPER
+from second_suite.cases import make_case
 from sledge import MASS, SLEDGE, swung
 from synthetic import Truth, nominal, simulate_axis
 from vpm import diagnosing
@@ -182,6 +183,21 @@ def test_where_a_ranking_fails_a_search_names(monkeypatch: pytest.MonkeyPatch, r
     assert np.isnan(why.effects[0].evidence_nats)
     (note,) = [note for note in why.notes if note.startswith("names come from a search")]
     assert "runs away" in note
+
+
+def test_a_name_that_no_balance_can_carry_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A load that nobody measures hangs on a lift: no balance follows the memory of a friction that warms up."""
+    case = make_case("hoist", "none", 3)
+    model = case.model()
+    warm = model.with_effect("warming_friction", "lift", time_constant=3.0)
+    values = {
+        name: warm.parameters[name].value for name in warm.effect("warming_friction", "lift").parameter_names.values()
+    }
+    one = replace(tried("warming_friction", values, 0.9, evidence=900.0, probability=0.99), site="lift")
+    monkeypatch.setattr(diagnosing, "rank", lambda *_, **__: Ranking((one,), ((one,),), warm, model))
+    why = diagnose(model, case.train, case.holdout, names="ranking", workers=1)
+    (told,) = [note for note in why.notes if note.startswith("the ranking names warming_friction at lift")]
+    assert "no balance of effort can be computed" in told
 
 
 def test_machines_that_a_ranking_does_not_cover_say_why() -> None:
