@@ -99,7 +99,7 @@ def diagnose(
 
     The parameters that the model file calls uncertain are fitted first, for a wrong parameter is not a missing
     effect. Where links are rigid and up to three joints move, a ranking of the training records names what is missing,
-    see `vpm.rank`, and unseen records decide nothing. Elsewhere every effect is screened at every site by its
+    see `vpm.rank`, and unseen records decide no name. Elsewhere every effect is screened at every site by its
     regressor; the promising ones are refitted together with the model and have to predict unseen records, both as a
     balance of effort and in simulation. One is accepted at a time, the one with the largest unseen gain per number.
 
