@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -20,8 +21,7 @@ OTHERS = tuple(name for name in arm.NAMES if name != "j4")
 def without_friction(seed: int) -> Case:
     """An arm whose file knows of no friction at any joint."""
     case = make_case("arm", NONE, seed)
-    document = {**case.document, "effects": []}
-    return Case(case.machine, case.request, seed, "several", document, case.train, case.holdout, (), ())
+    return replace(case, document={**case.document, "effects": []})
 
 
 def told(case: Case) -> Diagnosis:

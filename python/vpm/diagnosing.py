@@ -193,7 +193,7 @@ def _diagnosis(
     notes.extend(moved_far(model, recalibrated))
     found, ambiguous, late = _named(ranking, recalibrated, data, by, say, each, notes)
     say("measuring the noise floor")
-    measure = partial(_examined, nominal, recalibrated, data, setup)
+    measure = partial(_examined, nominal, recalibrated, data, mode, setup)
     floor, gap, left = measure(found.final)
     if (kept := only_where_closed(found, data, gap, left)) is not found:
         found, (floor, gap, left) = kept, measure(kept.final)
@@ -468,10 +468,9 @@ def _gaps(
 
 
 def _examined(
-    nominal: Judged, recalibrated: Judged, data: Data, setup: Setup, final: Judged
+    nominal: Judged, recalibrated: Judged, data: Data, mode: str, setup: Setup, final: Judged
 ) -> tuple[dict[str, float], dict[str, ChannelGap], Structure]:
     """Noise floor of each channel, gaps at all stages, and what is left of the last one."""
-    mode = data.simulation.mode if data.simulation is not None else "restarts"
     floor = noise_floor(final.model, data.unseen, final.unseen, mode, setup)
     timed = in_time(final, data)
     left = structure(final.model, data.training, data.unseen, timed.fitted, timed.unseen)

@@ -259,20 +259,21 @@ def measured(
 ) -> Trial:
     """What a refit gains on all the data; of something late it counts what it gains in motion, if that was timed."""
     fitted = judged.fit.residual * shrinkage(data.training, current, judged)
+    unseen = judged.unseen * shrinkage(data.unseen, current, judged)
     return Trial(
         probe,
         judged,
         own,
         held,
         gain(current.fit.residual, fitted, segments(data.training)),
-        gain(current.unseen, judged.unseen * shrinkage(data.unseen, current, judged), segments(data.unseen)),
+        gain(current.unseen, unseen, segments(data.unseen)),
         _simulated_gain(current, judged, data),
         timed.unseen if timed is not None else _away_gain(current, judged, data.unseen, probe),
         diverged,
         is_clear(judged, own),
-        _slow_gain(current, judged, data.unseen),
+        _slow_gain(current, unseen, data.unseen),
         gap=max(share for _, share, _ in gaps(data.unseen, current.unseen).values()),
-        here=_where_it_acts(current, judged, data.unseen, probe.candidate.site),
+        here=_where_it_acts(current, unseen, data.unseen, probe.candidate.site),
     )
 
 
@@ -355,16 +356,15 @@ def shrinkage(problem: InverseDynamicsProblem, current: Judged, judged: Judged) 
     return factors
 
 
-def _where_it_acts(current: Judged, judged: Judged, problem: InverseDynamicsProblem, site: str) -> Gain | None:
+def _where_it_acts(current: Judged, unseen: Array, problem: InverseDynamicsProblem, site: str) -> Gain | None:
     """What a refit gains of the effort on the joint where an effect acts; None without one or if something is lost."""
-    joint, shrunk = joint_at(current.model, site), judged.unseen * shrinkage(problem, current, judged)
-    lost = float(shrunk @ shrunk) > float(current.unseen @ current.unseen)
+    joint, lost = joint_at(current.model, site), float(unseen @ unseen) > float(current.unseen @ current.unseen)
     if len(problem.joints) == 1 or joint not in problem.joints or lost:
         return None
-    here = np.zeros(len(shrunk))
+    here = np.zeros(len(unseen))
     for record in range(len(problem.motions)):
         here[problem.efforts(record)[problem.joints.index(joint)].samples] = 1.0
-    return gain(here * current.unseen, here * shrunk, segments(problem))
+    return gain(here * current.unseen, here * unseen, segments(problem))
 
 
 def _simulated_gain(current: Judged, judged: Judged, data: Data) -> Gain | None:
@@ -373,11 +373,10 @@ def _simulated_gain(current: Judged, judged: Judged, data: Data) -> Gain | None:
     return gain(current.simulated, judged.simulated, segments(data.simulation))
 
 
-def _slow_gain(current: Judged, judged: Judged, data: InverseDynamicsProblem) -> Gain | None:
+def _slow_gain(current: Judged, unseen: Array, data: InverseDynamicsProblem) -> Gain | None:
     if not has_impacts(current.model):
         return None
-    shrunk = judged.unseen * shrinkage(data, current, judged)
-    return gain(slow(data, current.unseen), slow(data, shrunk), segments(data))
+    return gain(slow(data, current.unseen), slow(data, unseen), segments(data))
 
 
 def _timed(current: Judged, judged: Judged, data: Data, probe: Probe) -> tuple[Timed | None, OwnRun | None]:

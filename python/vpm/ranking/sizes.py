@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.catalogue import EffectParameter
-from vpm.discrepancy.candidates import Candidate, slow_speeds
+from vpm.discrepancy.candidates import Candidate, joint_at, slow_speeds
 from vpm.identify import InverseDynamicsProblem
 from vpm.model import Model
 from vpm.weighing.priors import FACTOR, NATURAL, NEAR, SHARE, Prior, natural_sizes
@@ -66,13 +66,8 @@ class Sizes:
 
     def _shown(self, site: str) -> tuple[float, float, float]:
         """Effort, speed and way at a site; the largest of all joints where it is at none of them."""
-        if site in self.joints:
-            return self.joints[site]
-        if site in self.model.actuators:
-            return self.joints[self.model.joints_of_actuator(site)[0]]
-        for channel in self.model.output_channels:
-            if self.model.sensor_of(channel) == site and channel.rpartition(".")[0] in self.joints:
-                return self.joints[channel.rpartition(".")[0]]
+        if (joint := joint_at(self.model, site)) in self.joints:
+            return self.joints[joint]
         effort, speed, way = np.max(list(self.joints.values()), axis=0)
         return float(effort), float(speed), float(way)
 
