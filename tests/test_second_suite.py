@@ -40,15 +40,16 @@ from vpm import Experiment, Model
 from vpm.errors import ValidityWarning
 
 Array = NDArray[np.float64]
-NAMES = sorted(MACHINES)
+#: Without those of `test_second_suite_beam.py`: how they bend has other coordinates than in a file.
+NAMES = sorted({*MACHINES} - {"slewer", "sweeper"})
 #: Largest difference of the positions of both programs over the way that is made, in free runs of one or two seconds:
 #: both step the same equations, with errors of second order in the generator's steps, 0.25 to 0.5 ms, of the arm 2 ms.
 #: Where gravity lets errors grow, as in the arm's shoulder, they do.
-ALIKE = {"belt": 1e-6, "rotary": 1e-5, "cart": 2e-4, "scara": 1e-5, "hoist": 1e-5, "arm": 1e-3}
+ALIKE = {"belt": 1e-6, "rotary": 1e-5, "cart": 2e-4, "scara": 1e-5, "hoist": 1e-5, "arm": 1e-3, "boom": 1e-5}
 #: Where a payload sits in the frame of its body, and whether a tilt is positive about y.
-PAYLOADS = {"cart": {"z": -0.55}, "arm": {"x": 0.03, "z": 0.09}}
+PAYLOADS = {"cart": {"z": -0.55}, "arm": {"x": 0.03, "z": 0.09}, "boom": {"x": 2.4}}
 TILTS = {"scara": -1.0}
-HEAVY = (("cart", "bob"), ("scara", "tool"), ("hoist", "load"), ("arm", "link6"))
+HEAVY = (("cart", "bob"), ("scara", "tool"), ("hoist", "load"), ("arm", "link6"), ("boom", "boom"))
 #: Effects whose law is the same in both programs.
 EXACT = (
     ("belt", "bias_force@axis"),
@@ -216,7 +217,7 @@ def test_a_clean_log_leaves_no_effort(name: str) -> None:
     assert (left < 0.1 * noise).all()
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", sorted({*NAMES} - {"boom"}))
 def test_dry_friction_is_that_of_the_model_file(name: str) -> None:
     m = short(name)
     values = true_values(m, 0)

@@ -23,7 +23,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from second_suite import arm, belt, cart, hoist, rotary, scara
+from second_suite import arm, belt, boom, cart, hoist, rotary, scara, slewer, sweeper
+from second_suite.logs import flat, least, logged
 from second_suite.loop import Inputs, Signals, simulated
 from second_suite.machine import Machine, columns_of, drawn
 from second_suite.plant import Hidden
@@ -31,7 +32,9 @@ from vpm import Experiment, Model
 
 Array = NDArray[np.float64]
 
-MACHINES: dict[str, Machine] = {m.MACHINE.name: m.MACHINE for m in (belt, rotary, cart, scara, hoist, arm)}
+MACHINES: dict[str, Machine] = {
+    m.MACHINE.name: m.MACHINE for m in (belt, rotary, cart, scara, hoist, arm, boom, slewer, sweeper)
+}
 NONE, PARAMETERS = "none", "parameters"
 CLEAN = frozenset({NONE, PARAMETERS})
 DEV, FRESH, SLICES = range(5), range(100, 105), 5
@@ -149,9 +152,9 @@ def strength(m: Machine, seed: int, hidden: Sequence[Hidden], others: Sequence[H
     """How far the effects beyond ``others`` stand clear of the noise, on training or judging records, which is less."""
     values = true_values(m, seed)
     rng = np.random.default_rng(0)
-    change = _flat(m, _records(m, seed, values, hidden, noisy=False, rng=rng))
+    change = flat(m, _records(m, seed, values, hidden, noisy=False, rng=rng))
     gone = {h.base: 0.0 for h in hidden if h.base and h not in others}
-    change = change - _flat(m, _records(m, seed, values | gone, others, noisy=False, rng=rng))
+    change = change - flat(m, _records(m, seed, values | gone, others, noisy=False, rng=rng))
     slopes, noise = _nudged(m.name, seed)
     picked = slopes[[i for i, name in enumerate(m.adjustable) if name in names]] / noise
     change = change / noise
@@ -185,26 +188,12 @@ def _nudged(machine: str, seed: int) -> tuple[Array, Array]:
     noisy = np.arange(records * times) >= records * (times - 1)
     wide = Inputs(*(np.tile(a, times) for a in (inputs.reference, inputs.torque, inputs.feedback)))
     rng = _rng(machine, "oracle", seed)
-    flat = _flat(m, simulated(m, columns, (), wide, noisy, rng))
-    parts = np.split(flat, times, axis=2)
+    signals = simulated(m, columns, (), wide, noisy, rng)
+    parts = np.split(flat(m, signals), times, axis=2)
     clean = parts[-2]
     slopes = np.stack([(part - clean) / (NUDGE * m.adjustable[name]) for part, name in zip(parts, names, strict=False)])
     noise = np.sqrt(np.mean((parts[-1] - clean) ** 2, axis=0, keepdims=True))
-    return slopes, np.maximum(noise, _least(m)[None, :, None])
-
-
-def _least(m: Machine) -> Array:
-    """Noise below which no channel counts: that of its encoder, and a thousandth of a command."""
-    motion = [m.joints[i].noise + m.joints[i].resolution / np.sqrt(12.0) for i in m.measured]
-    speeds = [joint.speed_noise for joint in m.joints if joint.speed_unit]
-    return np.array([*motion, *[1e-3] * len(m.driven), *speeds])
-
-
-def _flat(m: Machine, signals: Signals) -> Array:
-    """All logged channels, (samples, channels, columns)."""
-    tacho = [i for i, joint in enumerate(m.joints) if joint.speed_unit]
-    parts = [signals.position[:, m.measured], signals.command[:, m.driven], signals.speed[:, tacho]]
-    return np.concatenate(parts, axis=1)
+    return slopes, np.maximum(noise, least(m)[None, :, None])
 
 
 def _records(
@@ -216,27 +205,7 @@ def _records(
 
 
 def _log(m: Machine, seed: int, signals: Signals, record: int) -> Experiment:
-    """One record as an engineer logs it, in the units of the machine."""
-    count = round(m.lengths[record] * m.rate)
-    data: dict[str, Array] = {}
-    units: dict[str, str] = {}
-    asked, _ = inputs_of(m, seed)
-    for i, joint in enumerate(m.joints):
-        if joint.encoder:
-            data[f"{joint.name}.position"] = signals.position[:count, i, record] / joint.per_unit
-            units[f"{joint.name}.position"] = joint.unit
-        if joint.speed_unit:
-            data[f"{joint.name}.velocity"] = signals.speed[:count, i, record] / joint.per_speed_unit
-            units[f"{joint.name}.velocity"] = joint.speed_unit
-        if joint.drive:
-            data[f"{joint.drive}.command"] = signals.command[:count, i, record]
-            units[f"{joint.drive}.command"] = "A"
-        if joint.drive and m.known_loop:
-            data[f"{joint.drive}.reference"] = asked.reference[:count, i, record] / joint.per_unit
-            units[f"{joint.drive}.reference"] = joint.unit
-            data[f"{joint.drive}.disturbance"] = asked.torque[:count, i, record]
-            units[f"{joint.drive}.disturbance"] = "A"
-    return Experiment.from_arrays(np.arange(count) / m.rate, data, units, name=f"record {record + 1}")
+    return logged(m, inputs_of(m, seed)[0], signals, record)
 
 
 def _numbers(m: Machine, values: dict[str, float], names: Sequence[str], kind: str, rng: np.random.Generator) -> Any:

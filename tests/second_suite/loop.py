@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from second_suite.machine import Machine, Values
+from second_suite.oil import OilPlant
 from second_suite.plant import Hidden, Plant
 
 Array = NDArray[np.float64]
@@ -31,11 +32,12 @@ class Inputs:
 
 @dataclass(frozen=True)
 class Signals:
-    """Readings and commands, (samples, n, columns), SI."""
+    """Readings and commands, (samples, n, columns), SI; pressures are (samples, gauges, columns)."""
 
     position: Array
     speed: Array
     command: Array
+    pressure: Array
 
 
 class Drives:
@@ -112,6 +114,31 @@ class Encoders:
         return out
 
 
+class Gauges:
+    """Pressures to readings: scaled, shifted, with noise, in counts."""
+
+    def __init__(self, machine: Machine, hidden: Sequence[Hidden]) -> None:
+        def of(effect: str, neutral: float) -> Array:
+            found = {h.site: h.values["value"] for h in hidden if h.effect == effect}
+            return np.array([[found.get(gauge.name, neutral)] for gauge in machine.gauges]).reshape(-1, 1)
+
+        self.gain, self.offset = of("sensor_gain", 1.0), of("sensor_offset", 0.0)
+        self.noise = np.array([gauge.noise for gauge in machine.gauges])[:, None]
+        self.resolution = np.array([gauge.resolution for gauge in machine.gauges])[:, None]
+
+    def read(self, pressure: Array, noise: Array, noisy: NDArray[np.bool_]) -> Array:
+        """Readings now."""
+        out = self.gain * pressure + self.offset
+        rough = self.resolution * np.round((out + self.noise * noise) / self.resolution)
+        return np.where(noisy, rough, out)
+
+
+def plant_of(machine: Machine, values: Values, hidden: Sequence[Hidden], step: float) -> Plant:
+    """The machine in time, with its oil if it has some."""
+    kind = Plant if machine.line is None else OilPlant
+    return kind(machine, values, hidden, step)
+
+
 def simulated(
     machine: Machine,
     values: Values,
@@ -134,13 +161,14 @@ def simulated(
     """
     samples, n, columns = inputs.reference.shape
     step = 1.0 / machine.rate / machine.substeps
-    plant = Plant(machine, values, hidden, step)
+    plant = plant_of(machine, values, hidden, step)
     first = inputs.reference[0]
     plant.start(first if machine.rest is None else machine.rest(plant.values, first))
-    law, drives, encoders = (
+    law, drives, encoders, gauges = (
         machine.law(machine, columns),
         Drives(machine, hidden, step, columns),
         Encoders(machine, hidden, step),
+        Gauges(machine, hidden),
     )
     dt = 1.0 / machine.rate
     rates = np.gradient(inputs.reference, dt, axis=0)
@@ -148,6 +176,7 @@ def simulated(
     asked = np.stack([inputs.reference, rates, rates2], axis=1)
     shape = (samples, n, columns)
     position, speed, command = np.zeros(shape), np.zeros(shape), np.zeros(shape)
+    pressure = np.zeros((samples, len(machine.gauges), columns))
     seen_rate, share = np.zeros((n, columns)), -np.expm1(-2.0 * np.pi * SPEED_FILTER)
     on = inputs.feedback
     ripple_size = np.array([joint.drive_noise for joint in machine.joints])[:, None] * noisy
@@ -156,6 +185,7 @@ def simulated(
     for k in range(samples):
         place, rate = plant.measured()
         position[k] = encoders.read(place, rng.standard_normal((n, columns)), noisy)
+        pressure[k] = gauges.read(plant.pressures(), rng.standard_normal(pressure[k].shape), noisy)
         if k:
             seen_rate = seen_rate + share * ((position[k] - position[k - 1]) / dt - seen_rate)
         for i in tacho:
@@ -168,4 +198,4 @@ def simulated(
         for sub in range(machine.substeps):
             plant.advance(drives.effort(command, k, sub, ripple))
             encoders.keep(plant.measured()[0])
-    return Signals(position, speed, command)
+    return Signals(position, speed, command, pressure)

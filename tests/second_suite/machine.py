@@ -12,6 +12,8 @@ Array = NDArray[np.float64]
 Values = Mapping[str, Array]
 #: Mass matrix (columns, n, n), and loads h of M a + h = effort (n, columns), of the machine without rotors and losses.
 Tree = Callable[[Values, Array, Array], tuple[Array, Array]]
+#: Length of a line that a cylinder closes, and its lever: what the length gains per coordinate.
+Line = Callable[[Values, Array], tuple[Array, Array]]
 #: From (sample, readings, their rates, references with two derivatives) to commands; arrays (n, columns).
 Law = Callable[[int, Array, Array, Array], Array]
 Range = tuple[float, float]
@@ -36,6 +38,8 @@ class Joint:
         Logged in mm, else in degrees.
     speed_unit, per_speed_unit, speed_noise : str, float, float
         Of a tachometer, if there is one: unit in the log, SI per unit, noise (SI).
+    command_unit : str
+        Of the drive.
     """
 
     name: str
@@ -49,6 +53,12 @@ class Joint:
     speed_unit: str = ""
     per_speed_unit: float = 1.0
     speed_noise: float = 0.0
+    command_unit: str = "A"
+
+    @property
+    def channel(self) -> str:
+        """Under which positions are logged."""
+        return f"{self.name}.position"
 
     @property
     def unit(self) -> str:
@@ -59,6 +69,18 @@ class Joint:
     def per_unit(self) -> float:
         """SI per unit of a logged position."""
         return 1e-3 if self.prismatic else np.pi / 180.0
+
+
+@dataclass(frozen=True)
+class PressureGauge:
+    """A gauge of the pressure in a chamber: its name, what it reads, noise and resolution (Pa)."""
+
+    name: str
+    channel: str
+    noise: float
+    resolution: float
+    unit: str = "bar"
+    per_unit: float = 1e5
 
 
 @dataclass(frozen=True)
@@ -112,6 +134,10 @@ class Machine:
         Whether the model file has the controller, and the log its references and what is added to its commands.
     rest : callable, optional
         Where the coordinates stand at first, from the values and the first references (n, columns).
+    line : callable, optional
+        Of a machine whose only joint is moved by a cylinder: the line that the cylinder closes.
+    gauges : tuple of PressureGauge
+        Of the chambers a and b of that cylinder.
     """
 
     name: str
@@ -134,6 +160,8 @@ class Machine:
     known_loop: bool = False
     same: tuple[tuple[tuple[str, str], tuple[str, str]], ...] = ()
     rest: Callable[[Values, Array], Array] | None = None
+    line: Line | None = None
+    gauges: tuple[PressureGauge, ...] = ()
 
     @property
     def driven(self) -> tuple[int, ...]:

@@ -94,6 +94,10 @@ class Plant:
         """What encoders are fixed to: the motors' places, and their speeds, (n, columns)."""
         return self.q[self.motor], self.v[self.motor]
 
+    def pressures(self) -> Array:
+        """What pressure gauges are screwed into, (chambers, columns)."""
+        return np.zeros((0, self.columns))
+
     def mass_and_load(self, q: Array, v: Array) -> tuple[Array, Array]:
         """Mass matrix (columns, size, size) with rotors, and loads (size, columns)."""
         n = self.links

@@ -13,12 +13,13 @@ from vpm import Experiment, Model
 #: Names that speak of one kind of physics: a wrong name of the right class sends an engineer to the right place.
 FRICTIONS = ("coulomb", "stribeck", "asymmetric", "viscous", "warming", "position_dependent", "load_dependent", "lugre")
 CLASSES = (
-    {*(f"{kind}_friction" for kind in FRICTIONS), "hysteresis", "quadratic_drag"},
+    {*(f"{kind}_friction" for kind in FRICTIONS), "hysteresis", "quadratic_drag", "seal_friction"},
     {"bias_force", "gravity_tilt", "sensor_offset", "spring", "cubic_spring", "end_stop", "torque_ripple"},
     {"payload", "rotor_inertia", "sensor_gain"},
-    {"input_delay", "actuator_lag", "sensor_delay"},
+    {"input_delay", "actuator_lag", "sensor_delay", "valve_dynamics"},
     {"joint_compliance", "backlash", "link_flexibility"},
-    {"dead_zone", "saturation"},
+    {"dead_zone", "saturation", "uneven_edges"},
+    {"internal_leakage", "supply_drop"},
 )
 Named = tuple[str, str]
 #: From the model file and the records to learn from and to judge by, to what is missing: (effect, site) of each.
