@@ -47,6 +47,12 @@ def tried(effect: str, values: dict[str, float], least: float, **more: Any) -> R
     return Ranked(effect, "axis", values, Judgement(least, least, 9.0, 0.1, 1.0, 1.0), 1.0, **more)
 
 
+def seen_by_observer(recalibrated: float, after: float) -> Gap:
+    """What an observer leaves of a channel without noise, the model as it was a half worse."""
+    left = (after / recalibrated) ** 2 if recalibrated else float("nan")
+    return Gap(1.5 * recalibrated, recalibrated, after, "m", left=left, noise=0.0, signal=10.0)
+
+
 def two() -> Ranking:
     """Dry friction, which has a rival, and a constant force."""
     rival = tried("spring", {"axis.spring.stiffness": 1.0}, 0.03)
@@ -140,8 +146,9 @@ def test_a_ranking_learns_from_the_training_records_alone(
 def test_names_that_leave_more_of_unseen_records_are_no_explanation(
     after: float, word: str, monkeypatch: pytest.MonkeyPatch, records: list[Experiment]
 ) -> None:
-    seen = replace(two(), gaps={"axis.position": Gap(2.0, 1.0, after, "m"), "tip.position": Gap(1.0, 0.0, 0.0, "m")})
-    assert seen.left == {"axis": pytest.approx(after**2)}
+    told = {"axis.position": seen_by_observer(1.0, after), "tip.position": seen_by_observer(0.0, 0.0)}
+    seen = replace(two(), gaps=told)
+    assert seen.left == {"axis": after**2}
     monkeypatch.setattr(diagnosing, "rank", lambda *_, **__: seen)
     assert diagnose(nominal(), records[0], records[1], names="ranking", workers=1).verdict == word
 
@@ -153,7 +160,7 @@ def test_names_that_explain_unseen_records_stand_whatever_the_balance_leaves(
     small = ranking(tried("bias_force", BIAS, 0.9, evidence=900.0, probability=0.99))
     words = []
     for left in (float("nan"), 0.1):
-        seen = replace(small, gaps={"axis.position": Gap(1.0, 1.0, left, "m")})
+        seen = replace(small, gaps={"axis.position": seen_by_observer(1.0, left**0.5)})
         monkeypatch.setattr(diagnosing, "rank", lambda *_, seen=seen, **__: seen)
         words.append(diagnose(nominal(), records[0], records[1], names="ranking", workers=1).verdict)
     assert words == ["unexplained", "effect_found"]

@@ -1,5 +1,7 @@
 """Effects of joints that a diagnosis does not try: in every mode of a simulation, along records, in fits and files."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -12,6 +14,7 @@ from vpm.errors import ModelError, SimulationError
 from vpm.identify import InverseDynamicsProblem, identify
 
 Array = NDArray[np.float64]
+EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
 
 #: Values that matter beside forces of 20 N on 2 kg.
 VALUES: dict[str, dict[str, float]] = {
@@ -145,3 +148,11 @@ def test_files_keep_them_and_a_diagnosis_leaves_them_alone() -> None:
 def test_what_knows_the_load_has_no_sides() -> None:
     with pytest.raises(ModelError, match="has no sides"):
         geared().with_effect("load_dependent_friction", at="axis", side="link", driving=0.1)
+
+
+def test_what_knows_the_load_needs_an_actuator_on_its_joint() -> None:
+    """One that closes a line beside the joint loads it, too, but not the law."""
+    with pytest.raises(ModelError, match='is "knee_rotation", on which no actuator acts itself'):
+        Model.load(EXAMPLES / "hyl" / "hydraulic.toml").with_effect(
+            "load_dependent_friction", at="knee_rotation", driving=0.1
+        )

@@ -18,7 +18,7 @@ from vpm.discrepancy.ambiguity import Rivals, listed, rivals
 from vpm.discrepancy.apart import only_where_closed
 from vpm.discrepancy.beliefs import moved_far
 from vpm.discrepancy.by_ranking import notes as notes_of
-from vpm.discrepancy.by_ranking import searched, why_not_ranked
+from vpm.discrepancy.by_ranking import observed_gaps, searched, why_not_ranked
 from vpm.discrepancy.candidates import slow_speeds
 from vpm.discrepancy.choice import Accepted
 from vpm.discrepancy.confirmation import Data, Judged, is_clear, judge
@@ -201,7 +201,8 @@ def _diagnosis(
     rest, stopped = _until_stopped(
         lambda: _rest(recalibrated, found, data, each) if found.accepted or not is_negligible(gap) else None, None
     )
-    word, summary, described = verdict(data, nominal, recalibrated, found, gap, left, rest)
+    beyond = observed_gaps(ranking, data.training.joints) if ranking is not None else {}
+    word, summary, described = verdict(data, nominal, recalibrated, found, gap | beyond, left, rest)
     final, empirical, accepted = found.final, None, found.accepted
     if described and rest is not None:
         told = rest.best if word == "unexplained" else rest.choices[-1]
@@ -221,7 +222,7 @@ def _diagnosis(
         word,
         f"Stopped before every candidate was tried. {summary}" if found.interrupted else summary,
         tuple(_accepted_effect(entry, found.final) for entry in accepted),
-        gap,
+        gap | beyond,
         found.refused,
         found.ranking,
         listed(ambiguities(accepted), ambiguous),

@@ -168,6 +168,8 @@ class EffectType:
         Plainer effects that it is at some values of its parameters.
     exact : bool
         Whether mechanics alone gives its law, so that no machine differs from it by its shape.
+    takes_effort : bool
+        Whether it does nothing at a joint on which no actuator acts itself.
     """
 
     name: str
@@ -186,6 +188,7 @@ class EffectType:
     memory: str = ""
     contains: tuple[str, ...] = ()
     exact: bool = False
+    takes_effort: bool = False
 
     @property
     def has_sides(self) -> bool:

@@ -127,6 +127,7 @@ LOAD_DEPENDENT_FRICTION = EffectType(
     confused_with={},
     screened=False,
     motor_side_alone=True,
+    takes_effort=True,
 )
 
 LUGRE_FRICTION = EffectType(

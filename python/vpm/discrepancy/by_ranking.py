@@ -19,7 +19,7 @@ from vpm.discrepancy.ambiguity import Rivals
 from vpm.discrepancy.candidates import Candidate, Key, candidates
 from vpm.discrepancy.choice import Accepted
 from vpm.discrepancy.confirmation import Data, Judged, Trial, judged_anyhow, measured, unmoved
-from vpm.discrepancy.diagnosis import RankedCandidate, RefusedEffect
+from vpm.discrepancy.diagnosis import OBSERVED, ChannelGap, RankedCandidate, RefusedEffect
 from vpm.discrepancy.elimination import Stage
 from vpm.discrepancy.refusal import LEAST_GAIN, NORMAL_95_ONE_SIDED
 from vpm.discrepancy.screening import Probe, sort_columns
@@ -64,18 +64,39 @@ SETTINGS = Settings()
 def why_not_ranked(model: Model, experiments: Sequence[Experiment]) -> str:
     """Why names do not come from a ranking, or "": it covers up to three joints, rigid links, and drives without oil.
 
-    Drives may not go by samples of their own either. A ranking does not read a deflection that a log holds.
+    With oil it does so where a joint has no drive, for no balance of effort sees what acts there. Drives may not go by
+    samples of their own. A ranking does not read a deflection that a log holds.
     """
     if bends(model):
         return "links bend"
+    blind = has_free_joints(model)
     for name in model.actuators:
-        if (kind := model.actuator_type(name)) in {"hydraulic", *SAMPLED_TYPES}:
+        kind = model.actuator_type(name)
+        if kind in SAMPLED_TYPES or (kind == "hydraulic" and not blind):
             return f"the actuator {name} has type {kind}"
     own = set(model.joints) - set(model.added_joints)
     if len(own) > SETTINGS.joints:
         return f"there are {len(own)} joints, more than {SETTINGS.joints}"
     held = [channel for channel in model.deflections if any(channel in record for record in experiments)]
     return f"records hold {held[0]}" if held else ""
+
+
+def has_free_joints(model: Model) -> bool:
+    """Whether a joint has no drive, so that no balance of effort sees what acts there."""
+    driven = {joint for name in model.actuators for joint in model.joints_of_actuator(name)}
+    return not driven.issuperset(set(model.joints) - set(model.added_joints))
+
+
+def observed_gaps(ranking: Ranking, balanced: Sequence[str]) -> dict[str, ChannelGap]:
+    """Errors of an observer on unseen records, of channels of joints that a balance of effort does not see."""
+    joints = set(ranking.recalibrated.joints) - set(balanced)
+    return {
+        f"{channel} ({OBSERVED})": ChannelGap(
+            gap.before, gap.recalibrated, gap.after, gap.noise, gap.unit, gap.signal, OBSERVED
+        )
+        for channel, gap in ranking.gaps.items()
+        if channel.rpartition(".")[0] in joints
+    }
 
 
 def searched(

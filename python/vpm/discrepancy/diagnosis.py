@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+#: Mode of a gap that an observer leaves.
+OBSERVED = "observed"
 VERDICTS = ("effect_found", "parameters_only", "no_disagreement", "unexplained")
 
 
@@ -181,7 +183,7 @@ class ChannelGap(Storable):
     signal : float
         Root mean square of the measured signal; the gaps over it are the relative errors.
     mode : str
-        Mode of comparison.
+        Mode of comparison; `OBSERVED` where an observer kept the model on the record.
     """
 
     before: float

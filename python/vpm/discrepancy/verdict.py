@@ -9,8 +9,9 @@ from scipy.special import ndtri
 
 from vpm.discrepancy.apart import FLOOR_FACTOR, MOSTLY_OPEN, Joints
 from vpm.discrepancy.beliefs import driven_away
+from vpm.discrepancy.candidates import joint_at
 from vpm.discrepancy.confirmation import Data, Judged
-from vpm.discrepancy.diagnosis import ChannelGap
+from vpm.discrepancy.diagnosis import OBSERVED, ChannelGap
 from vpm.discrepancy.refusal import FALSE_ALARM_LEVEL, LEAST_GAIN, MOST_OF_IT, NEGLIGIBLE
 from vpm.discrepancy.remainder import Remainder
 from vpm.discrepancy.search import Search
@@ -66,11 +67,13 @@ def verdict(
         None where nothing was found and what is left is negligible.
     """
     main = main_gaps(gap)
-    above, small = _above(main), is_negligible(gap)
+    beside = [g for g in gap.values() if g.mode == OBSERVED]
+    still = [g for g in beside if not _is_nothing(g) and _above([g]) > FLOOR_FACTOR]
+    above, small = _above(main + still), is_negligible(gap)
     # A channel far above its noise that is nothing beside its signal says nothing of one that is not.
     structured = left.present and _above([g for g in main if not _is_nothing(g)]) > FLOOR_FACTOR
-    remaining = structured or (rest is not None and rest.repeats and not small)
-    worst = max(main, key=_clear_of_noise)
+    remaining = structured or (rest is not None and rest.repeats and not small) or bool(still)
+    worst = max(beside if beside and _is_unseen(found, data) else main + beside, key=_clear_of_noise)
     numbers = f"{_percent(worst.before, worst)} before, {_percent(worst.recalibrated, worst)} recalibrated"
     names = ", then ".join(e.trial.probe.candidate.label for e in found.accepted)
     share_left = (worst.after / worst.recalibrated) ** 2 if worst.recalibrated > 0.0 else 0.0
@@ -109,7 +112,14 @@ def verdict(
             f"explains it. Error on unseen data: {numbers}.",
             True,
         )
-    return (*_nothing_missing(data, nominal, recalibrated, main, numbers), False)
+    return (*_nothing_missing(data, nominal, recalibrated, (main, beside), numbers), False)
+
+
+def _is_unseen(found: Search, data: Data) -> bool:
+    """Whether all that was named acts at joints that a balance does not see."""
+    model, sites = found.final.model, [entry.key[1] for entry in found.accepted]
+    at = {model.joint_of_body(site) if site in model.bodies else joint_at(model, site) for site in sites}
+    return bool(at) and not at & {*data.training.joints, ""}
 
 
 def _clear_of_noise(gap: ChannelGap) -> float:
@@ -148,17 +158,30 @@ def _told_by_runs(found: Search) -> bool:
 
 
 def _nothing_missing(
-    data: Data, nominal: Judged, recalibrated: Judged, main: list[ChannelGap], numbers: str
+    data: Data,
+    nominal: Judged,
+    recalibrated: Judged,
+    told: tuple[list[ChannelGap], list[ChannelGap]],
+    numbers: str,
 ) -> tuple[str, str]:
-    agrees = max((g.before / g.noise_floor if g.noise_floor > 0.0 else np.inf) for g in main) <= FLOOR_FACTOR
-    agrees = agrees or max(g.before / g.signal if g.signal > 0.0 else 0.0 for g in main) <= NEGLIGIBLE
+    """Of gaps of the balance, and of an observer of joints that it does not see."""
+    main, beside = told
+    small = max(g.before / g.signal if g.signal > 0.0 else 0.0 for g in main) <= NEGLIGIBLE
+    agrees = small or max((g.before / g.noise_floor if g.noise_floor > 0.0 else np.inf) for g in main) <= FLOOR_FACTOR
     better = gain(nominal.unseen, recalibrated.unseen, segments(data.unseen))
-    if not agrees and better.relative > LEAST_GAIN and better.score > float(ndtri(1.0 - FALSE_ALARM_LEVEL)):
+    balanced = not agrees and better.relative > LEAST_GAIN and better.score > float(ndtri(1.0 - FALSE_ALARM_LEVEL))
+    if balanced or any(_was_closed(g) for g in beside):
         return (
             "parameters_only",
             f"Nothing is missing: other values of the known parameters close the gap. Error on unseen data: {numbers}.",
         )
     return "no_disagreement", f"The nominal model agrees with the data. Error on unseen data: {numbers}."
+
+
+def _was_closed(gap: ChannelGap) -> bool:
+    """Whether other values of the known parameters have closed a gap that was there."""
+    was_there = gap.before > FLOOR_FACTOR * gap.noise_floor and gap.before > NEGLIGIBLE * gap.signal
+    return was_there and gap.recalibrated < gap.before * np.sqrt(1.0 - LEAST_GAIN)
 
 
 def _percent(value: float, gap: ChannelGap) -> str:

@@ -70,6 +70,9 @@ def effect_problems(document: Document, structure: Structure) -> Iterator[Proble
                 repair = f"the seals of {entry.at} rub at the joint that it moves; {repair}"
             rest = f'is "{entry.at}", which is no {effect.site} of the model; {effect.name} sits at one, {repair}'
             yield Problem(place(*keys, "at"), rest)
+        elif effect.takes_effort and all(drive.joint != entry.at for drive in document.actuators.values()):
+            rest = f'is "{entry.at}", on which no actuator acts itself, so that {effect.name} does nothing there'
+            yield Problem(place(*keys, "at"), f"{rest}; name a joint with an actuator, or leave the effect out")
         if entry.side == "link" and not effect.has_sides:
             yield Problem(place(*keys, "side"), f'is "link", but a {effect.title} has no sides; leave the key out')
         earlier = seen.setdefault((entry.type, entry.owner), position)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from vpm.discrepancy.candidates import Key
-from vpm.ranking.fit import Fitted, Fitter, View
+from vpm.ranking.fit import ASTRAY, Fitted, Fitter, View
 from vpm.ranking.look import same_curve
 from vpm.ranking.noise_model import NoiseModel, fitted_noise
 from vpm.ranking.posterior import apart, probabilities
@@ -25,11 +26,10 @@ def weighed(counting: Sequence[Trial], fitter: Fitter) -> list[Trial]:
     """
     several, richer = _rivals(counting, fitter.settings)
     noise = fitted_noise(several[0].fitted.residual, fitter.observed.parts, fitter.settings.order)
-    fits = [likely(trial.fitted, fitter, noise) for trial in several]
-    without = fitter.evidence(likely(several[0].look.fitted, fitter, noise), noise)
-    gains = [fitter.evidence(fit, noise) - without for fit in fits]
-    told = [replace(trial, evidence=gain) for trial, gain in zip(several, gains, strict=True)]
-    *shares, _ = probabilities(gains, fitter.settings.tempering)
+    told, fits = _with_evidence(several, fitter, noise)
+    if not told:
+        return [replace(several[0], evidence=-np.inf), *several[1:], *richer]
+    *shares, _ = probabilities([one.evidence for one in told], fitter.settings.tempering)
     same = [told[place] for place in _most_probable(shares, fits, fitter, noise)]
     probable = [told[place] for place in _credible(shares, fitter.settings.sure)]
     best = min(same, key=lambda trial: trial.order)
@@ -74,6 +74,21 @@ def likely(fitted: Fitted, fitter: Fitter, noise: NoiseModel) -> Fitted:
     """At the values that are most likely under the noise, about which evidence is told; others leave least power."""
     cost = fitter.cost(fitted.structure, fitted.residual, noise)
     return fitter.finished(replace(fitted, cost=cost), View(noise))
+
+
+def _with_evidence(several: Sequence[Trial], fitter: Fitter, noise: NoiseModel) -> tuple[list[Trial], list[Fitted]]:
+    """Trials with the evidence that each adds to what there is without it, and where they are most likely.
+
+    Those that run away from the records on the way there are left out.
+    """
+    without = fitter.evidence(likely(several[0].look.fitted, fitter, noise), noise)
+    told, fits = [], []
+    for trial in several:
+        with contextlib.suppress(*ASTRAY):
+            fit = likely(trial.fitted, fitter, noise)
+            told.append(replace(trial, evidence=fitter.evidence(fit, noise) - without))
+            fits.append(fit)
+    return told, fits
 
 
 def _credible(shares: Sequence[float], sure: float) -> list[int]:

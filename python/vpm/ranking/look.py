@@ -15,7 +15,7 @@ from vpm.discrepancy.candidates import Key
 from vpm.model import Effect
 from vpm.ranking.fit import ASTRAY, Fitted, Fitter, Followed, View, bounded_step
 from vpm.ranking.judgement import Judgement
-from vpm.ranking.noise_model import white_noise
+from vpm.ranking.noise_model import above_noise
 from vpm.ranking.structure import Structure
 
 Array = NDArray[np.float64]
@@ -41,15 +41,14 @@ class Look:
 
     def __init__(self, fitted: Fitted, fitter: Fitter, first: Look | None = None) -> None:
         observed, self._fitter, self.settings = fitter.observed, fitter, fitter.settings
-        noise = white_noise(fitted.residual, observed.parts)
+        noise = above_noise(fitted.residual, observed.parts)
         self.coarse = self._followed(fitted)
         slopes = noise.whitened(self.coarse.jacobian, observed.parts).T
         self.view = View(noise, dict(zip(self.coarse.names, slopes, strict=True)))
         cost = fitter.cost(fitted.structure, fitted.residual, noise)
         self.fitted = replace(fitted, cost=cost)
-        self.sizes = np.array(noise.deviations)
-        self.left = observed.squares(fitted.residual, self.sizes)
-        self.added = np.zeros(len(self.sizes)) if first is None else self._added(first.fitted.residual)
+        self.left = self._squares(fitted.residual)
+        self.added = np.zeros(len(noise.tails)) if first is None else self._added(first.fitted.residual)
         approximate = [one for one in fitted.structure.model.effects if not one.type.exact]
         self.explained = np.maximum(self._explained(approximate), self.added)
         self._curves: dict[tuple[str, ...], Array] = {}
@@ -64,7 +63,8 @@ class Look:
     def predicted_gain(self, other: Followed) -> float:
         """What another structure gains by a step of a fit, or as it stands, with few steps of the integrator, nats.
 
-        None where it does most in a channel in which no effect could count any more.
+        None where it does most in a channel in which no effect could count any more, or where so little would hardly
+        show in white noise.
         """
         return self._gain(self._after_a_step(other.structure, *self.view.errors(other, self._fitter.observed.parts)))
 
@@ -85,9 +85,11 @@ class Look:
 
     def _gain(self, left: Array) -> float:
         noise, alone = self.view.noise, self._alone
-        powers = (np.sum(noise.by_channel(errors) ** 2, axis=1) for errors in (left, alone))
-        place = int(np.argmin(np.divide(*powers)))
-        return noise.cost(alone) - noise.cost(left) if self._rooms()[place] else 0.0
+        before, after = (np.sum(noise.by_channel(errors) ** 2, axis=1) for errors in (alone, left))
+        place = int(np.argmin(_ratio([before[None]], [after[None]])))
+        above = 0.5 * float(np.sum((before - after) * (1.0 / np.maximum(noise.floors, 1e-12)) ** 2))
+        shows = above >= self.settings.odds / self.settings.patience and self._rooms()[place]
+        return noise.cost(alone) - noise.cost(left) if shows else 0.0
 
     @cached_property
     def _errors(self) -> tuple[Array, Array]:
@@ -111,7 +113,7 @@ class Look:
     @property
     def follows(self) -> bool:
         """Whether it leaves less of the records than a machine at rest would, in the mean of the channels."""
-        still = self._fitter.observed.squares(self._fitter.observed.motion, self.sizes)
+        still = self._squares(self._fitter.observed.motion)
         return float(np.sum(np.log(_ratio(still, self.left)))) < 0.0
 
     @property
@@ -124,7 +126,7 @@ class Look:
         """Whether any effect could still count, or could if another structure had removed before what it does."""
         if beside is None:
             return any(self._rooms())
-        return any(self._rooms(_ratio(self.left, self._fitter.observed.squares(beside.residual, self.sizes))))
+        return any(self._rooms(_ratio(self.left, self._squares(beside.residual))))
 
     def _rooms(self, left: Array | float = 1.0) -> list[bool]:
         """Whether effects could count that do most in each of the channels, of which so much is left."""
@@ -138,8 +140,7 @@ class Look:
         Nobody knows how exact a model can be in each channel. So the errors of all have scales of their own, of which
         each is the most likely one, and shares of error power that are left multiply.
         """
-        observed = self._fitter.observed
-        left = observed.squares(fitted.residual, self.sizes)
+        left = self._squares(fitted.residual)
         shares = [1.0 - float(np.prod(_ratio([b], [a]))) for b, a in zip(self.left, left, strict=True)]
         ratio = _ratio(self.left, left)
         removed, place = max(1.0 - float(np.prod(ratio)), 1e-12), int(np.argmin(ratio))
@@ -185,12 +186,14 @@ class Look:
                 bare = self.coarse.structure.bare(effects)
                 left = self._fitter.followed(bare, self.fitted.observer.coarse, ()).residual
                 return np.minimum(self._beside(left), self._beside(self._fitter.observed.motion))
-        return np.zeros(len(self.sizes))
+        return np.zeros(len(self.view.noise.tails))
 
     def _beside(self, residual: Array) -> Array:
         """By how many times what is left of each channel the power of another residual is more (m,)."""
-        squares = self._fitter.observed.squares(residual, self.sizes)
-        return np.maximum(1.0 / _ratio(squares, self.left) - 1.0, 0.0)
+        return np.maximum(1.0 / _ratio(self._squares(residual), self.left) - 1.0, 0.0)
+
+    def _squares(self, residual: Array) -> tuple[Array, Array]:
+        return self._fitter.observed.squares(residual, self.view.noise)
 
 
 def same_curve(one: Key, other: Key) -> bool:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.fft import dct, idct
 from scipy.linalg import solve_toeplitz
 from scipy.special import gammaln
 
@@ -25,6 +26,8 @@ SAME = 1e-7
 FLOOR = 1e-9
 #: Bands in an octave of the spectrum, and fewest lines of a band.
 PER_OCTAVE, LINES = 3, 12
+#: Standard errors of the level of a band by which noise may be stronger than it.
+SURE = 3.0
 
 
 @dataclass(frozen=True)
@@ -50,13 +53,10 @@ class Colour:
         """That of a signal in pieces (n,)."""
         places = np.concatenate([np.fft.rfftfreq(len(piece)) for piece in pieces])
         powers = np.concatenate([np.abs(np.fft.rfft(piece)) ** 2 / len(piece) for piece in pieces])
-        order = np.argsort(places, kind="stable")
-        places, powers = places[order], powers[order]
-        begins = _begins(places)
-        bands = np.split(powers, begins)
+        edges, bands = _banded(places, powers)
         sizes = np.sqrt(np.maximum([np.mean(band) for band in bands], FLOOR * np.mean(powers) + 1e-300))
         mean = np.average(np.log(sizes), weights=[len(band) for band in bands])
-        return cls(places[begins], sizes / np.exp(mean))
+        return cls(edges, sizes / np.exp(mean))
 
     def removed(self, piece: Array) -> Array:
         """A piece of a signal (n,), or of derivatives of it (n, k), with all frequencies in one size."""
@@ -79,6 +79,62 @@ def _begins(places: Array) -> list[int]:
 
 
 @dataclass(frozen=True)
+class Structured:
+    """The part of a signal that stands out of white noise: what a sensor adds is not what a model lacks.
+
+    Law: N. Wiener, *Extrapolation, Interpolation, and Smoothing of Stationary Time Series*, MIT Press 1949, the filter
+    that leaves least of noise and takes least of a signal. The quietest band of the spectrum says how strong that is.
+    The lines are those of a cosine transform, which mirrors a piece at its ends: no jump there leaks into others.
+
+    Attributes
+    ----------
+    edges : ndarray, shape (b - 1,)
+        Where the next band begins, cycles per sample.
+    kept : ndarray, shape (b,)
+        Share of the amplitude that is kept in each band.
+    noise : float
+        Root mean square of the noise.
+    """
+
+    edges: Array
+    kept: Array
+    noise: float
+
+    @classmethod
+    def of(cls, pieces: Sequence[Array]) -> Structured:
+        """That of a signal in pieces (n,)."""
+        places = np.concatenate([_places(len(piece)) for piece in pieces])
+        powers = np.concatenate([dct(piece, norm="ortho") ** 2 for piece in pieces])
+        edges, bands = _banded(places, powers)
+        levels = np.array([np.mean(band) for band in bands])
+        errors = np.array([np.sqrt(2.0 / len(band)) for band in bands])
+        power = float(np.min(levels * (1.0 + SURE * errors)))
+        return cls(edges, np.maximum(1.0 - power / np.maximum(levels, 1e-300), 0.0), float(np.sqrt(power)))
+
+    def removed(self, piece: Array) -> Array:
+        """A piece of a signal (n,), or of derivatives of it (n, k), without the noise."""
+        lines = dct(piece, axis=0, norm="ortho")
+        return np.asarray(idct((lines.T * self._kept_of(len(piece))).T, axis=0, norm="ortho"))
+
+    def _kept_of(self, count: int) -> Array:
+        """Share of the amplitude of each line of a piece."""
+        return self.kept[np.searchsorted(self.edges, _places(count), side="right")]
+
+
+def _places(count: int) -> Array:
+    """Frequencies of the lines of a cosine transform, cycles per sample."""
+    return np.arange(count) / (2.0 * count)
+
+
+def _banded(places: Array, powers: Array) -> tuple[Array, list[Array]]:
+    """Where bands of frequencies begin, but for the first, and the lines of each."""
+    order = np.argsort(places, kind="stable")
+    places = places[order]
+    begins = _begins(places)
+    return places[begins], np.split(powers[order], begins)
+
+
+@dataclass(frozen=True)
 class NoiseModel:
     """How the residual of each channel follows from its own past.
 
@@ -93,12 +149,15 @@ class NoiseModel:
     tails : tuple of float
         Degrees of freedom of their density, Student's: impacts and stiction leave errors that are no bell (K. Lange,
         R. Little and J. Taylor, *J. American Statistical Association* 84, 1989).
+    floors : tuple of float
+        White noise out of which the errors stand, in their scales; empty where they hold it.
     """
 
     filters: tuple[Array, ...]
-    colours: tuple[Colour, ...]
+    colours: tuple[Colour | Structured, ...]
     deviations: tuple[float, ...]
     tails: tuple[float, ...]
+    floors: tuple[float, ...] = ()
 
     def whitened(self, values: Array, parts: Parts) -> Array:
         """Prediction errors of residuals (N, m), or of their derivatives (N, m, k), channel after channel.
@@ -188,13 +247,14 @@ def _weights(errors: Array, freedom: Array) -> Array:
     return np.where(normal, 1.0, weights) if np.any(normal) else weights
 
 
-def white_noise(residual: Array, parts: Parts) -> NoiseModel:
-    """Channels as they are, in their root mean squares."""
+def above_noise(residual: Array, parts: Parts) -> NoiseModel:
+    """What stands out of the white noise of each channel, in its root mean square."""
     one = np.ones(1)
-    sizes = [_deviation(_joined(residual[:, place], parts, one, Colour())) for place in range(residual.shape[1])]
-    return NoiseModel(
-        tuple(one for _ in sizes), tuple(Colour() for _ in sizes), tuple(sizes), tuple(np.inf for _ in sizes)
-    )
+    channels = residual.T
+    filters = [Structured.of([channel[part] for part in parts]) for channel in channels]
+    sizes = [_deviation(_joined(c, parts, one, f)) for c, f in zip(channels, filters, strict=True)]
+    floors = tuple(f.noise / size for f, size in zip(filters, sizes, strict=True))
+    return NoiseModel((one,) * len(sizes), tuple(filters), tuple(sizes), (np.inf,) * len(sizes), floors)
 
 
 def fitted_noise(residual: Array, parts: Parts, order: int) -> NoiseModel:
@@ -227,7 +287,7 @@ def _bell(errors: Array) -> tuple[float, float]:
     return best[1], best[2]
 
 
-def _joined(values: Array, parts: Parts, taps: Array, colour: Colour) -> Array:
+def _joined(values: Array, parts: Parts, taps: Array, colour: Colour | Structured) -> Array:
     """Prediction errors of all parts, one after the other, without their colour."""
     return np.concatenate([colour.removed(piece) for piece in _filtered(values, parts, taps)])
 

@@ -17,7 +17,7 @@ from vpm.initial import initial_state
 from vpm.model import Model
 from vpm.observer import Record
 from vpm.ranking.firsts import STEP, Firsts, hidden_states
-from vpm.ranking.noise_model import Parts
+from vpm.ranking.noise_model import NoiseModel, Parts
 from vpm.ranking.settings import Settings
 from vpm.simulate import Setup
 
@@ -148,12 +148,10 @@ class Observed:
             slopes.append(whole)
         return np.concatenate(residuals), np.concatenate(slopes)
 
-    def squares(self, residual: Array, sizes: Array) -> tuple[Array, Array]:
-        """Squares of a residual (N, m) in these sizes of the channels (m,): of fitted and of held-back samples."""
-        power = (residual / sizes) ** 2
-        parts = (self.parts, self.held_back)
-        fitted, held = (np.concatenate([power[part] for part in several]) for several in parts)
-        return fitted, held
+    def squares(self, residual: Array, noise: NoiseModel) -> tuple[Array, Array]:
+        """Squares of a residual (N, m) as a noise model sees it: of fitted (n, m) and of held-back samples."""
+        fitted, held = (noise.by_channel(noise.whitened(residual, part)) ** 2 for part in (self.parts, self.held_back))
+        return fitted.T, held.T
 
     def _steps(self, model: Model, observer: Observer, record: Record) -> int:
         """Steps of the integrator within a sample."""
@@ -197,7 +195,7 @@ class Observed:
             np.tile(gain.ravel(), (len(record.time), 1)),
             record.dt,
             self.setup.substeps * self._steps(model, observer, record),
-            self.setup.method(model),
+            self.setup.method(model, drawn=True),
             list(columns),
             self.setup.course,
         )

@@ -67,17 +67,22 @@ class Gap(Storable):
     before, recalibrated, after : float
         Of the model as it was, with fitted parameters, and with what was found, in ``unit``; NaN where it runs away.
     unit : str
+    left : float
+        Share of the error power above the noise that the recalibrated model leaves and that is still there with what
+        was found; NaN if not known.
+    noise : float
+        What noise alone leaves, as far as it is white; NaN if not known.
+    signal : float
+        Root mean square of the channel about its mean.
     """
 
     before: float
     recalibrated: float
     after: float
     unit: str
-
-    @property
-    def left(self) -> float:
-        """Share of the error power of the recalibrated model that is left with what was found; NaN if not known."""
-        return (self.after / self.recalibrated) ** 2 if self.recalibrated > 0.0 else float("nan")
+    left: float
+    noise: float
+    signal: float
 
 
 @dataclass(frozen=True, repr=False, eq=False)

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from vpm.model import Model
 from vpm.ranking.fit import ASTRAY
+from vpm.ranking.noise_model import Parts, Structured
 from vpm.ranking.observed import Observed, Observer
 from vpm.ranking.result import Gap
 
@@ -25,20 +26,38 @@ def gaps(held_out: Observed, stages: tuple[Model, Model, Model], band: float) ->
     """
     if not held_out.records:
         return {}
-    left = np.transpose([_left(held_out, model, band) for model in stages])
-    units = map(stages[0].channel_unit, held_out.records[0].channels)
+    parts = [slice(part.start, held.stop) for part, held in zip(held_out.parts, held_out.held_back, strict=True)]
+    before, recalibrated, after = (_left(held_out, model, band) for model in stages)
+    signals = (before, recalibrated, after, held_out.motion)
+    levels = np.array([np.sqrt(np.mean(np.concatenate([one[part] for part in parts]) ** 2, axis=0)) for one in signals])
+    shares, noise = _above_noise(recalibrated, after, parts)
+    names = held_out.records[0].channels
+    units = map(stages[0].channel_unit, names)
     return {
-        channel: Gap(float(before), float(recalibrated), float(after), unit)
-        for channel, unit, (before, recalibrated, after) in zip(held_out.records[0].channels, units, left, strict=True)
+        name: Gap(float(level[0]), float(level[1]), float(level[2]), unit, float(share), float(floor), float(level[3]))
+        for name, unit, level, share, floor in zip(names, units, levels.T, shares, noise, strict=True)
     }
 
 
 def _left(observed: Observed, model: Model, band: float) -> Array:
-    """Root mean square of what is left of each channel (m,); NaN where the model runs away."""
+    """What is left of each channel (N, m); NaN where the model runs away."""
     try:
         residual, _ = observed.follow(model, model.theta, Observer(band))
     except ASTRAY:
-        return np.full(len(observed.records[0].channels), np.nan)
-    told = np.concatenate([residual[part] for part in (*observed.parts, *observed.held_back)])
-    level: Array = np.sqrt(np.mean(told**2, axis=0))
-    return level
+        return np.full_like(observed.motion, np.nan)
+    return residual
+
+
+def _above_noise(before: Array, after: Array, parts: Parts) -> tuple[Array, Array]:
+    """Share of the power above the noise of each channel (m,) that is left of it, and the noise; NaN if not known."""
+    if not np.all(np.isfinite(before)):
+        unknown = np.full(before.shape[1], np.nan)
+        return unknown, unknown
+    filters = [Structured.of([channel[part] for part in parts]) for channel in before.T]
+
+    def power(one: Structured, channel: Array) -> float:
+        return sum(float(np.sum(one.removed(channel[part]) ** 2)) for part in parts)
+
+    pairs = [(power(one, b), power(one, a)) for one, b, a in zip(filters, before.T, after.T, strict=True)]
+    shares = [left / whole if whole > 0.0 else np.nan for whole, left in pairs]
+    return np.array(shares), np.array([one.noise for one in filters])

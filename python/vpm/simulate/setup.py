@@ -76,7 +76,7 @@ class Setup(Storable):
         """What commands do between samples, as the core names it."""
         return HOLDS[0] if self.hold == AUTOMATIC else self.hold
 
-    def method(self, model: Model, *, bounded: bool = False, guided: bool = False) -> str:
+    def method(self, model: Model, *, bounded: bool = False, guided: bool = False, drawn: bool = False) -> str:
         """Integrator for a model, as the core names it.
 
         Parameters
@@ -86,10 +86,13 @@ class Setup(Storable):
             Where ``auto`` would step adaptively, take ``guarded``, whose time has a bound.
         guided : bool
             Whether the joints follow a measured motion, so that no step has their equations to solve.
+        drawn : bool
+            Whether an observer draws the model back at every sample, so that errors of steps cannot add up: then steps
+            of one length do where ``auto`` would step adaptively.
         """
         if self.integrator != AUTOMATIC:
             return self.integrator
-        if model.is_abrupt:
+        if model.is_abrupt and not drawn:
             return "guarded" if bounded else "adaptive"
         return "additive" if model.is_linearly_stiff and not guided else "linearly_implicit"
 
