@@ -451,3 +451,13 @@ def test_a_place_is_moved_as_it_is_where_nothing_pulls() -> None:
     structure = Structure(model, model.theta.copy(), dict.fromkeys(names, prior))
     assert structure.leaning == []
     assert list(structure.moved(np.array([3.0, 0.5])).values.values()) == pytest.approx([3.0, 0.6])
+
+
+@pytest.mark.parametrize("band", [1.0, 10.0])
+def test_a_machine_that_is_too_heavy_is_drawn_along_by_the_observer_alone(band: float) -> None:
+    model = Model.from_toml(SLEDGE).with_parameters({"sledge.mass": 1e9})
+    observed = Observed(model, records(), Settings())
+    left, _ = observed.follow(model, model.theta, Observer(band))
+    drawn = observed.drawn(band)
+    for part in observed.parts[2::3]:  # by then the first rate, which an encoder does not tell, is forgotten
+        assert drawn[part] == pytest.approx(left[part], abs=1e-4 * float(np.std(left[part])))

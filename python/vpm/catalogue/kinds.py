@@ -196,6 +196,11 @@ class EffectType:
         return self.site == "joint" and not self.motor_side_alone
 
     @property
+    def adds_inertia(self) -> bool:
+        """Whether a mass or an inertia is among its parameters."""
+        return any(parameter.scale in {"mass", "inertia"} for parameter in self.parameters)
+
+    @property
     def signature(self) -> Signature:
         """Where it shows: the state that its picture is drawn over, and what is to be seen there."""
         return self.shows or signature_of(self.name)

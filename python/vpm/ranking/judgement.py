@@ -27,6 +27,9 @@ class Judgement(Storable):
         The same of those that were added before.
     shape : float
         The same of those that show over the same states at the same place: one curve with two shapes.
+    alone : float
+        Of an effect that adds inertia, the share of the error power that is left of what the observer leaves of masses
+        on which nothing acts: too heavy a machine is drawn along by the observer alone.
     """
 
     removed: float
@@ -35,6 +38,7 @@ class Judgement(Storable):
     size: float
     beside: float
     shape: float
+    alone: float = 0.0
 
     def counts(self, settings: Settings) -> bool:
         """Whether that is more than chance, and more than what laws are wrong by."""
@@ -60,6 +64,11 @@ class Judgement(Storable):
             return (
                 f"it does {_percent(self.shape)} of what effects over the same states do there, "
                 "and no law is as exact as that"
+            )
+        if self.alone >= 1.0 - settings.worth:
+            return (
+                f"it leaves {_percent(self.alone)} of the error power of a mass on which nothing acts: it makes the "
+                "machine too heavy for its forces"
             )
         return ""
 

@@ -146,8 +146,20 @@ class Look:
         removed, place = max(1.0 - float(np.prod(ratio)), 1e-12), int(np.argmin(ratio))
         there = max(1.0 - float(ratio[place]), 1e-12)
         curve = np.zeros(len(ratio)) if key is None else self._curve(key)
-        sizes = (float(np.sqrt(there / (power[place] + there))) for power in (self.explained, self.added, curve))
-        return Judgement(removed, min(shares), _repeated(self.left[1], left[1], self.settings.pieces), *sizes)
+        powers = (self.explained, self.added, curve)
+        size, beside, shape = (float(np.sqrt(there / (power[place] + there))) for power in powers)
+        score = _repeated(self.left[1], left[1], self.settings.pieces)
+        alone = 0.0 if key is None or not EFFECTS[key[0]].adds_inertia else float(np.prod(_ratio(self._drawn, left)))
+        return Judgement(removed, min(shares), score, size, beside, shape, alone)
+
+    @cached_property
+    def _drawn(self) -> tuple[Array, Array]:
+        """Of masses on which nothing acts; what is left now in channels that are no positions of joints."""
+        drawn = self._squares(self._fitter.observed.drawn(self.fitted.observer.band))
+        fitted, held = (
+            np.where(np.any(new > 0.0, axis=0), new, now) for new, now in zip(drawn, self.left, strict=True)
+        )
+        return fitted, held
 
     def _curve(self, key: Key) -> Array:
         """What those effects of the model remove that show over the same states at the same place as another one."""

@@ -10,6 +10,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 
 from vpm.errors import VpmError
 from vpm.experiment import Experiment
@@ -119,6 +120,21 @@ class Observed:
         """What a model that never moves leaves of the records (N, m): readings less their means."""
         return np.concatenate([record.readings - np.mean(record.readings, axis=0) for record in self.records])
 
+    def drawn(self, band: float) -> Array:
+        """What an observer leaves of masses on which nothing acts (N, m); zero of channels that are no positions.
+
+        Of a machine that is far too heavy it leaves the same, for no force of its model does anything any more.
+        """
+        left = np.zeros_like(self.motion)
+        for end, record in zip(np.cumsum([len(one.time) for one in self.records]), self.records, strict=True):
+            place, rate = _gains(band, record.dt)
+            poles = [1.0, place + record.dt * rate - 2.0, 1.0 - place]
+            for column, channel in enumerate(record.channels):
+                if is_position(self.model, channel):
+                    reading = record.readings[:, column] - record.readings[0, column]
+                    left[end - len(reading) : end, column] = lfilter([1.0, -2.0, 1.0], poles, reading)
+        return left
+
     def follow(
         self, model: Model, theta: Array, observer: Observer, columns: Sequence[int] = ()
     ) -> tuple[Array, Array]:
@@ -209,15 +225,26 @@ def observer_gain(model: Model, channels: Sequence[str], band: float, dt: float,
     a multiple of what it measures is corrected for it: else it would change the bandwidth, and pass for a better model.
     """
     gain = np.zeros((len(model.state_names), len(channels)))
-    coordinates, turn = model.coordinates, 2.0 * np.pi * band * dt
+    coordinates = model.coordinates
     for column, channel in enumerate(channels):
-        joint, _, quantity = channel.rpartition(".")
-        if quantity != "position" or joint not in coordinates:
+        if not is_position(model, channel):
             continue
-        place = coordinates.index(joint)
-        moved = np.array([-np.expm1(-2.0 * DAMPING * turn), turn**2 / dt]) / _factor(model, channel, theta)
+        place = coordinates.index(channel.rpartition(".")[0])
+        moved = np.array(_gains(band, dt)) / _factor(model, channel, theta)
         gain[[place, len(coordinates) + place], column] = moved
     return gain
+
+
+def is_position(model: Model, channel: str) -> bool:
+    """Whether a channel is the position of a joint, to which an observer draws the model."""
+    joint, _, quantity = channel.rpartition(".")
+    return quantity == "position" and joint in model.coordinates
+
+
+def _gains(band: float, dt: float) -> tuple[float, float]:
+    """By how much an error of a position moves it, and its rate."""
+    turn = 2.0 * np.pi * band * dt
+    return float(-np.expm1(-2.0 * DAMPING * turn)), turn**2 / dt
 
 
 def _factor(model: Model, channel: str, theta: Array) -> float:

@@ -83,7 +83,7 @@ class Search:
                 if best is None:
                     break
                 named[best.key] = rounds[-1][0]
-                looks = [self._look(best.fitted)]  # known, should the next fits be interrupted
+                was, looks = looks, [self._look(best.fitted)]  # known, should the next fits be interrupted
                 self.say(f"{best.label} removes {100.0 * best.judgement.removed:.3g} % of the error power")
                 looks = self._all_looks(looks[0])
                 for key in present:
@@ -91,6 +91,10 @@ class Search:
                     if several:
                         rounds.append(several)
                         named[several[0].key] = several[0]
+                if _is_worse(looks, was):
+                    self.say(f"{best.label} does not do the work of what it makes needless")
+                    looks = was
+                    break
                 if present:
                     looks = self._out_of_a_dead_end(best, looks)
         except KeyboardInterrupt:
@@ -312,3 +316,10 @@ class Search:
             probability,
             trial.rivals,
         )
+
+
+def _is_worse(now: Sequence[Look], before: Sequence[Look]) -> bool:
+    """Whether as many effects as before, or fewer, leave more of the records than those did, fitted and held back."""
+    fewer = len(now[0].fitted.structure.effects) <= len(before[0].fitted.structure.effects)
+    same = [look for look in before if look.fitted.observer == now[0].fitted.observer]
+    return fewer and any(now[0].judged(look.fitted).least > 0.0 for look in same)
