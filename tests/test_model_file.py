@@ -52,9 +52,12 @@ def inertias(draw: st.DrawFn) -> list[float]:
 
 
 @st.composite
-def effects(draw: st.DrawFn, sites: dict[str, list[str]], units: dict[tuple[str, str], dict[str, str]]) -> list[Any]:
-    """Effects of the catalogue at sites, none of them twice."""
+def effects(
+    draw: st.DrawFn, sites: dict[str, list[str]], units: dict[tuple[str, str], dict[str, str]], driven: list[str]
+) -> list[Any]:
+    """Effects of the catalogue at sites, none of them twice; those of an actuator's effort at joints that have one."""
     places = [(effect, at) for effect in EFFECTS.values() for at in sites.get(effect.site, [])]
+    places = [(effect, at) for effect, at in places if at in driven or not effect.takes_effort]
     chosen = draw(st.lists(st.sampled_from(places), max_size=5, unique_by=lambda place: (place[0].name, place[1])))
 
     def entry(effect: EffectType, at: str) -> dict[str, Any]:
@@ -140,7 +143,7 @@ def machines(draw: st.DrawFn) -> dict[str, Any]:
         "actuators": actuators,
         "sensors": sensors,
         "controllers": controllers,
-        "effects": draw(effects(sites, units)),
+        "effects": draw(effects(sites, units, driven)),
     }
     if draw(st.booleans()):
         column = draw(st.text(min_size=1, max_size=8))

@@ -17,7 +17,7 @@ from second_suite import laws, plant, slewer, sweeper
 from second_suite.blade import Blade
 from second_suite.cases import _log as log_of
 from second_suite.cases import _records as records_of
-from second_suite.cases import hidden_of, requests
+from second_suite.cases import hidden_of, make_case, requests
 from second_suite.entries import file
 from second_suite.laws import Numbers
 from second_suite.machine import Joint, Machine, columns_of
@@ -258,3 +258,16 @@ def test_all_kinds_of_cases_have_files_that_can_be_read(name: str) -> None:
     for far in (-3.0, 3.0):
         values = {key: value * float(np.exp(far * m.adjustable.get(key, 0.0))) for key, value in m.values.items()}
         assert Model.from_dict(file(m, values)).joints == ("slew",)
+
+
+@pytest.mark.parametrize("name", ["slewer", "sweeper"])
+def test_restarts_begin_with_the_blade_as_the_motion_has_bent_it(name: str) -> None:
+    """From the place of balance the strain would be off by half of it, and the hub by a tenth of its motion."""
+    case = make_case(name, "none", 0)
+    model = case.model()
+    for record in case.train[:2]:
+        run = vpm.simulate(model, record, "restarts")
+        rows = np.searchsorted(record.time, run.time)
+        for channel in {"slew.position", "root.strain"} & set(record.channels):
+            left = np.std(run[channel] - record[channel][rows])
+            assert left < (0.1 if channel == "root.strain" else 0.01) * np.std(record[channel])

@@ -30,8 +30,8 @@ def measured_states(
 ) -> Array:
     """States (len(rows), nx) at some samples of the measured motion.
 
-    Sensor errors are undone; flexible links are deflected as in equilibrium; lags and spools have followed the commands
-    from the beginning of the log, currents have settled on the held one, and chambers are without net force, unless the
+    Sensor errors are undone; flexible links bend as the measured motion of the joints has made them; lags and spools
+    have followed the commands from the beginning of the log, currents have settled on the held one, and chambers are without net force, unless the
     log holds what is inside of a drive. Effects remember what was since the first sample. Joints that effects have
     split off are where the measured motion of the others takes them. The motion of all joints may be ``given``.
     """
@@ -42,9 +42,10 @@ def measured_states(
     joints, coordinates = len(model.joints), len(model.coordinates)
     states[:, :joints] = (m.position[rows] - offset) / gain
     states[:, coordinates : coordinates + joints] = m.velocity[rows] / gain
+    if coordinates > joints:
+        bent = _bent(model, theta, ((m.position - offset) / gain, m.velocity / gain, m.acceleration / gain), m.dt)
+        states[:, : 2 * coordinates] = bent[rows]
     for state, row in zip(states, rows, strict=True):
-        if coordinates > joints:
-            state[:coordinates] = model.core.equilibrium(theta, state[:joints])[0]
         internal = _internal(model, experiment, theta, state[:coordinates], int(row))
         follow(model, theta, internal, m.inputs[row], state[coordinates : coordinates + joints])
         for place, name in enumerate(model.internal_names):
@@ -55,6 +56,19 @@ def measured_states(
     if memories:  # what the joints remember of their way until then
         states[:, -memories:] = model.core.memories(theta, (m.position - offset) / gain, m.dt)[rows]
     return states
+
+
+def _bent(model: Model, theta: Array, motion: tuple[Array, Array, Array], dt: float) -> Array:
+    """Coordinates and their rates (N, 2 coordinates) of a machine with flexible links along a motion of its joints."""
+    position, velocity, acceleration = motion
+    joints, coordinates = len(model.joints), len(model.coordinates)
+    _, states, _ = model.core.simulate_prescribed(
+        theta, position, velocity, acceleration, dt, 1, "linearly_implicit", [], []
+    )
+    bent = np.array(states[:, : 2 * coordinates])
+    bent[:, :joints] = position
+    bent[:, coordinates : coordinates + joints] = velocity
+    return bent
 
 
 def initial_state(model: Model, experiment: Experiment, theta: Array) -> Array:
