@@ -31,9 +31,10 @@ def measured_states(
     """States (len(rows), nx) at some samples of the measured motion.
 
     Sensor errors are undone; flexible links bend as the measured motion of the joints has made them; lags and spools
-    have followed the commands from the beginning of the log, currents have settled on the held one, and chambers are without net force, unless the
-    log holds what is inside of a drive. Effects remember what was since the first sample. Joints that effects have
-    split off are where the measured motion of the others takes them. The motion of all joints may be ``given``.
+    have followed the commands from the beginning of the log, currents have settled on the held one, and chambers are
+    without net force, unless the log holds what is inside of a drive. Effects remember what was since the first sample.
+    Joints that effects have split off are where the measured motion of the others takes them. The motion of all joints
+    may be ``given``.
     """
     m = given or whole_motion(model, experiment, theta, cutoff)
     gain, offset = sensor_errors(model, theta)
