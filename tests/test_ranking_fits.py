@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import lru_cache
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -24,6 +26,7 @@ from vpm.ranking.fit import Fitter, View, by_secant
 from vpm.ranking.look import Look
 from vpm.ranking.observed import Observed, Observer
 from vpm.ranking.proposals import Proposal, _seated, proposals
+from vpm.ranking.search import _is_worse
 from vpm.ranking.settings import Settings
 from vpm.ranking.sizes import Sizes
 from vpm.ranking.starts import started
@@ -461,3 +464,18 @@ def test_a_machine_that_is_too_heavy_is_drawn_along_by_the_observer_alone(band: 
     drawn = observed.drawn(band)
     for part in observed.parts[2::3]:  # by then the first rate, which an encoder does not tell, is forgotten
         assert drawn[part] == pytest.approx(left[part], abs=1e-4 * float(np.std(left[part])))
+
+
+def test_an_effect_that_makes_another_one_needless_has_to_do_its_work() -> None:
+    """One came in beside another, which went. The same number of effects as before leaves more, or it does not."""
+
+    def look(effects: int, band: float, left: float) -> Any:
+        fitted = SimpleNamespace(
+            structure=SimpleNamespace(effects=(None,) * effects), observer=Observer(band), left=left
+        )
+        return SimpleNamespace(fitted=fitted, judged=lambda other: SimpleNamespace(least=1.0 - other.left / left))
+
+    was = [look(2, 1.0, 1.0), look(2, 10.0, 1.0)]
+    assert _is_worse([look(2, 10.0, 1.4)], was)
+    assert not _is_worse([look(2, 10.0, 0.8)], was)
+    assert not _is_worse([look(3, 10.0, 1.4)], was)
