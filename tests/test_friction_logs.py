@@ -85,7 +85,7 @@ def test_a_diagnosis_names_dry_friction_then_hysteresis(diagnosis: Diagnosis) ->
 
 def test_the_model_of_the_diagnosis_predicts_motions_that_were_not_fitted(diagnosis: Diagnosis) -> None:
     for motion in UNSEEN:
-        assert error(diagnosis.model, motion) < 14.0  # 12.5 by a fit of the force; this one follows the positions, too
+        assert error(diagnosis.model, motion) < 13.5  # 12.5 by a fit of the force; this one follows the positions, too
 
 
 def fitted(*effects: str) -> Model:

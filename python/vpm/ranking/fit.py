@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
 from vpm.errors import VpmError
-from vpm.ranking.noise_model import NoiseModel, Parts, above_noise
+from vpm.ranking.noise_model import NoiseModel, Parts, white_noise
 from vpm.ranking.observed import Observed, Observer
 from vpm.ranking.posterior import log_volume
 from vpm.ranking.settings import Settings
@@ -176,7 +176,7 @@ class Fitter:
         return Followed(structure, observer, tuple(names), *self._pass(structure, observer, columns))
 
     def noise_of(self, structure: Structure, observer: Observer) -> NoiseModel:
-        """What stands out of the noise of each channel where a fit begins.
+        """Channels in the root mean squares of what the observer leaves where a fit begins.
 
         Raises
         ------
@@ -184,7 +184,7 @@ class Fitter:
             The structure runs away from the records.
         """
         residual, _ = self._pass(structure.at(structure.standard), observer, ())
-        return above_noise(residual, self.observed.parts)
+        return white_noise(residual, self.observed.parts)
 
     def log_density(self, fitted: Fitted, noise: NoiseModel) -> Array:
         """Logarithm of the density of each sample that is fitted (n,)."""

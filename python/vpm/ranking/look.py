@@ -15,7 +15,7 @@ from vpm.discrepancy.candidates import Key
 from vpm.model import Effect
 from vpm.ranking.fit import ASTRAY, Fitted, Fitter, Followed, View, bounded_step
 from vpm.ranking.judgement import Judgement
-from vpm.ranking.noise_model import above_noise
+from vpm.ranking.noise_model import white_noise
 from vpm.ranking.structure import Structure
 
 Array = NDArray[np.float64]
@@ -41,7 +41,7 @@ class Look:
 
     def __init__(self, fitted: Fitted, fitter: Fitter, first: Look | None = None) -> None:
         observed, self._fitter, self.settings = fitter.observed, fitter, fitter.settings
-        noise = above_noise(fitted.residual, observed.parts)
+        noise = white_noise(fitted.residual, observed.parts)
         self.coarse = self._followed(fitted)
         slopes = noise.whitened(self.coarse.jacobian, observed.parts).T
         self.view = View(noise, dict(zip(self.coarse.names, slopes, strict=True)))
@@ -63,8 +63,7 @@ class Look:
     def predicted_gain(self, other: Followed) -> float:
         """What another structure gains by a step of a fit, or as it stands, with few steps of the integrator, nats.
 
-        None where it does most in a channel in which no effect could count any more, or where so little would hardly
-        show in white noise.
+        None where it does most in a channel in which no effect could count any more.
         """
         return self._gain(self._after_a_step(other.structure, *self.view.errors(other, self._fitter.observed.parts)))
 
@@ -85,11 +84,9 @@ class Look:
 
     def _gain(self, left: Array) -> float:
         noise, alone = self.view.noise, self._alone
-        before, after = (np.sum(noise.by_channel(errors) ** 2, axis=1) for errors in (alone, left))
-        place = int(np.argmin(_ratio([before[None]], [after[None]])))
-        above = 0.5 * float(np.sum((before - after) * (1.0 / np.maximum(noise.floors, 1e-12)) ** 2))
-        shows = above >= self.settings.odds / self.settings.patience and self._rooms()[place]
-        return noise.cost(alone) - noise.cost(left) if shows else 0.0
+        powers = (np.sum(noise.by_channel(errors) ** 2, axis=1) for errors in (left, alone))
+        place = int(np.argmin(np.divide(*powers)))
+        return noise.cost(alone) - noise.cost(left) if self._rooms()[place] else 0.0
 
     @cached_property
     def _errors(self) -> tuple[Array, Array]:

@@ -26,7 +26,7 @@ SAME = 1e-7
 FLOOR = 1e-9
 #: Bands in an octave of the spectrum, and fewest lines of a band.
 PER_OCTAVE, LINES = 3, 12
-#: Standard errors of the level of a band by which noise may be stronger than it.
+#: Standard errors by which the level of a band may be higher than its lines say.
 SURE = 3.0
 
 
@@ -84,7 +84,8 @@ class Structured:
 
     Law: N. Wiener, *Extrapolation, Interpolation, and Smoothing of Stationary Time Series*, MIT Press 1949, the filter
     that leaves least of noise and takes least of a signal. The quietest band of the spectrum says how strong that is.
-    The lines are those of a cosine transform, which mirrors a piece at its ends: no jump there leaks into others.
+    Of a band with few lines little is known, so that it is kept: nothing may grow there unseen. The lines are those of
+    a cosine transform, which mirrors a piece at its ends: no jump there leaks into others.
 
     Attributes
     ----------
@@ -106,19 +107,14 @@ class Structured:
         places = np.concatenate([_places(len(piece)) for piece in pieces])
         powers = np.concatenate([dct(piece, norm="ortho") ** 2 for piece in pieces])
         edges, bands = _banded(places, powers)
-        levels = np.array([np.mean(band) for band in bands])
-        errors = np.array([np.sqrt(2.0 / len(band)) for band in bands])
-        power = float(np.min(levels * (1.0 + SURE * errors)))
-        return cls(edges, np.maximum(1.0 - power / np.maximum(levels, 1e-300), 0.0), float(np.sqrt(power)))
+        most = np.array([np.mean(band) * (1.0 + SURE * np.sqrt(2.0 / len(band))) for band in bands])
+        noise = max(float(np.min(most)), 1e-300)
+        return cls(edges, 1.0 - noise / np.maximum(most, noise), float(np.sqrt(noise)))
 
-    def removed(self, piece: Array) -> Array:
-        """A piece of a signal (n,), or of derivatives of it (n, k), without the noise."""
-        lines = dct(piece, axis=0, norm="ortho")
-        return np.asarray(idct((lines.T * self._kept_of(len(piece))).T, axis=0, norm="ortho"))
-
-    def _kept_of(self, count: int) -> Array:
-        """Share of the amplitude of each line of a piece."""
-        return self.kept[np.searchsorted(self.edges, _places(count), side="right")]
+    def part_of(self, piece: Array) -> Array:
+        """That part of a piece of a signal (n,)."""
+        kept = self.kept[np.searchsorted(self.edges, _places(len(piece)), side="right")]
+        return np.asarray(idct(dct(piece, norm="ortho") * kept, norm="ortho"))
 
 
 def _places(count: int) -> Array:
@@ -149,15 +145,12 @@ class NoiseModel:
     tails : tuple of float
         Degrees of freedom of their density, Student's: impacts and stiction leave errors that are no bell (K. Lange,
         R. Little and J. Taylor, *J. American Statistical Association* 84, 1989).
-    floors : tuple of float
-        White noise out of which the errors stand, in their scales; empty where they hold it.
     """
 
     filters: tuple[Array, ...]
-    colours: tuple[Colour | Structured, ...]
+    colours: tuple[Colour, ...]
     deviations: tuple[float, ...]
     tails: tuple[float, ...]
-    floors: tuple[float, ...] = ()
 
     def whitened(self, values: Array, parts: Parts) -> Array:
         """Prediction errors of residuals (N, m), or of their derivatives (N, m, k), channel after channel.
@@ -247,14 +240,13 @@ def _weights(errors: Array, freedom: Array) -> Array:
     return np.where(normal, 1.0, weights) if np.any(normal) else weights
 
 
-def above_noise(residual: Array, parts: Parts) -> NoiseModel:
-    """What stands out of the white noise of each channel, in its root mean square."""
+def white_noise(residual: Array, parts: Parts) -> NoiseModel:
+    """Channels as they are, in their root mean squares."""
     one = np.ones(1)
-    channels = residual.T
-    filters = [Structured.of([channel[part] for part in parts]) for channel in channels]
-    sizes = [_deviation(_joined(c, parts, one, f)) for c, f in zip(channels, filters, strict=True)]
-    floors = tuple(f.noise / size for f, size in zip(filters, sizes, strict=True))
-    return NoiseModel((one,) * len(sizes), tuple(filters), tuple(sizes), (np.inf,) * len(sizes), floors)
+    sizes = [_deviation(_joined(residual[:, place], parts, one, Colour())) for place in range(residual.shape[1])]
+    return NoiseModel(
+        tuple(one for _ in sizes), tuple(Colour() for _ in sizes), tuple(sizes), tuple(np.inf for _ in sizes)
+    )
 
 
 def fitted_noise(residual: Array, parts: Parts, order: int) -> NoiseModel:
@@ -287,7 +279,7 @@ def _bell(errors: Array) -> tuple[float, float]:
     return best[1], best[2]
 
 
-def _joined(values: Array, parts: Parts, taps: Array, colour: Colour | Structured) -> Array:
+def _joined(values: Array, parts: Parts, taps: Array, colour: Colour) -> Array:
     """Prediction errors of all parts, one after the other, without their colour."""
     return np.concatenate([colour.removed(piece) for piece in _filtered(values, parts, taps)])
 

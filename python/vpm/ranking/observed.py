@@ -10,7 +10,6 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 from vpm.errors import VpmError
 from vpm.experiment import Experiment
@@ -125,6 +124,8 @@ class Observed:
 
         Of a machine that is far too heavy it leaves the same, for no force of its model does anything any more.
         """
+        from scipy.signal import lfilter  # slow to import, and seldom needed
+
         left = np.zeros_like(self.motion)
         for end, record in zip(np.cumsum([len(one.time) for one in self.records]), self.records, strict=True):
             place, rate = _gains(band, record.dt)

@@ -56,7 +56,7 @@ def _above_noise(before: Array, after: Array, parts: Parts) -> tuple[Array, Arra
     filters = [Structured.of([channel[part] for part in parts]) for channel in before.T]
 
     def power(one: Structured, channel: Array) -> float:
-        return sum(float(np.sum(one.removed(channel[part]) ** 2)) for part in parts)
+        return sum(float(np.sum(one.part_of(channel[part]) ** 2)) for part in parts)
 
     pairs = [(power(one, b), power(one, a)) for one, b, a in zip(filters, before.T, after.T, strict=True)]
     shares = [left / whole if whole > 0.0 else np.nan for whole, left in pairs]
