@@ -17,8 +17,8 @@ from vpm.compare import compare
 from vpm.discrepancy.ambiguity import Rivals, listed, rivals
 from vpm.discrepancy.apart import only_where_closed
 from vpm.discrepancy.beliefs import moved_far
+from vpm.discrepancy.by_ranking import free_joints, observed_gaps, searched, why_not_ranked
 from vpm.discrepancy.by_ranking import notes as notes_of
-from vpm.discrepancy.by_ranking import observed_gaps, searched, why_not_ranked
 from vpm.discrepancy.candidates import slow_speeds
 from vpm.discrepancy.choice import Accepted
 from vpm.discrepancy.confirmation import Data, Judged, is_clear, judge
@@ -70,6 +70,8 @@ FOUND_HOLD = "commands run from sample to sample, as readings of a drive do; sim
 #: Which way the names came.
 RANKED = "names come from a ranking of the training records"
 SEARCHED = "names come from a search on balances of effort, for {reason}"
+#: Said where names come from a search.
+UNSEEN = "the joint {joint} has no drive, so that no balance of effort sees what acts there, and nothing is said of it"
 STOPPED_LATE = "stopped by Ctrl-C before what is left, and what else would do, was examined"
 #: Stated uncertainties, on a logarithmic scale, that a recalibration may move what the model is not linear in.
 REACH = 4.0
@@ -282,6 +284,7 @@ def _ranking(
         except (VpmError, ArithmeticError) as error:
             reason = f"a ranking fails: {error}"
     notes.append(SEARCHED.format(reason=reason))
+    notes.extend(UNSEEN.format(joint=joint) for joint in free_joints(model))
     return None
 
 

@@ -64,15 +64,12 @@ SETTINGS = Settings()
 def why_not_ranked(model: Model, experiments: Sequence[Experiment]) -> str:
     """Why names do not come from a ranking, or "": it covers up to three joints, rigid links, and drives without oil.
 
-    With oil it does so where a joint has no drive, for no balance of effort sees what acts there. Drives may not go by
-    samples of their own. A ranking does not read a deflection that a log holds.
+    Drives may not go by samples of their own either. A ranking does not read a deflection that a log holds.
     """
     if bends(model):
         return "links bend"
-    blind = has_free_joints(model)
     for name in model.actuators:
-        kind = model.actuator_type(name)
-        if kind in SAMPLED_TYPES or (kind == "hydraulic" and not blind):
+        if (kind := model.actuator_type(name)) in {"hydraulic", *SAMPLED_TYPES}:
             return f"the actuator {name} has type {kind}"
     own = set(model.joints) - set(model.added_joints)
     if len(own) > SETTINGS.joints:
@@ -81,10 +78,10 @@ def why_not_ranked(model: Model, experiments: Sequence[Experiment]) -> str:
     return f"records hold {held[0]}" if held else ""
 
 
-def has_free_joints(model: Model) -> bool:
-    """Whether a joint has no drive, so that no balance of effort sees what acts there."""
+def free_joints(model: Model) -> tuple[str, ...]:
+    """Joints without a drive, so that no balance of effort sees what acts there."""
     driven = {joint for name in model.actuators for joint in model.joints_of_actuator(name)}
-    return not driven.issuperset(set(model.joints) - set(model.added_joints))
+    return tuple(name for name in model.joints if name not in driven and name not in model.added_joints)
 
 
 def observed_gaps(ranking: Ranking, balanced: Sequence[str]) -> dict[str, ChannelGap]:
