@@ -70,9 +70,9 @@ FOUND_HOLD = "commands run from sample to sample, as readings of a drive do; sim
 #: Which way the names came.
 RANKED = "names come from a ranking of the training records"
 SEARCHED = "names come from a search on balances of effort, for {reason}"
+STOPPED_LATE = "stopped by Ctrl-C before what is left, and what else would do, was examined"
 #: Said where names come from a search.
 UNSEEN = "the joint {joint} has no drive, so that no balance of effort sees what acts there, and nothing is said of it"
-STOPPED_LATE = "stopped by Ctrl-C before what is left, and what else would do, was examined"
 #: Stated uncertainties, on a logarithmic scale, that a recalibration may move what the model is not linear in.
 REACH = 4.0
 

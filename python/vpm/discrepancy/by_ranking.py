@@ -80,8 +80,7 @@ def why_not_ranked(model: Model, experiments: Sequence[Experiment]) -> str:
 
 def free_joints(model: Model) -> tuple[str, ...]:
     """Joints without a drive, so that no balance of effort sees what acts there."""
-    driven = {joint for name in model.actuators for joint in model.joints_of_actuator(name)}
-    return tuple(name for name in model.joints if name not in driven and name not in model.added_joints)
+    return tuple(name for name in model.joints if name not in {*model.driven_joints, *model.added_joints})
 
 
 def observed_gaps(ranking: Ranking, balanced: Sequence[str]) -> dict[str, ChannelGap]:

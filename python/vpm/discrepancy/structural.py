@@ -67,8 +67,7 @@ def sites_worth_trying(effect: EffectType, model: Model) -> tuple[str, ...]:
     if effect.name == "structural_damping":
         return tuple(site for site in sites if model.levels[site] != "rigid")
     if effect.name in {"backlash", "joint_compliance"}:
-        driven = {joint for name in model.actuators for joint in model.joints_of_actuator(name)}
-        return tuple(site for site in sites if site in driven and not model.joint_behind(site))
+        return tuple(site for site in sites if site in model.driven_joints and not model.joint_behind(site))
     return sites
 
 

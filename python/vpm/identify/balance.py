@@ -85,7 +85,7 @@ class InverseDynamicsProblem:
         # The parallel filter passes over whole records: where one begins and ends at rest there is nothing to settle.
         self._whole = tuple(replace(m, edge=0) for m in self.motions)
         measured = self.motions[0].joints
-        moved = {joint for name in model.actuators for joint in model.joints_of_actuator(name)}
+        moved = model.driven_joints
         self._joints = [place for place, joint in enumerate(measured) if joint in moved] or list(range(len(measured)))
         self.joints = tuple(measured[place] for place in self._joints)
         #: Channels beside the balance that are compared too: what shows inside of drives, strains of links.

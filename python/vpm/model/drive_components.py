@@ -119,6 +119,12 @@ class DriveComponents:
         entry = self._checked.document.actuators[self._known(actuator, self.actuators, "actuator")]
         return entry.supply if entry.type == "hydraulic" else None
 
+    @cached_property
+    def driven_joints(self) -> tuple[str, ...]:
+        """Joints on which an actuator has an effect, see `joints_of_actuator`; a balance of effort sees no others."""
+        driven = {joint for name in self.actuators for joint in self.joints_of_actuator(name)}
+        return tuple(joint for joint in self._checked.structure.joints if joint in driven)
+
     def joints_of_actuator(self, actuator: str) -> tuple[str, ...]:
         """Joints on which an actuator has an effect: its own, or those that change the length of its line.
 
