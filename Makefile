@@ -8,7 +8,7 @@
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .SUFFIXES:
-.PHONY: help demo test test-rust test-python test-nightly reference validation lint lint-rust lint-python bench peers chirp narx-peers bench-counts c-library bench-diagnosis docs docs-rust figures package clean
+.PHONY: help demo test test-rust test-python test-nightly reference validation lint lint-rust lint-python bench peers chirp narx-peers bench-counts c-library bench-diagnosis bench-lisdd docs docs-rust figures package clean
 
 PYTHON ?= python3
 DEMO_OUT ?= demo-report
@@ -80,6 +80,9 @@ narx-peers: $(VENV)/.installed ## time a NARX model beside what is installed (C,
 
 bench-diagnosis: $(VENV)/.installed ## time whole diagnoses of an axis and of a flexible arm; writes into docs/performance.md
 	$(BIN)/python benches/diagnosis/diagnosis.py --write
+
+bench-lisdd: $(VENV)/.installed ## put the diagnosis beside LISDD, a baseline, on blind cases of an axis, for a quarter of an hour
+	OMP_NUM_THREADS=1 $(BIN)/python benches/diagnosis/side_by_side.py --seeds 9100-9102
 
 c-library: | $(VENV)/.tools-found ## build the C library: header, static and shared library in dist/c
 	cargo build --release --package vpm-c $(CARGO_ARGS)

@@ -32,7 +32,7 @@ BOOM = {
 #: Effects that put a joint behind the one they sit at, or say nothing about an effort at a coordinate and rate.
 ELSEWHERE = {
     *("empirical_force", "hysteresis", "joint_compliance", "rotor_inertia", "end_stop"),
-    *("load_dependent_friction", "lugre_friction", "warming_friction"),
+    *("current_ripple", "load_dependent_friction", "lugre_friction", "warming_friction"),
 }
 
 

@@ -20,7 +20,7 @@ def told(elbow: float) -> str:
     data: Any = SimpleNamespace(unseen=SimpleNamespace(blocks=(SimpleNamespace(samples=slice(0, 400)),)))
     nominal: Any = SimpleNamespace(unseen=3.0 * noise)
     recalibrated: Any = SimpleNamespace(unseen=noise)
-    found: Any = SimpleNamespace(accepted=(), left={})
+    found: Any = SimpleNamespace(accepted=(), left={}, within_laws=False)
     left: Any = SimpleNamespace(present=True)
     gap = {
         "strain": ChannelGap(3e-3, 2e-3, 2e-3, NOISE, "1", SIGNAL, "inverse_dynamics"),

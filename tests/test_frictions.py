@@ -21,6 +21,7 @@ VALUES: dict[str, dict[str, float]] = {
     "quadratic_drag": {"drag": 25.0},
     "cubic_spring": {"stiffness": 2e4, "rest": 0.01},
     "position_dependent_friction": {"period": 0.04, "cosine": 2.0, "sine": -3.0, "transition_velocity": 0.02},
+    "current_ripple": {"period": 0.03, "cosine": 0.2, "sine": -0.1},
     "load_dependent_friction": {"driving": 0.25, "driven": 0.15, "transition_velocity": 0.02},
     "lugre_friction": {
         "coulomb": 5.0,

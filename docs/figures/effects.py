@@ -44,6 +44,7 @@ SHOWN: Mapping[str, dict[str, float]] = {
     "quadratic_drag": {"drag": 0.15},
     "cubic_spring": {"stiffness": 0.8, "rest": 0.2},
     "position_dependent_friction": {"period": 1.1, "cosine": 0.2, "sine": 0.3, "transition_velocity": 0.02},
+    "current_ripple": {"period": 0.7, "cosine": 0.25, "sine": 0.1},
     "load_dependent_friction": {"driving": 0.15, "driven": 0.1, "transition_velocity": 0.02},
     "lugre_friction": {
         "coulomb": 0.4,

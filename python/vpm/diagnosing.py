@@ -510,6 +510,7 @@ def _accepted_effect(entry: Accepted, final: Judged) -> AcceptedEffect:
         (*notes, *(f"{'not told from it' if entry.ranked else ALIKE}: {rival}" for rival in entry.rivals)),
         entry.probability,
         entry.evidence,
+        entry.class_probability,
     )
 
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -33,24 +34,25 @@ def prove(
     workers: Annotated[int, typer.Option(help="Processes; 0 takes one for each core.")] = 0,
     limit: Annotated[float, typer.Option(help="Longest time of one diagnosis on its core, s.")] = 120.0,
     folder: Annotated[Path, typer.Option(help="Folder of a checkout that holds blind/.")] = Path("tests"),
+    answers: Annotated[Path | None, typer.Option(help="Tables of the answers in this file instead.")] = None,
+    calibrate: Annotated[
+        Path | None, typer.Option(help="Fit the numbers behind probabilities to the answers, and write them here.")
+    ] = None,
     out: Annotated[Path | None, typer.Option(help="Write the tables into this page, and every case beside it.")] = None,
 ) -> None:
     """Hide effects in machines that other code simulates, diagnose them blind, and count what was named."""
-    proving, table = _proving_ground(folder)
+    proving, table, reliability = _proving_ground(folder)
     if out is not None:
         page(out, "")
-    try:
-        todo = proving.jobs(machine or (), effect or (), numbers(seeds), noise or (1.0,), kind or proving.KINDS, each)
-    except ValueError as error:
-        raise DiagnosisError(str(error)) from None
-    console.print(f"{len(todo)} cases", markup=False)
-    found = []
-    for answer in proving.answers(todo, workers, limit, lambda line: errors.print(line, markup=False)):
-        found.append(answer)
-        if out is not None:
-            proving.save_json(found, out.with_suffix(".json"))
-    if len(found) < len(todo):
-        errors.print(f"interrupted: {len(found)} of {len(todo)} cases are done", markup=False)
+    if answers is not None:
+        found = proving.load_json(answers)
+    else:
+        try:
+            kinds = kind or proving.KINDS
+            todo = proving.jobs(machine or (), effect or (), numbers(seeds), noise or (1.0,), kinds, each)
+        except ValueError as error:
+            raise DiagnosisError(str(error)) from None
+        found = _asked(proving, todo, (workers, limit), out)
     found.sort(key=lambda a: (list(proving.KINDS).index(a.kind), a.machine, a.request, a.seed))
     text = table.tables(found)
     console.print(text, markup=False)
@@ -58,6 +60,22 @@ def prove(
         proving.save_json(found, out.with_suffix(".json"))
         out.write_text(page(out, text), encoding="utf-8")
         console.print(f"wrote {out} and {out.with_suffix('.json')}", markup=False)
+    if calibrate is not None:
+        fitted, told = reliability.report(found)
+        console.print(f"{told}\nwrote {fitted.save(calibrate)}", markup=False)
+
+
+def _asked(proving: ModuleType, todo: Sequence[Any], how: tuple[int, float], out: Path | None) -> list[Any]:
+    """Answers to cases, told and kept as they come."""
+    console.print(f"{len(todo)} cases", markup=False)
+    found = []
+    for answer in proving.answers(todo, *how, lambda line: errors.print(line, markup=False)):
+        found.append(answer)
+        if out is not None:
+            proving.save_json(found, out.with_suffix(".json"))
+    if len(found) < len(todo):
+        errors.print(f"interrupted: {len(found)} of {len(todo)} cases are done", markup=False)
+    return found
 
 
 def page(path: Path, text: str) -> str:
@@ -82,7 +100,7 @@ def numbers(text: str) -> tuple[int, ...]:
     return tuple(dict.fromkeys(found))
 
 
-def _proving_ground(folder: Path) -> tuple[ModuleType, ModuleType]:
+def _proving_ground(folder: Path) -> tuple[ModuleType, ModuleType, ModuleType]:
     """Modules of the proving ground, which is no part of the installed package."""
     if not (folder / "blind" / "proving.py").is_file():
         raise DiagnosisError(
@@ -92,4 +110,4 @@ def _proving_ground(folder: Path) -> tuple[ModuleType, ModuleType]:
     place = str(folder.resolve())
     if place not in sys.path:
         sys.path.insert(0, place)
-    return import_module("blind.proving"), import_module("blind.table")
+    return import_module("blind.proving"), import_module("blind.table"), import_module("blind.reliability")

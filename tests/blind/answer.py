@@ -7,7 +7,7 @@ import threading
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import asdict, dataclass, field, fields, replace
 from types import FrameType
 from typing import Any
 
@@ -28,12 +28,29 @@ GRACE = 0.25
 
 @dataclass(frozen=True)
 class Named:
-    """An effect at a site, with the values of its parameters and their stated standard deviations (SI)."""
+    """An effect at a site, with the values of its parameters and their stated standard deviations (SI).
+
+    The probability is that of its class: of it and of all that the diagnosis says it cannot tell from it, which are
+    alike.
+    """
 
     name: str
     site: str
     values: dict[str, float] = field(default_factory=dict)
     stds: dict[str, float] = field(default_factory=dict)
+    probability: float | None = None
+    alike: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Weighed:
+    """An effect at a site whose evidence was told in a round of a ranking, nats; the one that came in is accepted."""
+
+    round: int
+    name: str
+    site: str
+    evidence: float
+    accepted: bool
 
 
 @dataclass(frozen=True)
@@ -72,6 +89,8 @@ class Answer:
         Whether the diagnosis was ended by the limit of time and this is what it knew until then.
     alone : tuple of float
         Strengths of effects where the other one of a pair is not there.
+    weighed : tuple of Weighed
+        Evidence of all effects of which a ranking told it.
     """
 
     machine: str
@@ -96,6 +115,7 @@ class Answer:
     error: str = ""
     late: bool = False
     alone: tuple[float, ...] = ()
+    weighed: tuple[Weighed, ...] = ()
 
     @property
     def solvable(self) -> bool:
@@ -116,15 +136,21 @@ class Answer:
         """The same, read back."""
         values: dict[str, object] = {}
         for entry in fields(cls):
-            if entry.name in {"late", "alone"} and entry.name not in stored:
+            if entry.name in {"late", "alone", "weighed"} and entry.name not in stored:
                 continue
             value = stored[entry.name]
             if entry.name in {"hidden", "named", "ranking"}:
-                value = tuple(Named(**item) for item in value)  # type: ignore[attr-defined]
+                value = tuple(_named(item) for item in value)  # type: ignore[attr-defined]
+            elif entry.name == "weighed":
+                value = tuple(Weighed(**item) for item in value)  # type: ignore[attr-defined]
             elif isinstance(value, list):
                 value = tuple(value)
             values[entry.name] = np.nan if value is None else value
         return cls(**values)  # type: ignore[arg-type]
+
+
+def _named(stored: dict[str, Any]) -> Named:
+    return Named(**{**stored, "alike": tuple(stored.get("alike", ()))})
 
 
 def hidden_in(case: Case) -> tuple[Named, ...]:
@@ -162,12 +188,25 @@ def answered(case: Case, kind: str, request: Sequence[str], strengths: Sequence[
         return Answer(*about, seconds=time.process_time() - began, error=f"{type(error).__name__}: {error}")
     seconds = time.process_time() - began
     named = tuple(
-        Named(e.name, e.site, {p.name: p.value for p in e.parameters}, {p.name: p.std for p in e.parameters})
+        Named(
+            e.name,
+            e.site,
+            {p.name: p.value for p in e.parameters},
+            {p.name: p.std for p in e.parameters},
+            e.class_probability if np.isfinite(e.class_probability) else None,
+            tuple(other for first, *others in why.classes if first == f"{e.name} at {e.site}" for other in others),
+        )
         for e in why.effects
+    )
+    weighed = tuple(
+        Weighed(c.round, c.name, c.site, c.evidence_nats, c.accepted)
+        for c in why.candidates
+        if np.isfinite(c.evidence_nats)
     )
     rivals = tuple(dict.fromkeys(other for a in why.ambiguous_with for other in a.others))
     gaps, note = _gaps(case, why, limit)
-    return Answer(*about, why.verdict, named, ranking(why), rivals, *gaps, note, seconds=seconds, late=alarm.rung)
+    answer = Answer(*about, why.verdict, named, ranking(why), rivals, *gaps, note, seconds=seconds, late=alarm.rung)
+    return replace(answer, weighed=weighed)
 
 
 def ranking(why: Diagnosis) -> tuple[Named, ...]:

@@ -285,19 +285,36 @@ def _nominal(
 
 
 def _as_catalogued(hidden: Hidden, values: Mapping[str, float]) -> Hidden:
-    """The same with parameters that say what is there: gain, stiffness of a link [N m^2], loss in a contact or stop."""
-    if hidden.name == "backlash":
-        named = {"contact_damping" if name == "damping" else name: v for name, v in hidden.parameters.items()}
-        return Hidden(hidden.name, hidden.site, named, hidden.known)
-    if hidden.name == "end_stop":
-        share = hidden.parameters["damping"] / hidden.parameters["stiffness"]
-        return Hidden(hidden.name, hidden.site, {**hidden.parameters, "damping": share}, hidden.known)
-    if hidden.name == "sensor_gain":
-        return Hidden(hidden.name, hidden.site, {"value": 1.0 + hidden.parameters["excess"]}, hidden.known)
-    if hidden.name == "link_flexibility":
-        bending = values[f"{hidden.site}.bending"] * hidden.parameters["share"]
-        return Hidden(hidden.name, hidden.site, {"bending": bending}, hidden.known)
-    return hidden
+    """The same with names that say what is there: gain, stiffness of a link [N m^2], loss in a contact or stop."""
+    name, parameters = _in_words_of_the_catalogue(hidden.name, hidden.site, hidden.parameters, values)
+    return replace(hidden, name=name, parameters=parameters)
+
+
+def _in_words_of_the_catalogue(
+    name: str, site: str, by: Mapping[str, float], values: Mapping[str, float]
+) -> tuple[str, dict[str, float]]:
+    if name == "cubic_spring":
+        return name, {**by, "rest": 0.0}
+    if name == "load_dependent_friction":
+        return name, {"driving": by["share"], "driven": by["share"]}
+    if name == "position_dependent_friction":
+        half, phase = 0.5 * by["coulomb"], by["phase"]
+        wave = {"cosine": half * float(np.cos(phase)), "sine": -half * float(np.sin(phase))}
+        return name, {"period": by["period"], **wave}
+    if name == "friction_drift":
+        # What friction loses in time is what it has more while it is cold.
+        levels = {kind: values.get(f"{site}.{kind}_friction.{kind}", 0.0) for kind in ("coulomb", "viscous")}
+        cold = {kind: -by["share"] * level for kind, level in levels.items()}
+        return "warming_friction", {**cold, "time_constant": by["time"]}
+    if name == "backlash":
+        return name, {"contact_damping" if key == "damping" else key: v for key, v in by.items()}
+    if name == "end_stop":
+        return name, {**by, "damping": by["damping"] / by["stiffness"]}
+    if name == "sensor_gain":
+        return name, {"value": 1.0 + by["excess"]}
+    if name == "link_flexibility":
+        return name, {"bending": values[f"{site}.bending"] * by["share"]}
+    return name, dict(by)
 
 
 def _case(plan: Plan, pieces: Sequence[Array]) -> Case | FloatingPointError:

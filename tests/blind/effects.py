@@ -1,8 +1,8 @@
 """What can be hidden, where, and how large: sizes are drawn relative to the machine's efforts, speeds and ways.
 
 The sizes reach from what drowns in the noise to what nobody overlooks, evenly on a logarithmic scale. Parameters of
-known effects are named as in the catalogue; an effect with ``known = False`` is physics that no diagnosis screens for,
-whether the catalogue has a law for it or not, so that "unexplained" is the right answer.
+known effects are named as in the catalogue, in the end at least; an effect with ``known = False`` is physics that is
+not in it, so that "unexplained" is the right answer.
 """
 
 from __future__ import annotations
@@ -161,9 +161,6 @@ _ALL = (
     Effect("sensor_offset", "sensor", lambda g, s: {"value": _sign(g) * between(g, 2e-3, 5e-2) * s.way}),
     Effect("sensor_gain", "sensor", lambda g, _s: {"excess": _sign(g) * between(g, 3e-3, 0.1)}),
     Effect("sensor_delay", "sensor", lambda g, _s: {"time": between(g, 5e-4, 8e-3)}),
-)
-
-_OUTSIDE = (
     Effect("quadratic_drag", "joint", lambda g, s: {"drag": between(g, 0.01, 0.5) * s.effort / s.speed**2}),
     Effect("cubic_spring", "joint", lambda g, s: {"stiffness": between(g, 0.02, 1.5) * s.effort / s.way**3}),
     Effect("load_dependent_friction", "joint", lambda g, _s: {"share": between(g, 0.01, 0.3)}),
@@ -177,6 +174,15 @@ _OUTSIDE = (
         },
     ),
     Effect(
+        "friction_drift",
+        "joint",
+        lambda g, _s: {"share": -float(g.uniform(0.2, 0.7)), "time": float(g.uniform(2.0, 8.0))},
+        needs=("coulomb_friction",),
+    ),
+)
+
+_OUTSIDE = (
+    Effect(
         "load_dependent_cogging",
         "joint",
         lambda g, s: {"share": between(g, 0.005, 0.2), "period": s.way / between(g, 2.0, 12.0)},
@@ -185,12 +191,6 @@ _OUTSIDE = (
         "periodic_disturbance",
         "joint",
         lambda g, s: {"amplitude": between(g, 0.005, 0.3) * s.effort, "frequency": between(g, 0.7, 8.0)},
-    ),
-    Effect(
-        "friction_drift",
-        "joint",
-        lambda g, _s: {"share": -float(g.uniform(0.2, 0.7)), "time": float(g.uniform(2.0, 8.0))},
-        needs=("coulomb_friction",),
     ),
     Effect(
         "pressure_dependent_friction",

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
-from blind import score
+from blind import reliability, score
 from blind.answer import Answer
 
 Rows = list[Sequence[object]]
@@ -22,6 +22,7 @@ def tables(answers: Sequence[Answer]) -> str:
         + _grouped([a for a in answers if a.kind == "single"], "effect", lambda a: a.hidden[0].name),
         "### Hidden against named\n\n" + _confusion(answers),
         "### Errors of parameters\n\n" + _parameters(answers),
+        "### Whether probabilities are true\n\n" + _probabilities(answers),
         "### What fails\n\n" + _failures(answers),
     ]
     return "\n\n".join(parts) + "\n"
@@ -204,6 +205,12 @@ def failed(answer: Answer) -> str:
     if not score.top(answer, 1):
         return told + (" (hidden one among the first three)" if score.top(answer, 3) else "")
     return "" if score.in_place(answer) else told
+
+
+def _probabilities(answers: Sequence[Answer]) -> str:
+    found = reliability.rows(answers)
+    head = ("of the classes that were named", "probability, mean", "the hidden effect is in it")
+    return markdown(head, found) if found else "No effect was named with a probability."
 
 
 def _failures(answers: Sequence[Answer]) -> str:

@@ -180,6 +180,11 @@ SIGNATURES: Mapping[str, Signature] = MappingProxyType(
             "A wave that repeats over the way and turns over with the direction",
             "Slow motion at constant speed over many periods, forward and back",
         ),
+        "current_ripple": Signature(
+            ("position", "effort"),
+            "A wave that repeats over the way, as large as the effort, and turns over with it",
+            "Slow motion at constant speed over many periods, under several loads",
+        ),
         "load_dependent_friction": Signature(
             ("effort",),
             "Lines through zero over the effort, one for each direction",

@@ -1,7 +1,7 @@
 """Effects of a joint for those who know that they are there: a diagnosis does not try them.
 
-Drag, a stiffening spring, and friction that depends on the place, on the load, on the time since a cold start and on
-the way of bristles. The sources stand at the laws in the core.
+Drag, a stiffening spring, a ripple of the current, and friction that depends on the place, on the load, on the time
+since a cold start and on the way of bristles. The sources stand at the laws in the core.
 """
 
 from __future__ import annotations
@@ -130,6 +130,37 @@ LOAD_DEPENDENT_FRICTION = EffectType(
     takes_effort=True,
 )
 
+CURRENT_RIPPLE = EffectType(
+    name="current_ripple",
+    site="joint",
+    group="current_ripple",
+    parameters=(
+        shape(
+            "period",
+            "current_ripple.period",
+            "{C}",
+            "coordinate",
+            "way after which the ripple repeats; it follows from the motor: a turn, or a pair of its poles",
+            start=None,
+        ),
+        size("cosine", "current_ripple.cosine", "1", "one", "share of the actuators' effort that is lost at zero"),
+        size("sine", "current_ripple.sine", "1", "one", "share of it that is lost a quarter of a period later"),
+    ),
+    law=(
+        "tau = -u (cosine cos(2 pi q/period) + sine sin(2 pi q/period)), u the effort of the actuators on the joint,"
+        " the bracket within 0.95"
+    ),
+    sentence=(
+        "{at} gets more and less of its effort along its way, by {cosine} (cosine) and {sine} (sine), every {period}"
+        " alike."
+    ),
+    impossible="a motor that pushes the other way at some angles is wired wrongly",
+    confused_with={},
+    screened=False,
+    motor_side_alone=True,
+    takes_effort=True,
+)
+
 LUGRE_FRICTION = EffectType(
     name="lugre_friction",
     site="joint",
@@ -246,6 +277,7 @@ UNSCREENED_EFFECTS = (
     CUBIC_SPRING,
     POSITION_DEPENDENT_FRICTION,
     LOAD_DEPENDENT_FRICTION,
+    CURRENT_RIPPLE,
     LUGRE_FRICTION,
     WARMING_FRICTION,
 )

@@ -128,7 +128,7 @@ def searched(
             except VpmError as error:
                 outside[one.key] = f"it {_removes(one)}, but no balance of effort can be computed: {error}"
                 continue
-            accepted.append(Accepted(trial, one.rivals, one.evidence, one.probability, one.side))
+            accepted.append(Accepted(trial, one.rivals, one.evidence, one.probability, one.side, one.class_probability))
             stages.append(Stage("added", *one.key, trial.judged))
         known = _rivals(ranking, stages[-1].judged, accepted, data)
     except KeyboardInterrupt:
@@ -137,7 +137,16 @@ def searched(
     if ranking.rounds:
         outside |= _unpromising(ranking, stages[-1].judged, data, effects)
     refused, tried = _refused(ranking, outside, settings), _candidates(ranking, gains, settings)
-    found = Search(tuple(stages), tuple(accepted), refused, tried, interrupted, left=ranking.left, ranked=ranking.model)
+    found = Search(
+        tuple(stages),
+        tuple(accepted),
+        refused,
+        tried,
+        interrupted,
+        left=ranking.left,
+        ranked=ranking.model,
+        within_laws=ranking.is_within_laws(settings),
+    )
     return found, known
 
 

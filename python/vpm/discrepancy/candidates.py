@@ -154,7 +154,7 @@ def _candidate(effect: EffectType, site: str, model: Model, data: InverseDynamic
         fixed = ("damping", "width") if effect.name == "backlash" else ()
         return Candidate(effect, site, *found, fixed, neutral=False)
     if effect.name == "end_stop":
-        where, _, values = _over_way(data, model.joints[joint], residual)
+        where, _, _, values = _over_way(data, model, joint, residual)
         return Candidate(effect, site, *stop_starts(where, values, seen.middle, seen.travel, softest(model, site)))
     if effect.name == "coulomb_friction":
         return Candidate(effect, site, _grid("transition_velocity", TRANSITION_SHARES, seen.speed), _slow(seen))
@@ -168,9 +168,12 @@ def _candidate(effect: EffectType, site: str, model: Model, data: InverseDynamic
         starts = tuple({"stribeck_velocity": s * seen.speed, "transition_velocity": velocity} for s in STRIBECK_SHARES)
         bounds = {"stribeck_velocity": (2e-3 * seen.speed, HIGHEST_STRIBECK * seen.speed), **_slow(seen)}
         return Candidate(effect, site, starts, bounds, fixed=("transition_velocity",))
-    if effect.name in {"torque_ripple", "position_dependent_friction"}:
-        rubs = effect.name == "position_dependent_friction"
-        periods = _ripple_periods(*_over_way(data, model.joints[joint], residual), rubs=rubs)
+    names = {parameter.name for parameter in effect.parameters}
+    if "period" in names:
+        rubs = "transition_velocity" in names
+        where, rate, effort, values = _over_way(data, model, joint, residual)
+        factor = np.sign(rate) if rubs else effort if effect.takes_effort else np.ones_like(values)
+        periods = _ripple_periods(where, values * factor, 0.5 if rubs else 2.0)
         bounds = {"period": (min(periods) / 1.5, max(periods) * 1.5)}
         return Candidate(effect, site, tuple({"period": p} for p in periods), bounds)
     if effect.name in {"spring", "cubic_spring"}:
@@ -282,19 +285,19 @@ def _excitation(data: InverseDynamicsProblem, model: Model, joint: int, actuator
     )
 
 
-def _ripple_periods(position: Array, velocity: Array, values: Array, *, rubs: bool) -> list[float]:
+def _ripple_periods(position: Array, values: Array, fewest: float) -> list[float]:
     """Periods in position at which a residual is strongest: peaks of its least-squares periodogram.
 
-    Evenly spaced frequencies up to what the decimated samples resolve, from two periods per travel; what ``rubs`` turns
-    round with the motion, and is told from the rest of the machine over half a period already; N. Lomb, *Astrophysics
-    and Space Science* 39, 1976.
+    Evenly spaced frequencies up to what the decimated samples resolve, from ``fewest`` periods per travel; what rubs
+    turns round with the motion, and is told from the rest of the machine over half a period already; N. Lomb,
+    *Astrophysics and Space Science* 39, 1976.
     """
     thin = max(1, len(values) // 4000)
-    position, values = position[::thin], (values * np.sign(velocity) if rubs else values)[::thin]
+    position, values = position[::thin], values[::thin]
     travel = max(float(np.ptp(position)), 1e-12)
     step = float(np.median(np.abs(np.diff(position)))) or travel / 1e3
     highest = min(1.0 / (2.5 * step), 400.0 / travel)
-    frequencies = np.arange(0.5 if rubs else 2.0, max(highest * travel, 4.0), 0.25) / travel
+    frequencies = np.arange(fewest, max(highest * travel, 4.0), 0.25) / travel
     phase = 2.0 * np.pi * np.outer(frequencies, position - position.mean())
     centred = values - values.mean()
     power = (np.cos(phase) @ centred) ** 2 + (np.sin(phase) @ centred) ** 2
@@ -303,10 +306,12 @@ def _ripple_periods(position: Array, velocity: Array, values: Array, *, rubs: bo
     return [float(1.0 / frequencies[i]) for i in best]
 
 
-def _over_way(data: InverseDynamicsProblem, joint: str, residual: Array) -> tuple[Array, Array, Array]:
-    """Position, velocity and residual of one joint, or of the first one that is measured, at all samples."""
-    column = data.joints.index(joint) if joint in data.joints else 0
+def _over_way(data: InverseDynamicsProblem, model: Model, joint: int, residual: Array) -> tuple[Array, ...]:
+    """Position, velocity, effort and residual of one joint, or of the first one that is measured, at all samples."""
+    name = model.joints[joint]
+    column = data.joints.index(name) if name in data.joints else 0
     records = range(len(data.motions))
     position, velocity = (np.concatenate([data.state(r)[which][:, column] for r in records]) for which in (0, 1))
+    effort = np.concatenate([data.effort(model, model.theta, r)[1][:, column] for r in records])
     values = np.concatenate([residual[data.efforts(r)[column].samples] for r in records])
-    return position, velocity, values
+    return position, velocity, effort, values

@@ -42,6 +42,7 @@ class Accepted:
     evidence: float = float("nan")
     probability: float = float("nan")
     side: Side = "motor"
+    class_probability: float = float("nan")
 
     @property
     def key(self) -> Key:

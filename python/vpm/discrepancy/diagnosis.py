@@ -60,6 +60,8 @@ class AcceptedEffect(Storable):
         That this is what was missing beside the effects before it; NaN where no ranking named it.
     evidence_nats : float
         What it added to the evidence of the records; NaN where no ranking named it.
+    class_probability : float
+        That it was this or one of those that the records do not tell from it; NaN where no ranking named it.
     """
 
     name: str
@@ -71,6 +73,7 @@ class AcceptedEffect(Storable):
     notes: tuple[str, ...]
     probability: float = float("nan")
     evidence_nats: float = float("nan")
+    class_probability: float = float("nan")
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -367,6 +370,7 @@ class Diagnosis(Result):
                 "gain": e.gain,
                 "score": e.score,
                 "probability": e.probability,
+                "class_probability": e.class_probability,
                 "evidence_nats": e.evidence_nats,
                 "notes": list(e.notes),
             }

@@ -52,7 +52,7 @@ class Search:
 
     ``last`` is given if nothing has changed since the last effect came in; ``over`` is the last round, if it accepted
     nothing. ``left`` is told by a ranking: by joint the share of the error power of unseen records that effects leave;
-    ``ranked`` is its model.
+    ``ranked`` is its model, and ``within_laws`` whether it leaves less than laws are wrong by.
     """
 
     stages: tuple[Stage, ...]
@@ -64,6 +64,7 @@ class Search:
     over: Over = field(default_factory=Over)
     left: Mapping[str, float] = field(default_factory=dict)
     ranked: Model | None = None
+    within_laws: bool = False
 
     @property
     def gone(self) -> set[Key]:

@@ -73,6 +73,7 @@ def verdict(
     # A channel far above its noise that is nothing beside its signal says nothing of one that is not.
     structured = left.present and _above([g for g in main if not _is_nothing(g)]) > FLOOR_FACTOR
     remaining = structured or (rest is not None and rest.repeats and not small) or bool(still)
+    remaining = remaining and not found.within_laws
     worst = max(beside if beside and _is_unseen(found, data) else main + beside, key=_clear_of_noise)
     numbers = f"{_percent(worst.before, worst)} before, {_percent(worst.recalibrated, worst)} recalibrated"
     names = ", then ".join(e.trial.probe.candidate.label for e in found.accepted)
@@ -138,6 +139,8 @@ def _is_explanation(found: Search, observed: float, mostly_open: bool) -> bool:
     A machine that an observer keeps beside unseen records tells it where it is clear: effects that leave little in the
     channel ``observed`` best are the explanation of what is missing there, those that leave more than all none.
     """
+    if found.within_laws:
+        return True
     if np.isnan(observed):
         return _told_by_runs(found) or not mostly_open
     return observed <= MOSTLY_OPEN or (observed < 1.0 and not mostly_open)

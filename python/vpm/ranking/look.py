@@ -16,7 +16,7 @@ from vpm.model import Effect
 from vpm.ranking.fit import ASTRAY, Fitted, Fitter, Followed, View, bounded_step
 from vpm.ranking.judgement import Judgement
 from vpm.ranking.noise_model import white_noise
-from vpm.ranking.structure import Structure
+from vpm.ranking.structure import Structure, approximate
 
 Array = NDArray[np.float64]
 
@@ -49,8 +49,7 @@ class Look:
         self.fitted = replace(fitted, cost=cost)
         self.left = self._squares(fitted.residual)
         self.added = np.zeros(len(noise.tails)) if first is None else self._added(first.fitted.residual)
-        approximate = [one for one in fitted.structure.model.effects if not one.type.exact]
-        self.explained = np.maximum(self._explained(approximate), self.added)
+        self.explained = np.maximum(self._explained(approximate(fitted.structure.model)), self.added)
         self._curves: dict[tuple[str, ...], Array] = {}
 
     def _followed(self, fitted: Fitted) -> Followed:

@@ -10,6 +10,7 @@ import numpy as np
 from vpm.catalogue.kinds import Side, in_words
 from vpm.model import Model
 from vpm.ranking.judgement import Judgement
+from vpm.ranking.settings import Settings
 from vpm.results import Result, Storable
 from vpm.simulate.setup import HOLDS
 
@@ -35,6 +36,8 @@ class Ranked(Storable):
         That this is what is missing next, and not another one that was fitted to the end, or none; NaN likewise.
     rivals : tuple of str
         Effects that the records do not tell from it.
+    class_probability : float
+        That it is this or one of these.
     """
 
     effect: str
@@ -46,6 +49,7 @@ class Ranked(Storable):
     evidence: float = float("nan")
     probability: float = float("nan")
     rivals: tuple[str, ...] = ()
+    class_probability: float = float("nan")
 
     @property
     def key(self) -> tuple[str, str]:
@@ -74,6 +78,9 @@ class Gap(Storable):
         What noise alone leaves, as far as it is white; NaN if not known.
     signal : float
         Root mean square of the channel about its mean.
+    explained : float
+        What is left without the effects of the model whose laws are not exact, those that were found among them; no
+        more than the motion itself, and as much as with them where there are none.
     """
 
     before: float
@@ -83,6 +90,11 @@ class Gap(Storable):
     left: float
     noise: float
     signal: float
+    explained: float = float("nan")
+
+    def is_within_laws(self, settings: Settings) -> bool:
+        """Whether what is left is less than what the laws of the model may be wrong by: no effect could count there."""
+        return self.after <= settings.slight * self.explained
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -127,6 +139,10 @@ class Ranking(Result):
             if np.isfinite(gap.left):
                 found[owner] = min(gap.left, found.get(owner, np.inf))
         return found
+
+    def is_within_laws(self, settings: Settings) -> bool:
+        """Whether nothing more could be told to be missing of validation records, in none of their channels."""
+        return bool(self.gaps) and all(gap.is_within_laws(settings) for gap in self.gaps.values())
 
     def _headline(self) -> Mapping[str, object]:
         return {f"{one.effect} at {one.place}": one.judgement.removed for one in self.effects} or {"effects": "none"}

@@ -296,13 +296,17 @@ class Search:
         several: dict[Key, Ranked] = {}
         told = [trial for trial in tried if np.isfinite(trial.evidence)]
         *shares, _ = probabilities([trial.evidence - self.settings.odds for trial in told], self.settings.tempering)
-        probability = {id(trial): float(share) for trial, share in zip(told, shares, strict=True)}
+        here = 1.0 - self.settings.elsewhere
+        probability = {id(trial): here * float(share) for trial, share in zip(told, shares, strict=True)}
+        labels = {trial.label: probability[id(trial)] for trial in told}
         for trial in sorted(tried, key=lambda trial: (trial is not best, trial.left)):
-            ranked = self._ranked(trial, probability.get(id(trial), np.nan))
+            own = probability.get(id(trial), np.nan)
+            alike = sum(labels.get(label, 0.0) for label in trial.rivals)
+            ranked = self._ranked(trial, own, own + alike)
             several.setdefault(ranked.key, ranked)
         return tuple(several.values())
 
-    def _ranked(self, trial: Trial, probability: float) -> Ranked:
+    def _ranked(self, trial: Trial, probability: float, class_probability: float) -> Ranked:
         structure, without = trial.fitted.structure, trial.look.fitted.structure
         values = {name: value for name, value in structure.values.items() if name not in without.priors}
         side, band = structure.side(trial.key), trial.fitted.observer.band
@@ -315,6 +319,7 @@ class Search:
             trial.evidence,
             probability,
             trial.rivals,
+            class_probability,
         )
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+
+from vpm.ranking.calibration import shipped
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,7 +59,9 @@ class Settings:
     odds : float
         Evidence, nats, at which an effect is as probable as none.
     tempering : float
-        Power of evidence in probabilities: no model is exact.
+        Power of evidence in probabilities: no model is exact. As it was fitted to cases of which the truth is known.
+    elsewhere : float
+        Probability that what is missing is none of what was tried, likewise.
     same : float
         Effects between which the records decide by fewer nats than this, in the mean, are rivals.
     sure : float
@@ -86,7 +90,8 @@ class Settings:
     reach: float = 6.0
     order: int = 12
     odds: float = 16.0
-    tempering: float = 0.2
+    tempering: float = field(default_factory=lambda: shipped().tempering)
+    elsewhere: float = field(default_factory=lambda: shipped().elsewhere)
     same: float = 1.0
     sure: float = 0.95
     effects: int = 4

@@ -24,6 +24,22 @@ def sides_taken(model: Model, joint: str) -> set[Side]:
     return {effect.side for effect in model.effects if effect.at == joint and effect.type.has_sides}
 
 
+def approximate(model: Model) -> list[Effect]:
+    """Effects of a model whose laws are not exact."""
+    return [effect for effect in model.effects if not effect.type.exact]
+
+
+def without_sizes(model: Model, theta: Array, effects: Collection[Effect]) -> Array:
+    """Values of the parameters of a model where none of these effects of it does anything; shapes stay."""
+    theta = theta.copy()
+    for effect in effects:
+        for short, name in effect.parameter_names.items():
+            parameter = effect.type.parameter(short)
+            if not parameter.shape and parameter.neutral is not None:
+                theta[model.index(name)] = parameter.neutral
+    return theta
+
+
 @dataclass(frozen=True, eq=False)
 class Structure:
     """Effects in a model, the values of its parameters, and what is known of the unknown ones beforehand.
@@ -97,13 +113,7 @@ class Structure:
 
     def bare(self, effects: Collection[Effect]) -> Structure:
         """The same where none of these effects of the model does anything; shapes stay."""
-        theta = self.theta.copy()
-        for effect in effects:
-            for short, name in effect.parameter_names.items():
-                parameter = effect.type.parameter(short)
-                if not parameter.shape and parameter.neutral is not None:
-                    theta[self.model.index(name)] = parameter.neutral
-        return replace(self, theta=theta, priors={})
+        return replace(self, theta=without_sizes(self.model, self.theta, effects), priors={})
 
     def at(self, standard: Array) -> Structure:
         """With unknown parameters at these deviations of their priors, as far as they are possible."""

@@ -10,6 +10,7 @@ from vpm.ranking.fit import ASTRAY
 from vpm.ranking.noise_model import Parts, Structured
 from vpm.ranking.observed import Observed, Observer
 from vpm.ranking.result import Gap
+from vpm.ranking.structure import approximate, without_sizes
 
 Array = NDArray[np.float64]
 
@@ -27,22 +28,33 @@ def gaps(held_out: Observed, stages: tuple[Model, Model, Model], band: float) ->
     if not held_out.records:
         return {}
     parts = [slice(part.start, held.stop) for part, held in zip(held_out.parts, held_out.held_back, strict=True)]
-    before, recalibrated, after = (_left(held_out, model, band) for model in stages)
-    signals = (before, recalibrated, after, held_out.motion)
+    before, recalibrated, after = (_left(held_out, model, model.theta, band) for model in stages)
+    found = stages[-1]
+    bare = _left(held_out, found, without_sizes(found, found.theta, approximate(found)), band)
+    signals = (before, recalibrated, after, held_out.motion, bare)
     levels = np.array([np.sqrt(np.mean(np.concatenate([one[part] for part in parts]) ** 2, axis=0)) for one in signals])
     shares, noise = _above_noise(recalibrated, after, parts)
     names = held_out.records[0].channels
     units = map(stages[0].channel_unit, names)
     return {
-        name: Gap(float(level[0]), float(level[1]), float(level[2]), unit, float(share), float(floor), float(level[3]))
+        name: Gap(
+            before=float(level[0]),
+            recalibrated=float(level[1]),
+            after=float(level[2]),
+            unit=unit,
+            left=float(share),
+            noise=float(floor),
+            signal=float(level[3]),
+            explained=float(np.fmin(level[4], level[3])),
+        )
         for name, unit, level, share, floor in zip(names, units, levels.T, shares, noise, strict=True)
     }
 
 
-def _left(observed: Observed, model: Model, band: float) -> Array:
+def _left(observed: Observed, model: Model, theta: Array, band: float) -> Array:
     """What is left of each channel (N, m); NaN where the model runs away."""
     try:
-        residual, _ = observed.follow(model, model.theta, Observer(band))
+        residual, _ = observed.follow(model, theta, Observer(band))
     except ASTRAY:
         return np.full_like(observed.motion, np.nan)
     return residual

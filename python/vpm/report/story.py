@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import isnan
 from typing import TYPE_CHECKING
 
-from vpm.discrepancy import ChannelGap, Diagnosis, Step
+from vpm.discrepancy import AcceptedEffect, ChannelGap, Diagnosis, Step
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -49,10 +49,15 @@ def _effects(d: Diagnosis) -> list[str]:
             f"({effect.score:.1f} standard deviations)"
         )
         if not isnan(effect.evidence_nats):
-            lines.append(f"       evidence {effect.evidence_nats:.4g} nats, probability {effect.probability:.2f}")
+            lines.append(f"       evidence {effect.evidence_nats:.4g} nats, probability {_probability(effect)}")
         lines += [f"       {p.dotted} = {p.value:.5g} {_spread(p.std)}{p.unit}" for p in effect.parameters]
         lines += [f"       {note}" for note in effect.notes]
     return lines
+
+
+def _probability(effect: AcceptedEffect) -> str:
+    own, whole = effect.probability, effect.class_probability
+    return f"{own:.2f}, {whole:.2f} with what is not told from it" if whole > own else f"{own:.2f}"
 
 
 def _steps(d: Diagnosis) -> list[str]:

@@ -8,6 +8,7 @@ mod backlash;
 mod bias_force;
 mod coulomb_friction;
 mod cubic_spring;
+mod current_ripple;
 mod domain;
 mod empirical_force;
 mod end_stop;
@@ -33,6 +34,7 @@ pub use backlash::Backlash;
 pub use bias_force::BiasForce;
 pub use coulomb_friction::CoulombFriction;
 pub use cubic_spring::CubicSpring;
+pub use current_ripple::CurrentRipple;
 pub use domain::Domain;
 pub use empirical_force::EmpiricalForce;
 pub use end_stop::EndStop;
@@ -83,6 +85,8 @@ family! {
         CubicSpring,
         /// Effort periodic in the coordinate.
         TorqueRipple,
+        /// Share of the drive's effort, periodic in the coordinate.
+        CurrentRipple,
         /// Spring with a dead band.
         Backlash,
         /// Wind-up of a drive.

@@ -1,10 +1,10 @@
-//! Drag, stiffening springs, friction that depends on place, load, warmth and path: against closed forms.
+//! Drag, stiffening springs, a winding's ripple, friction that depends on place, load, warmth and path: against closed forms.
 
 use std::f64::consts::PI;
 
 use vpm_core::Result;
 use vpm_core::effect::{
-    CubicSpring, Hysteresis, Law, LoadDependentFriction, LugreFriction, MemoryLaw, PositionDependentFriction,
+    CubicSpring, CurrentRipple, Hysteresis, Law, LoadDependentFriction, LugreFriction, MemoryLaw, PositionDependentFriction,
     WarmingFriction,
 };
 use vpm_core::evaluate;
@@ -102,6 +102,46 @@ fn lifting_takes_more_and_lowering_less_than_the_weight() -> Result<()> {
         };
         close(inverse_dynamics(&d, &machine.values, motion, &[], ALWAYS)?.required[0], effort, 1e-12);
     }
+    Ok(())
+}
+
+#[test]
+fn a_ripple_of_the_current_takes_no_work_over_a_turn() {
+    let (period, cosine, sine) = (0.4, 0.3, -0.2);
+    let law = CurrentRipple { period, cosine, sine };
+    let work = |u: f64, turns: f64| {
+        let middle = |k: i32| turns * period * (f64::from(k) + 0.5) / 4000.0;
+        (0..4000).map(|k| law.effort_under(middle(k), 1.0, u)).sum::<f64>() * turns * period / 4000.0
+    };
+    for u in [7.0, -7.0] {
+        close(work(u, 1.0), 0.0, 1e-12);
+        // The integral of the sine over its half wave is period/pi, that of the cosine nothing.
+        close(work(u, 0.5), -u * sine * period / PI, 1e-6);
+    }
+    // Nothing of it is friction, and at its largest it leaves something of the effort.
+    close(law.share_of_load(0.1, -3.0, 2.0), law.share_of_load(0.1, 3.0, 2.0), 1e-15);
+    close(CurrentRipple { period, cosine: 4.0, sine }.share_of_load(0.0, 0.0, 1.0), 0.95, 1e-15);
+}
+
+#[test]
+fn a_motion_needs_the_effort_that_its_ripple_leaves() -> Result<()> {
+    let mut machine = machine("current_ripple", &[("period", 0.4), ("cosine", 0.3), ("sine", -0.2)]);
+    machine.effect("bias_force", 0, &[("force", 20.0)]);
+    let d = machine.build();
+    let (q, v, a) = (0.13, 0.7, 4.0);
+    let table = |numbers| Table::new("motion", numbers, 3, 1);
+    let (position, velocity, acceleration) = ([q; 3], [v; 3], [a; 3]);
+    let motion = Motion {
+        position: table(&position)?,
+        velocity: table(&velocity)?,
+        acceleration: table(&acceleration)?,
+        inputs: table(&acceleration)?,
+        time_step: 1e-3,
+    };
+    let needed = inverse_dynamics(&d, &machine.values, motion, &[], ALWAYS)?.required[0];
+    let phase = 2.0 * PI * q / 0.4;
+    close(needed, (2.0 * a + 20.0) / (1.0 - 0.3 * phase.cos() + 0.2 * phase.sin()), 1e-12);
+    close(evaluate::accelerations(&d, &machine.values, &[q], &[v], &[needed])?[0], a, 1e-12);
     Ok(())
 }
 

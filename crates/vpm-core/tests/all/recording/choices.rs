@@ -83,7 +83,8 @@ fn effects() -> Effects {
         "program": ["velocity", "abs", "velocity", "multiply", {"parameter": 0}, "multiply"]});
     let drag = json!({"type": "quadratic_drag", "drag": 2.0});
     let gear = json!({"type": "load_dependent_friction", "driving": 0.2, "driven": 0.1, "transition_velocity": 0.1});
-    let laws = [end_stop, backlash, stribeck, coulomb, uneven, fitted, formula, drag, gear].map(read);
+    let winding = json!({"type": "current_ripple", "period": 0.7, "cosine": 0.8, "sine": 0.6});
+    let laws = [end_stop, backlash, stribeck, coulomb, uneven, fitted, formula, drag, gear, winding].map(read);
     let memory = |shape: f64| MemoryEffect::Hysteresis(Hysteresis { force: 3.0, displacement: 0.2, shape });
     let bristles = json!({"type": "lugre_friction", "coulomb": 3.0, "displacement": 0.2, "damping": 0.3, "excess": 0.5,
         "stribeck_velocity": 0.4});

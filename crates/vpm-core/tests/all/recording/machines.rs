@@ -244,7 +244,7 @@ fn effects_behind_a_joint_agree() -> Result<()> {
 }
 
 /// Effects of joints with their parameters: each a size that is drawn up to it, from a tenth of it.
-const EFFECTS: [(&str, &[(&str, f64)]); 15] = [
+const EFFECTS: [(&str, &[(&str, f64)]); 16] = [
     ("viscous_friction", &[("viscous", 0.5)]),
     ("coulomb_friction", &[("coulomb", 2.0), ("transition_velocity", 0.2)]),
     ("stribeck_friction", &[("stribeck", 1.0), ("stribeck_velocity", 0.4), ("transition_velocity", 0.2)]),
@@ -257,6 +257,7 @@ const EFFECTS: [(&str, &[(&str, f64)]); 15] = [
     ("quadratic_drag", &[("drag", 0.5)]),
     ("cubic_spring", &[("stiffness", 20.0), ("rest", 0.5)]),
     ("position_dependent_friction", &[("period", 2.0), ("cosine", 0.5), ("sine", 0.5), ("transition_velocity", 0.2)]),
+    ("current_ripple", &[("period", 2.0), ("cosine", 0.2), ("sine", -0.3)]),
     ("load_dependent_friction", &[("driving", 0.3), ("driven", 0.2), ("transition_velocity", 0.2)]),
     (
         "lugre_friction",
