@@ -46,8 +46,8 @@ at = "way"
 coulomb = { value = 3.4, uncertainty = 0.4 }
 """
 )
-#: Way after which dry friction repeats, m.
-WAVE = 1.5
+#: Way after which dry friction repeats, and the torque constant of the motor, m.
+WAVE, TURN = 1.5, 0.4
 MASS, OIL, GAIN, STEP, FINE, READING = 3.0, 8.0, 4.0, 2e-3, 10, 5e-6
 
 
@@ -56,6 +56,7 @@ def pushed(
     dry: float = 0.0,
     uneven: float = 0.0,
     wavy: float = 0.0,
+    winding: float = 0.0,
     lag: float = 0.0,
     late: float = 0.0,
     ends: float = np.inf,
@@ -64,7 +65,8 @@ def pushed(
 ) -> Experiment:
     """The sledge by small explicit steps: dry friction as an impulse that at most stops it, a delay as a queue.
 
-    Dry friction may differ between the two directions by ``uneven``, and from place to place by ``wavy`` either way.
+    Dry friction may differ between the two directions by ``uneven``, and from place to place by ``wavy`` either way;
+    the force of the motor differs by a share ``winding`` of it.
     """
     random, samples, h = np.random.default_rng(seed), round(duration / STEP), STEP / FINE
     time = STEP * np.arange(samples)
@@ -80,7 +82,7 @@ def pushed(
         places[sample] = place
         for _ in range(FINE):
             queue.append(command[sample])
-            asked, before = GAIN * queue.popleft(), speed
+            asked, before = GAIN * queue.popleft() * (1.0 - winding * np.sin(2.0 * np.pi * place / TURN)), speed
             mean = asked + (force - asked) * (_mean_decay(h / lag) if lag else 0.0)
             force = asked + (force - asked) * (np.exp(-h / lag) if lag else 0.0)
             stop = -4e4 * (place - np.clip(place, -ends, ends))

@@ -22,6 +22,8 @@ from shared_cases import shared_case
 from vpm.cli import app
 from vpm.errors import DiagnosisError
 from vpm.prove_command import BEGIN, END, numbers, page
+from vpm.ranking.calibration import Calibration
+from vpm.ranking.settings import Settings
 
 TESTS = Path(__file__).resolve().parent
 
@@ -333,6 +335,15 @@ def test_one_case_from_its_seed_to_the_page(tmp_path: Path) -> None:
     assert score.gap_ratios([found]) == pytest.approx(1.0, abs=0.3)
     (error,) = (e for e in score.parameter_errors([found]) if e.parameter == "coulomb")
     assert abs(error.relative) < 0.05
+    assert found.weighed[0].accepted
+    assert found.named[0].probability == pytest.approx(1.0 - Settings().elsewhere, abs=0.02)
+    assert (tmp_path / "page.svg").read_text(encoding="utf-8").startswith("<?xml")
+
+    again = ["prove", "--answers", str(tmp_path / "page.json"), "--folder", str(TESTS)]
+    run = CliRunner().invoke(app, [*again, "--calibrate", str(tmp_path / "numbers.json")], catch_exceptions=False)
+    assert run.exit_code == 0
+    assert "named first (top-1)" in run.output
+    assert Calibration.load(tmp_path / "numbers.json").seeds == "0"
 
 
 def test_what_is_done_is_kept_when_someone_interrupts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -14,7 +14,7 @@ from scipy.stats import t as student
 
 import vpm
 from hopper import HOPPER, hopped
-from sledge import DRY, MASS, OIL, READING, SEEN, SLEDGE, WAVE, pushed, swung
+from sledge import DRY, MASS, OIL, READING, SEEN, SLEDGE, TURN, WAVE, pushed, swung
 from vpm.errors import DiagnosisError, ExperimentError
 from vpm.experiment import Experiment
 from vpm.model import Model
@@ -201,6 +201,15 @@ def test_dry_friction_is_told_from_what_pushes_as_much(
     ranking = vpm.rank(Model.from_toml(DRY), records)
     assert [one.effect for one in ranking.effects] == [named]
     assert ranking.model.parameters[parameter].value == pytest.approx(value, rel=0.05)
+
+
+def test_a_motor_whose_constant_is_none_is_told_from_one_that_cogs() -> None:
+    """A wave along the way that is as large as the command: cogging would push where nothing is commanded, too."""
+    records = [pushed(seed=seed, winding=0.1, duration=4.0) for seed in (1, 2)]
+    ranking = vpm.rank(Model.from_toml(SLEDGE), records)
+    assert [one.effect for one in ranking.effects] == ["current_ripple"]
+    assert ranking.model.parameters["way.current_ripple.period"].value == pytest.approx(TURN, rel=0.01)
+    assert ranking.model.parameters["way.current_ripple.sine"].value == pytest.approx(0.1, rel=0.05)
 
 
 @pytest.mark.nightly

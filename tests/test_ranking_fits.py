@@ -166,7 +166,9 @@ def test_the_size_of_an_effect_is_its_amplitude_beside_all_effects() -> None:
     assert told.least > 0.99
     assert told.counts(Settings())
     assert not replace(told, size=0.002).counts(Settings())
-    assert not replace(told, beside=0.04).counts(Settings())
+    assert not replace(told, beside=0.04, least=0.5).counts(Settings())
+    # What removes nearly all that is left is more than a law is wrong by, however small it is beside another one.
+    assert replace(told, beside=0.04, least=0.9).counts(Settings())
     assert not replace(told, shape=0.01).counts(Settings())
     assert not replace(told, score=2.0).counts(Settings())
     assert not replace(told, least=0.01).counts(Settings())

@@ -38,7 +38,9 @@ def prove(
     calibrate: Annotated[
         Path | None, typer.Option(help="Fit the numbers behind probabilities to the answers, and write them here.")
     ] = None,
-    out: Annotated[Path | None, typer.Option(help="Write the tables into this page, and every case beside it.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Write the tables into this page; beside it every case and a diagram.")
+    ] = None,
 ) -> None:
     """Hide effects in machines that other code simulates, diagnose them blind, and count what was named."""
     proving, table, reliability = _proving_ground(folder)
@@ -59,7 +61,10 @@ def prove(
     if out is not None:
         proving.save_json(found, out.with_suffix(".json"))
         out.write_text(page(out, text), encoding="utf-8")
-        console.print(f"wrote {out} and {out.with_suffix('.json')}", markup=False)
+        written = [out, out.with_suffix(".json")]
+        if reliability.stated(found):
+            written.append(reliability.draw(found, out.with_suffix(".svg")))
+        console.print(f"wrote {', '.join(map(str, written))}", markup=False)
     if calibrate is not None:
         fitted, told = reliability.report(found)
         console.print(f"{told}\nwrote {fitted.save(calibrate)}", markup=False)

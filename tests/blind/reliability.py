@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import groupby
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from blind import score
@@ -122,6 +123,12 @@ def diagram(answers: Sequence[Answer]) -> Figure:
     axis.set_xlabel("stated probability")
     axis.set_ylabel("share that was right")
     return figure
+
+
+def draw(answers: Sequence[Answer], path: Path) -> Path:
+    """Write the diagram as a picture."""
+    diagram(answers).savefig(path, metadata={"Date": None, "Creator": None})
+    return path
 
 
 def _is_hidden(answer: Answer, named: Named) -> bool:

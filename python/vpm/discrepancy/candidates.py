@@ -154,7 +154,7 @@ def _candidate(effect: EffectType, site: str, model: Model, data: InverseDynamic
         fixed = ("damping", "width") if effect.name == "backlash" else ()
         return Candidate(effect, site, *found, fixed, neutral=False)
     if effect.name == "end_stop":
-        where, _, _, values = _over_way(data, model, joint, residual)
+        where, _, values = _over_way(data, model.joints[joint], residual)
         return Candidate(effect, site, *stop_starts(where, values, seen.middle, seen.travel, softest(model, site)))
     if effect.name == "coulomb_friction":
         return Candidate(effect, site, _grid("transition_velocity", TRANSITION_SHARES, seen.speed), _slow(seen))
@@ -168,14 +168,8 @@ def _candidate(effect: EffectType, site: str, model: Model, data: InverseDynamic
         starts = tuple({"stribeck_velocity": s * seen.speed, "transition_velocity": velocity} for s in STRIBECK_SHARES)
         bounds = {"stribeck_velocity": (2e-3 * seen.speed, HIGHEST_STRIBECK * seen.speed), **_slow(seen)}
         return Candidate(effect, site, starts, bounds, fixed=("transition_velocity",))
-    names = {parameter.name for parameter in effect.parameters}
-    if "period" in names:
-        rubs = "transition_velocity" in names
-        where, rate, effort, values = _over_way(data, model, joint, residual)
-        factor = np.sign(rate) if rubs else effort if effect.takes_effort else np.ones_like(values)
-        periods = _ripple_periods(where, values * factor, 0.5 if rubs else 2.0)
-        bounds = {"period": (min(periods) / 1.5, max(periods) * 1.5)}
-        return Candidate(effect, site, tuple({"period": p} for p in periods), bounds)
+    if any(parameter.name == "period" for parameter in effect.parameters):
+        return _periodic(effect, site, data, model.joints[joint], residual)
     if effect.name in {"spring", "cubic_spring"}:
         return Candidate(effect, site, ({"rest": seen.middle},), {"rest": _around(seen)})
     if effect.name == "hysteresis":
@@ -195,6 +189,17 @@ def _candidate(effect: EffectType, site: str, model: Model, data: InverseDynamic
         # Data hardly show in which way air is compressed.
         return Candidate(effect, site, ({},), fixed=("exponent", "reference_pressure"))
     return Candidate(effect, site, ({},))
+
+
+def _periodic(effect: EffectType, site: str, data: InverseDynamicsProblem, joint: str, residual: Array) -> Candidate:
+    """Waves over the way of a joint; what rubs turns round with the motion, a share of the effort with that."""
+    rubs = any(parameter.name == "transition_velocity" for parameter in effect.parameters)
+    where, rate, values = _over_way(data, joint, residual)
+    if rubs or effect.takes_effort:
+        values = values * (np.sign(rate) if rubs else _applied(data, joint))
+    periods = _ripple_periods(where, values, 0.5 if rubs else 2.0)
+    bounds = {"period": (min(periods) / 1.5, max(periods) * 1.5)}
+    return Candidate(effect, site, tuple({"period": p} for p in periods), bounds)
 
 
 def _in_drive(effect: EffectType, site: str, seen: Excitation, guessed: float | None) -> Candidate:
@@ -306,12 +311,20 @@ def _ripple_periods(position: Array, values: Array, fewest: float) -> list[float
     return [float(1.0 / frequencies[i]) for i in best]
 
 
-def _over_way(data: InverseDynamicsProblem, model: Model, joint: int, residual: Array) -> tuple[Array, ...]:
-    """Position, velocity, effort and residual of one joint, or of the first one that is measured, at all samples."""
-    name = model.joints[joint]
-    column = data.joints.index(name) if name in data.joints else 0
+def _over_way(data: InverseDynamicsProblem, joint: str, residual: Array) -> tuple[Array, Array, Array]:
+    """Position, velocity and residual of one joint, or of the first one that is measured, at all samples."""
+    column = _column(data, joint)
     records = range(len(data.motions))
     position, velocity = (np.concatenate([data.state(r)[which][:, column] for r in records]) for which in (0, 1))
-    effort = np.concatenate([data.effort(model, model.theta, r)[1][:, column] for r in records])
     values = np.concatenate([residual[data.efforts(r)[column].samples] for r in records])
-    return position, velocity, effort, values
+    return position, velocity, values
+
+
+def _applied(data: InverseDynamicsProblem, joint: str) -> Array:
+    """What drives deliver there by the model as it was given, at all samples."""
+    model, column = data.nominal, _column(data, joint)
+    return np.concatenate([data.effort(model, model.theta, r)[1][:, column] for r in range(len(data.motions))])
+
+
+def _column(data: InverseDynamicsProblem, joint: str) -> int:
+    return data.joints.index(joint) if joint in data.joints else 0

@@ -55,7 +55,7 @@ class Judgement(Storable):
             )
         if self.size <= settings.slight:
             return f"it does {_percent(self.size)} of what all effects of the model do, and no law is as exact as that"
-        if self.beside <= settings.second:
+        if self.beside <= settings.second and self.least <= settings.clear:
             return (
                 f"it does {_percent(self.beside)} of what the effects that were found do, "
                 f"and {_percent(settings.second)} may be what their laws are wrong by"

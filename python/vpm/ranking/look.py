@@ -15,7 +15,7 @@ from vpm.discrepancy.candidates import Key
 from vpm.model import Effect
 from vpm.ranking.fit import ASTRAY, Fitted, Fitter, Followed, View, bounded_step
 from vpm.ranking.judgement import Judgement
-from vpm.ranking.noise_model import white_noise
+from vpm.ranking.noise_model import Structured, white_noise
 from vpm.ranking.structure import Structure, approximate
 
 Array = NDArray[np.float64]
@@ -127,8 +127,17 @@ class Look:
     def _rooms(self, left: Array | float = 1.0) -> list[bool]:
         """Whether effects could count that do most in each of the channels, of which so much is left."""
         size, beside = (np.sqrt(left / (power + 1.0)) for power in (self.explained, self.added))
-        told = (Judgement(1.0, 1.0, np.inf, float(a), float(b), 1.0) for a, b in zip(size, beside, strict=True))
-        return [judgement.counts(self.settings) for judgement in told]
+        most = zip(self._structured, size, beside, strict=True)
+        return [Judgement(c, c, np.inf, float(a), float(b), 1.0).counts(self.settings) for c, a, b in most]
+
+    @cached_property
+    def _structured(self) -> list[float]:
+        """Share of the error power of each channel that stands out of white noise: no effect removes more of it."""
+        parts, residual = self._fitter.observed.parts, self.fitted.residual
+        pieces = [[channel[part] for part in parts] for channel in residual.T]
+        powers = [float(np.mean(np.concatenate(several) ** 2)) for several in pieces]
+        quiet = [Structured.of(several).noise ** 2 for several in pieces]
+        return [1.0 - min(noise / max(power, 1e-300), 1.0) for noise, power in zip(quiet, powers, strict=True)]
 
     def judged(self, fitted: Fitted, key: Key | None = None) -> Judgement:
         """What another structure removes by one of its effects, or by what is none.

@@ -31,6 +31,9 @@ class Settings:
         is exact do not count here, see `EffectType.exact`.
     second : float
         The same of the amplitude of effects that were added, of whose laws less is known.
+    clear : float
+        Share of the error power above which an effect counts beside those all the same: what laws are wrong by has no
+        shape that another law happens to have.
     worth : float
         Share of the error power that another effect has to remove, of fitted and of held-back stretches.
     score : float
@@ -77,6 +80,7 @@ class Settings:
     inexact: float = 0.01
     slight: float = 0.003
     second: float = 0.05
+    clear: float = 0.85
     worth: float = 0.06
     score: float = 3.0
     seats: int = 8
