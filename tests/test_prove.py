@@ -336,7 +336,7 @@ def test_one_case_from_its_seed_to_the_page(tmp_path: Path) -> None:
     (error,) = (e for e in score.parameter_errors([found]) if e.parameter == "coulomb")
     assert abs(error.relative) < 0.05
     assert found.weighed[0].accepted
-    assert found.named[0].probability == pytest.approx(1.0 - Settings().elsewhere, abs=0.02)
+    assert found.named[0].probability == pytest.approx(1.0 - Settings().astray, abs=0.02)
     assert (tmp_path / "page.svg").read_text(encoding="utf-8").startswith("<?xml")
 
     again = ["prove", "--answers", str(tmp_path / "page.json"), "--folder", str(TESTS)]

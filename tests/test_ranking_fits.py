@@ -23,6 +23,7 @@ from vpm.initial import invertible
 from vpm.model import Model
 from vpm.ranking.extensions import Extensions
 from vpm.ranking.fit import Fitter, View, by_secant
+from vpm.ranking.judgement import Judgement
 from vpm.ranking.look import Look
 from vpm.ranking.observed import Observed, Observer
 from vpm.ranking.proposals import Proposal, _seated, proposals
@@ -406,6 +407,20 @@ def test_an_observer_that_lets_a_machine_fall_is_not_looked_at() -> None:
         view = View(fitter.noise_of(structure, Observer(band)))
         looks[band] = Look(fitter.fitted(structure, Observer(band), view), fitter)
     assert {band: look.follows for band, look in looks.items()} == {1.0: False, 10.0: True}
+
+
+@pytest.mark.parametrize(
+    ("period", "overtone"), [(0.2, True), (0.1333, True), (0.2 * 1.01, True), (0.4, False), (0.23, False), (0.8, False)]
+)
+def test_what_repeats_along_a_whole_fraction_of_a_period_is_an_overtone(period: float, overtone: bool) -> None:
+    """One tone stands for what a motor cogs; its second and third harmonic are no ripple of the current."""
+    cogging = Model.from_toml(SLEDGE).with_effect("torque_ripple", "way", period=0.4, cosine=1.0)
+    both = structure_of(cogging.with_effect("current_ripple", "way", period=period, cosine=0.1))
+    assert both.is_overtone(("current_ripple", "way")) == overtone
+    assert not both.is_overtone(("viscous_friction", "way"))
+    told = Judgement(0.9, 0.9, 9.0, 0.1, 0.1, 0.1, overtone=overtone)
+    assert told.counts(Settings()) != overtone
+    assert ("an overtone of that" in told.lacks(Settings())) == overtone
 
 
 def test_a_split_joint_has_inverse_dynamics_without_what_remembers() -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,7 +11,7 @@ from blind import score
 from blind.answer import Answer, Named, Weighed
 from vpm.plot.style import BLUE, SOFT, panels, styled
 from vpm.ranking.calibration import Calibration, Reliability, Round, calibrated, calibration_error, reliability
-from vpm.ranking.posterior import probabilities
+from vpm.ranking.posterior import believed
 from vpm.ranking.settings import Settings
 
 if TYPE_CHECKING:
@@ -36,21 +35,26 @@ def bins(answers: Sequence[Answer]) -> list[Reliability]:
 
 
 def rounds(answers: Sequence[Answer]) -> list[Round]:
-    """What was weighed in each round, and what of it was true then: what had not been named yet."""
-    odds = Settings().odds
+    """What was weighed where each named effect came in, and what of it was true: what no other named one is."""
     found = []
     for answer in answers:
-        named: list[Weighed] = []
-        for _, group in groupby(answer.weighed, key=lambda one: one.round):
-            several = list(group)
-            told = [Named(one.name, one.site) for one in named]
-            missing = [h for h in answer.hidden if not any(score.site_right(answer.machine, h, one) for one in told)]
+        for named in answer.named:
+            several = _beside(answer, named)
+            others = [one for one in answer.named if one is not named]
+            missing = [h for h in answer.hidden if not any(score.site_right(answer.machine, h, one) for one in others)]
             right = [
                 any(score.site_right(answer.machine, h, Named(one.name, one.site)) for h in missing) for one in several
             ]
-            found.append(Round(tuple(one.evidence - odds for one in several), tuple(right), bool(missing)))
-            named += [one for one in several if one.accepted]
+            if several:
+                gains = tuple(one.evidence - Settings().odds for one in several)
+                found.append(Round(gains, tuple(right), bool(missing)))
     return found
+
+
+def _beside(answer: Answer, named: Named) -> list[Weighed]:
+    """All that was weighed in the round in which an effect came in for the last time."""
+    came = [one.round for one in answer.weighed if one.accepted and (one.name, one.site) == (named.name, named.site)]
+    return [one for one in answer.weighed if came and one.round == came[-1]]
 
 
 def calibrate(answers: Sequence[Answer]) -> Calibration:
@@ -73,14 +77,14 @@ def restated(answers: Sequence[Answer], calibration: Calibration) -> list[Answer
 
 
 def _restated(answer: Answer, named: Named, calibration: Calibration) -> Named:
-    number = next((w.round for w in answer.weighed if w.accepted and (w.name, w.site) == (named.name, named.site)), 0)
-    several = [w for w in answer.weighed if w.round == number]
+    several = _beside(answer, named)
     if named.probability is None or not several:
         return named
-    *shares, _ = probabilities([w.evidence - Settings().odds for w in several], calibration.tempering)
+    gains = [w.evidence - Settings().odds for w in several]
+    *shares, _, _ = believed(gains, calibration.tempering, calibration.astray)
     alike = {f"{named.name} at {named.site}", *named.alike}
     whole = sum(share for w, share in zip(several, shares, strict=True) if f"{w.name} at {w.site}" in alike)
-    return replace(named, probability=float((1.0 - calibration.elsewhere) * whole))
+    return replace(named, probability=float(whole))
 
 
 def report(answers: Sequence[Answer]) -> tuple[Calibration, str]:
@@ -90,8 +94,8 @@ def report(answers: Sequence[Answer]) -> tuple[Calibration, str]:
     told = restated(second, fitted)
     error, count = calibration_error(bins(told)), len(stated(told))
     return whole, (
-        f"calibrated on {fitted.cases} cases with every other seed: tempering {fitted.tempering:g}, elsewhere "
-        f"{fitted.elsewhere:g}; calibration error {error:.3f} on {count} named classes of the other {len(second)} cases"
+        f"calibrated on {fitted.cases} cases with every other seed: tempering {fitted.tempering:g}, astray "
+        f"{fitted.astray:g}; calibration error {error:.3f} on {count} named classes of the other {len(second)} cases"
     )
 
 

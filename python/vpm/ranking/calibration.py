@@ -6,22 +6,22 @@ import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from functools import cache
-from math import exp, log
+from math import log
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize_scalar
+from scipy.optimize import minimize
 
 from vpm.errors import DiagnosisError
-from vpm.ranking.posterior import probabilities
+from vpm.ranking.posterior import believed
 
 Array = NDArray[np.float64]
 
 #: The numbers that are shipped.
 SHIPPED = Path(__file__).with_name("calibration.json")
-#: Ends between which the power of evidence is searched.
-TEMPERING = (1e-3, 1.0)
+#: Ends between which they are searched.
+TEMPERING, ASTRAY = (1e-3, 1.0), (1e-3, 0.5)
 #: Where bins of a reliability diagram begin, but for the first.
 BINS = (0.5, 0.7, 0.8, 0.9, 0.95, 0.98)
 
@@ -34,8 +34,8 @@ class Calibration:
     ----------
     tempering : float
         Power of evidence in probabilities: no model is exact.
-    elsewhere : float
-        Probability that what is missing is none of what was tried.
+    astray : float
+        How often evidence leads astray.
     cases : int
         How many cases they were fitted to.
     seeds : str
@@ -43,7 +43,7 @@ class Calibration:
     """
 
     tempering: float
-    elsewhere: float
+    astray: float
     cases: int = 0
     seeds: str = ""
 
@@ -82,26 +82,18 @@ class Round:
     right: tuple[bool, ...]
     missing: bool
 
-    def share(self, tempering: float) -> float:
-        """Probability that was given to what was true, among what was tried and nothing; zero of what is elsewhere."""
-        *shares, none = probabilities(self.gains, tempering)
-        told = zip(shares, self.right, strict=True)
-        return float(sum(share for share, right in told if right) if self.missing else none)
-
-    def likelihood(self, tempering: float, elsewhere: float) -> float:
-        """The same, with what is elsewhere."""
-        if self.missing and not any(self.right):
-            return elsewhere
-        return (1.0 - elsewhere) * self.share(tempering)
+    def likelihood(self, tempering: float, astray: float) -> float:
+        """Probability that was given to what was true."""
+        *shares, none, other = believed(self.gains, tempering, astray)
+        told = [share for share, right in zip(shares, self.right, strict=True) if right]
+        return float((sum(told) if told else other) if self.missing else none)
 
 
 def calibrated(rounds: Sequence[Round], seeds: str, cases: int) -> Calibration:
     """The numbers under which what was true was most probable.
 
     Law: the logarithm of the probability that was given to the truth is a proper score: it is largest in the mean for
-    probabilities that are true (I. Good, *J. Royal Statistical Society B* 14, 1952). The share of rounds in which the
-    truth was elsewhere is the most likely one, under a prior that says as little as can be (H. Jeffreys, *Proc. Royal
-    Society A* 186, 1946).
+    probabilities that are true (I. Good, *J. Royal Statistical Society B* 14, 1952).
 
     Raises
     ------
@@ -110,15 +102,15 @@ def calibrated(rounds: Sequence[Round], seeds: str, cases: int) -> Calibration:
     """
     if not rounds:
         raise DiagnosisError("no answer weighed any evidence; calibrate on machines that a ranking covers")
-    inside = [one for one in rounds if not one.missing or any(one.right)]
-    elsewhere = (len(rounds) - len(inside) + 0.5) / (len(rounds) + 1.0)
 
-    def loss(logarithm: float) -> float:
-        return -sum(log(max(one.share(exp(logarithm)), 1e-12)) for one in inside)
+    def loss(logarithms: Array) -> float:
+        tempering, astray = np.exp(logarithms)
+        return -sum(log(one.likelihood(float(tempering), float(astray))) for one in rounds)
 
-    found = minimize_scalar(loss, bounds=(log(TEMPERING[0]), log(TEMPERING[1])), method="bounded")
-    tempering = exp(found.x) if inside else TEMPERING[0]
-    return Calibration(float(f"{tempering:.3g}"), float(f"{elsewhere:.3g}"), cases, seeds)
+    ends = [(log(low), log(high)) for low, high in (TEMPERING, ASTRAY)]
+    found = minimize(loss, np.mean(ends, axis=1), method="Nelder-Mead", bounds=ends, options={"xatol": 1e-3})
+    tempering, astray = (float(f"{number:.3g}") for number in np.exp(found.x))
+    return Calibration(tempering, astray, cases, seeds)
 
 
 @dataclass(frozen=True)

@@ -30,6 +30,8 @@ class Judgement(Storable):
     alone : float
         Of an effect that adds inertia, the share of the error power that is left of what the observer leaves of masses
         on which nothing acts: too heavy a machine is drawn along by the observer alone.
+    overtone : bool
+        Whether it repeats along a whole fraction of the period of another effect at its place.
     """
 
     removed: float
@@ -39,6 +41,7 @@ class Judgement(Storable):
     beside: float
     shape: float
     alone: float = 0.0
+    overtone: bool = False
 
     def counts(self, settings: Settings) -> bool:
         """Whether that is more than chance, and more than what laws are wrong by."""
@@ -70,6 +73,8 @@ class Judgement(Storable):
                 f"it leaves {_percent(self.alone)} of the error power of a mass on which nothing acts: it makes the "
                 "machine too heavy for its forces"
             )
+        if self.overtone:
+            return "it repeats along a whole fraction of the period of another effect there, and is an overtone of that"
         return ""
 
 

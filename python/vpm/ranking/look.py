@@ -155,7 +155,8 @@ class Look:
         size, beside, shape = (float(np.sqrt(there / (power[place] + there))) for power in powers)
         score = _repeated(self.left[1], left[1], self.settings.pieces)
         alone = 0.0 if key is None or not EFFECTS[key[0]].adds_inertia else float(np.prod(_ratio(self._drawn, left)))
-        return Judgement(removed, min(shares), score, size, beside, shape, alone)
+        overtone = key is not None and fitted.structure.is_overtone(key)
+        return Judgement(removed, min(shares), score, size, beside, shape, alone, overtone)
 
     @cached_property
     def _drawn(self) -> tuple[Array, Array]:

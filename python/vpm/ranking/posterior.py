@@ -28,6 +28,23 @@ def probabilities(gains: Sequence[float], tempering: float) -> Array:
     return np.asarray(shares / np.sum(shares))
 
 
+def believed(gains: Sequence[float], tempering: float, astray: float) -> Array:
+    """Probabilities of each of several effects, of none, and that what is missing was not among them (k + 2,).
+
+    Law: a mixture with what knows nothing, as in robust statistics (J. Tukey, *Contributions to Probability and
+    Statistics*, 1960), so that evidence that leads astray is no surprise without end.
+
+    Parameters
+    ----------
+    gains, tempering
+        See `probabilities`.
+    astray : float
+        How often evidence leads astray: then all of these are as probable.
+    """
+    shares = np.append(probabilities(gains, tempering), 0.0)
+    return (1.0 - astray) * shares + astray / len(shares)
+
+
 def log_volume(slopes: Array) -> float:
     """Logarithm of the determinant of ``1 + K' K`` of derivatives K (n, k): by what records shrink what is unknown.
 

@@ -21,7 +21,7 @@ from vpm.ranking.judgement import Judgement
 from vpm.ranking.look import Look
 from vpm.ranking.noise_model import fitted_noise
 from vpm.ranking.observed import Observed, Observer
-from vpm.ranking.posterior import probabilities
+from vpm.ranking.posterior import believed
 from vpm.ranking.proposals import proposals
 from vpm.ranking.race import raced
 from vpm.ranking.result import Ranked, Ranking
@@ -295,9 +295,9 @@ class Search:
         """All effects that were tried, what was added first, then those that leave least."""
         several: dict[Key, Ranked] = {}
         told = [trial for trial in tried if np.isfinite(trial.evidence)]
-        *shares, _ = probabilities([trial.evidence - self.settings.odds for trial in told], self.settings.tempering)
-        here = 1.0 - self.settings.elsewhere
-        probability = {id(trial): here * float(share) for trial, share in zip(told, shares, strict=True)}
+        gains = [trial.evidence - self.settings.odds for trial in told]
+        *shares, _, _ = believed(gains, self.settings.tempering, self.settings.astray)
+        probability = {id(trial): float(share) for trial, share in zip(told, shares, strict=True)}
         labels = {trial.label: probability[id(trial)] for trial in told}
         for trial in sorted(tried, key=lambda trial: (trial is not best, trial.left)):
             own = probability.get(id(trial), np.nan)

@@ -63,8 +63,8 @@ class Settings:
         Evidence, nats, at which an effect is as probable as none.
     tempering : float
         Power of evidence in probabilities: no model is exact. As it was fitted to cases of which the truth is known.
-    elsewhere : float
-        Probability that what is missing is none of what was tried, likewise.
+    astray : float
+        How often evidence leads astray, likewise: then all that was tried, and what was not, is as probable.
     same : float
         Effects between which the records decide by fewer nats than this, in the mean, are rivals.
     sure : float
@@ -95,7 +95,7 @@ class Settings:
     order: int = 12
     odds: float = 16.0
     tempering: float = field(default_factory=lambda: shipped().tempering)
-    elsewhere: float = field(default_factory=lambda: shipped().elsewhere)
+    astray: float = field(default_factory=lambda: shipped().astray)
     same: float = 1.0
     sure: float = 0.95
     effects: int = 4

@@ -18,6 +18,9 @@ from vpm.weighing.priors import Prior
 
 Array = NDArray[np.float64]
 
+#: Share by which periods may be off that are found in whole fractions of each other.
+OVERTONE = 0.02
+
 
 def sides_taken(model: Model, joint: str) -> set[Side]:
     """Sides of a joint on which there are effects that may be on either."""
@@ -77,6 +80,21 @@ class Structure:
         own = set(self.model.effect(*key, self.side(key)).parameter_names.values())
         values = {name: float(self.theta[self.model.index(name)]) for name in self.range_limited if name in own}
         return all(self.priors[name].low < value < self.priors[name].high for name, value in values.items())
+
+    def is_overtone(self, key: Key) -> bool:
+        """Whether an effect repeats along a whole fraction of the period of another one at its place.
+
+        A law that repeats along the way has one tone, and what it stands for has overtones: those are no other effect.
+        """
+        own = self._period(self.model.effect(*key, self.side(key)))
+        others = [self._period(one) for one in self.model.effects if one.at == key[1] and one.name != key[0]]
+        ratios = [other / own for other in others if own and other]
+        return any(round(ratio) > 1 and abs(ratio / round(ratio) - 1.0) < OVERTONE for ratio in ratios)
+
+    def _period(self, effect: Effect) -> float:
+        """Of what repeats along the way; zero of what does not."""
+        name = effect.parameter_names.get("period")
+        return 0.0 if name is None else abs(float(self.theta[self.model.index(name)]))
 
     @cached_property
     def columns(self) -> list[int]:
