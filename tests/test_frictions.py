@@ -1,4 +1,4 @@
-"""Effects of joints that a diagnosis does not try: in every mode of a simulation, along records, in fits and files."""
+"""Effects of joints that no search tries: in every mode of a simulation, along records, in fits and files."""
 
 from pathlib import Path
 

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 import vpm
 from vpm.catalogue import EFFECTS, EffectParameter, EffectType
+from vpm.catalogue.unscreened import UNSCREENED_EFFECTS
 from vpm.discrepancy.view import View
 from vpm.identify import InverseDynamicsProblem
 from vpm.plot.style import BLUE, SOFT, label, panels, styled
@@ -258,8 +259,10 @@ def _section(effect: EffectType) -> list[str]:
         f"{effect.title[0].upper()}{effect.title[1:]}, at {_article(effect.site)}: `{effect.law}`",
         "",
     ]
-    if not effect.screened:
-        lines += ["A diagnosis does not screen for it.", ""]
+    if effect in UNSCREENED_EFFECTS:
+        lines += ["A search does not try it; a ranking does.", ""]
+    elif not effect.screened:
+        lines += ["A diagnosis does not try it, but describes by it what it cannot name.", ""]
     if effect.has_sides:
         lines += ['**Side:** motor, or link with `side = "link"`.', ""]
     if effect.requires:

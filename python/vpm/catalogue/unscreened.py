@@ -1,4 +1,4 @@
-"""Effects of a joint for those who know that they are there: a diagnosis does not try them.
+"""Effects of a joint that a ranking tries, and no search.
 
 Drag, a stiffening spring, a ripple of the current, and friction that depends on the place, on the load, on the time
 since a cold start and on the way of bristles. The sources stand at the laws in the core.
