@@ -4,8 +4,8 @@ use std::f64::consts::PI;
 
 use vpm_core::Result;
 use vpm_core::effect::{
-    CubicSpring, CurrentRipple, Hysteresis, Law, LoadDependentFriction, LugreFriction, MemoryLaw, PositionDependentFriction,
-    WarmingFriction,
+    CubicSpring, CurrentRipple, Hysteresis, Law, LoadDependentFriction, LugreFriction, MemoryLaw,
+    PositionDependentFriction, WarmingFriction,
 };
 use vpm_core::evaluate;
 use vpm_core::integrator::Method;
