@@ -46,8 +46,7 @@ def rounds(answers: Sequence[Answer]) -> list[Round]:
                 any(score.site_right(answer.machine, h, Named(one.name, one.site)) for h in missing) for one in several
             ]
             if several:
-                gains = tuple(one.evidence - Settings().odds for one in several)
-                found.append(Round(gains, tuple(right), bool(missing)))
+                found.append(Round(_gains(several), tuple(right), bool(missing)))
     return found
 
 
@@ -55,6 +54,12 @@ def _beside(answer: Answer, named: Named) -> list[Weighed]:
     """All that was weighed in the round in which an effect came in for the last time."""
     came = [one.round for one in answer.weighed if one.accepted and (one.name, one.site) == (named.name, named.site)]
     return [one for one in answer.weighed if came and one.round == came[-1]]
+
+
+def _gains(several: Sequence[Weighed]) -> tuple[float, ...]:
+    """Evidence beyond that at which an effect is as probable as none."""
+    odds = Settings().odds
+    return tuple(one.evidence - odds for one in several)
 
 
 def calibrate(answers: Sequence[Answer]) -> Calibration:
@@ -80,8 +85,7 @@ def _restated(answer: Answer, named: Named, calibration: Calibration) -> Named:
     several = _beside(answer, named)
     if named.probability is None or not several:
         return named
-    gains = [w.evidence - Settings().odds for w in several]
-    *shares, _, _ = believed(gains, calibration.tempering, calibration.astray)
+    *shares, _, _ = believed(_gains(several), calibration.tempering, calibration.astray)
     alike = {f"{named.name} at {named.site}", *named.alike}
     whole = sum(share for w, share in zip(several, shares, strict=True) if f"{w.name} at {w.site}" in alike)
     return replace(named, probability=float(whole))

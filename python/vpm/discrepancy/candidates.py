@@ -168,7 +168,7 @@ def _candidate(effect: EffectType, site: str, model: Model, data: InverseDynamic
         starts = tuple({"stribeck_velocity": s * seen.speed, "transition_velocity": velocity} for s in STRIBECK_SHARES)
         bounds = {"stribeck_velocity": (2e-3 * seen.speed, HIGHEST_STRIBECK * seen.speed), **_slow(seen)}
         return Candidate(effect, site, starts, bounds, fixed=("transition_velocity",))
-    if any(parameter.name == "period" for parameter in effect.parameters):
+    if any(parameter.name == "period" and not parameter.optional for parameter in effect.parameters):
         return _periodic(effect, site, data, model.joints[joint], residual)
     if effect.name in {"spring", "cubic_spring"}:
         return Candidate(effect, site, ({"rest": seen.middle},), {"rest": _around(seen)})
