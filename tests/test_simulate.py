@@ -74,8 +74,9 @@ def test_a_fit_follows_the_hold(mode: str) -> None:
 def test_a_hold_that_cannot_be_is_refused(record: Experiment) -> None:
     with pytest.raises(SimulationError, match="unknown hold 'linear'; choose one of auto, zero_order, first_order"):
         Setup(hold="linear")
-    with pytest.raises(SimulationError, match="hold 'cubic' is for commands of a log, and mode 'closed_loop' takes"):
-        simulate(nominal(), record, "closed_loop", hold="cubic")
+    for mode in ("closed_loop", "inverse_dynamics"):
+        with pytest.raises(SimulationError, match=f"hold 'cubic' is for commands of a log, and mode '{mode}' takes"):
+            simulate(nominal(), record, mode, hold="cubic")
 
 
 def test_closed_loop_follows_the_other_simulation(record: Experiment) -> None:

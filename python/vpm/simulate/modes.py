@@ -83,14 +83,14 @@ def simulate(
     ValidityWarning
         A flexible link in displacement coordinates bends more than its kinematics allow.
     """
-    if mode == "inverse_dynamics":
-        return _inverse_dynamics_run(model, experiment, cutoff)
     setup = Setup(integrator, substeps, horizon, hold=hold)
     if setup.course != HOLDS[0] and mode not in LOGGED:
         raise SimulationError(
             f"hold '{hold}' is for commands of a log, and mode '{mode}' takes none; leave it out, or use the mode "
             f"{' or '.join(LOGGED)}"
         )
+    if mode == "inverse_dynamics":
+        return _inverse_dynamics_run(model, experiment, cutoff)
     arrays = simulate_arrays(model, experiment, mode, setup=setup, cutoff=cutoff, initial_state=initial_state)
     run = run_of(model, experiment, mode, arrays, setup)
     if arrays.states is None:
