@@ -167,6 +167,20 @@ def test_names_that_explain_unseen_records_stand_whatever_the_balance_leaves(
     assert words == ["unexplained", "effect_found"]
 
 
+def test_names_that_leave_more_of_an_effort_than_it_is_explain_nothing(
+    monkeypatch: pytest.MonkeyPatch, records: list[Experiment]
+) -> None:
+    """An observer draws too heavy a machine along; its efforts tell."""
+    words = []
+    for mass in (1.0, 1e4):
+        heavy = ranking(tried("rotor_inertia", {"axis.rotor.inertia": mass}, 0.9, evidence=900.0, probability=0.99))
+        seen = replace(heavy, gaps={"axis.position": seen_by_observer(1.0, 0.1)})
+        monkeypatch.setattr(diagnosing, "rank", lambda *_, seen=seen, **__: seen)
+        monkeypatch.setattr(by_ranking, "judged_anyhow", by_ranking.unmoved)
+        words.append(diagnose(nominal(), records[0], records[1], names="ranking", workers=1).verdict)
+    assert words == ["effect_found", "unexplained"]
+
+
 def test_ctrl_c_in_the_ranking_gives_what_is_known(monkeypatch: pytest.MonkeyPatch, records: list[Experiment]) -> None:
     def stopped(*_: object, **__: object) -> Ranking:
         raise KeyboardInterrupt

@@ -64,12 +64,14 @@ SETTINGS = Settings()
 def why_not_ranked(model: Model, experiments: Sequence[Experiment]) -> str:
     """Why names do not come from a ranking, or "": it covers up to three joints, rigid links, and drives without oil.
 
-    Drives may not go by samples of their own either. A ranking does not read a deflection that a log holds.
+    It covers oil where a joint has no drive, for no search sees that. Drives may not go by samples of their own, and a
+    ranking does not read a deflection that a log holds.
     """
     if bends(model):
         return "links bend"
+    without = set(SAMPLED_TYPES) if free_joints(model) else {"hydraulic", *SAMPLED_TYPES}
     for name in model.actuators:
-        if (kind := model.actuator_type(name)) in {"hydraulic", *SAMPLED_TYPES}:
+        if (kind := model.actuator_type(name)) in without:
             return f"the actuator {name} has type {kind}"
     own = set(model.joints) - set(model.added_joints)
     if len(own) > SETTINGS.joints:

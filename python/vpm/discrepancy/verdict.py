@@ -90,7 +90,8 @@ def verdict(
     mostly_open = (structured and share_left > MOSTLY_OPEN) or _is_described_better(rest)
     joints = Joints.of(gap, left, found.left)
     apart = joints.differ and not any(joints.has(entry, found.final.model) for entry in found.accepted)
-    if found.accepted and not apart and not _is_explanation(found, observed, mostly_open):
+    spoiled = any(map(_is_worse_than_none, main)) and not found.final.model.added_joints
+    if found.accepted and (spoiled or (not apart and not _is_explanation(found, observed, mostly_open))):
         leave = f"leave {100.0 * (observed if observed >= 1.0 else share_left):.0f} % of its mean square"
         return (
             "unexplained",
@@ -114,6 +115,11 @@ def verdict(
             True,
         )
     return (*_nothing_missing(data, nominal, recalibrated, (main, beside), numbers), False)
+
+
+def _is_worse_than_none(gap: ChannelGap) -> bool:
+    """Whether effects leave more of a measured effort than a model without any force would; a play is hard to balance."""
+    return gap.recalibrated < gap.signal < gap.after
 
 
 def _is_unseen(found: Search, data: Data) -> bool:

@@ -15,7 +15,7 @@ from vpm.discrepancy.candidates import Key
 from vpm.model import Effect
 from vpm.ranking.fit import ASTRAY, Fitted, Fitter, Followed, View, bounded_step
 from vpm.ranking.judgement import Judgement
-from vpm.ranking.noise_model import Structured, white_noise
+from vpm.ranking.noise_model import SURE, Structured, white_noise
 from vpm.ranking.structure import Structure, approximate
 
 Array = NDArray[np.float64]
@@ -34,7 +34,7 @@ class Look:
         Channels in their root mean squares; derivatives are taken as known for effects that do nothing at first.
     explained : ndarray, shape (m,)
         Error power of each channel that all effects of the model remove that are not exact, as a multiple of what is
-        left.
+        left. Here and below error power is what stands out of white noise: what a sensor adds no model can remove.
     added : ndarray, shape (m,)
         The same of those that were added.
     """
@@ -48,6 +48,7 @@ class Look:
         cost = fitter.cost(fitted.structure, fitted.residual, noise)
         self.fitted = replace(fitted, cost=cost)
         self.left = self._squares(fitted.residual)
+        self._quiet = self._noise_power(noise.deviations)
         self.added = np.zeros(len(noise.tails)) if first is None else self._added(first.fitted.residual)
         self.explained = np.maximum(self._explained(approximate(fitted.structure.model)), self.added)
         self._curves: dict[tuple[str, ...], Array] = {}
@@ -110,34 +111,43 @@ class Look:
     def follows(self) -> bool:
         """Whether it leaves less of the records than a machine at rest would, in the mean of the channels."""
         still = self._squares(self._fitter.observed.motion)
-        return float(np.sum(np.log(_ratio(still, self.left)))) < 0.0
+        return float(np.sum(np.log(self._ratio(still, self.left)))) < 0.0
 
     @property
     def needed(self) -> float:
         """What an effect has to gain to be worth it, nats."""
-        samples = sum(part.stop - part.start for part in self._fitter.observed.parts)
-        return float(-0.5 * samples * np.log1p(-self.settings.worth))
+        samples = len(self.left[0])
+        least = min((1.0 - quiet for quiet, room in zip(self._quiet, self._rooms(), strict=True) if room), default=1.0)
+        return float(-0.5 * samples * np.log1p(-self.settings.worth * least))
 
     def has_room(self, beside: Fitted | None = None) -> bool:
         """Whether any effect could still count, or could if another structure had removed before what it does."""
         if beside is None:
             return any(self._rooms())
-        return any(self._rooms(_ratio(self.left, self._squares(beside.residual))))
+        return any(self._rooms(self._ratio(self.left, self._squares(beside.residual))))
 
     def _rooms(self, left: Array | float = 1.0) -> list[bool]:
         """Whether effects could count that do most in each of the channels, of which so much is left."""
         size, beside = (np.sqrt(left / (power + 1.0)) for power in (self.explained, self.added))
-        most = zip(self._structured, size, beside, strict=True)
-        return [Judgement(c, c, np.inf, float(a), float(b), 1.0).counts(self.settings) for c, a, b in most]
+        power, chance = self._above_noise(self.left)
+        told = zip((power > SURE * chance).astype(float).tolist(), size.tolist(), beside.tolist(), strict=True)
+        return [Judgement(c, c, np.inf, a, b, 1.0).counts(self.settings) for c, a, b in told]
 
-    @cached_property
-    def _structured(self) -> list[float]:
-        """Share of the error power of each channel that stands out of white noise: no effect removes more of it."""
+    def _noise_power(self, sizes: Sequence[float]) -> Array:
+        """Share of the error power of each channel (m,) that is white noise."""
         parts, residual = self._fitter.observed.parts, self.fitted.residual
-        pieces = [[channel[part] for part in parts] for channel in residual.T]
-        powers = [float(np.mean(np.concatenate(several) ** 2)) for several in pieces]
-        quiet = [Structured.of(several).noise ** 2 for several in pieces]
-        return [1.0 - min(noise / max(power, 1e-300), 1.0) for noise, power in zip(quiet, powers, strict=True)]
+        quiet = [Structured.of([channel[part] for part in parts]).noise for channel in residual.T]
+        return np.asarray(np.minimum(np.array(quiet) / sizes, 1.0) ** 2)
+
+    def _above_noise(self, squares: Sequence[Array]) -> tuple[Array, Array]:
+        """Error power of each channel (m,) above white noise, no less than chance may make of none, and that."""
+        samples = sum(len(part) for part in squares)
+        chance = np.sqrt(2.0 * samples) * self._quiet + 1e-300
+        return np.maximum(sum(np.sum(part, axis=0) for part in squares) - samples * self._quiet, chance), chance
+
+    def _ratio(self, before: Sequence[Array], after: Sequence[Array]) -> Array:
+        """Error power above noise after, as shares of that before, channel by channel (m,)."""
+        return np.asarray(self._above_noise(after)[0] / self._above_noise(before)[0])
 
     def judged(self, fitted: Fitted, key: Key | None = None) -> Judgement:
         """What another structure removes by one of its effects, or by what is none.
@@ -146,15 +156,16 @@ class Look:
         each is the most likely one, and shares of error power that are left multiply.
         """
         left = self._squares(fitted.residual)
-        shares = [1.0 - float(np.prod(_ratio([b], [a]))) for b, a in zip(self.left, left, strict=True)]
-        ratio = _ratio(self.left, left)
+        shares = [1.0 - float(np.prod(self._ratio([b], [a]))) for b, a in zip(self.left, left, strict=True)]
+        ratio = self._ratio(self.left, left)
         removed, place = max(1.0 - float(np.prod(ratio)), 1e-12), int(np.argmin(ratio))
         there = max(1.0 - float(ratio[place]), 1e-12)
         curve = np.zeros(len(ratio)) if key is None else self._curve(key)
         powers = (self.explained, self.added, curve)
         size, beside, shape = (float(np.sqrt(there / (power[place] + there))) for power in powers)
         score = _repeated(self.left[1], left[1], self.settings.pieces)
-        alone = 0.0 if key is None or not EFFECTS[key[0]].adds_inertia else float(np.prod(_ratio(self._drawn, left)))
+        heavier = key is not None and EFFECTS[key[0]].adds_inertia
+        alone = float(np.prod(_shares(self._drawn, left))) if heavier else 0.0
         overtone = key is not None and fitted.structure.is_overtone(key)
         return Judgement(removed, min(shares), score, size, beside, shape, alone, overtone)
 
@@ -208,7 +219,7 @@ class Look:
 
     def _beside(self, residual: Array) -> Array:
         """By how many times what is left of each channel the power of another residual is more (m,)."""
-        return np.maximum(1.0 / _ratio(self._squares(residual), self.left) - 1.0, 0.0)
+        return np.maximum(1.0 / self._ratio(self._squares(residual), self.left) - 1.0, 0.0)
 
     def _squares(self, residual: Array) -> tuple[Array, Array]:
         return self._fitter.observed.squares(residual, self.view.noise)
@@ -220,8 +231,8 @@ def same_curve(one: Key, other: Key) -> bool:
     return one[1] == other[1] and bool(set.intersection(*states))
 
 
-def _ratio(before: Sequence[Array], after: Sequence[Array]) -> Array:
-    """Squares after, as shares of those before, channel by channel (m,)."""
+def _shares(before: Sequence[Array], after: Sequence[Array]) -> Array:
+    """Squares after, noise among them, as shares of those before, channel by channel (m,)."""
     sums = [np.maximum(sum(np.sum(part, axis=0) for part in several), 1e-300) for several in (before, after)]
     return np.asarray(sums[1] / sums[0])
 
