@@ -20,6 +20,7 @@ from vpm import diagnosing
 from vpm.diagnosing import diagnose
 from vpm.discrepancy import by_ranking
 from vpm.discrepancy.by_ranking import why_not_ranked
+from vpm.discrepancy.confirmation import unmoved
 from vpm.errors import DiagnosisError, VpmError
 from vpm.experiment import Experiment
 from vpm.model import Model
@@ -176,7 +177,7 @@ def test_names_that_leave_more_of_an_effort_than_it_is_explain_nothing(
         heavy = ranking(tried("rotor_inertia", {"axis.rotor.inertia": mass}, 0.9, evidence=900.0, probability=0.99))
         seen = replace(heavy, gaps={"axis.position": seen_by_observer(1.0, 0.1)})
         monkeypatch.setattr(diagnosing, "rank", lambda *_, seen=seen, **__: seen)
-        monkeypatch.setattr(by_ranking, "judged_anyhow", by_ranking.unmoved)
+        monkeypatch.setattr(by_ranking, "judged_anyhow", unmoved)
         words.append(diagnose(nominal(), records[0], records[1], names="ranking", workers=1).verdict)
     assert words == ["effect_found", "unexplained"]
 

@@ -19,7 +19,7 @@ from vpm.errors import DiagnosisError, ExperimentError
 from vpm.experiment import Experiment
 from vpm.model import Model
 from vpm.ranking.noise_model import Colour, NoiseModel, Structured, fitted_noise, log_student, scale_of, white_noise
-from vpm.ranking.observed import DAMPING, observer_gain
+from vpm.ranking.observed import DAMPING, Observed, Observer, observer_gain
 from vpm.ranking.settings import Settings
 
 Array = NDArray[np.float64]
@@ -75,6 +75,20 @@ def test_what_stands_out_of_white_noise_is_the_slow_error_below_it(level: float)
 def test_of_white_noise_hardly_anything_stands_out() -> None:
     values = np.random.default_rng(8).standard_normal(20_000)
     assert np.std(Structured.of([values]).part_of(values)) < 0.15
+
+
+@pytest.mark.parametrize("band", [1.0, 10.0])
+def test_noise_is_told_where_an_observer_follows_what_is_slow_of_it(band: float) -> None:
+    """It draws the model to slow noise, too, and leaves less of that."""
+    record, level = pushed(seed=4), 2e-3
+    shaken = level * np.random.default_rng(4).standard_normal(len(record.time))
+    record = record.with_channel("way.position", record["way.position"] + shaken, "m")
+    true = Model.from_toml(SLEDGE).with_parameters({"sledge.mass": MASS, "way.friction.viscous": OIL})
+    observed = Observed(true, [record], Settings())
+    residual, _ = observed.follow(true, true.theta, Observer(band))
+    pieces, passed = [residual[part, 0] for part in observed.parts], observed.passed(band, observed.parts, 0)
+    left = np.std(np.concatenate(pieces))
+    assert Structured.of(pieces, passed).noise == pytest.approx(left, rel=0.15)
 
 
 def _largest_correlation(errors: Array) -> float:

@@ -90,6 +90,7 @@ def verdict(
     mostly_open = (structured and share_left > MOSTLY_OPEN) or _is_described_better(rest)
     joints = Joints.of(gap, left, found.left)
     apart = joints.differ and not any(joints.has(entry, found.final.model) for entry in found.accepted)
+    # A play is hard to balance.
     spoiled = any(map(_is_worse_than_none, main)) and not found.final.model.added_joints
     if found.accepted and (spoiled or (not apart and not _is_explanation(found, observed, mostly_open))):
         leave = f"leave {100.0 * (observed if observed >= 1.0 else share_left):.0f} % of its mean square"
@@ -118,7 +119,7 @@ def verdict(
 
 
 def _is_worse_than_none(gap: ChannelGap) -> bool:
-    """Whether effects leave more of a measured effort than a model without any force would; a play is hard to balance."""
+    """Whether effects leave more of a measured effort than a model without any force would."""
     return gap.recalibrated < gap.signal < gap.after
 
 

@@ -135,8 +135,13 @@ class Look:
 
     def _noise_power(self, sizes: Sequence[float]) -> Array:
         """Share of the error power of each channel (m,) that is white noise."""
-        parts, residual = self._fitter.observed.parts, self.fitted.residual
-        quiet = [Structured.of([channel[part] for part in parts]).noise for channel in residual.T]
+        observed, band = self._fitter.observed, self.fitted.observer.band
+        quiet = [
+            Structured.of(
+                [channel[part] for part in observed.parts], observed.passed(band, observed.parts, place)
+            ).noise
+            for place, channel in enumerate(self.fitted.residual.T)
+        ]
         return np.asarray(np.minimum(np.array(quiet) / sizes, 1.0) ** 2)
 
     def _above_noise(self, squares: Sequence[Array]) -> tuple[Array, Array]:

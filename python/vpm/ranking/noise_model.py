@@ -102,23 +102,33 @@ class Structured:
     noise: float
 
     @classmethod
-    def of(cls, pieces: Sequence[Array]) -> Structured:
-        """That of a signal in pieces (n,)."""
-        places = np.concatenate([_places(len(piece)) for piece in pieces])
+    def of(cls, pieces: Sequence[Array], passed: Sequence[Array] | None = None) -> Structured:
+        """That of a signal in pieces (n,).
+
+        Parameters
+        ----------
+        pieces : sequence of ndarray
+        passed : sequence of ndarray, optional
+            Share of the power of white noise that is in each line of each piece, where not all of it is.
+        """
+        places = np.concatenate([frequencies(len(piece)) for piece in pieces])
         powers = np.concatenate([dct(piece, norm="ortho") ** 2 for piece in pieces])
+        shares = np.ones(len(powers)) if passed is None else np.concatenate(list(passed))
         edges, bands = _banded(places, powers)
+        white = np.maximum([np.mean(band) for band in _banded(places, shares)[1]], 1e-300)
         most = np.array([np.mean(band) * (1.0 + SURE * np.sqrt(2.0 / len(band))) for band in bands])
-        noise = max(float(np.min(most)), 1e-300)
-        return cls(edges, 1.0 - noise / np.maximum(most, noise), float(np.sqrt(noise)))
+        level = max(float(np.min(most / white)), 1e-300)
+        most = np.maximum(most, level * white)
+        return cls(edges, 1.0 - level * white / most, float(np.sqrt(level * np.mean(shares))))
 
     def part_of(self, piece: Array) -> Array:
         """That part of a piece of a signal (n,)."""
-        kept = self.kept[np.searchsorted(self.edges, _places(len(piece)), side="right")]
+        kept = self.kept[np.searchsorted(self.edges, frequencies(len(piece)), side="right")]
         return np.asarray(idct(dct(piece, norm="ortho") * kept, norm="ortho"))
 
 
-def _places(count: int) -> Array:
-    """Frequencies of the lines of a cosine transform, cycles per sample."""
+def frequencies(count: int) -> Array:
+    """Those of the lines of a cosine transform, cycles per sample."""
     return np.arange(count) / (2.0 * count)
 
 

@@ -17,7 +17,7 @@ from vpm.initial import initial_state
 from vpm.model import Model
 from vpm.observer import Record
 from vpm.ranking.firsts import STEP, Firsts, hidden_states
-from vpm.ranking.noise_model import NoiseModel, Parts
+from vpm.ranking.noise_model import NoiseModel, Parts, frequencies
 from vpm.ranking.settings import Settings
 from vpm.simulate import Setup
 
@@ -128,13 +128,29 @@ class Observed:
 
         left = np.zeros_like(self.motion)
         for end, record in zip(np.cumsum([len(one.time) for one in self.records]), self.records, strict=True):
-            place, rate = _gains(band, record.dt)
-            poles = [1.0, place + record.dt * rate - 2.0, 1.0 - place]
+            zeros, poles = _free_mass(band, record.dt)
             for column, channel in enumerate(record.channels):
                 if is_position(self.model, channel):
                     reading = record.readings[:, column] - record.readings[0, column]
-                    left[end - len(reading) : end, column] = lfilter([1.0, -2.0, 1.0], poles, reading)
+                    left[end - len(reading) : end, column] = lfilter(zeros, poles, reading)
         return left
+
+    def passed(self, band: float, parts: Parts, channel: int) -> list[Array]:
+        """Share of the power of white noise of a sensor that an observer leaves, at the lines of each part.
+
+        It draws the model to what is slow, noise among that: less than all of it is left there.
+        """
+        ends = np.cumsum([len(record.time) for record in self.records])
+        found = []
+        for part in parts:
+            record, count = self.records[int(np.searchsorted(ends, part.stop))], part.stop - part.start
+            if is_position(self.model, record.channels[channel]):
+                turns = np.exp(2j * np.pi * frequencies(count))
+                zeros, poles = (np.polyval(one, turns) for one in _free_mass(band, record.dt))
+                found.append(np.abs(zeros / poles) ** 2)
+            else:
+                found.append(np.ones(count))
+        return found
 
     def follow(
         self, model: Model, theta: Array, observer: Observer, columns: Sequence[int] = ()
@@ -246,6 +262,12 @@ def _gains(band: float, dt: float) -> tuple[float, float]:
     """By how much an error of a position moves it, and its rate."""
     turn = 2.0 * np.pi * band * dt
     return float(-np.expm1(-2.0 * DAMPING * turn)), turn**2 / dt
+
+
+def _free_mass(band: float, dt: float) -> tuple[list[float], list[float]]:
+    """What an observer leaves of the position of a mass on which nothing acts: zeros and poles as polynomials."""
+    place, rate = _gains(band, dt)
+    return [1.0, -2.0, 1.0], [1.0, place + dt * rate - 2.0, 1.0 - place]
 
 
 def _factor(model: Model, channel: str, theta: Array) -> float:
