@@ -94,6 +94,7 @@ def test_what_was_tried_in_vain_is_refused_with_its_numbers(named: vpm.Diagnosis
     reasons = {refused.name: refused.reason for refused in named.refused}
     assert reasons["spring"] == "it removes 3 % of the error power; 6 % are needed"
     assert "promised" in reasons["torque_ripple"]
+    assert "empirical_force" not in reasons
     assert not {"coulomb_friction", "bias_force"} & set(reasons)
     assert [(c.name, c.round, c.accepted) for c in named.candidates if c.accepted] == [
         ("coulomb_friction", 1, True),
@@ -239,6 +240,38 @@ def test_a_refit_that_simulates_worse_is_not_kept(monkeypatch: pytest.MonkeyPatc
     step = why.steps[1]
     assert step.values["axis.friction.coulomb"] == pytest.approx(8.8)
     assert step.std["axis.friction.coulomb"] > 0.0
+
+
+def test_effects_that_no_search_tries_are_asked_of_a_ranking(
+    monkeypatch: pytest.MonkeyPatch, records: list[Experiment]
+) -> None:
+    asked: list[object] = []
+
+    def rank(*_: object, effects: object, **__: object) -> Ranking:
+        asked.append(effects)
+        return ranking()
+
+    monkeypatch.setattr(diagnosing, "rank", rank)
+    diagnose(nominal(), records[0], records[1], effects=["quadratic_drag"], workers=1)
+    assert asked == [["quadratic_drag"]]
+    with pytest.raises(DiagnosisError, match=r'does not try quadratic_drag, .*: names="search" was asked for; ask'):
+        diagnose(nominal(), records[0], records[1], effects=["quadratic_drag"], names="search", workers=1)
+    monkeypatch.setattr(diagnosing, "why_not_ranked", lambda *_: "links bend")
+    with pytest.raises(DiagnosisError, match=r"does not try quadratic_drag, .*: links bend; ask for"):
+        diagnose(nominal(), records[0], records[1], effects=["quadratic_drag"], workers=1)
+    why = diagnose(
+        nominal(), records[0], records[1], effects=["quadratic_drag", "coulomb_friction"], limit=1, workers=1
+    )
+    assert "a search on balances of effort does not try quadratic_drag" in why.notes
+    assert [effect.name for effect in why.effects] == ["coulomb_friction"]
+
+
+def test_what_is_no_law_or_no_effect_is_not_tried(records: list[Experiment]) -> None:
+    for call in (diagnose, vpm.rank):
+        with pytest.raises(DiagnosisError, match='"empirical_force" is not among the effects that are tried'):
+            call(nominal(), records[0], effects=["empirical_force"])
+        with pytest.raises(DiagnosisError, match='no effect "coulomb_frction"; did you mean'):
+            call(nominal(), records[0], effects=["coulomb_frction"])
 
 
 def test_names_come_from_one_of_two_places(records: list[Experiment]) -> None:

@@ -102,12 +102,12 @@ def _tried(only: list[str] | None, without: list[str] | None) -> list[str] | Non
     DiagnosisError
         Nothing is left to try, or what is to be left out was never in.
     """
-    from vpm.catalogue import EFFECTS
+    from vpm.discrepancy.candidates import asked_for
     from vpm.errors import DiagnosisError, near_match
 
     if not without:
         return only or None
-    given = only or [effect.name for effect in EFFECTS.values() if effect.screened]
+    given = only or asked_for(None)
     for name in without:
         if name not in given:
             raise DiagnosisError(f'--without: "{name}" is not among the effects to try; {near_match(name, given)}')

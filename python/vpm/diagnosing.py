@@ -19,7 +19,7 @@ from vpm.discrepancy.apart import only_where_closed
 from vpm.discrepancy.beliefs import moved_far
 from vpm.discrepancy.by_ranking import free_joints, observed_gaps, searched, why_not_ranked
 from vpm.discrepancy.by_ranking import notes as notes_of
-from vpm.discrepancy.candidates import slow_speeds
+from vpm.discrepancy.candidates import asked_for, slow_speeds
 from vpm.discrepancy.choice import Accepted
 from vpm.discrepancy.confirmation import Data, Judged, is_clear, judge
 from vpm.discrepancy.contacts import with_told_contacts
@@ -46,7 +46,7 @@ from vpm.discrepancy.telling_apart import experiments as experiments_for
 from vpm.discrepancy.timing import in_time
 from vpm.discrepancy.told_apart import told_apart
 from vpm.discrepancy.verdict import is_negligible, verdict
-from vpm.errors import DiagnosisError, DivergedError, VpmError, near_match
+from vpm.errors import DiagnosisError, DivergedError, VpmError
 from vpm.experiment import Experiment
 from vpm.identify import InverseDynamicsProblem, OutputErrorProblem, gaps
 from vpm.identify.fit import fit_of
@@ -70,6 +70,7 @@ FOUND_HOLD = "commands run from sample to sample, as readings of a drive do; sim
 #: Which way the names came.
 RANKED = "names come from a ranking of the training records"
 SEARCHED = "names come from a search on balances of effort, for {reason}"
+NOT_SEARCHED = "a search on balances of effort does not try {effects}"
 STOPPED_LATE = "stopped by Ctrl-C before what is left, and what else would do, was examined"
 #: Said where names come from a search.
 UNSEEN = "the joint {joint} has no drive, so that no balance of effort sees what acts there, and nothing is said of it"
@@ -146,7 +147,7 @@ def diagnose(
     ExperimentError
         A channel is missing.
     """
-    _check_effects(effects)
+    asked_for(effects)
     if names not in get_args(Names):
         raise DiagnosisError(f'names come from a "search" or a "ranking", not from "{names}"')
     worker_count(workers)
@@ -263,6 +264,7 @@ def _ranking(
     names, effects, limit = by
     training, unseen = records
     if names != "ranking":
+        notes.extend(_not_searched(effects, f'names="{names}" was asked for'))
         return None
     reason = why_not_ranked(model, training)
     if not reason:
@@ -284,6 +286,7 @@ def _ranking(
         except (VpmError, ArithmeticError) as error:
             reason = f"a ranking fails: {error}"
     notes.append(SEARCHED.format(reason=reason))
+    notes.extend(_not_searched(effects, reason))
     notes.extend(UNSEEN.format(joint=joint) for joint in free_joints(model))
     return None
 
@@ -299,6 +302,7 @@ def _named(
 ) -> tuple[Search, tuple[Rivals, ...], bool]:
     """What is missing by a ranking or else by a search, what else would do, and whether Ctrl-C left that open."""
     _, effects, limit = by
+    screened = _searchable(effects)
     if ranking is not None:
         tell("measuring what was named on unseen records")
         found, ambiguous = searched(ranking, recalibrated, data, Settings(effects=limit), effects)
@@ -307,13 +311,13 @@ def _named(
         notes.extend([RANKED, *notes_of(found.accepted), *([STOPPED] if found.interrupted else [])])
         notes.extend(f"the ranking names {one.name} at {one.site}: {one.reason}" for one in lost)
         return found, ambiguous, False
-    found = search(recalibrated, data, effects, limit, tell, each)
+    found = search(recalibrated, data, screened, limit, tell, each)
     if found.interrupted:
         notes.append(STOPPED)
     tell("looking for what else would do in the place of each effect")
     nothing: tuple[Rivals, ...] = ()
     (found, ambiguous), late = _until_stopped(
-        partial(_settled, found, data, effects, limit, tell, each), (found, nothing)
+        partial(_settled, found, data, screened, limit, tell, each), (found, nothing)
     )
     return found, ambiguous, late
 
@@ -352,15 +356,29 @@ def _until_stopped(work: Callable[[], Found], nothing: Found) -> tuple[Found, bo
         return nothing, True
 
 
-def _check_effects(effects: Sequence[str] | None) -> None:
-    for name in effects or ():
-        if name not in EFFECTS:
-            raise DiagnosisError(f'the catalogue has no effect "{name}"; {near_match(name, EFFECTS)}')
-        if not EFFECTS[name].screened:
-            raise DiagnosisError(
-                f'"{name}" is not among the effects that a diagnosis tries, because it asks for a joint of its own; '
-                "give the model that joint with the effect and compare, or leave it out of effects="
-            )
+def _searchable(effects: Sequence[str] | None) -> Sequence[str] | None:
+    """Those of the effects asked for that a search tries; all of these if not given."""
+    return None if effects is None else [name for name in effects if EFFECTS[name].screened]
+
+
+def _not_searched(effects: Sequence[str] | None, reason: str) -> list[str]:
+    """What is to be said of effects that were asked for and that a search does not try.
+
+    Raises
+    ------
+    DiagnosisError
+        There are no others; ``reason`` says why no ranking tries them.
+    """
+    left_out = [name for name in effects or () if not EFFECTS[name].screened]
+    if not left_out:
+        return []
+    told = ", ".join(left_out)
+    if not _searchable(effects):
+        raise DiagnosisError(
+            f"a search on balances of effort does not try {told}, and a ranking, which does, is no way here: {reason}; "
+            "ask for other effects"
+        )
+    return [NOT_SEARCHED.format(effects=told)]
 
 
 def _records(

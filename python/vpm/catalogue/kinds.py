@@ -191,6 +191,11 @@ class EffectType:
     takes_effort: bool = False
 
     @property
+    def has_law(self) -> bool:
+        """Whether it is a law of its own; a form for what no law explains has no number that must be there."""
+        return any(not parameter.shape and not parameter.optional for parameter in self.parameters)
+
+    @property
     def has_sides(self) -> bool:
         """Whether it may sit on either side of a compliance or backlash; the motor side if nothing is said."""
         return self.site == "joint" and not self.motor_side_alone

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from vpm.catalogue import EFFECTS
 from vpm.discrepancy.ambiguity import Rivals
-from vpm.discrepancy.candidates import Candidate, Key, candidates
+from vpm.discrepancy.candidates import Candidate, Key, asked_for, candidates
 from vpm.discrepancy.choice import Accepted
 from vpm.discrepancy.confirmation import Data, Judged, Trial, judged_anyhow, measured, unmoved
 from vpm.discrepancy.diagnosis import OBSERVED, ChannelGap, RankedCandidate, RefusedEffect
@@ -332,8 +332,7 @@ def _refused(ranking: Ranking, outside: Mapping[Key, str], settings: RankingSett
 
 def _unpromising(ranking: Ranking, final: Judged, data: Data, effects: Sequence[str] | None) -> dict[Key, str]:
     """Effects that could be there and that no round of a ranking fitted, with the reason."""
-    names = tuple(EFFECTS) if effects is None else effects
-    offered = candidates(final.model, data.training, final.fit.residual, names, simulated=True)
+    offered = candidates(final.model, data.training, final.fit.residual, asked_for(effects), simulated=True)
     tried = {one.key for several in ranking.rounds for one in several}
     reason = "the first step of a fit promised less evidence than others did, or too little for a fit"
     return {candidate.key: reason for candidate in offered if candidate.key not in tried}

@@ -19,6 +19,7 @@ from vpm.discrepancy.structural import (
     stop_starts,
     structural_starts,
 )
+from vpm.errors import DiagnosisError, near_match
 from vpm.identify import InverseDynamicsProblem
 from vpm.model import Model
 
@@ -91,6 +92,26 @@ class Excitation:
     interval: float
     command: float
     input: int
+
+
+def asked_for(effects: Sequence[str] | None) -> tuple[str, ...]:
+    """Names of effects that are to be tried; those of all that have a law if not given.
+
+    Raises
+    ------
+    DiagnosisError
+        The catalogue has no such effect, or it has no law.
+    """
+    laws = tuple(name for name, effect in EFFECTS.items() if effect.has_law)
+    for name in effects or ():
+        if name not in EFFECTS:
+            raise DiagnosisError(f'the catalogue has no effect "{name}"; {near_match(name, EFFECTS)}')
+        if name not in laws:
+            raise DiagnosisError(
+                f'"{name}" is not among the effects that are tried, for it has no law of its own: it describes what no '
+                "effect explains; leave it out of effects="
+            )
+    return laws if effects is None else tuple(effects)
 
 
 def candidates(

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 
 from threadpoolctl import threadpool_limits
 
-from vpm.catalogue import EFFECTS
+from vpm.discrepancy.candidates import asked_for
 from vpm.discrepancy.side_by_side import Progress, SideBySide
 from vpm.errors import DiagnosisError
 from vpm.experiment import Experiment, as_records
@@ -67,7 +67,7 @@ def rank(
     Raises
     ------
     DiagnosisError
-        No record was given.
+        No record was given, or an effect is asked for that the catalogue does not have.
     VpmError
         A channel is missing, or the model runs away from the records.
 
@@ -81,7 +81,7 @@ def rank(
         raise DiagnosisError("no record was given; pass at least one experiment")
     with threadpool_limits(1, user_api="blas"):
         each = SideBySide(workers, progress)
-        names = tuple(EFFECTS if effects is None else effects)
+        names = asked_for(effects)
         search = Search(model, records, names, settings or Settings(), setup, each, tell or (lambda _: None))
         # What a validation record lacks is said before the search.
         return search.run(Observed(model, [] if validate is None else as_records(validate), search.settings, setup))
