@@ -86,9 +86,9 @@ def test_noise_is_told_where_an_observer_follows_what_is_slow_of_it(band: float)
     true = Model.from_toml(SLEDGE).with_parameters({"sledge.mass": MASS, "way.friction.viscous": OIL})
     observed = Observed(true, [record], Settings())
     residual, _ = observed.follow(true, true.theta, Observer(band))
-    pieces, passed = [residual[part, 0] for part in observed.parts], observed.passed(band, observed.parts, 0)
-    left = np.std(np.concatenate(pieces))
-    assert Structured.of(pieces, passed).noise == pytest.approx(left, rel=0.15)
+    left = np.std(np.concatenate([residual[part, 0] for part in observed.parts]))
+    (told,) = observed.structured(residual, band, observed.parts)
+    assert told.noise == pytest.approx(left, rel=0.15)
 
 
 def _largest_correlation(errors: Array) -> float:

@@ -13,14 +13,14 @@ from blind import reliability as proving
 from blind.answer import Answer, Named, Weighed
 from vpm.errors import DiagnosisError
 from vpm.ranking.calibration import Calibration, Round, calibrated, calibration_error, reliability, shipped
-from vpm.ranking.posterior import believed
+from vpm.ranking.posterior import robust_probabilities
 from vpm.ranking.settings import Settings
 
 
 def drawn(generator: np.random.Generator, truth: Calibration) -> Round:
     """A round in which what is missing is drawn with the probabilities of these numbers."""
     gains = tuple(map(float, generator.uniform(-2.0, 30.0, 4) + 20.0 * generator.integers(0, 2)))
-    place = int(generator.choice(6, p=believed(gains, truth.tempering, truth.astray)))
+    place = int(generator.choice(6, p=robust_probabilities(gains, truth.tempering, truth.astray)))
     return Round(gains, tuple(k == place for k in range(4)), missing=place != 4)
 
 
@@ -93,7 +93,7 @@ def test_a_class_is_right_if_it_holds_what_was_hidden() -> None:
     wrong = answer("spring", (1, "hysteresis", 90.0, True))
     assert [right for _, right in proving.stated([rival, wrong])] == [True, False]
     told = proving.restated([wrong], Calibration(0.1, 0.2))[0].named[0].probability
-    assert told == pytest.approx(believed([90.0 - Settings().odds], 0.1, 0.2)[0])
+    assert told == pytest.approx(robust_probabilities([90.0 - Settings().odds], 0.1, 0.2)[0])
 
 
 def test_half_of_the_seeds_tell_how_true_the_other_half_makes_probabilities(tmp_path: Path) -> None:

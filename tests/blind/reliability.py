@@ -11,7 +11,7 @@ from blind import score
 from blind.answer import Answer, Named, Weighed
 from vpm.plot.style import BLUE, SOFT, panels, styled
 from vpm.ranking.calibration import Calibration, Reliability, Round, calibrated, calibration_error, reliability
-from vpm.ranking.posterior import believed
+from vpm.ranking.posterior import robust_probabilities
 from vpm.ranking.settings import Settings
 
 if TYPE_CHECKING:
@@ -85,7 +85,7 @@ def _restated(answer: Answer, named: Named, calibration: Calibration) -> Named:
     several = _beside(answer, named)
     if named.probability is None or not several:
         return named
-    *shares, _, _ = believed(_gains(several), calibration.tempering, calibration.astray)
+    *shares, _, _ = robust_probabilities(_gains(several), calibration.tempering, calibration.astray)
     alike = {f"{named.name} at {named.site}", *named.alike}
     whole = sum(share for w, share in zip(several, shares, strict=True) if f"{w.name} at {w.site}" in alike)
     return replace(named, probability=float(whole))

@@ -155,7 +155,7 @@ class EffectType:
     requires : str or None
         Effect that has to be at the same site before this one is worth looking for: it is a correction of that one.
     screened : bool
-        Whether a search tries it; a ranking tries all.
+        Whether a search tries it; a ranking tries all that have a law.
     shows : Signature or None
         Where it shows, for an entry without a row in `vpm.catalogue.signature`.
     formula : Formula or None

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from vpm.errors import DiagnosisError
-from vpm.ranking.posterior import believed
+from vpm.ranking.posterior import robust_probabilities
 
 Array = NDArray[np.float64]
 
@@ -84,7 +84,7 @@ class Round:
 
     def likelihood(self, tempering: float, astray: float) -> float:
         """Probability that was given to what was true."""
-        *shares, none, other = believed(self.gains, tempering, astray)
+        *shares, none, other = robust_probabilities(self.gains, tempering, astray)
         told = [share for share, right in zip(shares, self.right, strict=True) if right]
         return float((sum(told) if told else other) if self.missing else none)
 

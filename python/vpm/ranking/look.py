@@ -15,7 +15,7 @@ from vpm.discrepancy.candidates import Key
 from vpm.model import Effect
 from vpm.ranking.fit import ASTRAY, Fitted, Fitter, Followed, View, bounded_step
 from vpm.ranking.judgement import Judgement
-from vpm.ranking.noise_model import SURE, Structured, white_noise
+from vpm.ranking.noise_model import SURE, white_noise
 from vpm.ranking.structure import Structure, approximate
 
 Array = NDArray[np.float64]
@@ -48,7 +48,10 @@ class Look:
         cost = fitter.cost(fitted.structure, fitted.residual, noise)
         self.fitted = replace(fitted, cost=cost)
         self.left = self._squares(fitted.residual)
-        self._quiet = self._noise_power(noise.deviations)
+        told = observed.structured(fitted.residual, fitted.observer.band, observed.parts)
+        self._quiet = np.minimum([one.noise for one in told] / np.array(noise.deviations), 1.0) ** 2
+        power, chance = self._above_noise(self.left)
+        self._clear = power > SURE * chance
         self.added = np.zeros(len(noise.tails)) if first is None else self._added(first.fitted.residual)
         self.explained = np.maximum(self._explained(approximate(fitted.structure.model)), self.added)
         self._curves: dict[tuple[str, ...], Array] = {}
@@ -129,20 +132,8 @@ class Look:
     def _rooms(self, left: Array | float = 1.0) -> list[bool]:
         """Whether effects could count that do most in each of the channels, of which so much is left."""
         size, beside = (np.sqrt(left / (power + 1.0)) for power in (self.explained, self.added))
-        power, chance = self._above_noise(self.left)
-        told = zip((power > SURE * chance).astype(float).tolist(), size.tolist(), beside.tolist(), strict=True)
+        told = zip(self._clear.astype(float).tolist(), size.tolist(), beside.tolist(), strict=True)
         return [Judgement(c, c, np.inf, a, b, 1.0).counts(self.settings) for c, a, b in told]
-
-    def _noise_power(self, sizes: Sequence[float]) -> Array:
-        """Share of the error power of each channel (m,) that is white noise."""
-        observed, band = self._fitter.observed, self.fitted.observer.band
-        quiet = [
-            Structured.of(
-                [channel[part] for part in observed.parts], observed.passed(band, observed.parts, place)
-            ).noise
-            for place, channel in enumerate(self.fitted.residual.T)
-        ]
-        return np.asarray(np.minimum(np.array(quiet) / sizes, 1.0) ** 2)
 
     def _above_noise(self, squares: Sequence[Array]) -> tuple[Array, Array]:
         """Error power of each channel (m,) above white noise, no less than chance may make of none, and that."""

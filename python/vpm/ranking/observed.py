@@ -17,7 +17,7 @@ from vpm.initial import initial_state
 from vpm.model import Model
 from vpm.observer import Record
 from vpm.ranking.firsts import STEP, Firsts, hidden_states
-from vpm.ranking.noise_model import NoiseModel, Parts, frequencies
+from vpm.ranking.noise_model import NoiseModel, Parts, Structured, frequencies
 from vpm.ranking.settings import Settings
 from vpm.simulate import Setup
 
@@ -135,21 +135,27 @@ class Observed:
                     left[end - len(reading) : end, column] = lfilter(zeros, poles, reading)
         return left
 
-    def passed(self, band: float, parts: Parts, channel: int) -> list[Array]:
+    def structured(self, residual: Array, band: float, parts: Parts) -> list[Structured]:
+        """What stands out of the noise of each channel of a residual (N, m) that an observer leaves in these parts."""
+        return [
+            Structured.of([values[part] for part in parts], self._passed(band, parts, channel))
+            for values, channel in zip(residual.T, self.records[0].channels, strict=True)
+        ]
+
+    def _passed(self, band: float, parts: Parts, channel: str) -> list[Array]:
         """Share of the power of white noise of a sensor that an observer leaves, at the lines of each part.
 
         It draws the model to what is slow, noise among that: less than all of it is left there.
         """
+        if not is_position(self.model, channel):
+            return [np.ones(part.stop - part.start) for part in parts]
         ends = np.cumsum([len(record.time) for record in self.records])
         found = []
         for part in parts:
-            record, count = self.records[int(np.searchsorted(ends, part.stop))], part.stop - part.start
-            if is_position(self.model, record.channels[channel]):
-                turns = np.exp(2j * np.pi * frequencies(count))
-                zeros, poles = (np.polyval(one, turns) for one in _free_mass(band, record.dt))
-                found.append(np.abs(zeros / poles) ** 2)
-            else:
-                found.append(np.ones(count))
+            record = self.records[int(np.searchsorted(ends, part.stop))]
+            turns = np.exp(2j * np.pi * frequencies(part.stop - part.start))
+            zeros, poles = (np.polyval(one, turns) for one in _free_mass(band, record.dt))
+            found.append(np.abs(zeros / poles) ** 2)
         return found
 
     def follow(

@@ -28,7 +28,7 @@ def probabilities(gains: Sequence[float], tempering: float) -> Array:
     return np.asarray(shares / np.sum(shares))
 
 
-def believed(gains: Sequence[float], tempering: float, astray: float) -> Array:
+def robust_probabilities(gains: Sequence[float], tempering: float, astray: float) -> Array:
     """Probabilities of each of several effects, of none, and that what is missing was not among them (k + 2,).
 
     Law: a mixture with what knows nothing, as in robust statistics (J. Tukey, *Contributions to Probability and

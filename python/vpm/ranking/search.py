@@ -21,7 +21,7 @@ from vpm.ranking.judgement import Judgement
 from vpm.ranking.look import Look
 from vpm.ranking.noise_model import fitted_noise
 from vpm.ranking.observed import Observed, Observer
-from vpm.ranking.posterior import believed
+from vpm.ranking.posterior import robust_probabilities
 from vpm.ranking.proposals import proposals
 from vpm.ranking.race import raced
 from vpm.ranking.result import Ranked, Ranking
@@ -296,7 +296,7 @@ class Search:
         several: dict[Key, Ranked] = {}
         told = [trial for trial in tried if np.isfinite(trial.evidence)]
         gains = [trial.evidence - self.settings.odds for trial in told]
-        *shares, _, _ = believed(gains, self.settings.tempering, self.settings.astray)
+        *shares, _, _ = robust_probabilities(gains, self.settings.tempering, self.settings.astray)
         probability = {id(trial): float(share) for trial, share in zip(told, shares, strict=True)}
         labels = {trial.label: probability[id(trial)] for trial in told}
         for trial in sorted(tried, key=lambda trial: (trial is not best, trial.left)):

@@ -35,8 +35,10 @@ def gaps(held_out: Observed, stages: tuple[Model, Model, Model], band: float) ->
     bare = _left(held_out, found, without_sizes(found, found.theta, approximate(found)), band)
     signals = (before, recalibrated, after, held_out.motion, bare)
     levels = np.array([np.sqrt(np.mean(np.concatenate([one[part] for part in parts]) ** 2, axis=0)) for one in signals])
-    passed = [held_out.passed(band, parts, place) for place in range(after.shape[1])]
-    shares, noise = _above_noise(recalibrated, after, parts, passed)
+    unknown = np.full(after.shape[1], np.nan)
+    shares, noise = unknown, unknown
+    if np.all(np.isfinite(recalibrated)):
+        shares, noise = _above_noise(recalibrated, after, parts, held_out.structured(recalibrated, band, parts))
     names = held_out.records[0].channels
     units = map(stages[0].channel_unit, names)
     return {
@@ -63,15 +65,8 @@ def _left(observed: Observed, model: Model, theta: Array, band: float) -> Array:
     return residual
 
 
-def _above_noise(before: Array, after: Array, parts: Parts, passed: Sequence[Sequence[Array]]) -> tuple[Array, Array]:
-    """Share of the power above the noise of each channel (m,) that is left of it, and the noise; NaN if not known."""
-    if not np.all(np.isfinite(before)):
-        unknown = np.full(before.shape[1], np.nan)
-        return unknown, unknown
-    filters = [
-        Structured.of([channel[part] for part in parts], several)
-        for channel, several in zip(before.T, passed, strict=True)
-    ]
+def _above_noise(before: Array, after: Array, parts: Parts, filters: Sequence[Structured]) -> tuple[Array, Array]:
+    """Share of the power above the noise of each channel (m,) that is left of it, and the noise."""
 
     def power(one: Structured, channel: Array) -> float:
         return sum(float(np.sum(one.part_of(channel[part]) ** 2)) for part in parts)
