@@ -133,7 +133,8 @@ def machines(draw: st.DrawFn) -> dict[str, Any]:
         ("joint", name): {"E": effort[name], "C": coordinate[name]} for name in joints
     }
     units |= {(kind, name): {} for kind in ("body", "link", "world") for name in (*bodies, "world")}
-    units |= {("actuator", name): {"U": unit} for name, unit in zip(actuators, commands, strict=False)}
+    moved = zip(actuators, driven, commands, strict=False)
+    units |= {("actuator", name): {"U": unit, "C": coordinate[joint]} for name, joint, unit in moved}
     units |= {("sensor", f"s{i}"): {"S": coordinate[joint]} for i, joint in enumerate(read)}
     content = {
         "name": draw(st.text(min_size=1, max_size=10)),

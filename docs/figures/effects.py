@@ -71,6 +71,7 @@ SHOWN: Mapping[str, dict[str, float]] = {
     "dead_zone": {"width": 0.25},
     "saturation": {"limit": 1.5},
     "actuator_lag": {"time_constant": 0.02},
+    "drive_friction": {"driving": 0.15, "driven": 0.1, "transition_velocity": 0.02},
     "sensor_offset": {"value": 0.06},
     "sensor_gain": {"value": 1.08},
     "sensor_delay": {"time": 0.005},

@@ -4,7 +4,7 @@ mod course;
 mod record;
 mod sample_by_sample;
 
-use crate::actuator::{Drive, Target};
+use crate::actuator::{Actuator, Drive, Target};
 use crate::description::Description;
 use crate::error::{DriveError, Error, Result};
 use crate::motion::JointMotion;
@@ -60,10 +60,7 @@ pub fn inverse_dynamics(
     if let Some((beam, _)) = description.beams.iter().zip(description.elastic()).find(|(_, len)| **len > 0) {
         return Err(Error::Flexible { beam: beam.name.clone() });
     }
-    if let Some(own) = description.actuators.iter().find(|actuator| !matches!(actuator.drive, Drive::Ideal(_))) {
-        let (actuator, drive) = (own.name.clone(), own.drive.name());
-        return Err(DriveError::Effort { actuator, drive }.into());
-    }
+    description.actuators.iter().try_for_each(by_command)?;
     let (joints, Motion { position, velocity, acceleration, inputs, time_step }) = (description.n_joints(), motion);
     let motion = JointMotion { position, velocity, acceleration };
     motion.expect(joints)?;
@@ -93,10 +90,8 @@ pub fn delivered(
     sensitivities: &[usize],
 ) -> Result<(Vec<f64>, Vec<f64>)> {
     for actuator in &description.actuators {
+        by_command(actuator)?;
         let (name, drive) = (actuator.name.clone(), actuator.drive.name());
-        if !matches!(actuator.drive, Drive::Ideal(_)) {
-            return Err(DriveError::Effort { actuator: name, drive }.into());
-        }
         if let Target::Line(line) = actuator.on {
             let found = format!("the line `{}`", description.lines[line].name);
             return Err(DriveError::Target { actuator: name, drive, found, needed: "a joint" }.into());
@@ -140,6 +135,16 @@ pub fn required(
 fn check_parameters(description: &Description, theta: &[f64], sensitivities: &[usize]) -> Result<()> {
     check_variables(theta, sensitivities)?;
     description.check_values(theta)
+}
+
+/// Whether the effort of an actuator follows from its command alone.
+fn by_command(actuator: &Actuator<usize>) -> Result<()> {
+    let drive = match (&actuator.drive, &actuator.friction) {
+        (Drive::Ideal(_), None) => return Ok(()),
+        (Drive::Ideal(_), Some(_)) => "ideal with friction",
+        (drive, _) => drive.name(),
+    };
+    Err(DriveError::Effort { actuator: actuator.name.clone(), drive }.into())
 }
 
 /// The drives of a machine with their inputs.

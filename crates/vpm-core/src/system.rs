@@ -67,6 +67,8 @@ pub struct Dynamics<S> {
     /// What enters each actuator's lag, then the pressure of each logged supply; held constant over a sample interval.
     inputs: Vec<S>,
     forces: Vec<S>,
+    /// The same before the friction of each of them.
+    driven: Vec<S>,
     /// Efforts of the actuators on the joints.
     efforts: Vec<S>,
     /// Forces of the actuators on the lines.
@@ -78,7 +80,7 @@ pub struct Dynamics<S> {
     /// Whether all actuators give efforts by their commands alone, and nothing feeds them.
     ideal: bool,
     shown: Shown<S>,
-    /// Resistance of each actuator's seals in the place of their friction, where an iteration matrix asks for it.
+    /// Resistance of each actuator's seals and friction in the place of these, where an iteration matrix asks for it.
     seals: Vec<Option<S>>,
     loads: Vec<S>,
     /// Contacts, bushings and load cells.
@@ -103,10 +105,11 @@ impl<S: Scalar> Dynamics<S> {
             data: Data::new(&model),
             inputs,
             internal: actuators.iter().map(Actuator::n_states).sum::<usize>() + of_supplies,
-            ideal: supplies.is_empty() && actuators.iter().all(|actuator| actuator.drive.is_direct()),
+            ideal: supplies.is_empty() && actuators.iter().all(Actuator::is_direct),
             shown: Shown::new(&actuators, &supplies),
             seals: vec![None; actuators.len()],
             forces: zeros(actuators.len()),
+            driven: zeros(actuators.len()),
             efforts: zeros(model.n_joints()),
             tensions: zeros(model.lines().len()),
             pulls: actuators.iter().any(|actuator| matches!(actuator.on, Target::Line(_))),

@@ -170,6 +170,9 @@ class EffectType:
         Whether mechanics alone gives its law, so that no machine differs from it by its shape.
     takes_effort : bool
         Whether it does nothing at a joint on which no actuator acts itself.
+    beside_others : bool
+        Whether a diagnosis looks for it at an actuator that shares its joint with others alone: elsewhere it is what an
+        effect of the joint is.
     """
 
     name: str
@@ -189,6 +192,7 @@ class EffectType:
     contains: tuple[str, ...] = ()
     exact: bool = False
     takes_effort: bool = False
+    beside_others: bool = False
 
     @property
     def has_law(self) -> bool:
@@ -199,6 +203,11 @@ class EffectType:
     def has_sides(self) -> bool:
         """Whether it may sit on either side of a compliance or backlash; the motor side if nothing is said."""
         return self.site == "joint" and not self.motor_side_alone
+
+    @property
+    def rubs(self) -> bool:
+        """Whether it turns round with the motion, within a transition velocity."""
+        return any(parameter.name == "transition_velocity" for parameter in self.parameters)
 
     @property
     def adds_inertia(self) -> bool:

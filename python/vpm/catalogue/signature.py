@@ -190,6 +190,11 @@ SIGNATURES: Mapping[str, Signature] = MappingProxyType(
             "Lines through zero over the effort, one for each direction",
             "The same slow motion forward and back under several loads",
         ),
+        "drive_friction": Signature(
+            ("effort",),
+            "Lines through zero over the effort of one actuator, one for each direction",
+            "The same slow motion forward and back at several efforts of this actuator",
+        ),
         "lugre_friction": Signature(
             ("position", "velocity"),
             "A loop over short ways, and over long ones levels with a hump close to rest",

@@ -1,7 +1,7 @@
-"""Effects of a joint that a ranking tries, and no search.
+"""Effects of a joint or a drive that a ranking tries, and no search.
 
-Drag, a stiffening spring, a ripple of the current, and friction that depends on the place, on the load, on the time
-since a cold start and on the way of bristles. The sources stand at the laws in the core.
+Drag, a stiffening spring, a ripple of the current, and friction that depends on the place, on the load, on the effort
+of one drive, on the time since a cold start and on the way of bristles. The sources stand at the laws in the core.
 """
 
 from __future__ import annotations
@@ -128,6 +128,45 @@ LOAD_DEPENDENT_FRICTION = EffectType(
     screened=False,
     motor_side_alone=True,
     takes_effort=True,
+)
+
+DRIVE_FRICTION = EffectType(
+    name="drive_friction",
+    site="actuator",
+    group="friction",
+    parameters=(
+        size(
+            "driving",
+            "friction.driving",
+            "1",
+            "one",
+            "share of the effort of this actuator that is lost where it drives",
+            physical=_SHARE,
+            linear=False,
+        ),
+        size(
+            "driven",
+            "friction.driven",
+            "1",
+            "one",
+            "share of its effort that brakes besides where it is driven",
+            physical=_SHARE,
+            linear=False,
+        ),
+        transition("friction.transition_velocity"),
+    ),
+    law=(
+        "tau = -|u| s (driving + driven + (driving - driven) s sign(u))/2, s = tanh(v/transition_velocity), u the"
+        " effort of this actuator, each share within 0.95"
+    ),
+    sentence=(
+        "{at} rubs in proportion to its own effort, as seals under pressure do: {driving} of it is lost where it"
+        " drives, and {driven} of it brakes where it is driven."
+    ),
+    impossible="a negative share would give out more power than goes in",
+    confused_with={},
+    screened=False,
+    beside_others=True,
 )
 
 CURRENT_RIPPLE = EffectType(
@@ -277,6 +316,7 @@ UNSCREENED_EFFECTS = (
     CUBIC_SPRING,
     POSITION_DEPENDENT_FRICTION,
     LOAD_DEPENDENT_FRICTION,
+    DRIVE_FRICTION,
     CURRENT_RIPPLE,
     LUGRE_FRICTION,
     WARMING_FRICTION,

@@ -214,11 +214,10 @@ def _candidate(effect: EffectType, site: str, model: Model, data: InverseDynamic
 
 def _periodic(effect: EffectType, site: str, data: InverseDynamicsProblem, joint: str, residual: Array) -> Candidate:
     """Waves over the way of a joint; what rubs turns round with the motion, a share of the effort with that."""
-    rubs = any(parameter.name == "transition_velocity" for parameter in effect.parameters)
     where, rate, values = _over_way(data, joint, residual)
-    if rubs or effect.takes_effort:
-        values = values * (np.sign(rate) if rubs else _applied(data, joint))
-    periods = _ripple_periods(where, values, 0.5 if rubs else 2.0)
+    if effect.rubs or effect.takes_effort:
+        values = values * (np.sign(rate) if effect.rubs else _applied(data, joint))
+    periods = _ripple_periods(where, values, 0.5 if effect.rubs else 2.0)
     bounds = {"period": (min(periods) / 1.5, max(periods) * 1.5)}
     return Candidate(effect, site, tuple({"period": p} for p in periods), bounds)
 

@@ -57,6 +57,9 @@ def sites_worth_trying(effect: EffectType, model: Model) -> tuple[str, ...]:
     Play is looked for where an actuator drives the joint; elsewhere it needs a joint of its own.
     """
     sites = model.sites(effect.site)
+    if effect.beside_others:
+        moved = {name: set(model.joints_of_actuator(name)) for name in model.actuators}
+        return tuple(site for site in sites if any(moved[site] & moved[name] for name in moved if name != site))
     if effect.name == "link_flexibility":
         stiff = tuple(site for site in sites if model.levels.get(site, "rigid") == "rigid")
         if not model.core.n_elastic:

@@ -62,7 +62,7 @@ class Response:
 
 def has_own_drives(model: Model) -> bool:
     """Whether the effort of any drive does not follow from its command alone."""
-    return any(model.actuator_type(name) != "ideal" for name in model.actuators)
+    return not all(model.follows_command(name) for name in model.actuators)
 
 
 def bends(model: Model) -> bool:
@@ -94,8 +94,9 @@ def check_along(model: Model, joints: Sequence[str]) -> None:
     hidden += [name for name in model.joints if name not in joints]
     for name in model.actuators:
         kind, line = model.actuator_type(name), model.line_of_actuator(name)
-        if kind != "ideal" or line is not None:
-            what = f"has type {kind}" if kind != "ideal" else f"acts on the line {line}"
+        follows = model.follows_command(name)
+        if not follows or line is not None:
+            what = f"acts on the line {line}" if follows else f"has type {kind}{'' if kind != 'ideal' else ' and rubs'}"
             raise SimulationError(
                 f"no effort can be balanced along a motion that leaves {', '.join(hidden)} free while the actuator "
                 f"{name} {what}; make the links rigid with model.at('rigid'), measure every joint, or identify in the "

@@ -18,7 +18,7 @@ from vpm.model.connection_compile import (
     mount_json,
 )
 from vpm.model.controller import ComputedTorque, Controller
-from vpm.model.drive_compile import drive_json, supply_json
+from vpm.model.drive_compile import drive_json, optional_json, supply_json
 from vpm.model.effect_compile import EFFECT_SITES, effect_json
 from vpm.model.effects import effects_of
 from vpm.model.omissions import omissions
@@ -175,6 +175,7 @@ def _actuator(name: str, structure: Structure, index: Mapping[str, int]) -> dict
         "dead_zone": index.get(f"{name}.dead_zone.width"),
         "saturation": index.get(f"{name}.saturation.limit"),
         "lag": index.get(f"{name}.lag.time_constant"),
+        "friction": optional_json(f"{name}.friction", ("driving", "driven", "transition_velocity"), index),
     }
 
 

@@ -124,13 +124,13 @@ class Components(DriveComponents):
     def is_linearly_stiff(self) -> bool:
         """Whether it has flexible links, and nothing beside them that is stiff in ways of its own.
 
-        Stiff in ways of their own are contacts, bushings, ends of ways, backlash, and drives other than ideal and
-        sampled ones.
+        Stiff in ways of their own are contacts, bushings, ends of ways, backlash, and drives that rub or are other than
+        ideal and sampled ones.
         """
         document = self._checked.document
         effects = {effect.type for effect in document.effects}
         elastic = any(level != "rigid" for level in self.levels.values())
-        direct = all(entry.type in DIRECT for entry in document.actuators.values())
+        direct = all(entry.type in DIRECT and not self._rubs(name) for name, entry in document.actuators.items())
         return elastic and direct and not document.contacts and not document.bushings and not effects & IMPACTS
 
     @property

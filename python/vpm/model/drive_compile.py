@@ -27,14 +27,14 @@ def supply_json(name: str, supply: Supply, index: Index) -> dict[str, Any]:
             "bulk_modulus": index[f"{name}.oil.bulk_modulus"],
             "vapour_pressure": index[f"{name}.oil.vapour_pressure"],
             "air": None if supply.oil.air is None else air,
-            "more_air": _optional(f"{name}.entrained_air", tuple(air), index),
+            "more_air": optional_json(f"{name}.entrained_air", tuple(air), index),
         },
         "source": {"sagging": sagging} if supply.source == "sagging" else supply.source,
-        "drop": _optional(f"{name}.drop", ("resistance", "time_constant"), index),
+        "drop": optional_json(f"{name}.drop", ("resistance", "time_constant"), index),
     }
 
 
-def _optional(way: str, keys: tuple[str, ...], index: Index) -> dict[str, int] | None:
+def optional_json(way: str, keys: tuple[str, ...], index: Index) -> dict[str, int] | None:
     """What an effect adds, if it is there."""
     return {key: index[f"{way}.{key}"] for key in keys} if f"{way}.{keys[0]}" in index else None
 

@@ -86,6 +86,21 @@ class DriveComponents:
         """
         return self._checked.document.actuators[self._known(actuator, self.actuators, "actuator")].type
 
+    def follows_command(self, actuator: str) -> bool:
+        """Whether the effort of an actuator follows from its command alone, sample by sample.
+
+        Raises
+        ------
+        ModelError
+            There is no such actuator.
+        """
+        return self.actuator_type(actuator) == "ideal" and not self._rubs(actuator)
+
+    def _rubs(self, actuator: str) -> bool:
+        """Whether an actuator has friction of its own."""
+        own = (EFFECTS[e.type] for e in self._checked.document.effects if e.at == actuator)
+        return any(effect.site == "actuator" and effect.rubs for effect in own)
+
     def beyond_tables(self, time: Array, columns: Mapping[str, Array]) -> tuple[str, ...]:
         """Sentences on where a run left the tables of its drives; none as a rule.
 

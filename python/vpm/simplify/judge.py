@@ -191,4 +191,4 @@ def reference_mode(model: Model, experiments: Sequence[Experiment], against: str
 
 
 def _is_ideal(model: Model) -> bool:
-    return all(model.actuator_type(name) == "ideal" for name in model.actuators)
+    return all(model.follows_command(name) for name in model.actuators)

@@ -244,9 +244,10 @@ def check_balance(model: Model) -> None:
     """
     for name in model.actuators:
         kind = model.actuator_type(name)
-        if kind != "ideal":
+        if not model.follows_command(name):
+            what = f"type {kind}" if kind != "ideal" else "with friction of its own"
             raise SimulationError(
-                f"mode 'inverse_dynamics' gives efforts sample by sample, but that of {name} (type {kind}) does not "
+                f"mode 'inverse_dynamics' gives efforts sample by sample, but that of {name} ({what}) does not "
                 "follow from its command alone; use the mode 'free_run' or 'restarts', or describe it as ideal"
             )
     if model.core.n_elastic:

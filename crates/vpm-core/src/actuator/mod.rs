@@ -27,7 +27,7 @@ pub use saturation::Saturation;
 pub use spring_damper::SpringDamper;
 pub use table::TableDrive;
 
-use crate::effect::Domain;
+use crate::effect::{Domain, Law, LoadDependentFriction};
 use crate::scalar::Scalar;
 
 /// What an actuator acts on.
@@ -40,7 +40,7 @@ pub enum Target {
     Line(usize),
 }
 
-/// An actuator: delay, dead zone, saturation, lag, drive, in this order; links that are not there pass their input on.
+/// An actuator: delay, dead zone, saturation, lag, drive, friction, in this order; links that are not there pass their input on.
 ///
 /// Checked: see each link.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -64,6 +64,9 @@ pub struct Actuator<P> {
     /// Time to follow.
     #[serde(default = "none")]
     pub lag: Option<Lag<P>>,
+    /// What of its effort is lost where it moves: seals under pressure, a gear of its own.
+    #[serde(default = "none")]
+    pub friction: Option<LoadDependentFriction<P>>,
 }
 
 /// A missing link (the derive would ask for `P: Default`).
@@ -82,6 +85,7 @@ impl<P> Actuator<P> {
             dead_zone: self.dead_zone.as_ref().map(|link| link.map(f)),
             saturation: self.saturation.as_ref().map(|link| link.map(f)),
             lag: self.lag.as_ref().map(|link| link.map(f)),
+            friction: self.friction.as_ref().map(|link| link.map(f)),
         }
     }
 
@@ -92,12 +96,18 @@ impl<P> Actuator<P> {
         domains.extend(self.dead_zone.as_ref().map(|link| (&link.width, Domain::NonNegative)));
         domains.extend(self.saturation.as_ref().map(|link| (&link.limit, Domain::Positive)));
         domains.extend(self.lag.as_ref().map(|link| (&link.time_constant, Domain::Positive)));
+        domains.extend(self.friction.as_ref().into_iter().flat_map(LoadDependentFriction::domains));
         domains
     }
 
     /// Names of its states, in their order: that of the lag, then those of the drive.
     pub fn states(&self) -> impl Iterator<Item = &'static str> {
         self.lag.as_ref().map(|_| "lag").into_iter().chain(self.drive.states().iter().copied())
+    }
+
+    /// Whether its effort follows from its input alone, without states of the drive and motion.
+    pub fn is_direct(&self) -> bool {
+        self.drive.is_direct() && self.friction.is_none()
     }
 
     /// Number of its states.
@@ -127,5 +137,19 @@ impl<S: Scalar> Actuator<S> {
             input = saturation.apply(input);
         }
         input
+    }
+
+    /// What its friction takes off a `force` of its drive where it moves with `rate`.
+    ///
+    /// Law: [`LoadDependentFriction`] of this drive alone, whatever else moves the joint.
+    #[inline]
+    pub fn friction(&self, force: S, rate: S) -> S {
+        self.friction.as_ref().map_or_else(S::zero, |law| -law.effort_under(S::zero(), rate, force))
+    }
+
+    /// Its resistance there, the chord from rest.
+    #[inline]
+    pub fn friction_chord(&self, force: S, rate: S) -> S {
+        self.friction.as_ref().map_or_else(S::zero, |law| law.resistance_per_load(rate, force) * force.abs())
     }
 }

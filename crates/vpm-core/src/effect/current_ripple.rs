@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use super::{LARGEST_SHARE, Law, law};
+use super::{Law, law, within_largest};
 use crate::scalar::Scalar;
 
 law! {
@@ -32,8 +32,8 @@ impl<S: Scalar> Law<S> for CurrentRipple<S> {
 
     #[inline]
     fn share_of_load(&self, q: S, _: S, u: S) -> S {
-        let ((sine, cosine), limit) = ((q * TAU / self.period).sin_cos(), S::from_f64(LARGEST_SHARE));
-        let share = (self.cosine * cosine + self.sine * sine).max(-limit).min(limit);
+        let (sine, cosine) = (q * TAU / self.period).sin_cos();
+        let share = within_largest(self.cosine * cosine + self.sine * sine);
         u.if_negative(|| -share, || share)
     }
 }

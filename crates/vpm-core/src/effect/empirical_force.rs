@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use serde::Deserialize;
 
-use super::{Domain, LARGEST_SHARE, Law, tanh_ratio};
+use super::{Domain, Law, tanh_ratio, within_largest};
 use crate::scalar::Scalar;
 
 /// Empirical force of a joint: a short sum of terms that a fit chose. It describes a record; it explains nothing.
@@ -197,8 +197,7 @@ impl<S: Scalar> Law<S> for EmpiricalForce<S> {
     #[inline]
     fn share_of_load(&self, q: S, v: S, _: S) -> S {
         let dry = times(self.load_dry, (v / self.transition_velocity).tanh());
-        let limit = S::from_f64(LARGEST_SHARE);
-        (dry + self.harmonics(q, self.load_cosine, self.load_sine)).max(-limit).min(limit)
+        within_largest(dry + self.harmonics(q, self.load_cosine, self.load_sine))
     }
 
     #[inline]

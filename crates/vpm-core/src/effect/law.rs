@@ -3,7 +3,14 @@
 use crate::scalar::Scalar;
 
 /// Largest share of a joint's load that one law takes: beyond it, the effort that a motion needs would not be unique.
-pub(super) const LARGEST_SHARE: f64 = 0.95;
+const LARGEST_SHARE: f64 = 0.95;
+
+/// A share of a joint's load within what one law takes either way.
+#[inline]
+pub(super) fn within_largest<S: Scalar>(share: S) -> S {
+    let largest = S::from_f64(LARGEST_SHARE);
+    share.max(-largest).min(largest)
+}
 
 /// An effort on a joint as a function of its coordinate q (m or rad), its velocity v and the effort u of the actuators on it (N or N m).
 ///

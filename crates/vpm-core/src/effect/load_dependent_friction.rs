@@ -1,6 +1,6 @@
 //! Dry friction of a gear, in proportion to what it transmits.
 
-use super::{LARGEST_SHARE, Law, law, tanh_ratio};
+use super::{Law, law, tanh_ratio, within_largest};
 use crate::scalar::Scalar;
 
 law! {
@@ -33,8 +33,7 @@ impl<S: Scalar> Law<S> for LoadDependentFriction<S> {
     #[inline]
     fn share_of_load(&self, _: S, v: S, u: S) -> S {
         let direction = (v / self.transition_velocity).tanh();
-        let limit = S::from_f64(LARGEST_SHARE);
-        (self.level(direction, u) * direction).max(-limit).min(limit)
+        within_largest(self.level(direction, u) * direction)
     }
 
     #[inline]

@@ -56,7 +56,7 @@ pub use viscous_friction::ViscousFriction;
 pub use warming_friction::WarmingFriction;
 
 use crate::scalar::{Dual, Scalar};
-use law::{LARGEST_SHARE, family, law};
+use law::{family, law, within_largest};
 
 family! {
     /// Any effect that puts an effort on a joint as a function of its coordinate and velocity.

@@ -20,7 +20,7 @@ pub(crate) fn check_step(description: &Description, theta: &[f64], stepping: Ste
     if stepping.method == Method::Additive {
         return check_additive(description, theta, stepping, state);
     }
-    if description.actuators.iter().all(|actuator| actuator.drive.is_direct()) {
+    if description.actuators.iter().all(|actuator| actuator.is_direct()) {
         return check_structure(description, theta, stepping, state, &[]);
     }
     let explicit = matches!(stepping.method, Method::Rk4 | Method::SemiImplicit);
@@ -40,7 +40,7 @@ pub(crate) fn check_step(description: &Description, theta: &[f64], stepping: Ste
 
 /// As [`check_step`] for additive steps, by the derivative of the step itself: contacts, bushings and drives are explicit in them.
 fn check_additive(description: &Description, theta: &[f64], stepping: Stepping, state: &[f64]) -> Result<()> {
-    let direct = description.actuators.iter().all(|actuator| actuator.drive.is_direct());
+    let direct = description.actuators.iter().all(|actuator| actuator.is_direct());
     let free = description.contacts.is_empty() && description.bushings.is_empty();
     if direct && free || state.iter().any(|number| !number.is_finite()) {
         return Ok(());

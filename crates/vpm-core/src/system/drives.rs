@@ -164,12 +164,15 @@ impl<S: Scalar> Dynamics<S> {
                     shown.hydraulics[cylinders] =
                         [action.spool, pressures.a, pressures.b, flows.into_a, flows.out_of_b];
                     (at, cylinders) = (own.end, cylinders + 1);
-                    let seal = match seals[number] {
-                        Some(resistance) => -(resistance * rate),
-                        None => law.cylinder.seal.force(rate),
-                    };
+                    let seal = if seals[number].is_none() { law.cylinder.seal.force(rate) } else { S::zero() };
                     action.force + seal
                 }
+            };
+            self.driven[number] = force;
+            let force = match seals[number] {
+                Some(resistance) => force - resistance * moving()[1],
+                None if actuator.friction.is_some() => force - actuator.friction(force, moving()[1]),
+                None => force,
             };
             self.forces[number] = force;
             match actuator.on {

@@ -375,7 +375,7 @@ impl Dynamics<Recorded> {
             return Matrix::Entries(matrix, dim);
         }
         let mut seals = vec![None; self.seals.len()];
-        self.seal_chords(q, v, &mut seals);
+        self.drive_chords(q, v, &mut seals);
         self.chords(x, &resistances, &seals, &memories)
     }
 

@@ -59,20 +59,21 @@ impl<S: Scalar> Dynamics<S> {
         found
     }
 
-    /// Writes the resistances of the seals, N s/m, that stand for their friction in an iteration matrix at (q, v), after [`Dynamics::rhs`] there.
-    pub(super) fn seal_chords(&self, q: &[S], v: &[S], chords: &mut [Option<S>]) {
-        let sealed = |actuator: &Actuator<S>| match &actuator.drive {
-            Drive::Hydraulic(law) => law.cylinder.seal.is_there(),
-            _ => false,
+    /// Writes the resistances that stand for the friction of seals and drives in an iteration matrix at (q, v), after [`Dynamics::rhs`]
+    /// there.
+    pub(super) fn drive_chords(&self, q: &[S], v: &[S], chords: &mut [Option<S>]) {
+        let seal = |actuator: &Actuator<S>| match &actuator.drive {
+            Drive::Hydraulic(law) if law.cylinder.seal.is_there() => Some(law.cylinder.seal),
+            _ => None,
         };
-        if self.ideal || !self.actuators.iter().any(sealed) {
+        let rubs = |actuator: &Actuator<S>| actuator.friction.is_some() || seal(actuator).is_some();
+        if self.ideal || !self.actuators.iter().any(rubs) {
             return;
         }
-        for (actuator, chord) in self.actuators.iter().zip(chords) {
-            if let Drive::Hydraulic(law) = &actuator.drive {
-                let [_, rate] = motion(actuator.on, q, v, &self.data.composite.lines);
-                *chord = Some(law.cylinder.seal.resistance(rate));
-            }
+        for ((actuator, &force), chord) in self.actuators.iter().zip(&self.driven).zip(chords) {
+            let [_, rate] = motion(actuator.on, q, v, &self.data.composite.lines);
+            let sealed = seal(actuator).map_or_else(S::zero, |seal| seal.resistance(rate));
+            *chord = Some(sealed + actuator.friction_chord(force, rate));
         }
     }
 

@@ -6,7 +6,9 @@ use vpm_core::actuator::{DeadZone, InputDelay, Lag, Saturation};
 use vpm_core::controller::{Cascade, ControlMemory, Pid};
 use vpm_core::delay::SampleDelay;
 use vpm_core::integrator::Method;
+use vpm_core::inverse::{Motion, inverse_dynamics};
 use vpm_core::samples::slider;
+use vpm_core::table::Table;
 
 use crate::common::{Bench, Machine, close};
 
@@ -87,6 +89,63 @@ fn chain_acts_in_its_order() {
     assert_eq!(bench.channel(&run, 5), [30.0; 4]);
     assert_eq!(bench.channel(&run, 3), [30.0; 4]);
     assert_eq!(bench.channel(&run, 2), [15.0; 4]);
+}
+
+#[test]
+fn a_drive_rubs_in_proportion_to_its_own_effort() {
+    let mut machine = Machine::new(&slider(2.0));
+    machine.actuator(0, &[("gain", 1.0)]).rubbing_actuator(0, 1.0, [0.2, 0.3, 1e-3]);
+    let bench = Bench::new(&machine, 0.01, 4, Method::Rk4);
+    // The acceleration of the slider at 1 m/s either way, far beyond the transition velocity: (u + p - share |p| sign v) / m.
+    for (speed, [u, p], effort) in [
+        (1.0, [7.0, 5.0], 7.0 + 5.0 - 0.2 * 5.0),
+        (1.0, [7.0, -5.0], 7.0 - 5.0 - 0.3 * 5.0),
+        (-1.0, [7.0, -5.0], 7.0 - 5.0 + 0.2 * 5.0),
+        (-1.0, [-7.0, 5.0], -7.0 + 5.0 + 0.3 * 5.0),
+        (1.0, [7.0, 0.0], 7.0),
+        (0.0, [7.0, 5.0], 12.0),
+    ] {
+        let run = bench.free(&[0.0, speed], &[u, p]);
+        close(bench.channel(&run, 2)[0], effort / 2.0, 1e-12);
+        // Nothing is lost of the other drive, and the joint feels both.
+        close(bench.channel(&run, 5)[0], u, 1e-12);
+        close(bench.channel(&run, 7)[0], effort - u, 1e-12);
+        close(bench.channel(&run, 3)[0], effort, 1e-12);
+    }
+}
+
+#[test]
+fn a_drive_that_rubs_holds_a_load_that_it_could_not_push_back() {
+    // It is pressed with 10 N against a load of 8 N: 0.3 of its own effort holds what is left, and a load of 14 N breaks it loose.
+    let mut machine = Machine::new(&slider(2.0));
+    machine.actuator(0, &[("gain", 1.0)]).rubbing_actuator(0, 1.0, [0.3, 0.3, 1e-4]);
+    let bench = Bench::new(&machine, 0.01, 100, Method::LinearlyImplicit);
+    let held: Vec<f64> = [-8.0, 10.0].repeat(101);
+    let run = bench.free(&[0.0, 0.0], &held);
+    // Creep below the transition velocity: tanh(v / 1e-4) = 2 N / 3 N.
+    close(*bench.channel(&run, 1).last().unwrap(), 1e-4 * (2.0_f64 / 3.0).atanh(), 1e-9);
+    let loose: Vec<f64> = [-14.0, 10.0].repeat(101);
+    let run = bench.free(&[0.0, 0.0], &loose);
+    close(*bench.channel(&run, 1).last().unwrap(), -0.5, 1e-3);
+}
+
+#[test]
+fn efforts_of_a_drive_that_rubs_are_no_matter_of_its_command() {
+    let mut machine = Machine::new(&slider(2.0));
+    machine.rubbing_actuator(0, 1.0, [0.2, 0.3, 1e-3]);
+    let description = machine.build();
+    let zeros = [0.0; 3];
+    let table = |numbers| Table::new("motion", numbers, 3, 1).unwrap();
+    let inputs = table(&zeros);
+    let motion = Motion {
+        position: table(&zeros),
+        velocity: table(&zeros),
+        acceleration: table(&zeros),
+        inputs,
+        time_step: 0.01,
+    };
+    let error = inverse_dynamics(&description, &description.parameters, motion, &[], &|| false).unwrap_err();
+    assert!(error.to_string().contains("`pressed` of type ideal with friction"), "{error}");
 }
 
 #[test]

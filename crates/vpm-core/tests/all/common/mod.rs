@@ -130,6 +130,13 @@ impl Machine {
         self.part("actuators", &name, json!({"name": name, "on": {"joint": joint}, "drive": drive}), &others)
     }
 
+    /// A second drive `pressed` on a joint, which loses these shares of its effort where it drives and where it is driven.
+    pub fn rubbing_actuator(&mut self, joint: usize, gain: f64, [driving, driven, transition]: [f64; 3]) -> &mut Self {
+        let friction = json!({"driving": driving, "driven": driven, "transition_velocity": transition});
+        let numbers = json!({"drive": {"type": "ideal", "gain": gain}, "friction": friction});
+        self.add("actuators", json!({"name": "pressed", "on": {"joint": joint}}), numbers)
+    }
+
     /// A sensor on a channel, `{"kind": ..., "joint": ...}`.
     pub fn sensor(&mut self, channel: Value, numbers: &[(&str, f64)]) -> &mut Self {
         let name = format!("sensor{}", self.parts["sensors"].as_array().unwrap().len());

@@ -10,7 +10,7 @@ use vpm_core::simulate::{Run, Setting, Stepping, free_run};
 use vpm_core::system::{Kind, System};
 use vpm_core::table::Table;
 
-use super::machines::drawn;
+use super::machines::{drawn, rubbing};
 use crate::common::Machine;
 
 /// Derivatives that the witness takes at once.
@@ -107,7 +107,8 @@ fn train(seed: u64) -> Machine {
 /// Without exchanges of rows, which a recorded elimination leaves out, steps lose no digits; where they would, the function says so.
 #[test]
 fn a_whole_step_is_that_of_the_integrator() -> Result<()> {
-    let machines = (0..300).map(|seed| (seed, drawn(seed))).chain((300..500).map(|seed| (seed, train(seed))));
+    let machines = (0..300).map(|seed| (seed, drawn(seed))).chain((300..450).map(|seed| (seed, train(seed))));
+    let machines = machines.chain((450..500).map(|seed| (seed, rubbing(seed))));
     let mut exact = 0;
     for (seed, machine) in machines {
         let d = machine.build();
@@ -128,6 +129,7 @@ fn a_whole_step_is_that_of_the_integrator() -> Result<()> {
 #[test]
 fn derivatives_of_a_whole_step_are_those_of_dual_numbers() -> Result<()> {
     let machines = (0..60).map(|seed| (seed, drawn(seed))).chain((60..80).map(|seed| (seed, train(seed))));
+    let machines = machines.chain((80..100).map(|seed| (seed, rubbing(seed))));
     for (seed, machine) in machines {
         let d = machine.build();
         if d.n_coordinates() > 3 {
