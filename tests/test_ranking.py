@@ -18,11 +18,14 @@ from sledge import DRY, MASS, OIL, READING, SEEN, SLEDGE, TURN, WAVE, pushed, sw
 from vpm.errors import DiagnosisError, ExperimentError
 from vpm.experiment import Experiment
 from vpm.model import Model
+from vpm.ranking.judgement import Judgement
 from vpm.ranking.noise_model import Colour, NoiseModel, Structured, fitted_noise, log_student, scale_of, white_noise
-from vpm.ranking.observed import DAMPING, Observed, Observer, observer_gain
+from vpm.ranking.observed import DAMPING, PARTS, Observed, Observer, observer_gain
 from vpm.ranking.settings import Settings
 
 Array = NDArray[np.float64]
+#: Samples that are fitted, and those that are held back.
+ROOMS = ("parts", "held_back")
 
 
 def test_an_autoregression_is_found_again_and_its_density_is_the_exact_one() -> None:
@@ -290,6 +293,31 @@ def test_no_effect_comes_in_that_makes_no_sample_more_probable() -> None:
     (told,) = (one for one in ranking.rounds[0] if np.isfinite(one.evidence))
     assert told.judgement.counts(strict)
     assert 0.0 < told.evidence < strict.odds
+
+
+def test_each_part_of_a_record_is_held_back_once() -> None:
+    observed = Observed(
+        Model.from_toml(SLEDGE), [pushed(seed=1, duration=3.0), pushed(seed=2, duration=2.0)], Settings()
+    )
+    turns = [observed, *(observed.holding_back(part) for part in range(PARTS))]
+    fitted, held = ([np.concatenate([np.r_[part] for part in getattr(t, name)]) for t in turns] for name in ROOMS)
+    for one, other in zip(fitted, held, strict=True):
+        assert np.array_equal(np.sort(np.concatenate([one, other])), np.sort(np.concatenate([fitted[0], held[0]])))
+        assert len(other) == pytest.approx(len(one) / (PARTS - 1), rel=0.02)
+    assert np.array_equal(held[-1], held[0])
+    assert np.array_equal(np.sort(np.concatenate(held[1:])), np.sort(np.concatenate([fitted[0], held[0]])))
+
+
+def test_what_one_part_of_a_record_leaves_open_all_of_it_decides(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Three parts are surer than one by the root of three; here as much is asked for as one alone does not have."""
+    model, record, effects = Model.from_toml(SLEDGE), pushed(seed=2, dry=0.6, duration=4.0), ["coulomb_friction"]
+    (alone,) = vpm.rank(model, record, effects=effects).effects
+    strict = Settings(score=1.25 * alone.judgement.score)
+    (all_of_it,) = vpm.rank(model, record, effects=effects, settings=strict).effects
+    assert all_of_it.judgement.score == pytest.approx(np.sqrt(PARTS) * alone.judgement.score, rel=0.2)
+    assert vpm.rank(model, record, effects=effects, settings=Settings(score=4.0 * alone.judgement.score)).effects == ()
+    monkeypatch.setattr(Judgement, "is_faint", lambda *_: False)
+    assert vpm.rank(model, record, effects=effects, settings=strict).effects == ()
 
 
 def test_commands_that_were_read_and_not_sent_hide_no_effect() -> None:

@@ -127,9 +127,16 @@ class Fitter:
         """
         names = tuple(name for name in structure.priors if name not in view.known)
         now = self.followed(structure.at(structure.standard), observer, names, residual)
+        return self._descended(now, view, goal)
+
+    def moved(self, start: Followed, view: View) -> Fitted:
+        """The same near where a fit to other stretches ended, of which all derivatives are known: secants will do."""
+        return self._descended(start, view, anew=False)
+
+    def _descended(self, now: Followed, view: View, goal: float = math.inf, anew: bool = True) -> Fitted:
         before, fresh = self.cost(now.structure, now.residual, view.noise), True
         errors, slopes = view.errors(now, self.observed.parts)
-        for _ in range(self.settings.iterations if structure.priors else 0):
+        for _ in range(self.settings.iterations if now.structure.priors else 0):
             move, gain = self._step(now.structure, view, errors, slopes)
             hopeful = gain >= self.settings.tolerance and before - self.settings.patience * gain <= goal
             better = self._better(now, view.noise, move, before) if hopeful else None
@@ -139,13 +146,13 @@ class Fitter:
                 now, last, before = replace(now, structure=better[0], residual=better[1]), errors, better[2]
                 errors = view.noise.whitened(now.residual, self.observed.parts)
                 slopes = by_secant(slopes, errors - last, move)
-            if slow and fresh:
+            if slow and (fresh or not anew):
                 break
             fresh = slow
             if fresh:
-                now = self.followed(now.structure, observer, now.names, now.residual)
+                now = self.followed(now.structure, now.observer, now.names, now.residual)
                 errors, slopes = view.errors(now, self.observed.parts)
-        return Fitted(now.structure, observer, now.residual, before)
+        return Fitted(now.structure, now.observer, now.residual, before)
 
     def finished(self, found: Fitted, view: View) -> Fitted:
         """Fitted on, by all derivatives, until nothing is gained any more."""

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from vpm.ranking.settings import Settings
 from vpm.results import Storable
@@ -19,7 +21,8 @@ class Judgement(Storable):
     least : float
         The same of fitted and of held-back stretches of record, the smaller one.
     score : float
-        How surely it is removed from pieces of the held-back stretches, in standard deviations.
+        How surely it is removed from pieces of the held-back stretches, in standard deviations; of all stretches, each
+        held back in turn, where the last ones alone leave that open.
     size : float
         Its amplitude in the channel in which it removes most, as a share of that of all effects of the model whose laws
         are not exact.
@@ -46,6 +49,11 @@ class Judgement(Storable):
     def counts(self, settings: Settings) -> bool:
         """Whether that is more than chance, and more than what laws are wrong by."""
         return not self.lacks(settings)
+
+    def is_faint(self, settings: Settings, parts: int) -> bool:
+        """Whether it counts but for its score, and would if it did as well in so many parts of the record."""
+        enough = replace(self, score=np.sqrt(parts) * self.score)
+        return not self.counts(settings) and enough.counts(settings)
 
     def lacks(self, settings: Settings) -> str:
         """What is missing to that, in words; "" where it counts."""

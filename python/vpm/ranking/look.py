@@ -16,6 +16,7 @@ from vpm.model import Effect
 from vpm.ranking.fit import ASTRAY, Fitted, Fitter, Followed, View, bounded_step
 from vpm.ranking.judgement import Judgement
 from vpm.ranking.noise_model import SURE, white_noise
+from vpm.ranking.observed import PARTS
 from vpm.ranking.structure import Structure, approximate
 
 Array = NDArray[np.float64]
@@ -159,11 +160,40 @@ class Look:
         curve = np.zeros(len(ratio)) if key is None else self._curve(key)
         powers = (self.explained, self.added, curve)
         size, beside, shape = (float(np.sqrt(there / (power[place] + there))) for power in powers)
-        score = _repeated(self.left[1], left[1], self.settings.pieces)
+        score = _repeated([(self.left[1], left[1])], self.settings.pieces)
         heavier = key is not None and EFFECTS[key[0]].adds_inertia
         alone = float(np.prod(_shares(self._drawn, left))) if heavier else 0.0
         overtone = key is not None and fitted.structure.is_overtone(key)
-        return Judgement(removed, min(shares), score, size, beside, shape, alone, overtone)
+        judgement = Judgement(removed, min(shares), score, size, beside, shape, alone, overtone)
+        if key is None or not judgement.is_faint(self.settings, PARTS):
+            return judgement
+        return replace(judgement, score=max(score, self._score_of_all(fitted, left[1])))
+
+    def _score_of_all(self, fitted: Fitted, left: Array) -> float:
+        """How surely squares are smaller in pieces of all parts of the record, each fitted to the others.
+
+        Law: cross-validation (M. Stone, *J. Royal Statistical Society B* 36, 1974): what is held back for a judgement
+        can be fitted for another one, so that no part of a record goes unheard.
+        """
+        with contextlib.suppress(*ASTRAY):
+            priors = tuple(fitted.structure.priors)
+            start = self._fitter.followed(fitted.structure, fitted.observer, priors, fitted.residual)
+            others = [self._held_back(start, part) for part in range(PARTS - 1)]
+            pairs = [(self.left[1], left), *zip(self._of_others, others, strict=True)]
+            return _repeated(pairs, self.settings.pieces)
+        return 0.0
+
+    @cached_property
+    def _of_others(self) -> list[Array]:
+        """Squares of the other parts of the record, each held back from a fit of what was found."""
+        start = replace(self.coarse, observer=self.fitted.observer, residual=self.fitted.residual)
+        return [self._held_back(start, part) for part in range(PARTS - 1)]
+
+    def _held_back(self, start: Followed, part: int) -> Array:
+        """Squares of a part of the record that is held back, fitted to the others from where a fit ended."""
+        other = Fitter(self._fitter.observed.holding_back(part), self.settings)
+        moved = other.moved(start, View(self.view.noise))
+        return other.observed.squares(moved.residual, self.view.noise)[1]
 
     @cached_property
     def _drawn(self) -> tuple[Array, Array]:
@@ -233,11 +263,15 @@ def _shares(before: Sequence[Array], after: Sequence[Array]) -> Array:
     return np.asarray(sums[1] / sums[0])
 
 
-def _repeated(before: Array, after: Array, pieces: int) -> float:
-    """How surely squares are smaller in all pieces, or their logarithms are, in standard deviations of the mean."""
+def _repeated(parts: Sequence[tuple[Array, Array]], pieces: int) -> float:
+    """How surely squares before are smaller after, or their logarithms are, in standard deviations of the mean.
+
+    Parts of the record are cut into pieces each.
+    """
     pairs = [
         [np.maximum(np.sum(piece, axis=0), 1e-300) for piece in pair]
-        for pair in zip(*(np.array_split(x, pieces) for x in (before, after)), strict=True)
+        for part in parts
+        for pair in zip(*(np.array_split(x, pieces) for x in part), strict=True)
     ]
     changes = [[float(np.sum(b - a)) for b, a in pairs], [float(np.sum(np.log(b / a))) for b, a in pairs]]
-    return max(float(np.mean(c) / max(np.std(c, ddof=1) / np.sqrt(pieces), 1e-300)) for c in changes)
+    return max(float(np.mean(c) / max(np.std(c, ddof=1) / np.sqrt(len(pairs)), 1e-300)) for c in changes)

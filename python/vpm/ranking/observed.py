@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -27,10 +28,10 @@ Array = NDArray[np.float64]
 DAMPING = float(np.sqrt(0.5))
 #: Fewest steps of the integrator within a sample where a joint is split: contacts and gears ring fast.
 STEPS = 4
-#: Stretches into which a record is cut, each of which ends with a part that is held back.
+#: Stretches into which a record is cut.
 STRETCHES = 3
-#: That part.
-HELD_BACK = 1.0 / 3.0
+#: Parts of a stretch, of which one is held back, the last one if nobody asks for another.
+PARTS = 3
 
 
 @dataclass(frozen=True)
@@ -87,16 +88,21 @@ class Observed:
             int(end) - np.linspace(len(r.time) - min(int(settings.settling / r.dt), len(r.time) // 2), 0, STRETCHES + 1)
             for end, r in zip(ends, self.records, strict=True)
         ]
-        pairs = [pair for cut in cuts for pair in pairwise(cut)]
+        self._stretches = [np.linspace(*pair, PARTS + 1).astype(int) for cut in cuts for pair in pairwise(cut)]
         #: Samples that are fitted, and those that are held back.
-        self.parts: Parts = [slice(int(first), int(last - HELD_BACK * (last - first))) for first, last in pairs]
-        self.held_back: Parts = [slice(int(last - HELD_BACK * (last - first)), int(last)) for first, last in pairs]
+        self.parts, self.held_back = _divided(self._stretches, PARTS - 1)
 
     def with_hold(self, hold: str) -> Observed:
         """The same with commands that do this between samples."""
         if hold == self.setup.course:
             return self
         return Observed(self.model, self.experiments, self.settings, replace(self.setup, hold=hold))
+
+    def holding_back(self, part: int) -> Observed:
+        """The same with another part of each stretch held back, counted from 0."""
+        other = copy.copy(self)
+        other.parts, other.held_back = _divided(self._stretches, part)
+        return other
 
     @cached_property
     def firsts(self) -> Firsts:
@@ -239,6 +245,15 @@ class Observed:
             self.setup.course,
         )
         return outputs[:, places], states, slopes
+
+
+def _divided(stretches: Sequence[NDArray[np.int_]], held: int) -> tuple[Parts, Parts]:
+    """Samples that are fitted, and those that are held back: the part with this number of each of the stretches."""
+    fitted: list[slice] = []
+    for ends in stretches:
+        sides = (slice(int(ends[0]), int(ends[held])), slice(int(ends[held + 1]), int(ends[-1])))
+        fitted += [side for side in sides if side.start < side.stop]
+    return fitted, [slice(int(ends[held]), int(ends[held + 1])) for ends in stretches]
 
 
 def observer_gain(model: Model, channels: Sequence[str], band: float, dt: float, theta: Array) -> Array:

@@ -60,7 +60,8 @@ class Settings:
     order : int
         Length of the autoregression that whitens the error of a channel where evidence is told, samples.
     odds : float
-        Evidence, nats, at which an effect is as probable as none.
+        Evidence, nats, at which an effect is as probable as none. Chance makes more of an effect that is not there once
+        in exp(odds) times at most (A. Markov's inequality): one in a hundred is named if a hundred are tried.
     tempering : float
         Power of evidence in probabilities: no model is exact. As it was fitted to cases of which the truth is known.
     astray : float
@@ -93,7 +94,7 @@ class Settings:
     tolerance: float = 0.5
     reach: float = 6.0
     order: int = 12
-    odds: float = 16.0
+    odds: float = 9.2
     tempering: float = field(default_factory=lambda: shipped().tempering)
     astray: float = field(default_factory=lambda: shipped().astray)
     same: float = 1.0
