@@ -146,8 +146,10 @@ class Look:
         """Error power above noise after, as shares of that before, channel by channel (m,)."""
         return np.asarray(self._above_noise(after)[0] / self._above_noise(before)[0])
 
-    def judged(self, fitted: Fitted, key: Key | None = None) -> Judgement:
+    def judged(self, fitted: Fitted, key: Key | None = None, *, ended: bool = True) -> Judgement:
         """What another structure removes by one of its effects, or by what is none.
+
+        All parts of the record are asked where one leaves it open, of fits that have ``ended``.
 
         Nobody knows how exact a model can be in each channel. So the errors of all have scales of their own, of which
         each is the most likely one, and shares of error power that are left multiply.
@@ -165,7 +167,7 @@ class Look:
         alone = float(np.prod(_shares(self._drawn, left))) if heavier else 0.0
         overtone = key is not None and fitted.structure.is_overtone(key)
         judgement = Judgement(removed, min(shares), score, size, beside, shape, alone, overtone)
-        if key is None or not judgement.is_faint(self.settings, PARTS):
+        if key is None or not ended or not judgement.is_faint(self.settings, PARTS):
             return judgement
         return replace(judgement, score=max(score, self._score_of_all(fitted, left[1])))
 

@@ -199,7 +199,7 @@ class Search:
     def _tried(self, look: Look) -> list[Trial]:
         """The most promising effects, fitted under one observer."""
         chosen = proposals(look, self.fitter, self.data, self.extensions, self.each, self.names)
-        return [Trial.of(fitted, look) for fitted in raced(chosen, look, self.fitter, self.each)]
+        return [Trial.of(fitted, look, ended=False) for fitted in raced(chosen, look, self.fitter, self.each)]
 
     def _finished(self, tried: Sequence[Trial]) -> list[Trial]:
         """Those of one observer that are worth it and leave little, fitted to the end."""
@@ -286,7 +286,7 @@ class Search:
         def one_fitted(other: Structure) -> Trial:
             structure, view = look.fitted.structure.with_last_of(other), View(look.view.noise)
             fitted = self.fitter.fitted(structure, look.fitted.observer, view)
-            return Trial.of(fitted, look)
+            return Trial.of(fitted, look, ended=False)
 
         ends = self.each("exchanging", one_fitted, others, lambda other: " at ".join(other.effects[-1]))
         return self._finished([end for end in ends if isinstance(end, Trial)])

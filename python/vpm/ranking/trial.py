@@ -24,10 +24,10 @@ class Trial:
     rivals: tuple[str, ...] = ()
 
     @classmethod
-    def of(cls, fitted: Fitted, look: Look, key: Key | None = None) -> Trial:
-        """One of the effects of a structure, the last one if not told."""
+    def of(cls, fitted: Fitted, look: Look, key: Key | None = None, *, ended: bool = True) -> Trial:
+        """One of the effects of a structure, the last one if not told; of a fit that has ``ended``, or only begun."""
         key = key or fitted.structure.effects[-1]
-        return cls(key, fitted, look, look.judged(fitted, key))
+        return cls(key, fitted, look, look.judged(fitted, key, ended=ended))
 
     @property
     def counts(self) -> bool:
