@@ -168,7 +168,8 @@ def _absent(model: Model, effects: Sequence[str] | None) -> list[tuple[EffectTyp
 
 
 def _candidate(effect: EffectType, site: str, model: Model, data: InverseDynamicsProblem, residual: Array) -> Candidate:
-    joint = _joint_of(effect.site, site, model)
+    acted_on = joint_at(model, site)
+    joint = model.joints.index(acted_on) if acted_on else 0
     seen = _excitation(data, model, joint, site if effect.site in {"actuator", "cylinder"} else None)
     if effect.name in STRUCTURAL:
         found = structural_starts(effect.name, site, model, seen.travel, logged_swing(data, model, site))
@@ -281,14 +282,6 @@ def joint_at(model: Model, site: str) -> str:
         return model.joints_of_actuator(site)[0]
     read = (name.rpartition(".")[0] for name in model.output_channels if model.sensor_of(name) == site)
     return next((owner for owner in read if owner in model.joints), "")
-
-
-def _joint_of(kind: str, site: str, model: Model) -> int:
-    if kind == "joint":
-        return model.joints.index(site)
-    if kind in {"actuator", "cylinder"}:
-        return model.joints.index(model.joints_of_actuator(site)[0])
-    return 0
 
 
 def _excitation(data: InverseDynamicsProblem, model: Model, joint: int, actuator: str | None) -> Excitation:
