@@ -50,8 +50,10 @@ SAME = {
 LATE = {"input_delay@lifter": 0.04, "actuator_lag@lifter": 0.05, "sensor_delay@inclinometer": 0.04}
 #: Dry friction that is the same in both, and friction of another law: share of the effect that may be left.
 DRY = {"none": 0.02, "asymmetric_friction@luff": 0.02, "hysteresis@luff": 0.2, "stribeck_friction@luff": 0.4}
-#: What the catalogue has no law for, or none at a joint that a line moves.
-NOWHERE = {"seal_friction@luff", "load_dependent_friction@luff", "uneven_edges@lifter"}
+#: In the generator friction follows the torque of oil and viscous seals, in the file that of all seals besides.
+DRY["load_dependent_friction@luff"] = 0.07
+#: What the catalogue has no law for.
+NOWHERE = {"seal_friction@luff", "uneven_edges@lifter"}
 
 
 def written(values: dict[str, float], *entries: dict[str, object]) -> Model:
@@ -86,6 +88,9 @@ def described(hidden: Hidden, values: dict[str, float]) -> Model:
         numbers["stribeck_velocity"] = numbers.pop("speed")
     elif hidden.effect == "hysteresis":
         numbers["displacement"] = numbers.pop("way")
+    elif hidden.effect == "load_dependent_friction":  # on the one joint that the line moves
+        loss = {"driving": numbers["share"], "driven": numbers["share"]}
+        return written(values, {"type": "drive_friction", "at": "lifter", **loss})
     return written(values, {"type": hidden.effect, "at": hidden.site, **numbers})
 
 

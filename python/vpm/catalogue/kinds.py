@@ -171,8 +171,8 @@ class EffectType:
     takes_effort : bool
         Whether it does nothing at a joint on which no actuator acts itself.
     beside_others : bool
-        Whether a diagnosis looks for it at an actuator that shares its joint with others alone: elsewhere it is what an
-        effect of the joint is.
+        Whether a diagnosis looks for it at an actuator on a line or on a joint with other ones alone: elsewhere it is
+        what an effect of the joint is.
     """
 
     name: str

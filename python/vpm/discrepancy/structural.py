@@ -59,7 +59,8 @@ def sites_worth_trying(effect: EffectType, model: Model) -> tuple[str, ...]:
     sites = model.sites(effect.site)
     if effect.beside_others:
         moved = {name: set(model.joints_of_actuator(name)) for name in model.actuators}
-        return tuple(site for site in sites if any(moved[site] & moved[name] for name in moved if name != site))
+        shared = {site for site in sites if any(moved[site] & moved[name] for name in moved if name != site)}
+        return tuple(site for site in sites if site in shared or model.line_of_actuator(site) is not None)
     if effect.name == "link_flexibility":
         stiff = tuple(site for site in sites if model.levels.get(site, "rigid") == "rigid")
         if not model.core.n_elastic:
