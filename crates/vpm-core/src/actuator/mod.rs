@@ -27,7 +27,9 @@ pub use saturation::Saturation;
 pub use spring_damper::SpringDamper;
 pub use table::TableDrive;
 
-use crate::effect::{Domain, Law, LoadDependentFriction};
+use crate::effect::Domain;
+use crate::effect::Law;
+use crate::effect::LoadDependentFriction;
 use crate::scalar::Scalar;
 
 /// What an actuator acts on.

@@ -45,6 +45,7 @@ const ALONE: [(&str, &[&str]); 15] = [
             "effect::Domain",
             "effect::CoulombFriction",
             "effect::Law",
+            "effect::LoadDependentFriction",
             "effect::StribeckFriction",
             "effect::ViscousFriction",
         ],
