@@ -165,6 +165,7 @@ def _end(end: End, structure: Structure) -> dict[str, Any]:
 
 def _actuator(name: str, structure: Structure, index: Mapping[str, int]) -> dict[str, Any]:
     actuator = structure.document.actuators[name]
+    friction = optional_json(f"{name}.friction", ("driving", "driven", "transition_velocity"), index)
     return {
         "name": name,
         "on": {"line": list(structure.document.lines).index(actuator.line)}
@@ -175,7 +176,7 @@ def _actuator(name: str, structure: Structure, index: Mapping[str, int]) -> dict
         "dead_zone": index.get(f"{name}.dead_zone.width"),
         "saturation": index.get(f"{name}.saturation.limit"),
         "lag": index.get(f"{name}.lag.time_constant"),
-        "friction": optional_json(f"{name}.friction", ("driving", "driven", "transition_velocity"), index),
+        **({} if friction is None else {"friction": friction}),
     }
 
 
