@@ -24,8 +24,6 @@ from vpm.ranking.observed import DAMPING, PARTS, Observed, Observer, observer_ga
 from vpm.ranking.settings import Settings
 
 Array = NDArray[np.float64]
-#: Samples that are fitted, and those that are held back.
-ROOMS = ("parts", "held_back")
 
 
 def test_an_autoregression_is_found_again_and_its_density_is_the_exact_one() -> None:
@@ -300,7 +298,8 @@ def test_each_part_of_a_record_is_held_back_once() -> None:
         Model.from_toml(SLEDGE), [pushed(seed=1, duration=3.0), pushed(seed=2, duration=2.0)], Settings()
     )
     turns = [observed, *(observed.holding_back(part) for part in range(PARTS))]
-    fitted, held = ([np.concatenate([np.r_[part] for part in getattr(t, name)]) for t in turns] for name in ROOMS)
+    fitted = [np.concatenate([np.r_[part] for part in turn.parts]) for turn in turns]
+    held = [np.concatenate([np.r_[part] for part in turn.held_back]) for turn in turns]
     for one, other in zip(fitted, held, strict=True):
         assert np.array_equal(np.sort(np.concatenate([one, other])), np.sort(np.concatenate([fitted[0], held[0]])))
         assert len(other) == pytest.approx(len(one) / (PARTS - 1), rel=0.02)

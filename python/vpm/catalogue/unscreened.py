@@ -7,12 +7,30 @@ of one drive, on the time since a cold start and on the way of bristles. The sou
 from __future__ import annotations
 
 from vpm.catalogue.joint import STRIBECK, transition
-from vpm.catalogue.kinds import ABOVE_ZERO, ANY, NOT_NEGATIVE, EffectType, shape, size
+from vpm.catalogue.kinds import ABOVE_ZERO, ANY, NOT_NEGATIVE, EffectParameter, EffectType, shape, size
 
 #: Way over which bristles bend where none is given: prismatic (m), revolute (rad).
 _PRESLIDING = (1e-5, 1e-4)
 #: Largest share of a load that inverse dynamics has one solution for.
 _SHARE = (0.0, 0.95)
+_NEGATIVE_SHARE = "a negative share would give out more power than goes in"
+
+
+def _shares(driving: str, driven: str) -> tuple[EffectParameter, EffectParameter]:
+    """Shares of an effort that friction takes, each with its meaning."""
+
+    def share(name: str, meaning: str) -> EffectParameter:
+        return size(name, f"friction.{name}", "1", "one", meaning, physical=_SHARE, linear=False)
+
+    return share("driving", driving), share("driven", driven)
+
+
+def _law_of_load(effort: str) -> str:
+    """Law of friction in proportion to an effort, which is said in words."""
+    return (
+        "tau = -|u| s (driving + driven + (driving - driven) s sign(u))/2, s = tanh(v/transition_velocity), "
+        f"u {effort}, each share within 0.95"
+    )
 
 
 QUADRATIC_DRAG = EffectType(
@@ -95,35 +113,18 @@ LOAD_DEPENDENT_FRICTION = EffectType(
     site="joint",
     group="friction",
     parameters=(
-        size(
-            "driving",
-            "friction.driving",
-            "1",
-            "one",
+        *_shares(
             "share of the actuators' effort that is lost where they drive the joint",
-            physical=_SHARE,
-            linear=False,
-        ),
-        size(
-            "driven",
-            "friction.driven",
-            "1",
-            "one",
             "share of their effort that brakes the joint besides where it drives them",
-            physical=_SHARE,
-            linear=False,
         ),
         transition("friction.load_transition_velocity"),
     ),
-    law=(
-        "tau = -|u| s (driving + driven + (driving - driven) s sign(u))/2, s = tanh(v/transition_velocity), u the"
-        " effort of the actuators on the joint, each share within 0.95"
-    ),
+    law=_law_of_load("the effort of the actuators on the joint"),
     sentence=(
         "{at} rubs in proportion to its load: it loses {driving} of the effort where the drive pushes, and {driven} of"
         " it brakes where the joint pushes the drive."
     ),
-    impossible="a negative share would give out more power than goes in",
+    impossible=_NEGATIVE_SHARE,
     confused_with={},
     screened=False,
     motor_side_alone=True,
@@ -135,35 +136,18 @@ DRIVE_FRICTION = EffectType(
     site="actuator",
     group="friction",
     parameters=(
-        size(
-            "driving",
-            "friction.driving",
-            "1",
-            "one",
+        *_shares(
             "share of the effort of this actuator that is lost where it drives",
-            physical=_SHARE,
-            linear=False,
-        ),
-        size(
-            "driven",
-            "friction.driven",
-            "1",
-            "one",
             "share of its effort that brakes besides where it is driven",
-            physical=_SHARE,
-            linear=False,
         ),
         transition("friction.transition_velocity"),
     ),
-    law=(
-        "tau = -|u| s (driving + driven + (driving - driven) s sign(u))/2, s = tanh(v/transition_velocity), u the"
-        " effort of this actuator, each share within 0.95"
-    ),
+    law=_law_of_load("the effort of this actuator"),
     sentence=(
         "{at} rubs in proportion to its own effort, as seals under pressure do: {driving} of it is lost where it"
         " drives, and {driven} of it brakes where it is driven."
     ),
-    impossible="a negative share would give out more power than goes in",
+    impossible=_NEGATIVE_SHARE,
     confused_with={},
     screened=False,
     beside_others=True,

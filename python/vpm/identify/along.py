@@ -94,9 +94,9 @@ def check_along(model: Model, joints: Sequence[str]) -> None:
     hidden += [name for name in model.joints if name not in joints]
     for name in model.actuators:
         kind, line = model.actuator_type(name), model.line_of_actuator(name)
-        follows = model.follows_command(name)
-        if not follows or line is not None:
-            what = f"acts on the line {line}" if follows else f"has type {kind}{'' if kind != 'ideal' else ' and rubs'}"
+        if line is not None or not model.follows_command(name):
+            rest = f"acts on the line {line}" if line is not None else "has friction of its own"
+            what = f"has type {kind}" if kind != "ideal" else rest
             raise SimulationError(
                 f"no effort can be balanced along a motion that leaves {', '.join(hidden)} free while the actuator "
                 f"{name} {what}; make the links rigid with model.at('rigid'), measure every joint, or identify in the "

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
-
-import numpy as np
 
 from vpm.ranking.settings import Settings
 from vpm.results import Storable
@@ -52,7 +51,7 @@ class Judgement(Storable):
 
     def is_faint(self, settings: Settings, parts: int) -> bool:
         """Whether it counts but for its score, and would if it did as well in so many parts of the record."""
-        enough = replace(self, score=np.sqrt(parts) * self.score)
+        enough = replace(self, score=math.sqrt(parts) * self.score)
         return not self.counts(settings) and enough.counts(settings)
 
     def lacks(self, settings: Settings) -> str:
