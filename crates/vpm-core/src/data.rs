@@ -4,9 +4,10 @@ mod segment;
 
 use crate::algebra::BlockCholesky;
 use crate::beam::{Sections, Slices, Sums};
-use crate::model::Model;
+use crate::model::{Model, Shaft};
 use crate::scalar::Scalar;
 use crate::spatial::{ArticulatedInertia, Pose, SpatialInertia, Twist, Vector3, Wrench};
+use crate::transmission::Ratio;
 pub(crate) use segment::SegmentSlot;
 use segment::segments;
 
@@ -44,6 +45,7 @@ pub(crate) struct Composite<S> {
     /// Velocity terms and gravity, counted as loads.
     pub(crate) bias: Vec<S>,
     pub(crate) factors: BlockCholesky<S>,
+    /// Lines, then the shafts of transmissions: a shaft is a line whose levers are its ratios, wherever the machine is.
     pub(crate) lines: Vec<LineSlot<S>>,
 }
 
@@ -221,6 +223,13 @@ impl<S: Scalar> Composite<S> {
             to: point(),
             turns: vec![Vector3::zero(); n],
         };
+        let shaft = |shaft: &Shaft<S>| {
+            let mut slot = LineSlot { direction: Vector3::new(S::one(), S::zero(), S::zero()), ..line() };
+            for &Ratio { joint, ratio } in &shaft.ratios {
+                slot.to.columns[joint] = Vector3::new(ratio, S::zero(), S::zero());
+            }
+            slot
+        };
         Self {
             frames: vec![world; model.n_frames()],
             sections: model.beams().iter().map(|elastic| elastic.beam.sections()).collect(),
@@ -232,7 +241,7 @@ impl<S: Scalar> Composite<S> {
             columns: vec![Wrench::zero(); n],
             bias: vec![S::zero(); n],
             factors: BlockCholesky::new(model.blocks()),
-            lines: model.lines().iter().map(|_| line()).collect(),
+            lines: model.lines().iter().map(|_| line()).chain(model.shafts().iter().map(shaft)).collect(),
         }
     }
 }

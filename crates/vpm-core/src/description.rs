@@ -36,6 +36,7 @@ use crate::mount::{Gauge, Marker};
 use crate::scalar::Scalar;
 use crate::sensor::{Layout, Sensor};
 use crate::system::{Build, Cache, Dynamics, Functions, Kind, Machine, Memories, Placed, Places, Recorder, System};
+use crate::transmission::Transmission;
 
 /// The parts of a machine. Every `usize` in a law is a place in [`Description::parameters`]; all numbers are SI.
 #[derive(Clone, Debug, Deserialize)]
@@ -70,6 +71,9 @@ pub struct Description {
     /// Straight connections.
     #[serde(default)]
     pub lines: Vec<Line<usize>>,
+    /// Transmissions. Where something acts along a line, or reads one, they are numbered after the lines.
+    #[serde(default)]
+    pub transmissions: Vec<Transmission<usize>>,
     /// Physical effects.
     #[serde(default)]
     pub effects: Vec<EffectEntry>,
@@ -142,6 +146,11 @@ impl Description {
         self.beams.len()
     }
 
+    /// Number of lines and transmissions.
+    pub fn n_wires(&self) -> usize {
+        self.lines.len() + self.transmissions.len()
+    }
+
     /// Number of actuators.
     pub fn n_actuators(&self) -> usize {
         self.actuators.len()
@@ -160,10 +169,10 @@ impl Description {
         2 * self.n_coordinates() + drives + of_supplies + self.remembering().count()
     }
 
-    /// Numbers of the joints with effects that remember, one for each.
-    pub(crate) fn remembering(&self) -> impl Iterator<Item = usize> {
+    /// Seats of the effects that remember, one for each.
+    pub(crate) fn remembering(&self) -> impl Iterator<Item = &Seat<usize>> {
         self.effects.iter().filter_map(|entry| match entry {
-            EffectEntry::Memory { seat, .. } => Some(seat.joint),
+            EffectEntry::Memory { seat, .. } => Some(seat),
             EffectEntry::Joint { .. } | EffectEntry::Payload { .. } | EffectEntry::Tree(_) => None,
         })
     }
@@ -180,7 +189,7 @@ impl Description {
         Layout {
             joints: self.bodies.len(),
             actuators: self.actuators.len(),
-            lines: self.lines.len(),
+            lines: self.n_wires(),
             gauges: self.gauges.len(),
             markers: self.markers.len(),
             hydraulics: count(|drive| matches!(drive, Drive::Hydraulic(_))),
@@ -268,10 +277,18 @@ impl Description {
     fn model<S: Scalar>(&self, theta: &[S]) -> Result<Model<S>> {
         let number = &mut |&index: &usize| theta[index];
         let mut bodies: Vec<_> = self.bodies.iter().map(|body| body.map(number)).collect();
+        let mut transmissions: Vec<_> = self.transmissions.iter().map(|shaft| shaft.map(number)).collect();
         for actuator in &self.actuators {
-            if let (Target::Joint(joint), Drive::DcMotor(motor)) = (actuator.on, &actuator.drive) {
-                let (rotor, own) = (&mut bodies[joint].rotor_inertia, motor.map(number).reflected_inertia());
-                *rotor = Some(rotor.map_or(own, |rotor| rotor + own));
+            if let Drive::DcMotor(motor) = &actuator.drive {
+                let rotor = match actuator.on {
+                    Target::Joint(joint) => &mut bodies[joint].rotor_inertia,
+                    Target::Line(line) => &mut transmissions[line - self.lines.len()].inertia,
+                };
+                let own = motor.map(number).reflected_inertia();
+                // A motor without a rotor of its own leaves a shaft without one, which is cheaper.
+                if motor.rotor_inertia.is_some() || matches!(actuator.on, Target::Joint(_)) {
+                    *rotor = Some(rotor.map_or(own, |rotor| rotor + own));
+                }
             }
         }
         let mut parts = Parts {
@@ -281,6 +298,7 @@ impl Description {
             beams: self.beams.iter().map(|beam| beam.map(number)).collect(),
             point_masses: self.effects.iter().filter_map(|entry| entry.payload(theta)).collect(),
             lines: self.lines.iter().map(|line| line.map(number)).collect(),
+            transmissions,
             markers: self.markers.clone(),
             gauges: self.gauges.clone(),
             attachments: self.attachments(),
@@ -332,23 +350,25 @@ impl EffectEntry {
     }
 
     /// Where it puts an effort on joints; nowhere for what belongs to the tree.
-    pub(crate) fn seat(&self) -> Option<Seat> {
+    pub(crate) fn seat(&self) -> Option<&Seat<usize>> {
         match self {
-            Self::Joint { seat, .. } | Self::Memory { seat, .. } => Some(*seat),
+            Self::Joint { seat, .. } | Self::Memory { seat, .. } => Some(seat),
             Self::Payload { .. } | Self::Tree(_) => None,
         }
     }
 
-    pub(crate) fn on_joint<S: Scalar>(&self, theta: &[S]) -> Option<(Seat, JointEffect<S>)> {
+    pub(crate) fn on_joint<S: Scalar>(&self, theta: &[S]) -> Option<(Seat<S>, JointEffect<S>)> {
+        let number = &mut |&index: &usize| theta[index];
         match self {
-            Self::Joint { seat, law } => Some((*seat, law.map(&mut |&index| theta[index]))),
+            Self::Joint { seat, law } => Some((seat.map(number), law.map(number))),
             Self::Payload { .. } | Self::Memory { .. } | Self::Tree(_) => None,
         }
     }
 
-    pub(crate) fn with_memory<S: Scalar>(&self, theta: &[S]) -> Option<(Seat, MemoryEffect<S>)> {
+    pub(crate) fn with_memory<S: Scalar>(&self, theta: &[S]) -> Option<(Seat<S>, MemoryEffect<S>)> {
+        let number = &mut |&index: &usize| theta[index];
         match self {
-            Self::Memory { seat, law } => Some((*seat, law.map(&mut |&index| theta[index]))),
+            Self::Memory { seat, law } => Some((seat.map(number), law.map(number))),
             Self::Payload { .. } | Self::Joint { .. } | Self::Tree(_) => None,
         }
     }

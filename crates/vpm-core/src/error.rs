@@ -98,12 +98,12 @@ pub enum Error {
     },
     /// A prescribed motion of a machine with an effect that remembers.
     #[error(
-        "joint `{joint}` has an effect that remembers, whose memory a simulation with prescribed motion does not carry; balance the efforts \
+        "{site} has an effect that remembers, whose memory a simulation with prescribed motion does not carry; balance the efforts \
          of the joints (inverse dynamics) or simulate it on its commands"
     )]
     Memory {
-        /// Name of the first such joint.
-        joint: String,
+        /// The first such joint or transmission.
+        site: String,
     },
     /// A payload sits on a body that does not exist.
     #[error(

@@ -69,20 +69,20 @@ pub fn inverse_dynamics(
     check_parameters(description, theta, sensitivities)?;
     let along = Along::new(Record { description, motion, time_step, interrupt }, theta, sensitivities)?;
     let Numbers { values: required, mut jacobian } = along.follow(Kind::Required, joints)?;
-    let pulls = description.actuators.iter().any(|actuator| matches!(actuator.on, Target::Line(_)));
-    let levers = if pulls { Some(along.follow(Kind::Levers, description.lines.len() * joints)?) } else { None };
+    let pulls = drives(description, inputs, time_step).any(|drive| matches!(drive.on, Target::Line(_)));
+    let levers = if pulls { Some(along.follow(Kind::Levers, description.n_wires() * joints)?) } else { None };
     let mut applied = vec![0.0; required.len()];
     for drive in drives(description, inputs, time_step) {
         let course = Course::new(&drive, theta, sensitivities, &drive.parameters())?;
         let total =
             Total { joints, count: sensitivities.len(), values: &mut applied, jacobian: &mut jacobian, sign: -1.0 };
-        total.add(&course, drive.actuator.on, levers.as_ref());
+        total.add(&course, drive.on, levers.as_ref());
     }
     Ok(Efforts { required, applied, jacobian })
 }
 
 /// Efforts of ideal drives on the joints as in [`inverse_dynamics`], N x joints, and their derivatives; of a machine of which not every
-/// coordinate was measured, as long as all drives act on joints.
+/// coordinate was measured, as long as all drives act on joints or shafts.
 pub fn delivered(
     description: &Description,
     theta: &[f64],
@@ -92,8 +92,10 @@ pub fn delivered(
     for actuator in &description.actuators {
         by_command(actuator)?;
         let (name, drive) = (actuator.name.clone(), actuator.drive.name());
-        if let Target::Line(line) = actuator.on {
-            let found = format!("the line `{}`", description.lines[line].name);
+        if let Target::Line(line) = actuator.on
+            && let Some(line) = description.lines.get(line)
+        {
+            let found = format!("the line `{}`", line.name);
             return Err(DriveError::Target { actuator: name, drive, found, needed: "a joint" }.into());
         }
     }
@@ -106,7 +108,7 @@ pub fn delivered(
     for drive in drives(description, inputs, time_step) {
         let course = Course::new(&drive, theta, sensitivities, &drive.parameters())?;
         let total = Total { joints, count, values: &mut values, jacobian: &mut jacobian, sign: 1.0 };
-        total.add(&course, drive.actuator.on, None);
+        total.add(&course, drive.on, None);
     }
     Ok((values, jacobian))
 }
@@ -147,10 +149,18 @@ fn by_command(actuator: &Actuator<usize>) -> Result<()> {
     Err(DriveError::Effort { actuator: actuator.name.clone(), drive }.into())
 }
 
-/// The drives of a machine with their inputs.
+/// The drives of a machine with their inputs; one on a shaft acts on each of its joints by the ratio.
 fn drives<'a>(description: &'a Description, inputs: Table<'a>, time_step: f64) -> impl Iterator<Item = Delivered<'a>> {
-    let one = move |(number, actuator)| Delivered { actuator, number, inputs, time_step };
-    description.actuators.iter().enumerate().map(one)
+    let of_shaft = |on: Target| match on {
+        Target::Line(line) => line.checked_sub(description.lines.len()).map(|shaft| &description.transmissions[shaft]),
+        Target::Joint(_) => None,
+    };
+    description.actuators.iter().enumerate().flat_map(move |(number, actuator)| {
+        let one = move |on, ratio| Delivered { actuator, on, ratio, number, inputs, time_step };
+        let whole = of_shaft(actuator.on).is_none().then(|| one(actuator.on, None));
+        let ratios = of_shaft(actuator.on).into_iter().flat_map(|shaft| &shaft.ratios);
+        whole.into_iter().chain(ratios.map(move |entry| one(Target::Joint(entry.joint), Some(entry.ratio))))
+    })
 }
 
 /// Efforts on all joints along a record, and `sign` times their derivatives by `count` parameters.

@@ -46,6 +46,7 @@ mod statics;
 pub mod system;
 pub mod table;
 pub mod timing;
+pub mod transmission;
 
 pub use error::{Error, Result};
 pub use scalar::{Dual, Scalar};

@@ -19,6 +19,7 @@ use crate::joint::{Joint, JointKind};
 use crate::line::LinePart;
 use crate::scalar::Scalar;
 use crate::spatial::{Matrix3, Pose, SpatialInertia, Vector3};
+use crate::transmission::Ratio;
 
 /// A tree of rigid bodies and beams. Joint `k` carries body `k`; the coordinates are those of the joints, then the elastic ones of
 /// each beam.
@@ -35,6 +36,7 @@ pub struct Model<S> {
     beams: Vec<Elastic<S>>,
     order: Vec<Node>,
     lines: Vec<Wire<S>>,
+    shafts: Vec<Shaft<S>>,
     markers: Vec<Place>,
     attachments: Vec<Place>,
     gauges: Vec<Strip>,
@@ -129,6 +131,15 @@ pub(crate) struct Elastic<S> {
     pub(crate) slices: Option<Slices<S>>,
 }
 
+/// The shaft of a transmission.
+#[derive(Clone, Debug)]
+pub(crate) struct Shaft<S> {
+    /// Ratio of each joint that moves with it.
+    pub(crate) ratios: Vec<Ratio<S>>,
+    /// Inertia of its rotor, kg m^2; none where one joint alone turns it, whose rotor it is then.
+    pub(crate) inertia: Option<S>,
+}
+
 /// A line in its place.
 #[derive(Clone, Debug)]
 pub(crate) struct Wire<S> {
@@ -164,14 +175,14 @@ impl<S: Scalar> Model<S> {
         self.n_coordinates - self.links.len()
     }
 
-    /// Whether the algorithms for rigid trees apply: no elastic beams, no lines with mass, parents listed before their children, a mass matrix
+    /// Whether the algorithms for rigid trees apply: no elastic beams, no lines with mass, no rotor that several joints turn, parents listed before their children, a mass matrix
     /// in one piece.
     #[inline]
     pub fn is_recursive(&self) -> bool {
         self.recursive
     }
 
-    /// Whether the recursion over bodies and segments of beams applies: no lines with mass, a mass matrix in one piece, products of rates
+    /// Whether the recursion over bodies and segments of beams applies: no lines with mass, no rotor that several joints turn, a mass matrix in one piece, products of rates
     /// counted everywhere or nowhere.
     #[inline]
     pub fn is_segmented(&self) -> bool {
@@ -288,6 +299,18 @@ impl<S: Scalar> Model<S> {
     #[inline]
     pub(crate) fn lines(&self) -> &[Wire<S>] {
         &self.lines
+    }
+
+    /// The shafts of transmissions.
+    #[inline]
+    pub(crate) fn shafts(&self) -> &[Shaft<S>] {
+        &self.shafts
+    }
+
+    /// Number of lines and shafts. These are numbered after the lines wherever a force along something is meant.
+    #[inline]
+    pub(crate) fn n_wires(&self) -> usize {
+        self.lines.len() + self.shafts.len()
     }
 
     /// The markers.

@@ -40,17 +40,17 @@ pub enum Channel {
         /// Number of the actuator.
         actuator: usize,
     },
-    /// Distance of the ends of a line, m.
+    /// Distance of the ends of a line, m; angle of the shaft of a transmission, which count after the lines, rad.
     Length {
         /// Number of the line.
         line: usize,
     },
-    /// How fast a line grows, m/s.
+    /// How fast a line grows, m/s, or a shaft turns, rad/s.
     Rate {
         /// Number of the line.
         line: usize,
     },
-    /// Force of the actuators on a line, N; positive pushes its ends apart.
+    /// Force of the actuators on a line, N; positive pushes its ends apart. Their effort on a shaft, N m.
     Tension {
         /// Number of the line.
         line: usize,
@@ -204,7 +204,7 @@ pub struct Layout {
     pub joints: usize,
     /// Actuators.
     pub actuators: usize,
-    /// Lines.
+    /// Lines, then transmissions.
     pub lines: usize,
     /// Strain gauges.
     pub gauges: usize,

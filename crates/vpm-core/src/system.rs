@@ -40,7 +40,7 @@ use crate::actuator::{Actuator, Drive, Target};
 use crate::contact::ContactFriction;
 use crate::data::Data;
 use crate::dynamics::articulated::articulated;
-use crate::dynamics::{aba, flexible, frames, lines, motion, poses};
+use crate::dynamics::{aba, flexible, frames, lines, motion, poses, shafts};
 use crate::effect::{JointEffect, Seat};
 use crate::model::Model;
 use crate::scalar::Scalar;
@@ -59,7 +59,7 @@ pub struct Dynamics<S> {
     /// Working memory of the tree's algorithms.
     pub data: Data<S>,
     /// Effects, each with its seat.
-    pub effects: Vec<(Seat, JointEffect<S>)>,
+    pub effects: Vec<(Seat<S>, JointEffect<S>)>,
     /// Actuators.
     pub actuators: Vec<Actuator<S>>,
     /// Supplies of the hydraulic ones.
@@ -71,10 +71,12 @@ pub struct Dynamics<S> {
     driven: Vec<S>,
     /// Efforts of the actuators on the joints.
     efforts: Vec<S>,
-    /// Forces of the actuators on the lines.
+    /// Forces of the actuators on the lines, then their efforts on the shafts of transmissions.
     tensions: Vec<S>,
-    /// Whether any actuator acts on a line.
+    /// Whether any actuator acts on a line or a shaft.
     pulls: bool,
+    /// Whether any acts on a line.
+    stretches: bool,
     /// Number of states of drives and supplies.
     internal: usize,
     /// Whether all actuators give efforts by their commands alone, and nothing feeds them.
@@ -93,12 +95,12 @@ impl<S: Scalar> Dynamics<S> {
     /// Puts the parts together. The joints, lines and supplies that effects and actuators name must exist.
     pub fn new(
         model: Model<S>,
-        effects: Vec<(Seat, JointEffect<S>)>,
+        effects: Vec<(Seat<S>, JointEffect<S>)>,
         actuators: Vec<Actuator<S>>,
         supplies: Vec<Supply<S>>,
     ) -> Self {
         let zeros = |count: usize| vec![S::zero(); count];
-        let mut inputs = zeros(actuators.len());
+        let (mut inputs, n_lines) = (zeros(actuators.len()), model.lines().len());
         inputs.extend(supplies.iter().filter(|supply| supply.is_logged()).map(|supply| supply.pressure));
         let of_supplies: usize = supplies.iter().map(|supply| supply.states().count()).sum();
         Self {
@@ -111,8 +113,9 @@ impl<S: Scalar> Dynamics<S> {
             forces: zeros(actuators.len()),
             driven: zeros(actuators.len()),
             efforts: zeros(model.n_joints()),
-            tensions: zeros(model.lines().len()),
+            tensions: zeros(model.n_wires()),
             pulls: actuators.iter().any(|actuator| matches!(actuator.on, Target::Line(_))),
+            stretches: actuators.iter().any(|actuator| matches!(actuator.on, Target::Line(line) if line < n_lines)),
             loads: zeros(model.n_coordinates()),
             connections: Connections::default(),
             memories: Memories::new(Vec::new()),
@@ -188,7 +191,7 @@ impl<S: Scalar> Dynamics<S> {
     /// Resistance of each effect at (q, v), under the efforts of the actuators in the last state evaluated.
     fn write_resistances(&self, q: &[S], v: &[S], resistances: &mut [S]) {
         for ((seat, effect), resistance) in self.effects.iter().zip(resistances) {
-            let (law, q, v, u) = (effect.law(), seat.of(q), seat.of(v), self.efforts[seat.joint]);
+            let (law, q, v, u) = (effect.law(), seat.of(q), seat.of(v), seat.load(&self.efforts));
             *resistance = law.resistance(q, v) + law.resistance_per_load(v, u) * u.abs();
         }
     }
@@ -216,7 +219,7 @@ impl<S: Scalar> Dynamics<S> {
         &mut self,
         x: &[S],
         dxdt: &mut [S],
-        laws: (impl FnOnce(&[(Seat, JointEffect<S>)], [&[S]; 3], &mut [S]), impl Fn(&ContactFriction<S>, S, S) -> S),
+        laws: (impl FnOnce(&[(Seat<S>, JointEffect<S>)], [&[S]; 3], &mut [S]), impl Fn(&ContactFriction<S>, S, S) -> S),
     ) {
         let n = self.coordinates();
         let (q, v) = x[..2 * n].split_at(n);
@@ -238,8 +241,9 @@ impl<S: Scalar> Dynamics<S> {
     /// Moves lines and frames to (q, v), as far as anything acts on them, and of a machine that is no rigid tree all that its dynamics need.
     #[inline]
     fn locate(&mut self, q: &[S], v: &[S]) {
-        let (full, pulls) = (self.has_mass_matrix(), self.pulls || !self.connections.is_free());
+        let (full, pulls) = (self.has_mass_matrix(), self.stretches || !self.connections.is_free());
         let Self { model, data, .. } = self;
+        shafts(model, data, q, v);
         if full {
             flexible::terms(model, data, q, v);
             if !self.connections.is_free() {
@@ -264,7 +268,7 @@ impl<S: Scalar> Dynamics<S> {
         q: &[S],
         v: &[S],
         (add, resistance): (
-            impl FnOnce(&[(Seat, JointEffect<S>)], [&[S]; 3], &mut [S]),
+            impl FnOnce(&[(Seat<S>, JointEffect<S>)], [&[S]; 3], &mut [S]),
             impl Fn(&ContactFriction<S>, S, S) -> S,
         ),
         on_beams: &[S],
@@ -295,9 +299,9 @@ impl<S: Scalar> Dynamics<S> {
 
 /// Adds to `total` the efforts of all effects on the joints at coordinates q and rates v, where the actuators push with u.
 #[inline]
-pub(crate) fn add_effects<S: Scalar>(effects: &[(Seat, JointEffect<S>)], [q, v, u]: [&[S]; 3], total: &mut [S]) {
+pub(crate) fn add_effects<S: Scalar>(effects: &[(Seat<S>, JointEffect<S>)], [q, v, u]: [&[S]; 3], total: &mut [S]) {
     for (seat, effect) in effects {
-        let (law, q, v, u) = (effect.law(), seat.of(q), seat.of(v), u[seat.joint]);
+        let (law, q, v, u) = (effect.law(), seat.of(q), seat.of(v), seat.load(u));
         seat.push(total, law.effort_under(q, v, u));
     }
 }

@@ -38,7 +38,8 @@ use crate::scalar::Scalar;
 pub enum Target {
     /// The joint of that number, along its coordinate.
     Joint(usize),
-    /// The line of that number; a positive force pushes its ends apart.
+    /// The line of that number; a positive force pushes its ends apart. Transmissions count after the lines; a positive effort turns
+    /// their shaft forward.
     Line(usize),
 }
 

@@ -3,7 +3,7 @@
 use super::{Description, EffectEntry, connections, controllers, drives};
 use crate::actuator::Target;
 use crate::body::Site;
-use crate::effect::Domain;
+use crate::effect::{Domain, Seat};
 use crate::error::{Error, Result};
 use crate::sensor::Channel;
 
@@ -64,7 +64,12 @@ fn domains(description: &Description) -> impl Iterator<Item = (usize, Domain)> {
     let sensors = description.sensors.iter().flat_map(|sensor| sensor.domains());
     let controllers = description.controllers.iter().flat_map(|controller| controller.law.domains());
     let connections = connections::domains(description);
-    let domains = effects.chain(actuators).chain(supplies).chain(sensors).chain(controllers).chain(connections);
+    let shafts = description.transmissions.iter().flat_map(|shaft| {
+        let ratios = shaft.ratios.iter().map(|entry| (&entry.ratio, Domain::NonZero));
+        ratios.chain(shaft.inertia.as_ref().map(|inertia| (inertia, Domain::NonNegative)))
+    });
+    let domains =
+        shafts.chain(effects).chain(actuators).chain(supplies).chain(sensors).chain(controllers).chain(connections);
     domains.map(|(&index, domain)| (index, domain))
 }
 
@@ -82,6 +87,9 @@ fn used_parameters(description: &Description) -> Vec<(String, usize)> {
     }
     for line in &description.lines {
         line.map(&mut |&index| used.push((format!("line `{}`", line.name), index)));
+    }
+    for transmission in &description.transmissions {
+        transmission.map(&mut |&index| used.push((format!("transmission `{}`", transmission.name), index)));
     }
     for (number, effect) in description.effects.iter().enumerate() {
         used.extend(effect.domains().into_iter().map(|(&index, _)| (format!("effect number {number}"), index)));
@@ -104,11 +112,23 @@ fn used_parameters(description: &Description) -> Vec<(String, usize)> {
 
 fn sites(description: &Description) -> Result<()> {
     let joints = description.n_joints();
+    for shaft in &description.transmissions {
+        let (what, own) = (format!("transmission `{}`", shaft.name), &shaft.ratios);
+        own.iter().try_for_each(|entry| within(&what, "joint", entry.joint, joints))?;
+        let twice = (1..own.len()).any(|k| own[..k].iter().any(|entry| entry.joint == own[k].joint));
+        if own.is_empty() || twice {
+            let message = format!("{what} names no joint, or one twice; give each joint that turns it one ratio");
+            return Err(Error::Description { message });
+        }
+    }
     for (number, effect) in description.effects.iter().enumerate() {
         let what = format!("effect number {number}");
         match effect {
             EffectEntry::Joint { seat, .. } | EffectEntry::Memory { seat, .. } => {
-                seat.joints().try_for_each(|joint| within(&what, "joint", joint, joints))?;
+                seat.joints().into_iter().try_for_each(|joint| within(&what, "joint", joint, joints))?;
+                if let Seat::Shaft { transmission, .. } = seat {
+                    within(&what, "transmission", *transmission, description.transmissions.len())?;
+                }
             }
             EffectEntry::Payload { on: Site::Body(body), .. } => within(&what, "body", *body, joints)?,
             EffectEntry::Payload { on: Site::Weld(weld), .. } => within(&what, "weld", *weld, description.welds.len())?,
@@ -125,7 +145,7 @@ fn sites(description: &Description) -> Result<()> {
         let what = format!("actuator `{}`", actuator.name);
         match actuator.on {
             Target::Joint(joint) => within(&what, "joint", joint, joints)?,
-            Target::Line(line) => within(&what, "line", line, description.lines.len())?,
+            Target::Line(line) => within(&what, "line", line, description.n_wires())?,
         }
     }
     Ok(())
@@ -149,7 +169,7 @@ pub(super) fn channel(what: &str, channel: Channel, description: &Description) -
             within(what, "actuator", actuator, description.n_actuators())
         }
         Channel::Length { line } | Channel::Rate { line } | Channel::Tension { line } => {
-            within(what, "line", line, description.lines.len())
+            within(what, "line", line, description.n_wires())
         }
         Channel::Strain { gauge } => within(what, "gauge", gauge, description.gauges.len()),
         Channel::X { marker }

@@ -20,7 +20,7 @@ pub(super) fn check(description: &Description) -> Result<()> {
         }
         shape(&what, controller)?;
         for (place, &measured) in controller.measures.iter().enumerate() {
-            sees(&what, controller, measured)?;
+            sees(&what, controller, measured, description.lines.len())?;
             acts(&what, controller, description, place)?;
         }
         times(controller)?;
@@ -71,8 +71,10 @@ fn shape(what: &str, controller: &ControllerEntry) -> Result<()> {
     refuse(format!("{what} lists {actuators} actuators and {measures} measures, but a {kind} has one of each"))
 }
 
-fn sees(what: &str, controller: &ControllerEntry, measured: Channel) -> Result<()> {
+/// A law sees positions of joints; of lines, numbered below `lines`, and of shafts after them some see the length or the angle.
+fn sees(what: &str, controller: &ControllerEntry, measured: Channel, lines: usize) -> Result<()> {
     match (&controller.law, measured) {
+        (ControlLaw::Cascade(_) | ControlLaw::Pid(_), Channel::Length { line }) if line >= lines => Ok(()),
         (_, Channel::Position { .. }) | (ControlLaw::Pd(_), Channel::Length { .. }) => Ok(()),
         (ControlLaw::Pd(_), _) => {
             refuse(format!("{what} measures {measured:?}, but a pd measures a position or a length"))

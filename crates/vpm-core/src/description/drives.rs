@@ -32,8 +32,13 @@ pub(super) fn references(description: &Description) -> Result<()> {
 fn target(description: &Description, actuator: &Actuator<usize>) -> Result<()> {
     let sliding =
         |joint: usize| description.bodies.get(joint).is_some_and(|body| body.joint.kind == JointKind::Prismatic);
+    let lines = description.lines.len();
     let needed = match (&actuator.drive, actuator.on) {
-        (Drive::DcMotor(_), Target::Line(_)) => "a joint",
+        (Drive::DcMotor(_), Target::Line(line)) if line < lines => "a joint or a shaft",
+        (
+            Drive::SpringDamper(_) | Drive::Maxwell(_) | Drive::Hydraulic(_) | Drive::MaxwellNarx(_),
+            Target::Line(line),
+        ) if line >= lines => "a line",
         (Drive::SpringDamper(_) | Drive::Maxwell(_), Target::Joint(_)) => "a line",
         (Drive::Hydraulic(_) | Drive::MaxwellNarx(_), Target::Joint(joint)) if !sliding(joint) => {
             "a line or a prismatic joint"
@@ -53,8 +58,13 @@ fn measured(description: &Description, on: Target) -> (&'static str, String) {
             ("the position of", format!("joint `{name}`"))
         }
         Target::Line(line) => {
-            let name = description.lines.get(line).map_or("", |line| &line.name);
-            ("the length of", format!("line `{name}`"))
+            let (quantity, kind, name) = match description.lines.get(line) {
+                Some(line) => ("the length of", "line", &line.name),
+                None => {
+                    ("the angle of", "transmission", &description.transmissions[line - description.lines.len()].name)
+                }
+            };
+            (quantity, format!("{kind} `{name}`"))
         }
     }
 }

@@ -14,17 +14,17 @@ use crate::sensor::Channel;
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(try_from = "Map<String, Value>")]
 pub enum EffectEntry {
-    /// An effect on a joint.
+    /// An effect on a joint or a shaft.
     Joint {
         /// Where it acts.
-        seat: Seat,
+        seat: Seat<usize>,
         /// Its law.
         law: Box<JointEffect<usize>>,
     },
-    /// An effect on a joint that remembers.
+    /// An effect on a joint or a shaft that remembers.
     Memory {
         /// Where it acts.
-        seat: Seat,
+        seat: Seat<usize>,
         /// Its law.
         law: MemoryEffect<usize>,
     },
@@ -106,8 +106,12 @@ impl TryFrom<Map<String, Value>> for EffectEntry {
             if matches!(kind.as_str(), "rotor_inertia" | "gravity_tilt") || table.contains_key("beam") {
                 return Ok(Self::Tree(serde_json::from_value(Value::Object(table))?));
             }
-            let behind = table.remove("behind").map_or(Ok(None), serde_json::from_value)?;
-            let seat = Seat { joint: take(&mut table, "joint")?, behind };
+            let seat = if table.contains_key("transmission") {
+                Seat::Shaft { transmission: take(&mut table, "transmission")?, ratios: take(&mut table, "ratios")? }
+            } else {
+                let behind = table.remove("behind").map_or(Ok(None), serde_json::from_value)?;
+                Seat::Joint { joint: take(&mut table, "joint")?, behind }
+            };
             if matches!(kind.as_str(), "hysteresis" | "lugre_friction" | "warming_friction") {
                 return Ok(Self::Memory { seat, law: serde_json::from_value(Value::Object(table))? });
             }

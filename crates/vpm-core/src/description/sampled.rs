@@ -38,7 +38,7 @@ pub(super) fn references(description: &Description, actuator: &Actuator<usize>) 
                         within(&what, "joint", joint, description.n_joints())?;
                     }
                     Reading::Length(line) | Reading::Rate(line) => {
-                        within(&what, "line", line, description.lines.len())?;
+                        within(&what, "line", line, description.n_wires())?;
                     }
                 }
             }

@@ -30,7 +30,13 @@ pub fn energy<S: Scalar>(model: &Model<S>, data: &mut Data<S>, q: &[S], v: &[S])
     total
 }
 
-/// Kinetic energy of the drives' rotors, whose speed is the joint's.
+/// Kinetic energy of the drives' rotors, whose speed is the joint's or that of the shaft of a transmission.
 pub(super) fn of_rotors<S: Scalar>(model: &Model<S>, v: &[S]) -> S {
-    model.links().iter().zip(v).map(|(link, &v)| link.rotor * v * v * 0.5).sum()
+    let on_joints: S = model.links().iter().zip(v).map(|(link, &v)| link.rotor * v * v * 0.5).sum();
+    let shafts = model.shafts().iter().filter_map(|shaft| shaft.inertia.map(|inertia| (shaft, inertia)));
+    let on_shafts = shafts.map(|(shaft, inertia)| {
+        let speed: S = shaft.ratios.iter().map(|entry| entry.ratio * v[entry.joint]).sum();
+        inertia * speed * speed * 0.5
+    });
+    on_joints + on_shafts.sum::<S>()
 }

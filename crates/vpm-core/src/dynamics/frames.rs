@@ -139,6 +139,16 @@ pub(crate) fn lines<S: Scalar>(model: &Model<S>, data: &mut Data<S>) {
     }
 }
 
+/// Angle and speed of every shaft of a transmission at coordinates `q` and rates `v`; its levers stand since the data were made.
+#[inline]
+pub(crate) fn shafts<S: Scalar>(model: &Model<S>, data: &mut Data<S>, q: &[S], v: &[S]) {
+    for (shaft, slot) in model.shafts().iter().zip(&mut data.composite.lines[model.lines().len()..]) {
+        let of = |numbers: &[S]| shaft.ratios.iter().map(|entry| entry.ratio * numbers[entry.joint]).sum();
+        slot.length = of(q);
+        slot.to.velocity = Vector3::new(of(v), S::zero(), S::zero());
+    }
+}
+
 /// As [`lines`], but without the velocities per unit rate of the coordinates.
 pub(super) fn bare_lines<S: Scalar>(model: &Model<S>, data: &mut Data<S>) {
     let Data { composite: Composite { frames, lines, .. }, drifts, .. } = data;

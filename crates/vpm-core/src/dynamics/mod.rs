@@ -28,7 +28,7 @@ pub use aba::aba;
 pub use crba::crba;
 pub use energy::{Energy, energy};
 pub use frames::frames;
-pub(crate) use frames::{Stations, for_each_column, lines, motion, outward, poses};
+pub(crate) use frames::{Stations, for_each_column, lines, motion, outward, poses, shafts};
 pub use kinematics::kinematics;
 pub(crate) use reaction::{Motion, in_axes, reactions, take_off};
 pub use regular::check_regular;

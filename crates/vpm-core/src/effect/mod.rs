@@ -48,6 +48,7 @@ pub use lugre_friction::LugreFriction;
 pub use payload::Payload;
 pub use position_dependent_friction::PositionDependentFriction;
 pub use quadratic_drag::QuadraticDrag;
+pub(crate) use seat::Place;
 pub use seat::Seat;
 pub use spring::Spring;
 pub use stribeck_friction::StribeckFriction;

@@ -1,54 +1,136 @@
-//! Where an effect of a joint sits: before or behind a compliance or backlash there.
-
-use std::iter;
+//! Where an effect of a joint or a transmission sits.
 
 use crate::scalar::Scalar;
+use crate::transmission::Ratio;
 
-/// The coordinate on which an effect acts, that of one joint or the sum of two.
+/// The coordinate on which an effect acts: that of one joint, the sum of two, or the angle of a shaft.
 ///
 /// A joint with wind-up or play is two in the core, motor side and deflection, about one axis. What sits on the motor side sees the first
-/// coordinate alone. What sits on the link side sees their sum, `q + d`, and by virtual work its effort acts on both.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Seat {
-    /// Number of the joint.
-    pub joint: usize,
-    /// Number of the joint of its deflection, for what sits on the link side.
-    pub behind: Option<usize>,
+/// coordinate alone. What sits on the link side sees their sum, `q + d`, and by virtual work its effort acts on both. What sits on a shaft
+/// sees `sum r_i q_i`, and its effort tau acts on each joint as `r_i tau`.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Seat<P> {
+    /// A joint.
+    Joint {
+        /// Its number.
+        joint: usize,
+        /// Number of the joint of its deflection, for what sits on the link side.
+        behind: Option<usize>,
+    },
+    /// The shaft of a transmission.
+    Shaft {
+        /// Its number among the transmissions.
+        transmission: usize,
+        /// Ratio of each joint that moves with it.
+        ratios: Vec<Ratio<P>>,
+    },
 }
 
-impl Seat {
-    /// The joints whose coordinates add up to its own.
-    #[inline]
-    pub fn joints(self) -> impl Iterator<Item = usize> + Clone {
-        iter::once(self.joint).chain(self.behind)
+/// A seat without its ratios: seats at the same place are the same seat.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Place {
+    Joint(usize, Option<usize>),
+    Shaft(usize),
+}
+
+impl<P> Seat<P> {
+    /// The same seat over another parameter type.
+    pub fn map<T>(&self, f: &mut impl FnMut(&P) -> T) -> Seat<T> {
+        match self {
+            Self::Joint { joint, behind } => Seat::Joint { joint: *joint, behind: *behind },
+            Self::Shaft { transmission, ratios } => {
+                Seat::Shaft { transmission: *transmission, ratios: ratios.iter().map(|ratio| ratio.map(f)).collect() }
+            }
+        }
     }
 
+    /// Where it is.
+    #[inline]
+    pub(crate) fn place(&self) -> Place {
+        match self {
+            Self::Joint { joint, behind } => Place::Joint(*joint, *behind),
+            Self::Shaft { transmission, .. } => Place::Shaft(*transmission),
+        }
+    }
+
+    /// The joint whose coordinate alone is its own, if there is one.
+    #[inline]
+    pub(crate) fn alone(&self) -> Option<usize> {
+        match self {
+            Self::Joint { joint, behind: None } => Some(*joint),
+            _ => None,
+        }
+    }
+
+    /// The joint at which it is, on either side; none of a shaft.
+    #[inline]
+    pub(crate) fn joint(&self) -> Option<usize> {
+        match self {
+            Self::Joint { joint, .. } => Some(*joint),
+            Self::Shaft { .. } => None,
+        }
+    }
+
+    /// The joints that move it.
+    pub fn joints(&self) -> Vec<usize> {
+        match self {
+            Self::Joint { joint, behind } => [*joint].into_iter().chain(*behind).collect(),
+            Self::Shaft { ratios, .. } => ratios.iter().map(|ratio| ratio.joint).collect(),
+        }
+    }
+}
+
+impl<S: Scalar> Seat<S> {
     /// Its coordinate or rate of the joints' `numbers`.
     #[inline]
-    pub fn of<S: Scalar>(self, numbers: &[S]) -> S {
+    pub fn of(&self, numbers: &[S]) -> S {
         self.sum(|joint| numbers[joint])
     }
 
     /// The same of numbers that are given joint by joint.
     #[inline]
-    pub fn sum<S: Scalar>(self, number: impl Fn(usize) -> S) -> S {
-        let own = number(self.joint);
-        self.behind.map_or(own, |behind| own + number(behind))
+    pub fn sum(&self, number: impl Fn(usize) -> S) -> S {
+        match self {
+            Self::Joint { joint, behind: None } => number(*joint),
+            Self::Joint { joint, behind: Some(behind) } => number(*joint) + number(*behind),
+            Self::Shaft { ratios, .. } => ratios.iter().map(|entry| entry.ratio * number(entry.joint)).sum(),
+        }
+    }
+
+    /// What the actuators push on its joint with, of their `efforts` on the joints; laws that follow it do not sit on shafts.
+    #[inline]
+    pub(crate) fn load(&self, efforts: &[S]) -> S {
+        self.joint().map_or_else(S::zero, |joint| efforts[joint])
     }
 
     /// Adds an `effort` on it to those on the joints.
     #[inline]
-    pub fn push<S: Scalar>(self, efforts: &mut [S], effort: S) {
-        efforts[self.joint] += effort;
-        if let Some(behind) = self.behind {
-            efforts[behind] += effort;
+    pub fn push(&self, efforts: &mut [S], effort: S) {
+        match self {
+            Self::Joint { joint, behind } => {
+                efforts[*joint] += effort;
+                behind.iter().for_each(|&behind| efforts[behind] += effort);
+            }
+            Self::Shaft { ratios, .. } => ratios.iter().for_each(|entry| efforts[entry.joint] += entry.ratio * effort),
+        }
+    }
+
+    /// Hands out each joint with its coordinate's share in that of the seat.
+    #[inline]
+    pub(crate) fn for_each(&self, mut visit: impl FnMut(usize, S)) {
+        match self {
+            Self::Joint { joint, behind } => {
+                visit(*joint, S::one());
+                behind.iter().for_each(|&behind| visit(behind, S::one()));
+            }
+            Self::Shaft { ratios, .. } => ratios.iter().for_each(|entry| visit(entry.joint, entry.ratio)),
         }
     }
 }
 
 /// The coordinate of one joint.
-impl From<usize> for Seat {
+impl<P> From<usize> for Seat<P> {
     fn from(joint: usize) -> Self {
-        Self { joint, behind: None }
+        Self::Joint { joint, behind: None }
     }
 }

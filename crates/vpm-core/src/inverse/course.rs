@@ -1,7 +1,7 @@
 //! What joints, memories and drives do along a record, with derivatives by the parameters that each depends on.
 
 use super::record::Record;
-use crate::actuator::{Actuator, Drive};
+use crate::actuator::{Actuator, Drive, Target};
 use crate::description::EffectEntry;
 use crate::effect::Seat;
 use crate::error::Result;
@@ -101,9 +101,13 @@ impl Job for Memory<'_> {
     }
 }
 
-/// Effort of an ideal drive, mean over the two intervals that meet at each sample.
+/// Effort of an ideal drive on a joint or a line, mean over the two intervals that meet at each sample.
 pub(super) struct Delivered<'a> {
     pub(super) actuator: &'a Actuator<usize>,
+    /// The joint or line on which it acts.
+    pub(super) on: Target,
+    /// Place of the ratio by which it acts there through a shaft.
+    pub(super) ratio: Option<usize>,
     /// Number of the actuator.
     pub(super) number: usize,
     pub(super) inputs: Table<'a>,
@@ -113,7 +117,7 @@ pub(super) struct Delivered<'a> {
 impl Delivered<'_> {
     /// The parameters of the actuator.
     pub(super) fn parameters(&self) -> Vec<usize> {
-        self.actuator.domains().into_iter().map(|(&index, _)| index).collect()
+        self.actuator.domains().into_iter().map(|(&index, _)| index).chain(self.ratio).collect()
     }
 }
 
@@ -131,7 +135,8 @@ impl Job for Delivered<'_> {
                     state = Some(next);
                     mean
                 });
-                let effort = drive.effort(mean);
+                let shaft = drive.effort(mean);
+                let effort = self.ratio.map_or(shaft, |ratio| shaft * theta[ratio]);
                 (before.replace(effort).unwrap_or(effort) + effort) * 0.5
             }));
         }

@@ -10,6 +10,7 @@ use crate::line::Line;
 use crate::mount::{Gauge, Marker, Mount, placed};
 use crate::scalar::Scalar;
 use crate::spatial::{Matrix3, Pose, SpatialInertia, Vector3};
+use crate::transmission::Transmission;
 
 /// Everything that makes up a tree, over the number type `S`.
 #[derive(Clone, Debug, Default)]
@@ -26,6 +27,8 @@ pub struct Parts<S> {
     pub point_masses: Vec<PointMass<S>>,
     /// Lines.
     pub lines: Vec<Line<S>>,
+    /// Transmissions.
+    pub transmissions: Vec<Transmission<S>>,
     /// Markers.
     pub markers: Vec<Marker>,
     /// Strain gauges.

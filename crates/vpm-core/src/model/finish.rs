@@ -4,13 +4,14 @@ use super::assemble::Assembly;
 use super::omissions::Tree;
 use super::order::Part;
 use super::turning::turning_in_space;
-use super::{BodyFrame, Elastic, Link, Model, Node, Place, Products, Strip, Wire};
+use super::{BodyFrame, Elastic, Link, Model, Node, Place, Products, Shaft, Strip, Wire};
 use crate::error::Result;
 use crate::joint::Joint;
 use crate::line::{Line, LineEnd};
 use crate::mount::{Gauge, Marker, placed};
 use crate::scalar::Scalar;
 use crate::spatial::{Matrix3, Pose, Vector3};
+use crate::transmission::{Ratio, Transmission};
 
 /// Coordinates from which on articulated bodies are faster than a mass matrix where beams fall into segments: on arms of two links both take
 /// the same time at 8 coordinates, articulated bodies three quarters of it at 14, a quarter at 44.
@@ -62,7 +63,8 @@ impl<S: Scalar> Assembly<'_, S> {
             }] = true;
         }
         let summed = self.slices(&order, &links, &products);
-        let massive = lines.iter().any(Wire::is_massive);
+        let shafts: Vec<_> = self.parts.transmissions.iter().map(|shaft| shaft_of(shaft, &mut links)).collect();
+        let massive = lines.iter().any(Wire::is_massive) || shafts.iter().any(|shaft| shaft.inertia.is_some());
         let segmented = couples && uniform && !massive;
         let cut = self.beams.iter().any(|elastic| elastic.beam.segments().len() > 1);
         let rigid = n_coordinates == n_joints && self.beams.iter().all(|elastic| elastic.frame.is_none());
@@ -83,6 +85,7 @@ impl<S: Scalar> Assembly<'_, S> {
             links,
             frames,
             lines,
+            shafts,
             markers,
             attachments,
             gauges: self.parts.gauges.iter().map(|gauge| self.strip(gauge)).collect(),
@@ -161,6 +164,16 @@ impl<S: Scalar> Assembly<'_, S> {
         nodes.reverse();
         nodes
     }
+}
+
+/// A shaft; a rotor that one joint alone turns goes to the `links`, where the recursions know it.
+fn shaft_of<S: Scalar>(transmission: &Transmission<S>, links: &mut [Link<S>]) -> Shaft<S> {
+    let ratios = transmission.ratios.clone();
+    if let ([Ratio { joint, ratio }], Some(inertia)) = (&*ratios, transmission.inertia) {
+        links[*joint].rotor += *ratio * *ratio * inertia;
+        return Shaft { ratios, inertia: None };
+    }
+    Shaft { ratios, inertia: transmission.inertia }
 }
 
 /// A joint in the frame that its mount sits on.

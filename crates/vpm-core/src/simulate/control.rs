@@ -67,7 +67,7 @@ impl<S: Scalar> Control<S> {
             state: zeros(2 * n),
             acceleration: zeros(n),
             efforts: zeros(n),
-            levers: zeros(description.lines.len() * n),
+            levers: zeros(description.n_wires() * n),
         };
         Ok(Self { loops: loops.collect::<Result<_>>()?, drafts: zeros(rows * inputs), inputs, machine })
     }

@@ -2,6 +2,7 @@
 
 use crate::actuator::Drive;
 use crate::description::Description;
+use crate::effect::Seat;
 use crate::sensor::Layout;
 
 /// A state in words.
@@ -19,10 +20,19 @@ pub(crate) fn state_name(description: &Description, place: usize) -> String {
         of_drives.map(|(state, actuator)| format!("{} of actuator `{}`", state.replace('_', " "), actuator.name));
     let states = description.supplies.iter().flat_map(|supply| supply.states().map(move |state| (state, supply)));
     let of_supplies = states.map(|(state, supply)| format!("{state} of supply `{}`", supply.name));
-    let of_effects = description
-        .remembering()
-        .map(|joint| format!("memory of an effect of joint `{}`", description.bodies[joint].joint.name));
+    let of_effects =
+        description.remembering().map(|seat| format!("memory of an effect of {}", site(description, seat)));
     of_drives.chain(of_supplies).chain(of_effects).nth(place - 2 * n).unwrap_or_default()
+}
+
+/// Where an effect sits, in words.
+pub(super) fn site(description: &Description, seat: &Seat<usize>) -> String {
+    match seat {
+        Seat::Joint { joint, .. } => format!("joint `{}`", description.bodies[*joint].joint.name),
+        Seat::Shaft { transmission, .. } => {
+            format!("transmission `{}`", description.transmissions[*transmission].name)
+        }
+    }
 }
 
 fn coordinate_name(description: &Description, quantity: &str, place: usize) -> String {
@@ -69,6 +79,11 @@ pub(super) fn output_name(description: &Description, column: usize) -> String {
     }
     if column < layout.gauges() {
         let names: Vec<_> = d.lines.iter().map(|line| line.name.as_str()).collect();
+        let first = layout.lines() + 3 * names.len();
+        if column >= first {
+            let names: Vec<_> = d.transmissions.iter().map(|shaft| shaft.name.as_str()).collect();
+            return pick(first, &["position", "velocity", "effort"], "transmission", &names);
+        }
         return pick(layout.lines(), &["length", "rate", "force"], "line", &names);
     }
     if column < layout.markers() {

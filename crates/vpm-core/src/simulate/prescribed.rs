@@ -1,6 +1,7 @@
 //! Joints that follow a given motion, and what answers to it: beams, and joints that nobody drives.
 
 use super::guide::Guide;
+use super::names::site;
 use super::{Run, Setting, check_structure};
 use crate::error::{Error, Result};
 use crate::motion::{JointMotion, StrainRates};
@@ -35,8 +36,8 @@ pub fn observed(
         rate.expect("strain_rate", rows, setting.description.gauges.len())?;
         Table::new("strain_gain", gain, 1, gain.len())?.expect("strain_gain", 1, setting.description.gauges.len())?;
     }
-    if let Some(joint) = setting.description.remembering().next() {
-        return Err(Error::Memory { joint: setting.description.bodies[joint].joint.name.clone() });
+    if let Some(seat) = setting.description.remembering().next() {
+        return Err(Error::Memory { site: site(setting.description, seat) });
     }
     let mut passive = passive.to_vec();
     passive.sort_unstable();

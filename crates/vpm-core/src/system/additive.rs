@@ -22,8 +22,8 @@ pub(super) struct Split<S> {
     state: Vec<S>,
     /// Where the coordinates would be without acceleration.
     coasting: Vec<S>,
-    /// Where friction that is not linear acts, or a memory, or anything on the link side of a joint that winds up.
-    seats: Vec<Seat>,
+    /// Where friction that is not linear acts, or a memory, or anything on a shaft or on the link side of a joint that winds up.
+    seats: Vec<Seat<S>>,
     /// Acceleration of all coordinates per effort at each of these.
     columns: Vec<S>,
     /// Linear damping of each joint, and what its springs do as such over the reach of a stage.
@@ -67,11 +67,11 @@ impl<S: Scalar> Split<S> {
     /// For the machine `dynamics`.
     pub(super) fn new(dynamics: &Dynamics<S>) -> Self {
         let apart =
-            |(seat, effect): &&(Seat, JointEffect<S>)| seat.behind.is_some() || effect.law().damping().is_none();
-        let mut seats: Vec<Seat> = dynamics.effects.iter().filter(apart).map(|(seat, _)| *seat).collect();
-        seats.extend(dynamics.memories.seats());
-        seats.sort_unstable();
-        seats.dedup();
+            |(seat, effect): &&(Seat<S>, JointEffect<S>)| seat.alone().is_none() || effect.law().damping().is_none();
+        let mut seats: Vec<Seat<S>> = dynamics.effects.iter().filter(apart).map(|(seat, _)| seat.clone()).collect();
+        seats.extend(dynamics.memories.seats().cloned());
+        seats.sort_by_key(Seat::place);
+        seats.dedup_by_key(|seat| seat.place());
         let (n, count) = (dynamics.coordinates(), seats.len());
         let [free, velocity, resistance, rest] = [0; 4].map(|_| vec![S::zero(); count]);
         let (coasting, columns) = (vec![S::zero(); n], vec![S::zero(); n * count]);
@@ -119,10 +119,10 @@ impl<S: Scalar> Split<S> {
     /// Resistances at the velocities that are known, and what acts on the seats beside them.
     fn rub(&mut self, dynamics: &Dynamics<S>, Stage { explicit, implicit, reach }: Stage<'_, S>) {
         let n = dynamics.coordinates();
-        for (k, &seat) in self.seats.iter().enumerate() {
-            let (q, w, u) = (seat.of(explicit), self.velocity[k], dynamics.efforts[seat.joint]);
+        for (k, seat) in self.seats.iter().enumerate() {
+            let (q, w, u) = (seat.of(explicit), self.velocity[k], seat.load(&dynamics.efforts));
             let (mut resistance, mut rest) = (S::zero(), S::zero());
-            for (_, effect) in dynamics.effects.iter().filter(|(place, _)| *place == seat) {
+            for (_, effect) in dynamics.effects.iter().filter(|(other, _)| other.place() == seat.place()) {
                 let (law, linear) = (effect.law(), effect.law().damping().unwrap_or_default());
                 resistance += law.resistance(q, w) - linear;
                 if law.follows_load() {
@@ -130,7 +130,7 @@ impl<S: Scalar> Split<S> {
                     resistance += per_load * load;
                     rest -= (law.share_of_load(q, w, u) - per_load * w) * load;
                 }
-                if seat.behind.is_some() {
+                if seat.alone().is_none() {
                     let spring = Spring::new(effect, q);
                     let (coasting, v) = (seat.of(&self.coasting), seat.of(&implicit[n..]));
                     // Where the stage ends, `coasting + reach (w - v)`.
@@ -139,7 +139,7 @@ impl<S: Scalar> Split<S> {
                 }
             }
             let memories = &implicit[dynamics.first_memory()..];
-            for [own, at_rest] in dynamics.memories.at_end(seat, w, memories, reach) {
+            for [own, at_rest] in dynamics.memories.at_end(seat.place(), w, memories, reach) {
                 resistance += own;
                 rest += at_rest;
             }
@@ -216,8 +216,8 @@ impl<S: Scalar> Dynamics<S> {
         }
         flexible::subtract_elastic(model, coasting, v, loads);
         damping.fill(S::zero());
-        for (seat, effect) in effects.iter().filter(|(seat, _)| seat.behind.is_none()) {
-            let (joint, q) = (seat.joint, explicit[seat.joint]);
+        for (joint, effect) in effects.iter().filter_map(|(seat, effect)| Some((seat.alone()?, effect))) {
+            let q = explicit[joint];
             let (spring, linear) = (Spring::new(effect, q), effect.law().damping().unwrap_or_default());
             loads[joint] += spring.effort(q, coasting[joint]) - linear * v[joint];
             damping[joint] += linear + spring.stiffness * reach;
@@ -231,7 +231,7 @@ impl<S: Scalar> Dynamics<S> {
         stage: Stage<'_, S>,
         damping: &[S],
         acceleration: &mut [S],
-        (seats, columns): (&[Seat], &mut [S]),
+        (seats, columns): (&[Seat<S>], &mut [S]),
     ) {
         let n = self.coordinates();
         let columns = columns.chunks_exact_mut(n.max(1)).zip(seats);
@@ -242,10 +242,11 @@ impl<S: Scalar> Dynamics<S> {
             acceleration.copy_from_slice(shifted(model, data, (q, v), loads, shift));
             for (column, seat) in columns {
                 // The recursion is linear in the efforts.
-                let own = [Some(seat.joint), seat.behind].map(|joint| joint.map(|joint| (joint, loads[joint])));
+                column.copy_from_slice(loads);
                 seat.push(loads, S::one());
-                column.copy_from_slice(shifted(model, data, (q, v), loads, shift));
-                own.into_iter().flatten().for_each(|(joint, load)| loads[joint] = load);
+                let pushed = shifted(model, data, (q, v), loads, shift);
+                loads.copy_from_slice(column);
+                column.copy_from_slice(pushed);
                 column.iter_mut().zip(&*acceleration).for_each(|(entry, &a)| *entry -= a);
             }
             return;

@@ -47,11 +47,14 @@ impl<S: Scalar> Dynamics<S> {
     /// `u - k |u| = r`, so `u = r / (1 - k sign(r))`, k the sum of their shares.
     pub(crate) fn follow_load(&self, q: &[S], v: &[S], efforts: &mut [S]) {
         for (joint, effort) in efforts.iter_mut().enumerate().take(self.joints()) {
-            let own = |(seat, effect): &&(Seat, JointEffect<S>)| seat.joint == joint && effect.law().follows_load();
+            let own = |(seat, effect): &&(Seat<S>, JointEffect<S>)| {
+                seat.joint() == Some(joint) && effect.law().follows_load()
+            };
             if !self.effects.iter().any(|effect| own(&effect)) {
                 continue;
             }
-            let share = |(_, effect): &(Seat, JointEffect<S>)| effect.law().share_of_load(q[joint], v[joint], *effort);
+            let share =
+                |(_, effect): &(Seat<S>, JointEffect<S>)| effect.law().share_of_load(q[joint], v[joint], *effort);
             let taken: S = self.effects.iter().filter(own).map(share).sum();
             let arriving = *effort;
             *effort = arriving / (S::one() - arriving.if_negative(|| -taken, || taken));
@@ -152,12 +155,12 @@ impl<S: Scalar> Dynamics<S> {
         self.actuators.iter().map(potential).sum()
     }
 
-    /// Whether actuators act on lines.
+    /// Whether actuators act on lines or shafts.
     pub(crate) fn pulls(&self) -> bool {
         self.pulls
     }
 
-    /// Length of each line per unit of each coordinate at `q`: the lever arms of its force, lines x n.
+    /// Length of each line per unit of each coordinate at `q`, then angle of each shaft: the lever arms of its force, lines and shafts x n.
     pub(crate) fn levers(&mut self, q: &[S], levers: &mut [S]) {
         let Self { model, data, loads, .. } = self;
         loads.fill(S::zero());

@@ -288,13 +288,16 @@ impl<S: Scalar> Guided<S> {
         let (n, count) = (self.load.len(), self.free.len());
         for (seat, effect) in &self.dynamics.effects {
             let (q, v) = (seat.of(&self.x), seat.of(&self.x[n..]));
-            let own = seat.joints().filter_map(|joint| self.free.iter().position(|&place| place == joint));
-            for k in own.clone() {
-                for other in own.clone() {
-                    rows[k * width + other] += effect.slope_at_rest(q);
-                    rows[k * width + count + other] -= effect.law().resistance(q, v);
-                }
-            }
+            let (slope, resistance) = (effect.slope_at_rest(q), effect.law().resistance(q, v));
+            let place = |joint: usize| self.free.iter().position(|&place| place == joint);
+            seat.for_each(|joint, share| {
+                let Some(k) = place(joint) else { return };
+                seat.for_each(|joint, other_share| {
+                    let Some(other) = place(joint) else { return };
+                    rows[k * width + other] += slope * share * other_share;
+                    rows[k * width + count + other] -= resistance * share * other_share;
+                });
+            });
         }
     }
 

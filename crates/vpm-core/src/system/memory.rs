@@ -1,13 +1,13 @@
 //! Effects that remember: where their states stand, and how they move.
 
-use crate::effect::{MemoryChords, MemoryEffect, Seat};
+use crate::effect::{MemoryChords, MemoryEffect, Place, Seat};
 use crate::scalar::Scalar;
 
 /// Effects of joints that remember, with their memories, which follow the states of drives and supplies.
 #[derive(Clone, Debug)]
 pub struct Memories<S> {
     /// Effects, each with its seat.
-    laws: Vec<(Seat, MemoryEffect<S>)>,
+    laws: Vec<(Seat<S>, MemoryEffect<S>)>,
     /// Memory of each.
     values: Vec<S>,
     /// What stands for each law in an iteration matrix.
@@ -16,7 +16,7 @@ pub struct Memories<S> {
 
 impl<S: Scalar> Memories<S> {
     /// Relaxed ones.
-    pub(crate) fn new(laws: Vec<(Seat, MemoryEffect<S>)>) -> Self {
+    pub(crate) fn new(laws: Vec<(Seat<S>, MemoryEffect<S>)>) -> Self {
         let (values, chords) = (vec![S::zero(); laws.len()], vec![None; laws.len()]);
         Self { laws, values, chords }
     }
@@ -34,8 +34,8 @@ impl<S: Scalar> Memories<S> {
     }
 
     /// Where each of them is.
-    pub(super) fn seats(&self) -> impl Iterator<Item = Seat> {
-        self.laws.iter().map(|(seat, _)| *seat)
+    pub(super) fn seats(&self) -> impl Iterator<Item = &Seat<S>> {
+        self.laws.iter().map(|(seat, _)| seat)
     }
 
     /// Takes over the memories.
@@ -46,16 +46,16 @@ impl<S: Scalar> Memories<S> {
 
     /// Each law where it has come to, at the joints' velocities `v` and these memories, or what stands for it.
     #[inline]
-    fn at(&self, v: &[S], values: &[S]) -> impl Iterator<Item = (Seat, MemoryChords<S>)> {
+    fn at(&self, v: &[S], values: &[S]) -> impl Iterator<Item = (&Seat<S>, MemoryChords<S>)> {
         let laws = self.laws.iter().zip(&self.chords).zip(values);
-        laws.map(|(((seat, effect), chords), &z)| (*seat, chords.unwrap_or_else(|| effect.law().chords(seat.of(v), z))))
+        laws.map(|(((seat, effect), chords), &z)| (seat, chords.unwrap_or_else(|| effect.law().chords(seat.of(v), z))))
     }
 
     /// What the laws at one seat do at the end of an implicit step over the time `reach`, from `values`, moving with `w` then: resistance,
     /// and effort at rest.
     #[inline]
-    pub(super) fn at_end(&self, seat: Seat, w: S, values: &[S], reach: S) -> impl Iterator<Item = [S; 2]> {
-        let own = self.laws.iter().zip(values).filter(move |((place, _), _)| *place == seat);
+    pub(super) fn at_end(&self, place: Place, w: S, values: &[S], reach: S) -> impl Iterator<Item = [S; 2]> {
+        let own = self.laws.iter().zip(values).filter(move |((seat, _), _)| seat.place() == place);
         own.map(move |((_, effect), &z)| {
             let MemoryChords { push, gain, source, fading, .. } = effect.law().chords(w, z);
             let kept = (fading * reach + 1.0).recip();
@@ -121,7 +121,7 @@ impl<S: Scalar> Memories<S> {
 
     /// What stands for the laws where nothing rubs.
     pub(super) fn frictionless(&self) -> Vec<Option<MemoryChords<S>>> {
-        let at_rest = |(_, effect): &(Seat, MemoryEffect<S>)| effect.law().chords(S::zero(), S::zero());
+        let at_rest = |(_, effect): &(Seat<S>, MemoryEffect<S>)| effect.law().chords(S::zero(), S::zero());
         self.laws.iter().map(|law| Some(at_rest(law).frictionless())).collect()
     }
 

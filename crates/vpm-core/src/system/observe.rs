@@ -3,7 +3,7 @@
 use super::Dynamics;
 use super::connections::into_body;
 use crate::contact::ContactFriction;
-use crate::dynamics::{Motion, frames, lines, poses, reactions};
+use crate::dynamics::{Motion, frames, lines, poses, reactions, shafts};
 use crate::scalar::Scalar;
 use crate::sensor::Layout;
 use crate::spatial::Pose;
@@ -14,7 +14,7 @@ impl<S: Scalar> Dynamics<S> {
         Layout {
             joints: self.model.n_joints(),
             actuators: self.actuators.len(),
-            lines: self.model.lines().len(),
+            lines: self.model.n_wires(),
             gauges: self.model.gauges().len(),
             markers: self.model.markers().len(),
             hydraulics: self.shown.hydraulics.len(),
@@ -47,6 +47,7 @@ impl<S: Scalar> Dynamics<S> {
             frames(model, data, q, v);
             poses(model, data);
             lines(model, data);
+            shafts(model, data, q, v);
         }
         let (q, v) = x[..2 * n].split_at(n);
         for ((channels, &q), &v) in outputs[..layout.actuators()].chunks_exact_mut(4).zip(q).zip(v) {

@@ -399,12 +399,13 @@ impl Dynamics<Recorded> {
         self.seals = seals.iter().map(|seal| seal.map(Recorded::frozen)).collect();
         self.memories.replace(memories.iter().map(|law| law.map(|law| law.map(Recorded::frozen))));
         let resistances: Vec<_> = resistances.iter().map(|resistance| resistance.frozen()).collect();
-        let chords =
-            |effects: &[(Seat, JointEffect<Recorded>)], [q, v, _]: [&[Recorded]; 3], total: &mut [Recorded]| {
-                for ((seat, effect), &resistance) in effects.iter().zip(&resistances) {
-                    seat.push(total, effect.law().effort_at_rest(seat.of(q)) - resistance * seat.of(v));
-                }
-            };
+        let chords = |effects: &[(Seat<Recorded>, JointEffect<Recorded>)],
+                      [q, v, _]: [&[Recorded]; 3],
+                      total: &mut [Recorded]| {
+            for ((seat, effect), &resistance) in effects.iter().zip(&resistances) {
+                seat.push(total, effect.law().effort_at_rest(seat.of(q)) - resistance * seat.of(v));
+            }
+        };
         let resistance =
             |law: &ContactFriction<Recorded>, square: Recorded, normal| law.chord(square.frozen()).frozen() * normal;
         let mut rates = vec![Recorded::default(); x.len()];

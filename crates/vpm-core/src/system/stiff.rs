@@ -29,17 +29,17 @@ pub(super) fn iteration_matrix<S: Scalar>(
     elasticity(dynamics, lower, dim, column);
     let Dynamics { data, effects, actuators, .. } = dynamics;
     for (number, (seat, _)) in effects.iter().enumerate() {
-        if effects[..number].iter().any(|(earlier, _)| earlier == seat) {
+        if effects[..number].iter().any(|(earlier, _)| earlier.place() == seat.place()) {
             continue;
         }
-        let own = || effects.iter().zip(resistances).filter(|((place, _), _)| place == seat);
+        let own = || effects.iter().zip(resistances).filter(|((other, _), _)| other.place() == seat.place());
         let slope: S = own().map(|((_, effect), _)| effect.slope_at_rest(seat.of(q))).sum();
         let resistance: S = own().map(|(_, &resistance)| resistance).sum();
         for (entry, block) in [(slope, 0), (-resistance, n)] {
             column.fill(S::zero());
             seat.push(column, entry);
             data.solve(column);
-            seat.joints().for_each(|joint| add_column(lower, dim, block + joint, column));
+            seat.for_each(|joint, share| add_column(lower, dim, block + joint, (column, share)));
         }
     }
     let lagging = actuators.iter().filter_map(|actuator| actuator.lag.as_ref().map(|lag| (actuator, lag)));
@@ -52,7 +52,7 @@ pub(super) fn iteration_matrix<S: Scalar>(
             Target::Line(line) => data.line_load(line, force, column),
         }
         data.solve(column);
-        add_column(lower, dim, place, column);
+        add_column(lower, dim, place, (column, S::one()));
         lower[(place - n) * dim + place] = lag.rate(S::one(), S::zero());
     }
     remember(dynamics, lower, dim, chords, column);
@@ -68,16 +68,17 @@ fn remember<S: Scalar>(
 ) {
     let (n, first) = (dynamics.coordinates(), dynamics.first_memory());
     for ((place, seat), law) in (first..).zip(dynamics.memories.seats()).zip(chords.iter().flatten()) {
-        let mut pushed = |effort: S, places: &mut dyn Iterator<Item = usize>| {
+        let push = |column: &mut [S], effort: S| {
             column.fill(S::zero());
             seat.push(column, effort);
             dynamics.data.solve(column);
-            places.for_each(|place| add_column(rows, dim, place, column));
         };
-        pushed(-law.push, &mut std::iter::once(place));
-        pushed(-law.resistance, &mut seat.joints().map(|joint| n + joint));
+        push(column, -law.push);
+        add_column(rows, dim, place, (column, S::one()));
+        push(column, -law.resistance);
+        seat.for_each(|joint, share| add_column(rows, dim, n + joint, (column, share)));
         let row = &mut rows[(place - n) * dim..];
-        seat.joints().for_each(|joint| row[n + joint] = law.gain);
+        seat.for_each(|joint, share| row[n + joint] = law.gain * share);
         row[place] = -law.fading;
     }
 }
@@ -95,14 +96,15 @@ pub(super) fn elasticity<S: Scalar>(dynamics: &Dynamics<S>, rows: &mut [S], widt
                     *entry = -row[k];
                 }
                 dynamics.data.solve(column);
-                add_column(rows, width, block + first + k, column);
+                add_column(rows, width, block + first + k, (column, S::one()));
             }
         }
     }
 }
 
-fn add_column<S: Scalar>(rows: &mut [S], width: usize, place: usize, column: &[S]) {
+/// Adds so many times a column.
+fn add_column<S: Scalar>(rows: &mut [S], width: usize, place: usize, (column, times): (&[S], S)) {
     for (row, &entry) in rows.chunks_exact_mut(width).zip(column) {
-        row[place] += entry;
+        row[place] += entry * times;
     }
 }

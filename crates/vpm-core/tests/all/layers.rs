@@ -5,9 +5,10 @@ use std::io::Result;
 use std::path::{Path, PathBuf};
 
 /// The tree, lowest first; `beam` steps some of its motions by itself: each may import any before it.
-const TREE: [&str; 16] = [
+const TREE: [&str; 17] = [
     "error",
     "scalar",
+    "transmission",
     "algebra",
     "spatial",
     "mount",
@@ -34,7 +35,7 @@ const ALONE: [(&str, &[&str]); 15] = [
     ("delay", &["error", "scalar"]),
     ("ode", &["error", "scalar"]),
     ("integrator", &["error", "scalar", "algebra", "ode"]),
-    ("effect", &["error", "scalar"]),
+    ("effect", &["error", "scalar", "transmission::Ratio"]),
     (
         "actuator",
         &[

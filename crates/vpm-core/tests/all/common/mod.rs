@@ -107,6 +107,33 @@ impl Machine {
         self.part("effects", &format!("{kind}_behind"), part, numbers)
     }
 
+    /// A transmission of these joints and ratios, `shaft0`, `shaft1`, ..., with a rotor if it has an inertia.
+    pub fn transmission(&mut self, ratios: &[(usize, f64)], inertia: Option<f64>) -> &mut Self {
+        let number = self.parts["transmissions"].as_array().map_or(0, Vec::len);
+        let ratios: Vec<_> = ratios.iter().map(|(joint, ratio)| json!({"joint": joint, "ratio": ratio})).collect();
+        let numbers = inertia.map_or_else(
+            || json!({"ratios": ratios.clone()}),
+            |inertia| json!({"ratios": ratios.clone(), "inertia": inertia}),
+        );
+        self.add("transmissions", json!({"name": format!("shaft{number}"), "inertia": null}), numbers)
+    }
+
+    /// An effect on the shaft of a transmission; its parameters are named `type_shaft.parameter`.
+    pub fn effect_on_shaft(&mut self, kind: &str, transmission: usize, numbers: &[(&str, f64)]) -> &mut Self {
+        let ratios = self.parts["transmissions"][transmission]["ratios"].clone();
+        let part = json!({"type": kind, "transmission": transmission, "ratios": ratios});
+        self.part("effects", &format!("{kind}_shaft"), part, numbers)
+    }
+
+    /// An ideal drive on a transmission of a machine without lines.
+    pub fn actuator_on_shaft(&mut self, transmission: usize, numbers: &[(&str, f64)]) -> &mut Self {
+        let name = format!("motor{transmission}");
+        let gain = numbers.iter().find(|(key, _)| *key == "gain").map_or(1.0, |(_, gain)| *gain);
+        let drive = json!({"type": "ideal", "gain": self.parameter(&format!("{name}.gain"), gain)});
+        let others: Vec<_> = numbers.iter().filter(|(key, _)| *key != "gain").copied().collect();
+        self.part("actuators", &name, json!({"name": name, "on": {"line": transmission}, "drive": drive}), &others)
+    }
+
     /// A payload on a body.
     pub fn payload(&mut self, body: usize, mass: f64, position: [f64; 3]) -> &mut Self {
         let position: Vec<_> = ["x", "y", "z"]

@@ -29,6 +29,7 @@ pub fn lift<S: Scalar>(parts: &Parts<f64>) -> Parts<S> {
             .map(|p| PointMass { on: p.on, mass: S::from_f64(p.mass), position: p.position.map(S::from_f64) })
             .collect(),
         lines: parts.lines.iter().map(|line| line.map(number)).collect(),
+        transmissions: parts.transmissions.iter().map(|shaft| shaft.map(number)).collect(),
         markers: parts.markers.clone(),
         gauges: parts.gauges.clone(),
         attachments: parts.attachments.clone(),

@@ -6,3 +6,4 @@ mod load_cells;
 mod parts;
 mod passive_joints;
 mod prepared;
+mod transmissions;

@@ -243,6 +243,25 @@ fn effects_behind_a_joint_agree() -> Result<()> {
     Ok(())
 }
 
+#[test]
+fn effects_on_shafts_agree() -> Result<()> {
+    for (seed, inertia) in [(1, None), (2, Some(0.3)), (3, Some(0.05)), (4, None)] {
+        let mut machine = Machine::new(&random_tree(seed, 2 + seed as usize % 3));
+        machine
+            .transmission(&[(0, 3.0), (1, -2.0)], inertia)
+            .transmission(&[(1, 4.0)], inertia)
+            .effect_on_shaft("coulomb_friction", 0, &[("coulomb", 0.5), ("transition_velocity", 0.1)])
+            .effect_on_shaft("viscous_friction", 0, &[("viscous", 0.2)])
+            .effect_on_shaft("spring", 1, &[("stiffness", 6.0), ("rest", 0.3)])
+            .effect_on_shaft("hysteresis", 0, &[("force", 0.5), ("displacement", 0.1), ("shape", 1.0)])
+            .effect("viscous_friction", 1, &[("viscous", 0.2)])
+            .actuator_on_shaft(0, &[("gain", 30.0), ("lag", 0.05)])
+            .rubbing_actuator(1, 8.0, [0.2, 0.1, 0.1]);
+        check(&format!("tree {seed}"), &machine.build(), &WITH_DERIVATIVES, &[])?;
+    }
+    Ok(())
+}
+
 /// Effects of joints with their parameters: each a size that is drawn up to it, from a tenth of it.
 const EFFECTS: [(&str, &[(&str, f64)]); 16] = [
     ("viscous_friction", &[("viscous", 0.5)]),
