@@ -47,7 +47,7 @@ from vpm.discrepancy.timing import in_time
 from vpm.discrepancy.told_apart import told_apart
 from vpm.discrepancy.verdict import is_negligible, verdict
 from vpm.errors import DiagnosisError, DivergedError, VpmError
-from vpm.experiment import Experiment
+from vpm.experiment import Experiment, as_records, joints_from_shafts
 from vpm.identify import InverseDynamicsProblem, OutputErrorProblem, gaps
 from vpm.identify.fit import fit_of
 from vpm.identify.parallel import worker_count
@@ -111,7 +111,8 @@ def diagnose(
     model : Model
         The nominal model. Parameters with an uncertainty may be recalibrated.
     experiments : Experiment or sequence of Experiment
-        Records to fit: position of every joint and command of every actuator.
+        Records to fit: position of every joint, or of as many independent transmissions, and command of every
+        actuator.
     validate : Experiment or sequence of Experiment, optional
         Records that are never fitted. Without them the last 30 % of each record is kept out.
     effects : sequence of str, optional
@@ -153,7 +154,7 @@ def diagnose(
     worker_count(workers)
     # Its linear algebra is small: with threads of its own it would only take the cores from candidates side by side.
     with threadpool_limits(1, user_api="blas"):
-        records = _records(experiments, validate)
+        records = _records(model, experiments, validate)
         each = SideBySide(workers, progress)
         most = max(LEAST_LIMIT, 2 * len(model.joints)) if limit is None else limit
         return _diagnosis(model, records, effects, cutoff, setup or Setup(), most, names, each, tell)
@@ -382,14 +383,15 @@ def _not_searched(effects: Sequence[str] | None, reason: str) -> list[str]:
 
 
 def _records(
-    experiments: Experiment | Sequence[Experiment], validate: Experiment | Sequence[Experiment] | None
+    model: Model, experiments: Experiment | Sequence[Experiment], validate: Experiment | Sequence[Experiment] | None
 ) -> _Records:
     """Records to fit, records to judge on, and notes on both."""
-    training = (experiments,) if isinstance(experiments, Experiment) else tuple(experiments)
+    free = [parameter.name for parameter in model.parameters.values() if parameter.adjustable]
+    training = tuple(joints_from_shafts(record, model, free=free) for record in as_records(experiments))
     if not training:
         raise DiagnosisError("no record was given; pass at least one experiment")
     if validate is not None:
-        unseen = (validate,) if isinstance(validate, Experiment) else tuple(validate)
+        unseen = tuple(joints_from_shafts(record, model) for record in as_records(validate))
         if unseen:
             return training, unseen, []
     pairs = [e.split(1.0 - HELD_OUT) for e in training]

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vpm.experiment import Experiment, Motion, motion
+from vpm.errors import ExperimentError
+from vpm.experiment import Experiment, Motion, joints_from_shafts, motion
 from vpm.model import Model
 from vpm.model.commanded import commanded_states
 from vpm.model.settled import follow, rest
@@ -75,10 +77,13 @@ def _bent(model: Model, theta: Array, motion: tuple[Array, Array, Array], dt: fl
 def initial_state(model: Model, experiment: Experiment, theta: Array) -> Array:
     """State at the first sample, lags settled at the command, flexible links deflected as in equilibrium.
 
-    The machine is at rest at zero where the log holds no position. Drives have stood without commands, but for what the
-    log holds of them: pressures of chambers, current, place of the spool. One pressure and the load tell the other.
+    The machine is at rest at zero where the log holds no position, and shafts tell none. Drives have stood without
+    commands, but for what the log holds of them: pressures of chambers, current, place of the spool. One pressure and
+    the load tell the other.
     """
     joints, coordinates = len(model.joints), len(model.coordinates)
+    with suppress(ExperimentError):  # shafts that do not tell the joints leave them at rest
+        experiment = joints_from_shafts(experiment, model, theta)
     state = np.zeros(model.core.n_states)
     gain, offset = sensor_errors(model, theta)
     for joint, name in enumerate(model.joints):
@@ -101,6 +106,7 @@ def initial_state(model: Model, experiment: Experiment, theta: Array) -> Array:
 
 def whole_motion(model: Model, experiment: Experiment, theta: Array, cutoff: float | None) -> Motion:
     """Measured motion of all joints; that of joints which effects have split off is worked out along the others'."""
+    experiment = joints_from_shafts(experiment, model, theta)
     if not model.added_joints:
         return motion(experiment, model, cutoff=cutoff)
     own = tuple(name for name in model.joints if name not in model.added_joints)
@@ -279,8 +285,8 @@ def passive_joints(experiment: Experiment, model: Model) -> tuple[str, ...]:
     position is missing is a mistake of the log. One that an effect has split off is always one of them: where the log
     holds its deflection, that is compared and not prescribed, or the log would show nothing of its stiffness.
     """
-    on_joints = [name for name in model.actuators if model.line_of_actuator(name) is None]
-    driven = {model.joint_of_actuator(name) for name in on_joints}
+    turning = [name for name in model.actuators if model.line_of_actuator(name) is None]
+    driven = {joint for name in turning for joint in model.joints_of_actuator(name)}
     added = set(model.added_joints)
     unseen = (name for name in model.joints if name in added or f"{name}.position" not in experiment)
     return tuple(name for name in unseen if name not in driven)
@@ -299,6 +305,7 @@ def joint_motion(
     Of joints that are passive there (see `passive_joints`) it has no columns, as long as any joint is measured. The
     log need not hold commands, unless the motion is to be ``commanded``.
     """
+    experiment = joints_from_shafts(experiment, model)
     passive = passive_joints(experiment, model)
     followed = tuple(name for name in model.joints if name not in passive)
     inputs = (model.input_channels, tuple(model.optional_inputs)) if commanded else ((), ())

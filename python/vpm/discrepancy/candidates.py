@@ -168,15 +168,14 @@ def _absent(model: Model, effects: Sequence[str] | None) -> list[tuple[EffectTyp
 
 
 def _candidate(effect: EffectType, site: str, model: Model, data: InverseDynamicsProblem, residual: Array) -> Candidate:
-    acted_on = joint_at(model, site)
-    joint = model.joints.index(acted_on) if acted_on else 0
-    seen = _excitation(data, model, joint, site if effect.site in {"actuator", "cylinder"} else None)
+    joint = joint_at(model, site) or model.joints[0]
+    seen = _excitation(data, model, site, site if effect.site in {"actuator", "cylinder"} else None)
     if effect.name in STRUCTURAL:
         found = structural_starts(effect.name, site, model, seen.travel, logged_swing(data, model, site))
         fixed = ("damping", "width") if effect.name == "backlash" else ()
         return Candidate(effect, site, *found, fixed, neutral=False)
     if effect.name == "end_stop":
-        where, _, values = _over_way(data, model.joints[joint], residual)
+        where, _, values = _over_way(data, model, site, residual)
         return Candidate(effect, site, *stop_starts(where, values, seen.middle, seen.travel, softest(model, site)))
     if effect.name == "coulomb_friction":
         return Candidate(effect, site, _grid("transition_velocity", TRANSITION_SHARES, seen.speed), _slow(seen))
@@ -191,7 +190,7 @@ def _candidate(effect: EffectType, site: str, model: Model, data: InverseDynamic
         bounds = {"stribeck_velocity": (2e-3 * seen.speed, HIGHEST_STRIBECK * seen.speed), **_slow(seen)}
         return Candidate(effect, site, starts, bounds, fixed=("transition_velocity",))
     if any(parameter.name == "period" and not parameter.optional for parameter in effect.parameters):
-        return _periodic(effect, site, data, model.joints[joint], residual)
+        return _periodic(effect, site, data, model, residual)
     if effect.name in {"spring", "cubic_spring"}:
         return Candidate(effect, site, ({"rest": seen.middle},), {"rest": _around(seen)})
     if effect.name == "hysteresis":
@@ -203,7 +202,7 @@ def _candidate(effect: EffectType, site: str, model: Model, data: InverseDynamic
         return Candidate(effect, site, _payload_places(model, site))
     if effect.name in {"actuator_lag", "saturation"}:
         limited = effect.name == "saturation"
-        guessed = seen_limit(data, model.joints[joint], seen.input, residual) if limited else None
+        guessed = seen_limit(data, joint, seen.input, residual) if limited else None
         return _in_drive(effect, site, seen, guessed)
     if effect.name in {"supply_drop", "warming_friction"}:
         return _fading(effect, site, max(m.dt * len(m.time) for m in data.motions))
@@ -213,11 +212,11 @@ def _candidate(effect: EffectType, site: str, model: Model, data: InverseDynamic
     return Candidate(effect, site, ({},))
 
 
-def _periodic(effect: EffectType, site: str, data: InverseDynamicsProblem, joint: str, residual: Array) -> Candidate:
+def _periodic(effect: EffectType, site: str, data: InverseDynamicsProblem, model: Model, residual: Array) -> Candidate:
     """Waves over the way of a joint; what rubs turns round with the motion, a share of the effort with that."""
-    where, rate, values = _over_way(data, joint, residual)
+    where, rate, values = _over_way(data, model, site, residual)
     if effect.rubs or effect.takes_effort:
-        values = values * (np.sign(rate) if effect.rubs else _applied(data, joint))
+        values = values * (np.sign(rate) if effect.rubs else _applied(data, site))
     periods = _ripple_periods(where, values, 0.5 if effect.rubs else 2.0)
     bounds = {"period": (min(periods) / 1.5, max(periods) * 1.5)}
     return Candidate(effect, site, tuple({"period": p} for p in periods), bounds)
@@ -275,7 +274,7 @@ def _known_transition(model: Model, site: str, seen: Excitation) -> float:
 
 
 def joint_at(model: Model, site: str) -> str:
-    """The joint at which an effect acts, its drive or its sensor; "" if it acts on a body or on all."""
+    """The joint at which an effect acts, its drive or its sensor; "" if it acts on a body or on several."""
     if site in model.joints:
         return site
     if site in model.actuators:
@@ -284,12 +283,25 @@ def joint_at(model: Model, site: str) -> str:
     return next((owner for owner in read if owner in model.joints), "")
 
 
-def _excitation(data: InverseDynamicsProblem, model: Model, joint: int, actuator: str | None) -> Excitation:
+def shares_at(model: Model, site: str, joints: Sequence[str]) -> Array:
+    """Share of each of these joints in the coordinate at a site, shape (n,).
+
+    At a transmission these are its ratios, elsewhere 1 of the joint there, or of the first one.
+    """
+    if site in model.transmissions:
+        ratios = model.ratios(site)
+        return np.array([model.parameters[ratios[name]].value if name in ratios else 0.0 for name in joints])
+    joint = joint_at(model, site) or model.joints[0]
+    shares = np.zeros(len(joints))
+    shares[list(joints).index(joint) if joint in joints else 0] = 1.0
+    return shares
+
+
+def _excitation(data: InverseDynamicsProblem, model: Model, site: str, actuator: str | None) -> Excitation:
     """Largest speed (99.9 % quantile), middle and half range of the travel, interval and largest command."""
-    name = model.joints[joint]
-    column = data.motions[0].joints.index(name) if name in data.motions[0].joints else 0
-    position = np.concatenate([m.position[:, column] for m in data.motions])
-    velocity = np.concatenate([m.velocity[:, column] for m in data.motions])
+    shares = shares_at(model, site, data.motions[0].joints)
+    position = np.concatenate([m.position @ shares for m in data.motions])
+    velocity = np.concatenate([m.velocity @ shares for m in data.motions])
     column = model.actuators.index(actuator) if actuator is not None else 0
     command = max((float(np.abs(m.inputs[:, column]).max()) for m in data.motions if m.inputs.size), default=1.0)
     low, high = float(position.min()), float(position.max())
@@ -324,13 +336,15 @@ def _ripple_periods(position: Array, values: Array, fewest: float) -> list[float
     return [float(1.0 / frequencies[i]) for i in best]
 
 
-def _over_way(data: InverseDynamicsProblem, joint: str, residual: Array) -> tuple[Array, Array, Array]:
-    """Position, velocity and residual of one joint, or of the first one that is measured, at all samples."""
-    column = _column(data, joint)
-    records = range(len(data.motions))
-    position, velocity = (np.concatenate([data.state(r)[which][:, column] for r in records]) for which in (0, 1))
-    values = np.concatenate([residual[data.efforts(r)[column].samples] for r in records])
-    return position, velocity, values
+def _over_way(data: InverseDynamicsProblem, model: Model, site: str, residual: Array) -> tuple[Array, Array, Array]:
+    """Position, velocity and residual of one joint, or of the first one that is measured, at all samples.
+
+    At a transmission it is the effort on the shaft that leaves least of the residual of its joints.
+    """
+    shares, records = shares_at(model, site, data.joints), range(len(data.motions))
+    position, velocity = (np.concatenate([data.state(r)[which] @ shares for r in records]) for which in (0, 1))
+    efforts = [np.column_stack([residual[block.samples] for block in data.efforts(r)]) for r in records]
+    return position, velocity, np.concatenate(efforts) @ (shares / max(float(shares @ shares), 1e-300))
 
 
 def _applied(data: InverseDynamicsProblem, joint: str) -> Array:

@@ -5,6 +5,7 @@ from vpm.experiment.cutoff import CutoffChoice, choose_cutoff
 from vpm.experiment.motion import Motion, common_cutoff, motion
 from vpm.experiment.noise import noise_std, quantisation_step
 from vpm.experiment.record import Experiment
+from vpm.experiment.shafts import joints_from_shafts
 from vpm.experiment.signal import decimation_for, differentiate, lowpass, parallel_filter
 
 __all__ = [
@@ -17,6 +18,7 @@ __all__ = [
     "common_cutoff",
     "decimation_for",
     "differentiate",
+    "joints_from_shafts",
     "lowpass",
     "motion",
     "noise_std",

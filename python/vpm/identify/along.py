@@ -119,7 +119,11 @@ def _shown(model: Model, joints: Sequence[str], experiments: Sequence[Experiment
         return ()
     efforts = {f"{name}.effort" for name in model.joints}
     if has_own_drives(model):
-        lengths = {c for c in model.output_channels if c.rpartition(".")[0] in {*model.joints, *model.lines}}
+        lengths = {
+            c
+            for c in model.output_channels
+            if c.rpartition(".")[0] in {*model.joints, *model.lines, *model.transmissions}
+        }
         given = copied_channels(model, "free_run") | lengths | efforts
     else:
         passive = tuple(name for name in model.joints if name not in joints)

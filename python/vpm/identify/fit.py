@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.errors import IdentificationError
-from vpm.experiment import Experiment, as_records
+from vpm.experiment import Experiment, as_records, joints_from_shafts
 from vpm.identify.comparison import comparison
 from vpm.identify.engine import Found, fit_problem
 from vpm.identify.estimation import Estimate, Progress, estimate, limits
@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+#: Modes in which the model follows the measured motion of its joints.
+FOLLOWING = frozenset({"inverse_dynamics", "prescribed_motion", "input_error"})
 #: Times that an observer gets gains of the values that it led to, and the move (in deviations) after which it need not.
 RENEWALS, SETTLED = 4, 0.1
 
@@ -202,6 +204,8 @@ def identify(
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
         raise IdentificationError(f'"{twice[0]}" is named {names.count(twice[0])} times in free=; name it once')
+    if mode in FOLLOWING:
+        records = [joints_from_shafts(record, model, free=names) for record in records]
     data = comparison(model, records, mode, cutoff=cutoff, setup=setup, ties=ties, fitting=fitting)
     check_ties(model, ties or {}, names)
     data = _with_own_gains(model, data, names, tolerance)

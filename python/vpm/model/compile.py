@@ -19,12 +19,20 @@ from vpm.model.connection_compile import (
 )
 from vpm.model.controller import ComputedTorque, Controller
 from vpm.model.drive_compile import drive_json, optional_json, supply_json
-from vpm.model.effect_compile import EFFECT_SITES, effect_json
+from vpm.model.effect_compile import EFFECT_SITES, effect_json, shaft_json
 from vpm.model.effects import effects_of
 from vpm.model.omissions import omissions
 from vpm.model.parameters import INERTIA_AXES
 from vpm.model.pose import Pose, pose
-from vpm.model.structure import HYDRAULIC_CHANNELS, SUPPLY_CHANNELS, Axis, Frame, Structure
+from vpm.model.structure import (
+    HYDRAULIC_CHANNELS,
+    LINE_UNITS,
+    SHAFT_UNITS,
+    SUPPLY_CHANNELS,
+    Axis,
+    Frame,
+    Structure,
+)
 
 
 def description(checked: Checked) -> str:
@@ -63,6 +71,8 @@ def description(checked: Checked) -> str:
         "bushings": [bushing_json(name, entry, structure, index) for name, entry in document.bushings.items()],
         "load_cells": [cell_json(name, entry, structure) for name, entry in document.load_cells.items()],
     }
+    if document.transmissions:  # older programs know no such key
+        content["transmissions"] = [_transmission(name, structure, index) for name in document.transmissions]
     if not document.velocity_terms:
         content["drop_velocity_terms"] = True
     if omitted := omissions(structure):
@@ -158,6 +168,11 @@ def _line(name: str, line: Line, structure: Structure, index: Mapping[str, int])
     return {"name": name, "from": _end(line.start, structure), "to": _end(line.end, structure), **parts}
 
 
+def _transmission(name: str, structure: Structure, index: Mapping[str, int]) -> dict[str, Any]:
+    ratios = shaft_json(name, structure, index)["ratios"]
+    return {"name": name, "ratios": ratios, "inertia": index.get(f"{name}.inertia")}
+
+
 def _end(end: End, structure: Structure) -> dict[str, Any]:
     frame = structure.mounted(end.parent, end.at, Pose(end.point))
     return {"on": mount_json(frame.mount), "point": list(frame.pose.translation)}
@@ -168,9 +183,9 @@ def _actuator(name: str, structure: Structure, index: Mapping[str, int]) -> dict
     friction = optional_json(f"{name}.friction", ("driving", "driven", "transition_velocity"), index)
     return {
         "name": name,
-        "on": {"line": list(structure.document.lines).index(actuator.line)}
-        if actuator.line is not None
-        else {"joint": structure.joints.index(actuator.joint or "")},
+        "on": {"joint": structure.joints.index(actuator.joint)}
+        if actuator.joint is not None
+        else {"line": structure.wires.index(actuator.line or actuator.transmission or "")},
         "drive": drive_json(name, actuator, structure, index),
         "delay": index.get(f"{name}.delay.time"),
         "dead_zone": index.get(f"{name}.dead_zone.width"),
@@ -224,7 +239,7 @@ def _channel(channel: str, structure: Structure) -> dict[str, Any]:
     owners: dict[str, tuple[str, ...]] = {
         "joint": structure.joints,
         "actuator": tuple(structure.document.actuators),
-        "line": tuple(structure.document.lines),
+        "line": structure.wires,
         "gauge": tuple(structure.document.gauges),
         "marker": tuple(structure.document.markers),
     }
@@ -236,4 +251,6 @@ def _channel(channel: str, structure: Structure) -> dict[str, Any]:
     if kind == "current":
         return {"kind": kind, "dc_motor": structure.driven_by("dc_motor").index(owner)}
     what, names = next((what, names) for what, names in owners.items() if owner in names)
+    if owner in structure.document.transmissions:
+        kind = tuple(LINE_UNITS)[tuple(SHAFT_UNITS).index(kind)]
     return {"kind": kind, what: names.index(owner)}

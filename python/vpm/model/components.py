@@ -10,6 +10,7 @@ from vpm.catalogue import JointKind
 from vpm.errors import ModelError
 from vpm.model.check import Checked
 from vpm.model.drive_components import DriveComponents
+from vpm.model.drives import acted_on
 from vpm.model.schema import ChannelEntry
 from vpm.model.sensor_noise import stated_noise
 from vpm.model.splitting import name_behind
@@ -86,6 +87,22 @@ class Components(DriveComponents):
     def lines(self) -> tuple[str, ...]:
         """Lines between two points."""
         return tuple(self._checked.document.lines)
+
+    @property
+    def transmissions(self) -> tuple[str, ...]:
+        """Transmissions, shafts that turn with a combination of joints."""
+        return tuple(self._checked.document.transmissions)
+
+    def ratios(self, transmission: str) -> Mapping[str, str]:
+        """Parameter that is the ratio of each joint with which a transmission turns, by joint.
+
+        Raises
+        ------
+        ModelError
+            There is no such transmission.
+        """
+        entry = self._checked.document.transmissions[self._known(transmission, self.transmissions, "transmission")]
+        return {joint: f"{transmission}.ratios.{joint}" for joint in entry.ratios}
 
     @property
     def gauges(self) -> tuple[str, ...]:
@@ -174,11 +191,11 @@ class Components(DriveComponents):
         Raises
         ------
         ModelError
-            There is no such actuator, or it drives a line.
+            There is no such actuator, or it drives a line or a transmission.
         """
         entry = self._checked.document.actuators[self._known(actuator, self.actuators, "actuator")]
         if entry.joint is None:
-            rest = f'drives the line "{entry.line}", which moves several joints; ask joints_of_actuator'
+            rest = f"drives {acted_on(entry)}, which moves several joints; ask joints_of_actuator"
             raise ModelError(f"actuator {actuator} {rest}", where=actuator)
         return entry.joint
 
@@ -187,8 +204,12 @@ class Components(DriveComponents):
         return next((name for name, joint in self._checked.document.joints.items() if joint.child == body), "")
 
     def line_of_actuator(self, actuator: str) -> str | None:
-        """Line that an actuator drives; None if it drives a joint."""
+        """Line that an actuator drives; None if it drives a joint or a transmission."""
         return self._checked.document.actuators[self._known(actuator, self.actuators, "actuator")].line
+
+    def transmission_of_actuator(self, actuator: str) -> str | None:
+        """Transmission that an actuator drives; None if it drives a joint or a line."""
+        return self._checked.document.actuators[self._known(actuator, self.actuators, "actuator")].transmission
 
     def held_channel(self, actuator: str) -> str:
         """Channel that the controller of an actuator holds at its reference.
@@ -228,10 +249,11 @@ class Components(DriveComponents):
         """What a simulation gives, in the order of the core.
 
         Per joint position, velocity, acceleration, effort; per actuator command, force; per line length, rate, tension;
-        per gauge strain; per marker its origin x, y, z and its rotation vector rx, ry, rz in the world; per hydraulic
-        actuator spool, pressure_a, pressure_b, flow_a, flow_b; per motor current; per supply pressure, flow; per
-        contact depth, normal_force and the force fx, fy, fz in world axes; per bushing the wrench mx, my, mz, fx, fy,
-        fz on A in its axes; per load cell the reaction mx, my, mz, fx, fy, fz on the child in its axes.
+        per transmission position, velocity, effort; per gauge strain; per marker its origin x, y, z and its rotation
+        vector rx, ry, rz in the world; per hydraulic actuator spool, pressure_a, pressure_b, flow_a, flow_b; per motor
+        current; per supply pressure, flow; per contact depth, normal_force and the force fx, fy, fz in world axes; per
+        bushing the wrench mx, my, mz, fx, fy, fz on A in its axes; per load cell the reaction mx, my, mz, fx, fy, fz on
+        the child in its axes.
         """
         return self._checked.structure.outputs
 

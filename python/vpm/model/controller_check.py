@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from vpm.errors import near_match
-from vpm.model.controller import ComputedTorque, Controller, ForceLoop, Pd
+from vpm.model.controller import Cascade, ComputedTorque, Controller, ForceLoop, Pd, Pid
+from vpm.model.drives import acted_on
 from vpm.model.messages import Problem, place
 from vpm.model.schema import Document
 from vpm.model.structure import Structure
@@ -37,6 +38,8 @@ def controller_problems(document: Document, structure: Structure) -> Iterator[Pr
 
 def _channel_problems(where: str, channel: str, controller: Controller, structure: Structure) -> Iterator[Problem]:
     positions = [f"{joint}.position" for joint in structure.joints]
+    if isinstance(controller, Cascade | Pid | Pd):
+        positions += [f"{shaft}.position" for shaft in structure.document.transmissions]
     lengths = [f"{line}.length" for line in structure.document.lines] if isinstance(controller, Pd) else []
     if channel not in (*positions, *lengths):
         repair = near_match(channel, [*positions, *lengths], what="it can measure")
@@ -50,7 +53,7 @@ def _pair_problems(
     """Laws that go from a joint to its actuator, with an actuator that is elsewhere."""
     entry, joint = document.actuators[actuator], channel.partition(".")[0]
     elsewhere = entry.joint not in {None, joint}
-    drives = f'the joint "{entry.joint}"' if entry.joint is not None else f'the line "{entry.line}"'
+    drives = acted_on(entry)
     if isinstance(controller, ForceLoop) and elsewhere:
         rest = (
             f"but a force_loop needs an actuator on a line or on the joint it measures; measure {entry.joint}.position"

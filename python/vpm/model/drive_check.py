@@ -12,6 +12,7 @@ from vpm.model.entry import Quantity
 from vpm.model.hydraulic import EXAMPLES, SPOOL_DAMPING, Cylinder, Hydraulic, Supply, Valve
 from vpm.model.messages import Problem, place
 from vpm.model.parameters import Parameter
+from vpm.model.sampled import MaxwellNarx
 from vpm.model.sampled_check import sampled_problems
 from vpm.model.schema import Document
 from vpm.model.structure import Structure
@@ -55,12 +56,16 @@ def _carrier_problems(name: str, actuator: Actuator, structure: Structure) -> It
     """Drives on a joint or a line that their law does not know."""
     where = place("actuators", name)
     if isinstance(actuator, DcMotor) and actuator.line is not None:
-        rest = f'is a dc_motor on the line "{actuator.line}", but a motor turns a joint; give joint in place of line'
+        rest = f'is a dc_motor on the line "{actuator.line}", but a motor turns a joint or a transmission; '
+        rest += "give joint or transmission in place of line"
         yield Problem(where, rest)
     if isinstance(actuator, COMPLIANT) and actuator.joint is not None:
         rest = f'is a {actuator.type} on the joint "{actuator.joint}", but its force acts along a line; '
         rest += "give line in place of joint, or take an effect (spring, viscous_friction) of the joint"
         yield Problem(where, rest)
+    if isinstance(actuator, (*COMPLIANT, Hydraulic, MaxwellNarx)) and actuator.transmission is not None:
+        rest = f'is a {actuator.type} on the transmission "{actuator.transmission}", but its force acts along a line; '
+        yield Problem(where, f"{rest}give line in place of transmission, or take an ideal actuator or a dc_motor")
     if isinstance(actuator, Hydraulic) and actuator.joint in structure.joints:
         kind = structure.joint_kind(str(actuator.joint))
         if kind != "prismatic":

@@ -14,6 +14,7 @@ from vpm.model.check import Checked
 from vpm.model.drives import COMPLIANT
 from vpm.model.hydraulic import Hydraulic
 from vpm.model.pose import Pose
+from vpm.model.splitting import joints_turned
 from vpm.model.structure import Mount, Structure
 from vpm.model.table import Table, beyond
 
@@ -114,7 +115,7 @@ class DriveComponents:
         found = []
         for name, entry in self._checked.document.actuators.items():
             if isinstance(entry, Table):
-                moving = f"{entry.joint}.velocity" if entry.joint is not None else f"{entry.line}.rate"
+                moving = self.rate_channel(name)
                 axes = {f"{name}.command": entry.commands, moving: entry.velocities}
                 units = self._checked.structure.unit
                 told = (
@@ -122,6 +123,17 @@ class DriveComponents:
                 )
                 found += [sentence for sentence in told if sentence]
         return tuple(found)
+
+    def rate_channel(self, actuator: str) -> str:
+        """Channel that tells how fast what an actuator acts on moves.
+
+        Raises
+        ------
+        ModelError
+            There is no such actuator.
+        """
+        entry = self._checked.document.actuators[self._known(actuator, self.actuators, "actuator")]
+        return f"{entry.line}.rate" if entry.line is not None else f"{entry.joint or entry.transmission}.velocity"
 
     def supply_of_actuator(self, actuator: str) -> str | None:
         """Supply of a hydraulic actuator; None for the others.
@@ -141,7 +153,7 @@ class DriveComponents:
         return tuple(joint for joint in self._checked.structure.joints if joint in driven)
 
     def joints_of_actuator(self, actuator: str) -> tuple[str, ...]:
-        """Joints on which an actuator has an effect: its own, or those that change the length of its line.
+        """Joints on which an actuator has an effect: its own, those of its transmission, or those that move its line.
 
         Raises
         ------
@@ -149,8 +161,8 @@ class DriveComponents:
             There is no such actuator.
         """
         entry = self._checked.document.actuators[self._known(actuator, self.actuators, "actuator")]
-        if entry.joint is not None:
-            return (entry.joint,)
+        if entry.line is None:
+            return joints_turned(entry, self._checked.document)
         structure, line = self._checked.structure, self._checked.document.lines[str(entry.line)]
         ends = [structure.mounted(end.parent, end.at, Pose()).mount for end in (line.start, line.end)]
         ways = [set(_way(structure, end)) for end in ends]

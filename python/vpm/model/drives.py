@@ -22,17 +22,19 @@ class Ideal(Entry):
     type: Literal["ideal"] = "ideal"
     joint: Text | None = None
     line: Text | None = None
+    transmission: Text | None = None
     gain: ParameterValue
     limit: ParameterValue | None = None
     command_unit: Text = "1"
 
 
 class DcMotor(Entry):
-    """Motor with a winding and a gear, on a joint; the command is a voltage."""
+    """Motor with a winding and a gear, on a joint or a transmission; the command is a voltage."""
 
     type: Literal["dc_motor"]
     joint: Text | None = None
     line: Text | None = None
+    transmission: Text | None = None
     resistance: ParameterValue
     time_constant: ParameterValue
     torque_constant: ParameterValue
@@ -50,6 +52,7 @@ class SpringDamper(Entry):
     type: Literal["spring_damper"]
     joint: Text | None = None
     line: Text | None = None
+    transmission: Text | None = None
     stiffness: ParameterValue
     free_length: ParameterValue
     damping: ParameterValue
@@ -62,6 +65,7 @@ class Maxwell(Entry):
     type: Literal["maxwell"]
     joint: Text | None = None
     line: Text | None = None
+    transmission: Text | None = None
     stiffness: ParameterValue
     free_length: ParameterValue
     fast_stiffness: ParameterValue
@@ -86,6 +90,15 @@ Actuator = Annotated[
     | Annotated[MaxwellNarx, Tag("maxwell_narx")],
     Discriminator(_type_of),
 ]
+
+
+def acted_on(actuator: Actuator) -> str:
+    """Joint, line or transmission of an actuator in words."""
+    for what in ("joint", "line"):
+        if (name := getattr(actuator, what)) is not None:
+            return f'the {what} "{name}"'
+    return f'the transmission "{actuator.transmission}"'
+
 
 #: Actuators whose command is a length to add, so that none is the same as zero.
 COMPLIANT = (SpringDamper, Maxwell)

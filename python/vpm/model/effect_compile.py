@@ -27,22 +27,42 @@ def effect_json(effect: Effect, structure: Structure, index: Mapping[str, int]) 
         case "link" if effect.at in structure.beams:
             numbers.pop("inertia")  # of what carries the beam
             return [{"type": effect.name, "beam": structure.beams.index(effect.at), **numbers}]
-    return _on_joint(effect, structure, numbers)
+    return _on_joint(effect, structure, numbers, index)
 
 
-def _on_joint(effect: Effect, structure: Structure, numbers: dict[str, int]) -> list[dict[str, Any]]:
-    places, formula = structure.joints, effect.type.formula
+def shaft_json(name: str, structure: Structure, index: Mapping[str, int]) -> dict[str, Any]:
+    """Number of a transmission, and its ratios with the numbers of their joints."""
+    places, document = structure.joints, structure.document
+    ratios = [
+        {"joint": places.index(joint), "ratio": index[f"{name}.ratios.{joint}"]}
+        for joint in document.transmissions[name].ratios
+    ]
+    return {"transmission": list(document.transmissions).index(name), "ratios": ratios}
+
+
+def _law(effect: Effect, seat: Mapping[str, Any], numbers: Mapping[str, int]) -> dict[str, Any]:
+    """An effect that is nothing but a law on one coordinate."""
+    formula = effect.type.formula
+    if formula is None:
+        return {"type": effect.name, **seat, **numbers}
+    law = {"program": list(formula.program), "constants": list(formula.constants)}
+    return {"type": "formula", **seat, **law, "parameters": list(numbers.values())}
+
+
+def _on_joint(
+    effect: Effect, structure: Structure, numbers: dict[str, int], index: Mapping[str, int]
+) -> list[dict[str, Any]]:
+    places = structure.joints
+    if effect.at in structure.document.transmissions:
+        return [_law(effect, shaft_json(effect.at, structure, index), numbers)]
     before, behind = effect.at, deflections(structure.document).get(effect.at)
     if effect.type.site == "link":
         before, behind = structure.turned[effect.at], bendings(structure.document)[effect.at]
-    seat = {"joint": places.index(before)}
+    seat: dict[str, Any] = {"joint": places.index(before)}
     if effect.side == "link" and behind is not None:
         seat["behind"] = places.index(behind)
-    if formula is not None:
-        law = {"program": list(formula.program), "constants": list(formula.constants)}
-        return [{"type": "formula", **seat, **law, "parameters": list(numbers.values())}]
     if effect.name not in {"joint_compliance", "backlash", "link_flexibility"}:
-        return [{"type": effect.name, **seat, **numbers}]
+        return [_law(effect, seat, numbers)]
     inertia = {"type": "rotor_inertia", "joint": places.index(before), "inertia": numbers.pop("inertia")}
     return [{"type": effect.name, "joint": places.index(behind or before), **numbers}, inertia]
 

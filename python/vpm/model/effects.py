@@ -64,7 +64,13 @@ def effect_problems(document: Document, structure: Structure) -> Iterator[Proble
             continue
         effect = EFFECTS[entry.type]
         sites = structure.sites(effect.site)
-        if entry.at not in sites:
+        if effect.has_sides:
+            sites = (*sites, *document.transmissions)
+        if entry.at in document.transmissions and entry.at not in sites:
+            rest = f'is "{entry.at}", a transmission, but {effect.name} sits at {_a(effect.site)} alone'
+            repair = "drive_friction of its actuator follows the load" if effect.takes_effort else _shaft_repair(effect)
+            yield Problem(place(*keys, "at"), f"{rest}; {repair}")
+        elif entry.at not in sites:
             repair = near_match(entry.at, sites, what="it has")
             if effect.site == "joint" and entry.at in structure.sites("cylinder"):
                 repair = f"the seals of {entry.at} rub at the joint that it moves; {repair}"
@@ -73,7 +79,9 @@ def effect_problems(document: Document, structure: Structure) -> Iterator[Proble
         elif effect.takes_effort and all(drive.joint != entry.at for drive in document.actuators.values()):
             rest = f'is "{entry.at}", on which no actuator acts itself, so that {effect.name} does nothing there'
             yield Problem(place(*keys, "at"), f"{rest}; name a joint with an actuator, or leave the effect out")
-        if entry.side == "link" and not effect.has_sides:
+        if entry.side == "link" and entry.at in document.transmissions:
+            yield Problem(place(*keys, "side"), 'is "link", but a transmission has no sides; leave the key out')
+        elif entry.side == "link" and not effect.has_sides:
             yield Problem(place(*keys, "side"), f'is "link", but a {effect.title} has no sides; leave the key out')
         earlier = seen.setdefault((entry.type, entry.owner), position)
         if earlier != position:
@@ -81,6 +89,16 @@ def effect_problems(document: Document, structure: Structure) -> Iterator[Proble
             yield Problem(place(*keys), rest)
         yield from _value_problems(effect, entry, keys)
     yield from splitting_problems(document, structure.turned)
+
+
+def _a(site: str) -> str:
+    return f"{'an' if site[0] in 'aeiou' else 'a'} {site}"
+
+
+def _shaft_repair(effect: EffectType) -> str:
+    if effect.name == "rotor_inertia":
+        return "give the inertia of the transmission"
+    return f"put it at {_a(effect.site)}, or leave it out"
 
 
 def _value_problems(effect: EffectType, entry: EffectEntry, keys: tuple[str, int]) -> Iterator[Problem]:
@@ -105,8 +123,7 @@ def complete_effects(document: Document, structure: Structure) -> Document:
     entries = []
     for entry in document.effects:
         effect, given = EFFECTS[entry.type], entry.values
-        joint = structure.joint_at(effect.site, entry.at)
-        kind = None if joint is None else structure.joint_kind(joint)
+        kind = structure.kind_at(effect.site, entry.at)
         values = {}
         for parameter in effect.parameters:
             if parameter.optional and parameter.name not in given:
@@ -128,9 +145,8 @@ def effect_unit(template: str, entry: EffectEntry, structure: Structure) -> str:
     """SI unit of a parameter of an effect at its site, from the template of the catalogue."""
     site = EFFECTS[entry.type].site
     units: dict[str, str] = {"U": "1", "S": "1", "E": "1", "C": "1"}
-    joint = structure.joint_at(site, entry.at)
-    if joint is not None:
-        kind = structure.joint_kind(joint)
+    kind = structure.kind_at(site, entry.at)
+    if kind is not None:
         units |= {"C": COORDINATE_UNIT[kind], "E": EFFORT_UNIT[kind]}
     if site == "actuator":
         units["U"] = structure.document.actuators[entry.at].command_unit

@@ -45,6 +45,7 @@ _EXAMPLES: Mapping[str, str] = {
     "density": "density = 7850",
     "beam": 'beam = "link"',
     "gauges.at": "at = 0.05",
+    "ratios": "ratios = { pitch = 50.0, roll = 50.0 }",
     "from": 'from = { parent = "world", point = [0.0, 0.0, 0.0] }',
     "to": 'to = { parent = "link", point = [0.1, 0.0, 0.0] }',
     **EXAMPLES,

@@ -53,7 +53,8 @@ def _units(controller: Cascade | Pid | Pd | ForceLoop, command: str, structure: 
     held = structure.unit(controller.measures)
     if isinstance(controller, ForceLoop):
         effort = EFFORT_UNIT[structure.joint_kind(controller.measures.partition(".")[0])]
-        stroke = "m" if structure.document.actuators[controller.actuator].line is not None else held
+        entry = structure.document.actuators[controller.actuator]
+        stroke = held if entry.joint is not None else "m" if entry.line is not None else "rad"
         per_force = f"({command})/({structure.effort_unit(controller.actuator)})"
         return {
             "proportional": f"({effort})/({held})",

@@ -97,6 +97,7 @@ class Hydraulic(Entry):
     type: Literal["hydraulic"]
     joint: Text | None = None
     line: Text | None = None
+    transmission: Text | None = None
     supply: Text
     retracted_length: ParameterValue
     command_unit: Text = "A"

@@ -1,7 +1,7 @@
 """The parameters of a model: one flat, ordered table with SI values, read from the document and checked.
 
-Order: bodies (mass, centre of mass, inertia), rotors, beams, lines, supplies, actuators, controllers, contacts,
-bushings, then effects as they stand in the file.
+Order: bodies (mass, centre of mass, inertia), rotors, beams, lines, transmissions, supplies, actuators, controllers,
+contacts, bushings, then effects as they stand in the file.
 """
 
 from __future__ import annotations
@@ -22,7 +22,8 @@ from vpm.model.entry import Quantity
 from vpm.model.gains import gains
 from vpm.model.messages import Problem, place
 from vpm.model.schema import Document, EffectEntry
-from vpm.model.structure import Structure
+from vpm.model.structure import COORDINATE_UNIT, Structure
+from vpm.model.transmission import transmission_rows
 from vpm.units import convert, require_dimension, si_unit
 
 ParameterKind = Literal["linear", "shape"]
@@ -187,11 +188,13 @@ def slots(document: Document, structure: Structure) -> Iterator[Slot]:
         yield from _beam_slots(name, document.beams[name])
     for name, line in document.lines.items():
         yield from _line_slots(name, line)
+    for name, transmission in document.transmissions.items():
+        units = {joint: COORDINATE_UNIT[structure.joint_kind(joint)] for joint in transmission.ratios}
+        yield from (_slot(("transmissions", name), row) for row in transmission_rows(transmission, units))
     for name, supply in document.supplies.items():
         yield from (_slot(("supplies", name), row) for row in supply_rows(supply))
     for name, actuator in document.actuators.items():
-        kind = None if actuator.joint is None else structure.joint_kind(actuator.joint)
-        rows = actuator_rows(actuator, structure.effort_unit(name), kind)
+        rows = actuator_rows(actuator, structure.effort_unit(name), structure.driven_kind(name))
         yield from (_slot(("actuators", name), row) for row in rows)
     for name, controller in document.controllers.items():
         yield from _controller_slots(name, controller, structure)

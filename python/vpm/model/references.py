@@ -1,4 +1,4 @@
-"""What actuators, sensors, controllers, gauges and lines name."""
+"""What actuators, sensors, controllers, gauges, lines and transmissions name."""
 
 from __future__ import annotations
 
@@ -30,26 +30,42 @@ def reference_problems(document: Document, structure: Structure) -> Iterator[Pro
         seen.setdefault(sensor.measures, name)
     yield from controller_problems(document, structure)
     yield from _line_problems(document)
+    yield from _transmission_problems(document, structure)
 
 
 def _actuator_problems(name: str, actuator: Actuator, document: Document, structure: Structure) -> Iterator[Problem]:
-    match actuator.joint, actuator.line:
-        case None, None:
-            rest = 'is missing; add it, for example joint = "axis"'
-            rest += ", or line with the name of a line" if document.lines else ""
-            yield Problem(place("actuators", name, "joint"), rest)
-        case None, str(line):
-            if line not in document.lines:
-                repair = near_match(line, document.lines, what="it has")
-                yield Problem(place("actuators", name, "line"), f'is "{line}", which is no line of the model; {repair}')
-        case str(joint), None:
-            yield from _driven_problems(name, joint, document, structure)
-        case _:
-            yield Problem(place("actuators", name), "drives a joint and a line; remove one of the two keys")
+    given = [key for key in ("joint", "line", "transmission") if getattr(actuator, key) is not None]
+    if not given:
+        rest = 'is missing; add it, for example joint = "axis"'
+        rest += ", or line with the name of a line" if document.lines else ""
+        rest += ", or transmission with the name of one" if document.transmissions else ""
+        yield Problem(place("actuators", name, "joint"), rest)
+    elif len(given) > 1:
+        listed = " and ".join(f"a {key}" for key in given)
+        repair = "remove one of the two keys" if len(given) == 2 else "keep one of the three keys"
+        yield Problem(place("actuators", name), f"drives {listed}; {repair}")
+    elif actuator.joint is not None:
+        yield from _joint_problems(place("actuators", name, "joint"), actuator.joint, document, structure)
+    else:
+        key, known = given[0], document.lines if actuator.line is not None else document.transmissions
+        other = getattr(actuator, key)
+        if other not in known:
+            repair = near_match(other, known, what="it has") if known else f"add a table [{key}s.{other}]"
+            yield Problem(place("actuators", name, key), f'is "{other}", which is no {key} of the model; {repair}')
 
 
-def _driven_problems(name: str, joint: str, document: Document, structure: Structure) -> Iterator[Problem]:
-    where = place("actuators", name, "joint")
+def _transmission_problems(document: Document, structure: Structure) -> Iterator[Problem]:
+    """Transmissions of joints that are not there or do not turn them."""
+    for name, transmission in document.transmissions.items():
+        for joint, ratio in transmission.ratios.items():
+            where = place("transmissions", name, "ratios", joint)
+            yield from _joint_problems(where, joint, document, structure)
+            if ratio.value == 0.0:
+                rest = f'is 0, but a shaft that does not turn with "{joint}" needs no ratio; leave the joint out'
+                yield Problem(where, rest)
+
+
+def _joint_problems(where: str, joint: str, document: Document, structure: Structure) -> Iterator[Problem]:
     if joint in structure.joints:
         return
     if joint in document.joints:

@@ -45,6 +45,7 @@ class Narx(Entry):
     type: Literal["narx"]
     joint: Text | None = None
     line: Text | None = None
+    transmission: Text | None = None
     sample_time: Positive
     file: Text | None = None
     inputs: dict[str, Text] = Field(default_factory=dict)
@@ -60,6 +61,7 @@ class MaxwellNarx(Entry):
     type: Literal["maxwell_narx"]
     joint: Text | None = None
     line: Text | None = None
+    transmission: Text | None = None
     sample_time: Positive | None = None
     file: Text | None = None
     k0: Map | None = None

@@ -34,8 +34,9 @@ def sampled_problems(document: Document, structure: Structure) -> Iterator[Probl
 
 
 def readable(name: str, document: Document, structure: Structure) -> tuple[str, ...]:
-    """Channels that a NARX drive may read: its own command, and how joints and lines move."""
-    joints = (f"{joint}.{kind}" for joint in structure.joints for kind in ("position", "velocity"))
+    """Channels that a NARX drive may read: its own command, and how joints, transmissions and lines move."""
+    turning = (*structure.joints, *document.transmissions)
+    joints = (f"{joint}.{kind}" for joint in turning for kind in ("position", "velocity"))
     lines = (f"{line}.{kind}" for line in document.lines for kind in ("length", "rate"))
     return (f"{name}.command", *joints, *lines)
 

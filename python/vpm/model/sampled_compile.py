@@ -45,5 +45,7 @@ def _reading(name: str, channel: str, structure: Structure) -> str | dict[str, i
     owner, _, kind = channel.rpartition(".")
     if owner == name:
         return "command"
-    owners = structure.joints if kind in {"position", "velocity"} else tuple(structure.document.lines)
-    return {kind: owners.index(owner)}
+    if owner in structure.joints:
+        return {kind: structure.joints.index(owner)}
+    of_lines = {"position": "length", "velocity": "rate"}
+    return {of_lines.get(kind, kind): structure.wires.index(owner)}

@@ -17,6 +17,7 @@ from vpm.model.controller import TYPES, Controller
 from vpm.model.drives import ACTUATOR_TYPES, Actuator
 from vpm.model.entry import ORIGIN, ZERO, Entry, Number, ParameterValue, Quantity, Switch, Text, Vector
 from vpm.model.hydraulic import Supply
+from vpm.model.transmission import Transmission
 from vpm.units import parse_unit
 
 
@@ -160,6 +161,7 @@ class Document(Entry):
     joints: dict[str, Joint] = Field(default_factory=dict)
     beams: dict[str, Beam] = Field(default_factory=dict)
     lines: dict[str, Line] = Field(default_factory=dict)
+    transmissions: dict[str, Transmission] = Field(default_factory=dict)
     gauges: dict[str, Gauge] = Field(default_factory=dict)
     markers: dict[str, Marker] = Field(default_factory=dict)
     supplies: dict[str, Supply] = Field(default_factory=dict)
@@ -179,6 +181,7 @@ SECTIONS: Mapping[str, tuple[type[BaseModel], ...]] = {
     "joints": (Joint,),
     "beams": (Beam,),
     "lines": (Line,),
+    "transmissions": (Transmission,),
     "gauges": (Gauge,),
     "markers": (Marker,),
     "supplies": (Supply,),

@@ -61,6 +61,15 @@ def follow(model: Evaluations, theta: Array, internal: Array, inputs: Array, vel
             command = float(np.clip(value(f"{owner}.valve.gain") * command, -reach, reach))
         elif state == "current":
             constant = "back_emf" if f"{owner}.back_emf" in model.parameters else "torque_constant"
-            rate = value(f"{owner}.gear_ratio") * float(velocity[model.joints.index(model.joint_of_actuator(owner))])
+            rate = value(f"{owner}.gear_ratio") * _turning(model, theta, owner, velocity)
             command = (command - value(f"{owner}.{constant}") * rate) / value(f"{owner}.resistance")
         internal[place] = command
+
+
+def _turning(model: Evaluations, theta: Array, motor: str, velocity: Array) -> float:
+    """How fast the joint or the shaft of a motor turns (rad/s or m/s)."""
+    transmission = model.transmission_of_actuator(motor)
+    if transmission is None:
+        return float(velocity[model.joints.index(model.joint_of_actuator(motor))])
+    ratios = model.ratios(transmission).items()
+    return float(sum(theta[model.index(name)] * velocity[model.joints.index(joint)] for joint, name in ratios))

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from vpm.model.drives import DcMotor
+from vpm.model.drives import Actuator, DcMotor
 from vpm.model.messages import Problem, place
 from vpm.model.schema import Document, EffectEntry
 
@@ -23,13 +23,20 @@ def name_behind(joint: str) -> str:
     return f"{joint}_deflection"
 
 
+def joints_turned(actuator: Actuator, document: Document) -> tuple[str, ...]:
+    """Joints that an actuator turns: its own, or those of its transmission; none where it acts along a line."""
+    if actuator.transmission in document.transmissions:
+        return tuple(document.transmissions[actuator.transmission].ratios)
+    return () if actuator.joint is None else (actuator.joint,)
+
+
 def splits_joint(entry: EffectEntry, document: Document) -> bool:
     """Whether an effect parts motor and link: wind-up always, play at a joint that an actuator drives directly.
 
     A joint without an actuator may be the play itself.
     """
     if entry.type == "backlash":
-        return any(actuator.joint == entry.at for actuator in document.actuators.values())
+        return any(entry.at in joints_turned(actuator, document) for actuator in document.actuators.values())
     return entry.type == "joint_compliance"
 
 

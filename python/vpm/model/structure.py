@@ -12,6 +12,7 @@ from vpm.model.expand import Coordinate, Direction, coordinates, plane, unit
 from vpm.model.pose import Pose, denavit_hartenberg, pose
 from vpm.model.schema import Document, Joint
 from vpm.model.splitting import bendings, deflections, flexed, name_behind
+from vpm.model.transmission import TURNING
 from vpm.model.tree import WORLD
 from vpm.units import si_unit
 
@@ -31,6 +32,8 @@ DRIVE_UNITS: Mapping[str, str] = {
     "flow": "m^3/s",
 }
 LINE_UNITS: Mapping[str, str] = {"length": "m", "rate": "m/s", "tension": "N"}
+#: The core calls them length, rate and tension: a transmission is a line whose levers do not change.
+SHAFT_UNITS: Mapping[str, str] = {"position": "rad", "velocity": "rad/s", "effort": "N m"}
 GAUGE_UNITS: Mapping[str, str] = {"strain": "1"}
 CONTACT_UNITS: Mapping[str, str] = {"depth": "m", "normal_force": "N", "fx": "N", "fy": "N", "fz": "N"}
 WRENCH_UNITS: Mapping[str, str] = {"mx": "N m", "my": "N m", "mz": "N m", "fx": "N", "fy": "N", "fz": "N"}
@@ -192,10 +195,24 @@ class Structure:
         """Kind of a joint with one coordinate."""
         return self.axes[self.joints.index(joint)].coordinate.kind
 
+    def kind_at(self, kind: SiteKind, site: str) -> JointKind | None:
+        """Kind of the joint that a site belongs to, or that a transmission is like; None for what belongs to none."""
+        if kind == "joint" and site in self.document.transmissions:
+            return TURNING
+        joint = self.joint_at(kind, site)
+        return None if joint is None else self.joint_kind(joint)
+
+    def driven_kind(self, actuator: str) -> JointKind | None:
+        """Kind of the joint that an actuator acts on, or that its transmission is like; None for one on a line."""
+        entry = self.document.actuators[actuator]
+        if entry.transmission is not None:
+            return TURNING
+        return None if entry.joint is None else self.joint_kind(entry.joint)
+
     def joint_at(self, kind: SiteKind, site: str) -> str | None:
         """Joint that a site belongs to; None for what belongs to none, such as a sensor of an actuator's channel."""
         if kind == "joint":
-            return site
+            return site if site in self.joints else None
         if kind == "body":
             return self._mover(site)
         if kind in {"link", "beam", "world"}:
@@ -218,6 +235,11 @@ class Structure:
         return self.joints[mount.index] if mount.kind == "body" else None
 
     @property
+    def wires(self) -> tuple[str, ...]:
+        """Lines, then transmissions: along what of the core forces act, by their numbers there."""
+        return (*self.document.lines, *self.document.transmissions)
+
+    @property
     def channels(self) -> tuple[str, ...]:
         """Every channel that a log may hold."""
         return self._listed(ACTUATOR_CHANNELS)
@@ -233,6 +255,7 @@ class Structure:
             (self.joints, JOINT_CHANNELS),
             (tuple(document.actuators), of_actuators),
             (tuple(document.lines), tuple(LINE_UNITS)),
+            (tuple(document.transmissions), tuple(SHAFT_UNITS)),
             (tuple(document.gauges), tuple(GAUGE_UNITS)),
             (tuple(document.markers), tuple(MARKER_UNITS)),
             (self.driven_by("hydraulic"), HYDRAULIC_CHANNELS),
@@ -266,6 +289,8 @@ class Structure:
             coordinate = COORDINATE_UNIT[self.joint_kind(owner)]
             units = {"position": coordinate, "velocity": f"{coordinate}/s", "acceleration": f"{coordinate}/s^2"}
             return units.get(name, EFFORT_UNIT[self.joint_kind(owner)])
+        if owner in self.document.transmissions:
+            return SHAFT_UNITS[name]
         if name in DRIVE_UNITS:
             return DRIVE_UNITS[name]
         if owner in self.document.actuators:
@@ -275,18 +300,20 @@ class Structure:
     def _actuator_unit(self, actuator: str, channel: str) -> str:
         if channel == "force":
             return self.effort_unit(actuator)
-        if channel == "reference":  # of what the controller holds: a position of some joint, a length of some line
+        if (
+            channel == "reference"
+        ):  # of what the controller holds: a position of some joint or shaft, a length of some line
             pairs = [pair for controller in self.document.controllers.values() for pair in controller.pairs]
             held = [measured for commanded, measured in pairs if commanded == actuator]
-            joint = self.document.actuators[actuator].joint
-            own = "m" if joint is None else COORDINATE_UNIT[self.joint_kind(joint)]
+            kind = self.driven_kind(actuator)
+            own = "m" if kind is None else COORDINATE_UNIT[kind]
             return self.unit(held[0]) if held else own
         return si_unit(self.document.actuators[actuator].command_unit)
 
     def effort_unit(self, actuator: str) -> str:
-        """SI unit of the effort of an actuator: what its joint takes, or a force along its line."""
-        joint = self.document.actuators[actuator].joint
-        return "N" if joint is None else EFFORT_UNIT[self.joint_kind(joint)]
+        """SI unit of the effort of an actuator: what its joint or shaft takes, or a force along its line."""
+        kind = self.driven_kind(actuator)
+        return "N" if kind is None else EFFORT_UNIT[kind]
 
 
 def build_structure(document: Document) -> Structure:

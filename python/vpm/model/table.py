@@ -21,6 +21,7 @@ class Table(Entry):
     type: Literal["table"]
     joint: Text | None = None
     line: Text | None = None
+    transmission: Text | None = None
     commands: tuple[Number, ...]
     velocities: tuple[Number, ...]
     efforts: tuple[tuple[Number, ...], ...]

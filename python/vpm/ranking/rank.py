@@ -9,7 +9,7 @@ from threadpoolctl import threadpool_limits
 from vpm.discrepancy.candidates import asked_for
 from vpm.discrepancy.side_by_side import Progress, SideBySide
 from vpm.errors import DiagnosisError
-from vpm.experiment import Experiment, as_records
+from vpm.experiment import Experiment, as_records, joints_from_shafts
 from vpm.model import Model
 from vpm.ranking.observed import Observed
 from vpm.ranking.result import Ranking
@@ -42,7 +42,7 @@ def rank(
     model : Model
         Its uncertain parameters are fitted with every structure.
     experiments : Experiment or sequence of Experiment
-        Positions of joints and commands of actuators.
+        Positions of joints, or of as many independent transmissions, and commands of actuators.
     validate : Experiment or sequence of Experiment, optional
         Records that decide nothing; `Ranking.gaps` is measured on them, once, when all is found.
     effects : sequence of str, optional
@@ -76,7 +76,9 @@ def rank(
     >>> rank(model, log).effects
     (Ranked(effect='coulomb_friction', site='axis', judgement=Judgement(removed=0.97)),)
     """
-    records = as_records(experiments)
+    free = [parameter.name for parameter in model.parameters.values() if parameter.adjustable]
+    records = [joints_from_shafts(record, model, free=free) for record in as_records(experiments)]
+    unseen = [joints_from_shafts(record, model) for record in as_records(() if validate is None else validate)]
     if not records:
         raise DiagnosisError("no record was given; pass at least one experiment")
     with threadpool_limits(1, user_api="blas"):
@@ -84,4 +86,4 @@ def rank(
         names = asked_for(effects)
         search = Search(model, records, names, settings or Settings(), setup, each, tell or (lambda _: None))
         # What a validation record lacks is said before the search.
-        return search.run(Observed(model, [] if validate is None else as_records(validate), search.settings, setup))
+        return search.run(Observed(model, unseen, search.settings, setup))

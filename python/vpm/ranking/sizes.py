@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.catalogue import EffectParameter
-from vpm.discrepancy.candidates import Candidate, joint_at, slow_speeds
+from vpm.discrepancy.candidates import Candidate, joint_at, shares_at, slow_speeds
 from vpm.identify import InverseDynamicsProblem
 from vpm.model import Model
 from vpm.weighing.priors import FACTOR, NATURAL, NEAR, SHARE, Prior, natural_sizes
@@ -18,25 +18,21 @@ DELAY = 5e-3
 
 
 class Sizes:
-    """How large what the records show is, by joint: effort, speed and way."""
+    """How large what the records show is, by joint and transmission: effort, speed and way."""
 
     def __init__(self, model: Model, data: InverseDynamicsProblem) -> None:
         self.model = model
         records = range(len(data.motions))
-        efforts = [data.effort(model, model.theta, record)[1] for record in records]
-        states = [data.state(record) for record in records]
-        self.joints = {
-            joint: (
-                _strength(np.concatenate([effort[:, place] for effort in efforts])),
-                _strength(np.concatenate([state[1][:, place] for state in states])),
-                0.5 * float(np.ptp(np.concatenate([state[0][:, place] for state in states]))),
-            )
-            for place, joint in enumerate(data.joints)
-        }
-        self.ways = {
-            joint: (min(float(s[0][:, place].min()) for s in states), max(float(s[0][:, place].max()) for s in states))
-            for place, joint in enumerate(data.joints)
-        }
+        efforts = np.concatenate([data.effort(model, model.theta, record)[1] for record in records])
+        positions, velocities = (np.concatenate([data.state(r)[which] for r in records]) for which in (0, 1))
+        self.joints: dict[str, tuple[float, float, float]] = {}
+        self.ways: dict[str, tuple[float, float]] = {}
+        for site in (*data.joints, *model.transmissions):
+            shares = shares_at(model, site, data.joints)
+            way = positions @ shares
+            self.ways[site] = float(way.min()), float(way.max())
+            effort = efforts @ (shares / max(float(shares @ shares), 1e-300))
+            self.joints[site] = _strength(effort), _strength(velocities @ shares), 0.5 * float(np.ptp(way))
         self.commands = {
             name: _strength(np.concatenate([motion.inputs[:, place] for motion in data.motions]))
             for place, name in enumerate(model.actuators)
@@ -66,7 +62,7 @@ class Sizes:
 
     def _shown(self, site: str) -> tuple[float, float, float]:
         """Effort, speed and way at a site; the largest of all joints where it is at none of them."""
-        if (joint := joint_at(self.model, site)) in self.joints:
+        if (joint := joint_at(self.model, site) or site) in self.joints:
             return self.joints[joint]
         effort, speed, way = np.max(list(self.joints.values()), axis=0)
         return float(effort), float(speed), float(way)
@@ -88,10 +84,10 @@ def known(model: Model, data: InverseDynamicsProblem) -> dict[str, Prior]:
     }
     for effect in model.effects:
         name = effect.parameter_names.get("transition_velocity")
-        if name is None or name in priors or effect.at not in data.joints:
+        if name is None or name in priors or effect.at not in (*data.joints, *model.transmissions):
             continue
-        joint = data.joints.index(effect.at)
-        speeds = np.concatenate([np.abs(data.state(record)[1][:, joint]) for record in range(len(data.motions))])
+        shares = shares_at(model, effect.at, data.joints)
+        speeds = np.concatenate([np.abs(data.state(record)[1] @ shares) for record in range(len(data.motions))])
         low, high = slow_speeds(float(np.quantile(speeds, 0.999)))
         spread = 0.25 * float(np.log(high / low))
         priors[name] = Prior(float(np.sqrt(low * high)), spread, low, high, logarithmic=True)

@@ -59,8 +59,7 @@ def _read(
     model: Model, taught: Sequence[Mapping[str, Array]], runs: Callable[[Model], Sequence[Run]]
 ) -> Iterator[Replacement]:
     for drive in hydraulic_drives(model):
-        line = model.line_of_actuator(drive)
-        channel = f"{model.joint_of_actuator(drive)}.velocity" if line is None else f"{line}.rate"
+        channel = model.rate_channel(drive)
         fastest = SPARE * max(float(np.max(np.abs(each[channel]))) for each in taught)
         value = {key: model.parameters[f"{drive}.valve.{key}"].value for key in ("stroke", "gain")}
         if not fastest > 0.0 or value["gain"] == 0.0:

@@ -160,7 +160,7 @@ class _Sizes:
         joint = self._joint(effect.at)
         way, speed = 0.5 * float(np.ptp(self._shown[f"{joint}.position"])), self._strength(f"{joint}.velocity")
         effort = self._strength(f"{joint}.effort") or max(
-            self._strength(f"{name}.effort") for name in self.model.joints
+            self._strength(f"{name}.effort") for name in (*self.model.joints, *self.model.transmissions)
         )
         sizes = {
             **natural_sizes(effort, speed, way),
@@ -177,8 +177,8 @@ class _Sizes:
         return size
 
     def _joint(self, site: str) -> str:
-        """The joint at which an effect acts; the first one where it acts on all."""
-        if site in self.model.joints:
+        """The joint or transmission at which an effect acts; the first joint where it acts on all."""
+        if site in (*self.model.joints, *self.model.transmissions):
             return site
         if site in self.model.actuators:
             return self.model.joints_of_actuator(site)[0]
