@@ -279,6 +279,21 @@ def test_motors_with_a_winding_turn_shafts() -> None:
     assert still.state[4] == pytest.approx((6.0 - 0.05 * 2.0 * 50.0 * 0.5) / 2.0)
 
 
+def test_a_joint_winds_up_behind_the_motors_of_a_differential() -> None:
+    """The rotors of the shafts are before its spring, so that no other inertia has to be."""
+    model = wrist.model().with_effect("joint_compliance", at="pitch", stiffness=200.0, damping=0.0)
+    assert model.parameters["pitch.compliance.inertia"].value == 0.0
+    mass, other = model.mass_matrix(np.zeros(3)), wrist.Wrist()
+    rotors = wrist.RATIOS.T @ np.diag(other.rotors) @ wrist.RATIOS
+    rigid = other.mass_matrix(np.zeros(2)) - rotors
+    before, behind = model.joints.index("pitch"), model.joints.index("pitch_deflection")
+    assert mass[before, before] - rotors[0, 0] == pytest.approx(rigid[0, 0])
+    assert mass[behind, behind] == pytest.approx(rigid[0, 0])
+    # Laws of shafts begin as those of joints that turn.
+    rubbing = model.with_effect("coulomb_friction", at="left", coulomb=1e-3)
+    assert rubbing.parameters["left.friction.transition_velocity"].value == 0.01
+
+
 def test_effects_of_the_drive_chain_fit_motors_on_shafts() -> None:
     content = wrist.model().to_dict()
     content["effects"] += [
@@ -292,6 +307,43 @@ def test_effects_of_the_drive_chain_fit_motors_on_shafts() -> None:
     left = 0.5 * wrist.TORQUE
     assert run["left.effort"][0] == pytest.approx(left * (1.0 - 0.2), rel=1e-6)
     assert run["right.effort"][0] == pytest.approx(0.6 * wrist.TORQUE)
+
+
+def test_a_force_loop_pushes_through_the_ratio() -> None:
+    loop = {"type": "force_loop", "actuator": "left_motor", "measures": "pitch.position", "proportional": 3.0}
+    content = without(wrist.model(), "controllers").to_dict()
+    content["controllers"] = {"arm": {**loop, "feed_forward": {"value": 1.0 / wrist.TORQUE, "unit": "A/(N m)"}}}
+    model = Model.from_dict(content)
+    channels, commands = ("left_motor.reference", "right_motor.command"), np.tile([0.2, 0.0], (10, 1))
+    log = Experiment("held", wrist.times(10, 1e-3), commands, channels, ("rad", "A"))
+    run = vpm.simulate(model, log, "closed_loop", initial_state=np.zeros(4))
+    assert 50.0 * run["left.effort"][0] == pytest.approx(3.0 * 0.2)
+
+
+def test_mujoco_moves_the_same_wrist() -> None:
+    """A fixed tendon is a shaft: its armature a rotor, a motor on it an effort on the shaft."""
+    mujoco: Any = pytest.importorskip("mujoco", reason="MuJoCo is not installed (pip install mujoco)")
+    tendons = "".join(
+        f'<fixed name="{name}" armature="{rotor}" damping="1.5e-5">'
+        f'<joint joint="pitch" coef="{row[0]}"/><joint joint="roll" coef="{row[1]}"/></fixed>'
+        for name, rotor, row in zip(wrist.SHAFTS, (2e-6, 2e-6), wrist.RATIOS, strict=True)
+    )
+    motors = "".join(f'<motor tendon="{name}" gear="{wrist.TORQUE}"/>' for name in wrist.SHAFTS)
+    text = f"""<mujoco><compiler angle="radian"/><option gravity="0 0 -9.81"/><worldbody><body name="fork">
+      <joint name="pitch" type="hinge" axis="0 1 0"/>
+      <inertial pos="0.05 0 0" mass="1.2" diaginertia="1e-3 3e-3 3e-3"/>
+      <body name="hand" pos="0.12 0 0"><joint name="roll" type="hinge" axis="1 0 0"/>
+        <inertial pos="0 0 -0.06" mass="0.6" diaginertia="1.2e-3 1.0e-3 0.5e-3"/></body></body></worldbody>
+      <tendon>{tendons}</tendon><actuator>{motors}</actuator></mujoco>"""
+    other = mujoco.MjModel.from_xml_string(text)
+    data, model = mujoco.MjData(other), wrist.model()
+    for q, v in STATES[:10]:
+        data.qpos, data.qvel, data.ctrl = q, v, [0.7, -1.1]
+        mujoco.mj_forward(other, data)
+        run = seen(model, np.concatenate([q, v]), (0.7, -1.1))
+        found = [run[f"{joint}.acceleration"][0] for joint in model.joints]
+        np.testing.assert_allclose(found, data.qacc, rtol=1e-8, atol=1e-8)
+        assert [run[f"{name}.position"][0] for name in wrist.SHAFTS] == pytest.approx(data.ten_length)
 
 
 # ---- logs of motors --------------------------------------------------------------------------------------------------
@@ -321,6 +373,24 @@ def test_joints_follow_from_as_many_shafts() -> None:
         ExperimentError, match=r"left\.ratios\.pitch cannot be fitted to positions of joints that follow from"
     ):
         vpm.identify(model, log, ["left.ratios.pitch"])
+
+
+def test_gain_and_offset_of_a_motor_encoder_are_undone() -> None:
+    log, told = wrist.moved(duration=1.0), joints_from_shafts(wrist.moved(duration=1.0), wrist.model())
+    content = wrist.model().to_dict() | {"sensors": {"encoder": {"measures": "left.position"}}}
+    errors = [
+        {"type": "sensor_offset", "at": "encoder", "value": 0.3},
+        {"type": "sensor_gain", "at": "encoder", "value": 1.1},
+    ]
+    model = Model.from_dict({**content, "effects": [*content["effects"], *errors]})
+    seen_by_it = log.with_channel("left.position", 1.1 * log["left.position"] + 0.3, "rad")
+    found = joints_from_shafts(seen_by_it, model)
+    np.testing.assert_allclose(found["roll.position"], told["roll.position"], atol=1e-12)
+    with pytest.raises(ExperimentError, match=r"encoder\.offset\.value cannot be fitted"):
+        joints_from_shafts(seen_by_it, model, free=["encoder.offset.value"])
+    late = Model.from_dict({**content, "effects": [{"type": "sensor_delay", "at": "encoder", "time": 1e-3}]})
+    with pytest.raises(ExperimentError, match=r"late by encoder\.delay\.time"):
+        joints_from_shafts(log, late)
 
 
 @pytest.mark.parametrize("mode", ["inverse_dynamics", "free_run"])

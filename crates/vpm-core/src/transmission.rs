@@ -6,8 +6,8 @@ use serde::Deserialize;
 ///
 /// Law: `theta = sum r_i q_i`; an effort tau on the shaft gives `r_i tau` at joint i, by virtual work; a rotor of inertia J on it adds
 /// `J r r^T` to the mass matrix. What the turning rotor does to the body that carries it, gyroscopic moments, is left out. Source: Siciliano,
-/// Sciavicco, Villani & Oriolo 2009, "Robotics: Modelling, Planning and Control", sections 7.1 and 8.1; Featherstone 2008, "Rigid Body
-/// Dynamics Algorithms", section 3.3, for efforts through a constant Jacobian. Checked: ratios are not zero, the inertia not negative.
+/// Sciavicco, Villani & Oriolo 2009, "Robotics: Modelling, Planning and Control", sections 7.1 (rotors) and 8.1 (the matrix of ratios);
+/// Featherstone 2008, "Rigid Body Dynamics Algorithms", section 9.6. Checked: ratios are not zero, the inertia not negative.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Transmission<P> {

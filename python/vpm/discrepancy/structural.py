@@ -249,6 +249,12 @@ def moved(model: Model, site: str) -> float:
         for name in (f"{joint}.rotor_inertia", f"{joint}.rotor.inertia")
         if name in model.parameters
     )
+    shafts = (
+        name for name in model.transmissions if joint in model.ratios(name) and f"{name}.inertia" in model.parameters
+    )
+    for name in shafts:
+        ratio, inertia = (model.parameters[one].value for one in (model.ratios(name)[joint], f"{name}.inertia"))
+        rotor += ratio**2 * inertia
     return max(whole - rotor, 1e-3 * whole)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from typing import Protocol
 
 import numpy as np
@@ -45,14 +45,21 @@ class Geared(Protocol):
     def channel_unit(self, channel: str) -> str:
         """SI unit of a channel."""
 
+    def sensor_of(self, channel: str) -> str | None:
+        """Sensor that reads a channel."""
+
+    @property
+    def parameter_names(self) -> tuple[str, ...]:
+        """Names of the parameters."""
+
 
 def joints_from_shafts(
     experiment: Experiment, model: Geared, theta: Array | None = None, *, free: Collection[str] = ()
 ) -> Experiment:
     """Record with positions of joints in the place of those of shafts that tell them.
 
-    Law: ``q = R^-1 (theta - R_known q_known)``, R the ratios of the joints that the log does not hold. A record that
-    holds all of them, or no shaft that turns with another one, stays as it is.
+    Law: ``q = R^-1 (theta - R_known q_known)``, R the ratios of the joints that the log does not hold, ``theta`` behind
+    gain and offset of a sensor. A record that holds all joints, or no shaft that turns with others, stays as it is.
 
     Parameters
     ----------
@@ -66,51 +73,74 @@ def joints_from_shafts(
     Raises
     ------
     ExperimentError
-        The shafts in the record are not as many as the joints that it lacks, or do not tell them; or their ratios are
-        to be fitted to what would follow from these ratios.
+        The shafts in the record are not as many as the joints that it lacks, or do not tell them; or their ratios, or
+        errors of their sensors, are to be fitted to what would follow from these; or a sensor is late.
     """
     values = model.theta if theta is None else theta
-    turned = {
-        name: {joint: float(values[model.index(ratio)]) for joint, ratio in model.ratios(name).items()}
-        for name in model.transmissions
-        if f"{name}.position" in experiment
-    }
-    held = {joint for joint in model.joints if f"{joint}.position" in experiment}
-    shafts = {name: ratios for name, ratios in turned.items() if not held.issuperset(ratios)}
-    lacking = [
-        joint for joint in model.joints if any(joint in ratios for ratios in shafts.values()) and joint not in held
-    ]
+    held = [joint for joint in model.joints if f"{joint}.position" in experiment]
+    logged = {name: model.ratios(name) for name in model.transmissions if f"{name}.position" in experiment}
+    shafts = {name: ratios for name, ratios in logged.items() if not set(held).issuperset(ratios)}
+    lacking = [joint for joint in model.joints if joint not in held and any(joint in own for own in shafts.values())]
     if not lacking:
         return experiment
-    ratios = np.array([[own.get(joint, 0.0) for joint in lacking] for own in shafts.values()])
-    scaled = ratios / np.linalg.norm(ratios, axis=0)
-    if len(shafts) != len(lacking) or np.linalg.cond(scaled) > REGULAR:
-        raise ExperimentError(
-            f"{experiment.name}: the positions of {len(shafts)} transmissions ({', '.join(shafts)}) do not tell those "
-            f"of {len(lacking)} joints ({', '.join(lacking)}) of {model.name}; log as many independent shafts as "
-            f'joints, or the joints themselves, such as "{lacking[0]}.position"',
-            channel=f"{lacking[0]}.position",
-        )
-    sought = [ratio for name in shafts for ratio in model.ratios(name).values() if ratio in free]
-    if sought:
-        raise ExperimentError(
-            f"{experiment.name}: {sought[0]} cannot be fitted to positions of joints that follow from it; log the "
-            f'joints themselves, such as "{lacking[0]}.position", or take the ratio as known',
-            channel=f"{lacking[0]}.position",
-        )
-    angles = [
-        experiment[f"{name}.position"]
-        - sum((ratio * experiment[f"{joint}.position"] for joint, ratio in own.items() if joint in held), 0.0)
-        for name, own in shafts.items()
-    ]
-    positions = np.linalg.solve(ratios, np.array(angles))
-    kept = experiment.select(
-        [
-            name
-            for name in experiment.channels
-            if name.rpartition(".")[0] not in shafts or not name.endswith(".position")
-        ]
+    _check_known(experiment, model, shafts, lacking[0], free)
+
+    def ratio(name: str, joint: str) -> float:
+        return float(values[model.index(shafts[name][joint])]) if joint in shafts[name] else 0.0
+
+    ratios = np.array([[ratio(name, joint) for joint in lacking] for name in shafts])
+    _check_regular(experiment, model, ratios, tuple(shafts), lacking)
+    angles = np.array([_angle(experiment, model, values, name) for name in shafts])
+    known = [[ratio(name, joint) for joint in held] for name in shafts]
+    angles -= np.array(known) @ np.array([experiment[f"{joint}.position"] for joint in held]) if held else 0.0
+    spent = {f"{name}.position" for name in shafts}
+    told = experiment.select([channel for channel in experiment.channels if channel not in spent])
+    for joint, position in zip(lacking, np.linalg.solve(ratios, angles), strict=True):
+        told = told.with_channel(f"{joint}.position", position, model.channel_unit(f"{joint}.position"))
+    return told
+
+
+def _check_regular(
+    experiment: Experiment, model: Geared, ratios: Array, shafts: Sequence[str], lacking: Sequence[str]
+) -> None:
+    """Complain about shafts that do not tell the joints."""
+    if len(shafts) == len(lacking) and np.linalg.cond(ratios / np.linalg.norm(ratios, axis=0)) <= REGULAR:
+        return
+    raise ExperimentError(
+        f"{experiment.name}: the positions of {len(shafts)} transmissions ({', '.join(shafts)}) do not tell those of "
+        f"{len(lacking)} joints ({', '.join(lacking)}) of {model.name}; log as many independent shafts as joints, or "
+        f'the joints themselves, such as "{lacking[0]}.position"',
+        channel=f"{lacking[0]}.position",
     )
-    for joint, position in zip(lacking, positions, strict=True):
-        kept = kept.with_channel(f"{joint}.position", position, model.channel_unit(f"{joint}.position"))
-    return kept
+
+
+def _check_known(
+    experiment: Experiment, model: Geared, shafts: Mapping[str, Mapping[str, str]], joint: str, free: Collection[str]
+) -> None:
+    """Complain about ratios and sensors that are to be fitted, and about late sensors."""
+    errors = [parameter for name in shafts for parameter in _errors(model, name)]
+    taken = [parameter for ratios in shafts.values() for parameter in ratios.values()] + errors
+    repair = f'log the joints themselves, such as "{joint}.position"'
+    for parameter in taken:
+        if parameter.endswith(".delay.time"):
+            rest = f"positions of joints do not follow from a shaft whose sensor is late by {parameter}; {repair}"
+        elif parameter in free:
+            rest = (
+                f"{parameter} cannot be fitted to positions of joints that follow from it; {repair}, or keep its value"
+            )
+        else:
+            continue
+        raise ExperimentError(f"{experiment.name}: {rest}", channel=f"{joint}.position")
+
+
+def _angle(experiment: Experiment, model: Geared, values: Array, name: str) -> Array:
+    """Angle of a shaft behind gain and offset of its sensor, rad."""
+    numbers = {parameter.split(".")[-2]: float(values[model.index(parameter)]) for parameter in _errors(model, name)}
+    reading: Array = experiment[f"{name}.position"]
+    return (reading - numbers.get("offset", 0.0)) / numbers.get("gain", 1.0)
+
+
+def _errors(model: Geared, name: str) -> list[str]:
+    """Parameters of the sensor of a shaft's angle: gain, offset, delay."""
+    sensor = model.sensor_of(f"{name}.position")
+    return [] if sensor is None else [one for one in model.parameter_names if one.startswith(f"{sensor}.")]

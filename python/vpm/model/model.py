@@ -22,6 +22,7 @@ from vpm.model.effects import Effect, effects_of
 from vpm.model.evaluation import Evaluations
 from vpm.model.messages import parse_toml, read_toml
 from vpm.model.parameters import Parameter
+from vpm.model.transmission import TURNING
 from vpm.model.writer import content_of, plain, toml_of
 from vpm.results import Storable, html_table
 
@@ -244,7 +245,7 @@ class Model(Evaluations, Storable):
         entry: dict[str, Any] = {"type": name, "at": at, "side": side}
         for short in values:
             effect.parameter(short)
-        kind = self.joint_kind(at) if at in self.joints else None
+        kind = self.joint_kind(at) if at in self.joints else TURNING if at in self.transmissions else None
         for parameter in effect.parameters:
             if parameter.optional and parameter.name not in values:
                 continue
@@ -272,6 +273,7 @@ class Model(Evaluations, Storable):
             return 0.0
         known = [f"{joint}.rotor_inertia", f"{joint}.rotor.inertia"]
         known += [f"{name}.rotor_inertia" for name in self.actuators if self._drives(name, joint)]
+        known += [f"{name}.inertia" for name in self.transmissions if joint in self.ratios(name)]
         if any(name in self.parameters for name in known):
             return 0.0
         place = self.joints.index(joint)
@@ -281,7 +283,7 @@ class Model(Evaluations, Storable):
         return any(self._drives(name, joint) for name in self.actuators)
 
     def _drives(self, actuator: str, joint: str) -> bool:
-        return self._checked.document.actuators[actuator].joint == joint
+        return self.line_of_actuator(actuator) is None and joint in self.joints_of_actuator(actuator)
 
     def without_effect(self, name: str, at: str, side: Side = "motor") -> Self:
         """Model with one effect less.

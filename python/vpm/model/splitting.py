@@ -112,5 +112,8 @@ def _has_rotor(document: Document, joint: str) -> bool:
         return True
     if any(entry.type == "rotor_inertia" and entry.at == joint for entry in document.effects):
         return True
+    shafts = (shaft for shaft in document.transmissions.values() if joint in shaft.ratios)
+    if any(shaft.inertia is not None and shaft.inertia.value > 0.0 for shaft in shafts):
+        return True
     motors = (actuator for actuator in document.actuators.values() if isinstance(actuator, DcMotor))
-    return any(motor.joint == joint and motor.rotor_inertia is not None for motor in motors)
+    return any(joint in joints_turned(motor, document) and motor.rotor_inertia is not None for motor in motors)

@@ -3,7 +3,7 @@
 use super::{Description, EffectEntry, connections, controllers, drives};
 use crate::actuator::Target;
 use crate::body::Site;
-use crate::effect::{Domain, Seat};
+use crate::effect::{Domain, JointEffect, Seat};
 use crate::error::{Error, Result};
 use crate::sensor::Channel;
 
@@ -128,6 +128,8 @@ fn sites(description: &Description) -> Result<()> {
                 seat.joints().into_iter().try_for_each(|joint| within(&what, "joint", joint, joints))?;
                 if let Seat::Shaft { transmission, .. } = seat {
                     within(&what, "transmission", *transmission, description.transmissions.len())?;
+                    let name = &description.transmissions[*transmission].name;
+                    follows_no_load(&what, name, effect)?;
                 }
             }
             EffectEntry::Payload { on: Site::Body(body), .. } => within(&what, "body", *body, joints)?,
@@ -149,6 +151,24 @@ fn sites(description: &Description) -> Result<()> {
         }
     }
     Ok(())
+}
+
+/// A shaft does not know the load of a joint.
+fn follows_no_load(what: &str, transmission: &str, effect: &EffectEntry) -> Result<()> {
+    let EffectEntry::Joint { law, .. } = effect else { return Ok(()) };
+    let follows = |law: &JointEffect<usize>| {
+        matches!(
+            law,
+            JointEffect::LoadDependentFriction(_) | JointEffect::CurrentRipple(_) | JointEffect::EmpiricalForce(_)
+        )
+    };
+    if !follows(law) {
+        return Ok(());
+    }
+    let message = format!(
+        "{what} follows the load of a joint, but sits at transmission `{transmission}`; give the friction to its actuator, or take a joint"
+    );
+    Err(Error::Description { message })
 }
 
 fn channels(description: &Description) -> Result<()> {

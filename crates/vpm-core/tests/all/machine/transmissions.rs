@@ -166,6 +166,13 @@ fn what_cannot_be_is_refused() {
     assert!(with(&[(7, 2.0)], 0.1).contains("transmission `shaft0`") && with(&[(7, 2.0)], 0.1).contains("joint"));
     assert!(with(&[(0, 0.0)], 0.1).contains("`shaft0.ratios.0.ratio` must not be zero"), "{}", with(&[(0, 0.0)], 0.1));
     assert!(with(&[(0, 2.0)], -0.1).contains("`shaft0.inertia` must not be negative"));
+    let mut loaded = geared(1, None);
+    loaded.effect_on_shaft(
+        "load_dependent_friction",
+        0,
+        &[("driving", 0.1), ("driven", 0.1), ("transition_velocity", 0.1)],
+    );
+    assert!(refused(&loaded).contains("sits at transmission `shaft0`"), "{}", refused(&loaded));
     let mut along = geared(1, None);
     let law = json!({"drive": {"type": "spring_damper", "stiffness": 10.0, "free_length": 0.1, "damping": 0.1}});
     along.add("actuators", json!({"name": "strut", "on": {"line": 0}}), law);
