@@ -126,6 +126,7 @@ def test_a_shaft_of_one_joint_is_the_joint_with_reflected_numbers(ratio: float) 
             {"type": "viscous_friction", "at": "gear", "viscous": 2e-5},
             {"type": "coulomb_friction", "at": "gear", "coulomb": 3e-3, "transition_velocity": 0.4},
             {"type": "torque_ripple", "at": "gear", "period": 0.6, "cosine": 1e-3, "sine": -2e-3},
+            {"type": "hysteresis", "at": "gear", "force": 2e-3, "displacement": 0.8},
         ],
     }
     size = abs(ratio)
@@ -141,6 +142,7 @@ def test_a_shaft_of_one_joint_is_the_joint_with_reflected_numbers(ratio: float) 
                 "cosine": 1e-3 * ratio,
                 "sine": -2e-3 * size,
             },
+            {"type": "hysteresis", "at": "pitch", "force": 2e-3 * size, "displacement": 0.8 / size},
             {"type": "rotor_inertia", "at": "pitch", "inertia": 3e-6 * ratio**2},
         ],
     }
@@ -154,6 +156,11 @@ def test_a_shaft_of_one_joint_is_the_joint_with_reflected_numbers(ratio: float) 
             np.testing.assert_allclose(found[channel], expected[channel], rtol=1e-8, atol=1e-8, err_msg=integrator)
         np.testing.assert_allclose(found["gear.position"], ratio * found["pitch.position"], rtol=1e-12)
         np.testing.assert_allclose(ratio * found["gear.effort"], expected["pitch.effort"], rtol=1e-12, atol=1e-15)
+    moving = log.with_channel("pitch.position", found["pitch.position"], "rad")
+    moving = moving.with_channel("roll.position", found["roll.position"], "rad")
+    balances = [vpm.simulate(each, moving, "inverse_dynamics", cutoff=40.0) for each in (one, other)]
+    np.testing.assert_allclose(balances[0]["pitch.effort"], balances[1]["pitch.effort"], rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(balances[0].measured, balances[1].measured, rtol=1e-12, atol=1e-12)
 
 
 def test_energy_is_kept_without_friction() -> None:
