@@ -98,6 +98,29 @@ def test_transmissions_and_lines_are_numbered_one_after_the_other() -> None:
     assert run["strut.length"][0] == pytest.approx(np.hypot(*ends))
 
 
+def test_the_ratio_of_a_sliding_joint_is_an_angle_per_way() -> None:
+    """A pinion of 20 mm radius that a turning joint carries along: theta = q_turn + q_slide / radius."""
+    wheel = {"mass": 1.0, "inertia": [0.01, 0.01, 0.01, 0.0, 0.0, 0.0]}
+    model = Model.from_dict(
+        {
+            "name": "rack",
+            "gravity": [0.0, 0.0, 0.0],
+            "bodies": {"arm": wheel, "rack": {"mass": 2.0}},
+            "joints": {
+                "turn": {"type": "revolute", "parent": "world", "child": "arm", "axis": [0.0, 0.0, 1.0]},
+                "slide": {"type": "prismatic", "parent": "arm", "child": "rack", "axis": [0.0, 0.0, 1.0]},
+            },
+            "transmissions": {
+                "pinion": {"ratios": {"turn": 1.0, "slide": {"value": 0.05, "unit": "rad/mm"}}, "inertia": 1e-3}
+            },
+        }
+    )
+    assert model.parameters["pinion.ratios.slide"].unit == "rad/m"
+    assert model.parameters["pinion.ratios.slide"].value == pytest.approx(50.0)
+    rigid = np.diag([0.01, 2.0])
+    np.testing.assert_allclose(model.mass_matrix([0.1, 0.2]), rigid + 1e-3 * np.outer([1.0, 50.0], [1.0, 50.0]))
+
+
 # ---- dynamics --------------------------------------------------------------------------------------------------------
 
 
