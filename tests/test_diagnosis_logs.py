@@ -184,3 +184,52 @@ def test_what_a_model_cannot_carry_beside_what_it_has_is_no_candidate() -> None:
         tried = {c.key for c in candidates(model, data, np.zeros(len(data.blocks[0].time)))}
         assert tried
         assert not set(left_out(model, data)) & tried
+
+
+def merit(drive: int, gain: object) -> Model:
+    """A drive of the arm MERIt with its link as a rigid body in gravity, the other one standing still."""
+    return Model.from_dict(
+        {
+            "name": f"drive {drive} of MERIt",
+            "gravity": [0.0, 0.0, -9.81],
+            "bodies": {
+                "arm": {
+                    "mass": {"value": 1.3, "uncertainty": 0.5, "min": 0.1, "max": 5.0},
+                    "center_of_mass": [0.3, 0.0, 0.0],
+                    "inertia": [1e-3, 0.05, 0.05, 0.0, 0.0, 0.0],
+                }
+            },
+            "joints": {"axis": {"type": "revolute", "parent": "world", "child": "arm", "axis": [0.0, -1.0, 0.0]}},
+            "actuators": {"drive": {"joint": "axis", "gain": gain, "command_unit": "A"}},
+            "sensors": {"encoder": {"measures": "axis.position"}},
+            "effects": [
+                {
+                    "type": "viscous_friction",
+                    "at": "axis",
+                    "viscous": {"value": 0.5, "uncertainty": 0.5, "min": 0.0},
+                },
+                {
+                    "type": "coulomb_friction",
+                    "at": "axis",
+                    "coulomb": {"value": 1.0, "uncertainty": 1.0, "min": 0.0},
+                },
+            ],
+            "channels": {
+                "time": {"column": "time_s", "unit": "s"},
+                "axis.position": {"column": f"q{drive}_rad", "unit": "rad"},
+                "drive.command": {"column": f"i{drive}_A", "unit": "A"},
+            },
+        }
+    )
+
+
+@needs_logs
+@pytest.mark.parametrize("gain", [5.0, {"value": 5.0, "uncertainty": 3.0, "min": 0.1, "max": 50.0}])
+def test_no_effect_swallows_a_drive_whose_current_is_mostly_friction(gain: object) -> None:
+    model = merit(3, gain)
+    record = Experiment.load(DATA / "tudor_merit" / "exp1.csv", model=model)
+    first, second = record.split(0.5)
+    why = diagnose(model, first, second)
+    assert why.verdict == "unexplained", why.summary
+    told = why.gap["axis.effort"]
+    assert min(told.recalibrated, told.after) > 0.5 * told.signal

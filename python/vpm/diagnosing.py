@@ -21,7 +21,7 @@ from vpm.discrepancy.by_ranking import free_joints, observed_gaps, searched, why
 from vpm.discrepancy.by_ranking import notes as notes_of
 from vpm.discrepancy.candidates import asked_for, slow_speeds
 from vpm.discrepancy.choice import Accepted
-from vpm.discrepancy.confirmation import Data, Judged, is_clear, judge
+from vpm.discrepancy.confirmation import Data, Judged, is_clear, judge, weaker
 from vpm.discrepancy.contacts import with_told_contacts
 from vpm.discrepancy.diagnosis import (
     AcceptedEffect,
@@ -221,7 +221,7 @@ def _diagnosis(
     say("looking for the experiment that tells effects apart")
     if stopped or late:
         notes.append(STOPPED_LATE)
-    noise = {channel: g.noise_floor for channel, g in gap.items() if g.mode == "inverse_dynamics"}
+    noise = {channel: floor[channel] for channel in floor if channel in gap}
     return Diagnosis(
         word,
         f"Stopped before every candidate was tried. {summary}" if found.interrupted else summary,
@@ -476,11 +476,15 @@ def _gaps(
 ) -> dict[str, ChannelGap]:
     judged = (nominal, recalibrated, final)
     stages = [gaps(data.unseen, stage.unseen) for stage in judged]
+    # Of efforts as the drives of the nominal model give them: no drive may shrink them together with its error.
+    factors = np.array([weaker(data.unseen, nominal, stage) for stage in judged])
+    by_channel = {f"{joint}.effort": own for joint, own in zip(data.unseen.joints, factors.T, strict=True)}
     result = {}
     for channel, (_, _, unit) in stages[0].items():
-        before, known, after = (stage[channel][0] for stage in stages)
-        signal = _signal(data.unseen, channel)
-        result[channel] = ChannelGap(before, known, after, floor.get(channel, np.nan), unit, signal, data.unseen.mode)
+        own = by_channel.get(channel, np.ones(len(judged)))
+        before, known, after = (float(stage[channel][0] * factor) for stage, factor in zip(stages, own, strict=True))
+        signal, noise = _signal(data.unseen, channel), float(floor.get(channel, np.nan) * own[-1])
+        result[channel] = ChannelGap(before, known, after, noise, unit, signal, data.unseen.mode)
     if data.simulation is not None and nominal.simulated is not None:
         simulated = [gaps(data.simulation, j.simulated) for j in judged if j.simulated is not None]
         for channel, (_, _, unit) in simulated[0].items():

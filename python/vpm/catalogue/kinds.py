@@ -210,6 +210,11 @@ class EffectType:
         return any(parameter.name == "transition_velocity" for parameter in self.parameters)
 
     @property
+    def has_play(self) -> bool:
+        """Whether there is a gap within which its sides move without each other."""
+        return any(parameter.name == "gap" for parameter in self.parameters)
+
+    @property
     def adds_inertia(self) -> bool:
         """Whether a mass or an inertia is among its parameters."""
         return any(parameter.scale in {"mass", "inertia"} for parameter in self.parameters)

@@ -340,18 +340,23 @@ def _origin(data: InverseDynamicsProblem, probe: Probe, start: Model) -> Array |
     return probe.model.theta if alike or probe.candidate.neutral else None
 
 
-def shrinkage(problem: InverseDynamicsProblem, current: Judged, judged: Judged) -> Array:
-    """How much weaker the actuators of the joint of each residual have become, at least 1 (n,).
+def weaker(problem: InverseDynamicsProblem, current: Judged, judged: Judged) -> Array:
+    """How much weaker the actuators of each joint have become, at least 1 (joints,).
 
-    An effect that swallows the command leaves a small gap between two small efforts; errors are compared relative to
-    the effort, so that nothing is won that way. One drive may do so where others are stronger.
+    An effect that swallows the command, or a gain that shrinks, leaves a small gap between two small efforts; errors
+    are compared relative to the effort, so that nothing is won that way. One drive may do so where others are stronger.
     """
     after, before = (problem.strengths(one.model) for one in (judged, current))
-    weaker = np.maximum(1.0, before / np.maximum(after, np.maximum(1e-6 * before, 1e-300)))
+    return np.asarray(np.maximum(1.0, before / np.maximum(after, np.maximum(1e-6 * before, 1e-300))))
+
+
+def shrinkage(problem: InverseDynamicsProblem, current: Judged, judged: Judged) -> Array:
+    """How much `weaker` the actuators of the joint of each residual have become (n,)."""
+    factors_of_joints = weaker(problem, current, judged)
     # What else is logged is shown by the machine as a whole.
-    factors = np.full(max(block.samples.stop for block in problem.blocks), np.max(weaker))
+    factors = np.full(max(block.samples.stop for block in problem.blocks), np.max(factors_of_joints))
     for record in range(len(problem.motions)):
-        for block, factor in zip(problem.efforts(record), weaker, strict=True):
+        for block, factor in zip(problem.efforts(record), factors_of_joints, strict=True):
             factors[block.samples] = factor
     return factors
 

@@ -90,9 +90,9 @@ def verdict(
     mostly_open = (structured and share_left > MOSTLY_OPEN) or _is_described_better(rest)
     joints = Joints.of(gap, left, found.left)
     apart = joints.differ and not any(joints.has(entry, found.final.model) for entry in found.accepted)
-    # A play is hard to balance.
-    spoiled = any(map(_is_worse_than_none, main)) and not found.final.model.added_joints
-    if found.accepted and (spoiled or (not apart and not _is_explanation(found, observed, mostly_open))):
+    if found.accepted and (
+        _is_spoiled(found, gap, observed) or (not apart and not _is_explanation(found, observed, mostly_open))
+    ):
         leave = f"leave {100.0 * (observed if observed >= 1.0 else share_left):.0f} % of its mean square"
         return (
             "unexplained",
@@ -123,11 +123,28 @@ def _is_worse_than_none(gap: ChannelGap) -> bool:
     return gap.recalibrated < gap.signal < gap.after
 
 
+def _is_spoiled(found: Search, gap: Mapping[str, ChannelGap], observed: float) -> bool:
+    """Whether named effects leave most of a measured effort where they act, or more than a model without any force.
+
+    A play is hard to balance: where little is left of what an observer sees, that says more.
+    """
+    if observed <= MOSTLY_OPEN and any(effect.type.has_play for effect in found.final.model.effects):
+        return False
+    told = [gap[channel] for joint in _joints(found) if (channel := f"{joint}.effort") in gap]
+    most = any(g.after**2 > 0.5 * g.signal**2 and _above([g]) > FLOOR_FACTOR for g in told)
+    return most or any(map(_is_worse_than_none, main_gaps(gap)))
+
+
 def _is_unseen(found: Search, data: Data) -> bool:
     """Whether all that was named acts at joints that a balance does not see."""
-    model, sites = found.final.model, [entry.key[1] for entry in found.accepted]
-    at = {model.joint_of_body(site) if site in model.bodies else joint_at(model, site) for site in sites}
+    at = _joints(found)
     return bool(at) and not at & {*data.training.joints, ""}
+
+
+def _joints(found: Search) -> set[str]:
+    """Joints at which named effects act, "" for those that act on all."""
+    model, sites = found.final.model, [entry.key[1] for entry in found.accepted]
+    return {model.joint_of_body(site) if site in model.bodies else joint_at(model, site) for site in sites}
 
 
 def _clear_of_noise(gap: ChannelGap) -> float:

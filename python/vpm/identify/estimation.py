@@ -258,6 +258,8 @@ def _linear_step(counter: _Counter, start: Array, low: Array, high: Array) -> Ar
 def _refine(counter: _Counter, start: Array, low: Array, high: Array, tolerance: float, most: int) -> Array:
     residual, jacobian = counter(start)
     lengths = column_lengths(jacobian)
+    if not np.all(np.isfinite(lengths)):  # a motion that parts from its way ever faster leads nowhere
+        return start
     gradient = (jacobian / lengths).T @ residual
     interior = (start > low) & (start < high)
     # Nothing left to gain along any free direction: the problem was linear and the first step ended it.

@@ -30,8 +30,9 @@ class Judgement(Storable):
     shape : float
         The same of those that show over the same states at the same place: one curve with two shapes.
     alone : float
-        Of an effect that adds inertia, the share of the error power that is left of what the observer leaves of masses
-        on which nothing acts: too heavy a machine is drawn along by the observer alone.
+        Of an effect that adds inertia, the share of the error power that is left, in the channel in which it removes
+        most, of what the observer leaves of a mass on which nothing acts: too heavy a machine is drawn along by the
+        observer alone.
     overtone : bool
         Whether it repeats along a whole fraction of the period of another effect at its place.
     """

@@ -164,7 +164,7 @@ class Look:
         size, beside, shape = (float(np.sqrt(there / (power[place] + there))) for power in powers)
         score = _repeated([(self.left[1], left[1])], self.settings.pieces)
         heavier = key is not None and EFFECTS[key[0]].adds_inertia
-        alone = float(np.prod(_shares(self._drawn, left))) if heavier else 0.0
+        alone = float(_shares(self._drawn, left)[place]) if heavier else 0.0
         overtone = key is not None and fitted.structure.is_overtone(key)
         judgement = Judgement(removed, min(shares), score, size, beside, shape, alone, overtone)
         if key is None or not ended or not judgement.is_faint(self.settings, PARTS):

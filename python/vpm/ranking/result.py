@@ -72,8 +72,8 @@ class Gap(Storable):
         Of the model as it was, with fitted parameters, and with what was found, in ``unit``; NaN where it runs away.
     unit : str
     left : float
-        Share of the error power above the noise that the recalibrated model leaves and that is still there with what
-        was found; NaN if not known.
+        Share of the error power above the noise that is still there with what was found, of what the recalibrated model
+        leaves or, if that is less, masses on which nothing acts; NaN if not known.
     noise : float
         What noise alone leaves, as far as it is white; NaN if not known.
     signal : float

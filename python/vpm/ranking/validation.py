@@ -38,7 +38,8 @@ def gaps(held_out: Observed, stages: tuple[Model, Model, Model], band: float) ->
     unknown = np.full(after.shape[1], np.nan)
     shares, noise = unknown, unknown
     if np.all(np.isfinite(recalibrated)):
-        shares, noise = _above_noise(recalibrated, after, parts, held_out.structured(recalibrated, band, parts))
+        filters = held_out.structured(recalibrated, band, parts)
+        shares, noise = _shares((recalibrated, held_out.drawn(band)), after, parts, filters)
     names = held_out.records[0].channels
     units = map(stages[0].channel_unit, names)
     return {
@@ -65,12 +66,21 @@ def _left(observed: Observed, model: Model, theta: Array, band: float) -> Array:
     return residual
 
 
-def _above_noise(before: Array, after: Array, parts: Parts, filters: Sequence[Structured]) -> tuple[Array, Array]:
-    """Share of the power above the noise of each channel (m,) that is left of it, and the noise."""
+def _shares(
+    rivals: tuple[Array, Array], after: Array, parts: Parts, filters: Sequence[Structured]
+) -> tuple[Array, Array]:
+    """Share of the power above the noise of each channel (m,) that is left, and the noise.
+
+    Of what the better one of two rivals leaves: the model without effects, and masses on which nothing acts. What does
+    no better than these, which follow the record because an observer draws them along, explains no motion.
+    """
 
     def power(one: Structured, channel: Array) -> float:
         return sum(float(np.sum(one.part_of(channel[part]) ** 2)) for part in parts)
 
-    pairs = [(power(one, b), power(one, a)) for one, b, a in zip(filters, before.T, after.T, strict=True)]
-    shares = [left / whole if whole > 0.0 else np.nan for whole, left in pairs]
-    return np.array(shares), np.array([one.noise for one in filters])
+    shares = np.full(after.shape[1], np.nan)
+    for place, one in enumerate(filters):
+        powers = [power(one, rival[:, place]) for rival in rivals if np.any(rival[:, place])]
+        if (whole := min(powers, default=0.0)) > 0.0:
+            shares[place] = power(one, after[:, place]) / whole
+    return shares, np.array([one.noise for one in filters])
