@@ -1,4 +1,4 @@
-"""Records in which commands do not cause the motion: a machine moved by hand, or drives whose columns are another's.
+"""Records in which commands do not cause the motion: a machine moved by hand, or an encoder that counts backwards.
 
 Nothing of the catalogue is missing there, and no answer may name it. A model explains a motion if it follows the record
 better than masses on which nothing acts, which an observer draws along, and if the efforts that the motion needs are
@@ -60,3 +60,40 @@ def test_nothing_is_named_where_a_drive_does_not_cause_the_motion(gain: str, fri
     assert why.verdict == "unexplained", why.summary
     # Of what was measured most stays open, whatever the drive is believed to give.
     assert why.gap["axis.effort"].recalibrated > 0.5 * why.gap["axis.effort"].signal
+
+
+SLIDE = """
+name = "slide"
+gravity = [0.0, 0.0, 0.0]
+bodies.load = { mass = { value = 2.0, unit = "kg", uncertainty = 0.2 } }
+joints.axis = { type = "prismatic", parent = "world", child = "load", axis = [1.0, 0.0, 0.0] }
+actuators.drive = { joint = "axis", gain = 4.0, command_unit = "A" }
+sensors.encoder = { measures = "axis.position" }
+effects = [{ type = "viscous_friction", at = "axis", viscous = { value = 3.0, uncertainty = 0.3, min = 0.0 } }]
+"""
+
+
+def servoed(seed: int, length: float) -> tuple[Array, Array, Array]:
+    """Time, place and current of 2 kg on a slide that follow sines: `2 a = 4 u - 3 v`, `u` held for a sample."""
+    time, wanted = swing(seed, length)
+    x, v = wanted[0], 0.0
+    places, currents = np.empty_like(time), np.empty_like(time)
+    for sample in range(len(time)):
+        places[sample], currents[sample] = x, 40.0 * (wanted[sample] - x) - 8.0 * v
+        rest = 4.0 * currents[sample] / 3.0  # speed at which friction holds the drive
+        fading = np.exp(-1.5 * DT)
+        x += rest * DT + (v - rest) * (1.0 - fading) / 1.5
+        v = rest + (v - rest) * fading
+    return time, places, currents
+
+
+@pytest.mark.parametrize(("sign", "verdict"), [(1.0, "no_disagreement"), (-1.0, "unexplained")])
+def test_an_encoder_that_counts_backwards_is_no_missing_effect(sign: float, verdict: str) -> None:
+    model = vpm.Model.from_toml(SLIDE)
+    records = []
+    for seed in (7, 8):
+        time, place, current = servoed(seed, 12.0)
+        noise = NOISE * np.random.default_rng(seed).standard_normal(len(time))
+        columns = np.column_stack([sign * place + noise, current])
+        records.append(Experiment(f"slide {seed}", time, columns, ("axis.position", "drive.command"), ("m", "A")))
+    assert diagnose(model, records[:1], records[1:], workers=1).verdict == verdict

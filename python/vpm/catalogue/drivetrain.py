@@ -157,6 +157,7 @@ ROTOR_INERTIA = EffectType(
 END_STOP = EffectType(
     name="end_stop",
     site="joint",
+    link_side_alone=True,
     group="end_stop",
     parameters=(
         size(

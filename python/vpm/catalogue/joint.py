@@ -188,6 +188,7 @@ BIAS_FORCE = EffectType(
 SPRING = EffectType(
     name="spring",
     site="joint",
+    link_side_alone=True,
     group="spring",
     parameters=(
         size(

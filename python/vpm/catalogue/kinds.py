@@ -162,6 +162,8 @@ class EffectType:
         Law of an entry that a user wrote, see `vpm.catalogue.register`.
     motor_side_alone : bool
         Whether, at a joint with a compliance or backlash, it belongs to the motor side or to the spring itself.
+    link_side_alone : bool
+        Whether the link alone has it, and never the shaft of a transmission: links run into ends and hang on springs.
     memory : str
         What the memory of its law, a state of the machine, is called at its site; "" if it has none.
     contains : tuple of str
@@ -188,6 +190,7 @@ class EffectType:
     shows: Signature | None = None
     formula: Formula | None = None
     motor_side_alone: bool = False
+    link_side_alone: bool = False
     memory: str = ""
     contains: tuple[str, ...] = ()
     exact: bool = False

@@ -57,6 +57,7 @@ QUADRATIC_DRAG = EffectType(
 CUBIC_SPRING = EffectType(
     name="cubic_spring",
     site="joint",
+    link_side_alone=True,
     group="cubic_spring",
     parameters=(
         size(

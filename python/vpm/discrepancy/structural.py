@@ -29,8 +29,6 @@ HIDING = STRUCTURAL
 SERIES = "stiffness"
 #: What of these springs turns motion into heat, by short names.
 LOSSES = ("damping", "time")
-#: Effects of joints that no motor side has: what moves runs into ends and pulls at springs, not the shaft.
-OF_LINKS = frozenset({"end_stop", "spring", "cubic_spring"})
 #: Frequencies at which a spring lets the link swing behind a motor that stands still, Hz, and damping ratios there.
 FREQUENCIES = (3.0, 8.0, 20.0, 50.0)
 LOOSE, CONTACT = 0.05, 0.1
@@ -60,7 +58,7 @@ def sites_worth_trying(effect: EffectType, model: Model) -> tuple[str, ...]:
     be on the motor side of a transmission too, but for those of links.
     """
     sites = model.sites(effect.site)
-    if effect.has_sides and effect.name not in OF_LINKS:
+    if effect.has_sides and not effect.link_side_alone:
         # What sits on a shaft that one joint alone turns is the same at the joint.
         sites = (*sites, *(name for name in model.transmissions if len(model.ratios(name)) > 1))
     if effect.beside_others:
