@@ -54,7 +54,14 @@ def told(gain: str, friction: str, seed: int) -> Diagnosis:
     return diagnose(model, records[:1], records[1:], workers=1)
 
 
-@pytest.mark.parametrize(("gain", "friction", "seed"), [(KNOWN, DRY, 1), (FREE, "", 1), (FREE, "", 2)])
+@pytest.mark.parametrize(
+    ("gain", "friction", "seed"),
+    [
+        pytest.param(KNOWN, DRY, 1, marks=pytest.mark.nightly),
+        pytest.param(FREE, "", 1, marks=pytest.mark.nightly),
+        (FREE, "", 2),
+    ],
+)
 def test_nothing_is_named_where_a_drive_does_not_cause_the_motion(gain: str, friction: str, seed: int) -> None:
     why = told(gain, friction, seed)
     assert why.verdict == "unexplained", why.summary

@@ -224,7 +224,10 @@ def merit(drive: int, gain: object) -> Model:
 
 
 @needs_logs
-@pytest.mark.parametrize("gain", [5.0, {"value": 5.0, "uncertainty": 3.0, "min": 0.1, "max": 50.0}])
+@pytest.mark.parametrize(
+    "gain",
+    [pytest.param(5.0, marks=pytest.mark.nightly), {"value": 5.0, "uncertainty": 3.0, "min": 0.1, "max": 50.0}],
+)
 def test_no_effect_swallows_a_drive_whose_current_is_mostly_friction(gain: object) -> None:
     model = merit(3, gain)
     record = Experiment.load(DATA / "tudor_merit" / "exp1.csv", model=model)

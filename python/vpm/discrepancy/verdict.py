@@ -126,9 +126,8 @@ def _is_worse_than_none(gap: ChannelGap) -> bool:
 def _is_spoiled(found: Search, gap: Mapping[str, ChannelGap], observed: float) -> bool:
     """Whether named effects leave most of a measured effort where they act, or more than a model without any force.
 
-    No noise excuses that: the floor of a drive that gives next to nothing is as large as its effort.
-
-    A play is hard to balance: where little is left of what an observer sees, that says more.
+    No noise excuses that: the floor of a drive that gives next to nothing is as large as its effort. A play is hard to
+    balance: where little is left of what an observer sees, that says more.
     """
     if observed <= MOSTLY_OPEN and any(effect.type.has_play for effect in found.final.model.effects):
         return False
