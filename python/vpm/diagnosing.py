@@ -186,7 +186,7 @@ def _diagnosis(
     say("comparing the nominal model with the data")
     nominal = _nominal(model, data, notes)
     say("recalibrating the nominal parameters")
-    free = tuple(p.name for p in model.parameters.values() if p.adjustable)
+    free = model.adjustable
     if not free:
         notes.append("the model file gives no parameter an uncertainty, so none was recalibrated")
     transitions = _transitions(model, data.training)
@@ -221,7 +221,6 @@ def _diagnosis(
     say("looking for the experiment that tells effects apart")
     if stopped or late:
         notes.append(STOPPED_LATE)
-    noise = {channel: floor[channel] for channel in floor if channel in gap}
     return Diagnosis(
         word,
         f"Stopped before every candidate was tried. {summary}" if found.interrupted else summary,
@@ -242,7 +241,7 @@ def _diagnosis(
         found.interrupted or stopped or late,
         gather(found.final.model, [entry.key for entry in accepted if entry.side == "motor"], data.unseen, floor),
         empirical,
-        experiments_for(found.final, ambiguous, data.training, noise),
+        experiments_for(found.final, ambiguous, data.training, floor),
         _classes(accepted, ambiguous),
     )
 
@@ -386,8 +385,7 @@ def _records(
     model: Model, experiments: Experiment | Sequence[Experiment], validate: Experiment | Sequence[Experiment] | None
 ) -> _Records:
     """Records to fit, records to judge on, and notes on both."""
-    free = [parameter.name for parameter in model.parameters.values() if parameter.adjustable]
-    training = tuple(joints_from_shafts(record, model, free=free) for record in as_records(experiments))
+    training = tuple(joints_from_shafts(record, model, free=model.adjustable) for record in as_records(experiments))
     if not training:
         raise DiagnosisError("no record was given; pass at least one experiment")
     if validate is not None:
@@ -477,7 +475,8 @@ def _gaps(
     judged = (nominal, recalibrated, final)
     stages = [gaps(data.unseen, stage.unseen) for stage in judged]
     # Of efforts as the drives of the nominal model give them: no drive may shrink them together with its error.
-    factors = np.array([weaker(data.unseen, nominal, stage) for stage in judged])
+    shrunk = (weaker(data.unseen, nominal, stage) for stage in (recalibrated, final))
+    factors = np.array([np.ones(len(data.unseen.joints)), *shrunk])
     by_channel = {f"{joint}.effort": own for joint, own in zip(data.unseen.joints, factors.T, strict=True)}
     result = {}
     for channel, (_, _, unit) in stages[0].items():

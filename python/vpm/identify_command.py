@@ -141,7 +141,7 @@ def _without(model: Model, free: list[str] | None, fixed: list[str] | None) -> l
     """
     if not fixed:
         return free
-    given = free if free is not None else [p.name for p in model.parameters.values() if p.adjustable]
+    given = free if free is not None else list(model.adjustable)
     for name in fixed:
         if name not in given:
             raise IdentificationError(f'--fix: "{name}" is not among the free parameters; {near_match(name, given)}')

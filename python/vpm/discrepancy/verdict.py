@@ -132,7 +132,7 @@ def _is_spoiled(found: Search, gap: Mapping[str, ChannelGap], observed: float) -
     if observed <= MOSTLY_OPEN and any(effect.type.has_play for effect in found.final.model.effects):
         return False
     told = [gap[channel] for joint in _joints(found) if (channel := f"{joint}.effort") in gap]
-    most = any(g.after**2 > 0.5 * g.signal**2 for g in told)
+    most = any(g.after**2 > MOST_OF_IT * g.signal**2 for g in told)
     return most or any(map(_is_worse_than_none, main_gaps(gap)))
 
 

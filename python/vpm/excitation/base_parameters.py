@@ -72,7 +72,7 @@ def parameter_scales(model: Model, names: Sequence[str]) -> Array:
 def free_names(model: Model, free: Sequence[str] | None) -> tuple[str, ...]:
     """Named parameters, or those with an uncertainty; refuses unknown names and models without inverse dynamics."""
     check_balance(model)
-    names = tuple(free) if free is not None else tuple(p.name for p in model.parameters.values() if p.adjustable)
+    names = tuple(free) if free is not None else model.adjustable
     for name in names:
         if name not in model.parameters:
             raise ExcitationError(f'{model.name} has no parameter "{name}"; {near_match(name, model.parameters)}')

@@ -196,7 +196,7 @@ def identify(
         Nothing is free, a name is unknown, a channel that the mode needs is missing, or a tie has no single meaning.
     """
     records = as_records(experiments)
-    names = tuple(free) if free is not None else tuple(p.name for p in model.parameters.values() if p.adjustable)
+    names = tuple(free) if free is not None else model.adjustable
     if not names:
         raise IdentificationError(
             f"{model.name}: no parameter is free; give some an uncertainty in the model file or name them in free="

@@ -144,6 +144,11 @@ class Model(Evaluations, Storable):
         return tuple(self.parameters)
 
     @cached_property
+    def adjustable(self) -> tuple[str, ...]:
+        """Names of the parameters that a fit may change where nobody says which, in index order."""
+        return tuple(name for name, parameter in self.parameters.items() if parameter.adjustable)
+
+    @cached_property
     def theta(self) -> NDArray[np.float64]:
         """Values of all parameters (SI), shape (P,); read-only."""
         values = np.array([parameter.value for parameter in self.parameters.values()], dtype=np.float64)

@@ -76,8 +76,7 @@ def rank(
     >>> rank(model, log).effects
     (Ranked(effect='coulomb_friction', site='axis', judgement=Judgement(removed=0.97)),)
     """
-    free = [parameter.name for parameter in model.parameters.values() if parameter.adjustable]
-    records = [joints_from_shafts(record, model, free=free) for record in as_records(experiments)]
+    records = [joints_from_shafts(record, model, free=model.adjustable) for record in as_records(experiments)]
     unseen = [joints_from_shafts(record, model) for record in as_records(() if validate is None else validate)]
     if not records:
         raise DiagnosisError("no record was given; pass at least one experiment")

@@ -70,7 +70,7 @@ class Judge:
         ----------
         model : Model
         """
-        free = [p.name for p in model.parameters.values() if p.adjustable]
+        free = model.adjustable
         # Elements in sampled time were fitted as a whole, and no parameter of the machine can be fitted beside them.
         if not free or any(model.actuator_type(name) in SAMPLED for name in model.actuators):
             return model

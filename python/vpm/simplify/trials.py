@@ -143,8 +143,7 @@ class Trials:
         if nearest is None:
             return model
         known = self._models[nearest].parameters
-        adjustable = [each.name for each in model.parameters.values() if each.adjustable]
-        return model.with_parameters({name: known[name].value for name in adjustable if name in known})
+        return model.with_parameters({name: known[name].value for name in model.adjustable if name in known})
 
     def saved(self, change: Reduction, setup: Setup) -> float:
         """Seconds that a period of the full model takes less with one change, at a glance; none where it does not work.
