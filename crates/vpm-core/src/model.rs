@@ -175,15 +175,15 @@ impl<S: Scalar> Model<S> {
         self.n_coordinates - self.links.len()
     }
 
-    /// Whether the algorithms for rigid trees apply: no elastic beams, no lines with mass, no rotor that several joints turn, parents listed before their children, a mass matrix
-    /// in one piece.
+    /// Whether the algorithms for rigid trees apply: no elastic beams, no lines with mass, no rotor that several joints turn, parents listed
+    /// before their children, a mass matrix in one piece.
     #[inline]
     pub fn is_recursive(&self) -> bool {
         self.recursive
     }
 
-    /// Whether the recursion over bodies and segments of beams applies: no lines with mass, no rotor that several joints turn, a mass matrix in one piece, products of rates
-    /// counted everywhere or nowhere.
+    /// Whether the recursion over bodies and segments of beams applies: no lines with mass, no rotor that several joints turn, a mass matrix
+    /// in one piece, products of rates counted everywhere or nowhere.
     #[inline]
     pub fn is_segmented(&self) -> bool {
         self.segmented

@@ -22,7 +22,8 @@ pub(super) struct Split<S> {
     state: Vec<S>,
     /// Where the coordinates would be without acceleration.
     coasting: Vec<S>,
-    /// Where friction that is not linear acts, or a memory, or anything on a shaft or on the link side of a joint that winds up.
+    /// Where friction that is not linear acts, or a memory, or anything on a shaft or on the link side of a joint
+    /// with compliance.
     seats: Vec<Seat<S>>,
     /// Acceleration of all coordinates per effort at each of these.
     columns: Vec<S>,
