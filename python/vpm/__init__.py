@@ -36,6 +36,7 @@ if TYPE_CHECKING:
         identify_oil,
     )
     from vpm.linear import LinearModel
+    from vpm.log_check import LogCheck, check_log
     from vpm.model import Dynamics, Model
     from vpm.observer import Noise, Observation, observe
     from vpm.ranking import Ranking, rank
@@ -64,6 +65,7 @@ __all__ = [
     "InertialRegression",
     "Ladder",
     "LinearModel",
+    "LogCheck",
     "Model",
     "Noise",
     "Observation",
@@ -80,6 +82,7 @@ __all__ = [
     "Weighing",
     "__version__",
     "budget",
+    "check_log",
     "climb",
     "compare",
     "diagnose",
@@ -125,6 +128,8 @@ _HOMES = {
     "identify_inertial": "vpm.identify",
     "identify_oil": "vpm.identify",
     "LinearModel": "vpm.linear",
+    "LogCheck": "vpm.log_check",
+    "check_log": "vpm.log_check",
     "Dynamics": "vpm.model",
     "Model": "vpm.model",
     "Noise": "vpm.observer",

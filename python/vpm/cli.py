@@ -12,7 +12,15 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from typer.core import TyperGroup
 
-from vpm import __version__, detail_command, diagnose_command, identify_command, prove_command, rank_command
+from vpm import (
+    __version__,
+    check_command,
+    detail_command,
+    diagnose_command,
+    identify_command,
+    prove_command,
+    rank_command,
+)
 from vpm.command import (
     BESIDE,
     FORMATS,
@@ -82,6 +90,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 app.add_typer(excite_app, name="excite")
+app.command(epilog=check_command.EXAMPLES)(check_command.check)
 app.command(epilog=identify_command.EXAMPLES)(identify_command.identify)
 app.command(epilog=diagnose_command.EXAMPLES)(diagnose_command.diagnose)
 app.command(epilog=rank_command.EXAMPLES)(rank_command.rank)

@@ -66,6 +66,9 @@ FoundHold = Annotated[
         "back); auto finds out from the logs of machines that a ranking covers."
     ),
 ]
+Check = Annotated[
+    bool, typer.Option("--check/--no-check", help="Refuse logs with a wrong unit, sign, name or clock, see vpm check.")
+]
 Workers = Annotated[int, typer.Option(min=0, help="Candidates at a time; 0 for one per core. The result is the same.")]
 Plot = Annotated[Path | None, typer.Option(help="Write the plot to this file (PNG, SVG or PDF).")]
 

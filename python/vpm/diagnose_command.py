@@ -9,6 +9,7 @@ import typer
 
 from vpm.command import (
     Channels,
+    Check,
     Cutoff,
     FoundHold,
     Integrator,
@@ -55,6 +56,7 @@ def diagnose(
     without: Without = None,
     limit: Limit = None,
     names: Names = "ranking",
+    check: Check = True,
     channels: Channels = None,
     interpolate: Interpolate = False,
     cutoff: Cutoff = None,
@@ -85,6 +87,7 @@ def diagnose(
             setup=Setup(integrator, substeps, horizon, hold=hold),
             limit=limit,
             names=names,
+            check=check,
             workers=workers or None,
             tell=tell,
             progress=each,

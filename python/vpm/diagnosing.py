@@ -51,6 +51,7 @@ from vpm.experiment import Experiment, as_records, joints_from_shafts
 from vpm.identify import InverseDynamicsProblem, OutputErrorProblem, gaps
 from vpm.identify.fit import fit_of
 from vpm.identify.parallel import worker_count
+from vpm.log_check import refuse_mistakes
 from vpm.model import Model
 from vpm.ranking import Ranking, Settings, rank
 from vpm.simulate import Run, Setup, judging_mode
@@ -94,17 +95,19 @@ def diagnose(
     setup: Setup | None = None,
     limit: int | None = None,
     names: Names = "ranking",
+    check: bool = True,
     workers: int | None = None,
     tell: Tell | None = None,
     progress: Progress | None = None,
 ) -> Diagnosis:
     """Name the physics that ``model`` is missing, with evidence on data that were not fitted.
 
-    The parameters that the model file calls uncertain are fitted first, for a wrong parameter is not a missing
-    effect. Where links are rigid and up to three joints move, a ranking of the training records names what is missing,
-    see `vpm.rank`, and unseen records decide no name. Elsewhere every effect is screened at every site by its
-    regressor; the promising ones are refitted together with the model and have to predict unseen records, both as a
-    balance of effort and in simulation. One is accepted at a time, the one with the largest unseen gain per number.
+    Logs with a wrong unit, sign, name or clock are refused, see `vpm.check_log`. The parameters that the model file
+    calls uncertain are fitted first, for a wrong parameter is not a missing effect. Where links are rigid and up to
+    three joints move, a ranking of the training records names what is missing, see `vpm.rank`, and unseen records
+    decide no name. Elsewhere every effect is screened at every site by its regressor; the promising ones are refitted
+    together with the model and have to predict unseen records, both as a balance of effort and in simulation. One is
+    accepted at a time, the one with the largest unseen gain per number.
 
     Parameters
     ----------
@@ -126,6 +129,8 @@ def diagnose(
     names : {"ranking", "search"}
         Where names come from: from `vpm.rank` where that covers the machine and from rounds of screening on balances of
         effort elsewhere, or from these in any case.
+    check : bool
+        Refuse logs with a mistake that no machine makes by itself.
     workers : int, optional
         Candidates that are worked on at a time; one per core if not given. The result does not depend on it.
     tell : callable, optional
@@ -146,7 +151,7 @@ def diagnose(
     DiagnosisError
         No record was given, or an effect name or the source of names is unknown.
     ExperimentError
-        A channel is missing.
+        A channel is missing, or a log cannot be believed.
     """
     asked_for(effects)
     if names not in get_args(Names):
@@ -156,6 +161,11 @@ def diagnose(
     with threadpool_limits(1, user_api="blas"):
         records = _records(model, experiments, validate)
         each = SideBySide(workers, progress)
+        if check:
+            if tell is not None:
+                tell("checking the channels of the logs")
+            given = [*as_records(experiments), *as_records(validate or ())]
+            refuse_mistakes(model, given, setup=setup, workers=workers, progress=progress)
         most = max(LEAST_LIMIT, 2 * len(model.joints)) if limit is None else limit
         return _diagnosis(model, records, effects, cutoff, setup or Setup(), most, names, each, tell)
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from vpm.command import (
     Channels,
+    Check,
     Cutoff,
     Hold,
     Integrator,
@@ -70,6 +71,7 @@ def identify(
     replicates: options.Replicates = 0,
     workers: options.Workers = 0,
     validate: options.Validate = None,
+    check: Check = True,
     out: options.Out = None,
     plot: Plot = None,
 ) -> None:
@@ -77,6 +79,7 @@ def identify(
     from vpm.identify import Fitting, judged_on
     from vpm.identify import identify as fit_logs
     from vpm.identify.words import names, numbers, ranges, shown, told, told_intervals, told_unseen
+    from vpm.log_check import refuse_mistakes
     from vpm.simulate import Setup
 
     settings = Fitting(
@@ -102,6 +105,8 @@ def identify(
     machine, records = load_all(model, logs, channels, interpolate)
     unseen = [load_record(path, machine, channels, interpolate) for path in validate or []]
     setup = Setup(integrator, substeps, horizon, settling, hold)
+    if check:
+        refuse_mistakes(machine, [*records, *unseen], setup=setup, workers=workers or None)
     with shown(errors, starts) as tell:
         fit = fit_logs(
             machine,

@@ -2,6 +2,7 @@
 
 from vpm.experiment.campaign import Campaign, as_records
 from vpm.experiment.cutoff import CutoffChoice, choose_cutoff
+from vpm.experiment.draft import plain_table
 from vpm.experiment.motion import Motion, common_cutoff, motion
 from vpm.experiment.noise import noise_std, quantisation_step
 from vpm.experiment.record import Experiment
@@ -23,5 +24,6 @@ __all__ = [
     "motion",
     "noise_std",
     "parallel_filter",
+    "plain_table",
     "quantisation_step",
 ]

@@ -147,6 +147,28 @@ def plain_draft(path: str | PathLike[str]) -> Draft:
     return draft
 
 
+def plain_table(path: str | PathLike[str], model: Model) -> dict[str, ChannelEntry]:
+    """The channel table that says what is read of a log without one; columns that the model does not know stay out.
+
+    Raises
+    ------
+    ExperimentError
+        The file cannot be read, or has no clock.
+    """
+    from vpm.model import ChannelEntry
+
+    log = open_log(path)
+    names = {column: _stated(column, log) for column in log.header}
+    clock = _clock_column(path, names)
+    known = {
+        name: (column, unit or model.channel_unit(name))
+        for column, (name, unit) in names.items()
+        if column != clock and name in model.channels
+    }
+    told = {"time": (clock, names[clock][1] or "s"), **known}
+    return {name: ChannelEntry(column=column, unit=unit) for name, (column, unit) in told.items()}
+
+
 def _clock_column(path: str | PathLike[str], names: Mapping[str, tuple[str, str]]) -> str:
     """The column that is named like a clock; in files with groups, the only one whose last word is."""
     clocks = [column for column, (name, _) in names.items() if name in TIME_COLUMNS]

@@ -1,7 +1,7 @@
 """A model beside its log: what an observer of the record cannot explain, sample by sample."""
 
-from vpm.observer.filtering import Record, filtered
+from vpm.observer.filtering import Record, filtered, measured_outputs
 from vpm.observer.noise import Noise, likely_noise
 from vpm.observer.observation import Observation, observe
 
-__all__ = ["Noise", "Observation", "Record", "filtered", "likely_noise", "observe"]
+__all__ = ["Noise", "Observation", "Record", "filtered", "likely_noise", "measured_outputs", "observe"]

@@ -61,7 +61,7 @@ class Record:
         SimulationError, ExperimentError
             No channel can be compared, one is unknown, or the log lacks a command.
         """
-        names = tuple(channels) if channels is not None else _measured(model, experiment)
+        names = tuple(channels) if channels is not None else measured_outputs(model, experiment)
         if not names:
             raise SimulationError(
                 f"{experiment.name}: an observer compares measured outputs, and the log holds none of "
@@ -172,7 +172,7 @@ def first_deviations(model: Model, first: Array) -> Array:
     return spread
 
 
-def _measured(model: Model, experiment: Experiment) -> tuple[str, ...]:
+def measured_outputs(model: Model, experiment: Experiment) -> tuple[str, ...]:
     """Outputs that the log holds, without commands, which are inputs, and accelerations, which are mostly derived."""
     inputs = set(model.input_channels)
     return tuple(

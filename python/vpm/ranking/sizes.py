@@ -72,16 +72,21 @@ def _strength(values: Array) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 
+def stated(model: Model) -> dict[str, Prior]:
+    """What the model file says of its parameters."""
+    return {
+        p.name: Prior(p.value, p.uncertainty, p.minimum, p.maximum)
+        for p in model.parameters.values()
+        if p.adjustable and p.uncertainty and np.isfinite(p.uncertainty)
+    }
+
+
 def known(model: Model, data: InverseDynamicsProblem) -> dict[str, Prior]:
     """What the model file says of its parameters, and the speeds at which its dry friction turns round.
 
     Nobody knows these, and a wrong one leaves a gap at every reversal, where the finer effects live.
     """
-    priors = {
-        p.name: Prior(p.value, p.uncertainty, p.minimum, p.maximum)
-        for p in model.parameters.values()
-        if p.adjustable and p.uncertainty and np.isfinite(p.uncertainty)
-    }
+    priors = stated(model)
     for effect in model.effects:
         name = effect.parameter_names.get("transition_velocity")
         if name is None or name in priors or effect.at not in (*data.joints, *model.transmissions):

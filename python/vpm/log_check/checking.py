@@ -1,0 +1,196 @@
+"""Mistakes of logs, found before anything is concluded from them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import replace
+
+import numpy as np
+
+from vpm.discrepancy.side_by_side import Progress, SideBySide
+from vpm.errors import ExperimentError, VpmError
+from vpm.experiment import Experiment, as_records, joints_from_shafts
+from vpm.log_check.explanation import Explainer, Explanation
+from vpm.log_check.finding import Finding, LogCheck
+from vpm.log_check.mend import TIME
+from vpm.log_check.settings import Settings
+from vpm.log_check.shares import Judge, Shares
+from vpm.log_check.stretches import odd_stretches
+from vpm.log_check.table import line_of
+from vpm.model import ChannelEntry, Model
+from vpm.observer import measured_outputs
+from vpm.simulate import Setup
+
+
+def check_log(
+    model: Model,
+    experiments: Experiment | Sequence[Experiment],
+    *,
+    table: Mapping[str, ChannelEntry] | None = None,
+    settings: Settings | None = None,
+    setup: Setup | None = None,
+    workers: int | None = None,
+    progress: Progress | None = None,
+) -> LogCheck:
+    """Find wrong units, signs, names and clocks of logs, and stretches of channels that cannot be right.
+
+    A slow observer keeps the model on the beginning of each record. What it leaves of a channel is compared with what
+    it leaves of masses on which nothing acts: that share does not depend on the scale of the channel. A mistake is
+    named where its mend leaves at most half of what is left without it. In both cases the uncertain parameters of the
+    model and friction of its joints have been fitted, so that an effect that is missing does not pass for a mistake.
+
+    Parameters
+    ----------
+    model : Model
+    experiments : Experiment or sequence of Experiment
+    table : mapping of str to ChannelEntry, optional
+        Channel table by which they were read; that of the model by default.
+    settings : Settings, optional
+        The numbers that decide.
+    setup : Setup, optional
+        Integrator and hold.
+    workers : int, optional
+        Mends that are tried at a time; one per core if not given. The result does not depend on it.
+    progress : callable, optional
+        Called after every mend with what is being done, its name, how many are done and how many there are.
+
+    Returns
+    -------
+    LogCheck
+
+    Raises
+    ------
+    VpmError
+        A log lacks a command, or holds nothing that the model has.
+
+    Examples
+    --------
+    >>> check_log(model, log).mistakes
+    (Finding(kind='unit', channels=('axis.position',)),)
+    """
+    settings = settings or Settings()
+    check = _Check(Judge(model, settings, setup or Setup()), SideBySide(workers, progress))
+    findings: list[Finding] = []
+    shares: dict[str, float] = {}
+    for record in as_records(experiments):
+        told, left = check.of(record, model.channel_table if table is None else table)
+        findings += told
+        for name, share in left.by_channel.items():
+            shares[name] = max(share, shares.get(name, 0.0))
+    return LogCheck(tuple(sorted(_together(findings), key=lambda one: not one.mistake)), shares)
+
+
+def refuse_mistakes(
+    model: Model,
+    experiments: Experiment | Sequence[Experiment],
+    *,
+    setup: Setup | None = None,
+    workers: int | None = None,
+    progress: Progress | None = None,
+) -> None:
+    """Complain about logs of which nothing can be concluded, see `check_log`.
+
+    What keeps a log from being checked is no business of this: whoever uses it will say it.
+
+    Raises
+    ------
+    ExperimentError
+        There is a wrong unit, sign, name or clock.
+    """
+    told = ""
+    with suppress(VpmError, ArithmeticError):
+        found = check_log(model, experiments, setup=setup, workers=workers, progress=progress)
+        told = ". ".join(str(one) for one in found.mistakes)
+    if told:
+        raise ExperimentError(f"{told}. Nothing is concluded from such a log; to do it anyway, leave out its check")
+
+
+class _Check:
+    """Looks at one record after the other."""
+
+    def __init__(self, judge: Judge, each: SideBySide) -> None:
+        self.judge, self.each, self.settings = judge, each, judge.settings
+
+    def of(self, record: Experiment, table: Mapping[str, ChannelEntry]) -> tuple[list[Finding], Shares]:
+        """Findings of a record, and what is left of it when they are mended."""
+        record, model = joints_from_shafts(record, self.judge.model), self.judge.model
+        outputs = measured_outputs(model, record)
+        inputs = tuple(name for name in model.input_channels if name in record)
+        stretches = list(odd_stretches(record, outputs, inputs, self.settings))
+        part = _beginning(record, outputs, self.settings)
+        left, found = self.judge.fitted(part), list[Finding]()
+        for _ in range(self.settings.rounds):
+            units = {TIME: "s", **{name: model.channel_unit(name) for name in (*outputs, *inputs)}}
+            units |= {name: entry.unit for name, entry in table.items()}
+            explanations = Explainer(self.judge, units, self.each).explained(part, (*outputs, *inputs), left)
+            for one in explanations:
+                changed = one.mend.entries(table)
+                table = {**table, **changed}
+                found.append(_finding(one, units, changed, record.name))
+                part, left = one.mend.applied(part), one.after
+            if not explanations:
+                break
+        tangent = self.judge.tangent(part, left)
+        if tangent is not None and (unseen := self.judge.unseen(tangent)):
+            stretches.append(_of_parameters(unseen, record.name))
+        return [*found, *stretches], left
+
+
+def _beginning(record: Experiment, outputs: Sequence[str], settings: Settings) -> Experiment:
+    """The beginning of the motion of a record, from rest if it begins so: no observer knows what swings unseen."""
+    fewest, most = settings.samples
+    speeds = np.zeros(len(record))
+    for name in outputs:
+        step = np.diff(record[name], prepend=record[name][0]) ** 2
+        speeds += step / max(float(np.mean(step)), 1e-300)
+    done = np.cumsum(speeds) / max(float(np.sum(speeds)), 1e-300)
+    first = max(int(np.searchsorted(done, settings.still)) - int(settings.before / record.dt), 0)
+    enough = int(np.searchsorted(done, done[first] + settings.part)) - first
+    count = min(max(int(settings.window / record.dt), fewest, enough), most)
+    kept = slice(max(min(first, len(record) - count), 0), first + count)
+    return replace(record, time=record.time[kept], data=record.data[kept])
+
+
+def _finding(found: Explanation, units: Mapping[str, str], changed: Mapping[str, ChannelEntry], record: str) -> Finding:
+    """What is said of a mend that explains a record."""
+    mend, before, after = found.mend, found.before.by_channel, found.after.by_channel
+    said = ", or ".join(one.sentence(units) for one in (mend, *found.rivals))
+    if not found.is_mistake:
+        said += " (a clock of the log, or a delay of the machine or of its sensors)"
+    place = min(after, key=lambda name: after[name] / max(before[name], 1e-300))
+    lines = {channel: line_of(channel, entry) for channel, entry in changed.items()}
+    return Finding(
+        mend.kind,
+        mend.channels,
+        (record,),
+        f"{said}; of {place} the model leaves {_percent(before[place])} unexplained as it is, and "
+        f"{_percent(after[place])} with that mended",
+        f"write {' and '.join(lines.values())}" if lines else mend.repair,
+        found.is_mistake,
+        mend.factor,
+        mend.delay,
+        (before[place], after[place]),
+        lines,
+    )
+
+
+def _of_parameters(unseen: Sequence[str], record: str) -> Finding:
+    sentence = f"the beginning of its motion says next to nothing of {', '.join(unseen)}"
+    return Finding("unseen", (), (record,), sentence, "fit other parameters, or move the machine so that they matter")
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.3g} %"
+
+
+def _together(findings: Sequence[Finding]) -> list[Finding]:
+    """The same mistake of several records as one finding."""
+    found: list[Finding] = []
+    for one in findings:
+        place = next((n for n, other in enumerate(found) if one.is_alike(other)), None)
+        if place is None:
+            found.append(one)
+        else:
+            found[place] = replace(found[place], records=(*found[place].records, *one.records))
+    return found

@@ -1,0 +1,86 @@
+"""What a log check says."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from vpm.results import Result, Storable
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class Finding(Storable):
+    """One thing that is wrong, or at least odd, in a log.
+
+    Attributes
+    ----------
+    kind : str
+        ``unit``, ``scale``, ``sign``, ``swap``, ``clock`` or ``delay`` of channels; ``constant``, ``frozen``,
+        ``clipped``, ``spikes``, ``filtered`` or ``coarse`` of one by itself; ``unseen`` of parameters.
+    channels : tuple of str
+    records : tuple of str
+        Logs in which it is.
+    sentence : str
+        What is wrong, with the numbers.
+    repair : str
+        What to do about it.
+    mistake : bool
+        No machine does that by itself: nothing that follows from the log can be believed.
+    factor : float
+        By which the values have to be multiplied.
+    delay : float
+        By how much later than the others the channels were stamped, s.
+    share : tuple of float
+        Error power of the worst channel before and after its mend, as a share of what free masses leave.
+    lines : dict of str to str
+        Entries of the channel table as they should be, by channel.
+    """
+
+    kind: str
+    channels: tuple[str, ...]
+    records: tuple[str, ...]
+    sentence: str
+    repair: str
+    mistake: bool = False
+    factor: float = 1.0
+    delay: float = 0.0
+    share: tuple[float, float] = (0.0, 0.0)
+    lines: Mapping[str, str] = field(default_factory=dict)
+
+    def is_alike(self, other: Finding) -> bool:
+        """Whether both are the same mistake, in whichever records."""
+        same = (self.kind, self.channels, self.factor) == (other.kind, other.channels, other.factor)
+        return same and self.mistake and other.mistake
+
+    def __str__(self) -> str:
+        """Sentence and repair."""
+        where = f"{', '.join(self.records)}: " if self.records else ""
+        return f"{where}{self.sentence}; {self.repair}"
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class LogCheck(Result):
+    """What is wrong in logs of a machine, as far as its model can say.
+
+    Attributes
+    ----------
+    findings : tuple of Finding
+        Mistakes first.
+    shares : dict of str to float
+        What the model leaves of each channel when its uncertain parameters and friction are fitted and every mistake
+        is mended, in the worst record, as a share of the error power of free masses: 0 explains it, 1 nothing of it.
+    """
+
+    findings: tuple[Finding, ...]
+    shares: dict[str, float]
+
+    @property
+    def mistakes(self) -> tuple[Finding, ...]:
+        """What no machine does by itself."""
+        return tuple(one for one in self.findings if one.mistake)
+
+    def __str__(self) -> str:
+        """A line for each finding."""
+        if not self.findings:
+            return "nothing is wrong with the channels of these logs"
+        return "\n".join(str(one) for one in self.findings)

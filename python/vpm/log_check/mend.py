@@ -1,0 +1,141 @@
+"""A mistake that a channel table may have, and the record without it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from vpm.experiment import Experiment
+from vpm.model import ChannelEntry
+from vpm.units import parse_unit
+
+#: The clock among channels.
+TIME = "time"
+
+
+@dataclass(frozen=True)
+class Mend:
+    """A change of a channel table.
+
+    Attributes
+    ----------
+    channels : tuple of str
+        What it changes; two channels that change places where `swap` is set.
+    factor : float
+        By which their values are multiplied.
+    delay : float
+        By how much later than the others they were stamped, s.
+    swap : bool
+    unit : str
+        Unit that the column is in, where it is another one than the table says; else "".
+    """
+
+    channels: tuple[str, ...]
+    factor: float = 1.0
+    delay: float = 0.0
+    swap: bool = False
+    unit: str = ""
+
+    def applied(self, record: Experiment) -> Experiment:
+        """The record without the mistake.
+
+        Raises
+        ------
+        ExperimentError
+            The record is too short for a delay.
+        """
+        if self.channels == (TIME,):
+            return replace(record, time=record.time * self.factor)
+        if self.delay:
+            return record.align(dict.fromkeys(self.channels, self.delay))
+        data, places = np.array(record.data), [record.channels.index(name) for name in self.channels]
+        if self.swap:
+            data[:, places] = data[:, places[::-1]]
+        else:
+            data[:, places] *= self.factor
+        return replace(record, data=data)
+
+    def entries(self, table: Mapping[str, ChannelEntry]) -> dict[str, ChannelEntry]:
+        """The entries of a channel table that it changes, as they should be."""
+        known = [name for name in self.channels if name in table]
+        if self.swap:
+            first, second = self.channels
+            return {first: table[second], second: table[first]} if len(known) == 2 else {}
+        return {name: self._entry(table[name]) for name in known}
+
+    def _entry(self, entry: ChannelEntry) -> ChannelEntry:
+        if self.delay:
+            return entry.model_copy(update={"delay": entry.delay + self.delay})
+        if self.unit:
+            # An offset is in the old unit; in SI it is scaled as the numbers of the column are.
+            sign = math.copysign(1.0, self.factor)
+            return entry.model_copy(
+                update={"unit": self.unit, "scale": sign * entry.scale, "offset": sign * entry.offset}
+            )
+        return entry.model_copy(update={"scale": self.factor * entry.scale, "offset": self.factor * entry.offset})
+
+    def sentence(self, units: Mapping[str, str]) -> str:
+        """What is wrong, for people; ``units`` are those that were read."""
+        names = _listed(self.channels)
+        are = "is" if len(self.channels) == 1 else "are"
+        if self.swap:
+            return f"{names} are in each other's place"
+        if self.delay:
+            several, way = len(self.channels) > 1, "late" if self.delay > 0.0 else "early"
+            return f"{names} {'come' if several else 'comes'} {1e3 * abs(self.delay):.3g} ms {way}"
+        turned = " and has the opposite sign" if self.factor < 0.0 else ""
+        if self.unit:
+            return f"{names} {are} in {self.unit}, not in {units[self.channels[0]]}{turned}"
+        if self.factor == -1.0:
+            return f"{names} {'has' if len(self.channels) == 1 else 'have'} the opposite sign"
+        by = (
+            f"{1.0 / abs(self.factor):.4g} times too large"
+            if abs(self.factor) < 1.0
+            else (f"{abs(self.factor):.4g} times too small")
+        )
+        return f"{names} {are} {by}{turned}"
+
+    @property
+    def kind(self) -> str:
+        """See `Finding.kind`."""
+        if self.swap:
+            return "swap"
+        if self.channels == (TIME,):
+            return "clock"
+        if self.delay:
+            return "delay"
+        if self.unit:
+            return "unit"
+        return "sign" if self.factor == -1.0 else "scale"
+
+    @property
+    def repair(self) -> str:
+        """What to do where no channel table is at hand."""
+        if self.swap:
+            return "exchange their columns in the channel table"
+        if self.delay:
+            entry = f"delay = {self.delay:.4g}"
+        elif self.unit:
+            entry = f'unit = "{self.unit}"' + (" and scale = -1" if self.factor < 0.0 else "")
+        else:
+            entry = f"scale = {self.factor:.6g}"
+        return f"write {entry} into the channel table, or convert the values before"
+
+    @property
+    def is_possible(self) -> bool:
+        """Whether a machine may do that by itself: its answer comes late, or its sensors do."""
+        return self.delay != 0.0 and all(
+            (self.delay < 0.0) == name.endswith((".command", ".disturbance")) for name in self.channels
+        )
+
+
+def factor_between(unit: str, other: str) -> float:
+    """By what values are multiplied that are in ``unit`` and were read as being in ``other``."""
+    return parse_unit(unit).factor / parse_unit(other).factor
+
+
+def _listed(names: tuple[str, ...]) -> str:
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"

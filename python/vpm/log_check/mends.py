@@ -1,0 +1,110 @@
+"""Mistakes of channel tables that are tried: units, factors of ten, signs, names, clocks."""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import combinations
+
+from vpm.log_check.mend import TIME, Mend, factor_between
+from vpm.log_check.settings import Settings
+from vpm.model import Model
+
+#: Units in which logs are often written, by the SI unit of a channel.
+CUSTOMARY: Mapping[str, tuple[str, ...]] = {
+    "m": ("mm", "cm", "inch"),
+    "rad": ("deg", "rev"),
+    "m/s": ("mm/s", "cm/s", "m/min"),
+    "rad/s": ("deg/s", "rpm", "rev/s"),
+    "N": ("kN", "kgf", "lbf"),
+    "N m": ("N mm", "kN m", "kgf m"),
+    "A": ("mA",),
+    "V": ("mV",),
+    "Pa": ("kPa", "bar", "MPa", "psi"),
+    "m^3/s": ("l/min", "l/s"),
+    "1": ("%",),
+    "s": ("ms", "us", "ns", "min"),
+}
+#: Powers of ten by which counts and amplifiers are off.
+DECADES = (-6, -3, -2, -1, 1, 2, 3, 6)
+#: Factors that differ by less are one.
+SAME = 0.02
+
+
+def scales(model: Model, used: Sequence[str], units: Mapping[str, str], settings: Settings) -> Iterator[Mend]:
+    """Wrong units, factors and signs of channels, and channels that were exchanged.
+
+    Parameters
+    ----------
+    model : Model
+    used : sequence of str
+        Channels that the model reads.
+    units : mapping of str to str
+        Units in which the channels, and the time, were read.
+    settings : Settings
+    """
+    si = {name: model.channel_unit(name) for name in used}
+    for group in _groups(model, used, si):
+        if len({(si[name], units[name]) for name in group}) > 1:
+            yield Mend(group, -1.0)  # all that belongs to a joint that turns the other way
+            continue
+        yield Mend(group, -1.0)
+        for factor, unit in _factors(model, group, units[group[0]], si[group[0]]):
+            if max(factor, 1.0 / factor) >= settings.smallest:
+                yield from (Mend(group, sign * factor, unit=unit) for sign in (1.0, -1.0))
+    for pair in combinations(used, 2):
+        if si[pair[0]] == si[pair[1]]:
+            yield Mend(pair, swap=True)
+    for factor, unit in _in_other_units(units[TIME], "s"):
+        yield Mend((TIME,), factor, unit=unit)
+
+
+def delays(model: Model, used: Sequence[str], settings: Settings) -> Iterator[Mend]:
+    """Channels that were stamped too late, or, if less than nothing of a delay helps, too early; see `scales`."""
+    si = {name: model.channel_unit(name) for name in used}
+    for group in _groups(model, used, si):
+        if len({name.rpartition(".")[2] for name in group}) == 1:
+            yield from (Mend(group, delay=delay) for delay in settings.delays)
+
+
+def _groups(model: Model, used: Sequence[str], si: Mapping[str, str]) -> list[tuple[str, ...]]:
+    """Channels that may have one mistake: each alone, all of a kind, all of a joint with its drives."""
+    kinds: dict[tuple[str, str], list[str]] = defaultdict(list)
+    joints: dict[str, list[str]] = defaultdict(list)
+    for name in used:
+        owner, _, quantity = name.rpartition(".")
+        kinds[quantity, si[name]].append(name)
+        if owner in model.joints:
+            joints[owner].append(name)
+        elif owner in model.actuators and len(own := model.joints_of_actuator(owner)) == 1:
+            joints[own[0]].append(name)
+    several = [tuple(group) for group in (*kinds.values(), *joints.values()) if len(group) > 1]
+    return list(dict.fromkeys([*((name,) for name in used), *several]))
+
+
+def _factors(model: Model, group: Sequence[str], stated: str, si: str) -> Iterator[tuple[float, str]]:
+    """Factors by which channels of this stated unit may be wrong, each with the unit that they are in, or ""."""
+    found: list[float] = []
+    ratios = [factor for ratio in _gear_ratios(model, group) for factor in (ratio, 1.0 / ratio)]
+    tried = [*_in_other_units(stated, si), *((factor, "") for factor in (*ratios, *(10.0**n for n in DECADES)))]
+    for factor, unit in tried:
+        if all(abs(math.log(factor / other)) > SAME for other in found):
+            found.append(factor)
+            yield factor, unit
+
+
+def _in_other_units(stated: str, si: str) -> Iterator[tuple[float, str]]:
+    """Factors for values that are in another unit than is stated, or were converted twice, or the wrong way round."""
+    others = [unit for unit in (si, *CUSTOMARY.get(si, ())) if unit != stated]
+    yield from ((factor_between(unit, stated), unit) for unit in others)
+    yield from ((factor_between(stated, unit), "") for unit in others)
+
+
+def _gear_ratios(model: Model, group: Sequence[str]) -> Iterator[float]:
+    """Ratios of the drives of joints: a log may show the motor in the place of the joint, or the other way."""
+    owners = {name.rpartition(".")[0] for name in group}
+    for actuator in model.actuators:
+        name = f"{actuator}.gear_ratio"
+        if name in model.parameters and (actuator in owners or owners & set(model.joints_of_actuator(actuator))):
+            yield abs(model.parameters[name].value) or 1.0

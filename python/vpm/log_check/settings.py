@@ -1,0 +1,103 @@
+"""Every number that decides in a log check."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settings:
+    """Numbers that decide.
+
+    Attributes
+    ----------
+    band : float
+        Bandwidth of the observer that keeps the model on the log, Hz.
+    turn : float
+        Largest product of bandwidth and sample time: in a log whose time is wrong the observer is slower.
+    still : float
+        Share of the motion of a record, as squares of its steps, that has gone by where it begins.
+    before : float
+        Time before that which belongs to it, s.
+    part : float
+        Least share of it in the stretch that is looked at.
+    window : float
+        Least length of that stretch, s.
+    samples : tuple of int
+        Fewest and most samples of that stretch.
+    fewest : int
+        Fewest samples of which a noise can be told.
+    doubtful : float
+        Share of the error power of free masses that a model may leave of a channel. Where it leaves more, after its
+        uncertain parameters and the friction of its joints were fitted, units, signs and names of channels are tried.
+    negligible : float
+        Such a share that is as good as nothing.
+    better : float
+        A mistake explains a record if its mend leaves at most this share of what is left without it.
+    explained : float
+        Largest share of a channel that the mistake would spoil, for a mend to be the explanation.
+    alike : float
+        Another mend explains it as well if it leaves no more than 1/alike times what the best one leaves.
+    finalists : int
+        Mends for which the model is fitted, of those that were tried at its own values.
+    hopeful : float
+        Those among them leave at most exp(hopeful) times what the best one leaves.
+    far : float
+        Stated deviations of a parameter of the model by which the model file rules a value out.
+    branches : int
+        Mends with each of which another one is tried where none explains a record alone.
+    rounds : int
+        Most mistakes of a record that are found one after the other.
+    smallest : float
+        Factor, or its inverse, from which on a wrong scale is no fault of a machine.
+    delays : tuple of float
+        Delays of channels that are tried, s: by these the change of what is left is taken as linear.
+    latest : float
+        Longest delay that is told, s.
+    stuck : int
+        Samples of one value, in a channel with noise, that no sensor gives by chance.
+    jump : float
+        A channel stood still if it ends that by a step of so many times its largest other one.
+    clipped : float
+        Share of samples at the largest or smallest value from which on a channel is cut off there.
+    levels : int
+        A channel with fewer values is a square wave or a switch: it is not cut off, and has no noise.
+    spike : float
+        A sample is a spike if it differs from its neighbours by so many times the noise of the channel.
+    filtered : float
+        Power of noise in an octave, beside that in the octave before it, below which a channel was filtered.
+    unseen : float
+        A record does not show a parameter if it leaves more than this share of its stated uncertainty.
+    coarse : float
+        Resolution, as a share of the range of a channel, from which on it is told.
+    """
+
+    band: float = 1.0
+    turn: float = 0.02
+    still: float = 0.003
+    before: float = 0.5
+    part: float = 0.2
+    window: float = 5.0
+    samples: tuple[int, int] = (2000, 10000)
+    fewest: int = 20
+    doubtful: float = 0.1
+    negligible: float = 1e-3
+    better: float = 0.5
+    explained: float = 0.25
+    alike: float = 0.5
+    finalists: int = 4
+    hopeful: float = 3.0
+    far: float = 5.0
+    branches: int = 3
+    rounds: int = 3
+    smallest: float = 2.0
+    delays: tuple[float, ...] = (0.005, 0.02, 0.06)
+    latest: float = 0.1
+    stuck: int = 20
+    jump: float = 3.0
+    clipped: float = 0.01
+    levels: int = 20
+    spike: float = 30.0
+    filtered: float = 0.05
+    unseen: float = 0.9
+    coarse: float = 0.01

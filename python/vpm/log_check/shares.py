@@ -1,0 +1,279 @@
+"""What a model leaves of a record, as a share of what masses leave on which nothing acts."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vpm.experiment import Experiment
+from vpm.log_check.mend import Mend
+from vpm.log_check.settings import Settings
+from vpm.model import Model
+from vpm.observer import measured_outputs
+from vpm.ranking.fit import ASTRAY, Fitter, View
+from vpm.ranking.observed import Observed, Observer, is_position
+from vpm.ranking.settings import Settings as RankingSettings
+from vpm.ranking.sizes import stated
+from vpm.ranking.structure import Structure
+from vpm.simulate import Setup
+from vpm.weighing.priors import Prior
+
+Array = NDArray[np.float64]
+#: Friction that a joint may have without being described: nothing of it passes for a mistake of a log.
+FRICTION = ("viscous_friction", "coulomb_friction")
+#: Speed at which dry friction turns round, as a share of the usual speed of the joint.
+TRANSITION = 0.02
+#: Pieces of a record between whose ends speeds are measured, which noise hardly moves.
+PIECES = 200
+
+
+@dataclass(frozen=True, eq=False)
+class Shares:
+    """What is left of each channel, between 0 and 1: nobody has to believe a model that leaves more than nothing does.
+
+    A share does not depend on the scale of its channel, so that records in other units can be compared by it.
+
+    Attributes
+    ----------
+    by_channel : mapping of str to float
+    values : ndarray
+        Parameters by which it was found.
+    residual : ndarray, shape (N, m), or None
+        What is left of the channels; None where the model runs away from the record.
+    free : ndarray, shape (m,)
+        What free masses leave of each channel, as a sum of squares.
+    far : float
+        By how many of its stated deviations a parameter of the model was moved, the farthest one.
+    floor : float
+        Shares below this are as good as nothing.
+    """
+
+    by_channel: Mapping[str, float]
+    values: Array
+    residual: Array | None = None
+    free: Array = field(default_factory=lambda: np.ones(1))
+    far: float = 0.0
+    floor: float = 0.0
+
+    @property
+    def cost(self) -> float:
+        """Sum of the logarithms of the shares: errors of each channel have a scale of their own."""
+        return self.over(self.by_channel)
+
+    def over(self, channels: Iterable[str]) -> float:
+        """The same of some channels alone."""
+        return sum(math.log(max(self.by_channel[name], self.floor)) for name in channels)
+
+    def above(self, share: float) -> set[str]:
+        """Channels of which more than a share is left."""
+        return {name for name, left in self.by_channel.items() if left > share}
+
+    @property
+    def order(self) -> tuple[float, float]:
+        """Which of several leaves least; where all is as good as nothing, by what is left all the same."""
+        return self.cost, sum(math.log(max(share, 1e-300)) for share in self.by_channel.values())
+
+
+class Judge:
+    """Measures records by a model, to which friction was added at each joint without any.
+
+    An observer of stated bandwidth keeps the model on the record, see `vpm.ranking.observed.Observed`.
+
+    Parameters
+    ----------
+    model : Model
+    settings : Settings
+    setup : Setup
+    """
+
+    def __init__(self, model: Model, settings: Settings, setup: Setup) -> None:
+        self.settings, self.setup = settings, setup
+        present = {(effect.name, effect.at) for effect in model.effects}
+        joints = [name for name in model.joints if name not in model.added_joints]
+        self.added = tuple((name, at) for at in joints for name in FRICTION if (name, at) not in present)
+        for name, at in self.added:
+            model = model.with_effect(name, at)
+        self.model = model
+
+    def measured(self, record: Experiment, values: Array | None = None) -> Shares:
+        """Shares at given values of the parameters, by default those of the model, without friction that was added."""
+        observer, values = self._observer(record), self.model.theta if values is None else values
+        try:
+            observed = self._observed(record, observer)
+            residual, _ = observed.follow(self.model, values, observer)
+        except ASTRAY:
+            return self._lost(record, values)
+        return self._shares(observed, residual, observer, values)
+
+    def fitted(self, record: Experiment) -> Shares:
+        """Shares when the uncertain parameters of the model, and friction of its joints, have been fitted."""
+        observer = self._observer(record)
+        try:
+            observed = self._observed(record, observer)
+            fitter = Fitter(observed, RankingSettings(bands=(observer.band,)))
+            structure = self._structure(record)
+            fitted = fitter.fitted(structure, observer, View(fitter.noise_of(structure, observer)))
+        except ASTRAY:
+            return self.measured(record)
+        found = fitted.structure
+        own = [abs(z) for name, z in zip(found.priors, found.standard, strict=True) if not self._is_added(name)]
+        return self._shares(observed, fitted.residual, observer, found.theta, max(own, default=0.0))
+
+    def tangent(self, record: Experiment, shares: Shares) -> Tangent | None:
+        """How what is left changes with the parameters, about the values of a fit; None where that cannot be told."""
+        observer, structure = self._observer(record), replace(self._structure(record), theta=shares.values)
+        try:
+            fitter = Fitter(self._observed(record, observer), RankingSettings(bands=(observer.band,)))
+            followed = fitter.followed(structure, observer, tuple(structure.priors))
+        except ASTRAY:
+            return None
+        seen = _seen(fitter.observed)
+        return Tangent(structure, seen, followed.residual, followed.jacobian * structure.slopes, shares)
+
+    def unseen(self, tangent: Tangent) -> list[str]:
+        """Uncertain parameters of the model of which a record says next to nothing."""
+        told = zip(tangent.structure.priors, tangent.deviations.tolist(), strict=True)
+        return [name for name, left in told if left > self.settings.unseen and not self._is_added(name)]
+
+    def of_sensor(self, mend: Mend, record: Experiment, before: Shares) -> Shares | None:
+        """What a mend of sensors that do not draw the model leaves, without another run; None where it takes one."""
+        if before.residual is None or any(
+            name not in before.by_channel or is_position(self.model, name) for name in mend.channels
+        ):
+            return None
+        mended = mend.applied(record)
+        rows, shares = rows_of(mended, record), dict(before.by_channel)
+        for place, name in enumerate(before.by_channel):
+            if name in mend.channels:
+                reading, shown = mended[name], record[name][rows] - before.residual[rows, place]
+                free = float(np.sum((reading - np.mean(reading)) ** 2))
+                shares[name] = _share(float(np.sum((reading - shown) ** 2)), free)
+        return replace(before, by_channel=shares)
+
+    def _structure(self, record: Experiment) -> Structure:
+        """The model with friction at each joint that begins at nothing."""
+        model = self.model
+        priors, values = stated(model), model.theta.copy()
+        for name, joint in self.added:
+            effort, speed = self._usual(record, joint)
+            effect = model.effect(name, joint)
+            for short, parameter in effect.parameter_names.items():
+                if effect.type.parameter(short).shape:
+                    values[model.index(parameter)] = TRANSITION * speed
+                else:
+                    size = effort if name == "coulomb_friction" else effort / speed
+                    priors[parameter] = Prior(0.0, size, 0.0, math.inf)
+        return Structure(model, values, priors)
+
+    def _usual(self, record: Experiment, joint: str) -> tuple[float, float]:
+        """Effort and speed of a joint that are nothing unusual: its mass turned round on the way that is seen."""
+        place, channel = self.model.coordinates.index(joint), f"{joint}.position"
+        if channel not in record or np.ptp(record[channel]) == 0.0:
+            return 1.0, 1.0
+        ends = np.linspace(0, len(record) - 1, min(PIECES, len(record))).astype(int)
+        way, speed = np.std(record[channel]), np.std(np.diff(record[channel][ends]) / np.diff(record.time[ends]))
+        rest = np.zeros(len(self.model.coordinates))
+        mass = self.model.mass_matrix(rest)[place, place]
+        weight = abs(self.model.inverse_dynamics(rest, rest, rest)[place])
+        return float(mass * speed**2 / way + weight) + 1e-9, float(speed) + 1e-9
+
+    def _is_added(self, parameter: str) -> bool:
+        return any(parameter in self.model.effect(*key).parameter_names.values() for key in self.added)
+
+    def _observer(self, record: Experiment) -> Observer:
+        return Observer(min(self.settings.band, self.settings.turn / record.dt), fine=False)
+
+    def _observed(self, record: Experiment, observer: Observer) -> Observed:
+        return Observed(self.model, [record], RankingSettings(bands=(observer.band,)), self.setup)
+
+    def _shares(
+        self, observed: Observed, residual: Array, observer: Observer, values: Array, far: float = 0.0
+    ) -> Shares:
+        drawn, seen = observed.drawn(observer.band), _seen(observed)
+        free = np.sum(np.where(np.any(drawn != 0.0, axis=0), drawn, observed.motion)[seen] ** 2, axis=0)
+        with np.errstate(all="ignore"):
+            told = map(_share, np.sum(residual[seen] ** 2, axis=0).tolist(), free.tolist())
+        shares = dict(zip(observed.records[0].channels, told, strict=True))
+        return Shares(shares, values, residual, free, far, self.settings.negligible)
+
+    def _lost(self, record: Experiment, values: Array) -> Shares:
+        """Where the model runs away from a record."""
+        shares = dict.fromkeys(measured_outputs(self.model, record), 1.0)
+        return Shares(shares, values, floor=self.settings.negligible)
+
+
+@dataclass(frozen=True, eq=False)
+class Tangent:
+    """What is left of a record near fitted values of the parameters, as far as it is linear.
+
+    Attributes
+    ----------
+    structure : Structure
+    seen : ndarray of int
+        Samples that count.
+    residual : ndarray, shape (N, m)
+    slopes : ndarray, shape (N, m, k)
+        Derivatives by deviations of the priors.
+    shares : Shares
+        Of the fit.
+    """
+
+    structure: Structure
+    seen: NDArray[np.intp]
+    residual: Array
+    slopes: Array
+    shares: Shares
+
+    @property
+    def deviations(self) -> Array:
+        """Standard deviations of the parameters, as shares of those that the model file states (k,)."""
+        slopes, _ = self._weighed(self.seen)
+        normal = slopes.T @ slopes + np.eye(slopes.shape[1])
+        sizes = 1.0 / np.sqrt(np.diag(normal))
+        return np.asarray(sizes * np.sqrt(np.maximum(np.diag(np.linalg.inv(normal * np.outer(sizes, sizes))), 0.0)))
+
+    def promised(self, mended: Experiment, record: Experiment, residual: Array) -> tuple[Shares, float]:
+        """What is left if more or less of a mend is done and all parameters give way, and how much of it that is.
+
+        ``residual`` is what the same values of the parameters leave of the mended record.
+        """
+        rows = rows_of(mended, record)
+        kept = np.flatnonzero(np.isin(rows, self.seen))
+        slopes, sizes = self._weighed(rows[kept])
+        before, after = (part / sizes for part in (self.residual[rows[kept]], residual[kept]))
+        along = (after - before).reshape(-1, 1)
+        columns = np.hstack([slopes, along])
+        normal = columns.T @ columns + np.diag([*np.ones(slopes.shape[1]), 1e-12 * float(np.sum(along**2)) + 1e-300])
+        pull = columns.T @ before.ravel() + np.append(self.structure.standard, 0.0)
+        move = -np.linalg.solve(normal, pull)
+        left = (before.ravel() + columns @ move).reshape(before.shape) * sizes
+        scale = self.shares.free * len(kept) / len(self.seen)
+        told = map(_share, np.sum(left**2, axis=0).tolist(), scale.tolist())
+        return replace(self.shares, by_channel=dict(zip(self.shares.by_channel, told, strict=True))), float(move[-1])
+
+    def _weighed(self, rows: NDArray[np.intp]) -> tuple[Array, Array]:
+        """Slopes in sizes of what is left of each channel, sample by sample and channel by channel, and these sizes."""
+        sizes = np.sqrt(np.mean(self.residual[self.seen] ** 2, axis=0)) + 1e-300
+        slopes = self.slopes[rows] / sizes[:, None]
+        return slopes.reshape(-1, slopes.shape[2]), sizes
+
+
+def rows_of(part: Experiment, record: Experiment) -> NDArray[np.intp]:
+    """Which samples of a record are those of a part of it."""
+    return np.asarray(np.round((part.time - record.time[0]) / record.dt), dtype=np.intp)
+
+
+def _seen(observed: Observed) -> NDArray[np.intp]:
+    """Samples that count: all but the beginning, which the first state decides."""
+    parts = (*observed.parts, *observed.held_back)
+    return np.sort(np.concatenate([np.arange(part.start, part.stop) for part in parts]))
+
+
+def _share(left: float, free: float) -> float:
+    """Error power beside that of free masses; one at most."""
+    share = left / max(free, 1e-300)
+    return min(share, 1.0) if np.isfinite(share) else 1.0

@@ -1,0 +1,159 @@
+"""What can be seen in a channel by itself: stretches that stand still, values cut off, spikes, coarse steps."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vpm.experiment import Experiment, noise_std, quantisation_step
+from vpm.log_check.finding import Finding
+from vpm.log_check.settings import Settings
+
+Array = NDArray[np.float64]
+#: Differences that take the motion out of a spectrum, and its octaves that are looked at.
+ORDER, OCTAVES = 4, 4
+
+
+def odd_stretches(
+    record: Experiment, outputs: Sequence[str], inputs: Sequence[str], settings: Settings
+) -> Iterator[Finding]:
+    """Findings of the channels of a record that the model reads.
+
+    Parameters
+    ----------
+    record : Experiment
+    outputs, inputs : sequence of str
+        Channels that sensors show, and commands.
+    settings : Settings
+    """
+    for name in outputs:
+        yield from _of_sensor(record, name, settings)
+    for name in (*outputs, *inputs):
+        yield from _clipped(record, name, settings)
+
+
+def _of_sensor(record: Experiment, name: str, settings: Settings) -> Iterator[Finding]:
+    values = record[name]
+
+    def finding(kind: str, sentence: str, repair: str) -> Finding:
+        return Finding(kind, (name,), (record.name,), sentence, repair)
+
+    if np.ptp(values) == 0.0:
+        yield finding("constant", f"{name} is {values[0]:g} all the time", "check that its column is the right one")
+        return
+    if np.unique(values).size < settings.levels:
+        return
+    if frozen := _frozen(values, settings):
+        first, last = record.time[frozen.start], record.time[frozen.stop - 1]
+        yield finding(
+            "frozen",
+            f"{name} stands still from {first:.4g} s to {last:.4g} s and then jumps",
+            "cut that stretch out of the record",
+        )
+    spikes = _spikes(values, settings)
+    if spikes.size:
+        yield finding(
+            "spikes",
+            f"{name} has {spikes.size} {'spike' if spikes.size == 1 else 'spikes'}, the first at "
+            f"{record.time[spikes[0]]:.4g} s",
+            "replace these samples by their neighbours",
+        )
+    if _cut_off(values, settings):
+        yield finding(
+            "filtered",
+            f"{name} was filtered before it was stored, which makes it late",
+            "log it unfiltered, or filter the commands alike",
+        )
+    step, reach = quantisation_step(values), float(np.ptp(values))
+    if step is not None and step > settings.coarse * reach:
+        yield finding(
+            "coarse",
+            f"{name} was recorded in steps of {step:.3g}, {100.0 * step / reach:.2g} % of its range",
+            "log it with more digits, or move the machine further",
+        )
+
+
+def _cut_off(values: Array, settings: Settings) -> bool:
+    """Whether the noise of a channel is the same in two octaves and then falls: a filter does that, no machine.
+
+    Numbers of a simulation have no noise; their spectrum ends where their digits do.
+    """
+    lines = np.abs(np.fft.rfft(np.diff(values, n=ORDER) * np.hanning(len(values) - ORDER))) ** 2
+    # Differences weigh white noise by frequency, which is taken out again.
+    turns = np.pi * np.arange(1, len(lines)) / (2 * (len(lines) - 1))
+    lines[1:] /= (2.0 * np.sin(turns)) ** (2 * ORDER)
+    ends = [len(lines) >> octave for octave in range(OCTAVES, -1, -1)]
+    levels = [float(np.median(lines[low:high])) for low, high in pairwise(ends)]
+    digits = len(values) * (8.0 * np.finfo(np.float64).eps * float(np.max(np.abs(values)))) ** 2
+    for place, (before, level) in enumerate(pairwise(levels), 2):
+        flat = max(level, before) < 2.0 * min(level, before) and level > 1e6 * digits
+        if flat and min(levels[place:], default=level) < settings.filtered * level:
+            return True
+    return False
+
+
+def _frozen(values: Array, settings: Settings) -> slice | None:
+    """The longest stretch of one value, if it ends by a jump, or if the channel has noise elsewhere."""
+    steps = np.diff(values)
+    run = _longest(steps == 0.0)
+    if (
+        run.stop - run.start < settings.stuck
+        or run.stop >= len(steps)
+        or values[run.start] in (values.max(), values.min())
+    ):
+        return None  # what stays at an end was cut off there
+    others = np.abs(np.delete(steps, run.stop))
+    jumps = abs(steps[run.stop]) > settings.jump * float(others.max())
+    return slice(run.start, run.stop + 1) if jumps or _is_noisy(np.delete(values, run), settings) else None
+
+
+def _is_noisy(values: Array, settings: Settings) -> bool:
+    """Whether noise moves a channel more than the step in which it is recorded: then no rest repeats a value."""
+    if values.size < settings.fewest:
+        return False
+    noise, step = noise_std(values), quantisation_step(values)
+    return noise > settings.negligible * float(np.median(np.abs(np.diff(values)))) and (step is None or step < noise)
+
+
+def _longest(same: NDArray[np.bool_]) -> slice:
+    """The longest run of true values."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], same, [False]]).astype(int)))
+    if not edges.size:
+        return slice(0, 0)
+    begins, ends = edges[::2], edges[1::2]
+    place = int(np.argmax(ends - begins))
+    return slice(int(begins[place]), int(ends[place]))
+
+
+def _spikes(values: Array, settings: Settings) -> NDArray[np.intp]:
+    """Single samples that are far from both neighbours, to the same side."""
+    before, after = np.diff(values)[:-1], -np.diff(values)[1:]
+    usual = np.abs(values[2:] - values[:-2])
+    noise = noise_std(values)
+    out = np.minimum(np.abs(before), np.abs(after))
+    far = (before * after > 0.0) & (out > settings.spike * noise) & (out > settings.spike * usual)
+    far &= out > settings.jump * float(np.quantile(np.abs(np.diff(values)), 1.0 - settings.clipped))
+    return np.flatnonzero(far) + 1
+
+
+def _clipped(record: Experiment, name: str, settings: Settings) -> Iterator[Finding]:
+    values = record[name]
+    if np.unique(values).size < settings.levels:
+        return
+    near = max(quantisation_step(values) or 0.0, settings.coarse * float(np.ptp(values)))
+    for end, word in ((float(values.max()), "largest"), (float(values.min()), "smallest")):
+        there, next_to_it = values == end, np.abs(values - end) < 1.5 * near
+        share = float(np.mean(there))
+        # A swing that turns round is slow there, but no slower than beside it.
+        stays = np.count_nonzero(there) > settings.jump * (np.count_nonzero(next_to_it) - np.count_nonzero(there))
+        if stays and share > settings.clipped and end != 0.0:
+            yield Finding(
+                "clipped",
+                (name,),
+                (record.name,),
+                f"{name} stands at its {word} value, {end:.4g}, in {100.0 * share:.2g} % of the samples",
+                "check the range of its sensor or the limit of its drive",
+            )

@@ -1,0 +1,51 @@
+"""Channel tables as text, and as they should be."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+from vpm.errors import ModelError
+from vpm.log_check.finding import Finding
+from vpm.model import ChannelEntry
+
+
+def line_of(channel: str, entry: ChannelEntry) -> str:
+    """An entry as a line of TOML; what stands at its default is left out."""
+    parts = [f"column = {_quoted(entry.column)}", f"unit = {_quoted(entry.unit)}"]
+    parts += [f"{key} = {value!r}" for key, value in (("scale", entry.scale),) if value != 1.0]
+    parts += [f"{key} = {value!r}" for key, value in (("offset", entry.offset), ("delay", entry.delay)) if value != 0.0]
+    parts += ["optional = true"] if entry.optional else []
+    return f"{channel if channel == 'time' else _quoted(channel)} = {{ {', '.join(parts)} }}"
+
+
+def mended_lines(findings: Iterable[Finding]) -> dict[str, str]:
+    """Entries as they should be, by channel; the last of several mends of one has all of them."""
+    return {channel: line for one in findings if one.mistake for channel, line in one.lines.items()}
+
+
+def mended_text(text: str, lines: Mapping[str, str], path: str | Path) -> str:
+    """The text of a file with a channel table, in which entries were replaced; comments stay.
+
+    Raises
+    ------
+    ModelError
+        An entry does not stand on one line.
+    """
+    for channel, line in lines.items():
+        entry = rf"""^[ \t]*["']?{re.escape(channel)}["']?[ \t]*=[ \t]*\{{[^{{}}\n]*\}}"""
+        found = list(re.finditer(entry, text, re.MULTILINE))
+        if len(found) != 1:
+            raise ModelError(
+                f"{path}: the entry of {channel} does not stand on a line of its own; replace it by {line}",
+                where=f"channels.{channel}",
+                path=str(path),
+            )
+        text = text[: found[0].start()] + line + text[found[0].end() :]
+    return text
+
+
+def _quoted(text: str) -> str:
+    escaped = text.replace("\\", "\\\\").replace('"', '\\"')
+    return f'"{escaped}"'

@@ -1,0 +1,287 @@
+"""Logs with a wrong unit, sign, name or clock, of a machine that was written by a textbook's equations."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import textbook_arm
+import vpm
+from command_line import vpm as run_vpm
+from vpm.errors import ExperimentError, ModelError
+from vpm.log_check import Finding, Settings
+from vpm.log_check.mend import Mend
+from vpm.log_check.stretches import odd_stretches
+from vpm.log_check.table import line_of, mended_text
+
+Array = NDArray[np.float64]
+Columns = dict[str, Array]
+
+MODEL = vpm.Model.from_toml(textbook_arm.FILE)
+PLAIN = textbook_arm.Arm()
+#: Faults of the machine itself, none of which is a mistake of the log.
+FAULTS = {
+    "none": PLAIN,
+    "friction": textbook_arm.Arm(friction=(1.5, 0.8)),
+    "weak drives": textbook_arm.Arm(strength=0.7),
+    "late commands": textbook_arm.Arm(delay=0.012),
+}
+
+
+def record(columns: Columns, name: str = "log") -> vpm.Experiment:
+    names = {"q1": "one.position", "q2": "two.position", "i1": "m1.command", "i2": "m2.command"}
+    values = {channel: columns[column] for column, channel in names.items()}
+    return vpm.Experiment.from_arrays(columns["t"], values, {}, name=name, model=MODEL)
+
+
+def scaled(column: str, factor: float) -> Callable[[Columns], Columns]:
+    return lambda columns: {**columns, column: factor * columns[column]}
+
+
+def exchanged(first: str, second: str) -> Callable[[Columns], Columns]:
+    return lambda columns: {**columns, first: columns[second], second: columns[first]}
+
+
+def stamped_late(column: str, samples: int) -> Callable[[Columns], Columns]:
+    return lambda columns: {
+        **columns,
+        column: np.concatenate([np.full(samples, columns[column][0]), columns[column][:-samples]]),
+    }
+
+
+def both(*changes: Callable[[Columns], Columns]) -> Callable[[Columns], Columns]:
+    def change(columns: Columns) -> Columns:
+        for one in changes:
+            columns = one(columns)
+        return columns
+
+    return change
+
+
+MISTAKES: dict[str, tuple[Callable[[Columns], Columns], str, tuple[str, ...], float]] = {
+    "degrees": (scaled("q1", 180.0 / np.pi), "unit", ("one.position",), np.pi / 180.0),
+    "turns": (scaled("q2", 0.5 / np.pi), "unit", ("two.position",), 2.0 * np.pi),
+    "all in degrees": (
+        both(scaled("q1", 180.0 / np.pi), scaled("q2", 180.0 / np.pi)),
+        "unit",
+        ("one.position", "two.position"),
+        np.pi / 180.0,
+    ),
+    "milliampere": (scaled("i2", 1e3), "unit", ("m2.command",), 1e-3),
+    "divided twice": (scaled("i1", 1e-3), "scale", ("m1.command",), 1e3),
+    "ten times": (scaled("i1", 10.0), "scale", ("m1.command",), 0.1),
+    "encoder turned round": (scaled("q2", -1.0), "sign", ("two.position",), -1.0),
+    "command turned round": (scaled("i1", -1.0), "sign", ("m1.command",), -1.0),
+    "joint turned round": (
+        both(scaled("q1", -1.0), scaled("i1", -1.0)),
+        "sign",
+        ("one.position", "m1.command"),
+        -1.0,
+    ),
+    "encoders exchanged": (exchanged("q1", "q2"), "swap", ("one.position", "two.position"), 1.0),
+    "commands exchanged": (exchanged("i1", "i2"), "swap", ("m1.command", "m2.command"), 1.0),
+    "milliseconds": (scaled("t", 1e3), "clock", ("time",), 1e-3),
+    "kiloseconds": (scaled("t", 1e-3), "clock", ("time",), 1e3),
+}
+
+
+@pytest.fixture(scope="module")
+def logs() -> dict[str, Columns]:
+    return {name: textbook_arm.log(arm, seed) for seed, (name, arm) in enumerate(FAULTS.items(), 1)}
+
+
+@pytest.mark.parametrize("fault", ["none", "friction"])
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_names_the_mistake_of_a_log(logs: dict[str, Columns], fault: str, mistake: str) -> None:
+    change, kind, channels, factor = MISTAKES[mistake]
+    found = vpm.check_log(MODEL, record(change(logs[fault])), workers=1)
+    (one,) = found.mistakes
+    assert kind in {one.kind, "clock" if one.kind == "clock" else kind}
+    assert set(one.channels) == set(channels)
+    assert one.factor == pytest.approx(factor)
+    assert max(found.shares.values()) < 0.1
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_fault_of_the_machine_is_no_mistake(logs: dict[str, Columns], fault: str) -> None:
+    assert vpm.check_log(MODEL, record(logs[fault]), workers=1).mistakes == ()
+
+
+def test_no_machine_moves_before_its_command(logs: dict[str, Columns]) -> None:
+    log = record(stamped_late("i2", 5)(logs["none"]))
+    (one,) = vpm.check_log(MODEL, log, workers=1).mistakes
+    assert (one.kind, one.channels) == ("delay", ("m2.command",))
+    assert one.delay == pytest.approx(0.02, abs=0.002)
+
+
+def test_a_late_answer_may_be_the_clock_or_the_machine(logs: dict[str, Columns]) -> None:
+    found = vpm.check_log(MODEL, record(logs["late commands"]), workers=1).findings
+    late = [one for one in found if one.kind == "delay"]
+    assert late
+    assert not late[0].mistake
+    assert "or a delay of the machine" in late[0].sentence
+
+
+def test_two_mistakes_are_found_one_after_the_other(logs: dict[str, Columns]) -> None:
+    log = record(both(scaled("q1", 180.0 / np.pi), scaled("i2", 1e3))(logs["none"]))
+    found = vpm.check_log(MODEL, log, workers=1).mistakes
+    assert {one.channels for one in found} == {("one.position",), ("m2.command",)}
+
+
+def test_the_same_mistake_of_two_logs_is_told_once(logs: dict[str, Columns]) -> None:
+    wrong = scaled("q2", -1.0)
+    records = [record(wrong(logs[name]), name) for name in ("none", "friction")]
+    (one,) = vpm.check_log(MODEL, records, workers=1).mistakes
+    assert one.records == ("none", "friction")
+
+
+def test_a_command_that_does_nothing_has_no_scale() -> None:
+    """Without the drive every small factor does as well, so that none of them is its scale."""
+    columns = textbook_arm.log(PLAIN, 9)
+    noise = np.random.default_rng(9).standard_normal(len(columns["t"]))
+    found = vpm.check_log(MODEL, record({**columns, "i2": 20.0 * noise}), workers=1)
+    assert [one for one in found.mistakes if one.kind in {"unit", "scale"}] == []
+    assert found.shares["two.position"] > 0.5
+
+
+def test_says_of_which_parameters_a_log_says_nothing() -> None:
+    spring = 'effects = [{ type = "spring", at = "two", stiffness = { value = 0.0, uncertainty = 1e-6 } }]'
+    file = textbook_arm.FILE.replace('name = "textbook arm"', f'name = "textbook arm"\n{spring}')
+    (one,) = vpm.check_log(vpm.Model.from_toml(file), record(textbook_arm.log(PLAIN, 5)), workers=1).findings
+    assert one.kind == "unseen"
+    assert "spring" in one.sentence
+
+
+def test_refuses_to_conclude_anything_from_such_a_log(logs: dict[str, Columns]) -> None:
+    log = record(scaled("i1", 1e3)(logs["friction"]))
+    with pytest.raises(ExperimentError, match=r"m1\.command is in mA, not in A.*leave out its check"):
+        vpm.diagnose(MODEL, log, workers=1)
+
+
+def odd(values: Array, **numbers: float) -> list[Finding]:
+    log = vpm.Experiment.from_arrays(
+        np.arange(len(values)) / 500.0, {"one.position": values}, {}, name="log", model=MODEL
+    )
+    return list(odd_stretches(log, ["one.position"], [], Settings(**numbers)))  # type: ignore[arg-type]
+
+
+def swing(noise: float = 1e-4) -> Array:
+    time, drawn = np.arange(4000) / 500.0, np.random.default_rng(3)
+    return np.asarray(np.sin(3.0 * time) + 0.3 * np.sin(11.0 * time + 1.0) + noise * drawn.standard_normal(4000))
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-4])
+def test_nothing_is_odd_about_a_swing(noise: float) -> None:
+    assert odd(swing(noise)) == []
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-4])
+def test_finds_a_sensor_that_stood_still(noise: float) -> None:
+    values = swing(noise)
+    values[1000:1200] = values[1000]
+    (one,) = odd(values)
+    assert (one.kind, "from 2 s to 2.398 s" in one.sentence) == ("frozen", True)
+
+
+def test_a_joint_at_rest_is_no_sensor_that_stood_still() -> None:
+    values = swing(0.0)
+    values[: len(values) // 2] = values[len(values) // 2]
+    assert odd(values) == []
+
+
+def test_finds_spikes() -> None:
+    values = swing()
+    values[[700, 1900]] += 0.5
+    (one,) = odd(values)
+    assert (one.kind, "2 spikes, the first at 1.4 s" in one.sentence) == ("spikes", True)
+
+
+def test_finds_what_was_cut_off() -> None:
+    found = odd(np.clip(swing(), -2.0, 0.9))
+    assert [one.kind for one in found] == ["clipped"]
+    assert "largest value, 0.9," in found[0].sentence
+
+
+def test_finds_coarse_steps() -> None:
+    (one,) = odd(np.round(swing() / 0.05) * 0.05)
+    assert one.kind == "coarse"
+
+
+def test_finds_what_was_filtered_before_it_was_stored() -> None:
+    from scipy.signal import butter, sosfilt
+
+    assert [one.kind for one in odd(np.asarray(sosfilt(butter(4, 0.3, output="sos"), swing())))] == ["filtered"]
+
+
+@pytest.mark.parametrize(
+    "mend",
+    [
+        Mend(("one.position",), -1.0),
+        Mend(("one.position",), np.pi / 180.0, unit="deg"),
+        Mend(("m1.command",), 1e-3, unit="mA"),
+        Mend(("one.position", "two.position"), swap=True),
+        Mend(("time",), 1e-3, unit="ms"),
+        Mend(("two.position",), delay=0.02),
+    ],
+)
+def test_the_mended_table_reads_the_mended_record(mend: Mend, tmp_path: Path) -> None:
+    """What a finding tells the user to write reads what was found to be right."""
+    path = tmp_path / "log.csv"
+    path.write_text(textbook_arm.text(textbook_arm.log(PLAIN, 2, seconds=2.0)), encoding="utf-8")
+    told = vpm.Experiment.load(path, {**MODEL.channel_table, **mend.entries(MODEL.channel_table)}, MODEL)
+    wanted = mend.applied(vpm.Experiment.load(path, None, MODEL))
+    np.testing.assert_allclose(told.time, wanted.time, atol=1e-12)
+    for channel in wanted.channels:
+        np.testing.assert_allclose(told[channel], wanted[channel], atol=1e-12)
+
+
+def test_writes_the_mended_entries_and_keeps_comments(tmp_path: Path) -> None:
+    model, log = tmp_path / "arm.toml", tmp_path / "log.csv"
+    model.write_text(textbook_arm.FILE, encoding="utf-8")
+    wrong = both(scaled("q1", 180.0 / np.pi), scaled("q2", 180.0 / np.pi))
+    log.write_text(textbook_arm.text(wrong(textbook_arm.log(PLAIN, 2))), encoding="utf-8")
+    told = run_vpm("check", str(model), str(log))
+    assert told.returncode == 1
+    assert 'write "one.position" = { column = "q1", unit = "deg" }' in told.stdout
+    assert run_vpm("check", str(model), str(log), "--fix").returncode == 0
+    text = model.read_text(encoding="utf-8")
+    assert '"one.position" = { column = "q1", unit = "deg" }  # the encoder at the base' in text
+    assert '"two.position" = { column = "q2", unit = "deg" }' in text
+    again = run_vpm("check", str(model), str(log))
+    assert (again.returncode, "nothing is wrong" in again.stdout) == (0, True)
+
+
+def test_writes_a_table_where_there_was_none(tmp_path: Path) -> None:
+    model, log = tmp_path / "arm.toml", tmp_path / "log.csv"
+    model.write_text(textbook_arm.FILE.partition("[channels]")[0], encoding="utf-8")
+    columns = scaled("q1", 180.0 / np.pi)(textbook_arm.log(PLAIN, 2))
+    names = {"t": "time", "q1": "one.position", "q2": "two.position [rad]", "i1": "m1.command", "i2": "m2.command"}
+    log.write_text(textbook_arm.text({names[key]: column for key, column in columns.items()}), encoding="utf-8")
+    assert run_vpm("check", str(model), str(log), "--fix").returncode == 0
+    table = vpm.Model.load(model).channel_table
+    assert table["one.position"].unit == "deg"
+    assert table["two.position"].column == "two.position [rad]"
+    assert run_vpm("check", str(model), str(log)).returncode == 0
+
+
+def test_does_not_mend_a_table_of_several_logs_for_one_of_them(tmp_path: Path) -> None:
+    model, logs = tmp_path / "arm.toml", [tmp_path / "a.csv", tmp_path / "b.csv"]
+    model.write_text(textbook_arm.FILE, encoding="utf-8")
+    for path, factor in zip(logs, (1.0, -1.0), strict=True):
+        columns = scaled("q2", factor)(textbook_arm.log(PLAIN, 2))
+        path.write_text(textbook_arm.text(columns), encoding="utf-8")
+    told = run_vpm("check", str(model), *map(str, logs), "--fix")
+    assert told.returncode == 1
+    assert "only b of 2 logs has this mistake" in told.stderr
+    assert model.read_text(encoding="utf-8") == textbook_arm.FILE
+
+
+def test_says_which_entry_it_cannot_replace() -> None:
+    entry = MODEL.channel_table["one.position"]
+    spread = '[channels."one.position"]\ncolumn = "q1"\nunit = "rad"\n'
+    with pytest.raises(ModelError, match=r"the entry of one\.position does not stand on a line of its own"):
+        mended_text(spread, {"one.position": line_of("one.position", entry)}, "arm.toml")
