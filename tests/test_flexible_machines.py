@@ -217,6 +217,16 @@ def cantilever(level: str, *, load: float, gravity: float = G) -> Model:
     return Model.from_dict(content)
 
 
+@pytest.mark.parametrize("load", [0.0, LOAD])
+def test_a_payload_at_the_end_of_a_bare_beam_is_a_body_there(load: float) -> None:
+    bare = cantilever("bezier(5)", load=0.0)
+    there = bare.with_effect("payload", at="strip", mass=load)
+    body = cantilever("bezier(5)", load=load)
+    zero = np.zeros(len(bare.coordinates))
+    masses = [Dynamics(model.core, model.theta).mass_matrix(zero) for model in (there, body)]
+    np.testing.assert_allclose(masses[0], masses[1], rtol=1e-12, atol=1e-15)
+
+
 def at_rest(model: Model) -> Array:
     """Coordinates at which the beam is in equilibrium, joints at zero."""
     core, joints = Dynamics(model.core, model.theta), len(model.joints)
