@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
+
+import typer
 
 from vpm.command import (
     Channels,
@@ -15,10 +17,12 @@ from vpm.command import (
     ModelPath,
     Plot,
     console,
-    errors,
+    fillable,
+    fitting,
     load_all,
     load_record,
     save_plot,
+    writable,
 )
 from vpm.errors import IdentificationError, near_match
 from vpm.identify import options
@@ -33,6 +37,19 @@ EXAMPLES = (
     "Example:  vpm identify rig.toml a.csv --mode free_run --piece 0.5 --loss huber --profile slide.mass\n\n"
     "Example:  vpm identify rig.toml a.csv --mode input_error --horizon 0.02 --validate b.csv --out fitted/"
 )
+
+
+def _place(path: Path | None) -> Path | None:
+    return writable(path) if path is not None and path.suffix == ".toml" else fillable(path)
+
+
+Out = Annotated[
+    Path | None,
+    typer.Option(
+        callback=_place,
+        help="Folder for model.toml, parameters.csv, report.md, fit.npz and fit.png; or a .toml: the model.",
+    ),
+]
 
 
 def identify(
@@ -70,13 +87,13 @@ def identify(
     replicates: options.Replicates = 0,
     workers: options.Workers = 0,
     validate: options.Validate = None,
-    out: options.Out = None,
+    out: Out = None,
     plot: Plot = None,
 ) -> None:
     """Fit parameters to one or several logs. Ctrl-C ends a fit and keeps the best until then."""
     from vpm.identify import Fitting, judged_on
     from vpm.identify import identify as fit_logs
-    from vpm.identify.words import names, numbers, ranges, shown, told, told_intervals, told_unseen
+    from vpm.identify.words import names, numbers, ranges, told, told_intervals, told_unseen
     from vpm.simulate import Setup
 
     settings = Fitting(
@@ -102,7 +119,7 @@ def identify(
     machine, records = load_all(model, logs, channels, interpolate)
     unseen = [load_record(path, machine, channels, interpolate) for path in validate or []]
     setup = Setup(integrator, substeps, horizon, settling, hold)
-    with shown(errors, starts) as tell:
+    with fitting(starts) as tell:
         fit = fit_logs(
             machine,
             records,
