@@ -7,16 +7,23 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from io import StringIO
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import pytest
+from rich.console import Console
 from typer.testing import CliRunner
 
 from vpm import command, demo
 from vpm.cli import app
+from vpm.diagnosing import diagnose
+from vpm.errors import SimulationError
 from vpm.experiment import Experiment
 from vpm.files import FileError, replacing, write_text
+from vpm.model import Model
+from vpm.report import print_story, write_report
 
 MODEL, LOG = str(demo.MODEL), str(demo.TRAIN)
 POSIX = pytest.mark.skipif(os.name != "posix", reason="needs limits and signals of POSIX")
@@ -153,3 +160,23 @@ def test_output_to_a_file_gets_a_line_for_each_stage_and_for_long_silence(
     lines = told.splitlines()
     assert lines[:2] == ["looking", "round 1 1 of 99: friction"]
     assert lines[2].startswith("round 1 99 of 99: friction (after ")
+
+
+@pytest.mark.parametrize(("names", "broken"), [("ranking", "_examined"), ("search", "_settled")])
+def test_an_error_after_the_search_leaves_what_it_found(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, names: Literal["ranking", "search"], broken: str
+) -> None:
+    def fail(*_: object, **__: object) -> None:
+        raise SimulationError("the beam is bent")
+
+    arm = Model.load(demo.MODEL)
+    logs = [Experiment.load(path, model=arm) for path in (demo.TRAIN, demo.VALIDATION)]
+    monkeypatch.setattr(f"vpm.diagnosing.{broken}", fail)
+    found = diagnose(arm, logs[:1], logs[1:], effects=["coulomb_friction"], names=names, workers=1)
+    assert [(effect.name, effect.site) for effect in found.effects] == [("coulomb_friction", "shoulder")]
+    assert any("could not be computed: the beam is bent" in note for note in found.notes)
+    buffer = StringIO()
+    print_story(found, Console(file=buffer))
+    assert "coulomb_friction" in buffer.getvalue()
+    write_report(found, tmp_path)
+    assert "coulomb_friction" in (tmp_path / "report.html").read_text(encoding="utf-8")
