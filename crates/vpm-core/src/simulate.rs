@@ -16,7 +16,7 @@ mod stepper;
 
 pub use along::{Along, drives_along};
 pub use hold::{Course, Hold, Inputs};
-pub(crate) use names::state_name;
+pub(crate) use names::{output_name, state_name};
 pub use observer::{Filtered, Gains, Noise, Readings, filter, observe};
 pub use prescribed::{observed, prescribed};
 pub use resolution::resolution;

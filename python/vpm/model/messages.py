@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import tomllib
 from collections.abc import Mapping, Sequence
@@ -12,6 +13,7 @@ from typing import Any, NoReturn
 
 from vpm.errors import ModelError
 from vpm.files import unreadable
+from vpm.numbers import LARGEST
 
 #: Deepest nesting of a file; a model file needs seven.
 DEEPEST = 32
@@ -84,12 +86,12 @@ def read_toml(path: str | PathLike[str]) -> dict[str, Any]:
 
 
 def check_plain(content: Mapping[str, object], path: str | None = None) -> None:
-    """Refuse what every later step would stumble over: tables of tables without end, and endless integers.
+    """Refuse what every later step would stumble over: tables of tables without end, and numbers that nothing has.
 
     Raises
     ------
     ModelError
-        A table is nested deeper than `DEEPEST`, or an integer has more than the 64 bits of TOML.
+        A table is nested deeper than `DEEPEST`, an integer has more than the 64 bits of TOML, or a number is huge.
     """
     left: list[tuple[tuple[str | int, ...], object]] = [((), content)]
     while left:
@@ -99,6 +101,9 @@ def check_plain(content: Mapping[str, object], path: str | None = None) -> None:
             raise_first([Problem(where, f"is nested more than {DEEPEST} deep; write it flatter")], path)
         if isinstance(value, int) and not -(2**63) <= value < 2**63:
             rest = "is an integer of more than 64 bits; write a number with a point, 1e300"
+            raise_first([Problem(place(*way), rest)], path)
+        if isinstance(value, float) and LARGEST < abs(value) < math.inf:
+            rest = f"is {value:g}, which is more than any machine has; correct the value"
             raise_first([Problem(place(*way), rest)], path)
         if isinstance(value, Mapping):
             left += [((*way, str(key)), inner) for key, inner in value.items()]
