@@ -5,6 +5,7 @@ import math
 import os
 import subprocess
 import sys
+import tomllib
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
@@ -16,10 +17,11 @@ from numpy.typing import NDArray
 
 import vpm
 from vpm import demo, results
-from vpm.errors import CoreError, ExperimentError, ModelError, SimulationError, UnitError, VpmError
+from vpm.errors import CoreError, ExperimentError, ModelError, ScenarioError, SimulationError, UnitError, VpmError
 from vpm.experiment import Experiment
 from vpm.experiment.readers import open_log
 from vpm.model import Model
+from vpm.scenario import Scenario
 from vpm.simulate import Setup
 from vpm.units import parse_unit
 
@@ -70,6 +72,14 @@ def test_no_result_is_a_number_that_is_none(arm: Model) -> None:
 
     with pytest.raises(SimulationError, match="is no longer finite"):
         steps()
+
+
+def test_runs_that_no_memory_holds_are_refused_before_they_begin() -> None:
+    """The core ended the process where it got no memory."""
+    path = EXAMPLES / "flexible_pendulum" / "release.toml"
+    content = {**tomllib.loads(path.read_text(encoding="utf-8")), "duration": 3000.0}
+    with pytest.raises(ScenarioError, match=r"duration makes \d+ samples of \d+ numbers in all runs"):
+        Scenario.from_dict(content, folder=path.parent)
 
 
 def test_an_element_without_linear_model_says_so() -> None:
