@@ -3,15 +3,18 @@
 # Settings, as in `make test PYTEST_ARGS="-k friction"`:
 #   PYTHON       the interpreter that makes .venv            (python3)
 #   DEMO_OUT     the folder that the demo's report goes to   (demo-report)
+#   CASES FIRST  count and first seed of `make fuzz`        (20000, 1)
 #   PYTEST_ARGS  CARGO_ARGS                                  passed on
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .SUFFIXES:
-.PHONY: help demo test test-rust test-python test-nightly reference validation lint lint-rust lint-python bench peers chirp narx-peers bench-counts c-library bench-diagnosis bench-lisdd docs docs-rust figures package clean
+.PHONY: help demo test test-rust test-python test-nightly fuzz reference validation lint lint-rust lint-python bench peers chirp narx-peers bench-counts c-library bench-diagnosis bench-lisdd docs docs-rust figures package clean
 
 PYTHON ?= python3
 DEMO_OUT ?= demo-report
+CASES ?= 20000
+FIRST ?= 1
 PYTEST_ARGS ?=
 CARGO_ARGS ?=
 
@@ -45,6 +48,9 @@ test-python: $(VENV)/.installed
 
 test-nightly: $(VENV)/.installed ## the claims of some tests on many more cases, which takes minutes
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses auto --dist worksteal -m nightly $(PYTEST_ARGS)
+
+fuzz: $(VENV)/.installed ## CASES damaged files from seed FIRST on: refused, or finite numbers within limits
+	cd tests && OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 ../$(BIN)/python -m fuzz $(CASES) $(FIRST)
 
 lint: lint-rust lint-python ## formatting, static checks and types, all as errors
 

@@ -357,10 +357,13 @@ def test_what_is_done_is_kept_when_someone_interrupts(tmp_path: Path, monkeypatc
     monkeypatch.setattr(proving, "ask", ask)
     words = ["prove", "--machine", "axis_linear", "--effect", "spring", "--effect", "bias_force", "--kind", "single"]
     words += ["--seeds", "0", "--workers", "1", "--folder", str(TESTS), "--out", str(tmp_path / "page.md")]
+    (tmp_path / "page.md").write_text(f"The whole campaign.\n{BEGIN}\nall cases\n{END}\n", encoding="utf-8")
+    (tmp_path / "page.json").write_text("all answers", encoding="utf-8")
     run = CliRunner().invoke(app, words, catch_exceptions=False)
-    assert run.exit_code == 0
     assert "interrupted: 1 of 2 cases are done" in run.stderr
-    assert len(proving.load_json(tmp_path / "page.json")) == 1
+    assert len(proving.load_json(tmp_path / "page.partial.json")) == 1
+    assert "all cases" in (tmp_path / "page.md").read_text(encoding="utf-8")
+    assert (tmp_path / "page.json").read_text(encoding="utf-8") == "all answers"
 
 
 @pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="needs an alarm")

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from vpm.errors import SimulationError
+from vpm.errors import CoreError, SimulationError
 from vpm.realtime import Loop, LoopReport
 
 
@@ -56,7 +56,7 @@ def test_a_closed_loop_does_not_wait() -> None:
     loop = Loop(100.0)
     loop.wait()
     loop.close()
-    with pytest.raises(RuntimeError, match="closed"):
+    with pytest.raises(CoreError, match="closed"):
         loop.wait()
 
 

@@ -286,7 +286,7 @@ def test_a_run_that_fails_leaves_the_others(folder: Path) -> None:
 
 
 def test_ctrl_c_stops_all_runs(folder: Path) -> None:
-    made = scenario(folder, duration=5e3, substeps=100)
+    made = scenario(folder, duration=5e2, substeps=1000)
     Timer(0.3, _thread.interrupt_main).start()
     begin = time.monotonic()
     with pytest.raises(KeyboardInterrupt):

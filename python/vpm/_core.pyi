@@ -6,6 +6,8 @@ from typing import final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vpm.errors import CoreError
+
 __all__ = [
     "Diverged",
     "Dynamics",
@@ -27,7 +29,7 @@ __all__ = [
     "stop_when",
 ]
 
-class Diverged(ArithmeticError):
+class Diverged(CoreError):
     """A simulation left the finite numbers, or no step of ``adaptive`` can follow it.
 
     Attributes
@@ -59,14 +61,14 @@ def soft_flights(
     """
 
 def check_integrator(name: str) -> None:
-    """Raise ``ValueError`` for a name that is no integrator's, or a tolerance in it that means nothing."""
+    """Raise ``CoreError`` for a name that is no integrator's, or a tolerance in it that means nothing."""
 
 @final
 class Dynamics:
     """Single evaluations of a machine with fixed parameters, as fast as the crossing into Python allows.
 
     One-dimensional contiguous arrays of double precision are read where they are, others are converted first. n is
-    the number of coordinates. Raises ``ValueError`` for other sizes and for numbers
+    the number of coordinates. Raises ``CoreError`` for other sizes and for numbers
     that are not finite.
 
     Parameters
@@ -190,7 +192,7 @@ class System:
     outputs are position, velocity, acceleration and effort of each joint, command and force of each actuator, length,
     rate and force of each line, strain of each gauge, origin and rotation vector of each marker; a sensor replaces
     the channel it measures.
-    Every function raises ``ValueError``, in one sentence with the repair, for wrong shapes, numbers that are not
+    Every function raises ``CoreError``, in one sentence with the repair, for wrong shapes, numbers that are not
     finite, and parameters for which a law is not defined. Ctrl-C raises ``KeyboardInterrupt``.
 
     Parameters
@@ -393,7 +395,7 @@ class System:
         The drives may be any: what they deliver does not enter.
         """
     def check(self, theta: ArrayLike) -> None:
-        """Raise ValueError for parameters with which the machine does not exist."""
+        """Raise CoreError for parameters with which the machine does not exist."""
     def delivered(
         self, theta: ArrayLike, inputs: ArrayLike, time_step: float, sensitivities: Sequence[int] = ...
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

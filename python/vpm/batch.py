@@ -154,8 +154,6 @@ def _kept(job: Callable[[], Run]) -> Run | VpmError:
         return job()
     except VpmError as error:
         return error
-    except ValueError as error:  # of the core: sizes and numbers that no simulation can take
-        return SimulationError(str(error))
 
 
 def _one(model: Model, trial: Trial, mode: str, setup: Setup, cutoff: float | None) -> Run:

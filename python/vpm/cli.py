@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import signal
 import sys
 import warnings
 from collections.abc import Sequence
 from pathlib import Path
+from threading import Event
 from time import perf_counter
+from types import FrameType
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -32,12 +35,16 @@ from vpm.command import (
     ModelPath,
     OneLog,
     Plot,
+    ReportFolder,
     console,
+    drawable,
     errors,
+    fillable,
     load_pair,
     progress,
     save_plot,
     warnings_told,
+    writable,
 )
 from vpm.errors import ValidityWarning, VpmError
 from vpm.excite_command import app as excite_app
@@ -47,6 +54,10 @@ if TYPE_CHECKING:
     from vpm.experiment import Experiment
     from vpm.model import Model
     from vpm.simulate import Run
+
+
+#: Exit code after Ctrl-C, as shells have it: 128 and the number of the signal.
+INTERRUPTED = 130
 
 
 class _Commands(TyperGroup):
@@ -96,16 +107,37 @@ app.command(epilog=diagnose_command.EXAMPLES)(diagnose_command.diagnose)
 app.command(epilog=rank_command.EXAMPLES)(rank_command.rank)
 app.command(epilog=prove_command.EXAMPLES)(prove_command.prove)
 detail_command.add_to(app)
-Out = Annotated[Path, typer.Option(help="Folder for report.json, report.html and the repaired model.")]
 
 
 def main() -> None:
-    """Run the command line; an error of the input is one sentence and exit code 1."""
+    """Run the command line.
+
+    An error of the input is one sentence and exit code 1. After Ctrl-C the exit code is 130, also of commands that
+    then tell what they know.
+    """
+    pressed = Event()
+
+    def press(number: int, frame: FrameType | None) -> None:
+        pressed.set()
+        signal.default_int_handler(number, frame)
+
+    before = signal.signal(signal.SIGINT, press)
+    code: str | int | None = 0
     try:
         app()
+    except SystemExit as end:
+        code = end.code
     except VpmError as error:
         errors.print(f"error: {error}", markup=False)
-        sys.exit(1)
+        code = 1
+    except KeyboardInterrupt:
+        pressed.set()
+    finally:
+        signal.signal(signal.SIGINT, before)
+    if pressed.is_set():
+        errors.print("stopped by Ctrl-C")
+        code = INTERRUPTED
+    sys.exit(code)
 
 
 @app.command(epilog="Example:  vpm info examples/emps/model.toml")
@@ -161,11 +193,12 @@ def simulate(
     ] = None,
     channels: Channels = None,
     interpolate: Interpolate = False,
-    out: Annotated[Path | None, typer.Option(help="Save the run or the runs (NPZ) here.")] = None,
+    out: Annotated[Path | None, typer.Option(callback=writable, help="Save the run or the runs (NPZ) here.")] = None,
     plot: Annotated[
         Path | None,
         typer.Option(
             metavar="[PICTURE]",
+            callback=drawable,
             help="Write the plot to this file (PNG, SVG or PDF); alone: to a PNG here, named after scenario or log.",
         ),
     ] = None,
@@ -258,7 +291,7 @@ def compare(
 @app.command(epilog="Example:  vpm report report/diagnosis.npz --out report/")
 def report(
     diagnosis: Annotated[Path, typer.Argument(metavar="DIAGNOSIS", help="The diagnosis.npz of an earlier run.")],
-    out: Out = Path("report"),
+    out: ReportFolder = Path("report"),
 ) -> None:
     """Tell the story of an earlier diagnosis again and write its report anew."""
     from vpm.discrepancy import Diagnosis
@@ -287,7 +320,9 @@ def linkage(
 
 @app.command(epilog="Example:  vpm demo --out demo-report\n\nExample:  vpm demo --hide torque_ripple")
 def demo(
-    out: Out = Path("demo-report"),
+    out: Annotated[Path, typer.Option(help="Folder for report.json, report.html and the repaired model.")] = Path(
+        "demo-report"
+    ),
     hide: Annotated[
         str | None, typer.Option(metavar="EFFECT", help="Hide another effect: makes its log first, into OUT/log.")
     ] = None,
@@ -299,5 +334,6 @@ def demo(
     if listing:
         print_list(console)
         return
+    fillable(out)
     with progress() as tell:
         run_demo(out, console, tell, hide)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from functools import partial
 from pathlib import Path
+from threading import Event, Lock, Thread
+from time import perf_counter
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -14,6 +16,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from vpm.errors import ValidityWarning, VpmError
+from vpm.files import probe_file, probe_folder, replacing
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -24,6 +27,10 @@ if TYPE_CHECKING:
 #: What ``--plot`` without a file name stands for, and the endings by which such a name is told from a model or a log.
 BESIDE = "*.png"
 PICTURES = (".png", ".svg", ".pdf")
+#: Evaluations that a fit mostly takes; where its progress bar ends.
+USUAL_EVALUATIONS = 15
+#: Longest silence of a long command whose output goes to a file, s.
+PERIOD = 10.0
 
 console = Console(highlight=False, soft_wrap=True)
 errors = Console(stderr=True, highlight=False, soft_wrap=True)
@@ -70,7 +77,33 @@ Check = Annotated[
     bool, typer.Option("--check/--no-check", help="Refuse logs with a wrong unit, sign, name or clock, see vpm check.")
 ]
 Workers = Annotated[int, typer.Option(min=0, help="Candidates at a time; 0 for one per core. The result is the same.")]
-Plot = Annotated[Path | None, typer.Option(help="Write the plot to this file (PNG, SVG or PDF).")]
+
+
+def writable(path: Path | None) -> Path | None:
+    """A file to write in the end, refused at once where it could not be written."""
+    if path is not None:
+        probe_file(path)
+    return path
+
+
+def fillable(path: Path | None) -> Path | None:
+    """The same for a folder."""
+    if path is not None:
+        probe_folder(path)
+    return path
+
+
+def drawable(path: Path | None) -> Path | None:
+    """The same for a picture, whose ending says its format."""
+    if path is not None and path.suffix.lower() not in PICTURES:
+        raise VpmError(f"{path} is no name of a picture; give it one of the endings {', '.join(PICTURES)}")
+    return writable(path)
+
+
+Plot = Annotated[Path | None, typer.Option(callback=drawable, help="Write the plot to this file (PNG, SVG or PDF).")]
+ReportFolder = Annotated[
+    Path, typer.Option(callback=fillable, help="Folder for report.json, report.html and the repaired model.")
+]
 
 Tell = Callable[[str], None]
 Each = Callable[[str, str, int, int], None]
@@ -102,11 +135,52 @@ def load_all(model: Path, logs: list[Path], channels: Path | None, interpolate: 
     return machine, [load_record(log, machine, channels, interpolate) for log in logs]
 
 
+class _Lines:
+    """What is being done, in lines of a file: what is new at once, and the last word again after every `PERIOD`.
+
+    Words that differ in their numbers only are not new, so that a long search does not fill the file.
+    """
+
+    def __init__(self) -> None:
+        self._text, self._words = "", ""
+        self._lock, self._over = Lock(), Event()
+
+    def tell(self, text: str) -> None:
+        with self._lock:
+            new = (words := re.sub(r"[\d.]+", "#", text)) != self._words
+            self._text, self._words = text, words
+            if new:
+                errors.print(text, markup=False)
+
+    def each(self, what: str, name: str, done: int, total: int) -> None:
+        with self._lock:
+            new, self._words = what != self._words, what
+            self._text = f"{what} {done} of {total}: {name}"
+            if new:
+                errors.print(self._text, markup=False)
+
+    def _repeat(self) -> None:
+        begin = perf_counter()
+        while not self._over.wait(PERIOD):
+            with self._lock:
+                errors.print(f"{self._text or 'at work'} (after {perf_counter() - begin:.0f} s)", markup=False)
+
+    def __enter__(self) -> _Lines:
+        self._thread = Thread(target=self._repeat, name="progress", daemon=True)
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._over.set()
+        self._thread.join()
+
+
 @contextmanager
 def progress() -> Iterator[Callable[[str], None]]:
-    """A line on the terminal that says what is being done; a line each where the output goes to a file."""
+    """A line on the terminal that says what is being done; some lines where the output goes to a file."""
     if not errors.is_terminal:
-        yield partial(errors.print, markup=False)
+        with _Lines() as lines:
+            yield lines.tell
         return
     with errors.status("starting") as status:
         yield status.update
@@ -114,12 +188,10 @@ def progress() -> Iterator[Callable[[str], None]]:
 
 @contextmanager
 def searching() -> Iterator[tuple[Tell, Each]]:
-    """A bar of the candidates of each round; a line each where the output goes to a file."""
+    """A bar of the candidates of each round; some lines where the output goes to a file."""
     if not errors.is_terminal:
-        yield (
-            lambda text: errors.print(text, markup=False),
-            lambda what, name, done, total: errors.print(f"{what} {done} of {total}: {name}", markup=False),
-        )
+        with _Lines() as lines:
+            yield lines.tell, lines.each
         return
     words = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[name]}"))
     with Progress(*words, TimeElapsedColumn(), console=errors, transient=True) as bar:
@@ -132,6 +204,19 @@ def searching() -> Iterator[tuple[Tell, Each]]:
             bar.update(task, description=what, completed=done, total=total, name=name)
 
         yield tell, each
+
+
+@contextmanager
+def fitting(starts: int) -> Iterator[Callable[[int, float], None]]:
+    """A bar of the evaluations of a fit with its residual; some lines where the output goes to a file."""
+    if not errors.is_terminal:
+        with _Lines() as lines:
+            yield lambda n, r: lines.tell(f"evaluation {n}: residual {r:.5g}")
+        return
+    words = TextColumn("evaluation {task.completed}: residual {task.fields[residual]:.5g}")
+    with Progress(TextColumn("fitting"), BarColumn(), words, TimeElapsedColumn(), console=errors) as bar:
+        task = bar.add_task("fitting", total=USUAL_EVALUATIONS * starts, residual=float("nan"))
+        yield lambda n, r: bar.update(task, completed=n, total=max(n, USUAL_EVALUATIONS * starts), residual=r)
 
 
 @contextmanager
@@ -150,7 +235,6 @@ def save_plot(draw: Callable[[], Figure], path: Path | None, named: Path | None 
     """Draw to a file; one that is to be named after another file is a PNG in the working directory."""
     if path is not None:
         path = Path(f"{named.stem}.png") if named is not None and str(path) == BESIDE else path
-        if path.suffix.lower() not in PICTURES:
-            raise VpmError(f"{path} is no name of a picture; give it one of the endings {', '.join(PICTURES)}")
-        draw().savefig(path)
+        with replacing(path) as beside:
+            draw().savefig(beside)
         console.print(f"wrote {path}", markup=False)

@@ -15,11 +15,13 @@ from vpm.command import (
     ModelPath,
     Plot,
     console,
+    fillable,
     load_all,
     load_model,
     load_pair,
     progress,
     save_plot,
+    writable,
 )
 
 Share = Annotated[float, typer.Option(help="Share of the period that a step may take at its 99.9 % quantile.")]
@@ -45,7 +47,9 @@ def climb(
     compare: Annotated[list[str] | None, typer.Option(help="Channel that counts; all measured by default.")] = None,
     integrator: Integrator = "auto",
     settling: Annotated[float, typer.Option(help="Time at the beginning of each record that does not count, s.")] = 0.0,
-    out: Annotated[Path | None, typer.Option(help="Write the model of the chosen level to this file.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(callback=writable, help="Write the model of the chosen level to this file.")
+    ] = None,
     plot: Plot = None,
 ) -> None:
     """Identify a model level by level, as far up in detail as unseen records say that it pays."""
@@ -86,7 +90,7 @@ def simplify(
     channels: Channels = None,
     interpolate: Interpolate = False,
     plot: Plot = None,
-    out: Annotated[Path | None, typer.Option(help="Write the simplified model (TOML) here.")] = None,
+    out: Annotated[Path | None, typer.Option(callback=writable, help="Write the simplified model (TOML) here.")] = None,
 ) -> None:
     """Find the cheapest model that still tells the truth within a tolerance; exit code 1 if it misses the period."""
     from vpm.simplify import simplify as find_cheapest
@@ -172,7 +176,10 @@ def compile_(
     integrator: Integrator = "auto",
     substeps: Annotated[int, typer.Option(help="Integration steps in a period.")] = 1,
     c: Annotated[
-        Path | None, typer.Option("--c", help="Write the equations as C99 into this folder instead, for any rate.")
+        Path | None,
+        typer.Option(
+            "--c", callback=fillable, help="Write the equations as C99 into this folder instead, for any rate."
+        ),
     ] = None,
     name: Annotated[str | None, typer.Option(help="With --c: what every name in C begins with.")] = None,
     parameter: Annotated[
@@ -189,6 +196,7 @@ def compile_(
             f"wrote {header} and {source}: free are {', '.join(written.parameters) or 'no parameters'}", markup=False
         )
         return
+    writable(out)
     compiled = compile_model(load_model(model), rate, integrator=integrator, substeps=substeps)
     compiled.save(out)
     console.print(f"wrote {out}: takes {', '.join(compiled.inputs)}; shows {', '.join(compiled.outputs)}", markup=False)

@@ -16,6 +16,7 @@ from vpm.command import (
     Interpolate,
     Logs,
     ModelPath,
+    ReportFolder,
     Workers,
     console,
     load_all,
@@ -33,7 +34,6 @@ Words = list[str] | None
 Validate = Annotated[
     list[Path] | None, typer.Option(help="Record that is never fitted; repeat. Default: 30 % of each log.")
 ]
-Out = Annotated[Path, typer.Option(help="Folder for report.json, report.html and the repaired model.")]
 Effect = Annotated[Words, typer.Option(help="Try only these effects; repeat.")]
 Without = Annotated[Words, typer.Option(help="Try all effects but these; repeat.")]
 Limit = Annotated[
@@ -51,7 +51,7 @@ def diagnose(
     model: ModelPath,
     logs: Logs,
     validate: Validate = None,
-    out: Out = Path("report"),
+    out: ReportFolder = Path("report"),
     effect: Effect = None,
     without: Without = None,
     limit: Limit = None,

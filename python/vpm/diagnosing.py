@@ -73,6 +73,9 @@ RANKED = "names come from a ranking of the training records"
 SEARCHED = "names come from a search on balances of effort, for {reason}"
 NOT_SEARCHED = "a search on balances of effort does not try {effects}"
 STOPPED_LATE = "stopped by Ctrl-C before what is left, and what else would do, was examined"
+#: Said where an error follows a search, and what such an error is.
+FAILED = "{what} could not be computed: {error}"
+BROKEN = (ValueError, ArithmeticError, LookupError)
 #: Said where names come from a search.
 UNSEEN = "the joint {joint} has no drive, so that no balance of effort sees what acts there, and nothing is said of it"
 #: Stated uncertainties, on a logarithmic scale, that a recalibration may move what the model is not linear in.
@@ -206,53 +209,90 @@ def _diagnosis(
     data.training.workers = 1  # candidates share the cores from here on
     notes.extend(moved_far(model, recalibrated))
     found, ambiguous, late = _named(ranking, recalibrated, data, by, say, each, notes)
-    say("measuring the noise floor")
-    measure = partial(_examined, nominal, recalibrated, data, mode, setup)
-    floor, gap, left = measure(found.final)
-    if (kept := only_where_closed(found, data, gap, left)) is not found:
-        found, (floor, gap, left) = kept, measure(kept.final)
-    say("examining what is left")
-    rest, stopped = _until_stopped(
-        lambda: _rest(recalibrated, found, data, each) if found.accepted or not is_negligible(gap) else None, None
-    )
-    beyond = observed_gaps(ranking, data.training.joints) if ranking is not None else {}
-    word, summary, described = verdict(data, nominal, recalibrated, found, gap | beyond, left, rest)
-    final, empirical, accepted = found.final, None, found.accepted
-    if described and rest is not None:
-        told = rest.best if word == "unexplained" else rest.choices[-1]
-        final, empirical = told.judged, told.told
-        accepted = accepted if told.base is found.final else ()
-        if accepted:
-            empirical, final = beside(found.final, empirical, final, data)
-        gap = _gaps(data, nominal, recalibrated, final, floor)
-        summary = f"{summary} {empirical.sentence}" + (f" {rest.seals.sentence}" if rest.seals is not None else "")
-    if not accepted:
-        ambiguous = ()
-    say("looking for the experiment that tells effects apart")
-    if stopped or late:
-        notes.append(STOPPED_LATE)
+    try:
+        say("measuring the noise floor")
+        measure = partial(_examined, nominal, recalibrated, data, mode, setup)
+        floor, gap, left = measure(found.final)
+        if (kept := only_where_closed(found, data, gap, left)) is not found:
+            found, (floor, gap, left) = kept, measure(kept.final)
+        say("examining what is left")
+        rest, stopped = _until_stopped(
+            lambda: _rest(recalibrated, found, data, each) if found.accepted or not is_negligible(gap) else None, None
+        )
+        beyond = observed_gaps(ranking, data.training.joints) if ranking is not None else {}
+        word, summary, described = verdict(data, nominal, recalibrated, found, gap | beyond, left, rest)
+        final, empirical, accepted = found.final, None, found.accepted
+        if described and rest is not None:
+            told = rest.best if word == "unexplained" else rest.choices[-1]
+            final, empirical = told.judged, told.told
+            accepted = accepted if told.base is found.final else ()
+            if accepted:
+                empirical, final = beside(found.final, empirical, final, data)
+            gap = _gaps(data, nominal, recalibrated, final, floor)
+            summary = f"{summary} {empirical.sentence}" + (f" {rest.seals.sentence}" if rest.seals is not None else "")
+        if not accepted:
+            ambiguous = ()
+        say("looking for the experiment that tells effects apart")
+        if stopped or late:
+            notes.append(STOPPED_LATE)
+        return Diagnosis(
+            word,
+            f"Stopped before every candidate was tried. {summary}" if found.interrupted else summary,
+            tuple(_accepted_effect(entry, found.final) for entry in accepted),
+            gap | beyond,
+            found.refused,
+            found.ranking,
+            listed(ambiguities(accepted), ambiguous),
+            _where(recalibrated.model, data.unseen),
+            tuple(_step(data, stage) for stage in found.stages),
+            tuple(e.name for e in training),
+            tuple(e.name for e in unseen),
+            tuple(notes),
+            final.model,
+            fit_of(final.model, data.training, final.fit, nominal.fit.residual, [e.name for e in training]),
+            _pictures(data, nominal, recalibrated, final),
+            time.perf_counter() - began,
+            found.interrupted or stopped or late,
+            gather(found.final.model, [entry.key for entry in accepted if entry.side == "motor"], data.unseen, floor),
+            empirical,
+            experiments_for(found.final, ambiguous, data.training, floor),
+            _classes(accepted, ambiguous),
+        )
+    except BROKEN as error:
+        notes.append(FAILED.format(what="what follows the search", error=error))
+        return _of_search(model, records, recalibrated, found, data, time.perf_counter() - began)
+
+
+def _of_search(
+    model: Model, records: _Records, recalibrated: Judged, found: Search, data: Data, seconds: float
+) -> Diagnosis:
+    """What a search found, where nothing after it can be computed: nobody waits for it twice."""
+    training, unseen, notes = records
+    names = ", ".join(entry.label for entry in found.accepted) or "no effect"
     return Diagnosis(
-        word,
-        f"Stopped before every candidate was tried. {summary}" if found.interrupted else summary,
-        tuple(_accepted_effect(entry, found.final) for entry in accepted),
-        gap | beyond,
+        "effect_found" if found.accepted else "unexplained",
+        f"The search accepts {names} in {model.name}; what is left on unseen records could not be computed.",
+        tuple(_accepted_effect(entry, found.final) for entry in found.accepted),
+        {},
         found.refused,
         found.ranking,
-        listed(ambiguities(accepted), ambiguous),
-        _where(recalibrated.model, data.unseen),
-        tuple(_step(data, stage) for stage in found.stages),
+        (),
+        {},
+        (),
         tuple(e.name for e in training),
         tuple(e.name for e in unseen),
         tuple(notes),
-        final.model,
-        fit_of(final.model, data.training, final.fit, nominal.fit.residual, [e.name for e in training]),
-        _pictures(data, nominal, recalibrated, final),
-        time.perf_counter() - began,
-        found.interrupted or stopped or late,
-        gather(found.final.model, [entry.key for entry in accepted if entry.side == "motor"], data.unseen, floor),
-        empirical,
-        experiments_for(found.final, ambiguous, data.training, floor),
-        _classes(accepted, ambiguous),
+        found.final.model,
+        fit_of(
+            found.final.model,
+            data.training,
+            found.final.fit,
+            recalibrated.fit.residual,
+            [e.name for e in training],
+        ),
+        (),
+        seconds,
+        found.interrupted,
     )
 
 
@@ -326,9 +366,12 @@ def _named(
         notes.append(STOPPED)
     tell("looking for what else would do in the place of each effect")
     nothing: tuple[Rivals, ...] = ()
-    (found, ambiguous), late = _until_stopped(
-        partial(_settled, found, data, screened, limit, tell, each), (found, nothing)
-    )
+    settle = partial(_settled, found, data, screened, limit, tell, each)
+    try:
+        (found, ambiguous), late = _until_stopped(settle, (found, nothing))
+    except BROKEN as error:
+        notes.append(FAILED.format(what="what else would do in the place of each effect", error=error))
+        ambiguous, late = nothing, False
     return found, ambiguous, late
 
 

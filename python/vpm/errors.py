@@ -17,6 +17,13 @@ class VpmError(ValueError):
         self.message = message
 
 
+class CoreError(VpmError):
+    """The compiled core refused what it was given: a wrong length, a number that is not finite, a state without rest.
+
+    The core raises it itself, so that nothing it says reaches a user as a plain ``ValueError``.
+    """
+
+
 class ModelError(VpmError):
     """A model description is wrong.
 

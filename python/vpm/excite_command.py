@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.console import Console
 
+from vpm.command import Plot, console, progress, save_plot, writable
 from vpm.errors import ExcitationError
 
 if TYPE_CHECKING:
@@ -21,8 +20,6 @@ app = typer.Typer(
     no_args_is_help=True,
     rich_markup_mode=None,
 )
-console = Console(highlight=False, soft_wrap=True)
-errors = Console(stderr=True, highlight=False, soft_wrap=True)
 
 Channel = Annotated[str, typer.Option(help="Channel as in the model, for example motor.command.")]
 Unit = Annotated[str, typer.Option(help="Its unit.")]
@@ -30,8 +27,7 @@ Band = Annotated[tuple[float, float], typer.Option(help="Lowest and highest freq
 TimeStep = Annotated[float, typer.Option(help="Time between samples, s.")]
 Period = Annotated[float, typer.Option(help="Period, which is the duration of what does not repeat, s.")]
 Peak = Annotated[float, typer.Option(help="Largest absolute value, in the unit.")]
-Out = Annotated[Path, typer.Option(help="Table to write (CSV with units in its header).")]
-Plot = Annotated[Path | None, typer.Option(help="Write the plot to this file (PNG, SVG or PDF).")]
+Out = Annotated[Path, typer.Option(callback=writable, help="Table to write (CSV with units in its header).")]
 Seed = Annotated[int, typer.Option(help="The same seed gives the same numbers.")]
 
 
@@ -159,13 +155,10 @@ def fourier(
 
 def _limits(path: Path) -> dict[str, JointLimits]:
     from vpm.excitation import JointLimits
+    from vpm.model.messages import read_toml
 
-    try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise ExcitationError(f"{path} cannot be read as limits ({error}); give a TOML file") from error
     limits = {}
-    for joint, values in content.items():
+    for joint, values in read_toml(path).items():
         try:
             low, high = values["position"]
             numbers = {name: float(values[name]) for name in ("speed", "acceleration", "effort") if name in values}
@@ -185,16 +178,11 @@ def _finish(result: Excitation, out: Path, plot: Path | None) -> None:
     for note in result.notes:
         console.print(f"  {note}", markup=False)
     console.print(f"wrote {result.to_csv(out)}", markup=False)
-    if plot is not None:
-        result.plot().savefig(plot)
-        console.print(f"wrote {plot}", markup=False)
+    save_plot(result.plot, plot)
 
 
 @contextmanager
-def _progress(what: str) -> Iterator[Callable[[int, float], None] | None]:
-    """A line on the terminal; nothing where the output goes to a file."""
-    if not errors.is_terminal:
-        yield None
-        return
-    with errors.status("starting") as status:
-        yield lambda count, value: status.update(f"{count}: {what} {value:.5g}")
+def _progress(what: str) -> Iterator[Callable[[int, float], None]]:
+    """A line on the terminal, some lines in a file."""
+    with progress() as tell:
+        yield lambda count, value: tell(f"{count}: {what} {value:.5g}")

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
+
+import typer
 
 from vpm.command import (
     Channels,
@@ -16,10 +18,12 @@ from vpm.command import (
     ModelPath,
     Plot,
     console,
-    errors,
+    fillable,
+    fitting,
     load_all,
     load_record,
     save_plot,
+    writable,
 )
 from vpm.errors import IdentificationError, near_match
 from vpm.identify import options
@@ -34,6 +38,19 @@ EXAMPLES = (
     "Example:  vpm identify rig.toml a.csv --mode free_run --piece 0.5 --loss huber --profile slide.mass\n\n"
     "Example:  vpm identify rig.toml a.csv --mode input_error --horizon 0.02 --validate b.csv --out fitted/"
 )
+
+
+def _place(path: Path | None) -> Path | None:
+    return writable(path) if path is not None and path.suffix == ".toml" else fillable(path)
+
+
+Out = Annotated[
+    Path | None,
+    typer.Option(
+        callback=_place,
+        help="Folder for model.toml, parameters.csv, report.md, fit.npz and fit.png; or a .toml: the model.",
+    ),
+]
 
 
 def identify(
@@ -72,13 +89,13 @@ def identify(
     workers: options.Workers = 0,
     validate: options.Validate = None,
     check: Check = True,
-    out: options.Out = None,
+    out: Out = None,
     plot: Plot = None,
 ) -> None:
     """Fit parameters to one or several logs. Ctrl-C ends a fit and keeps the best until then."""
     from vpm.identify import Fitting, judged_on
     from vpm.identify import identify as fit_logs
-    from vpm.identify.words import names, numbers, ranges, shown, told, told_intervals, told_unseen
+    from vpm.identify.words import names, numbers, ranges, told, told_intervals, told_unseen
     from vpm.log_check import refuse_mistakes
     from vpm.simulate import Setup
 
@@ -107,7 +124,7 @@ def identify(
     setup = Setup(integrator, substeps, horizon, settling, hold)
     if check:
         refuse_mistakes(machine, [*records, *unseen], setup=setup, workers=workers or None)
-    with shown(errors, starts) as tell:
+    with fitting(starts) as tell:
         fit = fit_logs(
             machine,
             records,

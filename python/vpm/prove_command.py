@@ -11,8 +11,9 @@ from typing import Annotated, Any
 
 import typer
 
-from vpm.command import console, errors
+from vpm.command import console, errors, writable
 from vpm.errors import DiagnosisError
+from vpm.files import write_text
 
 EXAMPLES = (
     "Example:  vpm prove --machine axis_linear --effect coulomb_friction --seeds 0-4 --each 5\n\n"
@@ -36,10 +37,14 @@ def prove(
     folder: Annotated[Path, typer.Option(help="Folder of a checkout that holds blind/.")] = Path("tests"),
     answers: Annotated[Path | None, typer.Option(help="Tables of the answers in this file instead.")] = None,
     calibrate: Annotated[
-        Path | None, typer.Option(help="Fit the numbers behind probabilities to the answers, and write them here.")
+        Path | None,
+        typer.Option(
+            callback=writable, help="Fit the numbers behind probabilities to the answers, and write them here."
+        ),
     ] = None,
     out: Annotated[
-        Path | None, typer.Option(help="Write the tables into this page; beside it every case and a diagram.")
+        Path | None,
+        typer.Option(callback=writable, help="Write the tables into this page; beside it every case and a diagram."),
     ] = None,
 ) -> None:
     """Hide effects in machines that other code simulates, diagnose them blind, and count what was named."""
@@ -54,13 +59,19 @@ def prove(
             todo = proving.jobs(machine or (), effect or (), numbers(seeds), noise or (1.0,), kinds, each)
         except ValueError as error:
             raise DiagnosisError(str(error)) from None
-        found = _asked(proving, todo, (workers, limit), out)
+        kept = None if out is None else out.with_suffix(".partial.json")
+        found = _asked(proving, todo, (workers, limit), kept)
+        if len(found) < len(todo):
+            where = "" if kept is None else f"; what was answered is in {kept}, for vpm prove --answers {kept}"
+            errors.print(f"interrupted: {len(found)} of {len(todo)} cases are done{where}", markup=False)
+            out = calibrate = None
     found.sort(key=lambda a: (list(proving.KINDS).index(a.kind), a.machine, a.request, a.seed))
     text = table.tables(found)
     console.print(text, markup=False)
     if out is not None:
         proving.save_json(found, out.with_suffix(".json"))
-        out.write_text(page(out, text), encoding="utf-8")
+        write_text(out, page(out, text))
+        out.with_suffix(".partial.json").unlink(missing_ok=True)
         written = [out, out.with_suffix(".json")]
         if reliability.stated(found):
             written.append(reliability.draw(found, out.with_suffix(".svg")))
@@ -70,16 +81,14 @@ def prove(
         console.print(f"{told}\nwrote {fitted.save(calibrate)}", markup=False)
 
 
-def _asked(proving: ModuleType, todo: Sequence[Any], how: tuple[int, float], out: Path | None) -> list[Any]:
+def _asked(proving: ModuleType, todo: Sequence[Any], how: tuple[int, float], kept: Path | None) -> list[Any]:
     """Answers to cases, told and kept as they come."""
     console.print(f"{len(todo)} cases", markup=False)
     found = []
     for answer in proving.answers(todo, *how, lambda line: errors.print(line, markup=False)):
         found.append(answer)
-        if out is not None:
-            proving.save_json(found, out.with_suffix(".json"))
-    if len(found) < len(todo):
-        errors.print(f"interrupted: {len(found)} of {len(todo)} cases are done", markup=False)
+        if kept is not None:
+            proving.save_json(found, kept)
     return found
 
 

@@ -20,6 +20,7 @@ from vpm.command import (
     load_all,
     load_record,
     searching,
+    writable,
 )
 
 if TYPE_CHECKING:
@@ -37,7 +38,9 @@ Validate = Annotated[
     list[Path] | None, typer.Option(help="Record that decides nothing; the gap is told on it; repeat.")
 ]
 Most = Annotated[int, typer.Option(min=1, help="Most effects to add.")]
-Out = Annotated[Path | None, typer.Option(help="Write the model with what was found to this file (TOML).")]
+Out = Annotated[
+    Path | None, typer.Option(callback=writable, help="Write the model with what was found to this file (TOML).")
+]
 
 
 def rank(

@@ -29,6 +29,7 @@ import html
 import json
 import math
 import re
+import struct
 import zipfile
 import zlib
 from collections.abc import Mapping
@@ -41,6 +42,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from vpm.errors import MissingExtraError, VpmError
+from vpm.files import replacing, unreadable
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -49,7 +51,88 @@ if TYPE_CHECKING:
 FORMAT = 1
 
 _HEADER = "header"
+#: What reading a broken archive raises, and building a class from content that is not its own.
+_BROKEN = (
+    *(OSError, EOFError, MemoryError, NotImplementedError, RuntimeError),
+    *(struct.error, zipfile.BadZipFile, zlib.error),
+)
+_MISFIT = (ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError)
 _TAG = "$"
+
+#: Modules of the classes that stand in files, by the names that files give them: loading a file imports nothing else.
+#: A class of a program's own has to be imported by that program before.
+_MODULES: Mapping[str, tuple[str, ...]] = {
+    "vpm.budget.report": ("BudgetReport", "Stage"),
+    "vpm.climb.result": ("Climb", "Level"),
+    "vpm.compare.comparison": ("ChannelComparison", "Comparison"),
+    "vpm.compare.correlation": ("Correlation",),
+    "vpm.compare.regions": ("Bin", "Region", "Where"),
+    "vpm.discrepancy.diagnosis": (
+        "AcceptedEffect",
+        "Ambiguity",
+        "ChannelGap",
+        "Diagnosis",
+        "EffectParameterEstimate",
+        "Empirical",
+        "EmpiricalTerm",
+        "Picture",
+        "ProposedExperiment",
+        "RankedCandidate",
+        "RefusedEffect",
+        "Step",
+    ),
+    "vpm.discrepancy.evidence": ("Evidence",),
+    "vpm.excitation.base_parameters": ("BaseParameters",),
+    "vpm.excitation.excitation": ("Excitation",),
+    "vpm.excitation.fourier": ("FourierTrajectory",),
+    "vpm.excitation.limits": ("JointLimits",),
+    "vpm.experiment.campaign": ("Campaign",),
+    "vpm.experiment.motion": ("Motion",),
+    "vpm.experiment.record": ("Experiment",),
+    "vpm.identify.fit": ("Fit",),
+    "vpm.identify.identifiability": ("Combination",),
+    "vpm.identify.inertial_fit": ("InertialFit",),
+    "vpm.identify.inertial_regression": ("InertialRegression",),
+    "vpm.identify.intervals": ("Bootstrap", "Profile"),
+    "vpm.identify.oil_equations": ("CylinderGeometry",),
+    "vpm.identify.oil_fit": ("OilFit",),
+    "vpm.identify.settings": ("Fitting",),
+    "vpm.impedance.decay": ("Decay", "LogarithmicDecrement"),
+    "vpm.impedance.impact": ("ImpulseBalance", "Stop"),
+    "vpm.impedance.landing": ("Landing",),
+    "vpm.impedance.loop": ("Loop",),
+    "vpm.impedance.loss": ("LossLaw",),
+    "vpm.impedance.repeated": ("ImpedanceTable", "Repeated", "RepeatedTests"),
+    "vpm.linear": ("LinearModel",),
+    "vpm.linkages.dropping": ("DropLimit",),
+    "vpm.linkages.karl": ("KarlGeometry",),
+    "vpm.linkages.karl_results": ("KarlPoses", "KarlSingularities", "KarlWorkspace"),
+    "vpm.linkages.leg_parameters": ("Attachment", "Cylinder", "LegParameters", "LegPart", "Segment"),
+    "vpm.linkages.leg_results": ("LegReactions", "LegStrokes", "LegTerms", "ShareMap"),
+    "vpm.model.model": ("Model",),
+    "vpm.narx.maxwell": ("MaxwellNarx",),
+    "vpm.narx.maxwell_maps": ("MaxwellMap",),
+    "vpm.narx.maxwell_records": ("MaxwellSignals",),
+    "vpm.narx.maxwell_result": ("MaxwellFit",),
+    "vpm.narx.maxwell_runs": ("MaxwellErrors",),
+    "vpm.narx.maxwell_windows": ("MaxwellWindows",),
+    "vpm.narx.model": ("Narx",),
+    "vpm.narx.run": ("NarxRun", "ResidualTests"),
+    "vpm.narx.validation": ("NarxValidation",),
+    "vpm.observer.noise": ("Noise",),
+    "vpm.observer.observation": ("Observation",),
+    "vpm.ranking.judgement": ("Judgement",),
+    "vpm.ranking.result": ("Gap", "Ranked", "Ranking"),
+    "vpm.realtime.loop": ("LoopReport",),
+    "vpm.scenario.outcome": ("ScenarioRun",),
+    "vpm.simplify.ladder": ("Ladder", "Rung"),
+    "vpm.simplify.reductions": ("Reduction",),
+    "vpm.simplify.replacement": ("Replacement",),
+    "vpm.simulate.resolution": ("Resolution",),
+    "vpm.simulate.run": ("Run",),
+    "vpm.simulate.setup": ("Setup",),
+    "vpm.weighing.weigh": ("Weighing",),
+}
 
 #: Every subclass of `Storable`, by "module:class": the only classes that loading a file can build.
 _STORED_CLASSES: dict[str, type[Storable]] = {}
@@ -142,10 +225,10 @@ class Result(Storable):
         """
         arrays: dict[str, np.ndarray[Any, Any]] = {}
         header = json.dumps({"format": FORMAT, "content": _encode(self, type(self).__name__, arrays)}, allow_nan=False)
-        target = Path(path)
-        with target.open("wb") as file:  # an open file, because savez appends .npz to names
+        # An open file, because savez appends .npz to names.
+        with replacing(path) as beside, beside.open("wb") as file:
             np.savez_compressed(file, allow_pickle=False, **{_HEADER: np.array(header)}, **arrays)
-        return target
+        return Path(path)
 
     @classmethod
     def load(cls, path: str | PathLike[str]) -> Self:
@@ -164,7 +247,7 @@ class Result(Storable):
         try:
             document = json.loads(str(arrays.pop(_HEADER)[()]))
             version, content = int(document["format"]), document["content"]
-        except (KeyError, TypeError, ValueError) as error:
+        except _MISFIT as error:
             raise VpmError(
                 f"{path} is an array file but not a saved result: its header is missing or unreadable"
             ) from error
@@ -172,7 +255,9 @@ class Result(Storable):
             raise VpmError(f"{path} has format {version}, and this version reads up to {FORMAT}; use a newer version")
         try:
             result = _decode(content, arrays, path)
-        except (KeyError, TypeError) as error:
+        except VpmError:
+            raise
+        except _MISFIT as error:
             raise VpmError(f"{path} does not fit this version of its class: {error}; write it anew") from error
         if not isinstance(result, cls):
             found = type(result).__name__
@@ -203,13 +288,16 @@ def html_table(caption: str, head: tuple[str, ...], rows: list[tuple[object, ...
 def _read_arrays(path: Path) -> dict[str, np.ndarray[Any, Any]]:
     """Arrays of an .npz file; pickled objects are refused."""
     try:
+        if reason := unreadable(path):
+            raise VpmError(reason)
         if not path.exists():
             raise VpmError(f"{path} does not exist; check the path")
         if not zipfile.is_zipfile(path):
             raise VpmError(f"{path} is not a saved result: it is no .npz file")
-        with np.load(path, allow_pickle=False) as file:
+        # A stream of its own, because NumPy leaves that of a broken file open.
+        with path.open("rb") as stream, np.load(stream, allow_pickle=False) as file:
             return {name: file[name] for name in file.files}
-    except (OSError, EOFError, zipfile.BadZipFile, zlib.error) as error:
+    except _BROKEN as error:
         raise VpmError(f"{path} cannot be read as a saved result: {error}") from error
     except ValueError as error:
         if isinstance(error, VpmError):
@@ -278,16 +366,15 @@ def _decode(value: object, arrays: Mapping[str, np.ndarray[Any, Any]], path: obj
 
 
 def _stored_class(name: str, path: object) -> type[Storable]:
-    module = name.partition(":")[0]
-    if name not in _STORED_CLASSES and module.startswith("vpm."):
-        try:
-            import_module(module)
-        except ModuleNotFoundError as error:
-            raise VpmError(f"{path} holds a {name}, which this version does not have") from error
+    module, _, kind = name.partition(":")
+    if kind in _MODULES.get(module, ()):
+        import_module(module)
     try:
         return _STORED_CLASSES[name]
     except KeyError as error:
-        raise VpmError(f"{path} holds a {name}, which is not known here; import its module first") from error
+        raise VpmError(
+            f"{path} holds a {name}, which is not known here; import its class before, or use the version that wrote it"
+        ) from error
 
 
 def _same(left: object, right: object) -> bool:

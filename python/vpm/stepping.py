@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from vpm.errors import DivergedError, SimulationError, near_match
 from vpm.model import Model
+from vpm.numbers import array_of
 from vpm.simulate import AUTOMATIC, Resolution, Run, Setup, judged
 from vpm.simulate.resolution import resolution
 
@@ -281,12 +282,16 @@ class Simulation:
     def _command(self, inputs: ArrayLike | Mapping[str, float]) -> ArrayLike:
         if isinstance(inputs, np.ndarray) and inputs.ndim == 1:
             return inputs
-        return self._model.command(inputs) if isinstance(inputs, Mapping) else np.atleast_1d(np.asarray(inputs, float))
+        return (
+            self._model.command(inputs)
+            if isinstance(inputs, Mapping)
+            else np.atleast_1d(array_of(inputs, "the command", SimulationError))
+        )
 
     def _driven(self, inputs: ArrayLike) -> Array:
         from vpm._core import Diverged
 
-        table = np.ascontiguousarray(inputs, dtype=np.float64)
+        table = np.ascontiguousarray(array_of(inputs, "the commands", SimulationError))
         if table.ndim == 1 and len(self.inputs) == 1:
             table = table[:, None]
         columns = len(self.inputs)

@@ -27,6 +27,8 @@ from vpm.errors import UnitError, near_match
 
 #: Powers beyond this, or with more characters, mean nothing.
 LARGEST_POWER, LONGEST_POWER = 99, 8
+#: Units with more characters mean nothing either.
+LONGEST = 100
 
 #: The base units that the dimension vectors count.
 BASE_UNITS = ("m", "kg", "s", "A", "K")
@@ -46,9 +48,9 @@ _PREFIXES = {
 }
 
 _TOKEN = re.compile(
-    r"\s*(?:(?P<name>[^\W\d_]+|[°%])|(?P<power>\^|\*\*)|(?P<number>[+-]?\d+(?:\.\d+)?)|(?P<mark>[*·/()]))"
+    r"\s*(?:(?P<name>[^\W\d_]+|[°%])|(?P<power>\^|\*\*)|(?P<number>[+-]?[0-9]+(?:\.[0-9]+)?)|(?P<mark>[*·/()]))"
 )
-
+_NUMBER = re.compile(r"[+-]?[0-9]+(?:\.[0-9]+)?")
 
 #: Power of a unit; a whole one is an int.
 Power = int | Fraction
@@ -168,10 +170,12 @@ def parse_unit(text: str) -> Unit:
     """
     if not text.strip():
         return Unit(text, 1.0, _DIMENSIONLESS, ())
+    if len(text) > LONGEST:
+        raise _unreadable(text, f"it has {len(text)} characters, and at most {LONGEST} make sense")
     reader = _Reader(text)
     try:
         factor, dimension, terms = reader.expression()
-    except OverflowError:
+    except (OverflowError, ZeroDivisionError):
         factor = math.inf
     if not 0.0 < factor < math.inf:
         raise _unreadable(text, "it is too large or too small for a number")
@@ -304,7 +308,7 @@ class _Reader:
             return factor, dimension, terms
         self.at += 1
         digits = self.next or ""
-        if not digits.lstrip("+-").replace(".", "", 1).isdigit():
+        if not _NUMBER.fullmatch(digits):
             raise _unreadable(self.text, 'a number has to follow the "^"')
         if len(digits) > LONGEST_POWER or abs(Fraction(digits)) > LARGEST_POWER:
             raise _unreadable(self.text, f"the power {digits} is beyond {LARGEST_POWER}, or has too many digits")
@@ -373,7 +377,8 @@ def _find(name: str) -> _Parsed | None:
 
 
 def _unreadable(text: str, reason: str) -> UnitError:
-    return UnitError(f'unit "{text}" cannot be read: {reason}; units are written like "N s/m" or "kg m^2"', unit=text)
+    shown = text if len(text) <= LONGEST else f"{text[:40]}..."
+    return UnitError(f'unit "{shown}" cannot be read: {reason}; units are written like "N s/m" or "kg m^2"', unit=text)
 
 
 def _write(terms: tuple[tuple[str, Power], ...]) -> str:

@@ -23,6 +23,7 @@ from blind.effects import EFFECTS
 from blind.machines import MACHINES
 from blind.score import site_right
 from blind.table import failed
+from vpm.files import write_text
 
 KINDS = ("single", "pairs", "none", "parameters", "outside")
 #: Cases that are made together.
@@ -280,7 +281,7 @@ def _beside(todo: Sequence[Job], count: int, limit: float) -> Iterator[Answer]:
 def save_json(found: Sequence[Answer], path: Path) -> None:
     """Every answer, one to a line."""
     lines = ",\n".join(json.dumps(answer.to_dict()) for answer in found)
-    path.write_text(f"[\n{lines}\n]\n", encoding="utf-8")
+    write_text(path, f"[\n{lines}\n]\n")
 
 
 def load_json(path: Path) -> list[Answer]:

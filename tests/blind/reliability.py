@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from blind import score
 from blind.answer import Answer, Named, Weighed
+from vpm.files import replacing
 from vpm.plot.style import BLUE, SOFT, panels, styled
 from vpm.ranking.calibration import Calibration, Reliability, Round, calibrated, calibration_error, reliability
 from vpm.ranking.posterior import robust_probabilities
@@ -135,7 +136,8 @@ def diagram(answers: Sequence[Answer]) -> Figure:
 
 def draw(answers: Sequence[Answer], path: Path) -> Path:
     """Write the diagram as a picture."""
-    diagram(answers).savefig(path, metadata={"Date": None, "Creator": None})
+    with replacing(path) as beside:
+        diagram(answers).savefig(beside, metadata={"Date": None, "Creator": None})
     return path
 
 

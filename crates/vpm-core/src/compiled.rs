@@ -14,6 +14,10 @@ use crate::simulate::Stepping;
 
 /// The version of the format that this core reads.
 pub const FORMAT: u32 = 1;
+/// Largest file that is read, bytes; machines of a hundred coordinates take less than a hundredth.
+pub const LARGEST: u64 = 64 << 20;
+/// Most states of a machine: several matrices of their square have to be held.
+pub const MOST_STATES: usize = 4096;
 
 /// What the file holds beside the description, whose `parameters` are the model's numbers in one flat block.
 #[derive(Deserialize)]
@@ -56,10 +60,18 @@ pub struct Compiled {
 impl Compiled {
     /// Reads what `vpm compile` wrote.
     pub fn read(path: &Path) -> Result<Self> {
-        let text = std::fs::read_to_string(path).map_err(|error| {
-            unreadable(format!("{}: {error}; give the file that `vpm compile` wrote", path.display()))
-        })?;
-        Self::parse(&text)
+        let faulty =
+            |what: String| unreadable(format!("{}: {what}; give the file that `vpm compile` wrote", path.display()));
+        let told = |error: std::io::Error| faulty(error.to_string());
+        let found = std::fs::metadata(path).map_err(told)?;
+        // A pipe never ends, and a file of no end takes all memory.
+        if !found.is_file() {
+            return Err(faulty("it is no ordinary file".to_owned()));
+        }
+        if found.len() > LARGEST {
+            return Err(faulty(format!("it has {} bytes, and at most {LARGEST} are read", found.len())));
+        }
+        Self::parse(&std::fs::read_to_string(path).map_err(told)?)
     }
 
     /// The same from memory.
@@ -73,6 +85,12 @@ impl Compiled {
         }
         let text: Text = serde_json::from_str(text).map_err(faulty)?;
         let description = Description::from_json(text.description.get())?;
+        let states = description.n_states();
+        if states > MOST_STATES {
+            return Err(unreadable(format!(
+                "its machine has {states} states, and at most {MOST_STATES} can be stepped; use coarser flexible links"
+            )));
+        }
         let lengths = [
             ("inputs", text.inputs.len(), description.n_inputs()),
             ("outputs", text.outputs.len(), description.n_outputs()),

@@ -7,7 +7,9 @@ use crate::error::{Diverged, Error, Result};
 use crate::integrator::Integrator;
 use crate::ode::Ode;
 use crate::sensor::Sensor;
-use crate::simulate::{SampledDrives, Stepping, check_pistons, check_state, check_step, halted, state_name};
+use crate::simulate::{
+    SampledDrives, Stepping, check_pistons, check_state, check_step, halted, output_name, state_name,
+};
 use crate::system::System;
 use crate::table::Table;
 
@@ -197,7 +199,7 @@ impl Live {
 
     fn observe(&mut self) -> Result<()> {
         if let Some(place) = self.state.iter().position(|state| !state.is_finite()) {
-            return Err(self.diverged(place));
+            return Err(self.diverged(&state_name(&self.description, place)));
         }
         let (layout, width) = (self.description.layout(), self.outputs.len());
         let row = self.sample % self.depth * width;
@@ -215,13 +217,17 @@ impl Live {
             let truth = |sample: usize| self.truth[(sample % self.depth) * width + column];
             self.outputs[column] = sensor.read(self.sample, self.stepping.time_step, truth);
         }
-        Ok(())
+        // A state may be finite still where its rate is not.
+        match self.outputs.iter().position(|output| !output.is_finite()) {
+            Some(column) => Err(self.diverged(&output_name(&self.description, column))),
+            None => Ok(()),
+        }
     }
 
     #[cold]
-    fn diverged(&self, place: usize) -> Error {
+    fn diverged(&self, what: &str) -> Error {
         Error::Diverged(Box::new(Diverged {
-            what: format!("the {}", state_name(&self.description, place)),
+            what: format!("the {what}"),
             event: Diverged::NOT_FINITE.to_owned(),
             time: self.time(),
             sample_index: self.sample,

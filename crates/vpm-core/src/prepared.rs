@@ -37,21 +37,21 @@ impl Prepared {
     pub fn inverse_dynamics(&mut self, q: &[f64], v: &[f64], a: &[f64]) -> Result<&[f64]> {
         self.expect([("position", q), ("velocity", v), ("acceleration", a)])?;
         self.dynamics.inverse_dynamics(q, v, a, &mut self.efforts);
-        Ok(&self.efforts)
+        sound("effort", &self.efforts)
     }
 
     /// Accelerations (m/s^2 or rad/s^2) that efforts `tau` (N or N m) on all coordinates give, with all effects.
     #[inline]
     pub fn forward_dynamics(&mut self, q: &[f64], v: &[f64], tau: &[f64]) -> Result<&[f64]> {
         self.expect([("position", q), ("velocity", v), ("effort", tau)])?;
-        Ok(self.dynamics.forward_dynamics(q, v, tau))
+        sound("acceleration", self.dynamics.forward_dynamics(q, v, tau))
     }
 
     /// Mass matrix with payloads, n x n (kg, kg m or kg m^2), symmetric.
     #[inline]
     pub fn mass_matrix(&mut self, q: &[f64]) -> Result<&[f64]> {
         self.expect([("position", q)])?;
-        Ok(self.dynamics.mass_matrix(q))
+        sound("mass_matrix", self.dynamics.mass_matrix(q))
     }
 
     /// Kinetic and potential energy in J. The potential is that of gravity, of the beams, and of the effects that have one.
@@ -59,6 +59,7 @@ impl Prepared {
     pub fn energy(&mut self, q: &[f64], v: &[f64]) -> Result<(f64, f64)> {
         self.expect([("position", q), ("velocity", v)])?;
         let total = self.dynamics.energy(q, v);
+        sound("energy", &[total.kinetic, total.potential])?;
         Ok((total.kinetic, total.potential))
     }
 
@@ -73,7 +74,7 @@ impl Prepared {
             return Err(Error::Reference { what, target: "marker", index: number, count });
         }
         self.dynamics.jacobian(q, number, &mut self.jacobian);
-        Ok(&self.jacobian)
+        sound("jacobian", &self.jacobian)
     }
 
     #[inline]
@@ -88,6 +89,20 @@ impl Prepared {
         }
         Ok(())
     }
+}
+
+/// A result, unless finite numbers far beyond any machine have made an infinite one of it.
+#[inline]
+fn sound<'a>(name: &str, result: &'a [f64]) -> Result<&'a [f64]> {
+    match result.iter().position(|number| !number.is_finite()) {
+        Some(place) => Err(unsound(name, place, result[place])),
+        None => Ok(result),
+    }
+}
+
+#[cold]
+fn unsound(name: &str, place: usize, value: f64) -> Error {
+    Error::NonFinite { path: format!("{name}[{place}] at this state"), value }
 }
 
 #[cold]

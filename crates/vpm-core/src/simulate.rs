@@ -16,7 +16,7 @@ mod stepper;
 
 pub use along::{Along, drives_along};
 pub use hold::{Course, Hold, Inputs};
-pub(crate) use names::state_name;
+pub(crate) use names::{output_name, state_name};
 pub use observer::{Filtered, Gains, Noise, Readings, filter, observe};
 pub use prescribed::{observed, prescribed};
 pub use resolution::resolution;
@@ -33,6 +33,9 @@ use crate::sensitivity::{Interrupt, Job, LANES, Pair, differentiate_by};
 use crate::system::Build;
 use crate::table::Table;
 use sampled::Astray;
+
+/// Most integration steps per sample: with more, one sample would take minutes that nobody can interrupt in C.
+pub const MOST_SUBSTEPS: usize = 1_000_000;
 
 /// How time advances.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -53,6 +56,11 @@ impl Stepping {
         if substeps == 0 {
             let condition = "be at least 1".to_owned();
             return Err(Error::Setting { setting: "substeps", condition, value: 0.0, repair: "use 1 to begin with" });
+        }
+        if substeps > MOST_SUBSTEPS {
+            let condition = format!("be at most {MOST_SUBSTEPS}");
+            let repair = "use 1 to begin with, or an integrator with controlled errors";
+            return Err(Error::Setting { setting: "substeps", condition, value: substeps as f64, repair });
         }
         Ok(Self { time_step, substeps, method })
     }

@@ -2,9 +2,10 @@
 
 use numpy::prelude::*;
 use numpy::{AllowTypeChange, PyArray1, PyArray2, PyArray3, PyArrayLikeDyn, PyReadonlyArray1};
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use vpm_core::table::Table;
+
+use crate::errors::CoreError;
 
 /// A copy of an array of two dimensions (or of one, as a single row), so that the core can read it without the interpreter lock.
 pub(crate) struct Numbers {
@@ -91,9 +92,7 @@ impl<'py> Vector<'py> {
 
 fn read(name: &str, array: &Bound<'_, PyAny>) -> PyResult<(Vec<f64>, Vec<usize>)> {
     let array: PyArrayLikeDyn<'_, f64, AllowTypeChange> = array.extract().map_err(|_| {
-        PyValueError::new_err(format!(
-            "`{name}` must be an array of numbers; convert it with numpy.asarray(..., float)"
-        ))
+        CoreError::new_err(format!("`{name}` must be an array of numbers; convert it with numpy.asarray(..., float)"))
     })?;
     let view = array.as_array();
     // Without gaps it is one copy of memory, which matters for records.
@@ -102,7 +101,7 @@ fn read(name: &str, array: &Bound<'_, PyAny>) -> PyResult<(Vec<f64>, Vec<usize>)
 }
 
 fn wrong_shape(name: &str, wanted: &str, shape: &[usize]) -> PyErr {
-    PyValueError::new_err(format!("`{name}` must have {wanted}, got shape {shape:?}; reshape it"))
+    CoreError::new_err(format!("`{name}` must have {wanted}, got shape {shape:?}; reshape it"))
 }
 
 /// Places in a list that Python may have counted from the end or beyond.
@@ -113,7 +112,7 @@ pub(crate) fn places(name: &str, numbers: &[i64]) -> PyResult<Vec<usize>> {
 /// A place that Python may have counted from the end or beyond.
 pub(crate) fn place(name: &str, number: i64) -> PyResult<usize> {
     usize::try_from(number)
-        .map_err(|_| PyValueError::new_err(format!("`{name}` must not be negative, got {number}; count from 0")))
+        .map_err(|_| CoreError::new_err(format!("`{name}` must not be negative, got {number}; count from 0")))
 }
 
 /// A table as an array of shape (rows, columns).

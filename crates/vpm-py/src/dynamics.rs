@@ -3,12 +3,11 @@
 use std::sync::{Mutex, MutexGuard};
 
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
-use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use vpm_core::prepared::Prepared;
 
 use crate::arrays::{Numbers, Vector, place, square};
-use crate::errors::exception;
+use crate::errors::{CoreError, exception};
 use crate::interrupt::unbroken;
 use crate::system::System;
 
@@ -27,7 +26,7 @@ type Any<'py> = Bound<'py, PyAny>;
 ///
 /// Raises
 /// ------
-/// ValueError
+/// CoreError
 ///     A parameter is not possible; one sentence with the repair.
 #[pyclass(frozen, module = "vpm._core")]
 pub(crate) struct Dynamics {
@@ -39,7 +38,7 @@ impl Dynamics {
     #[inline]
     fn prepared(&self) -> PyResult<MutexGuard<'_, Prepared>> {
         self.prepared.try_lock().map_err(|_| {
-            PyRuntimeError::new_err("these dynamics are at work in another thread; give each thread its own dynamics")
+            CoreError::new_err("these dynamics are at work in another thread; give each thread its own dynamics")
         })
     }
 }

@@ -2,15 +2,18 @@
 
 use numpy::PyArray1;
 use numpy::prelude::*;
-use pyo3::create_exception;
-use pyo3::exceptions::{PyArithmeticError, PyKeyboardInterrupt, PyValueError};
+use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
+use pyo3::{create_exception, import_exception};
 use vpm_core::error::{Diverged as Partial, Error};
+
+// An error of what was asked, as all of vpm's are: `vpm.errors` imports nothing, so that the core may import it.
+import_exception!(vpm.errors, CoreError);
 
 create_exception!(
     vpm._core,
     Diverged,
-    PyArithmeticError,
+    CoreError,
     "A simulation left the finite numbers; `sample_index`, `outputs` and `states` hold how far it came."
 );
 
@@ -19,7 +22,7 @@ pub(crate) fn exception(py: Python<'_>, error: Error, outputs: usize, states: us
     match error {
         Error::Diverged(partial) => diverged(py, *partial, outputs, states).unwrap_or_else(|error| error),
         Error::Interrupted => PyKeyboardInterrupt::new_err(error.to_string()),
-        error => PyValueError::new_err(error.to_string()),
+        error => CoreError::new_err(error.to_string()),
     }
 }
 

@@ -1,11 +1,11 @@
 //! Flights of a link through a play.
 
 use numpy::PyArray2;
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use vpm_core::flight::SoftPlay;
 
 use crate::arrays::{Numbers, matrix};
+use crate::errors::CoreError;
 use crate::interrupt::unbroken;
 
 /// Acceleration (N, k) of a link against the motor for each of k plays, where nothing but ``pull`` (N,) moves it within them; ``gaps``,
@@ -23,7 +23,7 @@ pub(crate) fn soft_flights<'py>(
     let (rates, dampings) = (Numbers::vector("rates", rates)?, Numbers::vector("dampings", dampings)?);
     let plays = gaps.values().len();
     if rates.values().len() != plays || dampings.values().len() != plays {
-        return Err(PyValueError::new_err(format!(
+        return Err(CoreError::new_err(format!(
             "gaps has {plays} values, rates {} and dampings {}; give one of each for every play",
             rates.values().len(),
             dampings.values().len()

@@ -1,8 +1,10 @@
 //! The class `Loop`: a loop at a fixed rate.
 
-use pyo3::exceptions::{PyRuntimeError, PyValueError};
+use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use vpm_core::realtime::{Loop as Core, Right, Rights};
+
+use crate::errors::CoreError;
 
 /// A loop at a fixed rate with absolute deadlines; it belongs to the thread that made it.
 ///
@@ -24,7 +26,7 @@ pub(crate) struct Loop {
 impl Loop {
     #[new]
     fn new(period: f64, lock_memory: bool, priority: Option<u8>) -> PyResult<Self> {
-        let core = Core::new(period).map_err(|error| PyValueError::new_err(error.to_string()))?;
+        let core = Core::new(period).map_err(|error| CoreError::new_err(error.to_string()))?;
         Ok(Self { core, rights: Some(Rights::ask(lock_memory, priority)) })
     }
 
@@ -32,7 +34,7 @@ impl Loop {
     fn wait(&mut self, py: Python<'_>) -> PyResult<(u64, f64, u64)> {
         let Self { core, rights } = self;
         if rights.is_none() {
-            return Err(PyRuntimeError::new_err("this loop is closed; make a new one"));
+            return Err(CoreError::new_err("this loop is closed; make a new one"));
         }
         // The other threads of Python go on while this one sleeps; a signal that ends the sleep is Python's to handle.
         let mut signal = None;

@@ -3,7 +3,6 @@
 use std::sync::{Mutex, MutexGuard};
 
 use numpy::{PyArray1, PyArray2};
-use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use vpm_core::Error;
 use vpm_core::integrator::Method;
@@ -11,6 +10,7 @@ use vpm_core::live::Live;
 use vpm_core::simulate::Stepping;
 
 use crate::arrays::{Numbers, Vector, matrix};
+use crate::errors::CoreError;
 use crate::interrupt::{interruptible, unbroken};
 use crate::system::{System, checked};
 
@@ -22,16 +22,15 @@ const PATIENCE: usize = 256;
 
 /// Checked settings from what Python gave.
 pub(crate) fn stepping((time_step, substeps, integrator): (f64, i64, &str)) -> PyResult<Result<Stepping, Error>> {
-    let substeps = usize::try_from(substeps).map_err(|_| {
-        PyValueError::new_err(format!("substeps must be at least 1, got {substeps}; use 1 to begin with"))
-    })?;
+    let substeps = usize::try_from(substeps)
+        .map_err(|_| CoreError::new_err(format!("substeps must be at least 1, got {substeps}; use 1 to begin with")))?;
     Ok(Method::from_name(integrator).and_then(|method| Stepping::new(time_step, substeps, method)))
 }
 
-/// Complains with `ValueError` about a name that is no integrator's, or a tolerance in it that means nothing.
+/// Complains with `CoreError` about a name that is no integrator's, or a tolerance in it that means nothing.
 #[pyfunction]
 pub(crate) fn check_integrator(name: &str) -> PyResult<()> {
-    Method::from_name(name).map(|_| ()).map_err(|error| PyValueError::new_err(error.to_string()))
+    Method::from_name(name).map(|_| ()).map_err(|error| CoreError::new_err(error.to_string()))
 }
 
 /// A simulation as it was at one time.
@@ -68,7 +67,7 @@ impl Snapshot {
 ///
 /// Raises
 /// ------
-/// ValueError
+/// CoreError
 ///     A setting, a size or a value is wrong; one sentence with the repair.
 #[pyclass(frozen, module = "vpm._core")]
 pub(crate) struct Simulation {
@@ -79,7 +78,7 @@ impl Simulation {
     /// The simulation, if no other thread is at work with it: to wait for that thread here could block the interpreter.
     fn live(&self) -> PyResult<MutexGuard<'_, Live>> {
         self.live.try_lock().map_err(|_| {
-            PyRuntimeError::new_err("this simulation is at work in another thread; give each thread its own simulation")
+            CoreError::new_err("this simulation is at work in another thread; give each thread its own simulation")
         })
     }
 }
@@ -178,7 +177,7 @@ impl Simulation {
     fn restore(&self, snapshot: &Snapshot) -> PyResult<()> {
         let mut live = self.live()?;
         if !live.is_alike(&snapshot.live) {
-            return Err(PyValueError::new_err(
+            return Err(CoreError::new_err(
                 "the snapshot is of another model, other parameters or other steps; restore one that this simulation or its like has taken",
             ));
         }

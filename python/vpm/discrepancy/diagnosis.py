@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.discrepancy.evidence import Evidence
+from vpm.files import write_text
 from vpm.identify import Fit
 from vpm.model import Model
 from vpm.results import Result, Storable
@@ -403,8 +404,7 @@ class Diagnosis(Result):
 
     def save_json(self, path: Path) -> Path:
         """Write ``report.json``."""
-        path.write_text(json.dumps(_finite(self.to_dict()), indent=2, allow_nan=False) + "\n", encoding="utf-8")
-        return path
+        return write_text(path, json.dumps(_finite(self.to_dict()), indent=2, allow_nan=False) + "\n")
 
     def _headline(self) -> Mapping[str, object]:
         names = ", ".join(f"{e.name} at {e.site}" for e in self.effects) or "no effect"

@@ -8,7 +8,6 @@ from functools import partial
 from threading import Lock
 from typing import TypeVar
 
-from vpm.errors import VpmError
 from vpm.identify.parallel import in_order, worker_count
 
 Item = TypeVar("Item")
@@ -64,7 +63,7 @@ class SideBySide:
             outcome: Outcome | Failure
             try:
                 outcome = work(item)
-            except (VpmError, ValueError, ArithmeticError) as error:
+            except (ValueError, ArithmeticError) as error:
                 outcome = Failure(f"it cannot be computed here: {error}")
             with lock:
                 done += 1

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from vpm.errors import ExcitationError, near_match
 from vpm.experiment import Experiment
+from vpm.files import replacing
 from vpm.results import Result
 
 if TYPE_CHECKING:
@@ -103,14 +104,13 @@ class Excitation(Result):
 
         `vpm.Experiment.load` reads it back without a channel table.
         """
-        target = Path(path)
         names = [f"{channel} [{unit}]" for channel, unit in zip(self.channels, self.units, strict=True)]
-        with target.open("w", encoding="utf-8", newline="") as file:
+        with replacing(path) as beside, beside.open("w", encoding="utf-8", newline="") as file:
             writer = csv.writer(file)
             writer.writerow(["time [s]", *names])
             for time, row in zip(self.time, self.data, strict=True):
                 writer.writerow([f"{time:.12g}", *(f"{value:.12g}" for value in row)])
-        return target
+        return Path(path)
 
     def to_experiment(self, references: Mapping[str, str] | None = None) -> Experiment:
         """The excitation as a record, whose commands and references `vpm.simulate` takes.

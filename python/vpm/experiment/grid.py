@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from vpm.errors import ExperimentError
 from vpm.experiment.signal import interpolate
+from vpm.numbers import LARGEST
 
 Array = NDArray[np.float64]
 
@@ -23,6 +24,12 @@ GRID_TOLERANCE = 0.05
 
 #: A step beyond this many median steps is a gap.
 GAP = 1.5
+
+#: Most samples of an interpolated record for each of its own: with more, nearly all of it would be invented.
+MOST_GROWTH = 10.0
+
+#: The same where somebody asks for a finer grid.
+MOST_FINER = 1000.0
 
 #: Quantities that change smoothly, and so may be interpolated by a spline.
 SMOOTH_QUANTITIES = ("position", "velocity", "acceleration")
@@ -58,14 +65,14 @@ class Source:
 
 
 def check_finite(values: Array, time: Array, what: str, source: Source, *, channel: str | None = None) -> None:
-    """Refuse NaN and infinity.
+    """Refuse NaN, infinity and what no machine can be at.
 
     Raises
     ------
     ExperimentError
         Names the first place, its time, and how many there are.
     """
-    bad = np.flatnonzero(~np.isfinite(values))
+    bad = np.flatnonzero(~(np.abs(values) <= LARGEST))  # nor NaN
     if bad.size:
         first = int(bad[0])
         when = f" at t = {time[first]:.6g} s" if np.isfinite(time[first]) else ""
@@ -153,7 +160,9 @@ def check_uniform(time: Array, source: Source) -> str:
     )
 
 
-def make_uniform(time: Array, data: Array, channels: tuple[str, ...], rate: float | None) -> tuple[Array, Array, str]:
+def make_uniform(
+    time: Array, data: Array, channels: tuple[str, ...], rate: float | None, source: Source
+) -> tuple[Array, Array, str]:
     """Interpolate a record onto a uniform grid.
 
     Parameters
@@ -165,6 +174,7 @@ def make_uniform(time: Array, data: Array, channels: tuple[str, ...], rate: floa
         Positions, velocities and accelerations are interpolated by cubic splines, all others by straight lines.
     rate : float or None
         Hz; None takes the median step.
+    source : Source
 
     Returns
     -------
@@ -172,10 +182,16 @@ def make_uniform(time: Array, data: Array, channels: tuple[str, ...], rate: floa
     data : ndarray, shape (M, C)
     sentence : str
         For the history.
+
+    Raises
+    ------
+    ExperimentError
+        The grid would have many times the samples of the record, as after one wrong stamp.
     """
     steps = np.diff(time)
     median = float(np.median(steps))
     step = median if rate is None else 1.0 / rate
+    check_grid(time, step, MOST_GROWTH if rate is None else MOST_FINER, source)
     grid = time[0] + step * np.arange(int((time[-1] - time[0]) / step * (1.0 + 1e-12) + 1e-6) + 1)
     grid = grid[grid <= time[-1] + 1e-6 * step]
     inside = np.minimum(grid, time[-1])
@@ -190,6 +206,25 @@ def make_uniform(time: Array, data: Array, channels: tuple[str, ...], rate: floa
             f"after t = {time[int(np.argmax(steps))]:.6g} s"
         )
     return grid, np.column_stack(columns) if columns else np.zeros((grid.size, 0)), text + "."
+
+
+def check_grid(time: Array, step: float, growth: float, source: Source) -> None:
+    """Refuse a grid that has many times the samples of the record.
+
+    Raises
+    ------
+    ExperimentError
+    """
+    count = float(time[-1] - time[0]) / step if step > 0.0 else np.inf
+    if count > growth * time.size:
+        steps = np.diff(time)
+        at = int(np.argmax(steps))
+        raise source.error(
+            f"{source.at(at + 1)}: a grid with steps of {step:.6g} s would have {count:.3g} samples where the record "
+            f"has {time.size}, and its longest step is from {time[at]:.9g} s to {time[at + 1]:.9g} s; correct this "
+            "time stamp, or trim the record there",
+            time=float(time[at + 1]),
+        )
 
 
 def is_smooth(channel: str) -> bool:

@@ -15,6 +15,7 @@ from vpm.experiment.draft import Draft, mapped_draft, plain_draft, to_si
 from vpm.experiment.grid import Source, check_finite, check_increasing, check_uniform, make_uniform
 from vpm.experiment.merge import merge_clocks
 from vpm.experiment.record import Experiment
+from vpm.numbers import array_of
 
 if TYPE_CHECKING:
     from vpm.model import ChannelEntry, Model
@@ -60,7 +61,7 @@ def array_parts(
     name: str,
 ) -> Parts:
     """Parts of a record from arrays; see `Experiment.from_arrays`."""
-    clock = np.asarray(time, dtype=np.float64)
+    clock = array_of(time, f"{name}: the time", ExperimentError)
     if clock.ndim != 1:
         raise ExperimentError(f"{name}: the time has shape {clock.shape}; give one number per sample")
     for channel in units:
@@ -72,7 +73,7 @@ def array_parts(
     draft = Draft(Source(name), clock)
     draft.history.append(f"Taken from arrays of {clock.size} samples.")
     for channel, given in values.items():
-        column = np.asarray(given, dtype=np.float64)
+        column = array_of(given, f'{name}: the channel "{channel}"', ExperimentError)
         if column.shape != clock.shape:
             raise ExperimentError(
                 f'{name}: the channel "{channel}" has shape {column.shape} and the time {clock.shape}; '
@@ -119,7 +120,7 @@ def _finish(draft: Draft, name: str, irregular: str, resample: float | None) -> 
         np.column_stack(list(draft.columns.values())) if channels else np.zeros((draft.time.size, 0)),
     )
     if irregular == "interpolate":
-        time, data, sentence = make_uniform(time, data, channels, None)
+        time, data, sentence = make_uniform(time, data, channels, None, draft.source)
     else:
         sentence = check_uniform(time, draft.source)
     units = tuple(draft.units[channel] for channel in channels)

@@ -8,7 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.errors import ExperimentError
-from vpm.experiment.grid import FEWEST_SAMPLES, Source, check_finite, check_increasing, is_smooth, make_uniform
+from vpm.experiment.grid import (
+    FEWEST_SAMPLES,
+    MOST_GROWTH,
+    Source,
+    check_finite,
+    check_grid,
+    check_increasing,
+    is_smooth,
+    make_uniform,
+)
 from vpm.experiment.signal import anti_alias, interpolate
 
 Array = NDArray[np.float64]
@@ -72,10 +81,11 @@ def merge_clocks(
             path=source.path,
             channel=late,
         )
+    check_grid(time, step, MOST_GROWTH, Source(source.name, None, source.path))
     grid = start + step * np.arange(int((stop - start) / step + 1e-6) + 1)
     merged, sentences = {}, []
     for channel, own in every.items():
-        merged[channel], how = _onto(grid, step, own, columns[channel], channel)
+        merged[channel], how = _onto(grid, step, own, columns[channel], channel, source)
         if channel in others:
             sentences.append(how)
     sentences.append(
@@ -85,7 +95,7 @@ def merge_clocks(
     return grid, merged, sentences
 
 
-def _onto(grid: Array, step: float, own: Array, values: Array, channel: str) -> tuple[Array, str]:
+def _onto(grid: Array, step: float, own: Array, values: Array, channel: str, source: Source) -> tuple[Array, str]:
     """Values on the grid; one that comes faster than the grid passes a filter first, as in `Experiment.resample`."""
     steps = np.diff(own)
     usual = float(np.median(steps))
@@ -93,7 +103,7 @@ def _onto(grid: Array, step: float, own: Array, values: Array, channel: str) -> 
     words = f"{channel} came every {usual:.6g} s (the longest step {steps.max():.6g} s) and was interpolated by "
     words += "cubic splines" if smooth else "straight lines"
     if step > 1.05 * usual:
-        own, data, _ = make_uniform(own, values[:, None], (channel,), None)
+        own, data, _ = make_uniform(own, values[:, None], (channel,), None, source)
         values = anti_alias(data, step / usual)[:, 0]
         words += f", behind a filter at {0.4 / step:.6g} Hz"
     return interpolate(own, values, np.clip(grid, own[0], own[-1]), smooth=smooth), f"{words}."

@@ -13,8 +13,18 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vpm.errors import ExperimentError, near_match
-from vpm.experiment.grid import FEWEST_SAMPLES, Source, check_finite, is_smooth, make_uniform
+from vpm.experiment.grid import (
+    FEWEST_SAMPLES,
+    Source,
+    check_finite,
+    check_increasing,
+    check_uniform,
+    is_smooth,
+    make_uniform,
+)
 from vpm.experiment.signal import anti_alias, differentiate, interpolate, lowpass
+from vpm.files import replacing
+from vpm.numbers import array_of
 from vpm.results import Result
 from vpm.units import parse_unit
 
@@ -70,7 +80,9 @@ class Experiment(Result):
     def __post_init__(self) -> None:
         """Take read-only copies of the arrays and check that the parts fit together."""
         for attribute in ("time", "data"):
-            values = np.array(getattr(self, attribute), dtype=np.float64, order="C")
+            values = np.array(
+                array_of(getattr(self, attribute), f"{self.name}: {attribute}", ExperimentError), order="C"
+            )
             values.setflags(write=False)
             object.__setattr__(self, attribute, values)
         expected = (self.time.size, len(self.channels))
@@ -84,6 +96,17 @@ class Experiment(Result):
             raise ExperimentError(
                 f'{self.name}: the channel "{repeated[0]}" is there twice; rename one of them', channel=repeated[0]
             )
+        self._check()
+
+    def _check(self) -> None:
+        """Check the numbers as those of a file are."""
+        source = Source(self.name)
+        check_finite(self.time, self.time, "the time", source, channel="time")
+        check_increasing(self.time, source)
+        check_uniform(self.time, source)
+        for channel, unit, column in zip(self.channels, self.units, self.data.T, strict=True):
+            parse_unit(unit)
+            check_finite(column, self.time, f'the channel "{channel}"', source, channel=channel)
 
     @classmethod
     def load(
@@ -232,7 +255,7 @@ class Experiment(Result):
 
     def split(self, fraction: float) -> tuple[Self, Self]:
         """Training and validation record: the first `fraction` of the time, and the rest."""
-        count = round(fraction * len(self))
+        count = round(fraction * len(self)) if 0.0 <= fraction <= 1.0 else 0
         if min(count, len(self) - count) < FEWEST_SAMPLES:
             raise ExperimentError(
                 f"{self.name}: a split at {fraction:g} leaves {count} and {len(self) - count} of {len(self)} samples, "
@@ -275,7 +298,7 @@ class Experiment(Result):
             )
         factor = self.rate / rate
         data = self.data if factor <= 1.0 else anti_alias(self.data, factor)
-        time, data, _ = make_uniform(self.time, data, self.channels, rate)
+        time, data, _ = make_uniform(self.time, data, self.channels, rate, Source(self.name))
         how = f"below a filter at {0.4 * rate:.6g} Hz" if factor > 1.0 else "without a filter"
         return self._changed(f"Resampled from {self.rate:.6g} Hz to {rate:.6g} Hz {how}.", time=time, data=data)
 
@@ -365,13 +388,12 @@ class Experiment(Result):
         ----------
         path : path-like
         """
-        target = Path(path)
-        with target.open("w", encoding="utf-8", newline="") as file:
+        with replacing(path) as beside, beside.open("w", encoding="utf-8", newline="") as file:
             writer = csv.writer(file)
             writer.writerow(["time [s]", *(f"{channel} [{self.unit(channel)}]" for channel in self)])
             columns = [self.time, *(self[channel] for channel in self)]
             writer.writerows([repr(float(value)) for value in row] for row in zip(*columns, strict=True))
-        return target
+        return Path(path)
 
     def plot(self) -> Figure:
         """All channels over time. Needs the extra ``plot``."""

@@ -12,6 +12,12 @@ from vpm.errors import ExperimentError
 
 Array = NDArray[np.float64]
 
+#: Highest order of one pass of a filter: beyond, sections of second order overflow.
+HIGHEST_ORDER = 20
+
+#: Least share of a period of the cut-off frequency that a record has to hold: below, a filter leaves a straight line.
+SHORTEST = 1e-2
+
 #: Order of the Butterworth filter of the motion, applied forward and backward.
 MOTION_FILTER_ORDER = 4
 
@@ -46,17 +52,22 @@ def lowpass(values: Array, rate: float, cutoff: float, order: int = MOTION_FILTE
     Raises
     ------
     ExperimentError
-        The cut-off frequency is not between zero and half of the rate, the order is below one, or there are fewer
-        than four samples.
+        The cut-off frequency is not between zero and half of the rate, or far too low for the record, the order is
+        none that can be computed, or there are fewer than four samples.
     """
     if not 0.0 < cutoff < 0.5 * rate:
         raise ExperimentError(
             f"a cut-off frequency of {cutoff:g} Hz cannot be had at {rate:g} samples per second; "
             f"choose one between 0 and {0.5 * rate:g} Hz"
         )
-    if order < 1:
-        raise ExperimentError(f"a filter of order {order} does nothing; choose an order of at least 1")
+    if not 1 <= order <= HIGHEST_ORDER:
+        raise ExperimentError(f"a filter of order {order} cannot be had; choose an order from 1 to {HIGHEST_ORDER}")
     _need_samples(values, 4, "filtering")
+    if cutoff * len(values) < SHORTEST * rate:
+        raise ExperimentError(
+            f"a cut-off frequency of {cutoff:g} Hz is too low for {len(values) / rate:g} s of record, which hold less "
+            f"than {SHORTEST:g} of its period; choose at least {SHORTEST * rate / len(values):.3g} Hz"
+        )
     from scipy.signal import butter
 
     sections = butter(order, cutoff / (0.5 * rate), output="sos")

@@ -15,7 +15,7 @@ from functools import lru_cache, partial
 import numpy as np
 from numpy.typing import NDArray
 
-from vpm.errors import DivergedError, SimulationError, VpmError
+from vpm.errors import CoreError, DivergedError, SimulationError
 from vpm.experiment import Experiment, Motion
 from vpm.identify.drive_answers import apart, driven, first_drives, needed, picked, together
 from vpm.identify.drive_memory import DriveMemory, Filter
@@ -192,8 +192,8 @@ def respond(
     except Diverged as error:
         time = float(m.time[0]) + len(error.outputs) * m.dt
         raise DivergedError(f"{experiment.name}: {error}", time=time) from None
-    except ValueError as error:
-        if isinstance(error, VpmError) or not has_hidden(model, m.joints):
+    except (CoreError, np.linalg.LinAlgError) as error:
+        if not has_hidden(model, m.joints):
             raise
         # No place of rest, or no mass matrix: with these numbers the machine cannot follow the motion.
         raise DivergedError(f"{experiment.name}: {error}", time=float(m.time[m.kept][0])) from None

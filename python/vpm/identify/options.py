@@ -50,7 +50,3 @@ Workers = Annotated[int, _option("Threads; 0 for one per core.")]
 Validate = Annotated[
     list[Path] | None, typer.Option(help="Record that is never fitted, on which the fit is judged; repeat.")
 ]
-Out = Annotated[
-    Path | None,
-    typer.Option(help="Folder for model.toml, parameters.csv, report.md, fit.npz and fit.png; or a .toml: the model."),
-]

@@ -2,32 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
-
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from collections.abc import Sequence
 
 from vpm.errors import IdentificationError
 from vpm.experiment import Experiment
 from vpm.identify.fit import Fit
 from vpm.identify.intervals import bootstrap, profile_intervals
 from vpm.identify.unseen import Gaps
-
-#: Evaluations that a fit mostly takes; where its progress bar ends.
-USUAL_EVALUATIONS = 15
-
-
-@contextmanager
-def shown(errors: Console, starts: int) -> Iterator[Callable[[int, float], None]]:
-    """A bar of the evaluations of a fit with its residual; a line each where the output goes to a file."""
-    if not errors.is_terminal:
-        yield lambda n, r: errors.print(f"evaluation {n}: residual {r:.5g}", markup=False)
-        return
-    words = TextColumn("evaluation {task.completed}: residual {task.fields[residual]:.5g}")
-    with Progress(TextColumn("fitting"), BarColumn(), words, TimeElapsedColumn(), console=errors) as bar:
-        task = bar.add_task("fitting", total=USUAL_EVALUATIONS * starts, residual=float("nan"))
-        yield lambda n, r: bar.update(task, completed=n, total=max(n, USUAL_EVALUATIONS * starts), residual=r)
 
 
 def told(fit: Fit) -> list[str]:

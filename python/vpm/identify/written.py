@@ -6,7 +6,8 @@ import csv
 from collections.abc import Sequence
 from pathlib import Path
 
-from vpm.errors import IdentificationError, MissingExtraError
+from vpm.errors import MissingExtraError
+from vpm.files import make_folder, replacing, write_text
 from vpm.identify.fit import Fit
 
 _COLUMNS = ("name", "start", "value", "std", "low", "high", "unit")
@@ -30,25 +31,23 @@ def write_fit(fit: Fit, folder: Path, lines: Sequence[str] = ()) -> list[Path]:
 
     Raises
     ------
-    IdentificationError
+    FileError
         The folder cannot be made or written to.
     """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        (folder / "report.md").write_text(_report(fit, lines), encoding="utf-8")
-        with (folder / "parameters.csv").open("w", encoding="utf-8", newline="") as file:
-            table = csv.writer(file)
-            table.writerow(_COLUMNS)
-            table.writerows(_rows(fit))
-    except OSError as error:
-        raise IdentificationError(f"{folder} cannot be written to ({error.strerror}); name another folder") from error
+    make_folder(folder)
+    write_text(folder / "report.md", _report(fit, lines))
+    with replacing(folder / "parameters.csv") as beside, beside.open("w", encoding="utf-8", newline="") as file:
+        table = csv.writer(file)
+        table.writerow(_COLUMNS)
+        table.writerows(_rows(fit))
     fit.model.save(folder / "model.toml")
     written = [folder / name for name in ("model.toml", "parameters.csv", "report.md")] + [fit.save(folder / "fit.npz")]
     try:
         figure = fit.plot()
     except MissingExtraError:  # a plain install draws nothing
         return written
-    figure.savefig(folder / "fit.png")
+    with replacing(folder / "fit.png") as beside:
+        figure.savefig(beside)
     return [*written, folder / "fit.png"]
 
 

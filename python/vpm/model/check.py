@@ -14,7 +14,7 @@ from vpm.model.connection_check import complete_contacts, connection_problems, c
 from vpm.model.drive_check import complete_drives, drive_problems, unit_problems, value_problems
 from vpm.model.effects import complete_effects, effect_problems
 from vpm.model.form import schema_problems
-from vpm.model.messages import Problem, place, raise_first
+from vpm.model.messages import Problem, check_plain, place, raise_first
 from vpm.model.omissions import omission_problems
 from vpm.model.parameters import Parameter, Slot, slots, table
 from vpm.model.references import gauge_problems, reference_problems
@@ -57,6 +57,7 @@ def check_document(content: Mapping[str, object], path: str | None = None) -> Ch
     ModelError
         One sentence about the first problem, and how many more the stage found.
     """
+    check_plain(content, path)
     try:
         document = Document.model_validate(content)
     except ValidationError as error:

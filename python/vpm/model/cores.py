@@ -31,7 +31,7 @@ def core_of(description: str, theta: NDArray[np.float64]) -> System:
 
     Raises
     ------
-    ValueError
+    CoreError
         The core refuses the description.
     VpmError
         There is no core.

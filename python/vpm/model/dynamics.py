@@ -18,7 +18,7 @@ class Dynamics:
 
     All buffers are made once. Contiguous arrays of double precision are read where they are; each call makes one new
     array, its result. Arrays have one number per coordinate, in the order of ``model.coordinates``: m or rad, per
-    second, N or N m. Wrong lengths and numbers that are not finite raise ``ValueError``.
+    second, N or N m. Wrong lengths and numbers that are not finite raise ``CoreError``.
     An object may be shared between threads, but one for each is faster.
 
     Parameters

@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vpm.errors import ModelError, near_match
+from vpm.errors import CoreError, ModelError, near_match
 from vpm.linear import LinearModel
 from vpm.model.components import Components
 from vpm.model.settled import follow, rest
+from vpm.numbers import array_of, number_of
 
 if TYPE_CHECKING:
     from vpm._core import Dynamics, System
@@ -74,7 +75,7 @@ class Evaluations(Components):
 
         Raises
         ------
-        ValueError
+        CoreError
             The length is wrong.
         """
         return self.dynamics.mass_matrix(q)
@@ -95,7 +96,7 @@ class Evaluations(Components):
 
         Raises
         ------
-        ValueError
+        CoreError
             A length is wrong.
         """
         return self.dynamics.inverse_dynamics(q, v, a)
@@ -114,7 +115,7 @@ class Evaluations(Components):
 
         Raises
         ------
-        ValueError
+        CoreError
             A length is wrong.
         """
         return self.dynamics.forward_dynamics(q, v, effort)
@@ -131,7 +132,7 @@ class Evaluations(Components):
 
         Raises
         ------
-        ValueError
+        CoreError
             A length is wrong.
         """
         return self.dynamics.energy(q, v)
@@ -153,7 +154,7 @@ class Evaluations(Components):
         ------
         ModelError
             There is no such marker.
-        ValueError
+        CoreError
             The length is wrong.
         """
         return self.dynamics.jacobian(q, self.markers.index(self._known(marker, self.markers, "marker")))
@@ -177,7 +178,7 @@ class Evaluations(Components):
 
         Raises
         ------
-        ValueError
+        CoreError
             The length is wrong, or there is no rest: what the links carry buckles them.
         """
         return self.core.equilibrium(self.theta, q)
@@ -197,7 +198,7 @@ class Evaluations(Components):
 
         Raises
         ------
-        ValueError
+        CoreError
             As `equilibrium`.
         """
         return self.core.natural_frequencies(self.theta, q)
@@ -229,7 +230,7 @@ class Evaluations(Components):
         try:
             coordinates, _ = self.equilibrium(rest)
             frequencies = self.natural_frequencies(rest)
-        except ValueError as error:
+        except CoreError as error:
             yield f"warning: no rest with all joints at zero: {error}"
             return
         more = ", ..." if frequencies.size > 4 else ""
@@ -339,7 +340,7 @@ class Evaluations(Components):
         ------
         ModelError
             A name or a length is wrong.
-        ValueError
+        CoreError
             A derivative is not finite there, or an actuator acts at samples of its own.
         """
         command = self.command(inputs)
@@ -389,9 +390,9 @@ class Evaluations(Components):
                 if name not in names:
                     repair = near_match(name, names, what="it has")
                     raise ModelError(f'{self.name} has no {what} "{name}"; {repair}', where=name)
-                filled[names.index(name)] = float(value)
+                filled[names.index(name)] = number_of(value, f"{self.name}: {name}", ModelError)
         elif values is not None:
-            given = np.asarray(values, dtype=np.float64)
+            given = array_of(values, f"{self.name}: {what}", ModelError)
             if given.shape != filled.shape and not (given.ndim == 0 and filled.size == 1):
                 listed = ", ".join(names) or "none"
                 raise ModelError(

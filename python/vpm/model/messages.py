@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import tomllib
 from collections.abc import Mapping, Sequence
@@ -11,6 +12,11 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from vpm.errors import ModelError
+from vpm.files import unreadable
+from vpm.numbers import LARGEST
+
+#: Deepest nesting of a file; a model file needs seven.
+DEEPEST = 32
 
 
 @dataclass(frozen=True)
@@ -66,6 +72,8 @@ def read_toml(path: str | PathLike[str]) -> dict[str, Any]:
     ModelError
         The file cannot be read, is not UTF-8, or breaks the syntax of TOML.
     """
+    if reason := unreadable(path):
+        raise ModelError(reason, path=str(path))
     try:
         text = Path(path).read_text(encoding="utf-8")
     except FileNotFoundError:
@@ -77,6 +85,32 @@ def read_toml(path: str | PathLike[str]) -> dict[str, Any]:
     return parse_toml(text, str(path))
 
 
+def check_plain(content: Mapping[str, object], path: str | None = None) -> None:
+    """Refuse what every later step would stumble over: tables of tables without end, and numbers that nothing has.
+
+    Raises
+    ------
+    ModelError
+        A table is nested deeper than `DEEPEST`, an integer has more than the 64 bits of TOML, or a number is huge.
+    """
+    left: list[tuple[tuple[str | int, ...], object]] = [((), content)]
+    while left:
+        way, value = left.pop()
+        if len(way) > DEEPEST:
+            where = f"{place(*way[:3])} ..."
+            raise_first([Problem(where, f"is nested more than {DEEPEST} deep; write it flatter")], path)
+        if isinstance(value, int) and not -(2**63) <= value < 2**63:
+            rest = "is an integer of more than 64 bits; write a number with a point, 1e300"
+            raise_first([Problem(place(*way), rest)], path)
+        if isinstance(value, float) and LARGEST < abs(value) < math.inf:
+            rest = f"is {value:g}, which is more than any machine has; correct the value"
+            raise_first([Problem(place(*way), rest)], path)
+        if isinstance(value, Mapping):
+            left += [((*way, str(key)), inner) for key, inner in value.items()]
+        elif isinstance(value, list | tuple):
+            left += [((*way, at), inner) for at, inner in enumerate(value)]
+
+
 def parse_toml(text: str, path: str | None = None) -> dict[str, Any]:
     """Content of a TOML text.
 
@@ -85,8 +119,11 @@ def parse_toml(text: str, path: str | None = None) -> dict[str, Any]:
     ModelError
         The text breaks the syntax of TOML; the error knows line and column.
     """
+    head = f"{path}: " if path else ""
     try:
-        return tomllib.loads(text)
+        content = tomllib.loads(text)
+    except RecursionError:
+        raise ModelError(f"{head}tables or lists are nested without end; write them flatter", path=path) from None
     except tomllib.TOMLDecodeError as error:
         found = re.fullmatch(
             r"(?P<what>.*) \(at (?:line (?P<line>\d+), column (?P<column>\d+)|end of document)\)", str(error)
@@ -95,9 +132,12 @@ def parse_toml(text: str, path: str | None = None) -> dict[str, Any]:
         what = found["what"] if found else str(error)
         line = int(found["line"]) if found and found["line"] else len(lines)
         column = int(found["column"]) if found and found["column"] else len(lines[-1]) + 1
-        head = f"{path}: " if path else ""
         message = f"{head}line {line}, column {column} is not TOML: {what[:1].lower()}{what[1:]}; correct the line"
         raise ModelError(message, path=path, line=line, column=column) from None
+    except ValueError:  # Python reads no integer of thousands of digits
+        raise ModelError(f"{head}an integer has more than 64 bits; write a number with a point", path=path) from None
+    check_plain(content, path)
+    return content
 
 
 def shown(value: object) -> str:

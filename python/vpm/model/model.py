@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.catalogue import SITE_KINDS, Side, effect_type
-from vpm.errors import ModelError, VpmError, near_match
+from vpm.errors import CoreError, ModelError, near_match
+from vpm.files import write_text
 from vpm.model.check import Checked, check_document
 from vpm.model.compile import description
 from vpm.model.cores import core_of
@@ -24,6 +25,7 @@ from vpm.model.messages import parse_toml, read_toml
 from vpm.model.parameters import Parameter
 from vpm.model.transmission import TURNING
 from vpm.model.writer import content_of, plain, toml_of
+from vpm.numbers import number_of
 from vpm.results import Storable, html_table
 
 if TYPE_CHECKING:
@@ -116,9 +118,7 @@ class Model(Evaluations, Storable):
         pathlib.Path
             Where it was written.
         """
-        target = Path(path)
-        target.write_text(self.to_toml(), encoding="utf-8")
-        return target
+        return write_text(path, self.to_toml())
 
     @property
     def path(self) -> str | None:
@@ -185,7 +185,7 @@ class Model(Evaluations, Storable):
         content = content_of(self._checked.document, complete=True)
         for name, value in values.items():
             slot = self._checked.slots[self.index(name)]
-            changed = slot.si_quantity().model_copy(update={"value": float(value)})
+            changed = slot.si_quantity().model_copy(update={"value": number_of(value, name, ModelError)})
             *way, last = slot.keys
             target: Any = content
             for key in way:
@@ -263,7 +263,8 @@ class Model(Evaluations, Storable):
                 given = self._motor_side(name, at)
             # Nobody knows beforehand at which velocity a friction law bends; places and periods are told.
             known = parameter.shape and (parameter.name in values or not parameter.learnt)
-            entry[parameter.name] = float(given) if known else {"value": float(given), "uncertainty": math.inf}
+            number = number_of(given, f"{parameter.name} of {name}", ModelError)
+            entry[parameter.name] = number if known else {"value": number, "uncertainty": math.inf}
         content = self.to_dict()
         content.setdefault("effects", []).append(entry)
         return type(self)(content)
@@ -365,9 +366,7 @@ class Model(Evaluations, Storable):
         """
         try:
             return core_of(self.description(), self.theta)
-        except VpmError:
-            raise
-        except ValueError as error:
+        except CoreError as error:
             raise ModelError(f"{self.name}: {error}") from error
 
     # ---- manners -----------------------------------------------------------------------------------------------------

@@ -24,6 +24,7 @@ from vpm.model.messages import Problem, place
 from vpm.model.schema import Document, EffectEntry
 from vpm.model.structure import COORDINATE_UNIT, Structure
 from vpm.model.transmission import transmission_rows
+from vpm.numbers import LARGEST
 from vpm.units import convert, require_dimension, si_unit
 
 ParameterKind = Literal["linear", "shape"]
@@ -111,6 +112,9 @@ class Slot:
             require_dimension(unit, self.unit)
         except UnitError as error:
             yield Problem(where, f"has a wrong unit: {error}")
+            return
+        if not abs(convert(quantity.value, unit, self.unit)) <= LARGEST:
+            yield Problem(where, f"is {quantity.value:g} {unit}, which is more than any machine has; correct the value")
             return
         spread, low, high = quantity.uncertainty, quantity.minimum, quantity.maximum
         if spread is not None and not spread > 0.0:

@@ -31,6 +31,7 @@ INK, SOFT, LINE = "#1b2430", "#5d6b7a", "#c9d1db"
 STAGES = (SOFT, ORANGE, BLUE, GREEN, PURPLE, SKY)
 
 _STYLE: Mapping[str, Any] = {
+    "text.parse_math": False,  # a dollar in a name of the user is a dollar
     "axes.axisbelow": True,
     "axes.edgecolor": SOFT,
     "axes.grid": True,

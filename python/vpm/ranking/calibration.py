@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from vpm.errors import DiagnosisError
+from vpm.files import write_text
 from vpm.ranking.posterior import robust_probabilities
 
 Array = NDArray[np.float64]
@@ -49,8 +50,7 @@ class Calibration:
 
     def save(self, path: Path) -> Path:
         """Write them as JSON."""
-        path.write_text(json.dumps(asdict(self), indent=2) + "\n", encoding="utf-8")
-        return path
+        return write_text(path, json.dumps(asdict(self), indent=2) + "\n")
 
     @classmethod
     def load(cls, path: Path) -> Calibration:

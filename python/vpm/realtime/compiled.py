@@ -11,6 +11,7 @@ from pathlib import Path
 from numpy.typing import ArrayLike
 
 from vpm.errors import SimulationError
+from vpm.files import write_text
 from vpm.model import Model
 from vpm.simulate import AUTOMATIC, Setup
 
@@ -38,9 +39,7 @@ class CompiledModel:
 
     def save(self, path: str | PathLike[str]) -> Path:
         """Write the file that ``vpm_open`` reads."""
-        target = Path(path)
-        target.write_text(self.text, encoding="utf-8")
-        return target
+        return write_text(path, self.text)
 
 
 def compile_model(

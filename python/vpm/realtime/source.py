@@ -10,6 +10,7 @@ from os import PathLike
 from pathlib import Path
 
 from vpm.errors import SimulationError, near_match
+from vpm.files import make_folder, write_text
 from vpm.model import Model
 
 
@@ -34,12 +35,8 @@ class CSource:
 
     def save(self, folder: str | PathLike[str]) -> tuple[Path, Path]:
         """Write ``NAME.h`` and ``NAME.c`` into a folder, which is made if it is not there."""
-        target = Path(folder)
-        target.mkdir(parents=True, exist_ok=True)
-        header, source = target / f"{self.name}.h", target / f"{self.name}.c"
-        header.write_text(self.header, encoding="utf-8")
-        source.write_text(self.source, encoding="utf-8")
-        return header, source
+        target = make_folder(folder)
+        return write_text(target / f"{self.name}.h", self.header), write_text(target / f"{self.name}.c", self.source)
 
 
 def c_source(model: Model, *, name: str | None = None, parameters: Sequence[str] = ()) -> CSource:

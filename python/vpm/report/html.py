@@ -14,6 +14,7 @@ from vpm.catalogue import EFFECTS
 from vpm.catalogue.signature import signature_of
 from vpm.discrepancy import Diagnosis, Evidence
 from vpm.errors import MissingExtraError
+from vpm.files import write_text
 from vpm.plot import (
     figure_to_svg,
     plot_candidates,
@@ -41,9 +42,7 @@ class Report:
 
     def save(self, path: str | PathLike[str]) -> Path:
         """Write the page to an HTML file that needs no other file."""
-        target = Path(path)
-        target.write_text(render_html(self.diagnosis, self.ladder), encoding="utf-8")
-        return target
+        return write_text(path, render_html(self.diagnosis, self.ladder))
 
     def _repr_html_(self) -> str:
         return render_html(self.diagnosis, self.ladder)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from vpm.discrepancy import Diagnosis
+from vpm.files import make_folder
 from vpm.report.html import report
 
 
@@ -28,7 +29,7 @@ def write_report(diagnosis: Diagnosis, folder: Path) -> tuple[Path, ...]:
     MissingExtraError
         The packages of the extra ``report`` are not installed; ``report.json`` and the model are there all the same.
     """
-    folder.mkdir(parents=True, exist_ok=True)
+    make_folder(folder)
     document = diagnosis.save_json(folder / "report.json")
     repaired = folder / "model.toml"
     diagnosis.model.save(repaired)

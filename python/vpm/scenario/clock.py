@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vpm.model import Model
 from vpm.scenario.messages import refuse
 from vpm.scenario.schema import Document
 from vpm.scenario.values import si_value
 
 #: Samples that a scenario may have: more do not fit into a memory.
 MOST_SAMPLES = 10_000_000
+
+#: Numbers that all runs of a scenario may make together, states and outputs of every sample: some copies of them fit
+#: into 2 GB, and a core that gets no memory ends the process.
+MOST_NUMBERS = 20_000_000
 
 #: Share of a step by which the duration may miss a whole number of steps: decimal fractions are rounded.
 DIVISION_TOLERANCE = 1e-6
@@ -64,3 +70,17 @@ def clock_of(document: Document) -> Clock:
         rest = f"is {time_step:g} s, which does not divide the duration of {duration:g} s ({steps:.6g} steps)"
         refuse(("time_step",), f"{rest}; write for example {near:.6g}")
     return Clock(duration, time_step, whole)
+
+
+def check_numbers(clock: Clock, models: Collection[Model]) -> None:
+    """Refuse runs that no memory holds.
+
+    Raises
+    ------
+    ScenarioError
+        The runs would make too many numbers together.
+    """
+    each = sum(len(model.state_names) + len(model.output_channels) for model in models)
+    if clock.steps * each > MOST_NUMBERS:
+        rest = f"makes {clock.steps} samples of {each} numbers in all runs, and {MOST_NUMBERS} numbers fit together"
+        refuse(("duration",), f"{rest}; shorten it, or make time_step longer")

@@ -20,7 +20,7 @@ from vpm.experiment import Experiment
 from vpm.model import Model
 from vpm.model.messages import parse_toml, read_toml
 from vpm.results import html_table
-from vpm.scenario.clock import clock_of
+from vpm.scenario.clock import check_numbers, clock_of
 from vpm.scenario.form import schema_problems
 from vpm.scenario.inputs import given_inputs
 from vpm.scenario.machine import machines
@@ -61,6 +61,7 @@ class Scenario:
             self._clock = clock_of(self._document)
             self._setup = _setup(self._document)
             self._models = machines(self._document.runs, Path(folder))
+            check_numbers(self._clock, self._models.values())
             # All that can be wrong is found here, before the first run takes its time.
             self._starts = {name: self._start(f'run "{name}"', model) for name, model in self._models.items()}
             self._panels = checked_panels(self._document, self._models)

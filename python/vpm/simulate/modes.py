@@ -21,7 +21,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from vpm.errors import DivergedError, SimulationError, VpmError
+from vpm.errors import CoreError, DivergedError, SimulationError
 from vpm.experiment import Experiment, Motion
 from vpm.initial import initial_state as start
 from vpm.initial import joint_motion, measured_states, whole_motion
@@ -134,9 +134,7 @@ def simulate_arrays(
         raise DivergedError(
             str(error), run=run, time=float(experiment.time[0]) + len(run.time) * experiment.dt
         ) from None
-    except VpmError:
-        raise
-    except ValueError as error:  # of the core: sizes, numbers and steps that no simulation can take
+    except (CoreError, np.linalg.LinAlgError) as error:  # sizes, numbers and steps that no simulation can take
         raise SimulationError(f"{experiment.name}: {error}") from error
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from vpm.errors import SimulationError
@@ -15,6 +16,9 @@ AUTOMATIC = "auto"
 INTEGRATORS = (AUTOMATIC, *FIXED_STEP, "guarded", "adaptive")
 #: What commands of a log do between its samples.
 HOLDS = ("zero_order", "first_order", "cubic")
+
+#: Most integration steps per sample, as the core has it.
+MOST_SUBSTEPS = 1_000_000
 
 
 @dataclass(frozen=True)
@@ -62,11 +66,11 @@ class Setup(Storable):
     def __post_init__(self) -> None:
         """Check the choices."""
         _check_integrator(self.integrator)
-        if self.substeps < 1:
-            raise SimulationError(f"substeps is {self.substeps}; give a whole number of at least 1")
-        if not self.horizon > 0.0:
+        if self.substeps % 1 or not 1 <= self.substeps <= MOST_SUBSTEPS:
+            raise SimulationError(f"substeps is {self.substeps}; give a whole number from 1 to {MOST_SUBSTEPS}")
+        if not 0.0 < self.horizon < math.inf:
             raise SimulationError(f"horizon is {self.horizon} s; give a positive time")
-        if not self.settling >= 0.0:
+        if not 0.0 <= self.settling < math.inf:
             raise SimulationError(f"settling is {self.settling} s; give a time that is not negative")
         if self.hold not in (choices := (AUTOMATIC, *HOLDS)):
             raise SimulationError(f"unknown hold '{self.hold}'; choose one of {', '.join(choices)}")

@@ -5,4 +5,5 @@
 mod calls;
 mod example;
 mod header;
+mod hostile;
 mod support;

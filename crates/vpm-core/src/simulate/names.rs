@@ -58,7 +58,7 @@ pub(super) fn coordinate(description: &Description, place: usize) -> String {
 }
 
 /// An output in words.
-pub(super) fn output_name(description: &Description, column: usize) -> String {
+pub(crate) fn output_name(description: &Description, column: usize) -> String {
     const JOINT: [&str; 4] = ["position", "velocity", "acceleration", "effort"];
     const MARKER: [&str; 6] = ["x", "y", "z", "rx", "ry", "rz"];
     const HYDRAULIC: [&str; 5] = ["spool", "pressure a", "pressure b", "flow a", "flow b"];

@@ -1,14 +1,13 @@
 //! The class `Karl`.
 
 use numpy::{PyArray1, PyArray2};
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use vpm_core::algebra::{Conic, resultant};
 use vpm_core::linkage::StrokeLinkage;
 use vpm_core::linkage::karl::{Karl as Limb, KarlGeometry, KarlPose};
 
 use crate::arrays::{Numbers, matrix};
-use crate::errors::exception;
+use crate::errors::{CoreError, exception};
 
 type Table<'py> = Bound<'py, PyArray2<f64>>;
 type Any<'py> = Bound<'py, PyAny>;
@@ -26,7 +25,7 @@ type Any<'py> = Bound<'py, PyAny>;
 ///
 /// Raises
 /// ------
-/// ValueError
+/// CoreError
 ///     No limb has these dimensions.
 #[pyclass(frozen, module = "vpm._core")]
 pub(crate) struct Karl {
@@ -135,7 +134,7 @@ impl Karl {
         let linkage = self.linkage(actuator)?;
         match linkage.alignments()[..] {
             [extended, _, folded, _] => Ok(linkage.span(&extended, &folded, mode)),
-            _ => Err(PyValueError::new_err(format!(
+            _ => Err(CoreError::new_err(format!(
                 "actuator {actuator} has no two pairs of alignments, so no span between them; ask for its alignments"
             ))),
         }
@@ -152,7 +151,7 @@ impl Karl {
         let place = usize::try_from(actuator).ok();
         place
             .and_then(|place| self.limb.linkages().get(place))
-            .ok_or_else(|| PyValueError::new_err(format!("KARL has no actuator {actuator}; its actuators are 0 and 1")))
+            .ok_or_else(|| CoreError::new_err(format!("KARL has no actuator {actuator}; its actuators are 0 and 1")))
     }
 }
 
@@ -167,7 +166,7 @@ pub(super) fn same_rows(name: &str, found: usize, wanted: usize) -> PyResult<()>
     if found == wanted {
         return Ok(());
     }
-    Err(PyValueError::new_err(format!("`{name}` has {found} rows for {wanted} configurations; give one row for each")))
+    Err(CoreError::new_err(format!("`{name}` has {found} rows for {wanted} configurations; give one row for each")))
 }
 
 pub(super) fn table<'py, const N: usize>(

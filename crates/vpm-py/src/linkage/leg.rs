@@ -1,7 +1,6 @@
 //! The class `Leg`.
 
 use numpy::{PyArray2, PyArray3};
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use vpm_core::Error;
 use vpm_core::linkage::leg::{
@@ -12,7 +11,7 @@ use vpm_core::spatial::Vector2;
 
 use super::karl::{same_rows, table};
 use crate::arrays::{Numbers, cube};
-use crate::errors::exception;
+use crate::errors::{CoreError, exception};
 use crate::interrupt::interruptible;
 
 type Table<'py> = Bound<'py, PyArray2<f64>>;
@@ -36,7 +35,7 @@ type Parameters = (f64, [[f64; 5]; 2], [[f64; 4]; 2], [[f64; 3]; 4], f64);
 ///
 /// Raises
 /// ------
-/// ValueError
+/// CoreError
 ///     No leg has these parameters.
 #[pyclass(frozen, module = "vpm._core")]
 pub(crate) struct Leg {
@@ -52,7 +51,7 @@ pub(crate) fn hyq_parameters(data: &str, shank: f64) -> PyResult<Parameters> {
         "plausible" => HyqData::Plausible,
         other => {
             let text = format!("there are no parameters \"{other}\"; the choices are table, identified, plausible");
-            return Err(PyValueError::new_err(text));
+            return Err(CoreError::new_err(text));
         }
     };
     let p = LegParameters::hyq(data, shank);
@@ -127,7 +126,7 @@ impl Leg {
             "lagrange" => |leg: &Limb, q, v| leg.lagrange(q, v),
             other => {
                 let text = format!("there is no derivation \"{other}\" of terms; use virtual_work or lagrange");
-                return Err(PyValueError::new_err(text));
+                return Err(CoreError::new_err(text));
             }
         };
         let rows = py.detach(|| {
@@ -201,7 +200,7 @@ impl Leg {
             other => {
                 let choices = "sum_of_norms, norm_of_absolute_sum, root_of_squares and torque";
                 let text = format!("there is no definition \"{other}\" of a share; the choices are {choices}");
-                return Err(PyValueError::new_err(text));
+                return Err(CoreError::new_err(text));
             }
         };
         let samples = usize::try_from(samples).unwrap_or(0);

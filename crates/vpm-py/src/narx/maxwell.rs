@@ -1,12 +1,12 @@
 //! The class `MaxwellNarx`.
 
 use numpy::PyArray1;
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use vpm_core::narx::{self, MaxwellScheme, Surface};
 
 use super::{Any, Row, raised};
 use crate::arrays::Numbers;
+use crate::errors::CoreError;
 
 /// A Maxwell element beside a spring as a difference equation.
 ///
@@ -25,7 +25,7 @@ pub(crate) struct MaxwellNarx {
 fn surface(name: &'static str, values: &Any<'_>) -> PyResult<Surface> {
     match Numbers::vector(name, values)?.rows_of::<10>()?[..] {
         [coefficients] => Ok(Surface(coefficients)),
-        _ => Err(PyValueError::new_err(format!("`{name}` must have ten coefficients; fill up with zeros"))),
+        _ => Err(CoreError::new_err(format!("`{name}` must have ten coefficients; fill up with zeros"))),
     }
 }
 
@@ -40,7 +40,7 @@ impl MaxwellNarx {
             "central_mean" => MaxwellScheme::CentralMean,
             other => {
                 let text = format!("`scheme` is {other}; the choices are trapezoidal, printed and central_mean");
-                return Err(PyValueError::new_err(text));
+                return Err(CoreError::new_err(text));
             }
         };
         let element = narx::MaxwellNarx::new(surface("k0", k0)?, surface("s0", s0)?, k1, c1, step, scheme);

@@ -3,7 +3,6 @@
 use std::sync::{Mutex, MutexGuard};
 
 use numpy::PyArray1;
-use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use vpm_core::Error;
 use vpm_core::error::NarxError;
@@ -12,7 +11,7 @@ use vpm_core::narx;
 pub(crate) use maxwell::MaxwellNarx;
 
 use crate::arrays::{Numbers, Vector};
-use crate::errors::{Diverged, exception};
+use crate::errors::{CoreError, Diverged, exception};
 
 mod maxwell;
 
@@ -61,7 +60,7 @@ impl Copied {
             let (rows, samples) = (inputs.rows(), output.values().len());
             let text =
                 format!("record `{name}` has {rows} rows of inputs for {samples} samples; give one row for each");
-            return Err(PyValueError::new_err(text));
+            return Err(CoreError::new_err(text));
         }
         Ok(Self { name: name.clone(), output, inputs })
     }
@@ -87,7 +86,7 @@ fn copied(records: &[Given<'_>]) -> PyResult<Vec<Copied>> {
 ///
 /// Raises
 /// ------
-/// ValueError
+/// CoreError
 ///     A term that is not possible; one sentence with the repair.
 #[pyclass(frozen, module = "vpm._core")]
 pub(crate) struct Narx {
@@ -100,7 +99,7 @@ impl Narx {
     #[pyo3(signature = (signals, terms, coefficients))]
     fn new(py: Python<'_>, signals: Vec<String>, terms: Terms, coefficients: &Any<'_>) -> PyResult<Self> {
         if signals.is_empty() {
-            return Err(PyValueError::new_err("`signals` is empty; give the output's name first, then the inputs'"));
+            return Err(CoreError::new_err("`signals` is empty; give the output's name first, then the inputs'"));
         }
         let theta = Numbers::vector("coefficients", coefficients)?;
         let model = structure(&signals, terms).and_then(|structure| narx::Narx::new(structure, theta.values()));
@@ -163,7 +162,7 @@ pub(crate) struct NarxStepper {
 impl NarxStepper {
     fn stepper(&self) -> PyResult<MutexGuard<'_, narx::Stepper>> {
         let taken = "this stepper is at work in another thread; give each thread its own";
-        self.stepper.try_lock().map_err(|_| PyRuntimeError::new_err(taken))
+        self.stepper.try_lock().map_err(|_| CoreError::new_err(taken))
     }
 }
 
@@ -185,7 +184,7 @@ impl NarxStepper {
             let (found, needed) = (inputs.len(), stepper.inputs());
             let text =
                 format!("`inputs` has {found} numbers, but the model has {needed} inputs; give one number for each");
-            return Err(PyValueError::new_err(text));
+            return Err(CoreError::new_err(text));
         }
         Ok(stepper.step(inputs))
     }
@@ -242,7 +241,7 @@ pub(crate) fn narx_select<'py>(
         "free_run_tail" => narx::Stop::FreeRunTail(value),
         other => {
             let text = format!("`stop` is {other}; the choices are terms, unexplained, bic, aic and free_run_tail");
-            return Err(PyValueError::new_err(text));
+            return Err(CoreError::new_err(text));
         }
     };
     let records = copied(&records)?;

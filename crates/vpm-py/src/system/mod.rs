@@ -25,7 +25,7 @@ use crate::interrupt::interruptible;
 ///
 /// Raises
 /// ------
-/// ValueError
+/// CoreError
 ///     The description cannot be right; one sentence with the place and the repair.
 #[pyclass(frozen, module = "vpm._core")]
 pub(crate) struct System {

@@ -2,7 +2,6 @@
 
 use allocation_counter::measure;
 use numpy::PyArray1;
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use vpm_core::live::Live;
 use vpm_core::timing::{Course, Stage};
@@ -10,6 +9,7 @@ use vpm_core::timing::{Course, Stage};
 use super::System;
 use super::simulation::Request;
 use crate::arrays::Numbers;
+use crate::errors::CoreError;
 
 type Any<'py> = Bound<'py, PyAny>;
 /// Durations, allocations, bytes, stages, why there is no machine code.
@@ -37,9 +37,8 @@ impl System {
         let request = Request::new(self, theta, (time_step, substeps, integrator), &[])?;
         let initial = Numbers::vector("initial_state", initial_state)?;
         let inputs = Numbers::table("inputs", inputs)?;
-        let count = usize::try_from(count).map_err(|_| {
-            PyValueError::new_err(format!("count must not be negative, got {count}; ask for some steps"))
-        })?;
+        let count = usize::try_from(count)
+            .map_err(|_| CoreError::new_err(format!("count must not be negative, got {count}; ask for some steps")))?;
         let (durations, allocations, bytes, stages, reason) = self.compute(py, |interrupt| {
             let setting = request.setting(&self.description, interrupt);
             let mut live = Ok(None);

@@ -6,7 +6,8 @@ from os import PathLike
 from pathlib import Path
 
 from vpm.errors import ExperimentError
-from vpm.experiment.readers.base import Log
+from vpm.experiment.readers.base import Log, reading
+from vpm.files import unreadable
 
 #: Endings of the formats beside text.
 PARQUET = (".parquet", ".pq")
@@ -38,6 +39,13 @@ def open_log(path: str | PathLike[str]) -> Log:
     MissingExtraError
         The library that reads this format is not installed.
     """
+    if reason := unreadable(path):
+        raise ExperimentError(reason, path=str(path))
+    with reading(path):
+        return _opened(path)
+
+
+def _opened(path: str | PathLike[str]) -> Log:
     file = Path(path)
     ending = file.suffix.lower()
     if ending in (*PARQUET, *MATLAB, *HDF5, *BAGS) and not file.exists():

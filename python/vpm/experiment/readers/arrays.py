@@ -59,7 +59,7 @@ class ArrayLog(Log):
             return array
         return f"{array}[{index}, :]" if row else f"{array}[:, {index}]"
 
-    def read(self, columns: Sequence[str], clock: str) -> Table:
+    def _read(self, columns: Sequence[str], clock: str) -> Table:
         """Columns by name; see `Log.read`."""
         found = {column: self._values(column) for column in columns}
         expected = found[clock].size

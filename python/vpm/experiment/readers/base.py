@@ -3,11 +3,33 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from os import PathLike
 
-from vpm.errors import ExperimentError
+from vpm.errors import ExperimentError, VpmError
 from vpm.experiment.table import Table, missing_column
+
+
+@contextmanager
+def reading(path: str | PathLike[str]) -> Iterator[None]:
+    """Whatever a parser raises about a broken file becomes one sentence.
+
+    Raises
+    ------
+    ExperimentError
+    """
+    try:
+        yield
+    except VpmError:
+        raise
+    except Exception as error:  # the parsers of five formats raise what they stumble over
+        told = str(error).splitlines()[0] if str(error).strip() else type(error).__name__
+        raise ExperimentError(
+            f"{path} cannot be read ({told[:200]}); check that it was closed when it was written, and that its ending "
+            "says what it is",
+            path=str(path),
+        ) from error
 
 
 class Log(ABC):
@@ -36,7 +58,6 @@ class Log(ABC):
         """Name in `header` of what a channel table calls ``column``; None where the file does not have it."""
         return column if column in self.header else None
 
-    @abstractmethod
     def read(self, columns: Sequence[str], clock: str) -> Table:
         """Columns by their names in the header.
 
@@ -50,8 +71,14 @@ class Log(ABC):
         Raises
         ------
         ExperimentError
-            A column holds something that is no number, or their lengths differ.
+            A column holds something that is no number, their lengths differ, or the file is broken.
         """
+        with reading(self.path):
+            return self._read(columns, clock)
+
+    @abstractmethod
+    def _read(self, columns: Sequence[str], clock: str) -> Table:
+        """Columns by their names; see `read`."""
 
     def missing(self, column: str, channel: str = "") -> ExperimentError:
         """Error for a column that the file does not have, or that is no column of numbers."""

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from vpm.errors import ExperimentError
 from vpm.experiment.readers.arrays import ArrayLog, shape_of_vector
 from vpm.experiment.readers.base import Log
+from vpm.experiment.readers.mat_tags import check_tags
 
 Array = NDArray[np.float64]
 
@@ -20,6 +21,7 @@ def open_mat(path: str | PathLike[str]) -> Log:
     from scipy.io import loadmat
     from scipy.io.matlab import MatReadError
 
+    check_tags(path)
     try:
         content = loadmat(path, simplify_cells=True)
     except NotImplementedError:  # version 7.3 is HDF5, and SciPy says so

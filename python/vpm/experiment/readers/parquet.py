@@ -59,7 +59,7 @@ class ParquetLog(Log):
         self.units: dict[str, str] = {}
         self._table = table
 
-    def read(self, columns: Sequence[str], clock: str) -> Table:  # noqa: ARG002
+    def _read(self, columns: Sequence[str], clock: str) -> Table:  # noqa: ARG002
         """Columns by name; see `Log.read`."""
         stamps = frozenset(column for column in columns if column in self._stamps)
         found = {column: self._seconds(column) if column in stamps else self._numbers(column) for column in columns}

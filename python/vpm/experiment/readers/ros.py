@@ -91,7 +91,7 @@ class BagLog(Log):
         topic = f"/{column.partition('.')[0].lstrip('/')}"
         return super().missing(topic if topic in self.refused else column, channel)
 
-    def read(self, columns: Sequence[str], clock: str) -> Table:
+    def _read(self, columns: Sequence[str], clock: str) -> Table:
         """Columns by name, each with its own times; see `Log.read`."""
         wanted = [column for column in columns if column != clock]
         for column in wanted:

@@ -20,6 +20,6 @@ class TextLog(Log):
         self.refused: dict[str, str] = {}
         self.units: dict[str, str] = {}
 
-    def read(self, columns: Sequence[str], clock: str) -> Table:  # noqa: ARG002
+    def _read(self, columns: Sequence[str], clock: str) -> Table:  # noqa: ARG002
         """Columns by name; see `Log.read`."""
         return read_table(self.path, columns)

@@ -1,0 +1,48 @@
+"""Numbers at the door: what users give becomes arrays of double precision, or an error that says what it is."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from vpm.errors import VpmError
+
+#: No quantity of a machine is larger in SI units; squares and products of three are still finite numbers.
+LARGEST = 1e100
+
+
+def array_of(given: ArrayLike, what: str, error: type[VpmError] = VpmError) -> NDArray[np.float64]:
+    """Array of numbers.
+
+    Parameters
+    ----------
+    given : array_like
+        Of any shape.
+    what : str
+        Name for messages, as the beginning of a sentence.
+    error : type
+        Class of the error.
+
+    Raises
+    ------
+    VpmError
+        It holds something else than numbers, or its rows differ in length.
+    """
+    try:
+        return np.asarray(given, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError) as reason:
+        raise error(f"{what} is no array of numbers ({reason}); give numbers in rows of equal length") from reason
+
+
+def number_of(given: object, what: str, error: type[VpmError] = VpmError) -> float:
+    """A single number.
+
+    Raises
+    ------
+    VpmError
+        It is none.
+    """
+    try:
+        return float(given)  # type: ignore[arg-type]  # whatever float takes is right
+    except (TypeError, ValueError, OverflowError) as reason:
+        raise error(f"{what} is no number ({reason}); give one") from reason

@@ -1,0 +1,182 @@
+"""Whatever happens while a file is written, there is the old or the new one; and long commands end as they should."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from io import StringIO
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+import pytest
+from rich.console import Console
+from typer.testing import CliRunner
+
+from vpm import command, demo
+from vpm.cli import app
+from vpm.diagnosing import diagnose
+from vpm.errors import SimulationError
+from vpm.experiment import Experiment
+from vpm.files import FileError, replacing, write_text
+from vpm.model import Model
+from vpm.report import print_story, write_report
+
+MODEL, LOG = str(demo.MODEL), str(demo.TRAIN)
+POSIX = pytest.mark.skipif(os.name != "posix", reason="needs limits and signals of POSIX")
+
+
+@contextmanager
+def largest(count: int) -> Iterator[None]:
+    """No file can grow beyond so many bytes, as on a full disk."""
+    import resource
+
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (count, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+        signal.signal(signal.SIGXFSZ, handler)
+
+
+@POSIX
+@pytest.mark.parametrize("what", ["text", "result", "table"])
+def test_a_full_disk_leaves_what_was_there(tmp_path: Path, what: str) -> None:
+    steps = np.arange(5000, dtype=np.float64)
+    noise = np.random.default_rng(0).normal(size=(5000, 1))
+    record = Experiment("made", 0.01 * steps, noise, ("x",), ("1",))
+    target = tmp_path / "file"
+    target.write_text("old", encoding="utf-8")
+    write = {"text": lambda: write_text(target, "new" * 5000), "result": lambda: record.save(target)}
+    with largest(4096), pytest.raises(FileError, match="file cannot be written"):
+        write.get(what, lambda: record.to_csv(target))()
+    assert target.read_text(encoding="utf-8") == "old"
+    assert list(tmp_path.iterdir()) == [target]
+
+
+@POSIX
+def test_a_kill_leaves_what_was_there(tmp_path: Path) -> None:
+    target = tmp_path / "file"
+    target.write_text("old", encoding="utf-8")
+    program = (
+        "import os, signal, sys\nfrom vpm.files import replacing\n"
+        "with replacing(sys.argv[1]) as beside:\n"
+        "    beside.write_text('half')\n    os.kill(os.getpid(), signal.SIGKILL)"
+    )
+    done = subprocess.run([sys.executable, "-c", program, str(target)], check=False)
+    assert done.returncode == -signal.SIGKILL
+    assert target.read_text(encoding="utf-8") == "old"
+
+
+def test_links_stay_links_and_modes_stay(tmp_path: Path) -> None:
+    (tmp_path / "there").write_text("old", encoding="utf-8")
+    (tmp_path / "there").chmod(0o600)
+    (tmp_path / "link").symlink_to("there")
+    write_text(tmp_path / "link", "new")
+    assert (tmp_path / "link").is_symlink()
+    assert (tmp_path / "there").read_text(encoding="utf-8") == "new"
+    assert (tmp_path / "there").stat().st_mode & 0o777 == 0o600
+    write_text(os.devnull, "nothing")
+    assert not Path(os.devnull).is_file()
+
+
+def test_an_error_while_writing_leaves_what_was_there(tmp_path: Path) -> None:
+    write_text(tmp_path / "file", "old")
+
+    def stopped() -> None:
+        with replacing(tmp_path / "file") as beside:
+            beside.write_text("half", encoding="utf-8")
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        stopped()
+    assert (tmp_path / "file").read_text(encoding="utf-8") == "old"
+    assert list(tmp_path.iterdir()) == [tmp_path / "file"]
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["simulate", "none.toml", LOG, "--out", "{}"],
+        ["identify", "none.toml", LOG, "--out", "{}/m.toml"],
+        ["identify", "none.toml", LOG, "--out", "{}"],
+        ["diagnose", "none.toml", LOG, "--out", "{}"],
+        ["rank", "none.toml", LOG, "--out", "{}/m.toml"],
+        ["climb", "none.toml", LOG, "--validate", LOG, "--out", "{}/m.toml"],
+        ["simplify", "none.toml", LOG, "--out", "{}/m.toml"],
+        ["compile", "none.toml", "--out", "{}/m.json"],
+        ["compile", "none.toml", "--c", "{}"],
+        ["report", "none.npz", "--out", "{}"],
+        ["demo", "--out", "{}"],
+        ["prove", "--folder", "none", "--out", "{}/page.md"],
+        ["excite", "chirp", "--channel", "c", "--unit", "A", "--band", "1", "2", "--period", "1", "--time-step", "0.01",
+         "--peak", "1", "--out", "{}/m.csv"],
+        ["compare", "none.toml", LOG, "--plot", "{}/a.png"],
+        ["budget", "none.toml", "--plot", "{}/a.png"],
+    ],
+    ids=lambda words: f"{words[0]} {words[-1]}",
+)  # fmt: skip
+def test_every_place_to_write_to_is_tried_before_anything_is_read(tmp_path: Path, words: list[str]) -> None:
+    """The model is not there either: what is told is the place, so it came first."""
+    (tmp_path / "file").write_text("no folder", encoding="utf-8")
+    bad = str(tmp_path / "file" / "x")
+    with pytest.raises(FileError, match="cannot be written"):
+        CliRunner().invoke(app, [word.format(bad) for word in words], catch_exceptions=False)
+
+
+@POSIX
+@pytest.mark.parametrize("words", [["budget", MODEL, "--steps", "100000000", "--latency", "0"], ["demo", "--out", "r"]])
+def test_ctrl_c_ends_with_the_exit_code_of_shells(tmp_path: Path, words: list[str]) -> None:
+    program = [sys.executable, "-c", "import vpm.cli; print('begun', flush=True); vpm.cli.main()", *words]
+    with subprocess.Popen(program, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=tmp_path) as running:
+        assert running.stdout is not None
+        assert running.stdout.readline() == "begun\n"
+        time.sleep(1.0)
+        running.send_signal(signal.SIGINT)
+        told = running.communicate(timeout=120)[1]
+    assert running.returncode == 130
+    assert "Traceback" not in told
+    assert "stopped by Ctrl-C" in told
+
+
+def test_output_to_a_file_gets_a_line_for_each_stage_and_for_long_silence(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(command, "PERIOD", 0.05)
+    with command.searching() as (tell, each):
+        tell("looking")
+        for done in range(1, 100):
+            each("round 1", "friction", done, 99)
+        deadline = time.monotonic() + 30.0
+        told = ""
+        while "after" not in told and time.monotonic() < deadline:
+            time.sleep(0.01)
+            told += capsys.readouterr().err
+    lines = told.splitlines()
+    assert lines[:2] == ["looking", "round 1 1 of 99: friction"]
+    assert lines[2].startswith("round 1 99 of 99: friction (after ")
+
+
+@pytest.mark.parametrize(("names", "broken"), [("ranking", "_examined"), ("search", "_settled")])
+def test_an_error_after_the_search_leaves_what_it_found(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, names: Literal["ranking", "search"], broken: str
+) -> None:
+    def fail(*_: object, **__: object) -> None:
+        raise SimulationError("the beam is bent")
+
+    arm = Model.load(demo.MODEL)
+    logs = [Experiment.load(path, model=arm) for path in (demo.TRAIN, demo.VALIDATION)]
+    monkeypatch.setattr(f"vpm.diagnosing.{broken}", fail)
+    found = diagnose(arm, logs[:1], logs[1:], effects=["coulomb_friction"], names=names, workers=1)
+    assert [(effect.name, effect.site) for effect in found.effects] == [("coulomb_friction", "shoulder")]
+    assert any("could not be computed: the beam is bent" in note for note in found.notes)
+    buffer = StringIO()
+    print_story(found, Console(file=buffer))
+    assert "coulomb_friction" in buffer.getvalue()
+    write_report(found, tmp_path)
+    assert "coulomb_friction" in (tmp_path / "report.html").read_text(encoding="utf-8")
