@@ -10,6 +10,7 @@ import typer
 
 from vpm.command import Channels, Hold, Integrator, Interpolate, Logs, ModelPath, Workers, console, load_all, searching
 from vpm.errors import ModelError
+from vpm.files import probe_file, write_text
 
 if TYPE_CHECKING:
     from vpm.log_check import LogCheck
@@ -39,6 +40,8 @@ def check(
     from vpm.log_check import check_log
     from vpm.simulate import Setup
 
+    if fix:
+        probe_file(channels or model)
     machine, records = load_all(model, logs, channels, interpolate)
     table = _table(machine, channels, logs[0])
     with searching() as (_, each):
@@ -93,4 +96,4 @@ def _write(found: LogCheck, logs: int, table: Mapping[str, ChannelEntry], path: 
     else:
         whole = {name: line_of(name, entry) for name, entry in table.items()} | lines
         text = "\n".join([text.rstrip(), "", "[channels]", *whole.values(), ""])
-    path.write_text(text, encoding="utf-8")
+    write_text(path, text)

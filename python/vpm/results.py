@@ -109,6 +109,7 @@ _MODULES: Mapping[str, tuple[str, ...]] = {
     "vpm.linkages.karl_results": ("KarlPoses", "KarlSingularities", "KarlWorkspace"),
     "vpm.linkages.leg_parameters": ("Attachment", "Cylinder", "LegParameters", "LegPart", "Segment"),
     "vpm.linkages.leg_results": ("LegReactions", "LegStrokes", "LegTerms", "ShareMap"),
+    "vpm.log_check.finding": ("Finding", "LogCheck"),
     "vpm.model.model": ("Model",),
     "vpm.narx.maxwell": ("MaxwellNarx",),
     "vpm.narx.maxwell_maps": ("MaxwellMap",),

@@ -298,8 +298,8 @@ impl<'a, S: Scalar> Assembly<'a, S> {
         for point in &self.parts.point_masses {
             let (name, frame) = (self.parts.site_name(point.on), self.site(point.on)?.frame);
             let total = self.inertias[frame].value();
-            // A beam carries its own mass: without anything at a section there is nothing to check.
-            if matches!(point.on, Mount::Section { .. }) && total.mass == 0.0 {
+            // A beam carries its own mass: without anything at its tip there is nothing to check.
+            if matches!(point.on, Site::Tip(_)) && total.mass == 0.0 {
                 continue;
             }
             let [xx, yy, zz, ..] = total.rotational.to_array();
