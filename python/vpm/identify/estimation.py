@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares, lsq_linear
 
 from vpm.identify.identifiability import RANK_TOLERANCE, Combination, column_lengths, unseen_combinations
-from vpm.identify.moments import real_bodies
+from vpm.identify.moments import Coordinates, real_bodies
 from vpm.identify.objective import AnyProblem
 from vpm.identify.problem import Problem, segments
 from vpm.identify.statistics import robust_covariance
@@ -101,11 +101,11 @@ def estimate(
     """
     columns = [model.index(name) for name in free]
     box = low, high = limits(model, free, bounds or {})
-    matrix: Array = np.eye(len(columns))
+    frame = Coordinates()
     if feasible:
-        matrix, low, high = real_bodies(model, free, low, high)
-    counter = _Counter(model, data, columns, progress, worth, matrix)
-    first = start = np.clip(np.asarray(np.linalg.solve(matrix, model.theta[columns])), low, high)
+        frame, low, high = real_bodies(model, free, low, high)
+    counter = _Counter(model, data, columns, progress, worth, frame)
+    first = start = np.clip(frame.at(model.theta[columns]), low, high)
     interrupted = early = False
     try:
         if columns:
@@ -122,7 +122,7 @@ def estimate(
         start, (residual, jacobian) = counter.best
         interrupted = isinstance(reason, KeyboardInterrupt)
         early = not interrupted
-    values, jacobian = matrix @ start, np.asarray(np.linalg.solve(matrix.T, jacobian.T).T)
+    values, jacobian = frame.parameters(start), frame.by_parameters(jacobian)
     unseen = unseen_combinations(jacobian, free)
     covariance = _covariance(data, residual, jacobian, unseen, free)
     touching = tuple(
@@ -198,9 +198,9 @@ class _Counter:
         columns: list[int],
         progress: Progress | None,
         worth: Worth | None = None,
-        matrix: Array | None = None,
+        frame: Coordinates | None = None,
     ) -> None:
-        self.matrix = np.eye(len(columns)) if matrix is None else matrix
+        self.frame = frame or Coordinates()
         self.model, self.data, self.columns, self.progress, self.worth = model, data, columns, progress, worth
         self.theta = model.theta.copy()
         self.count = 0
@@ -245,10 +245,10 @@ class _Counter:
     def _evaluate(self, x: Array, columns: list[int]) -> tuple[Array, Array]:
         """Infinite where the values make no machine (an inertia that no body has): a step to there is not taken."""
         theta = self.theta.copy()
-        theta[self.columns] = self.matrix @ x
+        theta[self.columns] = self.frame.parameters(x)
         try:
             residual, jacobian = self.data.evaluate(self.model, theta, columns)
-            return residual, jacobian @ self.matrix if columns else jacobian
+            return residual, self.frame.by_coordinates(jacobian)
         except ValueError:
             if self.count == 0:  # the start itself: an error of the input, not of a step
                 raise
@@ -278,15 +278,15 @@ def _nearest(counter: _Counter, found: Array, start: Array, low: Array, high: Ar
     residual, jacobian = counter(found)
     if not found.size or not np.all(np.isfinite(jacobian)):
         return found
-    for matrix in (counter.matrix, np.eye(found.size)):
-        slopes = np.asarray(np.linalg.solve(matrix.T, jacobian.T).T)
+    for frame in dict.fromkeys((counter.frame, Coordinates())):
+        slopes = frame.by_parameters(jacobian)
         lengths = column_lengths(slopes)
         _, values, directions = np.linalg.svd(np.linalg.qr(slopes / lengths, mode="r"))
         blind = directions[values < RANK_TOLERANCE * max(float(values[0]), 1e-300)]
         if not blind.size:
             return found
-        astray = blind.T @ (blind @ (lengths * (matrix @ (found - start)))) / lengths
-        nearer = np.asarray(np.clip(found - np.linalg.solve(matrix, astray), low, high))
+        astray = blind.T @ (blind @ (lengths * frame.parameters(found - start))) / lengths
+        nearer = np.asarray(np.clip(found - frame.at(astray), low, high))
         if np.sum(counter.residual(nearer) ** 2) <= (1.0 + UNCHANGED) * np.sum(residual**2):
             return nearer
     return found

@@ -9,6 +9,7 @@ Robotics and Automation Letters* 3, 2018); beside one known moment, sum and diff
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +23,33 @@ AXES, PAIRS = ("xx", "yy", "zz"), ("xy", "xz", "yz")
 TOUCHING = 1e-6
 
 
-def real_bodies(model: Model, free: Sequence[str], low: Array, high: Array) -> tuple[Array, Array, Array]:
+@dataclass(frozen=True, eq=False)
+class Coordinates:
+    """What a descent moves in place of parameters: ``parameters = matrix @ coordinates``, or the parameters themselves.
+
+    Derivatives of parameters that stay themselves may be infinite, which no product with a matrix bears.
+    """
+
+    matrix: Array | None = None
+
+    def parameters(self, x: Array) -> Array:
+        """Parameters (p,) at coordinates (p,)."""
+        return x if self.matrix is None else np.asarray(self.matrix @ x)
+
+    def at(self, parameters: Array) -> Array:
+        """Coordinates (p,) of parameters (p,)."""
+        return parameters if self.matrix is None else np.asarray(np.linalg.solve(self.matrix, parameters))
+
+    def by_coordinates(self, jacobian: Array) -> Array:
+        """Derivative (n, p) by the coordinates, of that by the parameters."""
+        return jacobian if self.matrix is None or not jacobian.size else np.asarray(jacobian @ self.matrix)
+
+    def by_parameters(self, jacobian: Array) -> Array:
+        """Derivative (n, p) by the parameters, of that by the coordinates."""
+        return jacobian if self.matrix is None else np.asarray(np.linalg.solve(self.matrix.T, jacobian.T).T)
+
+
+def real_bodies(model: Model, free: Sequence[str], low: Array, high: Array) -> tuple[Coordinates, Array, Array]:
     """Coordinates of free parameters in a box, with those of moments of inertia inside what bodies can have.
 
     Parameters
@@ -34,8 +61,7 @@ def real_bodies(model: Model, free: Sequence[str], low: Array, high: Array) -> t
 
     Returns
     -------
-    matrix : ndarray, shape (p, p)
-        Parameters are ``matrix @ coordinates``.
+    coordinates : Coordinates
     low, high : ndarray, shape (p,)
         Bounds of the coordinates. Moments that have bounds of their own, or products of inertia beside them, stay
         coordinates.
@@ -56,7 +82,7 @@ def real_bodies(model: Model, free: Sequence[str], low: Array, high: Array) -> t
             third = model.parameters[known].value
             matrix[np.ix_(mine, mine)] = [[0.5, 0.5], [0.5, -0.5]]
             low[mine], high[mine] = [third, -third], [np.inf, third]
-    return matrix, low, high
+    return Coordinates(None if np.array_equal(matrix, np.eye(len(free))) else matrix), low, high
 
 
 def on_the_border(model: Model, free: Sequence[str]) -> list[tuple[list[str], str]]:
