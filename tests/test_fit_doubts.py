@@ -9,11 +9,13 @@ import pytest
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
+import vpm
 from fit_machines import Arm, Axis, records
 from vpm.errors import IdentificationError
 from vpm.experiment import Experiment
-from vpm.identify import Checks, Fit, identify, ljung_box, problem
+from vpm.identify import Checks, Fit, gaps, identify, identify_inertial, ljung_box, problem
 from vpm.identify.comparison import comparison
+from vpm.identify.inertial_model import InertialModel, repaired
 from vpm.identify.words import told
 from vpm.model import Model
 from vpm.simulate import Setup
@@ -286,3 +288,46 @@ def test_first_states_that_nobody_knows_are_told() -> None:
     fit = identify(coupled(), swung(0, (0.05, 1.0)), list(COUPLED), mode="free_run", setup=Setup("rk4", 2))
     assert fit.first_states == "unknown"
     assert "first states: unknown" in told(fit)
+
+
+# ---- inertial parameters ---------------------------------------------------------------------------------------------
+
+
+def test_inertial_parameters_make_a_model_that_predicts_other_records() -> None:
+    """Of an arm without dry friction the repaired model is as good as the truth on a record that was never fitted."""
+    machine = Arm()
+    train, other = records(machine, "white", 1, seed=70)[0], records(machine, "white", 1, seed=71)[0]
+    fit = identify_inertial(machine.model, train, physical=True)
+    right = fit.repaired(machine.model)
+    before, after = fit.judged_on(machine.model, other)
+    exact = machine.model.with_parameters(dict(zip(machine.free, machine.truth, strict=True)))
+    data = problem(exact, [other])
+    best = gaps(data, data.evaluate(exact, exact.theta)[0])
+    for channel in after:
+        assert after[channel][0] < 0.5 * before[channel][0]
+        assert after[channel][0] < 1.2 * best[channel][0]
+    assert right.parameters["shoulder.friction.viscous"].value == pytest.approx(1.5, rel=0.1)
+
+
+def test_a_repaired_model_has_the_numbers_of_its_standard_parameters() -> None:
+    model = Arm().model
+    values = dict(zip((linear := InertialModel(model, [])).names, map(float, linear.nominal), strict=True))
+    np.testing.assert_allclose(repaired(model, values).theta, model.theta, atol=1e-15)
+
+
+@pytest.mark.nightly
+def test_diagnosis_works_with_the_repaired_model() -> None:
+    """Dry friction that the arm has and the model lacks is still named after the repair."""
+    machine = Arm(coulomb=1.0)
+    train, other = records(machine, "white", 1, 72, 0.005)[0], records(machine, "white", 1, 73, 0.005)[0]
+    right = identify_inertial(machine.model, train, physical=True).repaired(machine.model)
+    found = vpm.diagnose(right, [train], [other])
+    assert "coulomb_friction" in {effect.name for effect in found.effects}
+
+
+def test_values_of_no_body_make_no_model() -> None:
+    values = dict.fromkeys(InertialModel(Arm().model, []).names, 1.0)
+    with pytest.raises(IdentificationError, match="upper: no body has the values of this fit"):
+        repaired(Arm().model, values)
+    with pytest.raises(IdentificationError, match='has no parameter "elbow'):
+        repaired(Arm().model, {"elbow.ripple": 1.0})
