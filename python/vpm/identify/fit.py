@@ -24,7 +24,7 @@ from vpm.identify.output_error import OutputErrorProblem
 from vpm.identify.prediction_error import PredictionErrorProblem
 from vpm.identify.problem import gaps
 from vpm.identify.remarks import constant_channels, contradictions, lost_channels, remarks, resting, touching
-from vpm.identify.sandwich import record_groups, sandwich
+from vpm.identify.sandwich import freedom, record_groups, sandwich
 from vpm.identify.settings import Checks, Fitting
 from vpm.identify.shooting import ShootingProblem
 from vpm.identify.ties import TiedProblem, check_ties
@@ -75,7 +75,7 @@ class Fit(Result):
     whiteness : tuple of Whiteness
         What is left of each channel of each record, and how much of that the motion explains.
     freedom : float
-        Samples that count less the unknowns: degrees of freedom of Student's t in the intervals.
+        Degrees of freedom of Student's t in the intervals: fewer than samples, because neighbours resemble each other.
     noise : dict
         ``{channel: standard deviation}`` that residuals were divided by, SI; empty where it was the signal's spread.
     states, states_std : dict
@@ -257,11 +257,9 @@ def identify(
             found.evaluations,
         )
         fit = _with_details(fit_of(model, data, result, before, [e.name for e in records], ties or {}), data, found)
-    unknowns = len(names) + len(fit.states)
-    counted = float(sum(block.moving.sum() for block in data.blocks))
     judged = whiteness(fit.model, records, data, result.residual, result.jacobian)
     fit = replace(fit, setup=setup, fitting=fitting, ties=dict(ties or {}), whiteness=judged)
-    fit = replace(fit, freedom=max(1.0, counted - unknowns))
+    fit = replace(fit, freedom=freedom(data.blocks, len(names) + len(fit.states)))
     return replace(fit, warnings=_told(model, records, data, fit, checks or Checks()))
 
 

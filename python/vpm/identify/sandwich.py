@@ -62,6 +62,22 @@ def sandwich(jacobian: Array, residual: Array, groups: Sequence[Sequence[slice]]
     return 0.5 * (covariance + covariance.T)
 
 
+def freedom(blocks: Sequence[Block], unknowns: int) -> float:
+    """Degrees of freedom of the covariance: those of Bartlett's weights, ``3/2 n / (lags + 1)``, at least 1.
+
+    (M. Priestley, *Spectral Analysis and Time Series*, 1981, table 6.1, halved at frequency zero.) Samples that do not
+    count and the unknowns take theirs.
+    """
+    counted = [float(block.moving.sum()) for block in blocks]
+    share = max(0.0, 1.0 - unknowns / max(sum(counted), 1.0))
+    return max(1.0, share * sum(1.5 * n / (_lags(n) + 1.0) for n in counted if n > 0.0))
+
+
+def _lags(samples: float) -> int:
+    """The automatic rule of Newey and West."""
+    return int(np.ceil(4.0 * (samples / 100.0) ** (2.0 / 9.0)))
+
+
 def _long_run(scores: Array) -> Array:
     """Long-run covariance (p, p), times the number of samples, of scores (n, p)."""
     n = len(scores)
@@ -71,7 +87,7 @@ def _long_run(scores: Array) -> Array:
     products = np.sum(scores[1:] * scores[:-1], axis=0)
     memory = np.clip(products / np.where(powers > 0.0, powers, 1.0), -MOST_PERSISTENT, MOST_PERSISTENT)
     white = scores[1:] - memory * scores[:-1]
-    lags = min(int(np.ceil(4.0 * (n / 100.0) ** (2.0 / 9.0))), n - 2)
+    lags = min(_lags(n), n - 2)
     total = white.T @ white
     for lag in range(1, lags + 1):
         products = white[lag:].T @ white[:-lag]
