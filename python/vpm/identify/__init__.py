@@ -17,16 +17,18 @@ from vpm.identify.oil_fit import OilFit
 from vpm.identify.output_error import OutputErrorProblem
 from vpm.identify.prediction_error import PredictionErrorProblem
 from vpm.identify.problem import Block, Problem, gaps, segments
-from vpm.identify.settings import Fitting
+from vpm.identify.settings import Checks, Fitting
 from vpm.identify.shooting import ShootingProblem
 from vpm.identify.statistics import Gain, gain, robust_covariance
 from vpm.identify.unseen import judged_on
+from vpm.identify.whiteness import Whiteness, ljung_box
 from vpm.identify.written import write_fit
 
 __all__ = [
     "FIT_MODES",
     "Block",
     "Bootstrap",
+    "Checks",
     "Combination",
     "CylinderGeometry",
     "Estimate",
@@ -43,6 +45,7 @@ __all__ = [
     "Problem",
     "Profile",
     "ShootingProblem",
+    "Whiteness",
     "Worth",
     "bootstrap",
     "estimate",
@@ -53,6 +56,7 @@ __all__ = [
     "identify_oil",
     "inertial_regression",
     "judged_on",
+    "ljung_box",
     "pressures_from_force",
     "problem",
     "profile_intervals",

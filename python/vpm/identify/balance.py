@@ -215,11 +215,12 @@ class InverseDynamicsProblem:
             model, theta, whole, experiment, columns, self.shown, memory, kept=self._kept[record], origin=origin
         )
 
-    def strengths(self, model: Model) -> Array:
+    def strengths(self, model: Model, theta: Array | None = None) -> Array:
         """Root mean square of the applied effort on each joint over all records: what its errors are relative to."""
+        theta = model.theta if theta is None else theta
         power, count = np.zeros(len(self.joints)), np.zeros(len(self.joints))
         for record in range(len(self.motions)):
-            _, applied, _ = self.effort(model, model.theta, record)
+            _, applied, _ = self.effort(model, theta, record)
             for joint, (block, column) in enumerate(zip(self.efforts(record), applied.T, strict=True)):
                 power[joint] += float(np.sum((column * block.moving) ** 2))
                 count[joint] += float(block.moving.sum())

@@ -12,6 +12,7 @@ from vpm.identify.objective import AnyProblem
 from vpm.identify.output_error import OutputErrorProblem
 from vpm.identify.parallel import worker_count
 from vpm.identify.prediction_error import PredictionErrorProblem
+from vpm.identify.relative import relative_to_drives
 from vpm.identify.settings import Fitting
 from vpm.identify.shooting import ShootingProblem
 from vpm.identify.ties import TiedProblem, Untied
@@ -63,12 +64,13 @@ def comparison(
     setup: Setup | None = None,
     ties: Mapping[str, str] | None = None,
     fitting: Fitting | None = None,
+    free: Sequence[str] = (),
 ) -> AnyProblem:
     """Set up what a fit compares.
 
     Parameters
     ----------
-    model, records, mode, cutoff, setup, ties, fitting
+    model, records, mode, cutoff, setup, ties, fitting, free
         As for `identify`.
     """
     chosen = fitting or Fitting()
@@ -89,4 +91,6 @@ def comparison(
         )
     else:
         untied = problem(model, records, mode, cutoff=cutoff, setup=setup, channels=channels, workers=workers)
+        if isinstance(untied, InverseDynamicsProblem):
+            untied = relative_to_drives(model, untied, free, ties or {})
     return TiedProblem(untied, ties) if ties and not isinstance(untied, TiedProblem) else untied

@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from scipy.special import ndtri
 
 from vpm.errors import IdentificationError
+from vpm.identify.estimation import blinded
 from vpm.identify.identifiability import Combination, column_lengths, unseen_combinations
 from vpm.identify.objective import AnyProblem, Objective, noise_levels
 from vpm.identify.parallel import until_interrupted, worker_count
-from vpm.identify.problem import segments
+from vpm.identify.sandwich import record_groups, sandwich
 from vpm.identify.settings import Fitting
 from vpm.identify.solver import Descent, Point, descend
-from vpm.identify.statistics import robust_covariance
 from vpm.model import Model
 
 Array = NDArray[np.float64]
@@ -259,17 +259,12 @@ def _found(objective: Objective, point: Point, free: Sequence[str], costs: Array
 def _covariance(objective: Objective, point: Point, labels: Sequence[str], unseen: Sequence[Combination]) -> Array:
     """Covariance of parameters and first states: sandwich over records, with priors as what they claim to be."""
     lengths = column_lengths(point.jacobian)
-    scaled, rows = point.jacobian / lengths, len(point.residual)
+    rows, told = len(point.residual), objective.data.blocks[-1].samples.stop
     data = rows - objective.priors
-    pieces = segments(objective.data) + [slice(k, k + 1) for k in range(objective.data.blocks[-1].samples.stop, data)]
     expected = point.residual.copy()
     expected[data:] = 1.0  # a prior is off by its own standard deviation, whatever it happens to be off by
-    pieces += [slice(k, k + 1) for k in range(data, rows)]
-    covariance = robust_covariance(scaled, expected, pieces) / np.outer(lengths, lengths)
+    groups = record_groups(objective.data.blocks)
+    covariance = sandwich(point.jacobian / lengths, expected, groups, range(told, rows)) / np.outer(lengths, lengths)
     slopes = objective.slopes(point.x)
     covariance *= np.outer(slopes, slopes)
-    blind = [i for i, name in enumerate(labels) if any(name in combination.names for combination in unseen)]
-    covariance[blind, :] = 0.0
-    covariance[:, blind] = 0.0
-    covariance[blind, blind] = np.inf
-    return covariance
+    return blinded(covariance, unseen, labels)

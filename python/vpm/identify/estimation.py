@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares, lsq_linear
 
-from vpm.identify.identifiability import Combination, column_lengths, unseen_combinations
+from vpm.identify.identifiability import RANK_TOLERANCE, Combination, column_lengths, unseen_combinations
+from vpm.identify.moments import Coordinates, real_bodies
 from vpm.identify.objective import AnyProblem
 from vpm.identify.problem import Problem, segments
 from vpm.identify.statistics import robust_covariance
@@ -25,6 +26,8 @@ MOST_EVALUATIONS = 40
 PROGRESS = 0.05
 #: The same for a fit that has shown its worth: towards a bound, steps shrink with the distance and never end.
 CREEPING = 0.002
+#: Share by which the sum of squares may grow along a direction that the data cannot see.
+UNCHANGED = 1e-9
 
 #: Called after every evaluation with (evaluations so far, root mean square of the weighted residual).
 Progress = Callable[[int, float], None]
@@ -62,6 +65,7 @@ def estimate(
     progress: Progress | None = None,
     most_evaluations: int = MOST_EVALUATIONS,
     worth: Worth | None = None,
+    feasible: bool = False,
 ) -> Estimate:
     """Move ``free`` parameters of ``model`` until the residual of ``data`` is least.
 
@@ -86,6 +90,9 @@ def estimate(
         Where to stop in any case.
     worth : Worth, optional
         A fit that has not reached it in time ends with the best values until then.
+    feasible : bool
+        Move free moments of inertia in coordinates of real bodies, see `vpm.identify.moments`, and leave what nothing
+        shows where it was.
 
     Raises
     ------
@@ -93,14 +100,18 @@ def estimate(
         Ctrl-C before the start was evaluated; later it ends the fit with the best values until then.
     """
     columns = [model.index(name) for name in free]
-    low, high = limits(model, free, bounds or {})
-    counter = _Counter(model, data, columns, progress, worth)
-    start = np.clip(model.theta[columns], low, high)
+    box = low, high = limits(model, free, bounds or {})
+    frame = Coordinates()
+    if feasible:
+        frame, low, high = real_bodies(model, free, low, high)
+    counter = _Counter(model, data, columns, progress, worth, frame)
+    first = start = np.clip(frame.at(model.theta[columns]), low, high)
     interrupted = early = False
     try:
         if columns:
             start = _linear_step(counter, start, low, high)
             start = start if linear_only else _refine(counter, start, low, high, tolerance, most_evaluations)
+        start = _nearest(counter, start, first, low, high) if feasible else start
         residual, jacobian = counter(start)
         # Derivatives may leave all bounds where the motion itself does not; the best with derivatives stands then.
         if counter.best is not None and not np.all(np.isfinite(residual)):
@@ -111,15 +122,16 @@ def estimate(
         start, (residual, jacobian) = counter.best
         interrupted = isinstance(reason, KeyboardInterrupt)
         early = not interrupted
+    values, jacobian = frame.parameters(start), frame.by_parameters(jacobian)
     unseen = unseen_combinations(jacobian, free)
     covariance = _covariance(data, residual, jacobian, unseen, free)
     touching = tuple(
         name
-        for name, x, lo, hi in zip(free, start, low, high, strict=True)
+        for name, x, lo, hi in zip(free, values, *box, strict=True)
         if np.isclose(x, lo, rtol=1e-6, atol=1e-12) or np.isclose(x, hi, rtol=1e-6, atol=1e-12)
     )
     return Estimate(
-        tuple(free), start, residual, jacobian, covariance, unseen, touching, counter.count, interrupted, early
+        tuple(free), values, residual, jacobian, covariance, unseen, touching, counter.count, interrupted, early
     )
 
 
@@ -186,7 +198,9 @@ class _Counter:
         columns: list[int],
         progress: Progress | None,
         worth: Worth | None = None,
+        frame: Coordinates | None = None,
     ) -> None:
+        self.frame = frame or Coordinates()
         self.model, self.data, self.columns, self.progress, self.worth = model, data, columns, progress, worth
         self.theta = model.theta.copy()
         self.count = 0
@@ -231,9 +245,10 @@ class _Counter:
     def _evaluate(self, x: Array, columns: list[int]) -> tuple[Array, Array]:
         """Infinite where the values make no machine (an inertia that no body has): a step to there is not taken."""
         theta = self.theta.copy()
-        theta[self.columns] = x
+        theta[self.columns] = self.frame.parameters(x)
         try:
-            return self.data.evaluate(self.model, theta, columns)
+            residual, jacobian = self.data.evaluate(self.model, theta, columns)
+            return residual, self.frame.by_coordinates(jacobian)
         except ValueError:
             if self.count == 0:  # the start itself: an error of the input, not of a step
                 raise
@@ -253,6 +268,28 @@ def _linear_step(counter: _Counter, start: Array, low: Array, high: Array) -> Ar
     candidate = np.clip(start + step.x / lengths, low, high)
     better = np.sum(counter.residual(candidate) ** 2) <= np.sum(residual**2)
     return candidate if better else start
+
+
+def _nearest(counter: _Counter, found: Array, start: Array, low: Array, high: Array) -> Array:
+    """The same sum of squares as near to the start as possible: along unseen directions a descent may go anywhere.
+
+    Parameters stay where they were if that makes a machine, else the coordinates do.
+    """
+    residual, jacobian = counter(found)
+    if not found.size or not np.all(np.isfinite(jacobian)):
+        return found
+    for frame in dict.fromkeys((counter.frame, Coordinates())):
+        slopes = frame.by_parameters(jacobian)
+        lengths = column_lengths(slopes)
+        _, values, directions = np.linalg.svd(np.linalg.qr(slopes / lengths, mode="r"))
+        blind = directions[values < RANK_TOLERANCE * max(float(values[0]), 1e-300)]
+        if not blind.size:
+            return found
+        astray = blind.T @ (blind @ (lengths * frame.parameters(found - start))) / lengths
+        nearer = np.asarray(np.clip(found - frame.at(astray), low, high))
+        if np.sum(counter.residual(nearer) ** 2) <= (1.0 + UNCHANGED) * np.sum(residual**2):
+            return nearer
+    return found
 
 
 def _refine(counter: _Counter, start: Array, low: Array, high: Array, tolerance: float, most: int) -> Array:
@@ -322,7 +359,13 @@ def _covariance(
     """Robust covariance; infinite variance for every parameter that takes part in an unseen combination."""
     lengths = column_lengths(jacobian)
     covariance = robust_covariance(jacobian / lengths, residual, segments(data)) / np.outer(lengths, lengths)
-    blind = [i for i, name in enumerate(free) if any(name in combination.names for combination in unseen)]
+    return blinded(covariance, unseen, free)
+
+
+def blinded(covariance: Array, unseen: Sequence[Combination], names: Sequence[str]) -> Array:
+    """A covariance with infinite variance for every name that takes part in an unseen combination."""
+    covariance = covariance.copy()
+    blind = [i for i, name in enumerate(names) if any(name in combination.names for combination in unseen)]
     covariance[blind, :] = 0.0
     covariance[:, blind] = 0.0
     covariance[blind, blind] = np.inf

@@ -8,21 +8,27 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import ndtri, stdtrit
 
 from vpm.errors import IdentificationError
 from vpm.experiment import Experiment, as_records, joints_from_shafts
+from vpm.identify.beginning import BegunAnywhere, first_state_derivative, matters
 from vpm.identify.comparison import comparison
 from vpm.identify.engine import Found, fit_problem
-from vpm.identify.estimation import Estimate, Progress, estimate, limits
-from vpm.identify.identifiability import Combination
+from vpm.identify.estimation import Estimate, Progress, blinded, estimate, limits
+from vpm.identify.identifiability import Combination, column_lengths
+from vpm.identify.missing import missing_effects, whiteness
+from vpm.identify.moments import on_the_border
 from vpm.identify.objective import AnyProblem
+from vpm.identify.output_error import OutputErrorProblem
 from vpm.identify.prediction_error import PredictionErrorProblem
 from vpm.identify.problem import gaps
-from vpm.identify.remarks import constant_channels, lost_channels, remarks, touching
-from vpm.identify.settings import Fitting
+from vpm.identify.remarks import constant_channels, contradictions, lost_channels, remarks, resting, touching
+from vpm.identify.sandwich import freedom, record_groups, sandwich
+from vpm.identify.settings import Checks, Fitting
 from vpm.identify.shooting import ShootingProblem
-from vpm.identify.statistics import NORMAL_95
 from vpm.identify.ties import TiedProblem, check_ties
+from vpm.identify.whiteness import Whiteness
 from vpm.model import Model
 from vpm.results import Result
 from vpm.simulate import Setup
@@ -36,6 +42,10 @@ Array = NDArray[np.float64]
 FOLLOWING = frozenset({"inverse_dynamics", "prescribed_motion", "input_error"})
 #: Times that an observer gets gains of the values that it led to, and the move (in deviations) after which it need not.
 RENEWALS, SETTLED = 4, 0.1
+#: Times that a fit beside unknown first states is begun again with what these do at its values, unless it has settled.
+ROUNDS = 8
+#: What `Fit.first_states` says where no log says them.
+UNKNOWN = "unknown"
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -48,7 +58,7 @@ class Fit(Result):
         Mode of comparison the residual came from.
     names, units : tuple of str
     start, values, std : ndarray, shape (p,)
-        Before, after, and one standard deviation (robust against autocorrelated residuals).
+        Before, after, and one standard deviation (robust against autocorrelated and unequal residuals).
     correlation : ndarray, shape (p, p)
     before, after : dict
         ``{channel: (root mean square, share of the measured signal, unit)}`` on the fitted data.
@@ -59,8 +69,13 @@ class Fit(Result):
     model : Model
         The model with the identified values.
     warnings : tuple of str
-        What to know before the numbers are trusted, one sentence each: estimates on a bound, still at their start, not
-        identifiable, or collinear; too few samples; constant channels; a fit that Ctrl-C ended.
+        What to know before the numbers are trusted, one sentence each: residuals that repeat with the motion, estimates
+        that contradict the model file, rest on a bound, are still at their start, not identifiable, or collinear; too
+        few samples; constant channels; a fit that Ctrl-C ended.
+    whiteness : tuple of Whiteness
+        What is left of each channel of each record, and how much of that the motion explains.
+    freedom : float
+        Degrees of freedom of Student's t in the intervals: fewer than samples, because neighbours resemble each other.
     noise : dict
         ``{channel: standard deviation}`` that residuals were divided by, SI; empty where it was the signal's spread.
     states, states_std : dict
@@ -73,6 +88,9 @@ class Fit(Result):
         Simulations of all records with derivatives.
     ended : str
         ``"converged"``, ``"evaluations"`` or ``"interrupted"``; empty for a fit without `Fitting`.
+    first_states : str
+        ``"unknown"`` where the first states that the log suggests contradict the rest of it: the fit leaves them open,
+        to first order. Empty where they hold or are fitted.
     setup, fitting, ties
         How it was done, for `profile_intervals` and `bootstrap`.
     """
@@ -91,6 +109,8 @@ class Fit(Result):
     at_bounds: tuple[str, ...]
     model: Model
     warnings: tuple[str, ...] = ()
+    whiteness: tuple[Whiteness, ...] = ()
+    freedom: float = np.inf
     noise: dict[str, float] = field(default_factory=dict)
     states: dict[str, float] = field(default_factory=dict)
     states_std: dict[str, float] = field(default_factory=dict)
@@ -98,6 +118,7 @@ class Fit(Result):
     agreeing: int = 1
     evaluations: int = 0
     ended: str = ""
+    first_states: str = ""
     setup: Setup | None = None
     fitting: Fitting | None = None
     ties: dict[str, str] = field(default_factory=dict)
@@ -110,7 +131,8 @@ class Fit(Result):
     @property
     def intervals(self) -> Array:
         """95 % intervals, shape (p, 2)."""
-        return np.column_stack([self.values - NORMAL_95 * self.std, self.values + NORMAL_95 * self.std])
+        half = stdtrit(self.freedom, 0.975) * self.std if np.isfinite(self.freedom) else ndtri(0.975) * self.std
+        return np.column_stack([self.values - half, self.values + half])
 
     def __getitem__(self, name: str) -> float:
         """Identified value of one parameter, SI."""
@@ -156,6 +178,7 @@ def identify(
     tolerance: float = 1e-8,
     progress: Progress | None = None,
     fitting: Fitting | None = None,
+    checks: Checks | None = None,
 ) -> Fit:
     """Fit parameters of ``model`` to one or several experiments at once.
 
@@ -185,6 +208,8 @@ def identify(
         Called with the number of evaluations and the weighted residual; with several starts, from their threads.
     fitting : Fitting, optional
         Weights, losses, priors, bounds, several starts, unknown first states, pieces.
+    checks : Checks, optional
+        When `Fit.warnings` says that the fit may be wrong.
 
     Returns
     -------
@@ -206,14 +231,17 @@ def identify(
         raise IdentificationError(f'"{twice[0]}" is named {names.count(twice[0])} times in free=; name it once')
     if mode in FOLLOWING:
         records = [joints_from_shafts(record, model, free=names) for record in records]
-    data = comparison(model, records, mode, cutoff=cutoff, setup=setup, ties=ties, fitting=fitting)
+    data = comparison(model, records, mode, cutoff=cutoff, setup=setup, ties=ties, fitting=fitting, free=names)
     check_ties(model, ties or {}, names)
     data = _with_own_gains(model, data, names, tolerance)
     before, _ = data.evaluate(model, model.theta)
     if fitting is None:
-        result = estimate(model, data, names, tolerance=tolerance, progress=progress)
+        best = estimate(model, data, names, tolerance=tolerance, progress=progress, feasible=True)
+        data, best, begun = _from_anywhere(model, data, best, tolerance, (checks or Checks()).begun)
+        result = _with_intervals(data, best)
         fit = fit_of(model, data, result, before, [e.name for e in records], ties or {})
         fit = replace(fit, evaluations=result.evaluations, ended="interrupted" if result.interrupted else "")
+        fit = replace(fit, first_states=UNKNOWN if begun else "")
     else:
         check_bounds(names, fitting)
         box = limits(model, names, fitting.bounds)
@@ -229,8 +257,41 @@ def identify(
             found.evaluations,
         )
         fit = _with_details(fit_of(model, data, result, before, [e.name for e in records], ties or {}), data, found)
-    fit = replace(fit, setup=setup, fitting=fitting, ties=dict(ties or {}))
-    return replace(fit, warnings=_told(model, records, data, fit, result, (fitting or Fitting()).bounds))
+    judged = whiteness(fit.model, records, data, result.residual, result.jacobian)
+    fit = replace(fit, setup=setup, fitting=fitting, ties=dict(ties or {}), whiteness=judged)
+    fit = replace(fit, freedom=freedom(data.blocks, len(names) + len(fit.states)))
+    return replace(fit, warnings=_told(model, records, data, fit, checks or Checks()))
+
+
+def _from_anywhere(
+    model: Model, data: AnyProblem, best: Estimate, tolerance: float, level: float
+) -> tuple[AnyProblem, Estimate, bool]:
+    """The fit beside unknown first states, where those that the log suggests are wrong; and whether they are."""
+    if best.interrupted or not isinstance(data, OutputErrorProblem):
+        return data, best, False
+    fitted, plain = _moved(model, best), data
+    slopes = first_state_derivative(fitted, plain)
+    if not matters(plain, best.residual, best.jacobian, slopes, level):
+        return data, best, False
+    for _ in range(ROUNDS):
+        before, data = best.values, BegunAnywhere(plain, slopes)
+        best = estimate(fitted, data, best.names, tolerance=tolerance, feasible=True)
+        fitted, seen = _moved(model, best), np.isfinite(best.std)
+        if best.interrupted or np.all(np.abs(best.values - before)[seen] <= SETTLED * best.std[seen]):
+            break
+        slopes = first_state_derivative(fitted, plain)
+    return data, best, True
+
+
+def _moved(model: Model, best: Estimate) -> Model:
+    return model.with_parameters(dict(zip(best.names, map(float, best.values), strict=True)))
+
+
+def _with_intervals(data: AnyProblem, found: Estimate) -> Estimate:
+    """The same with the covariance of a final estimate, which takes longer than that of a search."""
+    lengths = column_lengths(found.jacobian)
+    covariance = sandwich(found.jacobian / lengths, found.residual, record_groups(data.blocks))
+    return replace(found, covariance=blinded(covariance / np.outer(lengths, lengths), found.unseen, found.names))
 
 
 def _with_own_gains(model: Model, data: AnyProblem, names: tuple[str, ...], tolerance: float) -> AnyProblem:
@@ -279,27 +340,26 @@ def _with_details(fit: Fit, data: AnyProblem, found: Found) -> Fit:
     )
 
 
-def _told(
-    model: Model,
-    records: Sequence[Experiment],
-    data: AnyProblem,
-    fit: Fit,
-    result: Estimate,
-    replaced: Mapping[str, tuple[float, float]],
-) -> tuple[str, ...]:
+def _told(model: Model, records: Sequence[Experiment], data: AnyProblem, fit: Fit, checks: Checks) -> tuple[str, ...]:
+    replaced = (fit.fitting or Fitting()).bounds
     box = dict(zip(fit.names, zip(*limits(model, fit.names, replaced), strict=True), strict=True))
-    resting = {name: box[name] for name in result.at_bounds}
-    told = remarks(
+    border = on_the_border(fit.model, fit.names)
+    held = {name: box[name] for name in resting(fit, box) if not any(name in names for names, _ in border)}
+    told = missing_effects(fit.whiteness, checks)
+    if fit.fitting is None or not fit.fitting.log or fit.fitting.priors:  # logarithms are for starts wrong by decades
+        told += contradictions(model, fit, checks)
+    told += remarks(
         fit.names,
         fit.start,
         fit.values,
         fit.std,
         fit.correlation,
         fit.unidentifiable,
-        resting,
+        held,
         data.blocks,
         len(fit.states),
     )
+    told += [sentence for _, sentence in border]
     told += constant_channels(model, records, data.blocks)
     told += lost_channels(fit.mode, fit.names, fit.after)
     if fit.ended == "interrupted":

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -15,7 +15,11 @@ from vpm.results import Result
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from vpm.experiment import Experiment
+    from vpm.model import Model
+
 Array = NDArray[np.float64]
+Gaps = dict[str, tuple[float, float, str]]
 
 #: What data can say about a parameter.
 KNOWN, VAGUE, TOGETHER, UNSEEN = "yes", "too uncertain", "only in combination", "no"
@@ -125,6 +129,44 @@ class InertialFit(Result):
         if name not in self.names:
             raise IdentificationError(f'there is no parameter "{name}"; {near_match(name, self.names)}')
         return float(self.values[self.names.index(name)])
+
+    def repaired(self, model: Model) -> Model:
+        """The model that was fitted with the estimates in place of its values, for simulation and diagnosis.
+
+        What the data leave open stands as near to the CAD values as the rest allows: sums are right, not each number.
+
+        Raises
+        ------
+        IdentificationError
+            The estimates are of another machine, or of no body: fit with ``physical=True``.
+        """
+        from vpm.identify.inertial_model import repaired
+
+        return repaired(model, dict(zip(self.names, map(float, self.values), strict=True)))
+
+    def judged_on(
+        self, model: Model, experiments: Experiment | Sequence[Experiment], *, cutoff: float | None = None
+    ) -> tuple[Gaps, Gaps]:
+        """How far efforts of other records are from those predicted by a model, and by the same model repaired.
+
+        Returns
+        -------
+        before, after : dict
+            ``{channel: (root mean square, share of the applied effort, unit)}``.
+
+        Raises
+        ------
+        IdentificationError
+            As for `repaired`.
+        """
+        from vpm.experiment import as_records
+        from vpm.identify.balance import InverseDynamicsProblem
+        from vpm.identify.problem import gaps
+
+        data = InverseDynamicsProblem(model, as_records(experiments), cutoff=cutoff)
+        machines = (model, self.repaired(model))
+        before, after = (gaps(data, data.evaluate(machine, machine.theta)[0]) for machine in machines)
+        return before, after
 
     @property
     def summary(self) -> tuple[str, ...]:

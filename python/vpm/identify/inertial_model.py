@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from vpm.errors import IdentificationError, near_match
 from vpm.experiment import Experiment
 from vpm.identify.balance import InverseDynamicsProblem
+from vpm.identify.feasibility import fault
 from vpm.identify.inertial_regression import InertialRegression
 from vpm.model import Model
 
@@ -50,6 +51,45 @@ def standard_parameters(mass: float, center: Array, inertia: Array) -> Array:
     x, y, z = 0, 1, 2
     entries = shift[[x, y, z, x, x, y], [x, y, z, y, z, z]]
     return np.array([mass, *(mass * center), *(inertia + entries)])
+
+
+def of_file(ten: Array) -> Array:
+    """Mass, centre of mass and moments of inertia about it, (10,), of standard parameters: a model file's numbers."""
+    center = ten[1:4] / ten[0]
+    return np.array([ten[0], *center, *(2.0 * ten[4:] - standard_parameters(float(ten[0]), center, ten[4:])[4:])])
+
+
+def repaired(model: Model, values: Mapping[str, float]) -> Model:
+    """A model with standard inertial parameters, and others, in place of its own.
+
+    Parameters
+    ----------
+    model : Model
+    values : mapping of str to float
+        As `inertial_regression` names them, all ten of a body.
+
+    Raises
+    ------
+    IdentificationError
+        A name is none of the model's, or no body can have the values.
+    """
+    changed = dict(values)
+    for body in model.bodies:
+        ten = [f"{body}.{end}" for end in STANDARD]
+        if not all(name in changed for name in ten):
+            continue
+        numbers = np.array([changed.pop(name) for name in ten])
+        if wrong := fault(numbers):
+            raise IdentificationError(
+                f"{body}: no body has the values of this fit, {wrong}; fit with physical=True, or record more"
+            )
+        changed |= {f"{body}.{end}": float(x) for end, x in zip(_OF_FILE, of_file(numbers), strict=True)}
+    for name in changed:
+        if name not in model.parameters:
+            raise IdentificationError(
+                f'{model.name} has no parameter "{name}" of this fit; {near_match(name, model.parameters)}'
+            )
+    return model.with_parameters(changed)
 
 
 class InertialModel:

@@ -40,7 +40,7 @@ def score_covariance(regressor: Array, residual: Array, records: Sequence[slice]
         Correlation is not carried over from one to the next.
     """
     channels = residual.shape[1]
-    models = [_autoregression(residual[:, c], records) for c in range(channels)]
+    models = [autoregression(residual[:, c], records) for c in range(channels)]
     memory = max(len(model) for model in models) - 1
     parts = [
         np.stack(
@@ -67,7 +67,7 @@ def score_covariance(regressor: Array, residual: Array, records: Sequence[slice]
     return np.asarray(0.5 * (total + total.T))
 
 
-def _autoregression(residual: Array, records: Sequence[slice]) -> Array:
+def autoregression(residual: Array, records: Sequence[slice]) -> Array:
     """Coefficients ``1, a_1, ... a_p`` of the autoregression of least BIC."""
     count = residual.size
     most = max(0, min(MOST_ORDER, min(record.stop - record.start for record in records) // 10))

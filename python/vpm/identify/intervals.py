@@ -293,7 +293,9 @@ def _again(fit: Fit, experiments: Experiment | Sequence[Experiment], cutoff: flo
     fitting = fit.fitting or Fitting()
     begun = fit.model.with_parameters(dict(zip(fit.names, map(float, fit.start), strict=True)))
     one = replace(fitting, workers=1)  # threads go to parameters and replicates instead
-    data = comparison(begun, records, fit.mode, cutoff=cutoff, setup=fit.setup, ties=fit.ties, fitting=one)
+    data = comparison(
+        begun, records, fit.mode, cutoff=cutoff, setup=fit.setup, ties=fit.ties, fitting=one, free=fit.names
+    )
     objective = Objective(begun, data, fit.names, limits(begun, fit.names, fitting.bounds), fitting)
     objective.noise = dict(fit.noise)
     states = np.array(list(fit.states.values())) / objective.sizes if fit.states else None

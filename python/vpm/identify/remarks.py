@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,18 +11,38 @@ from numpy.typing import NDArray
 from vpm.experiment import Experiment
 from vpm.identify.identifiability import Combination
 from vpm.identify.problem import Block
+from vpm.identify.settings import Checks
 from vpm.model import Model
 
 Array = NDArray[np.float64]
+
+
+class Fitted(Protocol):
+    """What sentences about estimates are made of."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Free parameters."""
+
+    @property
+    def values(self) -> Array:
+        """Estimates, shape (p,)."""
+
+    @property
+    def std(self) -> Array:
+        """Standard deviations, shape (p,)."""
+
 
 #: Correlation of two estimates beyond which they are called collinear.
 COLLINEAR = 0.99
 #: Samples per parameter below which there are too few.
 SAMPLES_EACH = 10
 #: A parameter has not moved if it changed by less than this share, and by less than this share of its deviation.
-STILL, STILL_STD = 1e-3, 1e-2
+STILL, STILL_STD = 1e-3, 1e-3
 #: Relative difference to a bound at which an estimate rests on it.
 TOUCHING = 1e-6
+#: Distance to a bound, in deviations of the estimate, at which it rests on it all the same.
+TOUCHING_STD = 1e-3
 #: Share of a measured signal beyond which a simulation has lost it: silence would be nearer.
 LOST = 1.0
 
@@ -30,6 +51,32 @@ def touching(names: Sequence[str], values: Array, low: Array, high: Array) -> tu
     """Names of estimates that rest on a bound."""
     near = np.isclose(values, low, rtol=TOUCHING, atol=1e-300) | np.isclose(values, high, rtol=TOUCHING, atol=1e-300)
     return tuple(name for name, at in zip(names, near, strict=True) if at)
+
+
+def resting(fit: Fitted, box: Mapping[str, tuple[float, float]]) -> tuple[str, ...]:
+    """Names of estimates that rest on a bound, or lie next to it by no more than a trace of their deviation."""
+    low, high = (np.array([box[name][side] for name in fit.names]) for side in (0, 1))
+    near = TOUCHING_STD * np.where(np.isfinite(fit.std), fit.std, 0.0)
+    at = (fit.values - low <= near) | (high - fit.values <= near)
+    beside = touching(fit.names, fit.values, low, high)
+    return tuple(name for name, rests in zip(fit.names, at, strict=True) if rests or name in beside)
+
+
+def contradictions(model: Model, fit: Fitted, checks: Checks) -> list[str]:
+    """Sentences about estimates that lie further from the model file than both deviations together allow."""
+    told = []
+    for name, value, std in zip(fit.names, fit.values, fit.std, strict=True):
+        before = model.parameters[name]
+        if before.uncertainty is None or not np.isfinite(std):
+            continue
+        away = abs(float(value) - before.value) / float(np.hypot(before.uncertainty, std))
+        if away > checks.far:
+            told.append(
+                f"{name} moved from {before.value:.6g} to {value:.6g} {before.unit}, {away:.1f} of its deviations "
+                f"(stated {before.uncertainty:.2g}, estimated {std:.2g}): correct the model file, or an effect may be "
+                "missing, run `vpm diagnose`"
+            )
+    return told
 
 
 def remarks(

@@ -103,6 +103,33 @@ class Fitting(Storable):
         return self.noise != "spread" or self.loss != "squares" or self.priors
 
 
+@dataclass(frozen=True, repr=False, eq=False)
+class Checks(Storable):
+    """When a fit warns that it may be wrong.
+
+    Attributes
+    ----------
+    level : float
+        Probability of a false warning that an effect is missing, in one fit whose model is right.
+    visible : float
+        Root mean square that the motion explains of a residual, as a share of the measured signal, below which nothing
+        is said.
+    far : float
+        Deviations, stated and estimated together, beyond which an estimate contradicts the model file.
+    begun : float
+        Probability that first states are taken as unknown although those that the log suggests are right.
+    """
+
+    level: float = 1e-6
+    visible: float = 2e-3
+    far: float = 3.0
+    begun: float = 0.05
+
+    def __post_init__(self) -> None:
+        """Check the numbers."""
+        _positive({"level": self.level, "visible": self.visible, "far": self.far, "begun": self.begun})
+
+
 def _positive(numbers: Mapping[str, float]) -> None:
     for name, number in numbers.items():
         if not number > 0.0:

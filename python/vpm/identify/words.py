@@ -23,6 +23,7 @@ def told(fit: Fit) -> list[str]:
     if fit.costs.size > 1:
         lines.append(f"{fit.agreeing} of {fit.costs.size} starts agree")
     lines += [f"noise of {channel}: {level:.4g}" for channel, level in fit.noise.items()]
+    lines += [f"first states: {fit.first_states}"] if fit.first_states else []
     lines += fit.warnings
     lines += [
         f"residual {channel}: {rms:.4g} {unit}, {100 * share:.2f} % of the signal"

@@ -1,0 +1,139 @@
+"""What a fit leaves beside the motion of its records: signs that an effect is missing, channel by channel."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vpm.errors import VpmError
+from vpm.experiment import Experiment
+from vpm.identify.balance import InverseDynamicsProblem
+from vpm.identify.objective import AnyProblem
+from vpm.identify.problem import FEWEST_SAMPLES, Block
+from vpm.identify.settings import Checks
+from vpm.identify.ties import TiedProblem
+from vpm.identify.whiteness import SHARPNESS, Whiteness, default_lags, explained_by, ljung_box, powers, shifted
+from vpm.initial import joint_motion
+from vpm.model import Model
+
+Array = NDArray[np.float64]
+#: Groups of regressors (n, k) of a record at the times of a block, for the joints named.
+Groups = Callable[[Sequence[str], Block], list[Array]]
+
+
+def whiteness(
+    model: Model, records: Sequence[Experiment], data: AnyProblem, residual: Array, jacobian: Array
+) -> tuple[Whiteness, ...]:
+    """Judge what is left of each channel of each record.
+
+    Parameters
+    ----------
+    model : Model
+        As fitted.
+    records : sequence of Experiment
+    data : problem
+    residual : ndarray, shape (n,)
+    jacobian : ndarray, shape (n, p)
+    """
+    untied = data.untied if isinstance(data, TiedProblem) else data
+    groups = {
+        record.name: _of_balance(model, untied, number)
+        if isinstance(untied, InverseDynamicsProblem)
+        else _of_log(model, record)
+        for number, record in enumerate(records)
+    }
+    judged = (
+        _judge(model, block, residual[block.samples], jacobian[block.samples], groups[block.experiment])
+        for block in data.blocks
+    )
+    return tuple(one for one in judged if one is not None)
+
+
+def _judge(model: Model, block: Block, residual: Array, slopes: Array, groups: Groups) -> Whiteness | None:
+    counts = block.moving > 0.0
+    n = int(counts.sum())
+    if n < FEWEST_SAMPLES or not np.all(np.isfinite(residual)) or block.scale == 0.0:
+        return None
+    lags = default_lags(n)
+    try:
+        added = groups(_joints(model, block.channel), block)
+    except VpmError:  # no motion can be had from this log
+        added = []
+    tests = [explained_by(residual, slopes, columns, counts) for columns in added]
+    share, chance = min(tests, key=lambda test: test[1], default=(0.0, 1.0))
+    size = float(np.sqrt(np.mean(residual[counts] ** 2))) / block.weight
+    white, visible = ljung_box(residual[counts], lags), np.sqrt(share) * size / block.scale
+    return Whiteness(block.experiment, block.channel, lags, white, share, min(1.0, len(tests) * chance), visible)
+
+
+def _joints(model: Model, channel: str) -> tuple[str, ...]:
+    """The joint a channel belongs to, those that its drive moves, or all."""
+    owner = channel.rpartition(".")[0]
+    if owner in model.joints:
+        return (owner,)
+    if owner in model.actuators:
+        return tuple(model.joints_of_actuator(owner)) or tuple(model.joints)
+    return tuple(model.joints)
+
+
+def _of_balance(model: Model, problem: InverseDynamicsProblem, record: int) -> Groups:
+    """Laws of the motion of joints and of the effort that it needs, as they are compared."""
+    motion = problem.state(record)
+    _, _, required = problem.effort(model, model.theta, record)
+
+    def groups(joints: Sequence[str], _: Block) -> list[Array]:
+        places = [problem.joints.index(joint) for joint in joints if joint in problem.joints]
+        return [
+            columns
+            for place in places or range(len(problem.joints))
+            for columns in _laws([part[:, place] for part in motion], required[:, place])
+        ]
+
+    return groups
+
+
+def _of_log(model: Model, record: Experiment) -> Groups:
+    """Laws of the motion of joints and of commands, at the times of a block."""
+
+    def groups(joints: Sequence[str], block: Block) -> list[Array]:
+        m = joint_motion(record, model)
+        places = [m.joints.index(joint) for joint in joints if joint in m.joints] or list(range(len(m.joints)))
+        commands = [record[channel] for channel in model.input_channels if channel in record]
+
+        def seen(signal: Array) -> Array:
+            return np.asarray(np.interp(block.time, record.time, signal))
+
+        return [
+            columns
+            for k in places
+            for command in [m.acceleration[:, k], *commands]
+            for columns in _laws([seen(part[:, k]) for part in (m.position, m.velocity, m.acceleration)], seen(command))
+        ]
+
+    return groups
+
+
+def _laws(motion: Sequence[Array], effort: Array) -> list[Array]:
+    """What one effect each would add: springs, friction, masses; delays and compliance; backlash and dead zones."""
+    size = float(np.sqrt(np.mean(effort**2))) or 1.0
+    return [*(powers(part) for part in motion), shifted(effort), shifted(np.tanh(effort / (SHARPNESS * size)))]
+
+
+def missing_effects(judged: Sequence[Whiteness], checks: Checks) -> list[str]:
+    """Sentences about channels whose residual repeats with the motion.
+
+    Parameters
+    ----------
+    judged : sequence of Whiteness
+    checks : Checks
+    """
+    level = checks.level / max(1, len(judged))
+    return [
+        f"the residual of {one.channel} in {one.experiment} repeats with the motion, which explains "
+        f"{100.0 * one.explained:.0f} % of it (Ljung-Box p = {one.white:.1g} over {one.lags} lags): an effect may be "
+        "missing, run `vpm diagnose`"
+        for one in judged
+        if one.chance < level and one.visible >= checks.visible
+    ]

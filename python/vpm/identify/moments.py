@@ -1,0 +1,108 @@
+"""Free principal moments of inertia in coordinates whose bounds are those of real bodies.
+
+No principal moment exceeds the sum of the other two. A fit that moves the moments themselves runs into that border,
+which no bound of a parameter shows: steps beyond it have no machine, and the fit creeps along or stalls. The second
+moments of mass along the axes, ``xx = Y + Z``, are positive and nothing else (P. Wensing, S. Kim, J.-J. Slotine, *IEEE
+Robotics and Automation Letters* 3, 2018); beside one known moment, sum and difference of the others have bounds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vpm.model import Model
+
+Array = NDArray[np.float64]
+
+AXES, PAIRS = ("xx", "yy", "zz"), ("xy", "xz", "yz")
+#: Share of a sum of moments that a moment may lack and still be as large.
+TOUCHING = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Coordinates:
+    """What a descent moves in place of parameters: ``parameters = matrix @ coordinates``, or the parameters themselves.
+
+    Derivatives of parameters that stay themselves may be infinite, which no product with a matrix bears.
+    """
+
+    matrix: Array | None = None
+
+    def parameters(self, x: Array) -> Array:
+        """Parameters (p,) at coordinates (p,)."""
+        return x if self.matrix is None else np.asarray(self.matrix @ x)
+
+    def at(self, parameters: Array) -> Array:
+        """Coordinates (p,) of parameters (p,)."""
+        return parameters if self.matrix is None else np.asarray(np.linalg.solve(self.matrix, parameters))
+
+    def by_coordinates(self, jacobian: Array) -> Array:
+        """Derivative (n, p) by the coordinates, of that by the parameters."""
+        return jacobian if self.matrix is None or not jacobian.size else np.asarray(jacobian @ self.matrix)
+
+    def by_parameters(self, jacobian: Array) -> Array:
+        """Derivative (n, p) by the parameters, of that by the coordinates."""
+        return jacobian if self.matrix is None else np.asarray(np.linalg.solve(self.matrix.T, jacobian.T).T)
+
+
+def real_bodies(model: Model, free: Sequence[str], low: Array, high: Array) -> tuple[Coordinates, Array, Array]:
+    """Coordinates of free parameters in a box, with those of moments of inertia inside what bodies can have.
+
+    Parameters
+    ----------
+    model : Model
+    free : sequence of str
+    low, high : ndarray, shape (p,)
+        Bounds of the parameters.
+
+    Returns
+    -------
+    coordinates : Coordinates
+    low, high : ndarray, shape (p,)
+        Bounds of the coordinates. Moments that have bounds of their own, or products of inertia beside them, stay
+        coordinates.
+    """
+    matrix, low, high = np.eye(len(free)), low.copy(), high.copy()
+    for body in dict.fromkeys(name.rpartition(".inertia.")[0] for name in free if ".inertia." in name):
+        mine = [k for k, name in enumerate(free) if name in {f"{body}.inertia.{axis}" for axis in AXES}]
+        products = [f"{body}.inertia.{pair}" for pair in PAIRS]
+        if any(name in free or model.parameters[name].value != 0.0 for name in products):
+            continue
+        if any(low[k] > 0.0 or np.isfinite(high[k]) for k in mine):
+            continue
+        if len(mine) == 3:
+            matrix[np.ix_(mine, mine)] = 1.0 - np.eye(3)
+            low[mine], high[mine] = 0.0, np.inf
+        elif len(mine) == 2:
+            known = next(n for a in AXES if (n := f"{body}.inertia.{a}") not in free)
+            third = model.parameters[known].value
+            matrix[np.ix_(mine, mine)] = [[0.5, 0.5], [0.5, -0.5]]
+            low[mine], high[mine] = [third, -third], [np.inf, third]
+    return Coordinates(None if np.array_equal(matrix, np.eye(len(free))) else matrix), low, high
+
+
+def on_the_border(model: Model, free: Sequence[str]) -> list[tuple[list[str], str]]:
+    """Free moments, and a sentence, of bodies whose moments of inertia are as unequal as any body's can be.
+
+    Parameters
+    ----------
+    model : Model
+        As fitted.
+    free : sequence of str
+    """
+    told = []
+    for body in dict.fromkeys(name.rpartition(".inertia.")[0] for name in free if ".inertia." in name):
+        largest, *others = sorted((model.parameters[f"{body}.inertia.{axis}"].value, axis) for axis in AXES)[::-1]
+        beside = sum(value for value, _ in others)
+        moved = [f"{body}.inertia.{axis}" for _, axis in (largest, *others) if f"{body}.inertia.{axis}" in free]
+        if moved and beside > 0.0 and largest[0] >= (1.0 - TOUCHING) * beside:
+            sentence = (
+                f"{', '.join(moved)}: the moment {largest[1]}, {largest[0]:.6g} kg m^2, is as large as the other two "
+                "together, the most that a body can have: free all three, or question the model"
+            )
+            told.append((moved, sentence))
+    return told

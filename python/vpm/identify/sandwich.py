@@ -1,0 +1,96 @@
+"""Covariance of final estimates whose residuals are neither white nor equally large, also from few samples."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vpm.identify.problem import Block
+
+Array = NDArray[np.float64]
+
+#: Largest autoregression that scores are freed of: beyond it the correction is larger than what it corrects.
+MOST_PERSISTENT = 0.97
+#: Least share of a residual that its own fit leaves: one sample that decides a parameter alone says nothing of noise.
+LEAST_LEFT = 0.1
+
+
+def record_groups(blocks: Sequence[Block]) -> list[list[slice]]:
+    """Slices of the residual by record: channels of one record are measured at the same times and disturbed together.
+
+    Channels whose samples are others stand alone.
+    """
+    groups: dict[tuple[str, int], list[slice]] = {}
+    for block in blocks:
+        groups.setdefault((block.experiment, block.time.size), []).append(block.samples)
+    return list(groups.values())
+
+
+def sandwich(jacobian: Array, residual: Array, groups: Sequence[Sequence[slice]], exact: Sequence[int] = ()) -> Array:
+    """Covariance of a least-squares estimate under autocorrelated, unequal residuals, corrected for few samples.
+
+    The sandwich ``B S B`` with ``B = (J'J)^-1``. ``S`` is the long-run covariance of the scores: these are freed of
+    their autoregression of first order, weighed as by W. Newey and K. West (*Econometrica* 55, 1987) over the lags of
+    their automatic rule, ``4 (n/100)^(2/9)`` (*Review of Economic Studies* 61, 1994), and coloured again (D. Andrews
+    and J. Monahan, *Econometrica* 60, 1992). Residuals are divided by the share that the fit leaves of each (HC3: J.
+    MacKinnon and H. White, *J. Econometrics* 29, 1985).
+
+    Parameters
+    ----------
+    jacobian : ndarray, shape (n, p)
+        Columns of similar length.
+    residual : ndarray, shape (n,)
+    groups : sequence of sequence of slice
+        Slices of one length each whose rows belong to the same times; see `record_groups`.
+    exact : sequence of int
+        Rows that are as large as their deviation says: independent, and not corrected.
+
+    Returns
+    -------
+    ndarray, shape (p, p)
+    """
+    bread = np.linalg.pinv(jacobian.T @ jacobian, hermitian=True)
+    left = 1.0 - np.einsum("ij,jk,ik->i", jacobian, bread, jacobian)
+    left[list(exact)] = 1.0
+    scores = jacobian * (residual / np.maximum(left, LEAST_LEFT))[:, None]
+    meat = scores[list(exact)].T @ scores[list(exact)]
+    for group in groups:
+        meat = meat + _long_run(np.sum([scores[rows] for rows in group], axis=0))
+    covariance: Array = bread @ meat @ bread
+    return 0.5 * (covariance + covariance.T)
+
+
+def freedom(blocks: Sequence[Block], unknowns: int) -> float:
+    """Degrees of freedom of the covariance: those of Bartlett's weights, ``3/2 n / (lags + 1)``, at least 1.
+
+    (M. Priestley, *Spectral Analysis and Time Series*, 1981, table 6.1, halved at frequency zero.) Samples that do not
+    count and the unknowns take theirs.
+    """
+    counted = [float(block.moving.sum()) for block in blocks]
+    share = max(0.0, 1.0 - unknowns / max(sum(counted), 1.0))
+    return max(1.0, share * sum(1.5 * n / (_lags(n) + 1.0) for n in counted if n > 0.0))
+
+
+def _lags(samples: float) -> int:
+    """The automatic rule of Newey and West."""
+    return int(np.ceil(4.0 * (samples / 100.0) ** (2.0 / 9.0)))
+
+
+def _long_run(scores: Array) -> Array:
+    """Long-run covariance (p, p), times the number of samples, of scores (n, p)."""
+    n = len(scores)
+    if n < 3:
+        return np.asarray(scores.T @ scores)
+    powers = np.sum(scores[:-1] ** 2, axis=0)
+    products = np.sum(scores[1:] * scores[:-1], axis=0)
+    memory = np.clip(products / np.where(powers > 0.0, powers, 1.0), -MOST_PERSISTENT, MOST_PERSISTENT)
+    white = scores[1:] - memory * scores[:-1]
+    lags = min(_lags(n), n - 2)
+    total = white.T @ white
+    for lag in range(1, lags + 1):
+        products = white[lag:].T @ white[:-lag]
+        total = total + (1.0 - lag / (lags + 1.0)) * (products + products.T)
+    back = 1.0 / (1.0 - memory)
+    return np.asarray(total * np.outer(back, back))

@@ -1,0 +1,157 @@
+"""Whether what a fit leaves is noise: whiteness of a residual, and how much of it the motion explains.
+
+Instruments alone make residuals that are not white: derivatives of counted positions, filters, drifts. What a model
+lacks differs from these in that it repeats with the motion. So two tests answer two questions:
+
+- Is the residual white? (G. Ljung and G. Box, "On a measure of lack of fit in time series models", *Biometrika* 65,
+  1978.)
+- Does it depend on the motion, once its own correlation is taken out? An F test of added regressors in the residual of
+  an autoregression (J. Ramsey, "Tests for specification errors in classical linear least-squares regression analysis",
+  *J. Royal Statistical Society B* 31, 1969; D. Cochrane and G. Orcutt, *J. American Statistical Association* 44, 1949).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import qr
+from scipy.special import chdtrc, fdtrc
+
+from vpm.identify.identifiability import column_lengths
+from vpm.identify.inertial_noise import autoregression
+from vpm.identify.problem import FEWEST_SAMPLES
+from vpm.results import Storable
+
+Array = NDArray[np.float64]
+
+#: Columns of which others leave less than this share of their length are left out.
+DEPENDENT = 1e-3
+#: Share of a signal's size at which a rounded sign bends.
+SHARPNESS = 0.05
+#: Samples by which laws of effort may come earlier or later.
+REACH = 3
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class Whiteness(Storable):
+    """What is left of one channel of one record after a fit.
+
+    Attributes
+    ----------
+    experiment, channel : str
+    lags : int
+        Of the test of whiteness.
+    white : float
+        Probability that white noise is as correlated as the residual (Ljung and Box).
+    explained : float
+        Share of the residual's power that the motion explains, 0 to 1.
+    chance : float
+        Probability that noise that knows nothing of the motion is explained as well as that.
+    visible : float
+        Root mean square of what the motion explains, as a share of the measured signal.
+    """
+
+    experiment: str
+    channel: str
+    lags: int
+    white: float
+    explained: float
+    chance: float
+    visible: float
+
+
+def ljung_box(residual: Array, lags: int) -> float:
+    """Probability that white noise has autocorrelations as large as a residual.
+
+    ``Q = n (n + 2) sum_k r_k^2 / (n - k)`` is chi-square with ``lags`` degrees of freedom for white noise (G. Ljung and
+    G. Box, *Biometrika* 65, 1978).
+
+    Parameters
+    ----------
+    residual : ndarray, shape (n,)
+    lags : int
+        Less than n.
+    """
+    n, centred = residual.size, residual - residual.mean()
+    power = float(centred @ centred)
+    if not power > 0.0:
+        return 1.0
+    shares = np.array([float(centred[k:] @ centred[:-k]) for k in range(1, lags + 1)]) / power
+    statistic = n * (n + 2) * float(np.sum(shares**2 / (n - np.arange(1, lags + 1))))
+    return float(chdtrc(lags, statistic))
+
+
+def explained_by(residual: Array, fitted: Array, added: Array, counts: NDArray[np.bool_]) -> tuple[float, float]:
+    """Share of a residual that added regressors explain, and the probability that noise is explained as well.
+
+    Residual and regressors pass the whitening filter of the residual's own autoregression before they are compared.
+
+    Parameters
+    ----------
+    residual : ndarray, shape (n,)
+    fitted : ndarray, shape (n, p)
+        Derivative of the residual by what was fitted: what it explains is not counted.
+    added : ndarray, shape (n, k)
+    counts : ndarray of bool, shape (n,)
+        Samples that count.
+
+    Returns
+    -------
+    share, chance : float
+    """
+    old = basis(np.where(counts[:, None], fitted, 0.0))
+    new = basis(np.where(counts[:, None], added, 0.0), old)
+    columns = np.column_stack([old, new])
+    p, k = old.shape[1], new.shape[1]
+    # The correlation of the noise is that of what both leave: that of the residual would take the effect for noise.
+    noise = np.where(counts, residual - columns @ (columns.T @ residual), 0.0)
+    filter_ = autoregression(noise, [slice(0, residual.size)])
+    # A sample counts if all that its filter reaches does.
+    sound = np.convolve(~counts, np.ones(filter_.size))[: counts.size] < 0.5
+    sound[: filter_.size - 1] = False
+    n = int(sound.sum())
+    if k < 1 or n < 2 * (p + k + filter_.size) + FEWEST_SAMPLES:
+        return 0.0, 1.0
+    white = np.apply_along_axis(np.convolve, 0, np.column_stack([residual, columns]), filter_)[: counts.size][sound]
+    before, _ = _left(white[:, 0], white[:, 1 : p + 1])
+    after, weights = _left(white[:, 0], white[:, 1:])
+    freedom = n - p - k - (filter_.size - 1)
+    ratio = (before - after) / k / max(after / freedom, 1e-300)
+    left = residual - columns @ weights
+    share = 1.0 - float(left[counts] @ left[counts]) / max(float(residual[counts] @ residual[counts]), 1e-300)
+    return max(0.0, share), float(fdtrc(k, freedom, ratio))
+
+
+def _left(target: Array, columns: Array) -> tuple[float, Array]:
+    """Sum of squares that columns leave of a target, and their weights."""
+    weights = np.linalg.lstsq(columns, target, rcond=None)[0]
+    rest = target - columns @ weights
+    return float(rest @ rest), np.asarray(weights, dtype=np.float64)
+
+
+def basis(columns: Array, others: Array | None = None) -> Array:
+    """Orthonormal basis of what columns add to an orthonormal basis of others."""
+    scaled = columns / column_lengths(columns)
+    if others is not None:
+        scaled = scaled - others @ (others.T @ scaled)
+    orthogonal, triangle, _ = qr(scaled, mode="economic", pivoting=True)
+    return np.asarray(orthogonal[:, np.abs(np.diag(triangle)) > DEPENDENT])
+
+
+def default_lags(samples: int) -> int:
+    """Lags of a test of whiteness, ``10 log10(n)``, at most a fifth of the samples."""
+    return max(1, min(round(10.0 * float(np.log10(max(samples, 2)))), samples // 5))
+
+
+def powers(signal: Array) -> Array:
+    """A constant, a signal (n,), its rounded sign and its square with the sign, as friction has them: (n, 4)."""
+    scaled = signal / (float(np.sqrt(np.mean(signal**2))) or 1.0)
+    return np.column_stack([np.ones_like(scaled), scaled, np.tanh(scaled / SHARPNESS), scaled * np.abs(scaled)])
+
+
+def shifted(signal: Array) -> Array:
+    """A signal (n,) up to `REACH` samples earlier and later, its ends held: (n, 2 REACH + 1)."""
+    padded = np.pad(signal, REACH, mode="edge")
+    return np.column_stack([padded[k : k + signal.size] for k in range(2 * REACH + 1)])
