@@ -162,6 +162,11 @@ def test_refuses_to_conclude_anything_from_such_a_log(logs: dict[str, Columns]) 
         vpm.diagnose(MODEL, log, workers=1)
 
 
+def test_a_diagnosis_notes_what_may_be_the_clock(logs: dict[str, Columns]) -> None:
+    why = vpm.diagnose(MODEL, record(logs["late commands"]), effects=["coulomb_friction"], workers=1)
+    assert "a clock of the log, or a delay of the machine" in why.notes[0]
+
+
 def odd(values: Array, **numbers: float) -> list[Finding]:
     log = vpm.Experiment.from_arrays(
         np.arange(len(values)) / 500.0, {"one.position": values}, {}, name="log", model=MODEL

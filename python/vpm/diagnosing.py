@@ -73,6 +73,8 @@ RANKED = "names come from a ranking of the training records"
 SEARCHED = "names come from a search on balances of effort, for {reason}"
 NOT_SEARCHED = "a search on balances of effort does not try {effects}"
 STOPPED_LATE = "stopped by Ctrl-C before what is left, and what else would do, was examined"
+#: What is odd in a channel and may pass for an effect.
+NOTED = ("delay", "frozen", "clipped", "spikes")
 #: Said where an error follows a search, and what such an error is.
 FAILED = "{what} could not be computed: {error}"
 BROKEN = (ValueError, ArithmeticError, LookupError)
@@ -164,13 +166,16 @@ def diagnose(
     with threadpool_limits(1, user_api="blas"):
         records = _records(model, experiments, validate)
         each = SideBySide(workers, progress)
+        odd: list[str] = []
         if check:
             if tell is not None:
                 tell("checking the channels of the logs")
             given = [*as_records(experiments), *as_records(validate or ())]
-            refuse_mistakes(model, given, setup=setup, workers=workers, progress=progress)
+            found = refuse_mistakes(model, given, setup=setup, workers=workers, progress=progress)
+            odd = [str(one) for one in found if one.kind in NOTED]
         most = max(LEAST_LIMIT, 2 * len(model.joints)) if limit is None else limit
-        return _diagnosis(model, records, effects, cutoff, setup or Setup(), most, names, each, tell)
+        diagnosis = _diagnosis(model, records, effects, cutoff, setup or Setup(), most, names, each, tell)
+        return replace(diagnosis, notes=(*odd, *diagnosis.notes))
 
 
 def _diagnosis(

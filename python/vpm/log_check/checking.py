@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -88,8 +87,8 @@ def refuse_mistakes(
     setup: Setup | None = None,
     workers: int | None = None,
     progress: Progress | None = None,
-) -> None:
-    """Complain about logs of which nothing can be concluded, see `check_log`.
+) -> tuple[Finding, ...]:
+    """What is odd in logs, see `check_log`, unless nothing can be concluded from them.
 
     What keeps a log from being checked is no business of this: whoever uses it will say it.
 
@@ -98,12 +97,14 @@ def refuse_mistakes(
     ExperimentError
         There is a wrong unit, sign, name or clock.
     """
-    told = ""
-    with suppress(VpmError, ArithmeticError):
+    try:
         found = check_log(model, experiments, setup=setup, workers=workers, progress=progress)
+    except (VpmError, ArithmeticError):
+        return ()
+    if found.mistakes:
         told = ". ".join(str(one) for one in found.mistakes)
-    if told:
         raise ExperimentError(f"{told}. Nothing is concluded from such a log; to do it anyway, leave out its check")
+    return found.findings
 
 
 class _Check:
@@ -158,7 +159,7 @@ def _finding(found: Explanation, units: Mapping[str, str], changed: Mapping[str,
     said = ", or ".join(one.sentence(units) for one in (mend, *found.rivals))
     if not found.is_mistake:
         said += " (a clock of the log, or a delay of the machine or of its sensors)"
-    place = min(after, key=lambda name: after[name] / max(before[name], 1e-300))
+    place = min(found.spoiled, key=lambda name: after[name] / max(before[name], 1e-300))
     lines = {channel: line_of(channel, entry) for channel, entry in changed.items()}
     return Finding(
         mend.kind,

@@ -27,6 +27,8 @@ class Explanation:
     mend : Mend
     before, after : Shares
         What is left of the record without it and with it.
+    spoiled : tuple of str
+        Channels that the mistake spoils.
     rivals : tuple of Mend
         Others that do as well.
     """
@@ -34,6 +36,7 @@ class Explanation:
     mend: Mend
     before: Shares
     after: Shares
+    spoiled: tuple[str, ...]
     rivals: tuple[Mend, ...]
 
     @property
@@ -76,7 +79,9 @@ class Explainer:
             mended = mend.applied(part)
             second = self._best(self._ended(mended, used, after), after)
             if second is not None and self._explains(mend, left, second.after):
-                pairs.append([Explanation(mend, left, after, ()), self._by_turns(second, mended)])
+                pairs.append(
+                    [Explanation(mend, left, after, self._spoiled(mend, after), ()), self._by_turns(second, mended)]
+                )
         return min(pairs, key=lambda pair: pair[-1].after.order, default=[])
 
     def _ended(self, part: Experiment, used: Sequence[str], left: Shares) -> list[tuple[Mend, Shares]]:
@@ -95,14 +100,16 @@ class Explainer:
                 rivals.append(other)
         if not self._explains(mend, left, after) or any(_is_no_scale(mend, other) for other in rivals):
             return None
-        return Explanation(mend, left, after, tuple(rivals))
+        return Explanation(mend, left, after, self._spoiled(mend, after), tuple(rivals))
 
     def _by_turns(self, found: Explanation, part: Experiment) -> Explanation:
         """A delay as the record has it; delay and parameters are fitted by turns."""
         for _ in range(self.settings.rounds if found.mend.delay else 0):
-            if (finer := self._refined(found.mend, found.after, part)) == found.mend:
+            finer = self._refined(found.mend, found.after, part)
+            after = self.judge.fitted(finer.applied(part))
+            if after.order >= found.after.order:
                 break
-            found = replace(found, mend=finer, after=self.judge.fitted(finer.applied(part)))
+            found = replace(found, mend=finer, after=after)
         return found
 
     def _finalists(self, part: Experiment, used: Sequence[str], left: Shares) -> list[Mend]:
@@ -120,7 +127,7 @@ class Explainer:
         """Those that may have spoiled one of these channels."""
         return [mend for mend in mends if channels & set(self._spoiled(mend, left))]
 
-    def _spoiled(self, mend: Mend, left: Shares) -> list[str]:
+    def _spoiled(self, mend: Mend, left: Shares) -> tuple[str, ...]:
         """Channels that a mistake spoils: its own, those of the joints of a command, all by the clock."""
         found: list[str] = []
         for name in mend.channels:
@@ -130,7 +137,7 @@ class Explainer:
             elif owner in self.model.actuators:
                 moved = [f"{joint}.position" for joint in self.model.joints_of_actuator(owner)]
                 found += [channel for channel in moved if channel in left.by_channel]
-        return found or list(left.by_channel)
+        return tuple(found or left.by_channel)
 
     def _hopeful(self, mends: Sequence[Mend], part: Experiment, before: Shares) -> list[Mend]:
         """The few that leave least at given values of the parameters, and less than is left without any."""

@@ -60,6 +60,8 @@ class Settings:
         A channel stood still if it ends that by a step of so many times its largest other one.
     clipped : float
         Share of samples at the largest or smallest value from which on a channel is cut off there.
+    abrupt : float
+        It comes there by steps of at least this share of its usual ones; a machine that rests comes slowly.
     levels : int
         A channel with fewer values is a square wave or a switch: it is not cut off, and has no noise.
     spike : float
@@ -96,6 +98,7 @@ class Settings:
     stuck: int = 20
     jump: float = 3.0
     clipped: float = 0.01
+    abrupt: float = 0.2
     levels: int = 20
     spike: float = 30.0
     filtered: float = 0.05

@@ -111,11 +111,12 @@ def _frozen(values: Array, settings: Settings) -> slice | None:
 
 
 def _is_noisy(values: Array, settings: Settings) -> bool:
-    """Whether noise moves a channel more than the step in which it is recorded: then no rest repeats a value."""
-    if values.size < settings.fewest:
-        return False
-    noise, step = noise_std(values), quantisation_step(values)
-    return noise > settings.negligible * float(np.median(np.abs(np.diff(values)))) and (step is None or step < noise)
+    """Whether noise moves a channel from sample to sample, so that no rest of the machine repeats a value."""
+    return (
+        values.size > settings.fewest
+        and float(np.mean(np.diff(values) == 0.0)) < settings.negligible
+        and (noise_std(values) > settings.negligible * float(np.median(np.abs(np.diff(values)))))
+    )
 
 
 def _longest(same: NDArray[np.bool_]) -> slice:
@@ -147,9 +148,9 @@ def _clipped(record: Experiment, name: str, settings: Settings) -> Iterator[Find
     for end, word in ((float(values.max()), "largest"), (float(values.min()), "smallest")):
         there, next_to_it = values == end, np.abs(values - end) < 1.5 * near
         share = float(np.mean(there))
-        # A swing that turns round is slow there, but no slower than beside it.
+        # A swing that turns round is slow there, but no slower than beside it; a machine that rests comes slowly.
         stays = np.count_nonzero(there) > settings.jump * (np.count_nonzero(next_to_it) - np.count_nonzero(there))
-        if stays and share > settings.clipped and end != 0.0:
+        if stays and share > settings.clipped and end != 0.0 and _is_abrupt(values, there, settings):
             yield Finding(
                 "clipped",
                 (name,),
@@ -157,3 +158,12 @@ def _clipped(record: Experiment, name: str, settings: Settings) -> Iterator[Find
                 f"{name} stands at its {word} value, {end:.4g}, in {100.0 * share:.2g} % of the samples",
                 "check the range of its sensor or the limit of its drive",
             )
+
+
+def _is_abrupt(values: Array, there: NDArray[np.bool_], settings: Settings) -> bool:
+    """Whether a channel comes to a value at full speed, as where it is cut off."""
+    begins = np.flatnonzero(there[2:] & ~there[1:-1]) + 2
+    steps = np.abs(np.diff(values))
+    if not begins.size:
+        return False
+    return float(np.median(steps[begins - 2])) > settings.abrupt * float(np.sqrt(np.mean(steps**2)))
