@@ -14,9 +14,9 @@ import vpm
 from command_line import vpm as run_vpm
 from vpm.errors import ExperimentError, ModelError
 from vpm.log_check import Finding, Settings
-from vpm.log_check.mend import Mend
+from vpm.log_check.correction import Correction
 from vpm.log_check.stretches import odd_stretches
-from vpm.log_check.table import line_of, mended_text
+from vpm.log_check.table import corrected_text, line_of
 
 Array = NDArray[np.float64]
 Columns = dict[str, Array]
@@ -223,28 +223,28 @@ def test_finds_what_was_filtered_before_it_was_stored() -> None:
 
 
 @pytest.mark.parametrize(
-    "mend",
+    "correction",
     [
-        Mend(("one.position",), -1.0),
-        Mend(("one.position",), np.pi / 180.0, unit="deg"),
-        Mend(("m1.command",), 1e-3, unit="mA"),
-        Mend(("one.position", "two.position"), swap=True),
-        Mend(("time",), 1e-3, unit="ms"),
-        Mend(("two.position",), delay=0.02),
+        Correction(("one.position",), -1.0),
+        Correction(("one.position",), np.pi / 180.0, unit="deg"),
+        Correction(("m1.command",), 1e-3, unit="mA"),
+        Correction(("one.position", "two.position"), swap=True),
+        Correction(("time",), 1e-3, unit="ms"),
+        Correction(("two.position",), delay=0.02),
     ],
 )
-def test_the_mended_table_reads_the_mended_record(mend: Mend, tmp_path: Path) -> None:
+def test_the_corrected_table_reads_the_corrected_record(correction: Correction, tmp_path: Path) -> None:
     """What a finding tells the user to write reads what was found to be right."""
     path = tmp_path / "log.csv"
     path.write_text(textbook_arm.text(textbook_arm.log(PLAIN, 2, seconds=2.0)), encoding="utf-8")
-    told = vpm.Experiment.load(path, {**MODEL.channel_table, **mend.entries(MODEL.channel_table)}, MODEL)
-    wanted = mend.applied(vpm.Experiment.load(path, None, MODEL))
+    told = vpm.Experiment.load(path, {**MODEL.channel_table, **correction.entries(MODEL.channel_table)}, MODEL)
+    wanted = correction.applied(vpm.Experiment.load(path, None, MODEL))
     np.testing.assert_allclose(told.time, wanted.time, atol=1e-12)
     for channel in wanted.channels:
         np.testing.assert_allclose(told[channel], wanted[channel], atol=1e-12)
 
 
-def test_writes_the_mended_entries_and_keeps_comments(tmp_path: Path) -> None:
+def test_writes_the_corrected_entries_and_keeps_comments(tmp_path: Path) -> None:
     model, log = tmp_path / "arm.toml", tmp_path / "log.csv"
     model.write_text(textbook_arm.FILE, encoding="utf-8")
     wrong = both(scaled("q1", 180.0 / np.pi), scaled("q2", 180.0 / np.pi))
@@ -273,7 +273,7 @@ def test_writes_a_table_where_there_was_none(tmp_path: Path) -> None:
     assert run_vpm("check", str(model), str(log)).returncode == 0
 
 
-def test_does_not_mend_a_table_of_several_logs_for_one_of_them(tmp_path: Path) -> None:
+def test_does_not_correct_a_table_of_several_logs_for_one_of_them(tmp_path: Path) -> None:
     model, logs = tmp_path / "arm.toml", [tmp_path / "a.csv", tmp_path / "b.csv"]
     model.write_text(textbook_arm.FILE, encoding="utf-8")
     for path, factor in zip(logs, (1.0, -1.0), strict=True):
@@ -289,4 +289,4 @@ def test_says_which_entry_it_cannot_replace() -> None:
     entry = MODEL.channel_table["one.position"]
     spread = '[channels."one.position"]\ncolumn = "q1"\nunit = "rad"\n'
     with pytest.raises(ModelError, match=r"the entry of one\.position does not stand on a line of its own"):
-        mended_text(spread, {"one.position": line_of("one.position", entry)}, "arm.toml")
+        corrected_text(spread, {"one.position": line_of("one.position", entry)}, "arm.toml")

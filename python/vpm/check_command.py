@@ -20,7 +20,7 @@ EXAMPLES = (
     "Example:  vpm check model.toml log.csv\n\nExample:  vpm check model.toml a.csv b.csv --channels table.toml --fix"
 )
 
-Fix = Annotated[bool, typer.Option("--fix", help="Write the mended entries into the channel table.")]
+Fix = Annotated[bool, typer.Option("--fix", help="Write the corrected entries into the channel table.")]
 
 
 def check(
@@ -35,7 +35,7 @@ def check(
 ) -> None:
     """Find wrong units, signs, names and clocks of logs, before anything is concluded from them.
 
-    Ends with exit code 1 where there is a mistake that was not mended.
+    Ends with exit code 1 where there is a mistake that was not corrected.
     """
     from vpm.log_check import check_log
     from vpm.simulate import Setup
@@ -81,7 +81,7 @@ def _write(found: LogCheck, logs: int, table: Mapping[str, ChannelEntry], path: 
     ModelError
         A mistake is not in all logs, or an entry does not stand on a line of its own.
     """
-    from vpm.log_check.table import line_of, mended_lines, mended_text
+    from vpm.log_check.table import corrected_lines, corrected_text, line_of
 
     for one in found.mistakes:
         if len(one.records) < logs:
@@ -90,9 +90,9 @@ def _write(found: LogCheck, logs: int, table: Mapping[str, ChannelEntry], path: 
                 "of its own with --channels",
                 path=str(path),
             )
-    text, lines = path.read_text(encoding="utf-8"), mended_lines(found.mistakes)
+    text, lines = path.read_text(encoding="utf-8"), corrected_lines(found.mistakes)
     if given:
-        text = mended_text(text, lines, path)
+        text = corrected_text(text, lines, path)
     else:
         whole = {name: line_of(name, entry) for name, entry in table.items()} | lines
         text = "\n".join([text.rstrip(), "", "[channels]", *whole.values(), ""])

@@ -10,9 +10,9 @@ import numpy as np
 from vpm.discrepancy.side_by_side import Progress, SideBySide
 from vpm.errors import ExperimentError, VpmError
 from vpm.experiment import Experiment, as_records, joints_from_shafts
+from vpm.log_check.correction import TIME
 from vpm.log_check.explanation import Explainer, Explanation
 from vpm.log_check.finding import Finding, LogCheck
-from vpm.log_check.mend import TIME
 from vpm.log_check.settings import Settings
 from vpm.log_check.shares import Judge, Shares
 from vpm.log_check.stretches import odd_stretches
@@ -36,8 +36,8 @@ def check_log(
 
     A slow observer keeps the model on the beginning of each record. What it leaves of a channel is compared with what
     it leaves of masses on which nothing acts: that share does not depend on the scale of the channel. A mistake is
-    named where its mend leaves at most half of what is left without it. In both cases the uncertain parameters of the
-    model and friction of its joints have been fitted, so that an effect that is missing does not pass for a mistake.
+    named where its correction leaves at most half of what is left without it. In both cases the uncertain parameters
+    of the model and friction of its joints have been fitted, so that a missing effect does not pass for a mistake.
 
     Parameters
     ----------
@@ -50,9 +50,9 @@ def check_log(
     setup : Setup, optional
         Integrator and hold.
     workers : int, optional
-        Mends that are tried at a time; one per core if not given. The result does not depend on it.
+        Corrections that are tried at a time; one per core if not given. The result does not depend on it.
     progress : callable, optional
-        Called after every mend with what is being done, its name, how many are done and how many there are.
+        Called after every correction with what is being done, its name, how many are done and how many there are.
 
     Returns
     -------
@@ -114,7 +114,7 @@ class _Check:
         self.judge, self.each, self.settings = judge, each, judge.settings
 
     def of(self, record: Experiment, table: Mapping[str, ChannelEntry]) -> tuple[list[Finding], Shares]:
-        """Findings of a record, and what is left of it when they are mended."""
+        """Findings of a record, and what is left of it when they are corrected."""
         record, model = joints_from_shafts(record, self.judge.model), self.judge.model
         outputs = measured_outputs(model, record)
         inputs = tuple(name for name in model.input_channels if name in record)
@@ -126,10 +126,10 @@ class _Check:
             units |= {name: entry.unit for name, entry in table.items()}
             explanations = Explainer(self.judge, units, self.each).explained(part, (*outputs, *inputs), left)
             for one in explanations:
-                changed = one.mend.entries(table)
+                changed = one.correction.entries(table)
                 table = {**table, **changed}
                 found.append(_finding(one, units, changed, record.name))
-                part, left = one.mend.applied(part), one.after
+                part, left = one.correction.applied(part), one.after
             if not explanations:
                 break
         tangent = self.judge.tangent(part, left)
@@ -154,23 +154,23 @@ def _beginning(record: Experiment, outputs: Sequence[str], settings: Settings) -
 
 
 def _finding(found: Explanation, units: Mapping[str, str], changed: Mapping[str, ChannelEntry], record: str) -> Finding:
-    """What is said of a mend that explains a record."""
-    mend, before, after = found.mend, found.before.by_channel, found.after.by_channel
-    said = ", or ".join(one.sentence(units) for one in (mend, *found.rivals))
+    """What is said of a correction that explains a record."""
+    correction, before, after = found.correction, found.before.by_channel, found.after.by_channel
+    said = ", or ".join(one.sentence(units) for one in (correction, *found.rivals))
     if not found.is_mistake:
         said += " (a clock of the log, or a delay of the machine or of its sensors)"
-    place = min(found.spoiled, key=lambda name: after[name] / max(before[name], 1e-300))
+    place = min(found.affected, key=lambda name: after[name] / max(before[name], 1e-300))
     lines = {channel: line_of(channel, entry) for channel, entry in changed.items()}
     return Finding(
-        mend.kind,
-        mend.channels,
+        correction.kind,
+        correction.channels,
         (record,),
         f"{said}; of {place} the model leaves {_percent(before[place])} unexplained as it is, and "
-        f"{_percent(after[place])} with that mended",
-        f"write {' and '.join(lines.values())}" if lines else mend.repair,
+        f"{_percent(after[place])} with that corrected",
+        f"write {' and '.join(lines.values())}" if lines else correction.repair,
         found.is_mistake,
-        mend.factor,
-        mend.delay,
+        correction.factor,
+        correction.delay,
         (before[place], after[place]),
         lines,
     )

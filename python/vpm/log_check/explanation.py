@@ -10,8 +10,8 @@ import numpy as np
 
 from vpm.discrepancy.side_by_side import Failure, SideBySide
 from vpm.experiment import Experiment
-from vpm.log_check.mend import Mend
-from vpm.log_check.mends import delays, scales
+from vpm.log_check.correction import Correction
+from vpm.log_check.corrections import delays, scales
 from vpm.log_check.shares import Judge, Shares
 
 #: Multiples of a delay that are tried next.
@@ -20,33 +20,33 @@ FINER = (0.5, 0.65, 0.8, 0.9, 0.95, 1.0, 1.05, 1.1, 1.2, 1.35, 1.5)
 
 @dataclass(frozen=True, eq=False)
 class Explanation:
-    """A mend that explains a record.
+    """A correction that explains a record.
 
     Attributes
     ----------
-    mend : Mend
+    correction : Correction
     before, after : Shares
         What is left of the record without it and with it.
-    spoiled : tuple of str
-        Channels that the mistake spoils.
-    rivals : tuple of Mend
+    affected : tuple of str
+        Channels that the mistake affects.
+    rivals : tuple of Correction
         Others that do as well.
     """
 
-    mend: Mend
+    correction: Correction
     before: Shares
     after: Shares
-    spoiled: tuple[str, ...]
-    rivals: tuple[Mend, ...]
+    affected: tuple[str, ...]
+    rivals: tuple[Correction, ...]
 
     @property
     def is_mistake(self) -> bool:
         """Whether no machine does that by itself."""
-        return not any(one.is_possible for one in (self.mend, *self.rivals))
+        return not any(one.is_possible for one in (self.correction, *self.rivals))
 
 
 class Explainer:
-    """Tries mends of records.
+    """Tries corrections of records.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ class Explainer:
         self.model, self.settings = judge.model, judge.settings
 
     def explained(self, part: Experiment, used: Sequence[str], left: Shares) -> list[Explanation]:
-        """The mend that leaves least of a record, if it explains it; else two that explain it together; or none.
+        """The correction that leaves least of a record, if it explains it; else two that explain it together; or none.
 
         Parameters
         ----------
@@ -75,46 +75,49 @@ class Explainer:
         if (best := self._best(ended, left)) is not None:
             return [self._by_turns(best, part)]
         pairs = []
-        for mend, after in ended[: self.settings.branches]:
-            mended = mend.applied(part)
-            second = self._best(self._ended(mended, used, after), after)
-            if second is not None and self._explains(mend, left, second.after):
+        for correction, after in ended[: self.settings.branches]:
+            corrected = correction.applied(part)
+            second = self._best(self._ended(corrected, used, after), after)
+            if second is not None and self._explains(correction, left, second.after):
                 pairs.append(
-                    [Explanation(mend, left, after, self._spoiled(mend, after), ()), self._by_turns(second, mended)]
+                    [
+                        Explanation(correction, left, after, self._affected(correction, after), ()),
+                        self._by_turns(second, corrected),
+                    ]
                 )
         return min(pairs, key=lambda pair: pair[-1].after.order, default=[])
 
-    def _ended(self, part: Experiment, used: Sequence[str], left: Shares) -> list[tuple[Mend, Shares]]:
-        """Mends with what is left after each, the model fitted, the least first."""
+    def _ended(self, part: Experiment, used: Sequence[str], left: Shares) -> list[tuple[Correction, Shares]]:
+        """Corrections with what is left after each, the model fitted, the least first."""
         return self._ordered("fitting", self.judge.fitted, self._finalists(part, used, left), part)
 
-    def _best(self, ended: Sequence[tuple[Mend, Shares]], left: Shares) -> Explanation | None:
-        """The first of several mends, if it explains what was left, with those that do as well."""
+    def _best(self, ended: Sequence[tuple[Correction, Shares]], left: Shares) -> Explanation | None:
+        """The first of several corrections, if it explains what was left, with those that do as well."""
         if not ended:
             return None
-        (mend, after), *others = ended
+        (correction, after), *others = ended
         close = after.cost - math.log(self.settings.alike)
-        rivals: list[Mend] = []
+        rivals: list[Correction] = []
         for other, shares in others:
-            if shares.cost <= close and not any(_is_same(other, one) for one in (mend, *rivals)):
+            if shares.cost <= close and not any(_is_same(other, one) for one in (correction, *rivals)):
                 rivals.append(other)
-        if not self._explains(mend, left, after) or any(_is_no_scale(mend, other) for other in rivals):
+        if not self._explains(correction, left, after) or any(_is_no_scale(correction, other) for other in rivals):
             return None
-        return Explanation(mend, left, after, self._spoiled(mend, after), tuple(rivals))
+        return Explanation(correction, left, after, self._affected(correction, after), tuple(rivals))
 
     def _by_turns(self, found: Explanation, part: Experiment) -> Explanation:
         """A delay as the record has it; delay and parameters are fitted by turns."""
-        for _ in range(self.settings.rounds if found.mend.delay else 0):
-            finer = self._refined(found.mend, found.after, part)
+        for _ in range(self.settings.rounds if found.correction.delay else 0):
+            finer = self._refined(found.correction, found.after, part)
             after = self.judge.fitted(finer.applied(part))
             if after.order >= found.after.order:
                 break
-            found = replace(found, mend=finer, after=after)
+            found = replace(found, correction=finer, after=after)
         return found
 
-    def _finalists(self, part: Experiment, used: Sequence[str], left: Shares) -> list[Mend]:
-        """Mends for which the model is worth a fit."""
-        settings, found = self.settings, list[Mend]()
+    def _finalists(self, part: Experiment, used: Sequence[str], left: Shares) -> list[Correction]:
+        """Corrections for which the model is worth a fit."""
+        settings, found = self.settings, list[Correction]()
         everything = set(left.by_channel) if left.far > settings.far else set()
         if doubtful := everything | left.above(settings.doubtful):
             tried = self._about(scales(self.model, used, self.units, settings), doubtful, left)
@@ -123,14 +126,14 @@ class Explainer:
             found += self._late(self._about(delays(self.model, used, settings), some, left), part, left)
         return list(dict.fromkeys(found))
 
-    def _about(self, mends: Iterable[Mend], channels: set[str], left: Shares) -> list[Mend]:
-        """Those that may have spoiled one of these channels."""
-        return [mend for mend in mends if channels & set(self._spoiled(mend, left))]
+    def _about(self, corrections: Iterable[Correction], channels: set[str], left: Shares) -> list[Correction]:
+        """Those that may have affected one of these channels."""
+        return [correction for correction in corrections if channels & set(self._affected(correction, left))]
 
-    def _spoiled(self, mend: Mend, left: Shares) -> tuple[str, ...]:
-        """Channels that a mistake spoils: its own, those of the joints of a command, all by the clock."""
+    def _affected(self, correction: Correction, left: Shares) -> tuple[str, ...]:
+        """Channels that a mistake affects: its own, those of the joints of a command, all by the clock."""
         found: list[str] = []
-        for name in mend.channels:
+        for name in correction.channels:
             owner = name.rpartition(".")[0]
             if name in left.by_channel:
                 found.append(name)
@@ -139,78 +142,82 @@ class Explainer:
                 found += [channel for channel in moved if channel in left.by_channel]
         return tuple(found or left.by_channel)
 
-    def _hopeful(self, mends: Sequence[Mend], part: Experiment, before: Shares) -> list[Mend]:
+    def _hopeful(self, corrections: Sequence[Correction], part: Experiment, before: Shares) -> list[Correction]:
         """The few that leave least at given values of the parameters, and less than is left without any."""
 
-        def measure(mend: Mend) -> tuple[Mend, Shares]:
-            quick = self.judge.of_sensor(mend, part, before)
-            return mend, quick or self.judge.measured(mend.applied(part), before.values)
+        def measure(correction: Correction) -> tuple[Correction, Shares]:
+            quick = self.judge.of_sensor(correction, part, before)
+            return correction, quick or self.judge.measured(correction.applied(part), before.values)
 
-        return self._few(self.each("trying", measure, mends, self._words), before)
+        return self._few(self.each("trying", measure, corrections, self._words), before)
 
-    def _late(self, mends: Sequence[Mend], part: Experiment, left: Shares) -> list[Mend]:
+    def _late(self, corrections: Sequence[Correction], part: Experiment, left: Shares) -> list[Correction]:
         """The few delays that promise to leave least if parameters give way: friction looks much like a delay."""
         tangent = self.judge.tangent(part, left)
         if tangent is None:
             return []
 
-        def measure(mend: Mend) -> tuple[Mend, Shares]:
-            mended = mend.applied(part)
-            there = self.judge.measured(mended, left.values)
+        def measure(correction: Correction) -> tuple[Correction, Shares]:
+            corrected = correction.applied(part)
+            there = self.judge.measured(corrected, left.values)
             if there.residual is None:
-                return mend, there
-            shares, share = tangent.promised(mended, part, there.residual)
-            delay = float(np.clip(share * mend.delay, -self.settings.latest, self.settings.latest))
-            return (replace(mend, delay=delay), shares) if abs(delay) > 0.5 * part.dt else (mend, left)
+                return correction, there
+            shares, share = tangent.promised(corrected, part, there.residual)
+            delay = float(np.clip(share * correction.delay, -self.settings.latest, self.settings.latest))
+            return (replace(correction, delay=delay), shares) if abs(delay) > 0.5 * part.dt else (correction, left)
 
-        return self._few(self.each("trying", measure, mends, self._words), left)
+        return self._few(self.each("trying", measure, corrections, self._words), left)
 
-    def _few(self, tried: Sequence[tuple[Mend, Shares] | Failure], before: Shares) -> list[Mend]:
-        """The mends that leave least, one of each kind, and less than is left without any."""
+    def _few(self, tried: Sequence[tuple[Correction, Shares] | Failure], before: Shares) -> list[Correction]:
+        """The corrections that leave least, one of each kind, and less than is left without any."""
         pairs = [pair for pair in tried if not isinstance(pair, Failure) and pair[1].cost < before.cost]
         better = sorted(pairs, key=lambda pair: pair[1].order)
-        hopeful: list[Mend] = []
-        for mend, left in better:
+        hopeful: list[Correction] = []
+        for correction, left in better:
             near = left.cost <= better[0][1].cost + self.settings.hopeful
-            if near and not any(_is_same(mend, other) for other in hopeful):
-                hopeful.append(mend)
+            if near and not any(_is_same(correction, other) for other in hopeful):
+                hopeful.append(correction)
         return hopeful[: self.settings.finalists]
 
-    def _refined(self, mend: Mend, at: Shares, part: Experiment) -> Mend:
+    def _refined(self, correction: Correction, at: Shares, part: Experiment) -> Correction:
         """A delay as the record has it, by the values of the parameters with which something was left."""
-        finer = [replace(mend, delay=share * mend.delay) for share in FINER]
+        finer = [replace(correction, delay=share * correction.delay) for share in FINER]
         return self._ordered("refining", lambda record: self.judge.measured(record, at.values), finer, part)[0][0]
 
-    def _explains(self, mend: Mend, before: Shares, after: Shares) -> bool:
-        """Whether a mend leaves half of what was left, and the model then explains what the mistake would spoil.
+    def _explains(self, correction: Correction, before: Shares, after: Shares) -> bool:
+        """Whether a correction leaves half of what was left, and the model then explains what the mistake would affect.
 
-        A mend that leaves no more does as well where the model else has values that its file rules out.
+        A correction that leaves no more does as well where the model else has values that its file rules out.
         """
         far, least = self.settings.far, math.log(self.settings.better)
-        spoiled = self._spoiled(mend, after)
-        if max(after.by_channel[name] for name in spoiled) > self.settings.explained:
+        affected = self._affected(correction, after)
+        if max(after.by_channel[name] for name in affected) > self.settings.explained:
             return False
         nearer = before.far > far and after.far < 0.5 * before.far and after.cost <= before.cost - least
-        return nearer or (after.cost - before.cost <= least and after.over(spoiled) - before.over(spoiled) <= least)
+        return nearer or (after.cost - before.cost <= least and after.over(affected) - before.over(affected) <= least)
 
     def _ordered(
-        self, what: str, measure: Callable[[Experiment], Shares], mends: Sequence[Mend], part: Experiment
-    ) -> list[tuple[Mend, Shares]]:
-        """Mends with what is left after each, the least first."""
-        found = self.each(what, lambda mend: measure(mend.applied(part)), mends, self._words)
-        pairs = [(mend, left) for mend, left in zip(mends, found, strict=True) if not isinstance(left, Failure)]
+        self, what: str, measure: Callable[[Experiment], Shares], corrections: Sequence[Correction], part: Experiment
+    ) -> list[tuple[Correction, Shares]]:
+        """Corrections with what is left after each, the least first."""
+        found = self.each(what, lambda correction: measure(correction.applied(part)), corrections, self._words)
+        pairs = [
+            (correction, left)
+            for correction, left in zip(corrections, found, strict=True)
+            if not isinstance(left, Failure)
+        ]
         return sorted(pairs, key=lambda pair: pair[1].order)
 
-    def _words(self, mend: Mend) -> str:
-        return mend.sentence(self.units)
+    def _words(self, correction: Correction) -> str:
+        return correction.sentence(self.units)
 
 
-def _is_same(one: Mend, other: Mend) -> bool:
-    """Whether two mends move the same channels in time."""
+def _is_same(one: Correction, other: Correction) -> bool:
+    """Whether two corrections move the same channels in time."""
     return bool(one.delay) and bool(other.delay) and one.channels == other.channels
 
 
-def _is_no_scale(mend: Mend, other: Mend) -> bool:
+def _is_no_scale(one: Correction, other: Correction) -> bool:
     """Whether another factor does as well for the same channels: then none of them is their scale."""
-    same = mend.channels == other.channels and not (mend.delay or other.delay or mend.swap or other.swap)
-    return same and abs(mend.factor) != abs(other.factor)
+    scales_both = not (one.delay or other.delay or one.swap or other.swap)
+    return scales_both and one.channels == other.channels and abs(one.factor) != abs(other.factor)

@@ -31,7 +31,7 @@ class Finding(Storable):
     delay : float
         By how much later than the others the channels were stamped, s.
     share : tuple of float
-        Error power of the worst channel before and after its mend, as a share of what free masses leave.
+        Error power of the worst channel before and after its correction, as a share of what free masses leave.
     lines : dict of str to str
         Entries of the channel table as they should be, by channel.
     """
@@ -68,7 +68,7 @@ class LogCheck(Result):
         Mistakes first.
     shares : dict of str to float
         What the model leaves of each channel when its uncertain parameters and friction are fitted and every mistake
-        is mended, in the worst record, as a share of the error power of free masses: 0 explains it, 1 nothing of it.
+        is corrected, in the worst record, as a share of the error power of free masses: 0 explains it, 1 nothing of it.
     """
 
     findings: tuple[Finding, ...]

@@ -33,19 +33,19 @@ class Settings:
     negligible : float
         Such a share that is as good as nothing.
     better : float
-        A mistake explains a record if its mend leaves at most this share of what is left without it.
+        A mistake explains a record if its correction leaves at most this share of what is left without it.
     explained : float
-        Largest share of a channel that the mistake would spoil, for a mend to be the explanation.
+        Largest share of a channel that the mistake would affect, for a correction to be the explanation.
     alike : float
-        Another mend explains it as well if it leaves no more than 1/alike times what the best one leaves.
+        Another correction explains it as well if it leaves no more than 1/alike times what the best one leaves.
     finalists : int
-        Mends for which the model is fitted, of those that were tried at its own values.
+        Corrections for which the model is fitted, of those that were tried at its own values.
     hopeful : float
         Those among them leave at most exp(hopeful) times what the best one leaves.
     far : float
         Stated deviations of a parameter of the model by which the model file rules a value out.
     branches : int
-        Mends with each of which another one is tried where none explains a record alone.
+        Corrections with each of which another one is tried where none explains a record alone.
     rounds : int
         Most mistakes of a record that are found one after the other.
     smallest : float

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.experiment import Experiment
-from vpm.log_check.mend import Mend
+from vpm.log_check.correction import Correction
 from vpm.log_check.settings import Settings
 from vpm.model import Model
 from vpm.observer import measured_outputs
@@ -139,17 +139,17 @@ class Judge:
         told = zip(tangent.structure.priors, tangent.deviations.tolist(), strict=True)
         return [name for name, left in told if left > self.settings.unseen and not self._is_added(name)]
 
-    def of_sensor(self, mend: Mend, record: Experiment, before: Shares) -> Shares | None:
-        """What a mend of sensors that do not draw the model leaves, without another run; None where it takes one."""
+    def of_sensor(self, correction: Correction, record: Experiment, before: Shares) -> Shares | None:
+        """What a correction of sensors that do not draw the model leaves; None where it takes another run."""
         if before.residual is None or any(
-            name not in before.by_channel or is_position(self.model, name) for name in mend.channels
+            name not in before.by_channel or is_position(self.model, name) for name in correction.channels
         ):
             return None
-        mended = mend.applied(record)
-        rows, shares = rows_of(mended, record), dict(before.by_channel)
+        corrected = correction.applied(record)
+        rows, shares = rows_of(corrected, record), dict(before.by_channel)
         for place, name in enumerate(before.by_channel):
-            if name in mend.channels:
-                reading, shown = mended[name], record[name][rows] - before.residual[rows, place]
+            if name in correction.channels:
+                reading, shown = corrected[name], record[name][rows] - before.residual[rows, place]
                 free = float(np.sum((reading - np.mean(reading)) ** 2))
                 shares[name] = _share(float(np.sum((reading - shown) ** 2)), free)
         return replace(before, by_channel=shares)
@@ -236,12 +236,12 @@ class Tangent:
         sizes = 1.0 / np.sqrt(np.diag(normal))
         return np.asarray(sizes * np.sqrt(np.maximum(np.diag(np.linalg.inv(normal * np.outer(sizes, sizes))), 0.0)))
 
-    def promised(self, mended: Experiment, record: Experiment, residual: Array) -> tuple[Shares, float]:
-        """What is left if more or less of a mend is done and all parameters give way, and how much of it that is.
+    def promised(self, corrected: Experiment, record: Experiment, residual: Array) -> tuple[Shares, float]:
+        """What is left if more or less of a correction is done and all parameters give way, and how much of it that is.
 
-        ``residual`` is what the same values of the parameters leave of the mended record.
+        ``residual`` is what the same values of the parameters leave of the corrected record.
         """
-        rows = rows_of(mended, record)
+        rows = rows_of(corrected, record)
         kept = np.flatnonzero(np.isin(rows, self.seen))
         slopes, sizes = self._weighed(rows[kept])
         before, after = (part / sizes for part in (self.residual[rows[kept]], residual[kept]))

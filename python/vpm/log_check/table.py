@@ -20,12 +20,12 @@ def line_of(channel: str, entry: ChannelEntry) -> str:
     return f"{channel if channel == 'time' else _quoted(channel)} = {{ {', '.join(parts)} }}"
 
 
-def mended_lines(findings: Iterable[Finding]) -> dict[str, str]:
-    """Entries as they should be, by channel; the last of several mends of one has all of them."""
+def corrected_lines(findings: Iterable[Finding]) -> dict[str, str]:
+    """Entries as they should be, by channel; the last of several corrections of one has all of them."""
     return {channel: line for one in findings if one.mistake for channel, line in one.lines.items()}
 
 
-def mended_text(text: str, lines: Mapping[str, str], path: str | Path) -> str:
+def corrected_text(text: str, lines: Mapping[str, str], path: str | Path) -> str:
     """The text of a file with a channel table, in which entries were replaced; comments stay.
 
     Raises

@@ -17,7 +17,7 @@ TIME = "time"
 
 
 @dataclass(frozen=True)
-class Mend:
+class Correction:
     """A change of a channel table.
 
     Attributes

@@ -7,7 +7,7 @@ from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import combinations
 
-from vpm.log_check.mend import TIME, Mend, factor_between
+from vpm.log_check.correction import TIME, Correction, factor_between
 from vpm.log_check.settings import Settings
 from vpm.model import Model
 
@@ -32,7 +32,7 @@ DECADES = (-6, -3, -2, -1, 1, 2, 3, 6)
 SAME = 0.02
 
 
-def scales(model: Model, used: Sequence[str], units: Mapping[str, str], settings: Settings) -> Iterator[Mend]:
+def scales(model: Model, used: Sequence[str], units: Mapping[str, str], settings: Settings) -> Iterator[Correction]:
     """Wrong units, factors and signs of channels, and channels that were exchanged.
 
     Parameters
@@ -47,25 +47,25 @@ def scales(model: Model, used: Sequence[str], units: Mapping[str, str], settings
     si = {name: model.channel_unit(name) for name in used}
     for group in _groups(model, used, si):
         if len({(si[name], units[name]) for name in group}) > 1:
-            yield Mend(group, -1.0)  # all that belongs to a joint that turns the other way
+            yield Correction(group, -1.0)  # all that belongs to a joint that turns the other way
             continue
-        yield Mend(group, -1.0)
+        yield Correction(group, -1.0)
         for factor, unit in _factors(model, group, units[group[0]], si[group[0]]):
             if max(factor, 1.0 / factor) >= settings.smallest:
-                yield from (Mend(group, sign * factor, unit=unit) for sign in (1.0, -1.0))
+                yield from (Correction(group, sign * factor, unit=unit) for sign in (1.0, -1.0))
     for pair in combinations(used, 2):
         if si[pair[0]] == si[pair[1]]:
-            yield Mend(pair, swap=True)
+            yield Correction(pair, swap=True)
     for factor, unit in _in_other_units(units[TIME], "s"):
-        yield Mend((TIME,), factor, unit=unit)
+        yield Correction((TIME,), factor, unit=unit)
 
 
-def delays(model: Model, used: Sequence[str], settings: Settings) -> Iterator[Mend]:
+def delays(model: Model, used: Sequence[str], settings: Settings) -> Iterator[Correction]:
     """Channels that were stamped too late, or, if less than nothing of a delay helps, too early; see `scales`."""
     si = {name: model.channel_unit(name) for name in used}
     for group in _groups(model, used, si):
         if len({name.rpartition(".")[2] for name in group}) == 1:
-            yield from (Mend(group, delay=delay) for delay in settings.delays)
+            yield from (Correction(group, delay=delay) for delay in settings.delays)
 
 
 def _groups(model: Model, used: Sequence[str], si: Mapping[str, str]) -> list[tuple[str, ...]]:
