@@ -118,6 +118,12 @@ def test_no_machine_moves_before_its_command(logs: dict[str, Columns]) -> None:
     assert one.delay == pytest.approx(0.02, abs=0.002)
 
 
+@pytest.mark.parametrize("samples", [25, 220, 500])
+def test_a_short_log_says_nothing_of_delays(logs: dict[str, Columns], samples: int) -> None:
+    short = record({name: column[:samples] for name, column in logs["friction"].items()})
+    assert vpm.check_log(MODEL, short, workers=1).mistakes == ()
+
+
 def test_a_late_answer_may_be_the_clock_or_the_machine(logs: dict[str, Columns]) -> None:
     found = vpm.check_log(MODEL, record(logs["late commands"]), workers=1).findings
     late = [one for one in found if one.kind == "delay"]

@@ -121,7 +121,7 @@ class _Check:
         stretches = list(odd_stretches(record, outputs, inputs, self.settings))
         part = _beginning(record, outputs, self.settings)
         left, found = self.judge.fitted(part), list[Finding]()
-        for _ in range(self.settings.rounds):
+        for _ in range(self.settings.rounds if len(part) >= self.settings.judged else 0):
             units = {TIME: "s", **{name: model.channel_unit(name) for name in (*outputs, *inputs)}}
             units |= {name: entry.unit for name, entry in table.items()}
             explanations = Explainer(self.judge, units, self.each).explained(part, (*outputs, *inputs), left)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -110,7 +110,7 @@ class Explainer:
         for _ in range(self.settings.rounds if found.correction.delay else 0):
             finer = self._refined(found.correction, found.after, part)
             after = self.judge.fitted(finer.applied(part))
-            if after.order >= found.after.order:
+            if after.order >= found.after.order or not self._explains(finer, found.before, after):
                 break
             found = replace(found, correction=finer, after=after)
         return found
@@ -122,7 +122,8 @@ class Explainer:
         if doubtful := everything | left.above(settings.doubtful):
             tried = self._about(scales(self.model, used, self.units, settings), doubtful, left)
             found += self._hopeful(tried, part, self.judge.measured(part))
-        if some := left.above(settings.negligible):
+        long = part.duration * settings.band >= settings.periods
+        if long and (some := left.above(settings.negligible)):
             found += self._late(self._about(delays(self.model, used, settings), some, left), part, left)
         return list(dict.fromkeys(found))
 
@@ -182,7 +183,8 @@ class Explainer:
     def _refined(self, correction: Correction, at: Shares, part: Experiment) -> Correction:
         """A delay as the record has it, by the values of the parameters with which something was left."""
         finer = [replace(correction, delay=share * correction.delay) for share in FINER]
-        return self._ordered("refining", lambda record: self.judge.measured(record, at.values), finer, part)[0][0]
+        tried = self._ordered("refining", lambda record: self.judge.measured(record, at.values), finer, part)
+        return tried[0][0] if tried else correction
 
     def _explains(self, correction: Correction, before: Shares, after: Shares) -> bool:
         """Whether a correction leaves half of what was left, and the model then explains what the mistake would affect.
@@ -194,7 +196,16 @@ class Explainer:
         if max(after.by_channel[name] for name in affected) > self.settings.explained:
             return False
         nearer = before.far > far and after.far < 0.5 * before.far and after.cost <= before.cost - least
-        return nearer or (after.cost - before.cost <= least and after.over(affected) - before.over(affected) <= least)
+        better = after.cost - before.cost <= least and after.over(affected) - before.over(affected) <= least
+        return nearer or (better and (not correction.delay or self._is_throughout(affected, before, after)))
+
+    def _is_throughout(self, affected: Collection[str], before: Shares, after: Shares) -> bool:
+        """Whether half of what was left is gone in each piece of the record: laws slightly wrong look late."""
+        if before.residual is None or after.residual is None:
+            return after.residual is not None
+        places = [place for place, name in enumerate(before.by_channel) if name in affected]
+        old, new = (np.array_split(r[:, places], self.settings.pieces) for r in (before.residual, after.residual))
+        return all(np.sum(n**2) <= self.settings.better * np.sum(o**2) for o, n in zip(old, new, strict=True))
 
     def _ordered(
         self, what: str, measure: Callable[[Experiment], Shares], corrections: Sequence[Correction], part: Experiment

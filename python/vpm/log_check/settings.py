@@ -27,6 +27,8 @@ class Settings:
         Fewest and most samples of that stretch.
     fewest : int
         Fewest samples of which a noise can be told.
+    judged : int
+        Fewest samples of a record that say anything of units and clocks.
     doubtful : float
         Share of the error power of free masses that a model may leave of a channel. Where it leaves more, after its
         uncertain parameters and the friction of its joints were fitted, units, signs and names of channels are tried.
@@ -36,6 +38,10 @@ class Settings:
         A mistake explains a record if its correction leaves at most this share of what is left without it.
     explained : float
         Largest share of a channel that the mistake would affect, for a correction to be the explanation.
+    periods : float
+        Least length of a record that says anything of delays, in periods of the bandwidth.
+    pieces : int
+        Pieces of a record in each of which a delay has to explain what was left.
     alike : float
         Another correction explains it as well if it leaves no more than 1/alike times what the best one leaves.
     finalists : int
@@ -82,10 +88,13 @@ class Settings:
     window: float = 5.0
     samples: tuple[int, int] = (2000, 10000)
     fewest: int = 20
+    judged: int = 200
     doubtful: float = 0.1
     negligible: float = 1e-3
     better: float = 0.5
     explained: float = 0.25
+    periods: float = 2.0
+    pieces: int = 3
     alike: float = 0.5
     finalists: int = 4
     hopeful: float = 3.0

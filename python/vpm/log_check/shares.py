@@ -131,6 +131,8 @@ class Judge:
             followed = fitter.followed(structure, observer, tuple(structure.priors))
         except ASTRAY:
             return None
+        if not np.all(np.isfinite(followed.jacobian)):
+            return None
         seen = _seen(fitter.observed)
         return Tangent(structure, seen, followed.residual, followed.jacobian * structure.slopes, shares)
 
@@ -234,7 +236,8 @@ class Tangent:
         slopes, _ = self._weighed(self.seen)
         normal = slopes.T @ slopes + np.eye(slopes.shape[1])
         sizes = 1.0 / np.sqrt(np.diag(normal))
-        return np.asarray(sizes * np.sqrt(np.maximum(np.diag(np.linalg.inv(normal * np.outer(sizes, sizes))), 0.0)))
+        spread = np.diag(np.linalg.pinv(normal * np.outer(sizes, sizes), hermitian=True))
+        return np.asarray(sizes * np.sqrt(np.maximum(spread, 0.0)))
 
     def promised(self, corrected: Experiment, record: Experiment, residual: Array) -> tuple[Shares, float]:
         """What is left if more or less of a correction is done and all parameters give way, and how much of it that is.
