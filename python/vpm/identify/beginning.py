@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from vpm.identify.objective import AnyProblem
 from vpm.identify.output_error import WHOLE, OutputErrorProblem
+from vpm.identify.settings import Checks
 from vpm.identify.shooting import ShootingProblem
 from vpm.identify.whiteness import basis, explained_by
 from vpm.model import Model
@@ -73,8 +74,8 @@ def first_state_derivative(model: Model, data: AnyProblem) -> Array:
     return slopes if np.all(np.isfinite(slopes)) else slopes[:, :0]
 
 
-def matters(data: AnyProblem, residual: Array, jacobian: Array, slopes: Array, level: float) -> bool:
-    """Whether first states other than the supposed ones explain what no parameter does.
+def matters(data: AnyProblem, residual: Array, jacobian: Array, slopes: Array, checks: Checks) -> bool:
+    """Whether first states other than the supposed ones explain what no parameter does, and enough of it to be seen.
 
     Parameters
     ----------
@@ -84,13 +85,16 @@ def matters(data: AnyProblem, residual: Array, jacobian: Array, slopes: Array, l
         By the parameters.
     slopes : ndarray, shape (n, k)
         By the first states.
-    level : float
-        Probability of a yes where the supposed ones are right.
+    checks : Checks
+        ``begun`` is the probability of a yes where the supposed ones are right.
     """
     if not slopes.shape[1] or not np.all(np.isfinite(residual)):
         return False
-    tests = [
-        explained_by(residual[b.samples], jacobian[b.samples], slopes[b.samples], b.moving > 0.0)[1]
-        for b in data.blocks
-    ]
-    return min(tests) < level / len(tests)
+    chances, seen = [], []
+    for block in data.blocks:
+        rows, counts = block.samples, block.moving > 0.0
+        share, chance = explained_by(residual[rows], jacobian[rows], slopes[rows], counts)
+        size = float(np.sqrt(np.mean(residual[rows][counts] ** 2))) / block.weight if counts.any() else 0.0
+        chances.append(chance)
+        seen.append(float(np.sqrt(share)) * size >= checks.visible * block.scale)
+    return any(chance < checks.begun / len(chances) and shown for chance, shown in zip(chances, seen, strict=True))

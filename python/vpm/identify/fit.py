@@ -237,7 +237,7 @@ def identify(
     before, _ = data.evaluate(model, model.theta)
     if fitting is None:
         best = estimate(model, data, names, tolerance=tolerance, progress=progress, feasible=True)
-        data, best, begun = _from_anywhere(model, data, best, tolerance, (checks or Checks()).begun)
+        data, best, begun = _from_anywhere(model, data, best, tolerance, checks or Checks(), ties or {})
         result = _with_intervals(data, best)
         fit = fit_of(model, data, result, before, [e.name for e in records], ties or {})
         fit = replace(fit, evaluations=result.evaluations, ended="interrupted" if result.interrupted else "")
@@ -264,27 +264,32 @@ def identify(
 
 
 def _from_anywhere(
-    model: Model, data: AnyProblem, best: Estimate, tolerance: float, level: float
+    model: Model, data: AnyProblem, best: Estimate, tolerance: float, checks: Checks, ties: Mapping[str, str]
 ) -> tuple[AnyProblem, Estimate, bool]:
     """The fit beside unknown first states, where those that the log suggests are wrong; and whether they are."""
-    if best.interrupted or not isinstance(data, OutputErrorProblem):
+    plain = data.untied if isinstance(data, TiedProblem) else data
+    if best.interrupted or not isinstance(plain, OutputErrorProblem):
         return data, best, False
-    fitted, plain = _moved(model, best), data
+    fitted = _moved(model, best, ties)
     slopes = first_state_derivative(fitted, plain)
-    if not matters(plain, best.residual, best.jacobian, slopes, level):
+    if not matters(data, best.residual, best.jacobian, slopes, checks):
         return data, best, False
     for _ in range(ROUNDS):
-        before, data = best.values, BegunAnywhere(plain, slopes)
+        before, begun = best.values, BegunAnywhere(plain, slopes)
+        data = TiedProblem(begun, ties) if ties else begun
         best = estimate(fitted, data, best.names, tolerance=tolerance, feasible=True)
-        fitted, seen = _moved(model, best), np.isfinite(best.std)
+        fitted, seen = _moved(model, best, ties), np.isfinite(best.std)
         if best.interrupted or np.all(np.abs(best.values - before)[seen] <= SETTLED * best.std[seen]):
             break
         slopes = first_state_derivative(fitted, plain)
     return data, best, True
 
 
-def _moved(model: Model, best: Estimate) -> Model:
-    return model.with_parameters(dict(zip(best.names, map(float, best.values), strict=True)))
+def _moved(model: Model, best: Estimate, ties: Mapping[str, str]) -> Model:
+    """The model at estimates, and at those of what follows them."""
+    values = dict(zip(best.names, map(float, best.values), strict=True))
+    followers = {follower: values[leader] for follower, leader in ties.items() if leader in values}
+    return model.with_parameters({**values, **followers})
 
 
 def _with_intervals(data: AnyProblem, found: Estimate) -> Estimate:

@@ -10,7 +10,7 @@ import numpy as np
 
 from vpm.discrepancy.side_by_side import Failure, SideBySide
 from vpm.experiment import Experiment
-from vpm.log_check.correction import Correction
+from vpm.log_check.correction import TIME, Correction
 from vpm.log_check.corrections import delays, scales
 from vpm.log_check.shares import Judge, Shares
 
@@ -78,7 +78,8 @@ class Explainer:
         for correction, after in ended[: self.settings.branches]:
             corrected = correction.applied(part)
             second = self._best(self._ended(corrected, used, after), after)
-            if second is not None and self._explains(correction, left, second.after):
+            again = second is not None and second.correction.channels == correction.channels
+            if second is not None and not again and self._explains(correction, left, second.after):
                 pairs.append(
                     [
                         Explanation(correction, left, after, self._affected(correction, after), ()),
@@ -121,6 +122,8 @@ class Explainer:
         everything = set(left.by_channel) if left.far > settings.far else set()
         if doubtful := everything | left.above(settings.doubtful):
             tried = self._about(scales(self.model, used, self.units, settings), doubtful, left)
+            if not left.above(settings.lost):  # with a wrong clock the model explains nothing
+                tried = [one for one in tried if one.channels != (TIME,)]
             found += self._hopeful(tried, part, self.judge.measured(part))
         long = part.duration * settings.band >= settings.periods
         if long and (some := left.above(settings.negligible)):
@@ -187,17 +190,18 @@ class Explainer:
         return tried[0][0] if tried else correction
 
     def _explains(self, correction: Correction, before: Shares, after: Shares) -> bool:
-        """Whether a correction leaves half of what was left, and the model then explains what the mistake would affect.
+        """Whether a correction leaves a tenth of the channels that the mistake affects, and no more of all together.
 
-        A correction that leaves no more does as well where the model else has values that its file rules out.
+        Where the model explains the record with values alone that its file rules out, it has to make these needless.
         """
-        far, least = self.settings.far, math.log(self.settings.better)
-        affected = self._affected(correction, after)
-        if max(after.by_channel[name] for name in affected) > self.settings.explained:
+        settings, affected = self.settings, self._affected(correction, after)
+        doubtful = before.above(settings.doubtful) | after.above(settings.doubtful)
+        if before.far > settings.far and after.far < settings.near and not doubtful:
+            return True
+        gain = after.logarithm(affected) - before.logarithm(affected)
+        if after.cost > before.cost or gain > math.log(settings.better):
             return False
-        nearer = before.far > far and after.far < 0.5 * before.far and after.cost <= before.cost - least
-        better = after.cost - before.cost <= least and after.over(affected) - before.over(affected) <= least
-        return nearer or (better and (not correction.delay or self._is_throughout(affected, before, after)))
+        return not correction.delay or self._is_throughout(affected, before, after)
 
     def _is_throughout(self, affected: Collection[str], before: Shares, after: Shares) -> bool:
         """Whether half of what was left is gone in each piece of the record: laws slightly wrong look late."""
@@ -205,7 +209,7 @@ class Explainer:
             return after.residual is not None
         places = [place for place, name in enumerate(before.by_channel) if name in affected]
         old, new = (np.array_split(r[:, places], self.settings.pieces) for r in (before.residual, after.residual))
-        return all(np.sum(n**2) <= self.settings.better * np.sum(o**2) for o, n in zip(old, new, strict=True))
+        return all(np.sum(n**2) <= 0.5 * np.sum(o**2) for o, n in zip(old, new, strict=True))
 
     def _ordered(
         self, what: str, measure: Callable[[Experiment], Shares], corrections: Sequence[Correction], part: Experiment

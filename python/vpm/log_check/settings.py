@@ -32,12 +32,12 @@ class Settings:
     doubtful : float
         Share of the error power of free masses that a model may leave of a channel. Where it leaves more, after its
         uncertain parameters and the friction of its joints were fitted, units, signs and names of channels are tried.
+    lost : float
+        Such a share of which a wrong clock leaves more, of one channel at least.
     negligible : float
         Such a share that is as good as nothing.
     better : float
-        A mistake explains a record if its correction leaves at most this share of what is left without it.
-    explained : float
-        Largest share of a channel that the mistake would affect, for a correction to be the explanation.
+        A mistake explains a record if its correction leaves at most this share of the channels that it affects.
     periods : float
         Least length of a record that says anything of delays, in periods of the bandwidth.
     pieces : int
@@ -48,8 +48,8 @@ class Settings:
         Corrections for which the model is fitted, of those that were tried at its own values.
     hopeful : float
         Those among them leave at most exp(hopeful) times what the best one leaves.
-    far : float
-        Stated deviations of a parameter of the model by which the model file rules a value out.
+    far, near : float
+        Stated deviations of a parameter of the model by which the model file rules a value out, and believes it.
     branches : int
         Corrections with each of which another one is tried where none explains a record alone.
     rounds : int
@@ -90,15 +90,16 @@ class Settings:
     fewest: int = 20
     judged: int = 200
     doubtful: float = 0.1
+    lost: float = 0.8
     negligible: float = 1e-3
-    better: float = 0.5
-    explained: float = 0.25
+    better: float = 0.1
     periods: float = 2.0
     pieces: int = 3
     alike: float = 0.5
     finalists: int = 4
     hopeful: float = 3.0
     far: float = 5.0
+    near: float = 2.0
     branches: int = 3
     rounds: int = 3
     smallest: float = 2.0

@@ -61,12 +61,13 @@ class Shares:
 
     @property
     def cost(self) -> float:
-        """Sum of the logarithms of the shares: errors of each channel have a scale of their own."""
-        return self.over(self.by_channel)
+        """Sum of the logarithms of the shares, but for what is negligible: each channel has a scale of its own."""
+        return sum(math.log(max(share, self.floor)) for share in self.by_channel.values())
 
-    def over(self, channels: Iterable[str]) -> float:
-        """The same of some channels alone."""
-        return sum(math.log(max(self.by_channel[name], self.floor)) for name in channels)
+    def logarithm(self, channels: Iterable[str]) -> float:
+        """Mean of the logarithms of the shares of some channels."""
+        shares = [self.by_channel[name] for name in channels]
+        return sum(math.log(max(share, 1e-300)) for share in shares) / len(shares)
 
     def above(self, share: float) -> set[str]:
         """Channels of which more than a share is left."""
@@ -75,7 +76,7 @@ class Shares:
     @property
     def order(self) -> tuple[float, float]:
         """Which of several leaves least; where all is as good as nothing, by what is left all the same."""
-        return self.cost, sum(math.log(max(share, 1e-300)) for share in self.by_channel.values())
+        return self.cost, self.logarithm(self.by_channel)
 
 
 class Judge:
