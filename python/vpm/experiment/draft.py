@@ -126,9 +126,7 @@ def _map_channel(
 
 def plain_draft(path: str | PathLike[str]) -> Draft:
     """Every column a channel of its own name; a unit may stand in brackets behind it."""
-    log = open_log(path)
-    names = {column: _stated(column, log) for column in log.header}
-    clock = _clock_column(path, names)
+    log, names, clock = _plain_columns(path)
     content = log.read(log.header, clock)
     source = Source(str(path), content.lines, str(path))
     factor, _ = to_si(names[clock][1] or "s", "time", None, str(path), expected="s")
@@ -157,9 +155,7 @@ def plain_table(path: str | PathLike[str], model: Model) -> dict[str, ChannelEnt
     """
     from vpm.model import ChannelEntry
 
-    log = open_log(path)
-    names = {column: _stated(column, log) for column in log.header}
-    clock = _clock_column(path, names)
+    _, names, clock = _plain_columns(path)
     known = {
         name: (column, unit or model.channel_unit(name))
         for column, (name, unit) in names.items()
@@ -167,6 +163,13 @@ def plain_table(path: str | PathLike[str], model: Model) -> dict[str, ChannelEnt
     }
     told = {"time": (clock, names[clock][1] or "s"), **known}
     return {name: ChannelEntry(column=column, unit=unit) for name, (column, unit) in told.items()}
+
+
+def _plain_columns(path: str | PathLike[str]) -> tuple[Log, dict[str, tuple[str, str]], str]:
+    """A log without a channel table, name and unit of each of its columns, and which of these is the clock."""
+    log = open_log(path)
+    names = {column: _stated(column, log) for column in log.header}
+    return log, names, _clock_column(path, names)
 
 
 def _clock_column(path: str | PathLike[str], names: Mapping[str, tuple[str, str]]) -> str:

@@ -18,7 +18,7 @@ from vpm.identify.objective import AnyProblem
 from vpm.identify.output_error import WHOLE, OutputErrorProblem
 from vpm.identify.settings import Checks
 from vpm.identify.shooting import ShootingProblem
-from vpm.identify.whiteness import basis, explained_by
+from vpm.identify.whiteness import basis, explained_by, explained_size
 from vpm.model import Model
 
 Array = NDArray[np.float64]
@@ -94,7 +94,6 @@ def matters(data: AnyProblem, residual: Array, jacobian: Array, slopes: Array, c
     for block in data.blocks:
         rows, counts = block.samples, block.moving > 0.0
         share, chance = explained_by(residual[rows], jacobian[rows], slopes[rows], counts)
-        size = float(np.sqrt(np.mean(residual[rows][counts] ** 2))) / block.weight if counts.any() else 0.0
         chances.append(chance)
-        seen.append(float(np.sqrt(share)) * size >= checks.visible * block.scale)
+        seen.append(explained_size(share, residual[rows][counts], block.weight) >= checks.visible * block.scale)
     return any(chance < checks.begun / len(chances) and shown for chance, shown in zip(chances, seen, strict=True))

@@ -14,7 +14,16 @@ from vpm.identify.objective import AnyProblem
 from vpm.identify.problem import FEWEST_SAMPLES, Block
 from vpm.identify.settings import Checks
 from vpm.identify.ties import TiedProblem
-from vpm.identify.whiteness import SHARPNESS, Whiteness, default_lags, explained_by, ljung_box, powers, shifted
+from vpm.identify.whiteness import (
+    SHARPNESS,
+    Whiteness,
+    default_lags,
+    explained_by,
+    explained_size,
+    ljung_box,
+    powers,
+    shifted,
+)
 from vpm.initial import joint_motion
 from vpm.model import Model
 
@@ -63,8 +72,8 @@ def _judge(model: Model, block: Block, residual: Array, slopes: Array, groups: G
         added = []
     tests = [explained_by(residual, slopes, columns, counts) for columns in added]
     share, chance = min(tests, key=lambda test: test[1], default=(0.0, 1.0))
-    size = float(np.sqrt(np.mean(residual[counts] ** 2))) / block.weight
-    white, visible = ljung_box(residual[counts], lags), np.sqrt(share) * size / block.scale
+    visible = explained_size(share, residual[counts], block.weight) / block.scale
+    white = ljung_box(residual[counts], lags)
     return Whiteness(block.experiment, block.channel, lags, white, share, min(1.0, len(tests) * chance), visible)
 
 

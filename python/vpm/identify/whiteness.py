@@ -124,6 +124,11 @@ def explained_by(residual: Array, fitted: Array, added: Array, counts: NDArray[n
     return max(0.0, share), float(fdtrc(k, freedom, ratio))
 
 
+def explained_size(share: float, residual: Array, weight: float) -> float:
+    """Root mean square of what explains a share of a residual (n,), before it was weighed; nothing without samples."""
+    return float(np.sqrt(share * np.mean(residual**2))) / weight if residual.size else 0.0
+
+
 def _left(target: Array, columns: Array) -> tuple[float, Array]:
     """Sum of squares that columns leave of a target, and their weights."""
     weights = np.linalg.lstsq(columns, target, rcond=None)[0]

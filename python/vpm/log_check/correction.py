@@ -91,11 +91,8 @@ class Correction:
             return f"{names} {are} in {self.unit}, not in {units[self.channels[0]]}{turned}"
         if self.factor == -1.0:
             return f"{names} {'has' if len(self.channels) == 1 else 'have'} the opposite sign"
-        by = (
-            f"{1.0 / abs(self.factor):.4g} times too large"
-            if abs(self.factor) < 1.0
-            else (f"{abs(self.factor):.4g} times too small")
-        )
+        size = abs(self.factor)
+        by = f"{1.0 / size:.4g} times too large" if size < 1.0 else f"{size:.4g} times too small"
         return f"{names} {are} {by}{turned}"
 
     @property

@@ -209,7 +209,7 @@ class Explainer:
             return after.residual is not None
         places = [place for place, name in enumerate(before.by_channel) if name in affected]
         old, new = (np.array_split(r[:, places], self.settings.pieces) for r in (before.residual, after.residual))
-        return all(np.sum(n**2) <= 0.5 * np.sum(o**2) for o, n in zip(old, new, strict=True))
+        return all(np.sum(n**2) <= self.settings.throughout * np.sum(o**2) for o, n in zip(old, new, strict=True))
 
     def _ordered(
         self, what: str, measure: Callable[[Experiment], Shares], corrections: Sequence[Correction], part: Experiment

@@ -42,6 +42,8 @@ class Settings:
         Least length of a record that says anything of delays, in periods of the bandwidth.
     pieces : int
         Pieces of a record in each of which a delay has to explain what was left.
+    throughout : float
+        Largest share of what was left that it leaves in each of these.
     alike : float
         Another correction explains it as well if it leaves no more than 1/alike times what the best one leaves.
     finalists : int
@@ -95,6 +97,7 @@ class Settings:
     better: float = 0.1
     periods: float = 2.0
     pieces: int = 3
+    throughout: float = 0.5
     alike: float = 0.5
     finalists: int = 4
     hopeful: float = 3.0

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -179,10 +180,14 @@ class Judge:
             return 1.0, 1.0
         ends = np.linspace(0, len(record) - 1, min(PIECES, len(record))).astype(int)
         way, speed = np.std(record[channel]), np.std(np.diff(record[channel][ends]) / np.diff(record.time[ends]))
+        masses, weights = self._at_rest
+        return float(masses[place] * speed**2 / way + weights[place]) + 1e-9, float(speed) + 1e-9
+
+    @cached_property
+    def _at_rest(self) -> tuple[Array, Array]:
+        """Mass and weight that each coordinate moves where all are zero: one machine serves all records."""
         rest = np.zeros(len(self.model.coordinates))
-        mass = self.model.mass_matrix(rest)[place, place]
-        weight = abs(self.model.inverse_dynamics(rest, rest, rest)[place])
-        return float(mass * speed**2 / way + weight) + 1e-9, float(speed) + 1e-9
+        return np.diag(self.model.mass_matrix(rest)), np.abs(self.model.inverse_dynamics(rest, rest, rest))
 
     def _is_added(self, parameter: str) -> bool:
         return any(parameter in self.model.effect(*key).parameter_names.values() for key in self.added)

@@ -14,8 +14,8 @@ from vpm.model import ChannelEntry
 def line_of(channel: str, entry: ChannelEntry) -> str:
     """An entry as a line of TOML; what stands at its default is left out."""
     parts = [f"column = {_quoted(entry.column)}", f"unit = {_quoted(entry.unit)}"]
-    parts += [f"{key} = {value!r}" for key, value in (("scale", entry.scale),) if value != 1.0]
-    parts += [f"{key} = {value!r}" for key, value in (("offset", entry.offset), ("delay", entry.delay)) if value != 0.0]
+    numbers = (("scale", entry.scale, 1.0), ("offset", entry.offset, 0.0), ("delay", entry.delay, 0.0))
+    parts += [f"{key} = {value!r}" for key, value, default in numbers if value != default]
     parts += ["optional = true"] if entry.optional else []
     return f"{channel if channel == 'time' else _quoted(channel)} = {{ {', '.join(parts)} }}"
 
@@ -34,7 +34,7 @@ def corrected_text(text: str, lines: Mapping[str, str], path: str | Path) -> str
         An entry does not stand on one line.
     """
     for channel, line in lines.items():
-        entry = rf"""^[ \t]*["']?{re.escape(channel)}["']?[ \t]*=[ \t]*\{{[^{{}}\n]*\}}"""
+        entry = rf"""^[ \t]*["']?{re.escape(channel)}["']?[ \t]*=[ \t]*\{{[^{{}}\n]*\bcolumn\b[^{{}}\n]*\}}"""
         found = list(re.finditer(entry, text, re.MULTILINE))
         if len(found) != 1:
             raise ModelError(
