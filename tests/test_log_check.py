@@ -138,6 +138,48 @@ def test_two_mistakes_are_found_one_after_the_other(logs: dict[str, Columns]) ->
     assert {one.channels for one in found} == {("one.position",), ("m2.command",)}
 
 
+@pytest.mark.parametrize("fault", ["none", "friction"])
+@pytest.mark.parametrize("channels", ["one", "all"])
+def test_finds_two_mistakes_that_hide_each_other(logs: dict[str, Columns], fault: str, channels: str) -> None:
+    """Degrees and milliamperes of one joint: either alone makes the log less likely, or hardly more."""
+    joints = "12" if channels == "all" else "1"
+    changes = [scaled(f"q{n}", 180.0 / np.pi) for n in joints] + [scaled(f"i{n}", 1e3) for n in joints]
+    found = vpm.check_log(MODEL, record(both(*changes)(logs[fault])), workers=1).mistakes
+    named = {"one.position", "m1.command"} | ({"two.position", "m2.command"} if channels == "all" else set())
+    assert {one.kind for one in found} == {"unit"}
+    assert {channel for one in found for channel in one.channels} == named
+    assert all("with both corrected" in one.sentence for one in found)
+
+
+def test_a_value_that_the_file_rules_out_is_no_explanation(logs: dict[str, Columns]) -> None:
+    """A gain ten times as small explains a command ten times as large, but the file says what the gain is."""
+    file = textbook_arm.FILE.replace("gain = 4.0", "gain = { value = 4.0, uncertainty = 0.2 }")
+    found = vpm.check_log(vpm.Model.from_toml(file), record(scaled("i1", 10.0)(logs["friction"])), workers=1)
+    (one,) = found.mistakes
+    assert (one.channels, one.factor) == (("m1.command",), pytest.approx(0.1))
+    assert "only with m1.gain" in one.sentence
+
+
+def test_a_mirror_image_that_explains_nearly_everything_is_not_believed() -> None:
+    """A slide on a slope, written in a frame turned round: only its weight tells, and that is small."""
+    slide = """
+        name = "slide"
+        gravity = [0.1, 0.0, -9.81]
+        bodies.table = { mass = { value = 2.0, uncertainty = 0.2 } }
+        joints.slide = { type = "prismatic", parent = "world", child = "table", axis = [1.0, 0.0, 0.0] }
+        actuators.drive = { joint = "slide", gain = 1.0, command_unit = "N" }
+    """
+    model, time = vpm.Model.from_toml(slide), np.arange(0.0, 8.0, 0.004)
+    way = 0.1 * np.sin(5.0 * time) + 0.05 * np.sin(11.0 * time)
+    acceleration = -2.5 * np.sin(5.0 * time) - 6.05 * np.sin(11.0 * time)
+    force = 2.1 * (acceleration - 0.1)
+    noise = 1e-6 * np.random.default_rng(4).standard_normal((2, time.size))
+    for sign in (1.0, -1.0):
+        columns = {"slide.position": sign * way + noise[0], "drive.command": sign * force + noise[1]}
+        found = vpm.check_log(model, vpm.Experiment.from_arrays(time, columns, {}, model=model), workers=1)
+        assert [one.channels for one in found.mistakes] == ([] if sign > 0.0 else [tuple(columns)])
+
+
 def test_the_same_mistake_of_two_logs_is_told_once(logs: dict[str, Columns]) -> None:
     wrong = scaled("q2", -1.0)
     records = [record(wrong(logs[name]), name) for name in ("none", "friction")]
@@ -220,6 +262,15 @@ def test_finds_what_was_cut_off() -> None:
 def test_finds_coarse_steps() -> None:
     (one,) = odd(np.round(swing() / 0.05) * 0.05)
     assert one.kind == "coarse"
+
+
+def test_a_resonance_above_the_noise_of_its_sensor_is_no_filter() -> None:
+    from scipy.signal import butter, sosfilt
+
+    noise = np.random.default_rng(5).standard_normal((2, 4000))
+    shaken = np.asarray(sosfilt(butter(6, 0.25, output="sos"), 2e-3 * noise[0]))
+    assert odd(swing(0.0) + shaken + 1e-4 * noise[1]) == []
+    assert [one.kind for one in odd(swing(0.0) + shaken)] == ["filtered"]
 
 
 def test_finds_what_was_filtered_before_it_was_stored() -> None:

@@ -36,7 +36,7 @@ def check_log(
 
     A slow observer keeps the model on the beginning of each record. What it leaves of a channel is compared with what
     it leaves of masses on which nothing acts: that share does not depend on the scale of the channel. A mistake is
-    named where its correction leaves at most half of what is left without it. In both cases the uncertain parameters
+    named where its correction leaves at most a tenth of what is left without it. In both cases the uncertain parameters
     of the model and friction of its joints have been fitted, so that a missing effect does not pass for a mistake.
 
     Parameters
@@ -165,8 +165,7 @@ def _finding(found: Explanation, units: Mapping[str, str], changed: Mapping[str,
         correction.kind,
         correction.channels,
         (record,),
-        f"{said}; of {place} the model leaves {_percent(before[place])} unexplained as it is, and "
-        f"{_percent(after[place])} with that corrected",
+        f"{said}; {_evidence(found, place)}",
         f"write {' and '.join(lines.values())}" if lines else correction.repair,
         found.is_mistake,
         correction.factor,
@@ -174,6 +173,19 @@ def _finding(found: Explanation, units: Mapping[str, str], changed: Mapping[str,
         (before[place], after[place]),
         lines,
     )
+
+
+def _evidence(found: Explanation, place: str) -> str:
+    """By what a correction explains a record, in numbers."""
+    before, after = found.before, found.after
+    corrected = "both corrected" if found.at_once else "that corrected"
+    if found.is_of_values:
+        return (
+            f"as it is the model explains the log only with {before.farthest} {before.far:.2g} of its deviations "
+            f"away from the model file, and with {corrected} none is farther away than {after.far:.2g}"
+        )
+    left, then = (_percent(shares.by_channel[place]) for shares in (before, after))
+    return f"of {place} the model leaves {left} unexplained as it is, and {then} with {corrected}"
 
 
 def _of_parameters(unseen: Sequence[str], record: str) -> Finding:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -109,6 +110,11 @@ class Correction:
         return "sign" if self.factor == -1.0 else "scale"
 
     @property
+    def is_mirror(self) -> bool:
+        """Whether it turns or exchanges channels and leaves their sizes as they are."""
+        return self.swap or self.factor == -1.0
+
+    @property
     def repair(self) -> str:
         """What to do where no channel table is at hand."""
         if self.swap:
@@ -127,6 +133,21 @@ class Correction:
         return self.delay != 0.0 and all(
             (self.delay < 0.0) == name.endswith((".command", ".disturbance")) for name in self.channels
         )
+
+
+class Pair(NamedTuple):
+    """Two corrections of which each alone explains nothing."""
+
+    first: Correction
+    second: Correction
+
+    def applied(self, record: Experiment) -> Experiment:
+        """The record without both mistakes."""
+        return self.second.applied(self.first.applied(record))
+
+    def sentence(self, units: Mapping[str, str]) -> str:
+        """What is wrong, for people; ``units`` are those that were read."""
+        return f"{self.first.sentence(units)}, and {self.second.sentence(units)}"
 
 
 def factor_between(unit: str, other: str) -> float:

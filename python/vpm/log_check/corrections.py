@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import combinations
+from itertools import combinations, product
 
-from vpm.log_check.correction import TIME, Correction, factor_between
+from vpm.log_check.correction import TIME, Correction, Pair, factor_between
 from vpm.log_check.settings import Settings
 from vpm.model import Model
 
@@ -66,6 +66,38 @@ def delays(model: Model, used: Sequence[str], settings: Settings) -> Iterator[Co
     for group in _groups(model, used, si):
         if len({name.rpartition(".")[2] for name in group}) == 1:
             yield from (Correction(group, delay=delay) for delay in settings.delays)
+
+
+def of_two(model: Model, used: Sequence[str], units: Mapping[str, str], settings: Settings) -> Iterator[Pair]:
+    """Wrong units and signs of joints and of what drives them at once, which hide each other; see `scales`."""
+    for positions, commands in _driven(model, used):
+        sides = (list(_of_units(model, group, units, settings)) for group in (positions, commands))
+        yield from (Pair(first, second) for first, second in product(*sides))
+
+
+def _of_units(
+    model: Model, group: tuple[str, ...], units: Mapping[str, str], settings: Settings
+) -> Iterator[Correction]:
+    """Other units, and the opposite sign, of channels of one kind."""
+    yield Correction(group, -1.0)
+    for factor, unit in _in_other_units(units[group[0]], model.channel_unit(group[0])):
+        if max(factor, 1.0 / factor) >= settings.smallest:
+            yield from (Correction(group, sign * factor, unit=unit) for sign in (1.0, -1.0))
+
+
+def _driven(model: Model, used: Sequence[str]) -> list[tuple[tuple[str, ...], tuple[str, ...]]]:
+    """Positions of joints with the commands that drive them: drive by drive, and all of the same units."""
+    found: list[tuple[tuple[str, ...], tuple[str, ...]]] = []
+    kinds: dict[tuple[str, str], tuple[list[str], list[str]]] = defaultdict(lambda: ([], []))
+    for command in (name for name in used if name.endswith(".command")):
+        joints = model.joints_of_actuator(command.rpartition(".")[0])
+        if positions := tuple(name for name in used if name in {f"{joint}.position" for joint in joints}):
+            found.append((positions, (command,)))
+            several = kinds[model.channel_unit(positions[0]), model.channel_unit(command)]
+            several[0].extend(name for name in positions if name not in several[0])
+            several[1].append(command)
+    together = [(tuple(positions), tuple(commands)) for positions, commands in kinds.values()]
+    return list(dict.fromkeys([*found, *together]))
 
 
 def _groups(model: Model, used: Sequence[str], si: Mapping[str, str]) -> list[tuple[str, ...]]:

@@ -5,15 +5,17 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 
 from vpm.discrepancy.side_by_side import Failure, SideBySide
 from vpm.experiment import Experiment
-from vpm.log_check.correction import TIME, Correction
-from vpm.log_check.corrections import delays, scales
+from vpm.log_check.correction import TIME, Correction, Pair
+from vpm.log_check.corrections import delays, of_two, scales
 from vpm.log_check.shares import Judge, Shares
 
+Change = TypeVar("Change", Correction, Pair)
 #: Multiples of a delay that are tried next.
 FINER = (0.5, 0.65, 0.8, 0.9, 0.95, 1.0, 1.05, 1.1, 1.2, 1.35, 1.5)
 
@@ -31,13 +33,19 @@ class Explanation:
         Channels that the mistake affects.
     rivals : tuple of Correction
         Others that do as well.
+    is_of_values : bool
+        The model explains the record without it as well, but with values that its file rules out.
+    at_once : bool
+        Another correction has to be made with it; alone it explains nothing.
     """
 
     correction: Correction
     before: Shares
     after: Shares
     affected: tuple[str, ...]
-    rivals: tuple[Correction, ...]
+    rivals: tuple[Correction, ...] = ()
+    is_of_values: bool = False
+    at_once: bool = False
 
     @property
     def is_mistake(self) -> bool:
@@ -74,6 +82,31 @@ class Explainer:
         ended = self._ended(part, used, left)
         if (best := self._best(ended, left)) is not None:
             return [self._by_turns(best, part)]
+        return self._at_once(part, used, left) or self._one_by_one(ended, part, used, left)
+
+    def _at_once(self, part: Experiment, used: Sequence[str], left: Shares) -> list[Explanation]:
+        """Two corrections of a joint of which each alone explains nothing, for the other one hides what it does."""
+        if not (doubtful := self._doubtful(left)):
+            return []
+        pairs = [
+            pair
+            for pair in of_two(self.model, used, self.units, self.settings)
+            if any(doubtful & set(self._affected(one, left)) for one in pair)
+        ]
+        before = self.judge.measured(part)
+        tried = self._ordered("trying", self.judge.measured, pairs, part)
+        few = [pair for pair, shares in tried if shares.cost < before.cost][: self.settings.fitted]
+        for pair, after in self._ordered("fitting", self.judge.fitted, few, part)[:1]:
+            if all(self._explains(one, left, after) for one in pair):
+                both = Explanation(pair.first, left, after, self._affected(pair.first, after), at_once=True)
+                both = replace(both, is_of_values=self._is_of_values(left, after))
+                return [replace(both, correction=one, affected=self._affected(one, after)) for one in pair]
+        return []
+
+    def _one_by_one(
+        self, ended: Sequence[tuple[Correction, Shares]], part: Experiment, used: Sequence[str], left: Shares
+    ) -> list[Explanation]:
+        """Two corrections of which the first one leaves less, though not little."""
         pairs = []
         for correction, after in ended[: self.settings.branches]:
             corrected = correction.applied(part)
@@ -104,7 +137,8 @@ class Explainer:
                 rivals.append(other)
         if not self._explains(correction, left, after) or any(_is_no_scale(correction, other) for other in rivals):
             return None
-        return Explanation(correction, left, after, self._affected(correction, after), tuple(rivals))
+        affected, of_values = self._affected(correction, after), self._is_of_values(left, after)
+        return Explanation(correction, left, after, affected, tuple(rivals), of_values)
 
     def _by_turns(self, found: Explanation, part: Experiment) -> Explanation:
         """A delay as the record has it; delay and parameters are fitted by turns."""
@@ -119,16 +153,21 @@ class Explainer:
     def _finalists(self, part: Experiment, used: Sequence[str], left: Shares) -> list[Correction]:
         """Corrections for which the model is worth a fit."""
         settings, found = self.settings, list[Correction]()
-        everything = set(left.by_channel) if left.far > settings.far else set()
-        if doubtful := everything | left.above(settings.doubtful):
-            tried = self._about(scales(self.model, used, self.units, settings), doubtful, left)
-            if not left.above(settings.lost):  # with a wrong clock the model explains nothing
-                tried = [one for one in tried if one.channels != (TIME,)]
-            found += self._hopeful(tried, part, self.judge.measured(part))
-        long = part.duration * settings.band >= settings.periods
-        if long and (some := left.above(settings.negligible)):
+        some = left.above(settings.negligible)
+        everything = list(scales(self.model, used, self.units, settings))
+        tried = self._about(everything, self._doubtful(left), left)
+        if not left.above(settings.lost):  # with a wrong clock the model explains nothing
+            tried = [one for one in tried if one.channels != (TIME,)]
+        # The mirror image of a machine explains most of a log as well as the machine does.
+        tried += self._about((one for one in everything if one.is_mirror), some, left)
+        found += self._hopeful(list(dict.fromkeys(tried)), part, self.judge.measured(part)) if tried else []
+        if some and part.duration * settings.band >= settings.periods:
             found += self._late(self._about(delays(self.model, used, settings), some, left), part, left)
         return list(dict.fromkeys(found))
+
+    def _doubtful(self, left: Shares) -> set[str]:
+        """Channels that the model does not explain; all where its file rules out the values by which it does."""
+        return set(left.by_channel) if left.far > self.settings.far else left.above(self.settings.doubtful)
 
     def _about(self, corrections: Iterable[Correction], channels: set[str], left: Shares) -> list[Correction]:
         """Those that may have affected one of these channels."""
@@ -190,18 +229,20 @@ class Explainer:
         return tried[0][0] if tried else correction
 
     def _explains(self, correction: Correction, before: Shares, after: Shares) -> bool:
-        """Whether a correction leaves a tenth of the channels that the mistake affects, and no more of all together.
-
-        Where the model explains the record with values alone that its file rules out, it has to make these needless.
-        """
-        settings, affected = self.settings, self._affected(correction, after)
-        doubtful = before.above(settings.doubtful) | after.above(settings.doubtful)
-        if before.far > settings.far and after.far < settings.near and not doubtful:
+        """Whether a correction explains what a model leaves, or by which values it leaves nothing."""
+        if self._is_of_values(before, after):
             return True
+        affected = self._affected(correction, after)
         gain = after.logarithm(affected) - before.logarithm(affected)
-        if after.cost > before.cost or gain > math.log(settings.better):
+        if after.cost > before.cost or gain > math.log(self.settings.better):
             return False
         return not correction.delay or self._is_throughout(affected, before, after)
+
+    def _is_of_values(self, before: Shares, after: Shares) -> bool:
+        """Whether the model explains the record anyway, but with values that its file rules out, now needless."""
+        settings = self.settings
+        doubtful = before.above(settings.doubtful) | after.above(settings.doubtful)
+        return before.far > settings.far and before.unlikely - after.unlikely > settings.likelier and not doubtful
 
     def _is_throughout(self, affected: Collection[str], before: Shares, after: Shares) -> bool:
         """Whether half of what was left is gone in each piece of the record: laws slightly wrong look late."""
@@ -212,8 +253,8 @@ class Explainer:
         return all(np.sum(n**2) <= self.settings.throughout * np.sum(o**2) for o, n in zip(old, new, strict=True))
 
     def _ordered(
-        self, what: str, measure: Callable[[Experiment], Shares], corrections: Sequence[Correction], part: Experiment
-    ) -> list[tuple[Correction, Shares]]:
+        self, what: str, measure: Callable[[Experiment], Shares], corrections: Sequence[Change], part: Experiment
+    ) -> list[tuple[Change, Shares]]:
         """Corrections with what is left after each, the least first."""
         found = self.each(what, lambda correction: measure(correction.applied(part)), corrections, self._words)
         pairs = [
@@ -223,7 +264,7 @@ class Explainer:
         ]
         return sorted(pairs, key=lambda pair: pair[1].order)
 
-    def _words(self, correction: Correction) -> str:
+    def _words(self, correction: Correction | Pair) -> str:
         return correction.sentence(self.units)
 
 

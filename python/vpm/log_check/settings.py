@@ -48,10 +48,14 @@ class Settings:
         Another correction explains it as well if it leaves no more than 1/alike times what the best one leaves.
     finalists : int
         Corrections for which the model is fitted, of those that were tried at its own values.
+    fitted : int
+        Pairs of corrections of one joint for which the model is fitted: each alone hides what the other one does.
     hopeful : float
         Those among them leave at most exp(hopeful) times what the best one leaves.
-    far, near : float
-        Stated deviations of a parameter of the model by which the model file rules a value out, and believes it.
+    far : float
+        Stated deviations of a parameter of the model by which the model file rules a value out.
+    likelier : float
+        A mistake also explains a record if its correction makes the values that explain it likelier by so many nats.
     branches : int
         Corrections with each of which another one is tried where none explains a record alone.
     rounds : int
@@ -76,6 +80,10 @@ class Settings:
         A sample is a spike if it differs from its neighbours by so many times the noise of the channel.
     filtered : float
         Power of noise in an octave, beside that in the octave before it, below which a channel was filtered.
+    level : float
+        Two octaves have the same noise if its powers differ by less than this factor.
+    digits : float
+        Noise of fewer roundings of a floating-point number is none.
     unseen : float
         A record does not show a parameter if it leaves more than this share of its stated uncertainty.
     coarse : float
@@ -100,9 +108,10 @@ class Settings:
     throughout: float = 0.5
     alike: float = 0.5
     finalists: int = 4
+    fitted: int = 24
     hopeful: float = 3.0
     far: float = 5.0
-    near: float = 2.0
+    likelier: float = 10.0
     branches: int = 3
     rounds: int = 3
     smallest: float = 2.0
@@ -115,5 +124,7 @@ class Settings:
     levels: int = 20
     spike: float = 30.0
     filtered: float = 0.05
+    level: float = 2.0
+    digits: float = 8e3
     unseen: float = 0.9
     coarse: float = 0.01

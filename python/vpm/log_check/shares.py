@@ -49,6 +49,10 @@ class Shares:
         What free masses leave of each channel, as a sum of squares.
     far : float
         By how many of its stated deviations a parameter of the model was moved, the farthest one.
+    farthest : str
+        Its name.
+    unlikely : float
+        How unlikely the model file makes its parameters, as half the sum of the squares of these deviations (nats).
     floor : float
         Shares below this are as good as nothing.
     """
@@ -58,6 +62,8 @@ class Shares:
     residual: Array | None = None
     free: Array = field(default_factory=lambda: np.ones(1))
     far: float = 0.0
+    farthest: str = ""
+    unlikely: float = 0.0
     floor: float = 0.0
 
     @property
@@ -122,8 +128,12 @@ class Judge:
         except ASTRAY:
             return self.measured(record)
         found = fitted.structure
-        own = [abs(z) for name, z in zip(found.priors, found.standard, strict=True) if not self._is_added(name)]
-        return self._shares(observed, fitted.residual, observer, found.theta, max(own, default=0.0))
+        shares = self._shares(observed, fitted.residual, observer, found.theta)
+        moved = zip(found.priors, np.abs(found.standard).tolist(), strict=True)
+        own = {name: far for name, far in moved if not self._is_added(name)}
+        farthest = max(own, key=lambda name: own[name], default="")
+        unlikely = sum(far**2 for far in own.values()) / 2.0
+        return replace(shares, far=own.get(farthest, 0.0), farthest=farthest, unlikely=unlikely)
 
     def tangent(self, record: Experiment, shares: Shares) -> Tangent | None:
         """How what is left changes with the parameters, about the values of a fit; None where that cannot be told."""
@@ -198,15 +208,13 @@ class Judge:
     def _observed(self, record: Experiment, observer: Observer) -> Observed:
         return Observed(self.model, [record], RankingSettings(bands=(observer.band,)), self.setup)
 
-    def _shares(
-        self, observed: Observed, residual: Array, observer: Observer, values: Array, far: float = 0.0
-    ) -> Shares:
+    def _shares(self, observed: Observed, residual: Array, observer: Observer, values: Array) -> Shares:
         drawn, seen = observed.drawn(observer.band), _seen(observed)
         free = np.sum(np.where(np.any(drawn != 0.0, axis=0), drawn, observed.motion)[seen] ** 2, axis=0)
         with np.errstate(all="ignore"):
             told = map(_share, np.sum(residual[seen] ** 2, axis=0).tolist(), free.tolist())
         shares = dict(zip(observed.records[0].channels, told, strict=True))
-        return Shares(shares, values, residual, free, far, self.settings.negligible)
+        return Shares(shares, values, residual, free, floor=self.settings.negligible)
 
     def _lost(self, record: Experiment, values: Array) -> Shares:
         """Where the model runs away from a record."""

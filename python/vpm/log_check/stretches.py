@@ -61,13 +61,13 @@ def _of_sensor(record: Experiment, name: str, settings: Settings) -> Iterator[Fi
             f"{record.time[spikes[0]]:.4g} s",
             "replace these samples by their neighbours",
         )
-    if _cut_off(values, settings):
+    step, reach = quantisation_step(values), float(np.ptp(values))
+    if _cut_off(values, step or 0.0, settings):
         yield finding(
             "filtered",
             f"{name} was filtered before it was stored, which makes it late",
             "log it unfiltered, or filter the commands alike",
         )
-    step, reach = quantisation_step(values), float(np.ptp(values))
     if step is not None and step > settings.coarse * reach:
         yield finding(
             "coarse",
@@ -76,21 +76,38 @@ def _of_sensor(record: Experiment, name: str, settings: Settings) -> Iterator[Fi
         )
 
 
-def _cut_off(values: Array, settings: Settings) -> bool:
+def _cut_off(values: Array, step: float, settings: Settings) -> bool:
     """Whether the noise of a channel is the same in two octaves and then falls: a filter does that, no machine.
 
-    Numbers of a simulation have no noise; their spectrum ends where their digits do.
+    Motion that is the same in two octaves falls as well, but to the noise of the sensor, which then stays; behind a
+    filter there is nothing but rounding to that ``step``. Numbers of a simulation have no noise: their spectrum ends
+    where their digits do.
     """
-    lines = np.abs(np.fft.rfft(np.diff(values, n=ORDER) * np.hanning(len(values) - ORDER))) ** 2
+    window = np.hanning(len(values) - ORDER)
+    lines = np.abs(np.fft.rfft(np.diff(values, n=ORDER) * window)) ** 2
     # Differences weigh white noise by frequency, which is taken out again.
     turns = np.pi * np.arange(1, len(lines)) / (2 * (len(lines) - 1))
     lines[1:] /= (2.0 * np.sin(turns)) ** (2 * ORDER)
-    ends = [len(lines) >> octave for octave in range(OCTAVES, -1, -1)]
-    levels = [float(np.median(lines[low:high])) for low, high in pairwise(ends)]
-    digits = len(values) * (8.0 * np.finfo(np.float64).eps * float(np.max(np.abs(values)))) ** 2
+    count = len(lines)
+
+    def powers(ends: list[int]) -> list[float]:
+        return [float(np.median(lines[low:high])) for low, high in pairwise(ends)]
+
+    levels, last = (
+        powers([count >> octave for octave in range(OCTAVES, -1, -1)]),
+        powers([count // 2, 3 * count // 4, count]),
+    )
+    digits = len(values) * (settings.digits * np.finfo(np.float64).eps * float(np.max(np.abs(values)))) ** 2
+    rounding = max(settings.level * float(np.sum(window**2)) * step**2 / 12.0, digits)
+
+    def is_flat(before: float, level: float) -> bool:
+        return max(level, before) < settings.level * min(level, before)
+
+    if is_flat(*last) and last[-1] > rounding:
+        return False
     for place, (before, level) in enumerate(pairwise(levels), 2):
-        flat = max(level, before) < 2.0 * min(level, before) and level > 1e6 * digits
-        if flat and min(levels[place:], default=level) < settings.filtered * level:
+        falls = min(levels[place:], default=level) < settings.filtered * level
+        if is_flat(before, level) and level > digits and falls:
             return True
     return False
 
