@@ -93,8 +93,8 @@ class Explainer:
             for pair in of_two(self.model, used, self.units, self.settings)
             if any(doubtful & set(self._affected(one, left)) for one in pair)
         ]
-        before = self.judge.measured(part)
-        tried = self._ordered("trying", self.judge.measured, pairs, part)
+        before = self.judge.guessed(part)
+        tried = self._ordered("trying", self.judge.guessed, pairs, part)
         few = [pair for pair, shares in tried if shares.cost < before.cost][: self.settings.fitted]
         for pair, after in self._ordered("fitting", self.judge.fitted, few, part)[:1]:
             if all(self._explains(one, left, after) for one in pair):
@@ -160,7 +160,7 @@ class Explainer:
             tried = [one for one in tried if one.channels != (TIME,)]
         # The mirror image of a machine explains most of a log as well as the machine does.
         tried += self._about((one for one in everything if one.is_mirror), some, left)
-        found += self._hopeful(list(dict.fromkeys(tried)), part, self.judge.measured(part)) if tried else []
+        found += self._hopeful(list(dict.fromkeys(tried)), part, self.judge.guessed(part)) if tried else []
         if some and part.duration * settings.band >= settings.periods:
             found += self._late(self._about(delays(self.model, used, settings), some, left), part, left)
         return list(dict.fromkeys(found))
@@ -186,11 +186,11 @@ class Explainer:
         return tuple(found or left.by_channel)
 
     def _hopeful(self, corrections: Sequence[Correction], part: Experiment, before: Shares) -> list[Correction]:
-        """The few that leave least at given values of the parameters, and less than is left without any."""
+        """The few that leave least at the values of the model, and less than is left without any."""
 
         def measure(correction: Correction) -> tuple[Correction, Shares]:
             quick = self.judge.of_sensor(correction, part, before)
-            return correction, quick or self.judge.measured(correction.applied(part), before.values)
+            return correction, quick or self.judge.guessed(correction.applied(part))
 
         return self._few(self.each("trying", measure, corrections, self._words), before)
 

@@ -117,6 +117,18 @@ class Judge:
             return self._lost(record, values)
         return self._shares(observed, residual, observer, values)
 
+    def guessed(self, record: Experiment) -> Shares:
+        """Shares at the values of the model, with no dry friction or as much as is usual, whichever leaves less."""
+        plain, dry = self.measured(record), [joint for name, joint in self.added if name == "coulomb_friction"]
+        if not dry:
+            return plain
+        structure = self._structure(record)
+        values = structure.theta.copy()
+        for joint in dry:
+            parameter = self.model.effect("coulomb_friction", joint).parameter_names["coulomb"]
+            values[self.model.index(parameter)] = structure.priors[parameter].spread
+        return min(plain, self.measured(record, values), key=lambda shares: shares.order)
+
     def fitted(self, record: Experiment) -> Shares:
         """Shares when the uncertain parameters of the model, and friction of its joints, have been fitted."""
         observer = self._observer(record)
@@ -179,8 +191,8 @@ class Judge:
                 if effect.type.parameter(short).shape:
                     values[model.index(parameter)] = TRANSITION * speed
                 else:
-                    size = effort if name == "coulomb_friction" else effort / speed
-                    priors[parameter] = Prior(0.0, size, 0.0, math.inf)
+                    size = effort / speed if name == "viscous_friction" else effort
+                    priors[parameter] = Prior(0.0, size, *effect.type.parameter(short).physical)
         return Structure(model, values, priors)
 
     def _usual(self, record: Experiment, joint: str) -> tuple[float, float]:
