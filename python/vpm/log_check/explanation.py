@@ -99,7 +99,7 @@ class Explainer:
         for pair, after in self._ordered("fitting", self.judge.fitted, few, part)[:1]:
             if all(self._explains(one, left, after) for one in pair):
                 both = Explanation(pair.first, left, after, self._affected(pair.first, after), at_once=True)
-                both = replace(both, is_of_values=self._is_of_values(left, after))
+                both = replace(both, is_of_values=self._is_of_values(pair.first, left, after))
                 return [replace(both, correction=one, affected=self._affected(one, after)) for one in pair]
         return []
 
@@ -137,7 +137,7 @@ class Explainer:
                 rivals.append(other)
         if not self._explains(correction, left, after) or any(_is_no_scale(correction, other) for other in rivals):
             return None
-        affected, of_values = self._affected(correction, after), self._is_of_values(left, after)
+        affected, of_values = self._affected(correction, after), self._is_of_values(correction, left, after)
         return Explanation(correction, left, after, affected, tuple(rivals), of_values)
 
     def _by_turns(self, found: Explanation, part: Experiment) -> Explanation:
@@ -230,7 +230,7 @@ class Explainer:
 
     def _explains(self, correction: Correction, before: Shares, after: Shares) -> bool:
         """Whether a correction explains what a model leaves, or by which values it leaves nothing."""
-        if self._is_of_values(before, after):
+        if self._is_of_values(correction, before, after):
             return True
         affected = self._affected(correction, after)
         gain = after.logarithm(affected) - before.logarithm(affected)
@@ -238,11 +238,16 @@ class Explainer:
             return False
         return not correction.delay or self._is_throughout(affected, before, after)
 
-    def _is_of_values(self, before: Shares, after: Shares) -> bool:
-        """Whether the model explains the record anyway, but with values that its file rules out, now needless."""
+    def _is_of_values(self, correction: Correction, before: Shares, after: Shares) -> bool:
+        """Whether the model explains the record anyway, but with values that its file rules out, now needless.
+
+        Of delays that says nothing: what a model lacks moves its parameters as well, and looks late.
+        """
         settings = self.settings
+        if correction.delay or before.far <= settings.far or after.far > settings.far:
+            return False
         doubtful = before.above(settings.doubtful) | after.above(settings.doubtful)
-        return before.far > settings.far and before.unlikely - after.unlikely > settings.likelier and not doubtful
+        return before.unlikely - after.unlikely > settings.likelier and not doubtful
 
     def _is_throughout(self, affected: Collection[str], before: Shares, after: Shares) -> bool:
         """Whether half of what was left is gone in each piece of the record: laws slightly wrong look late."""
