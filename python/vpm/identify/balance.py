@@ -76,10 +76,9 @@ class InverseDynamicsProblem:
         self.experiments = tuple(experiments)
         #: What was given: the model before any fit.
         self.nominal = model
-        self.motions: tuple[Motion, ...] = tuple(
-            joint_motion(e, model, one, commanded=True, band=other).held_as(hold)
-            for e, one, other in zip(experiments, _each(cutoff, experiments), _each(band, experiments), strict=True)
-        )
+        self.hold = hold
+        self._bands = tuple(_each(band, experiments))
+        self.motions = self._motions(experiments, _each(cutoff, experiments))
         for m in self.motions:
             check_along(model, m.joints)
         # The parallel filter passes over whole records: where one begins and ends at rest there is nothing to settle.
@@ -96,6 +95,37 @@ class InverseDynamicsProblem:
         self._kept = self._held(self.experiments, self.motions)
         self.workers = 1
         self.blocks = self._lay_out(model)
+        #: What is left at the true values, as far as that is known; see `vpm.identify.own_simulation`.
+        self.expected: Array | None = None
+
+    def _motions(self, experiments: Sequence[Experiment], cutoffs: Sequence[float | None]) -> tuple[Motion, ...]:
+        return tuple(
+            joint_motion(e, self.nominal, cutoff, commanded=True, band=band).held_as(self.hold)
+            for e, cutoff, band in zip(experiments, cutoffs, self._bands, strict=True)
+        )
+
+    def on(self, experiments: Sequence[Experiment]) -> InverseDynamicsProblem:
+        """The same of other records of the same lengths, filtered, counted and weighed as these are."""
+        motions = self._motions(experiments, [m.cutoff for m in self.motions])
+        pairs = list(zip(motions, experiments, strict=True))
+        memories = [DriveMemory(m.parallel, one.integrator) for m, one in zip(motions, self._memories, strict=True)]
+        same = copy(self)
+        vars(same).update(
+            experiments=tuple(experiments),
+            motions=motions,
+            expected=None,
+            _whole=tuple(replace(m, edge=0) for m in motions),
+            _memories=tuple(memories),
+            _compared=tuple(self._measured(m, e) for m, e in pairs),
+            _kept=self._held(experiments, motions),
+        )
+        return same
+
+    def less(self, expected: Array) -> InverseDynamicsProblem:
+        """The same, less what is left of it at the true values, shape (n,)."""
+        same = copy(self)
+        same.expected = expected
+        return same
 
     @property
     def integrators(self) -> tuple[str, ...]:
@@ -142,7 +172,8 @@ class InverseDynamicsProblem:
         for measured, answer in zip(self._compared, in_order(jobs, self.workers), strict=True):
             residuals.append(np.hstack([(answer.applied - answer.required)[:, self._joints], measured - answer.seen]))
             jacobians.append(-np.concatenate([answer.balance[:, self._joints], answer.slopes], axis=1))
-        return self._stack(residuals), self._stack(jacobians)
+        residual = self._stack(residuals)
+        return residual if self.expected is None else residual - self.expected, self._stack(jacobians)
 
     def _hold_gains(self, model: Model) -> dict[str, float]:
         """How firmly gauges hold links, the same for all records and for all models that are compared."""
