@@ -33,8 +33,6 @@ class Drives:
         Its parameters, inputs, and states of drives and supplies among those of the whole machine.
     own : ndarray of int
         Those of its own parameters that change what the drives do along a given motion.
-    structure : str
-        Its description without the values of its parameters.
     """
 
     model: Model
@@ -42,7 +40,6 @@ class Drives:
     inputs: NDArray[np.int64]
     states: NDArray[np.int64]
     own: NDArray[np.int64]
-    structure: str
 
 
 def moves_drives(model: Model, name: str) -> bool:
@@ -83,7 +80,7 @@ def _alone(model: Model, document: dict[str, Any], group: tuple[str, ...]) -> Dr
     effects = [entry for entry in document.get("effects", ()) if entry["at"] in sites]
     mine["sensors"] = kept
     mine["effects"] = [entry for entry in effects if EFFECTS[entry["type"]].site != "joint"]
-    alone, structure = _built(json.dumps(mine))
+    alone = _built(json.dumps(mine))
     own = [place for place, name in enumerate(alone.parameter_names) if moves_drives(alone, name)]
     return Drives(
         alone,
@@ -91,18 +88,13 @@ def _alone(model: Model, document: dict[str, Any], group: tuple[str, ...]) -> Dr
         _places(alone.inputs, model.inputs),
         _places(alone.internal_names, model.internal_names),
         np.array(own, dtype=np.int64),
-        structure,
     )
 
 
 @lru_cache(maxsize=KEPT)
-def _built(document: str) -> tuple[Model, str]:
-    """A model, and its description without the values of its parameters."""
+def _built(document: str) -> Model:
     model = Model.from_dict(json.loads(document))
-    model = model.at("rigid") if model.beams else model
-    described = json.loads(model.description())
-    del described["parameters"]
-    return model, json.dumps(described)
+    return model.at("rigid") if model.beams else model
 
 
 def _places(names: tuple[str, ...], whole: tuple[str, ...]) -> NDArray[np.int64]:
