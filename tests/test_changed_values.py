@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from functools import cached_property
+from collections.abc import Callable
+from functools import cached_property, partial
 from itertools import pairwise
 from pathlib import Path
 
 import pytest
-from hypothesis import example, given
+from hypothesis import given
 from hypothesis import strategies as st
 
 from vpm.demo import MODEL
@@ -20,7 +21,9 @@ from vpm.numbers import LARGEST
 ROOT = Path(__file__).resolve().parent.parent / "examples"
 #: Every model file of the examples, and two whose values have conditions between them that no example has.
 FILES = sorted(
-    str(path.relative_to(ROOT)) for path in ROOT.rglob("*.toml") if "\n[bodies." in path.read_text(encoding="utf-8") or "\n[beams." in path.read_text(encoding="utf-8")
+    str(path.relative_to(ROOT))
+    for path in ROOT.rglob("*.toml")
+    if "\n[bodies." in path.read_text(encoding="utf-8") or "\n[beams." in path.read_text(encoding="utf-8")
 )
 BLOCK = """
 name = "block on a sprung shaft"
@@ -66,7 +69,14 @@ friction = { static = 0.8, dynamic = 0.6, static_velocity = 0.01, dynamic_veloci
 [bushings.mount]
 a = { parent = "world" }
 b = { parent = "block" }
-stiffness = [[10.0, 1.0, 0, 0, 0, 0], [1.0, 10.0, 0, 0, 0, 0], [0, 0, 10.0, 0, 0, 0], [0, 0, 0, 1e3, 0, 0], [0, 0, 0, 0, 1e3, 0], [0, 0, 0, 0, 0, 1e3]]
+stiffness = [
+    [10.0, 1.0, 0, 0, 0, 0],
+    [1.0, 10.0, 0, 0, 0, 0],
+    [0, 0, 10.0, 0, 0, 0],
+    [0, 0, 0, 1e3, 0, 0],
+    [0, 0, 0, 0, 1e3, 0],
+    [0, 0, 0, 0, 0, 1e3],
+]
 damping = [1.0, 1.0, 1.0, 1.0, 1.0, 1.0]
 
 [[effects]]
@@ -107,8 +117,9 @@ def rebuilt(model: Model, values: dict[str, float]) -> Model:
 
 def told(model: Model) -> dict[str, object]:
     """All that a model keeps, and all that it writes."""
-    kinds = [name for kind in type(model).__mro__ for name, entry in vars(kind).items()
-             if isinstance(entry, cached_property)]
+    kinds = [
+        name for kind in type(model).__mro__ for name, entry in vars(kind).items() if isinstance(entry, cached_property)
+    ]
     kept = {name: getattr(model, name) for name in kinds if name not in {"core", "dynamics", "theta"}}
     return kept | {
         "theta": model.theta.tolist(),
@@ -120,51 +131,46 @@ def told(model: Model) -> dict[str, object]:
     }  # fmt: skip
 
 
-def refusal(error: ModelError) -> tuple[object, ...]:
-    return str(error), error.where, error.path, error.more
+def answer(make: Callable[[dict[str, float]], Model], values: dict[str, float]) -> Model | tuple[object, ...]:
+    """The model, or all that its refusal says."""
+    try:
+        return make(values)
+    except ModelError as error:
+        return str(error), error.where, error.path, error.more
+
+
+def compared(model: Model, values: dict[str, float]) -> Model | None:
+    """The changed model if there is one, after a comparison with what its file gives."""
+    changed, expected = answer(model.with_parameters, values), answer(partial(rebuilt, model), values)
+    if not isinstance(changed, Model) or not isinstance(expected, Model):
+        assert changed == expected
+        return None
+    assert told(changed) == told(expected)
+    assert changed == expected
+    assert hash(changed) == hash(expected)
+    return changed
 
 
 @pytest.mark.parametrize("name", MACHINES)
 def test_every_single_value_can_be_changed_as_by_its_file(name: str) -> None:
-    """Each parameter moved a little inside of its bounds."""
+    """Each parameter moved a little, most of them inside of their bounds."""
     model = MACHINES[name]
     told(model)  # so that what it keeps is handed on
     for parameter in model.parameters.values():
-        value = 1.001 * parameter.value + (1e-6 if parameter.value == 0.0 else 0.0)
-        values = {parameter.name: value}
-        try:
-            expected = rebuilt(model, values)
-        except ModelError as error:
-            with pytest.raises(ModelError) as caught:
-                model.with_parameters(values)
-            assert refusal(caught.value) == refusal(error)
-            continue
-        changed = model.with_parameters(values)
-        assert told(changed) == told(expected)
+        compared(model, {parameter.name: 1.001 * parameter.value + (1e-6 if parameter.value == 0.0 else 0.0)})
 
 
 @given(st.sampled_from(sorted(MACHINES)), changes)
-@example("block", [{0.0: ("to", -1.0)}])
-def test_any_change_gives_what_the_changed_file_gives(
-    name: str, steps: list[dict[float, tuple[str, float]]]
-) -> None:
+def test_any_change_gives_what_the_changed_file_gives(name: str, steps: list[dict[float, tuple[str, float]]]) -> None:
     model = MACHINES[name]
     for step in steps:
         values = {}
         for share, (how, number) in step.items():
             parameter = list(model.parameters.values())[int(share * len(model.parameters))]
             values[parameter.name] = number if how == "to" else number * parameter.value
-        try:
-            expected = rebuilt(model, values)
-        except ModelError as error:
-            with pytest.raises(ModelError) as caught:
-                model.with_parameters(values)
-            assert refusal(caught.value) == refusal(error)
+        changed = compared(model, values)
+        if changed is None:
             return
-        changed = model.with_parameters(values)
-        assert told(changed) == told(expected)
-        assert changed == expected
-        assert hash(changed) == hash(expected)
         assert Model.from_toml(changed.to_toml()) == changed
         model = changed
 

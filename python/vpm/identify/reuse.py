@@ -7,7 +7,6 @@ what moves the links (masses, elasticities, gravity, instruments of the motion) 
 
 from __future__ import annotations
 
-import json
 from collections import OrderedDict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -20,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.identify.gauges import Hold
-from vpm.model import Model
+from vpm.model import Model, Shape
 from vpm.model.effects import Effect
 
 Array = NDArray[np.float64]
@@ -36,7 +35,7 @@ NEAR = 0.005
 
 @dataclass(frozen=True)
 class Parts:
-    """A machine with elastic links as what moves them and what does not.
+    """A machine with elastic links as what moves them and what does not; values of these models mean nothing.
 
     Attributes
     ----------
@@ -78,9 +77,14 @@ def parts_of(model: Model, joints: tuple[str, ...]) -> Parts | None:
     return split(model, joints, SPLITTING if remembers else frozenset({"backlash"}))
 
 
-@lru_cache(maxsize=128)
 def split(model: Model, joints: tuple[str, ...], splits: frozenset[str]) -> Parts | None:
     """The same where all ``splits``, effects that bring a coordinate of their own, count as plays do."""
+    return _split(Shape(model), joints, splits)
+
+
+@lru_cache(maxsize=128)
+def _split(shape: Shape, joints: tuple[str, ...], splits: frozenset[str]) -> Parts | None:
+    model = shape.model
     plays = [e for e in model.effects if e.name in splits and model.joint_behind(e.at)]
     flying = {model.joint_behind(e.at) for e in plays}
     if any(e.side == "link" and model.joint_behind(e.at) for e in model.effects):
@@ -120,13 +124,7 @@ def _without(content: Mapping[str, Any], effects: Sequence[Effect], *, rigid: bo
     changed = {**content, "effects": kept}
     if rigid:
         changed["beams"] = {name: {**beam, "level": "rigid"} for name, beam in content["beams"].items()}
-    return _machine(json.dumps(changed))
-
-
-@lru_cache(maxsize=128)
-def _machine(text: str) -> Model:
-    """One machine for all that are the same without what was left out: it is checked and compiled once."""
-    return Model.from_dict(json.loads(text))
+    return Model.from_dict(changed)
 
 
 @dataclass

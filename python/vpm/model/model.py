@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
@@ -429,6 +430,24 @@ class Model(Evaluations, Storable):
     def from_stored(cls, content: Mapping[str, Any]) -> Self:
         """Model from what `to_stored` gave."""
         return cls.from_toml(str(content["toml"]))
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A model of which the structure counts alone: the key of answers that hold whatever the values are.
+
+    Attributes
+    ----------
+    model : Model
+        One of those that differ in values only.
+    structure : str
+    """
+
+    model: Model = field(compare=False)
+    structure: str = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "structure", self.model.structure)
 
 
 def _rebuild(cls: type[Model], content: dict[str, Any], path: str | None) -> Model:
