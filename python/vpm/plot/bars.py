@@ -121,9 +121,11 @@ def plot_gap(gaps: Mapping[str, GapLike]) -> Figure:
     stages = (("before", SOFT), ("recalibrated", ORANGE), ("after", BLUE))
     largest = 0.0
     for row, gap in enumerate(gaps.values()):
-        signal = gap.signal if gap.signal > 0.0 else 1.0
+        if not gap.signal > 0.0:
+            axis.annotate("no signal", (0.0, row), xytext=(4, 0), textcoords="offset points", va="center", color=SOFT)
+            continue
         for shift, (stage, color) in enumerate(stages):
-            share = 100.0 * float(getattr(gap, stage)) / signal
+            share = 100.0 * float(getattr(gap, stage)) / gap.signal
             largest = max(largest, share)
             place = row + 0.27 * (shift - 1)
             axis.barh(place, share, height=0.24, color=color)
@@ -131,7 +133,7 @@ def plot_gap(gaps: Mapping[str, GapLike]) -> Figure:
                 percent(share / 100.0), (share, place), xytext=(4, 0), textcoords="offset points", va="center"
             )
         if np.isfinite(gap.noise_floor):
-            floor = 100.0 * gap.noise_floor / signal
+            floor = 100.0 * gap.noise_floor / gap.signal
             axis.plot([floor, floor], [row - 0.42, row + 0.42], "--", color=INK, linewidth=1.1)
     axis.set_xlim(0.0, 1.13 * largest if largest > 0.0 else 1.0)
     _name_rows(axis, list(gaps))

@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-#: Samples of a segment of a spectrum: a picture shows no finer lines.
-MOST_IN_SEGMENT = 2048
+#: Samples of a segment of a spectrum: a picture shows no finer lines; and points that are few enough to have a mark.
+MOST_IN_SEGMENT, FEW = 2048, 40
 #: Parameters beyond which a matrix of correlations shows no numbers in its fields.
 MOST_NUMBERS = 14
 
@@ -157,7 +157,10 @@ def plot_joint_noise(
     right = axes[0][1]
     for (name, values), color in zip(stages.items(), (ORANGE, BLUE)[-len(stages) :], strict=True):
         frequency, density = amplitude_density(values, rate, MOST_IN_SEGMENT)
-        right.loglog(frequency, density, ".-" if frequency.size < 40 else "-", color=color, label=name)
+        there = density > 0.0
+        if there.any():
+            mark = ".-" if frequency.size < FEW else "-"
+            right.loglog(frequency[there], density[there], mark, color=color, label=name)
     right.set_xlabel("frequency [Hz]")
     right.set_ylabel(label("density", f"{unit}/√Hz"))
     legend_above(right, 2, right=True)

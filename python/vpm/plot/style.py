@@ -92,9 +92,9 @@ def styled(draw: Callable[P, R]) -> Callable[P, R]:
 
     @wraps(draw)
     def inner(*args: P.args, **kwargs: P.kwargs) -> R:
-        from matplotlib.figure import Figure
-
         with _style():
+            from matplotlib.figure import Figure
+
             result = draw(*args, **kwargs)
             if isinstance(result, Figure):
                 _write_powers(result)
@@ -205,15 +205,22 @@ def thinned(time: Array, *columns: Array) -> tuple[Array, ...]:
         return (time, *columns)
     stretch = -(-2 * len(columns) * time.size // MOST_POINTS)
     whole = time.size // stretch * stretch
-    base = np.arange(0, whole, stretch)
-    picks = []
+    picks = [np.array([0, time.size - 1])]
     for column in columns:
-        blocks = column[:whole].reshape(-1, stretch)
-        gaps = np.isnan(blocks)
-        picks += [base + np.argmin(np.where(gaps, np.inf, sign * blocks), axis=1) for sign in (1.0, -1.0)]
-        picks.append((base + np.argmax(gaps, axis=1))[gaps.any(axis=1)])
-    keep = np.unique(np.concatenate([*picks, np.arange(whole, time.size)]))
+        picks += [*_extremes(column[:whole], stretch, 0), *_extremes(column[whole:], time.size - whole, whole)]
+    keep = np.unique(np.concatenate(picks))
     return (time[keep], *(column[keep] for column in columns))
+
+
+def _extremes(column: Array, stretch: int, first: int) -> Iterator[NDArray[np.int64]]:
+    """Places of the least and the largest value of each stretch and of its first gap, counted from ``first`` on."""
+    if not column.size:
+        return
+    blocks = column.reshape(-1, stretch)
+    base, gaps = first + stretch * np.arange(len(blocks)), np.isnan(blocks)
+    for sign in (1.0, -1.0):
+        yield base + np.argmin(np.where(gaps, np.inf, sign * blocks), axis=1)
+    yield (base + np.argmax(gaps, axis=1))[gaps.any(axis=1)]
 
 
 def label(quantity: str, unit: str) -> str:
