@@ -16,9 +16,10 @@ from vpm.compare import compare
 from vpm.compare.correlation import gapped_autocorrelation
 from vpm.errors import MissingExtraError
 from vpm.experiment import Experiment
+from vpm.numbers import stretches
 from vpm.plot import findings
 from vpm.plot.evidence import law_line
-from vpm.plot.signals import amplitude_density, running_mean, stretches
+from vpm.plot.signals import amplitude_density, running_mean
 from vpm.plot.style import MOST_POINTS, plain_power, thinned
 
 matplotlib = pytest.importorskip("matplotlib")

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from vpm.catalogue import EFFECTS
-from vpm.compare import compare
 from vpm.discrepancy.ambiguity import Rivals, listed, rivals
 from vpm.discrepancy.apart import only_where_closed
 from vpm.discrepancy.beliefs import moved_far
@@ -39,7 +38,7 @@ from vpm.discrepancy.overlooked import overlooked
 from vpm.discrepancy.provenance import own_settings, provenance
 from vpm.discrepancy.remainder import Remainder, remainder
 from vpm.discrepancy.search import Search, ambiguities, further, search
-from vpm.discrepancy.shown import pictures, traces
+from vpm.discrepancy.shown import pictures, traces, where
 from vpm.discrepancy.side_by_side import Progress, SideBySide
 from vpm.discrepancy.standing import in_order, replaced, timed_again
 from vpm.discrepancy.structure import Structure, structure
@@ -55,7 +54,7 @@ from vpm.identify.parallel import worker_count
 from vpm.log_check import refuse_mistakes
 from vpm.model import Model
 from vpm.ranking import Ranking, Settings, rank
-from vpm.simulate import Run, Setup, judging_mode
+from vpm.simulate import Setup, judging_mode
 
 Array = NDArray[np.float64]
 
@@ -259,7 +258,7 @@ def _diagnosis(
             found.refused,
             found.ranking,
             listed(ambiguities(accepted), ambiguous),
-            _where(recalibrated.model, data.unseen),
+            where(recalibrated.model, data.unseen),
             tuple(_step(data, stage) for stage in found.stages),
             tuple(e.name for e in training),
             tuple(e.name for e in unseen),
@@ -632,13 +631,3 @@ def _step(data: Data, stage: Stage) -> Step:
         max(share for _, share, _ in gaps(data.training, fit.residual).values()),
         max(share for _, share, _ in gaps(data.unseen, stage.judged.unseen).values()),
     )
-
-
-def _where(model: Model, unseen: InverseDynamicsProblem) -> dict[str, tuple[str, ...]]:
-    """Where the efforts of the first unseen record part, in words."""
-    time, applied, required = unseen.effort(model, model.theta, 0)
-    channels = tuple(f"{joint}.effort" for joint in unseen.joints)
-    units = tuple(model.channel_unit(channel) for channel in channels)
-    record = unseen.experiments[0]
-    run = Run(model.name, record.name, "inverse_dynamics", time, channels, units, required, applied)
-    return {channel.channel: channel.where.sentences for channel in compare(run, record).channels}

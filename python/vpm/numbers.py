@@ -60,3 +60,9 @@ def percent(share: float) -> str:
     if np.isnan(share):
         return UNKNOWN
     return f"{100.0 * share:.2f} %" if abs(share) >= 1e-3 or share == 0.0 else f"{100.0 * share:.2g} %"
+
+
+def stretches(counts: NDArray[np.bool_]) -> list[slice]:
+    """Contiguous stretches of samples that count."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], counts, [False]]).astype(np.int8)))
+    return [slice(int(first), int(last)) for first, last in zip(edges[::2], edges[1::2], strict=True)]

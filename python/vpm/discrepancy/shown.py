@@ -4,8 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from vpm.compare import compare
 from vpm.discrepancy.confirmation import Data, Judged
 from vpm.discrepancy.diagnosis import Picture, Trace
+from vpm.identify import InverseDynamicsProblem
+from vpm.model import Model
+from vpm.numbers import stretches
+from vpm.simulate import Run
 
 
 def traces(data: Data, nominal: Judged, final: Judged) -> tuple[Trace, ...]:
@@ -51,3 +56,23 @@ def pictures(data: Data, nominal: Judged, recalibrated: Judged, final: Judged) -
             )
         )
     return tuple(found)
+
+
+def where(model: Model, unseen: InverseDynamicsProblem) -> dict[str, tuple[str, ...]]:
+    """Where the efforts of the first unseen record part, in words, by channel: over the samples that count."""
+    time, applied, required = unseen.effort(model, model.theta, 0)
+    record, told = unseen.experiments[0], {}
+    for joint, block in enumerate(unseen.efforts(0)):
+        parts = [part for part in stretches(block.moving > 0.0) if part.stop - part.start > 1]
+        if not parts:
+            continue
+        rows = np.concatenate([np.arange(part.start, part.stop) for part in parts])
+        starts = np.cumsum([0, *(part.stop - part.start for part in parts[:-1])]).astype(np.int64)
+        columns = (required[rows, joint : joint + 1], applied[rows, joint : joint + 1])
+        run = Run(
+            model.name, record.name, "inverse_dynamics", time[rows], (block.channel,), (block.unit,), *columns, starts
+        )
+        (found,) = compare(run, record, [block.channel]).channels
+        # The machine is not set anew where a stretch begins, as in restarts: only what counts begins there.
+        told[block.channel] = tuple(r.sentence for r in found.where.regions if r.quantity != "time since restart")
+    return told

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from vpm.numbers import stretches
 from vpm.plot.style import BLUE, INK, ORANGE, SOFT, STAGES, label, panels, styled, thinned
 
 if TYPE_CHECKING:
@@ -235,12 +236,6 @@ def amplitude_density(values: Array, rate: float, most: int | None = None) -> tu
             total, weight = total + size * power, weight + size
     density: Array = np.sqrt(total[1:] / max(weight, 1.0))
     return np.asarray(frequency[1:], dtype=np.float64), density
-
-
-def stretches(counts: NDArray[np.bool_]) -> list[slice]:
-    """Contiguous stretches of samples that count."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], counts, [False]]).astype(np.int8)))
-    return [slice(int(first), int(last)) for first, last in zip(edges[::2], edges[1::2], strict=True)]
 
 
 @styled

@@ -153,7 +153,8 @@ def _joint(p: Picture, number: int, last: str) -> Iterator[Drawn]:
     name = p.channel
     sizes = " and ".join(f"{short(_rms(values))} {p.unit} {stage}" for stage, values in stages.items())
     left_out = 1.0 - float(np.mean(np.isfinite(p.after)))
-    masked = f" Gaps: {percent(left_out)} of the samples do not count, as at standstill." if left_out > 0.0 else ""
+    why = "at standstill, at a stop, or where the filter settles"
+    masked = f" Gaps: {percent(left_out)} of the samples do not count: {why}." if left_out > 0.0 else ""
     worst = int(np.nanargmax(np.abs(p.after))) if np.isfinite(p.after).any() else 0
     yield drawn(
         f"picture-{number}-time",
