@@ -201,11 +201,11 @@ def _nothing_missing(
     balanced = not agrees and better.relative > LEAST_GAIN and better.score > float(ndtri(1.0 - FALSE_ALARM_LEVEL))
     if balanced or any(_was_closed(g) for g in beside):
         closed = max(main + beside, key=_closed)
-        said = f"Error on unseen data: {_stages(closed) if _closed(worst) <= 0.0 < _closed(closed) else numbers}"
-        grew = f"; in another channel it grew, {numbers}" if _closed(worst) < 0.0 < _closed(closed) else ""
+        if _closed(worst) < 0.0 < _closed(closed):
+            numbers = f"{_stages(closed)}; in another channel it grew, {numbers}"
         return (
             "parameters_only",
-            f"Nothing is missing: other values of the known parameters close the gap. {said}{grew}.",
+            f"Nothing is missing: other values of the known parameters close the gap. Error on unseen data: {numbers}.",
         )
     return "no_disagreement", f"The nominal model agrees with the data. Error on unseen data: {numbers}."
 
