@@ -253,3 +253,10 @@ def test_long_records_make_no_large_page_and_keep_their_peaks(diagnosis: vpm.Dia
     html = vpm.report(replace(diagnosis, pictures=(long,) * 4, traces=(traced,) * 6))._repr_html_()
     assert len(html.encode()) < LARGEST
     assert html.count("largest at the end 77 N m at 300 s") >= 2
+
+
+def test_numbers_are_rounded_in_one_way() -> None:
+    assert [percent(share) for share in (0.3045, 0.0096, 0.00015, -0.25, 1e-12, 0.0)] == [
+        *("30.45 %", "0.96 %", "0.015 %", "-25.00 %", "0.00 %", "0.00 %"),
+    ]
+    assert [percent(float("nan")), short(float("nan")), short(0.451234)] == ["–", "–", "0.4512"]

@@ -56,10 +56,15 @@ def short(value: float) -> str:
 
 
 def percent(share: float) -> str:
-    """A share with two decimals, as texts, tables and pictures show it; two digits where that would hide it."""
+    """A share with two decimals, as texts, tables and pictures show it; two digits where that would hide it.
+
+    Less than a millionth is nothing.
+    """
     if np.isnan(share):
         return UNKNOWN
-    return f"{100.0 * share:.2f} %" if abs(share) >= 1e-3 or share == 0.0 else f"{100.0 * share:.2g} %"
+    if abs(share) < 1e-6:
+        return "0.00 %"
+    return f"{100.0 * share:.2f} %" if abs(share) >= 1e-3 else f"{100.0 * share:.2g} %"
 
 
 def stretches(counts: NDArray[np.bool_]) -> list[slice]:
