@@ -53,7 +53,7 @@ def stories() -> list[ParameterSet]:
 def test_the_story_comes_out_right(hide: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The effect, those that come with it, and no other one; its values; and it is not in the shipped files."""
     # Drawing takes as long as the diagnosis, and has tests of its own.
-    monkeypatch.setattr(import_module("vpm.report.html"), "figure_to_svg", lambda _: "<svg></svg>")
+    monkeypatch.setattr(import_module("vpm.report.pictures"), "figure_to_svg", lambda *_: "<svg></svg>")
     console = Console(file=StringIO(), width=400)
     why = run_demo(tmp_path, console, lambda _: None, hide)
     entry = HIDDEN[hide]

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from vpm.discrepancy.diagnosis import ChannelGap
-from vpm.discrepancy.verdict import verdict
+from vpm.discrepancy.verdict import _nothing_missing, verdict
 
 SIGNAL, NOISE = 1.0, 1e-3
 
@@ -32,3 +32,20 @@ def told(elbow: float) -> str:
 @pytest.mark.parametrize(("elbow", "word"), [(8e-3, "parameters_only"), (1.4e-2, "unexplained")])
 def test_a_trifle_above_its_noise_says_nothing_of_another_channel(elbow: float, word: str) -> None:
     assert told(elbow) == word
+
+
+def test_an_error_that_grew_is_not_told_as_a_gap_that_closed() -> None:
+    """Of two channels the one farthest above its noise became worse: the other one is told, and that this one grew."""
+    noise = np.random.default_rng(0).standard_normal(2000)
+    data: Any = SimpleNamespace(unseen=SimpleNamespace(blocks=(SimpleNamespace(samples=slice(0, 2000)),)))
+    nominal: Any = SimpleNamespace(unseen=5.0 * noise)
+    recalibrated: Any = SimpleNamespace(unseen=noise)
+    closed = ChannelGap(0.5, 0.1, 0.1, 0.01, "N", 1.0, "inverse_dynamics")
+    grew = ChannelGap(0.19, 0.2, 0.2, 0.01, "N", 1.0, "inverse_dynamics")
+    word, summary = _nothing_missing(data, nominal, recalibrated, ([closed, grew], []), grew)
+    assert word == "parameters_only"
+    assert summary.endswith(
+        "50.00 % before, 10.00 % recalibrated; in another channel it grew, 19.00 % before, 20.00 % recalibrated."
+    )
+    _, plain = _nothing_missing(data, nominal, recalibrated, ([closed, grew], []), closed)
+    assert plain.endswith("Error on unseen data: 50.00 % before, 10.00 % recalibrated.")

@@ -56,8 +56,8 @@ def test_names_the_effects_in_order(diagnosis: Diagnosis) -> None:
 def test_refuses_with_the_right_reasons(diagnosis: Diagnosis) -> None:
     reasons = {r.name: r.reason for r in diagnosis.refused}
     assert "negative" in reasons["stribeck_friction"]
-    assert "helps the training record" in reasons["torque_ripple"]
-    assert "hurts the unseen" in reasons["torque_ripple"]
+    assert "lowers the training error" in reasons["torque_ripple"]
+    assert "raises the unseen error" in reasons["torque_ripple"]
 
 
 def test_force_error_by_inverse_dynamics(diagnosis: Diagnosis) -> None:
@@ -90,7 +90,7 @@ def test_command_line(tmp_path: Path) -> None:
         "diagnose", MODEL, DATA / "emps_train.csv", "--validate", unseen, *tried, "--names", "search", "--out", tmp_path
     )
     assert done.returncode == 0, done.stderr
-    assert "torque_ripple at axis: it helps the training record" in done.stdout
+    assert "torque_ripple at axis: it lowers the training error" in done.stdout
     report = json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))
     assert report["verdict"] == "effect_found"
     assert set(report["gap"]["axis.effort"]) >= {"before", "recalibrated", "after", "noise_floor", "unit"}

@@ -13,10 +13,14 @@ from numpy.typing import NDArray
 
 from vpm import plot
 from vpm.compare import compare
+from vpm.compare.correlation import gapped_autocorrelation
 from vpm.errors import MissingExtraError
 from vpm.experiment import Experiment
-from vpm.plot.signals import running_mean
-from vpm.plot.style import MOST_POINTS, thinned
+from vpm.numbers import stretches
+from vpm.plot import findings
+from vpm.plot.evidence import law_line
+from vpm.plot.signals import amplitude_density, running_mean
+from vpm.plot.style import MOST_POINTS, plain_power, thinned
 
 matplotlib = pytest.importorskip("matplotlib")
 from matplotlib.figure import Figure  # noqa: E402  # only where there is one
@@ -76,10 +80,26 @@ class Picture:
     time: Array = field(default_factory=lambda: TIME)
     position: Array = field(default_factory=lambda: WAVE)
     velocity: Array = field(default_factory=lambda: 2 * np.cos(2 * TIME))
+    measured: Array = field(default_factory=lambda: 5 * WAVE)
     before: Array = field(default_factory=lambda: 3 * WAVE)
     recalibrated: Array = field(default_factory=lambda: 2 * WAVE)
     after: Array = field(default_factory=lambda: WAVE)
 
+
+@dataclass(frozen=True)
+class Trace:
+    """A channel that is made up."""
+
+    channel: str = "axis.position"
+    unit: str = "m"
+    time: Array = field(default_factory=lambda: TIME)
+    measured: Array = field(default_factory=lambda: WAVE)
+    before: Array = field(default_factory=lambda: 0.9 * WAVE)
+    after: Array = field(default_factory=lambda: np.where(TIME < 1.0, np.nan, WAVE))
+
+
+#: Residuals of a joint with dry friction, whose samples at standstill do not count.
+HOLES = np.where(np.abs(2 * np.cos(2 * TIME)) < 0.3, np.nan, 0.5 * np.sign(np.cos(2 * TIME)) + 0.1 * np.sin(40 * TIME))
 
 CANDIDATES = [
     Candidate("coulomb_friction", accepted=True),
@@ -106,6 +126,26 @@ FIGURES: dict[str, tuple[Callable[[], Figure], list[str]]] = {
         ["residual [N]", "velocity [m/s]", "recalibrated, mean", "after, mean"],
     ),
     "spectrum": (lambda: plot.plot_spectrum({"a": WAVE}, 100.0, "N"), ["frequency [Hz]", "density [N/√Hz]", "a"]),
+    "traces": (
+        lambda: findings.plot_traces([Trace(), Trace(channel="b.position")]),
+        ["axis.position [m]", "b.position [m]", "time [s]", "measured", "simulated before", "simulated after"],
+    ),
+    "joint_over_time": (
+        lambda: findings.plot_joint_over_time(Picture(), {"recalibrated": HOLES, "with the effects": HOLES}),
+        ["axis.effort [N]", "measured", "needed, recalibrated", "needed, with the effects", "residual [N]"],
+    ),
+    "joint_over_state": (
+        lambda: findings.plot_joint_over_state(Picture(), {"recalibrated": HOLES}),
+        ["velocity [m/s]", "position [m]", "> forward, < backward", "recalibrated, mean"],
+    ),
+    "joint_noise": (
+        lambda: findings.plot_joint_noise({"recalibrated": HOLES}, gapped_autocorrelation(HOLES, 0.01), 100.0, "N"),
+        ["lag [s]", "95 % if independent", "frequency [Hz]", "density [N/√Hz]", "recalibrated"],
+    ),
+    "parameter_correlation": (
+        lambda: findings.plot_parameter_correlation(["mass", "bias"], np.array([[1.0, -0.5], [-0.5, 1.0]])),
+        ["mass  1", "bias  2", "1.00", "-0.50", "correlation"],
+    ),
     "correlation": (
         lambda: plot.plot_correlation(TIME[:50], WAVE[:50], 0.1, "with itself"),
         ["lag [s]", "correlation", "with itself", "95 % if independent"],
@@ -116,7 +156,7 @@ FIGURES: dict[str, tuple[Callable[[], Figure], list[str]]] = {
     ),
     "gap": (
         lambda: plot.plot_gap({"axis.effort": Gap(), "b.effort": Gap(noise_floor=float("nan"), signal=0.0)}),
-        ["axis.effort", "before", "recalibrated", "after", "noise floor", "50 %", "20 %", "10 %"],
+        ["axis.effort", "before", "recalibrated", "after", "noise floor", "50.00 %", "20.00 %", "10.00 %", "no signal"],
     ),
     "candidates": (
         lambda: plot.plot_candidates(CANDIDATES),
@@ -226,6 +266,73 @@ def test_running_mean_leaves_gaps_open() -> None:
     filled = np.isfinite(means)
     assert not filled[(centers > 1.1) & (centers < 2.9)].any()
     np.testing.assert_allclose(means[filled], 2.0 * centers[filled], atol=0.1)
+
+
+def test_a_step_of_dry_friction_stays_a_step() -> None:
+    """Means of forward and backward motion are apart, and no bin of a law reaches over zero velocity."""
+    velocity = np.random.default_rng(0).uniform(-1.0, 1.0, 400)
+    residual = 0.5 * np.sign(velocity)
+    figure = plot.plot_residual_against(velocity, {"a": residual}, "velocity", "N", velocity)
+    means = [line for line in figure.axes[0].get_lines() if line.get_marker() in {">", "<"}]
+    assert len(means) == 2
+    for line, side in zip(means, (0.5, -0.5), strict=True):
+        drawn = np.asarray(line.get_ydata(), dtype=np.float64)
+        np.testing.assert_allclose(drawn[np.isfinite(drawn)], side)
+    order = np.sort(velocity)
+    _, levels, _ = law_line(order, 0.5 * np.sign(order))
+    assert set(np.round(levels, 12)) == {-0.5, 0.5}
+
+
+def test_samples_that_do_not_count_are_neither_drawn_nor_averaged() -> None:
+    holes = np.where(np.arange(50_000) % 1000 < 300, np.nan, 2.0)
+    _, kept = thinned(np.arange(50_000.0), holes)
+    assert kept.size <= 2 * MOST_POINTS
+    assert np.isnan(kept).any()
+    assert np.nanmin(kept) == np.nanmax(kept) == 2.0
+    _, means = running_mean(np.linspace(0.0, 1.0, holes.size), holes)
+    np.testing.assert_allclose(means[np.isfinite(means)], 2.0)
+    centers, _ = running_mean(np.zeros(3), np.full(3, np.nan))
+    assert centers.size == 0
+
+
+def test_stretches_are_contiguous() -> None:
+    counts = np.array([False, True, True, False, True])
+    assert stretches(counts) == [slice(1, 3), slice(4, 5)]
+    assert stretches(~counts) == [slice(0, 1), slice(3, 4)]
+    assert stretches(np.zeros(0, np.bool_)) == []
+
+
+def test_spectra_and_correlations_do_not_see_gaps() -> None:
+    """A sine is found at its frequency with its power, and white noise is white, whatever stretches are missing."""
+    random = np.random.default_rng(1)
+    time = np.arange(20_000) / 100.0
+    away = (np.arange(time.size) // 700) % 3 == 1
+    sine = np.where(away, np.nan, np.sqrt(2.0) * np.sin(2.0 * np.pi * 12.5 * time))
+    frequency, density = amplitude_density(sine, 100.0)
+    assert frequency[np.argmax(density)] == pytest.approx(12.5, abs=0.3)
+    assert np.sum(density**2) * (frequency[1] - frequency[0]) == pytest.approx(1.0, rel=0.02)
+    noise = np.where(away, np.nan, random.standard_normal(time.size))
+    lags, values, band = gapped_autocorrelation(noise, 0.01)
+    assert values[0] == pytest.approx(1.0)
+    assert lags[1] == 0.01
+    assert np.mean(np.abs(values[1:]) > band[1:]) < 0.12
+    assert gapped_autocorrelation(np.full(5, np.nan), 0.01)[0].size == 0
+
+
+def test_powers_of_ten_are_letters() -> None:
+    assert plain_power(r"$\mathdefault{2\times10^{-3}}$") == "2×10⁻³"
+    assert plain_power(r"$\mathdefault{10^{12}}$") == "10¹²"
+    assert plain_power("plain") == "plain"
+    figure = plot.plot_spectrum({"a": WAVE}, 100.0, "N")
+    assert "mathdefault" not in plot.figure_to_svg(figure)
+
+
+def test_words_of_a_picture_stand_in_its_svg() -> None:
+    svg = plot.figure_to_svg(FIGURES["gap"][0](), 'errors of "a" < 5 %')
+    root = ET.fromstring(svg)
+    assert root.attrib["role"] == "img"
+    assert root.attrib["aria-label"] == 'errors of "a" < 5 %'
+    assert any("50.00 %" in "".join(text.itertext()) for text in root.iter("{http://www.w3.org/2000/svg}text"))
 
 
 def test_without_matplotlib_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:

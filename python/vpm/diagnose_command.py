@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import shlex
+import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -92,6 +95,9 @@ def diagnose(
             tell=tell,
             progress=each,
         )
+    if diagnosis.provenance is not None:
+        command = shlex.join(["vpm", *sys.argv[1:]])
+        diagnosis = replace(diagnosis, provenance=replace(diagnosis.provenance, command=command))
     print_story(diagnosis, console)
     for path in write_report(diagnosis, out):
         console.print(f"wrote {path}", markup=False)

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from vpm.catalogue import EFFECTS
-from vpm.compare import compare
 from vpm.discrepancy.ambiguity import Rivals, listed, rivals
 from vpm.discrepancy.apart import only_where_closed
 from vpm.discrepancy.beliefs import moved_far
@@ -28,7 +27,6 @@ from vpm.discrepancy.diagnosis import (
     ChannelGap,
     Diagnosis,
     EffectParameterEstimate,
-    Picture,
     Step,
 )
 from vpm.discrepancy.elimination import Stage
@@ -37,8 +35,10 @@ from vpm.discrepancy.evidence import gather
 from vpm.discrepancy.filters import filters
 from vpm.discrepancy.floor import noise_floor
 from vpm.discrepancy.overlooked import overlooked
+from vpm.discrepancy.provenance import own_settings, provenance
 from vpm.discrepancy.remainder import Remainder, remainder
 from vpm.discrepancy.search import Search, ambiguities, further, search
+from vpm.discrepancy.shown import pictures, traces, where
 from vpm.discrepancy.side_by_side import Progress, SideBySide
 from vpm.discrepancy.standing import in_order, replaced, timed_again
 from vpm.discrepancy.structure import Structure, structure
@@ -54,7 +54,7 @@ from vpm.identify.parallel import worker_count
 from vpm.log_check import refuse_mistakes
 from vpm.model import Model
 from vpm.ranking import Ranking, Settings, rank
-from vpm.simulate import Run, Setup, judging_mode
+from vpm.simulate import Setup, judging_mode
 
 Array = NDArray[np.float64]
 
@@ -175,7 +175,17 @@ def diagnose(
             odd = [str(one) for one in found if one.kind in NOTED]
         most = max(LEAST_LIMIT, 2 * len(model.joints)) if limit is None else limit
         diagnosis = _diagnosis(model, records, effects, cutoff, setup or Setup(), most, names, each, tell)
-        return replace(diagnosis, notes=(*odd, *diagnosis.notes))
+        asked = {
+            "effects": (effects, None),
+            "cutoff": (cutoff, None),
+            "limit": (limit, None),
+            "names": (names, "ranking"),
+            "check": (check, True),
+            "workers": (workers, None),
+            **own_settings(setup or Setup(), "setup"),
+        }
+        made = provenance(model, as_records(experiments), as_records(validate or ()), "vpm.diagnose", asked)
+        return replace(diagnosis, notes=(*odd, *diagnosis.notes), provenance=made)
 
 
 def _diagnosis(
@@ -248,20 +258,22 @@ def _diagnosis(
             found.refused,
             found.ranking,
             listed(ambiguities(accepted), ambiguous),
-            _where(recalibrated.model, data.unseen),
+            where(recalibrated.model, data.unseen),
             tuple(_step(data, stage) for stage in found.stages),
             tuple(e.name for e in training),
             tuple(e.name for e in unseen),
             tuple(notes),
             final.model,
             fit_of(final.model, data.training, final.fit, nominal.fit.residual, [e.name for e in training]),
-            _pictures(data, nominal, recalibrated, final),
+            pictures(data, nominal, recalibrated, final),
             time.perf_counter() - began,
             found.interrupted or stopped or late,
             gather(found.final.model, [entry.key for entry in accepted if entry.side == "motor"], data.unseen, floor),
             empirical,
             experiments_for(found.final, ambiguous, data.training, floor),
             _classes(accepted, ambiguous),
+            traces(data, nominal, final),
+            {name: parameter.value for name, parameter in model.parameters.items()},
         )
     except BROKEN as error:
         notes.append(FAILED.format(what="what follows the search", error=error))
@@ -619,37 +631,3 @@ def _step(data: Data, stage: Stage) -> Step:
         max(share for _, share, _ in gaps(data.training, fit.residual).values()),
         max(share for _, share, _ in gaps(data.unseen, stage.judged.unseen).values()),
     )
-
-
-def _where(model: Model, unseen: InverseDynamicsProblem) -> dict[str, tuple[str, ...]]:
-    """Where the efforts of the first unseen record part, in words."""
-    time, applied, required = unseen.effort(model, model.theta, 0)
-    channels = tuple(f"{joint}.effort" for joint in unseen.joints)
-    units = tuple(model.channel_unit(channel) for channel in channels)
-    record = unseen.experiments[0]
-    run = Run(model.name, record.name, "inverse_dynamics", time, channels, units, required, applied)
-    return {channel.channel: channel.where.sentences for channel in compare(run, record).channels}
-
-
-def _pictures(data: Data, nominal: Judged, recalibrated: Judged, final: Judged) -> tuple[Picture, ...]:
-    """One for each joint of the first unseen record."""
-    pictures = []
-    problem = data.unseen
-    position, velocity, _ = problem.state(0)
-    _, applied, _ = problem.effort(final.model, final.model.theta, 0)
-    for joint, block in enumerate(problem.efforts(0)):
-        residuals = [j.unseen[block.samples] / block.weight for j in (nominal, recalibrated, final)]
-        unit = final.model.channel_unit(block.channel.replace(".effort", ".position"))
-        pictures.append(
-            Picture(
-                block.channel,
-                block.unit,
-                unit,
-                block.time,
-                position[:, joint],
-                velocity[:, joint],
-                applied[:, joint],
-                *residuals,
-            )
-        )
-    return tuple(pictures)

@@ -1,4 +1,4 @@
-"""Numbers at the door: what users give becomes arrays of double precision, or an error that says what it is."""
+"""Numbers at both doors: what users give becomes arrays or an error; what they read is rounded alike everywhere."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ from vpm.errors import VpmError
 
 #: No quantity of a machine is larger in SI units; squares and products of three are still finite numbers.
 LARGEST = 1e100
+#: Said for a number that nobody knows.
+UNKNOWN = "–"
 
 
 def array_of(given: ArrayLike, what: str, error: type[VpmError] = VpmError) -> NDArray[np.float64]:
@@ -46,3 +48,26 @@ def number_of(given: object, what: str, error: type[VpmError] = VpmError) -> flo
         return float(given)  # type: ignore[arg-type]  # whatever float takes is right
     except (TypeError, ValueError, OverflowError) as reason:
         raise error(f"{what} is no number ({reason}); give one") from reason
+
+
+def short(value: float) -> str:
+    """A number with four digits, as texts, tables and pictures show it; a dash where it is not known."""
+    return UNKNOWN if np.isnan(value) else f"{value:.4g}"
+
+
+def percent(share: float) -> str:
+    """A share with two decimals, as texts, tables and pictures show it; two digits where that would hide it.
+
+    Less than a millionth is nothing.
+    """
+    if np.isnan(share):
+        return UNKNOWN
+    if abs(share) < 1e-6:
+        return "0.00 %"
+    return f"{100.0 * share:.2f} %" if abs(share) >= 1e-3 else f"{100.0 * share:.2g} %"
+
+
+def stretches(counts: NDArray[np.bool_]) -> list[slice]:
+    """Contiguous stretches of samples that count."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], counts, [False]]).astype(np.int8)))
+    return [slice(int(first), int(last)) for first, last in zip(edges[::2], edges[1::2], strict=True)]

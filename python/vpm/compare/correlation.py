@@ -67,6 +67,37 @@ def autocorrelation(residual: Array, pieces: Sequence[slice], dt: float, channel
     return Correlation(channel, _times(dt, 0, positive.size), positive, float(band), outside)
 
 
+def gapped_autocorrelation(residual: Array, dt: float) -> tuple[Array, Array, Array]:
+    """Correlation of a residual with its own past over gaps: of the pairs of samples that are both there.
+
+    Parameters
+    ----------
+    residual : ndarray, shape (N,)
+        NaN where there is a gap.
+    dt : float
+        s.
+
+    Returns
+    -------
+    lags, values, band : ndarray, shape (L,)
+        s; between -1 and 1; 95 % of the values of white noise are within ``1.96 / sqrt(pairs)`` from zero. Lags that
+        less than half of the samples have pairs for are left out; nothing without samples that vary.
+    """
+    there = np.isfinite(residual)
+    centred = np.where(there, residual - residual[there].mean(), 0.0) if there.any() else np.zeros(0)
+    power = float(centred @ centred)
+    if not power > 0.0:
+        return np.zeros(0), np.zeros(0), np.zeros(0)
+    most = max(1, min(MOST_LAGS, residual.size // 4))
+    ones = there.astype(np.float64)
+    pairs = np.array([ones[k:] @ ones[: ones.size - k] for k in range(most + 1)])
+    products = np.array([centred[k:] @ centred[: centred.size - k] for k in range(most + 1)])
+    enough = np.append(pairs < 0.5 * pairs[0], True)
+    last = int(np.argmax(enough))
+    values = products[:last] / pairs[:last] * (pairs[0] / power)
+    return _times(dt, 0, last), values, NORMAL_95 / np.sqrt(pairs[:last])
+
+
 def cross_correlation(residual: Array, signal: Array, pieces: Sequence[slice], dt: float, name: str) -> Correlation:
     """Correlation of a residual with an input, over lags of both signs.
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 from vpm.discrepancy.confirmation import Judged
 from vpm.identify.statistics import NORMAL_95
 from vpm.model import Model, Parameter
+from vpm.numbers import short
 
 #: Parameters that move by more of their stated uncertainties than this are reported, and no effect is believed that
 #: drives one so far.
@@ -24,7 +25,7 @@ def moved_far(model: Model, recalibrated: Judged) -> list[str]:
         spread = _stated(before)
         if abs(after.value - before.value) > FAR * spread:
             notes.append(
-                f"recalibration moved {name} from {before.value:.5g} to {after.value:.5g} {before.unit}, "
+                f"recalibration moved {name} from {short(before.value)} to {short(after.value)} {before.unit}, "
                 f"{abs(after.value - before.value) / spread:.1f} times its stated uncertainty"
             )
     return notes

@@ -344,7 +344,7 @@ def _accepts(several: Sequence[Ranked], settings: RankingSettings) -> bool:
 
 
 def _removes(one: Ranked) -> str:
-    return f"removes {100.0 * one.judgement.least:.3g} % of the error power"
+    return one.judgement.words
 
 
 def _reason(told: _Last, settings: RankingSettings) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.discrepancy.evidence import Evidence
+from vpm.discrepancy.provenance import Provenance
 from vpm.files import write_text
 from vpm.identify import Fit
 from vpm.model import Model
@@ -198,6 +199,10 @@ class ChannelGap(Storable):
     signal: float
     mode: str
 
+    def share(self, value: float) -> float:
+        """An error as a share of the measured signal; NaN without one."""
+        return value / self.signal if self.signal > 0.0 else float("nan")
+
 
 @dataclass(frozen=True, repr=False, eq=False)
 class ProposedExperiment(Storable):
@@ -277,7 +282,7 @@ class Picture(Storable):
         m or rad.
     time, position, velocity, measured : ndarray, shape (n,)
     before, recalibrated, after : ndarray, shape (n,)
-        Residual at each stage.
+        Residual at each stage; NaN where a sample does not count, as at standstill.
     """
 
     channel: str
@@ -289,6 +294,29 @@ class Picture(Storable):
     measured: Array
     before: Array
     recalibrated: Array
+    after: Array
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class Trace(Storable):
+    """One channel of the first unseen record, measured and simulated.
+
+    Attributes
+    ----------
+    record, channel, unit, mode : str
+        And the mode of the simulation.
+    time, measured : ndarray, shape (n,)
+    before, after : ndarray, shape (n,)
+        Simulated by the nominal model and by the one with the accepted effects; NaN where the first state settles.
+    """
+
+    record: str
+    channel: str
+    unit: str
+    mode: str
+    time: Array
+    measured: Array
+    before: Array
     after: Array
 
 
@@ -334,6 +362,12 @@ class Diagnosis(Result):
         For each pair of effects that the data cannot tell apart, the experiment that would.
     classes : tuple of tuple of str
         Each accepted effect that has rivals, with these, as ``effect at site``: the records do not tell them apart.
+    traces : tuple of Trace
+        What was measured and what is simulated; none where no unseen record could be simulated.
+    stated : dict of str to float
+        Values of all parameters as the model file states them, SI.
+    provenance : Provenance or None
+        Files, settings and command that it came from.
     """
 
     verdict: str
@@ -357,6 +391,16 @@ class Diagnosis(Result):
     empirical: Empirical | None = None
     experiments: tuple[ProposedExperiment, ...] = ()
     classes: tuple[tuple[str, ...], ...] = ()
+    traces: tuple[Trace, ...] = ()
+    stated: dict[str, float] = field(default_factory=dict)
+    provenance: Provenance | None = None
+
+    @property
+    def order(self) -> str:
+        """In which order the effects stand, in words."""
+        if any(not np.isnan(effect.evidence_nats) for effect in self.effects):
+            return "in the order in which the ranking found them"
+        return "by what each adds beside all the others, the most first"
 
     def to_dict(self) -> dict[str, object]:
         """Content of ``report.json``: plain numbers and text, SI; what is not known is null."""
@@ -399,6 +443,7 @@ class Diagnosis(Result):
             "experiments": [e.to_dict() for e in self.experiments],
             "seconds": self.seconds,
             "interrupted": self.interrupted,
+            "provenance": None if self.provenance is None else self.provenance.to_dict(),
         }
         return document
 

@@ -14,6 +14,7 @@ from vpm.discrepancy.structural import coupled, moved
 from vpm.identify import Gain
 from vpm.identify.statistics import NORMAL_95
 from vpm.model import Model
+from vpm.numbers import percent, short
 
 #: Probability of accepting any effect by chance, shared among all candidates that are tried.
 FALSE_ALARM_LEVEL = 0.01
@@ -84,7 +85,7 @@ def refuse_probe(probe: Probe) -> str:
     if probe.drop < 0.0:
         return "it would make the training error larger wherever it was tried"
     if probe.drop < LEAST_SCREENED:
-        return f"it would lower the training error by only {_percent(probe.drop)} of its mean square"
+        return f"it would lower the training error by only {percent(probe.drop)} of its mean square"
     outside = impossible_values(probe)
     if outside:
         return _impossible(probe, outside[0])
@@ -121,9 +122,10 @@ def refuse_ringing(share: float, trial: Trial) -> str:
     rest = trial.unseen.relative - max(share, 0.0)
     if rest >= WORTH_A_NAME:
         return ""
+    noise = "lower" if share >= 0.0 else "raise"
     return (
-        f"it lowers the unseen error by {_percent(trial.unseen.relative)} of its mean square; noise of the "
-        f"measured motion alone, which rings less in the links with it, would be lowered by {_percent(share)}"
+        f"it {_moves('the unseen error', trial.unseen)}; it would {noise} noise of the measured motion alone, which "
+        f"rings in the links, by {percent(abs(share))} of its mean square"
     )
 
 
@@ -156,7 +158,7 @@ def refuse_timing(timed: Gain, shift: float, thresholds: Thresholds, *, beside: 
         return ""
     return (
         f"beside a shift of the commands by {1e3 * shift * thresholds.interval:.2g} ms, within the sampling interval, "
-        f"it lowers the unseen error by only {_percent(max(timed.relative, 0.0))} of its mean square"
+        f"it {_moves('the unseen error', timed, 'only ')}"
     )
 
 
@@ -185,8 +187,8 @@ def _too_short(trial: Trial, interval: float) -> str:
         if parameter.unit == "s" and parameter.value < interval:
             return (
                 f"{name} comes out as {1e3 * parameter.value:.3g} ms, less than the sampling interval of "
-                f"{1e3 * interval:.3g} ms, and lowers the unseen error by {_percent(max(trial.unseen.relative, 0.0))} "
-                "of its mean square: so little cannot be told from the sampling itself"
+                f"{1e3 * interval:.3g} ms, and {_moves('the unseen error', trial.unseen)}: "
+                "so little cannot be told from the sampling itself"
             )
     return ""
 
@@ -252,7 +254,7 @@ def _trifling_gain(trial: Trial) -> str:
         return reason
     if trial.slow is None and 0.0 <= drop < MODEST_GAIN:
         return (
-            f"{name} comes out as {value:.4g} and lowers the unseen error by only {_percent(drop)} of its mean square: "
+            f"{name} comes out as {value:.4g} and {_moves('the unseen error', trial.unseen, 'only ')}: "
             "an instrument is blamed where it explains more than an imitation would"
         )
     return ""
@@ -272,7 +274,7 @@ def _trifling_size(trial: Trial) -> str:
     if abs(value - 1.0) >= NEGLIGIBLE or magnified:
         return ""
     return (
-        f"{name} comes out as {value:.4g}: less than {_percent(NEGLIGIBLE)} of the signal is no error "
+        f"{name} comes out as {value:.4g}: less than {percent(NEGLIGIBLE)} of the signal is no error "
         "to be told from that of the model"
     )
 
@@ -281,10 +283,8 @@ def _only_training(trial: Trial) -> str:
     seen, unseen = trial.training, trial.unseen
     if unseen.relative >= 0.0:
         return ""
-    return (
-        f"it helps the training record (residual {_rms(seen.before, seen.after)}) "
-        f"and hurts the unseen one ({_rms(unseen.before, unseen.after)})"
-    )
+    joined = "and" if seen.relative < 0.0 else "but"
+    return f"it {_moves('the training error', seen)}, {joined} {_moves('the unseen error', unseen)}"
 
 
 def _not_clear(trial: Trial) -> str:
@@ -303,8 +303,8 @@ def _only_impacts(trial: Trial) -> str:
     if trial.slow is None or trial.slow.relative >= -LEAST_GAIN:
         return ""
     return (
-        f"it lowers the unseen error by {_percent(trial.unseen.relative)} of its mean square and raises its slow part "
-        f"({_rms(trial.slow.before, trial.slow.after)}): it makes up for single impacts of the play"
+        f"it {_moves('the unseen error', trial.unseen)} and {_moves('its slow part', trial.slow)}: "
+        "it makes up for single impacts of the play"
     )
 
 
@@ -320,14 +320,11 @@ def _too_little(trial: Trial, thresholds: Thresholds) -> str:
     if slow_shows_it(trial, thresholds):
         return ""
     if unseen.relative < WORTH_A_NAME:
-        return (
-            f"it lowers the unseen error by only {_percent(unseen.relative)} of its mean square "
-            f"({_rms(unseen.before, unseen.after)})"
-        )
+        return f"it {_moves('the unseen error', unseen, 'only ')}"
     needed = thresholds.needed(unseen, asked=trial.asked)
     if unseen.score < needed:
         return (
-            f"its gain of {_percent(unseen.relative)} on unseen data is {unseen.score:.1f} standard deviations over "
+            f"its gain of {percent(unseen.relative)} on unseen data is {unseen.score:.1f} standard deviations over "
             f"{unseen.pieces} independent pieces, and {needed:.1f} are needed when {thresholds.candidates} candidates "
             "are tried"
         )
@@ -339,7 +336,7 @@ def _only_reversals(trial: Trial) -> str:
         return ""
     return (
         "it lowers the unseen error only where a joint with dry friction turns round and sticks for a while; elsewhere "
-        f"by {_percent(trial.away.relative)} of its mean square"
+        f"it {_moves('that', trial.away, 'only ')}"
     )
 
 
@@ -352,9 +349,10 @@ def worse_in_simulation(trial: Trial) -> str:
     if simulated is None or decided or simulated.harm <= NORMAL_95_ONE_SIDED:
         return ""
     if simulated.relative < -LEAST_GAIN:
+        joined = "and" if trial.unseen.relative < 0.0 else "but"
         return (
-            "it helps the balance of effort and makes the simulation of the unseen record worse by "
-            f"{_percent(-simulated.relative)} of its mean square, {simulated.harm:.1f} standard deviations"
+            f"it {_moves('the unseen error of the balance of effort', trial.unseen)}, {joined} "
+            f"{_moves('that of the simulation', simulated)}, {simulated.harm:.1f} standard deviations"
         )
     return ""
 
@@ -365,9 +363,9 @@ def parameter_text(model: Model, name: str, std: float) -> str:
     return f"{name} = {parameter.value:.5g} ± {std:.2g} {parameter.unit}"
 
 
-def _percent(share: float) -> str:
-    return f"{100.0 * share:.2g} %"
-
-
-def _rms(before: float, after: float) -> str:
-    return f"{before:.4g} to {after:.4g}"
+def _moves(what: str, change: Gain, little: str = "") -> str:
+    """``lowers the unseen error by 3.00 % of its mean square (0.2 to 0.197)``, or raises it, as its numbers say."""
+    numbers = f"of its mean square ({short(change.before)} to {short(change.after)})"
+    if change.relative < 0.0:
+        return f"raises {what} by {percent(-change.relative)} {numbers}"
+    return f"lowers {what} by {little}{percent(change.relative)} {numbers}"

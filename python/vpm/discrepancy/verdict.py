@@ -17,6 +17,7 @@ from vpm.discrepancy.remainder import Remainder
 from vpm.discrepancy.search import Search
 from vpm.discrepancy.structure import Structure
 from vpm.identify import gain, segments
+from vpm.numbers import percent, short
 
 #: Said of what stays after effects were found.
 _REST = " A structured residual above the noise remains."
@@ -75,7 +76,7 @@ def verdict(
     remaining = structured or (rest is not None and rest.repeats and not small) or bool(still)
     remaining = remaining and not found.within_laws
     worst = max(beside if beside and _is_unseen(found, data) else main + beside, key=_clear_of_noise)
-    numbers = f"{_percent(worst.before, worst)} before, {_percent(worst.recalibrated, worst)} recalibrated"
+    numbers = _stages(worst)
     names = ", then ".join(e.trial.probe.candidate.label for e in found.accepted)
     share_left = (worst.after / worst.recalibrated) ** 2 if worst.recalibrated > 0.0 else 0.0
     away = driven_away(nominal.model, recalibrated, found.final, found.ranked) if found.accepted else {}
@@ -115,7 +116,7 @@ def verdict(
             f"explains it. Error on unseen data: {numbers}.",
             True,
         )
-    return (*_nothing_missing(data, nominal, recalibrated, (main, beside), numbers), False)
+    return (*_nothing_missing(data, nominal, recalibrated, (main, beside), worst), False)
 
 
 def _is_worse_than_none(gap: ChannelGap) -> bool:
@@ -190,15 +191,18 @@ def _nothing_missing(
     nominal: Judged,
     recalibrated: Judged,
     told: tuple[list[ChannelGap], list[ChannelGap]],
-    numbers: str,
+    worst: ChannelGap,
 ) -> tuple[str, str]:
     """Of gaps of the balance, and of an observer of joints that it does not see."""
-    main, beside = told
+    (main, beside), numbers = told, _stages(worst)
     small = max(g.before / g.signal if g.signal > 0.0 else 0.0 for g in main) <= NEGLIGIBLE
     agrees = small or max((g.before / g.noise_floor if g.noise_floor > 0.0 else np.inf) for g in main) <= FLOOR_FACTOR
     better = gain(nominal.unseen, recalibrated.unseen, segments(data.unseen))
     balanced = not agrees and better.relative > LEAST_GAIN and better.score > float(ndtri(1.0 - FALSE_ALARM_LEVEL))
     if balanced or any(_was_closed(g) for g in beside):
+        closed = max(main + beside, key=_closed)
+        if _closed(worst) < 0.0 < _closed(closed):
+            numbers = f"{_stages(closed)}; in another channel it grew, {numbers}"
         return (
             "parameters_only",
             f"Nothing is missing: other values of the known parameters close the gap. Error on unseen data: {numbers}.",
@@ -212,5 +216,14 @@ def _was_closed(gap: ChannelGap) -> bool:
     return was_there and gap.recalibrated < gap.before * np.sqrt(1.0 - LEAST_GAIN)
 
 
+def _stages(gap: ChannelGap) -> str:
+    return f"{_percent(gap.before, gap)} before, {_percent(gap.recalibrated, gap)} recalibrated"
+
+
+def _closed(gap: ChannelGap) -> float:
+    """Share of the signal by which other values of the known parameters lower an error; negative where it grew."""
+    return (gap.before - gap.recalibrated) / gap.signal if gap.signal > 0.0 else 0.0
+
+
 def _percent(value: float, gap: ChannelGap) -> str:
-    return f"{100.0 * value / gap.signal:.2f} %" if gap.signal > 0.0 else f"{value:.3g} {gap.unit}"
+    return percent(value / gap.signal) if gap.signal > 0.0 else f"{short(value)} {gap.unit}"

@@ -5,9 +5,10 @@ from __future__ import annotations
 import csv
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, Self, TypedDict, Unpack
+from typing import TYPE_CHECKING, Literal, Self, TypedDict, TypeVar, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -46,6 +47,7 @@ class _Changes(TypedDict, total=False):
     units: tuple[str, ...]
 
 
+_Record = TypeVar("_Record", bound="Experiment")
 _NEXT = {"position": "velocity", "velocity": "acceleration"}
 
 
@@ -155,11 +157,16 @@ class Experiment(Result):
             A unit cannot be read.
         """
         if str(path).endswith(".npz"):
-            return super().load(path)
+            return _read_from(path, super().load(path))
         from vpm.experiment.loading import load_parts
 
         parts = load_parts(path, channels, model, irregular=irregular, resample=resample, name=name)
-        return cls(*parts)
+        return _read_from(path, cls(*parts))
+
+    @cached_property
+    def path(self) -> str | None:
+        """File that the record was read from; None if it came another way or was changed since."""
+        return None
 
     @classmethod
     def from_arrays(
@@ -443,3 +450,9 @@ class Experiment(Result):
 
     def _frame_columns(self) -> Mapping[str, object]:
         return {"time_s": self.time, **dict(zip(self.channels, self.data.T, strict=True))}
+
+
+def _read_from(path: str | PathLike[str], record: _Record) -> _Record:
+    """The record, which knows its file: a path is no part of what makes two records equal."""
+    record.__dict__["path"] = str(path)
+    return record

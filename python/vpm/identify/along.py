@@ -23,7 +23,7 @@ from vpm.identify.gauges import Hold
 from vpm.identify.hidden_motion import with_hidden
 from vpm.identify.reuse import Kept
 from vpm.initial import whole_motion
-from vpm.model import Model
+from vpm.model import Model, Shape
 from vpm.simulate import Setup, copied_channels
 
 Array = NDArray[np.float64]
@@ -176,7 +176,7 @@ def respond(
             remembered = memory or DriveMemory(lambda values: values[m.kept])
             return _with_drives(model, theta, m, experiment, (columns, channels), remembered, origin)
         if has_own_drives(model):
-            bare = _unsplit(model, m.joints)
+            bare = _unsplit(Shape(model), m.joints)
             if bare is not None and shows_drives_alone(model, channels):
                 remembered = memory or DriveMemory(lambda values: values[m.kept])
                 return _with_known_drives(model, bare, theta, m, experiment, (columns, channels), remembered)
@@ -251,12 +251,12 @@ def _with_drives(
 
 
 @lru_cache(maxsize=128)
-def _unsplit(model: Model, joints: tuple[str, ...]) -> tuple[Model, NDArray[np.int64]] | None:
+def _unsplit(shape: Shape, joints: tuple[str, ...]) -> tuple[Model, NDArray[np.int64]] | None:
     """A machine without the effects that split its joints, if it has the measured ``joints`` then, and its parameters.
 
     The motor side of a split joint keeps the measured motion and the drives: these answer as in the machine as it was.
     """
-    bare = model
+    bare = model = shape.model
     for effect in model.effects:
         candidate = bare.without_effect(*effect.key)
         bare = candidate if len(candidate.joints) < len(bare.joints) else bare

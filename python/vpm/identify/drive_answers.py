@@ -47,7 +47,7 @@ def together(
     columns, channels = wanted
     internal = first_drives(model, theta, m, experiment)
     effects = tuple(effect.key for effect in model.effects)
-    key = (memory.commands, model.description(), effects, theta.tobytes(), internal.tobytes(), tuple(channels))
+    key = (memory.commands, model.structure, effects, theta.tobytes(), internal.tobytes(), tuple(channels))
     work = partial(_answered, model, theta, m, experiment, channels, internal, memory.integrator)
     return memory.recall(key, [model.parameter_names[column] for column in columns], work)
 
@@ -74,7 +74,7 @@ def apart(
         moved = [column for column in sorted(moving) if theta[column] != start[column]]
         shown = [place for place, channel in enumerate(channels) if channel.rpartition(".")[0] in alone.actuators]
         read, pushed = [channels[place] for place in shown], replace(m, inputs=m.inputs[:, drives.inputs])
-        key = (memory.commands, drives.structure, tuple(read), mine[drives.own].tobytes(), first.tobytes())
+        key = (memory.commands, alone.structure, tuple(read), mine[drives.own].tobytes(), first.tobytes())
         work = partial(_answered, alone, mine, pushed, experiment, read, first, memory.integrator)
         names = [model.parameter_names[column] for column in dict.fromkeys([*asked, *moved])]
         outputs, slopes = memory.recall(key, names, work)

@@ -5,7 +5,6 @@ A fault that is tried at one cylinder then asks for that cylinder alone, and the
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
@@ -15,10 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.catalogue import EFFECTS
-from vpm.model import Model
-
-#: Models of drives alone that are kept, over all machines.
-KEPT = 256
+from vpm.model import Model, Shape
 
 
 @dataclass(frozen=True)
@@ -28,13 +24,11 @@ class Drives:
     Attributes
     ----------
     model : Model
-        Without laws of joints, controllers and all that belongs to other drives alone.
+        Without laws of joints, controllers and all that belongs to other drives alone; its values mean nothing.
     places, inputs, states : ndarray of int
         Its parameters, inputs, and states of drives and supplies among those of the whole machine.
     own : ndarray of int
         Those of its own parameters that change what the drives do along a given motion.
-    structure : str
-        Its description without the values of its parameters.
     """
 
     model: Model
@@ -42,7 +36,6 @@ class Drives:
     inputs: NDArray[np.int64]
     states: NDArray[np.int64]
     own: NDArray[np.int64]
-    structure: str
 
 
 def moves_drives(model: Model, name: str) -> bool:
@@ -51,9 +44,14 @@ def moves_drives(model: Model, name: str) -> bool:
     return owner not in model.joints and owner not in model.bodies and owner != "world"
 
 
-@lru_cache(maxsize=128)
 def drives_of(model: Model) -> tuple[Drives, ...]:
     """Split a machine with rigid links, all of whose joints were measured, into drives that do not feel each other."""
+    return _drives_of(Shape(model))
+
+
+@lru_cache(maxsize=128)
+def _drives_of(shape: Shape) -> tuple[Drives, ...]:
+    model = shape.model
     document = model.to_dict()
     return tuple(_alone(model, document, group) for group in _groups(model))
 
@@ -83,7 +81,8 @@ def _alone(model: Model, document: dict[str, Any], group: tuple[str, ...]) -> Dr
     effects = [entry for entry in document.get("effects", ()) if entry["at"] in sites]
     mine["sensors"] = kept
     mine["effects"] = [entry for entry in effects if EFFECTS[entry["type"]].site != "joint"]
-    alone, structure = _built(json.dumps(mine))
+    alone = Model.from_dict(mine)
+    alone = alone.at("rigid") if alone.beams else alone
     own = [place for place, name in enumerate(alone.parameter_names) if moves_drives(alone, name)]
     return Drives(
         alone,
@@ -91,18 +90,7 @@ def _alone(model: Model, document: dict[str, Any], group: tuple[str, ...]) -> Dr
         _places(alone.inputs, model.inputs),
         _places(alone.internal_names, model.internal_names),
         np.array(own, dtype=np.int64),
-        structure,
     )
-
-
-@lru_cache(maxsize=KEPT)
-def _built(document: str) -> tuple[Model, str]:
-    """A model, and its description without the values of its parameters."""
-    model = Model.from_dict(json.loads(document))
-    model = model.at("rigid") if model.beams else model
-    described = json.loads(model.description())
-    del described["parameters"]
-    return model, json.dumps(described)
 
 
 def _places(names: tuple[str, ...], whole: tuple[str, ...]) -> NDArray[np.int64]:

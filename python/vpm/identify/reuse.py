@@ -7,7 +7,6 @@ what moves the links (masses, elasticities, gravity, instruments of the motion) 
 
 from __future__ import annotations
 
-import json
 from collections import OrderedDict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -20,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.identify.gauges import Hold
-from vpm.model import Model
+from vpm.model import Model, Shape
 from vpm.model.effects import Effect
 
 Array = NDArray[np.float64]
@@ -36,7 +35,7 @@ NEAR = 0.005
 
 @dataclass(frozen=True)
 class Parts:
-    """A machine with elastic links as what moves them and what does not.
+    """A machine with elastic links as what moves them and what does not; values of these models mean nothing.
 
     Attributes
     ----------
@@ -55,8 +54,6 @@ class Parts:
         Those that may change how the links bend.
     still : ndarray of bool
         Which parameters of ``bare`` do not: those of drives and controllers.
-    structure : str
-        Of ``bare``: its description without the values of its parameters.
     """
 
     bare: Model
@@ -68,7 +65,6 @@ class Parts:
     felt: frozenset[int]
     moving: frozenset[int]
     still: NDArray[np.bool_]
-    structure: str
 
 
 def parts_of(model: Model, joints: tuple[str, ...]) -> Parts | None:
@@ -81,9 +77,14 @@ def parts_of(model: Model, joints: tuple[str, ...]) -> Parts | None:
     return split(model, joints, SPLITTING if remembers else frozenset({"backlash"}))
 
 
-@lru_cache(maxsize=128)
 def split(model: Model, joints: tuple[str, ...], splits: frozenset[str]) -> Parts | None:
     """The same where all ``splits``, effects that bring a coordinate of their own, count as plays do."""
+    return _split(Shape(model), joints, splits)
+
+
+@lru_cache(maxsize=128)
+def _split(shape: Shape, joints: tuple[str, ...], splits: frozenset[str]) -> Parts | None:
+    model = shape.model
     plays = [e for e in model.effects if e.name in splits and model.joint_behind(e.at)]
     flying = {model.joint_behind(e.at) for e in plays}
     if any(e.side == "link" and model.joint_behind(e.at) for e in model.effects):
@@ -101,12 +102,9 @@ def split(model: Model, joints: tuple[str, ...], splits: frozenset[str]) -> Part
     owners = {*model.actuators, *model.controllers}
     still = np.array([name.partition(".")[0] in owners for name in bare.parameter_names], dtype=np.bool_)
     moving = frozenset(places[~still].tolist())
-    described = json.loads(bare.description())
-    del described["parameters"]
-    structure = json.dumps(described)
     laws = [effect for effect in aside if effect.type.site == "joint"]
     if not laws:
-        return Parts(bare, places, None, None, places, places, frozenset(), moving, still, structure)
+        return Parts(bare, places, None, None, places, places, frozenset(), moving, still)
     felt = {model.index(name) for effect in laws for name in effect.parameter_names.values()}
     read = [effect for effect in model.effects if effect.type.site == "sensor"]
     felt |= {model.index(name) for effect in read for name in effect.parameter_names.values()}
@@ -115,7 +113,7 @@ def split(model: Model, joints: tuple[str, ...], splits: frozenset[str]) -> Part
     rigid = bool(model.core.n_elastic)
     whole, shell = (_without(content, effects, rigid=rigid) for effects in (bent, [*bent, *aside]))
     of_laws, of_shell = (np.array([model.index(n) for n in m.parameter_names], dtype=np.int64) for m in (whole, shell))
-    return Parts(bare, places, whole, shell, of_laws, of_shell, frozenset(felt), moving, still, structure)
+    return Parts(bare, places, whole, shell, of_laws, of_shell, frozenset(felt), moving, still)
 
 
 def _without(content: Mapping[str, Any], effects: Sequence[Effect], *, rigid: bool = False) -> Model:
@@ -126,13 +124,7 @@ def _without(content: Mapping[str, Any], effects: Sequence[Effect], *, rigid: bo
     changed = {**content, "effects": kept}
     if rigid:
         changed["beams"] = {name: {**beam, "level": "rigid"} for name, beam in content["beams"].items()}
-    return _machine(json.dumps(changed))
-
-
-@lru_cache(maxsize=128)
-def _machine(text: str) -> Model:
-    """One machine for all that are the same without what was left out: it is checked and compiled once."""
-    return Model.from_dict(json.loads(text))
+    return Model.from_dict(changed)
 
 
 @dataclass
@@ -159,7 +151,7 @@ class Kept:
 
     def answer(self, parts: Parts, theta: Array, columns: Sequence[int], work: Work) -> tuple[Array, Array]:
         """Channels (n, k) and derivative (n, k, columns) of the bare machine; what is not known is worked out."""
-        key, bare = (parts.structure, theta.tobytes()), parts.bare
+        key, bare = (parts.bare.structure, theta.tobytes()), parts.bare
         names = [bare.parameter_names[column] for column in columns]
         with self._lock:
             known = self._answers.get(key)
@@ -190,15 +182,15 @@ class Kept:
         """
         (first, theta), (second, values) = one, other
         with self._lock:
-            known = self._answers.get((first.structure, theta.tobytes()))
+            known = self._answers.get((first.bare.structure, theta.tobytes()))
         if known is None:
             return
         nothing = np.zeros_like(known.channels)
         slopes = {name: known.slopes[name] for name in second.bare.parameter_names if name in known.slopes}
         slopes |= {name: nothing for name in own if name not in slopes}
         with self._lock:
-            self._shared[second.structure] = values, {name: slopes[name] for name in own}
-        self._keep((second.structure, values.tobytes()), Answer(known.channels, slopes))
+            self._shared[second.bare.structure] = values, {name: slopes[name] for name in own}
+        self._keep((second.bare.structure, values.tobytes()), Answer(known.channels, slopes))
 
     def share_again(self, one: tuple[Parts, Array], others: Sequence[tuple[Parts, Array]]) -> bool:
         """Let the ``others`` have the answer of ``one`` with derivatives by their own parameters shared earlier.
@@ -207,8 +199,8 @@ class Kept:
         """
         first, theta = one
         with self._lock:
-            known = self._answers.get((first.structure, theta.tobytes()))
-            earlier = [self._shared.get(parts.structure) for parts, _ in others]
+            known = self._answers.get((first.bare.structure, theta.tobytes()))
+            earlier = [self._shared.get(parts.bare.structure) for parts, _ in others]
         found = []
         for (parts, values), before in zip(others, earlier, strict=True):
             if known is None or before is None:
@@ -216,7 +208,7 @@ class Kept:
             moved = ~parts.still & (np.abs(values - before[0]) > NEAR * np.abs(before[0]))
             if np.any(moved):
                 return False
-            found.append(((parts.structure, values.tobytes()), Answer(known.channels, dict(before[1]))))
+            found.append(((parts.bare.structure, values.tobytes()), Answer(known.channels, dict(before[1]))))
         for key, answer in found:
             self._keep(key, answer)
         return True

@@ -5,8 +5,17 @@ from __future__ import annotations
 from vpm.model.channels import load_channel_table, parse_channel_table
 from vpm.model.dynamics import Dynamics
 from vpm.model.effects import Effect
-from vpm.model.model import Model
+from vpm.model.model import Model, Shape
 from vpm.model.parameters import Parameter
 from vpm.model.schema import ChannelEntry
 
-__all__ = ["ChannelEntry", "Dynamics", "Effect", "Model", "Parameter", "load_channel_table", "parse_channel_table"]
+__all__ = [
+    "ChannelEntry",
+    "Dynamics",
+    "Effect",
+    "Model",
+    "Parameter",
+    "Shape",
+    "load_channel_table",
+    "parse_channel_table",
+]

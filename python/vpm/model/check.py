@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from pydantic import ValidationError
 
 from vpm.errors import UnitError, near_match
 from vpm.model.beam_check import beam_problems, size_problems
+from vpm.model.checked import Checked, Rule
 from vpm.model.connection_check import complete_contacts, connection_problems, connection_value_problems
 from vpm.model.drive_check import complete_drives, drive_problems, unit_problems, value_problems
 from vpm.model.effects import complete_effects, effect_problems
 from vpm.model.form import schema_problems
 from vpm.model.messages import Problem, check_plain, place, raise_first
 from vpm.model.omissions import omission_problems
-from vpm.model.parameters import Parameter, Slot, slots, table
+from vpm.model.parameters import Parameter, slots, table
 from vpm.model.references import gauge_problems, reference_problems
 from vpm.model.sampled_files import with_files
 from vpm.model.schema import Document
@@ -28,16 +29,6 @@ from vpm.units import parse_unit, require_dimension
 
 #: An inertia may break its conditions by this share of its size: numbers in files are rounded.
 INERTIA_TOLERANCE = 1e-6
-
-
-@dataclass(frozen=True)
-class Checked:
-    """A document without problems, and what was found out on the way."""
-
-    document: Document
-    structure: Structure
-    slots: tuple[Slot, ...]
-    parameters: Mapping[str, Parameter]
 
 
 def check_document(content: Mapping[str, object], path: str | None = None) -> Checked:
@@ -80,11 +71,16 @@ def check_document(content: Mapping[str, object], path: str | None = None) -> Ch
     found = tuple(slots(document, structure))
     _stop_at([problem for slot in found for problem in slot.problems()], path)
     parameters = table(list(found))
-    inertias = [problem for body in structure.bodies for problem in _inertia_problems(body, parameters)]
-    pairs = [*value_problems(document, parameters), *connection_value_problems(document, parameters)]
-    stops = stop_problems(document, {name: parameter.value for name, parameter in parameters.items()})
-    _stop_at([*inertias, *size_problems(document, parameters), *pairs, *stops], path)
-    return Checked(document, structure, found, parameters)
+    judged = [rule.judge(parameters) for rule in _rules(document, structure)]
+    _stop_at([problem for _, problems in judged for problem in problems], path)
+    return Checked(document, structure, found, parameters, tuple(rule for rule, _ in judged))
+
+
+def _rules(document: Document, structure: Structure) -> Iterator[Rule]:
+    """What has to hold between parameters, in the order in which it is told."""
+    yield from (Rule(partial(_inertia_problems, body)) for body in structure.bodies)
+    for problems in (size_problems, value_problems, connection_value_problems, stop_problems):
+        yield Rule(partial(problems, document))
 
 
 def _stop_at(problems: list[Problem], path: str | None) -> None:

@@ -6,9 +6,12 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from vpm.catalogue import EFFECTS
 from vpm.model.beam import End, Gauge, Line, Marker, Section, sections_of
-from vpm.model.check import Checked
+from vpm.model.checked import Checked
 from vpm.model.connection_compile import (
     bushing_json,
     cell_json,
@@ -35,8 +38,16 @@ from vpm.model.structure import (
 )
 
 
-def description(checked: Checked) -> str:
-    """Description of a model for the core, as JSON text.
+def described(structure: str, theta: NDArray[np.float64]) -> str:
+    """Description of a model for the core, as JSON text, from that of its structure and the values of its parameters.
+
+    Minus zeros are zeros there: two models are equal when their descriptions are.
+    """
+    return f'{{"parameters": {json.dumps((theta + 0.0).tolist(), allow_nan=False)}, {structure.removeprefix("{")}'
+
+
+def structure_text(checked: Checked) -> str:
+    """Description of a model for the core without the values of its parameters, as JSON text.
 
     Parameters
     ----------
@@ -52,7 +63,6 @@ def description(checked: Checked) -> str:
     effects = effects_of(document)
     content = {
         "gravity": list(document.gravity),
-        "parameters": [parameter.value for parameter in checked.parameters.values()],
         "parameter_names": list(index),
         "bodies": [_body(axis, index) for axis in structure.axes],
         "welds": [_weld(name, structure.frames[name], index) for name in structure.welds],

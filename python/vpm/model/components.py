@@ -8,7 +8,7 @@ from types import MappingProxyType
 
 from vpm.catalogue import JointKind
 from vpm.errors import ModelError
-from vpm.model.check import Checked
+from vpm.model.checked import Checked
 from vpm.model.drive_components import DriveComponents
 from vpm.model.drives import acted_on
 from vpm.model.schema import ChannelEntry

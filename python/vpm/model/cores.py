@@ -6,7 +6,6 @@ same structure.
 
 from __future__ import annotations
 
-import json
 from collections import OrderedDict
 from threading import Lock
 from typing import TYPE_CHECKING
@@ -15,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.errors import VpmError
+from vpm.model.compile import described
 
 if TYPE_CHECKING:
     from vpm._core import System
@@ -26,8 +26,8 @@ _systems: OrderedDict[str, System] = OrderedDict()
 _lock = Lock()
 
 
-def core_of(description: str, theta: NDArray[np.float64]) -> System:
-    """Compiled system of a description, as JSON text, for the parameters ``theta`` that it holds.
+def core_of(structure: str, theta: NDArray[np.float64]) -> System:
+    """Compiled system of a structure, as `structure_text` gives it, for the parameters ``theta``.
 
     Raises
     ------
@@ -40,9 +40,6 @@ def core_of(description: str, theta: NDArray[np.float64]) -> System:
         from vpm._core import System
     except ImportError as error:
         raise VpmError(f"the compiled core of vpm cannot be imported ({error}); reinstall vpm-dynamics") from error
-    content = json.loads(description)
-    del content["parameters"]
-    structure = json.dumps(content)
     with _lock:
         known = _systems.get(structure)
         if known is not None:
@@ -50,7 +47,7 @@ def core_of(description: str, theta: NDArray[np.float64]) -> System:
     if known is not None:
         known.check(theta)
         return known
-    system = System(description)
+    system = System(described(structure, theta))
     with _lock:
         _systems[structure] = system
         while len(_systems) > KEPT:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from vpm.catalogue import EFFECTS
 from vpm.errors import ModelError, near_match
-from vpm.model.check import Checked
+from vpm.model.checked import Checked
 from vpm.model.drives import COMPLIANT
 from vpm.model.hydraulic import Hydraulic
 from vpm.model.pose import Pose

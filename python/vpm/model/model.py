@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
@@ -16,15 +17,16 @@ from numpy.typing import NDArray
 from vpm.catalogue import SITE_KINDS, Side, effect_type
 from vpm.errors import CoreError, ModelError, near_match
 from vpm.files import write_text
-from vpm.model.check import Checked, check_document
-from vpm.model.compile import description
+from vpm.model.check import check_document
+from vpm.model.checked import Checked
+from vpm.model.compile import described, structure_text
 from vpm.model.cores import core_of
 from vpm.model.effects import Effect, effects_of
 from vpm.model.evaluation import Evaluations
 from vpm.model.messages import parse_toml, read_toml
 from vpm.model.parameters import Parameter
 from vpm.model.transmission import TURNING
-from vpm.model.writer import content_of, plain, toml_of
+from vpm.model.writer import content_of, toml_of
 from vpm.numbers import number_of
 from vpm.results import Storable, html_table
 
@@ -34,6 +36,8 @@ if TYPE_CHECKING:
 
 #: Share of the inertia that a joint moves on the motor side of a spring or play, where nobody says better.
 MOTOR_SHARE = 0.1
+#: What a model keeps of its own values; the rest of what it keeps holds for all models of the same structure.
+_OF_VALUES = frozenset({"_checked", "_path", "_content", "parameters", "theta", "dynamics"})
 
 
 class Model(Evaluations, Storable):
@@ -136,7 +140,7 @@ class Model(Evaluations, Storable):
     @cached_property
     def parameters(self) -> Mapping[str, Parameter]:
         """Parameters by dotted name, in index order."""
-        return MappingProxyType(dict(self._checked.parameters))
+        return MappingProxyType(self._checked.parameters)
 
     @cached_property
     def parameter_names(self) -> tuple[str, ...]:
@@ -182,18 +186,20 @@ class Model(Evaluations, Storable):
         ModelError
             A name is unknown, or a value is outside its bounds or physically impossible.
         """
-        content = content_of(self._checked.document, complete=True)
-        for name, value in values.items():
-            slot = self._checked.slots[self.index(name)]
-            changed = slot.si_quantity().model_copy(update={"value": number_of(value, name, ModelError)})
-            *way, last = slot.keys
-            target: Any = content
-            for key in way:
-                target = target[key]
-            target[last] = plain(changed)
-        model = type(self)(content)
-        if "core" in self.__dict__:  # the core is given theta at every call: one serves all values
-            model.__dict__["core"] = self.core
+        places = {self.index(name): number_of(value, name, ModelError) for name, value in values.items()}
+        named = dict(zip(values, places.values(), strict=True))
+        admitted = self._checked.admitted(named)
+        if admitted is None:
+            model = type(self)(self._checked.with_values(named).content())
+            if "core" in self.__dict__:  # the core is given theta at every call: one serves all values
+                model.__dict__["core"] = self.core
+            return model
+        theta = self.theta.copy()
+        theta[list(places)] = list(places.values())
+        theta.flags.writeable = False
+        model = object.__new__(type(self))
+        kept = {name: answer for name, answer in self.__dict__.items() if name not in _OF_VALUES}
+        model.__dict__.update(kept, _checked=admitted, _path=None, theta=theta)
         return model
 
     # ---- effects -----------------------------------------------------------------------------------------------------
@@ -349,11 +355,12 @@ class Model(Evaluations, Storable):
 
     def description(self) -> str:
         """Description for the core, as JSON text."""
-        return self._description
+        return described(self.structure, self.theta)
 
     @cached_property
-    def _description(self) -> str:
-        return description(self._checked)
+    def structure(self) -> str:
+        """The description without the values of the parameters: equal for models that differ in these only."""
+        return structure_text(self._checked)
 
     @cached_property
     def core(self) -> System:
@@ -365,7 +372,7 @@ class Model(Evaluations, Storable):
             The core refuses the description.
         """
         try:
-            return core_of(self.description(), self.theta)
+            return core_of(self.structure, self.theta)
         except CoreError as error:
             raise ModelError(f"{self.name}: {error}") from error
 
@@ -402,7 +409,7 @@ class Model(Evaluations, Storable):
     @cached_property
     def _content(self) -> tuple[object, ...]:
         """What makes two models equal: units and places of a file do not, what they say does."""
-        return (self.name, self.description(), tuple(self.parameters.values()), tuple(self.channel_table.items()))
+        return (self.name, self.structure, tuple(self.parameters.values()), tuple(self.channel_table.items()))
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Model):
@@ -410,7 +417,7 @@ class Model(Evaluations, Storable):
         return self._content == other._content
 
     def __hash__(self) -> int:
-        return hash(self._content[:3])
+        return hash((self.name, self.structure, (self.theta + 0.0).tobytes()))  # minus zero is zero
 
     def __reduce__(self) -> tuple[object, ...]:
         return _rebuild, (type(self), self.to_dict(), self.path)
@@ -423,6 +430,24 @@ class Model(Evaluations, Storable):
     def from_stored(cls, content: Mapping[str, Any]) -> Self:
         """Model from what `to_stored` gave."""
         return cls.from_toml(str(content["toml"]))
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A model of which the structure counts alone: the key of answers that hold whatever the values are.
+
+    Attributes
+    ----------
+    model : Model
+        One of those that differ in values only.
+    structure : str
+    """
+
+    model: Model = field(compare=False)
+    structure: str = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "structure", self.model.structure)
 
 
 def _rebuild(cls: type[Model], content: dict[str, Any], path: str | None) -> Model:

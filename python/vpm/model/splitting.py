@@ -9,10 +9,14 @@ beam that bends is not split; it gets a level of detail that bends.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING
 
 from vpm.model.drives import Actuator, DcMotor
 from vpm.model.messages import Problem, place
 from vpm.model.schema import Document, EffectEntry
+
+if TYPE_CHECKING:
+    from vpm.model.parameters import Parameter
 
 #: Level of a rigid beam that bends: two strain polynomials carry its first mode within 0.1 % (docs/beams.md).
 FLEXED = "strain(2)"
@@ -95,11 +99,11 @@ def splitting_problems(document: Document, names: Mapping[str, str]) -> Iterator
                 )
 
 
-def stop_problems(document: Document, values: Mapping[str, float]) -> Iterator[Problem]:
+def stop_problems(document: Document, parameters: Mapping[str, Parameter]) -> Iterator[Problem]:
     """End stops that leave no way between them."""
     for position, entry in enumerate(document.effects):
         if entry.type == "end_stop":
-            low, high = (values[f"{entry.owner}.end_stop.{end}"] for end in ("low", "high"))
+            low, high = (parameters[f"{entry.owner}.end_stop.{end}"].value for end in ("low", "high"))
             if low >= high:
                 rest = f"is {low:g}, but the upper end is {high:g} (SI); the lower one has to be below"
                 yield Problem(place("effects", position, "low"), rest)

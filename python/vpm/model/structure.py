@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Literal
 
 from vpm.catalogue import JointKind, SiteKind
@@ -126,24 +127,24 @@ class Structure:
     frames: Mapping[str, Frame]
     document: Document
 
-    @property
+    @cached_property
     def joints(self) -> tuple[str, ...]:
         """Joints with one coordinate each; joint k is coordinate k."""
         return tuple(axis.name for axis in self.axes)
 
-    @property
+    @cached_property
     def added(self) -> tuple[str, ...]:
         """Joints that effects have split off; they have neither actuator nor sensor."""
         return tuple(axis.name for axis in self.axes if axis.added)
 
-    @property
+    @cached_property
     def turned(self) -> Mapping[str, str]:
         """Bodies that the last coordinate of their joint turns, with the name of that."""
         own = {axis.joint: axis for axis in self.axes if not axis.added}
         joints = ((joint.child, own[name]) for name, joint in self.document.joints.items() if name in own)
         return {body: axis.name for body, axis in joints if axis.coordinate.kind == "revolute"}
 
-    @property
+    @cached_property
     def deflections(self) -> Mapping[str, str]:
         """Positions of joints that effects would split off, each with the joint it is split from.
 
@@ -153,19 +154,19 @@ class Structure:
         wound = {name_behind(joint): joint for joint in self.sites("joint")}
         return {f"{name}.position": joint for name, joint in (bent | wound).items() if name not in self.joints}
 
-    @property
+    @cached_property
     def horizontal(self) -> tuple[Direction, Direction]:
         """Axes of the world about which gravity can be tilted; it must not be zero."""
         x, y, z = self.document.gravity
         return plane(unit((-x, -y, -z)))
 
-    @property
+    @cached_property
     def welds(self) -> tuple[str, ...]:
         """Bodies whose inertia is fixed to something else, at a constant place."""
         carried = {axis.body for axis in self.axes}
         return tuple(body for body in self.bodies if body not in carried)
 
-    @property
+    @cached_property
     def coordinates(self) -> tuple[str, ...]:
         """Every coordinate: those of the joints, then ``beam.component.number`` of each beam."""
         beams = ((name, self.document.beams[name]) for name in self.beams)
@@ -193,7 +194,11 @@ class Structure:
 
     def joint_kind(self, joint: str) -> JointKind:
         """Kind of a joint with one coordinate."""
-        return self.axes[self.joints.index(joint)].coordinate.kind
+        return self._kinds[joint]
+
+    @cached_property
+    def _kinds(self) -> Mapping[str, JointKind]:
+        return {axis.name: axis.coordinate.kind for axis in self.axes}
 
     def kind_at(self, kind: SiteKind, site: str) -> JointKind | None:
         """Kind of the joint that a site belongs to, or that a transmission is like; None for what belongs to none."""
@@ -234,17 +239,17 @@ class Structure:
             mount = self.frames[self.beams[mount.index]].mount
         return self.joints[mount.index] if mount.kind == "body" else None
 
-    @property
+    @cached_property
     def wires(self) -> tuple[str, ...]:
         """Lines, then transmissions: along what of the core forces act, by their numbers there."""
         return (*self.document.lines, *self.document.transmissions)
 
-    @property
+    @cached_property
     def channels(self) -> tuple[str, ...]:
         """Every channel that a log may hold."""
         return self._listed(ACTUATOR_CHANNELS)
 
-    @property
+    @cached_property
     def outputs(self) -> tuple[str, ...]:
         """Channels that a simulation gives, in the order of the core."""
         return self._listed(ACTUATOR_OUTPUTS)
@@ -279,13 +284,27 @@ class Structure:
         ModelError
             The model has no such channel; the message names near ones.
         """
+        if channel not in self._units:
+            self._units[channel] = self._unit(channel)
+        return self._units[channel]
+
+    @cached_property
+    def _units(self) -> dict[str, str]:
+        """Units that were asked for; not of all channels at once, since one may be wrong while a file is checked."""
+        return {}
+
+    @cached_property
+    def _known_channels(self) -> frozenset[str]:
+        return frozenset(self.channels)
+
+    def _unit(self, channel: str) -> str:
         owner, _, name = channel.partition(".")
         if channel in self.deflections:
             return COORDINATE_UNIT[self.joint_kind(self.deflections[channel])]
-        if channel not in self.channels:
+        if channel not in self._known_channels:
             repair = near_match(channel, self.channels, what="its channels are")
             raise ModelError(f'the model has no channel "{channel}"; {repair}', where=channel)
-        if owner in self.joints:
+        if owner in self._kinds:
             coordinate = COORDINATE_UNIT[self.joint_kind(owner)]
             units = {"position": coordinate, "velocity": f"{coordinate}/s", "acceleration": f"{coordinate}/s^2"}
             return units.get(name, EFFORT_UNIT[self.joint_kind(owner)])

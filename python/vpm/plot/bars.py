@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vpm.numbers import percent, short
 from vpm.plot.style import BLUE, GREEN, INK, LINE, ORANGE, SOFT, panels, styled
 
 if TYPE_CHECKING:
@@ -16,6 +17,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
+
+Candidate = TypeVar("Candidate", bound="CandidateLike")
 
 #: Candidates that are drawn.
 MOST_CANDIDATES = 16
@@ -94,7 +97,7 @@ def plot_parameters(
     error = np.where(np.isfinite(sigma), 1.96 * sigma / scale, 0.0)
     axis.errorbar(value / scale, rows, xerr=error, fmt="o", color=BLUE, capsize=3, markersize=5, label="fit, 95 %")
     for row, (number, spread, unit) in enumerate(zip(value, sigma, units, strict=True)):
-        text = f"{number:.5g} ± {spread:.2g} {unit if unit != '1' else ''}"
+        text = f"{short(number)} ± {spread:.2g} {unit if unit != '1' else ''}"
         axis.annotate(text, (1.01, row), xycoords=("axes fraction", "data"), va="center", fontsize=8.5, color=INK)
     _name_rows(axis, names)
     axis.set_xlabel("value / size of the start")
@@ -118,15 +121,19 @@ def plot_gap(gaps: Mapping[str, GapLike]) -> Figure:
     stages = (("before", SOFT), ("recalibrated", ORANGE), ("after", BLUE))
     largest = 0.0
     for row, gap in enumerate(gaps.values()):
-        signal = gap.signal if gap.signal > 0.0 else 1.0
+        if not gap.signal > 0.0:
+            axis.annotate("no signal", (0.0, row), xytext=(4, 0), textcoords="offset points", va="center", color=SOFT)
+            continue
         for shift, (stage, color) in enumerate(stages):
-            share = 100.0 * float(getattr(gap, stage)) / signal
+            share = 100.0 * float(getattr(gap, stage)) / gap.signal
             largest = max(largest, share)
             place = row + 0.27 * (shift - 1)
             axis.barh(place, share, height=0.24, color=color)
-            axis.annotate(f"{share:.3g} %", (share, place), xytext=(4, 0), textcoords="offset points", va="center")
+            axis.annotate(
+                percent(share / 100.0), (share, place), xytext=(4, 0), textcoords="offset points", va="center"
+            )
         if np.isfinite(gap.noise_floor):
-            floor = 100.0 * gap.noise_floor / signal
+            floor = 100.0 * gap.noise_floor / gap.signal
             axis.plot([floor, floor], [row - 0.42, row + 0.42], "--", color=INK, linewidth=1.1)
     axis.set_xlim(0.0, 1.13 * largest if largest > 0.0 else 1.0)
     _name_rows(axis, list(gaps))
@@ -148,10 +155,7 @@ def plot_candidates(candidates: Sequence[CandidateLike]) -> Figure:
     """
     from matplotlib.patches import Patch
 
-    first = min((c.round for c in candidates), default=1)
-    chosen = [c for c in candidates if c.round == first or c.accepted]
-    chosen.sort(key=lambda c: (not c.accepted, c.round if c.accepted else 0, -np.nan_to_num(c.screened)))
-    chosen = chosen[:MOST_CANDIDATES]
+    chosen = drawn_candidates(candidates)
     figure, axes = panels(1, height=0.5 + 0.36 * max(1, len(chosen)))
     axis = axes[0][0]
     for row, each in enumerate(chosen):
@@ -173,6 +177,14 @@ def plot_candidates(candidates: Sequence[CandidateLike]) -> Figure:
     kinds = {"screened, training data": LINE, "accepted, unseen data": GREEN, "refused, unseen data": ORANGE}
     _legend_above(axis, [Patch(color=color, label=text) for text, color in kinds.items()])
     return figure
+
+
+def drawn_candidates(candidates: Sequence[Candidate]) -> list[Candidate]:
+    """Those that `plot_candidates` draws, from above: accepted ones, then those that promised most."""
+    first = min((c.round for c in candidates), default=1)
+    chosen = [c for c in candidates if c.round == first or c.accepted]
+    chosen.sort(key=lambda c: (not c.accepted, c.round if c.accepted else 0, -np.nan_to_num(c.screened)))
+    return chosen[:MOST_CANDIDATES]
 
 
 @styled

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from vpm.numbers import short
 from vpm.plot.style import BLUE, INK, LINE, ORANGE, SOFT, label, panels, styled
 
 if TYPE_CHECKING:
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 #: Points that a cloud keeps.
-MOST_DOTS = 2500
+MOST_DOTS = 1200
 #: Bins of the line that stands for the law, and share of the law that a line has to explain to stand for it.
 LAW_BINS, LINE_SHARE = 300, 0.97
 #: The band of the noise floor reaches this many times its root mean square: 95 % of normal noise.
@@ -146,6 +147,8 @@ def draw_remaining(axis: Axes, evidence: EvidenceLike) -> None:
 def law_line(values: Array, law: Array) -> tuple[Array, Array, float]:
     """Means of a law in bins with equally many samples, and the share of its square that they explain.
 
+    No bin reaches over zero, where friction steps: its mean would be a level that the law never has.
+
     Parameters
     ----------
     values, law : ndarray, shape (n,)
@@ -158,8 +161,9 @@ def law_line(values: Array, law: Array) -> tuple[Array, Array, float]:
         1 for a law that is a function of ``values``, 0 for one that does not depend on them.
     """
     power = float(law @ law)
-    count = max(1, min(LAW_BINS, values.size // 6))
-    parts = np.array_split(np.arange(values.size), count)
+    sides = np.split(np.arange(values.size), np.searchsorted(values, [0.0]))
+    counts = [max(1, min(LAW_BINS * side.size // values.size, side.size // 6)) for side in sides]
+    parts = [part for side, n in zip(sides, counts, strict=True) if side.size for part in np.array_split(side, n)]
     centers = np.array([values[part].mean() for part in parts])
     means = np.array([law[part].mean() for part in parts])
     rest = float(np.sum((law - np.interp(values, centers, means)) ** 2))
@@ -206,7 +210,7 @@ def _cloud(axis: Axes, values: Array, residual: Array, color: str, name: str, mo
         alpha=0.5,
         markersize=size,
         markeredgewidth=0,
-        rasterized=shown > 1000,
+        rasterized=shown > 60,
         label=name,
     )
 
@@ -219,7 +223,7 @@ def _limits(values: Array, left_out: float = 0.5) -> tuple[float, float]:
 
 
 def _size(residual: Array, unit: str) -> str:
-    return f"{float(np.sqrt(np.mean(residual**2))):.3g} {unit} rms"
+    return f"{short(float(np.sqrt(np.mean(residual**2))))} {unit} rms"
 
 
 def _entries(*axes: Axes) -> tuple[list[Artist], list[str]]:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from vpm.numbers import stretches
 from vpm.plot.style import BLUE, INK, ORANGE, SOFT, STAGES, label, panels, styled, thinned
 
 if TYPE_CHECKING:
@@ -18,8 +19,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-#: Bins of the running mean over a state.
-MEAN_BINS = 40
+#: Bins of the running mean over a state, and samples that one has in the mean where there are fewer bins.
+MEAN_BINS, TYPICAL_IN_BIN = 40, 10
 
 #: Share of the samples that a bin needs before its mean is drawn.
 LEAST_IN_BIN = 0.0005
@@ -165,7 +166,9 @@ def plot_residual_time(time: Array, stages: Mapping[str, Array], unit: str) -> F
 
 
 @styled
-def plot_residual_against(values: Array, stages: Mapping[str, Array], axis_label: str, unit: str) -> Figure:
+def plot_residual_against(
+    values: Array, stages: Mapping[str, Array], axis_label: str, unit: str, velocity: Array | None = None
+) -> Figure:
     """Draw residuals over a state with their running mean: a line that is not zero is physics that is missing.
 
     Parameters
@@ -173,13 +176,16 @@ def plot_residual_against(values: Array, stages: Mapping[str, Array], axis_label
     values : ndarray, shape (N,)
         Velocity or position.
     stages : mapping of str to ndarray, shape (N,)
+        NaN where a sample does not count.
     axis_label : str
         With the unit.
     unit : str
         Of the residual.
+    velocity : ndarray, shape (N,), optional
+        Forward and backward motion have means of their own.
     """
     figure, axes = panels(1, height=3.0)
-    draw_residual_against(axes[0][0], values, stages, axis_label, unit=unit)
+    draw_residual_against(axes[0][0], values, stages, axis_label, unit=unit, velocity=velocity)
     legend_above(axes[0][0], len(stages))
     return figure
 
@@ -191,21 +197,45 @@ def plot_spectrum(signals: Mapping[str, Array], rate: float, unit: str) -> Figur
     Parameters
     ----------
     signals : mapping of str to ndarray, shape (N,)
+        NaN where a sample does not count: no segment reaches over it.
     rate : float
         Hz.
     unit : str
     """
-    from scipy.signal import welch
-
     figure, axes = panels(1, height=2.8)
-    axis = axes[0][0]
+    draw_spectrum(axes[0][0], signals, rate, unit)
+    return figure
+
+
+def draw_spectrum(axis: Axes, signals: Mapping[str, Array], rate: float, unit: str) -> None:
+    """Amplitude spectral densities, see `plot_spectrum`."""
     for (name, values), color in zip(signals.items(), STAGES[2:] + STAGES[:2], strict=False):
-        frequency, power = welch(values, rate, nperseg=min(values.size, max(256, values.size // 8)), detrend="constant")
-        axis.loglog(frequency[1:], np.sqrt(power[1:]), color=color, label=name)
+        frequency, density = amplitude_density(values, rate)
+        axis.loglog(frequency, density, color=color, label=name)
     axis.set_xlabel("frequency [Hz]")
     axis.set_ylabel(label("density", f"{unit}/√Hz"))
     axis.legend(loc="lower left")
-    return figure
+
+
+def amplitude_density(values: Array, rate: float, most: int | None = None) -> tuple[Array, Array]:
+    """Frequencies (Hz) above zero and amplitude density, by Welch's method over stretches without NaN.
+
+    Segments are an eighth of the longest stretch, but at least 256 samples where it has as many, and ``most`` at most.
+    """
+    from scipy.signal import welch
+
+    found = stretches(np.isfinite(values))
+    longest = max((part.stop - part.start for part in found), default=0)
+    length = min(longest, max(256, longest // 8), most or longest)
+    total, weight = np.zeros(length // 2 + 1), 0.0
+    frequency = np.fft.rfftfreq(max(length, 1), 1.0 / rate)
+    for part in found:
+        size = part.stop - part.start
+        if size >= max(length, 2):
+            frequency, power = welch(values[part], rate, nperseg=length, detrend="constant")
+            total, weight = total + size * power, weight + size
+    density: Array = np.sqrt(total[1:] / max(weight, 1.0))
+    return np.asarray(frequency[1:], dtype=np.float64), density
 
 
 @styled
@@ -222,17 +252,25 @@ def plot_correlation(lags: Array, values: Array, band: float, name: str) -> Figu
         What is correlated.
     """
     figure, axes = panels(1, height=2.4)
-    axis = axes[0][0]
-    axis.axhspan(-band, band, color=SOFT, alpha=0.18, linewidth=0, label="95 % if independent")
-    axis.vlines(lags, 0.0, values, color=BLUE, linewidth=1.0)
-    axis.plot(lags, values, "o", color=BLUE, markersize=2.5)
+    draw_correlation(axes[0][0], lags, values, band, name)
+    return figure
+
+
+def draw_correlation(axis: Axes, lags: Array, values: Array, band: float | Array, name: str) -> None:
+    """Correlation over lags with its 95 % band, see `plot_correlation`."""
+    wide = np.broadcast_to(band, lags.shape)
+    axis.fill_between(lags, -wide, wide, color=SOFT, alpha=0.18, linewidth=0, label="95 % if independent")
+    # One line with gaps: as many small ones would be most of a page.
+    ends = np.stack([np.zeros_like(values), values, np.full_like(values, np.nan)], axis=1)
+    axis.plot(np.repeat(lags, 3), ends.ravel(), color=BLUE, linewidth=1.0)
+    if lags.size <= MOST_ENDS:
+        axis.plot(lags, values, "o", color=BLUE, markersize=2.5)
     axis.axhline(0.0, color=INK, linewidth=0.8)
     axis.set_ylim(min(-0.25, 1.1 * float(values.min())), max(0.25, 1.1 * float(values.max())))
     axis.set_xlabel("lag [s]")
     axis.set_ylabel("correlation")
     axis.set_title(name)
     axis.legend(loc="upper right")
-    return figure
 
 
 def draw_overlay(axis: Axes, time: Array, measured: Array | None, simulated: Array, starts: Iterable[int]) -> None:
@@ -260,9 +298,16 @@ def draw_residual_time(axis: Axes, time: Array, stages: Mapping[str, Array], uni
 
 
 def draw_residual_against(
-    axis: Axes, values: Array, stages: Mapping[str, Array], axis_label: str, *, unit: str
+    axis: Axes,
+    values: Array,
+    stages: Mapping[str, Array],
+    axis_label: str,
+    *,
+    unit: str,
+    velocity: Array | None = None,
 ) -> None:
-    """Residuals as pale points over a state, their running means as lines."""
+    """Residuals as pale points over a state, their running means as lines: forward (>) and backward (<) apart."""
+    ways = {"o": np.ones(values.shape, np.bool_)} if velocity is None else {">": velocity > 0.0, "<": velocity < 0.0}
     step = -(-values.size // MOST_DOTS)
     bottom, top = 0.0, 0.0
     for (name, residual), color in zip(stages.items(), _colors(len(stages)), strict=True):
@@ -276,13 +321,15 @@ def draw_residual_against(
             markeredgewidth=0,
             rasterized=True,
         )
-        centers, means = running_mean(values, residual)
-        axis.plot(centers, means, color="white", linewidth=3.4)
-        axis.plot(
-            centers, means, "o-", color=color, linewidth=1.9, markersize=3.2, label=f"{name}, mean" if name else "mean"
-        )
-        low, high = np.percentile(residual, [0.2, 99.8])
-        bottom, top = min(bottom, float(low)), max(top, float(high))
+        title = f"{name}, mean" if name else "mean"
+        for marker, way in ways.items():
+            centers, means = running_mean(values[way], residual[way])
+            axis.plot(centers, means, color="white", linewidth=3.4)
+            axis.plot(centers, means, f"{marker}-", color=color, linewidth=1.9, markersize=3.6, label=title)
+            title = ""
+        if np.isfinite(residual).any():
+            low, high = np.nanpercentile(residual, [0.2, 99.8])
+            bottom, top = min(bottom, float(low)), max(top, float(high))
     if top > bottom:
         axis.set_ylim(bottom - 0.08 * (top - bottom), top + 0.08 * (top - bottom))
     axis.axhline(0.0, color=INK, linewidth=0.7)
@@ -291,21 +338,28 @@ def draw_residual_against(
 
 
 #: Points that a cloud keeps.
-MOST_DOTS = 5000
+MOST_DOTS = 1200
+#: Lags of a correlation beyond which none has a dot at its end.
+MOST_ENDS = 60
 
 
 def running_mean(values: Array, residual: Array) -> tuple[Array, Array]:
-    """Mean residual in 40 bins of a state, where there are enough samples.
+    """Mean residual in up to 40 bins of a state, where there are enough samples; those that are NaN do not count.
 
     Returns
     -------
     centers, means : ndarray, shape (M,)
-        NaN between bins that are not neighbours, so that no line joins them.
+        NaN between bins that are not neighbours, so that no line joins them; nothing without samples.
     """
-    edges = np.linspace(float(values.min()), float(values.max()), MEAN_BINS + 1)
-    place = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, MEAN_BINS - 1)
-    counts = np.bincount(place, minlength=MEAN_BINS)
-    sums = np.bincount(place, weights=residual, minlength=MEAN_BINS)
+    counts = np.isfinite(residual)
+    values, residual = values[counts], residual[counts]
+    if not values.size:
+        return np.zeros(0), np.zeros(0)
+    bins = max(1, min(MEAN_BINS, values.size // TYPICAL_IN_BIN))
+    edges = np.linspace(float(values.min()), float(values.max()), bins + 1)
+    place = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, bins - 1)
+    counts = np.bincount(place, minlength=bins)
+    sums = np.bincount(place, weights=residual, minlength=bins)
     enough = counts >= max(3.0, LEAST_IN_BIN * values.size)
     means = np.where(enough, sums / np.maximum(counts, 1), np.nan)
     return 0.5 * (edges[:-1] + edges[1:]), means

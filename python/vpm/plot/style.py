@@ -6,6 +6,7 @@ import re
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import wraps
+from html import escape
 from io import StringIO
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
@@ -16,7 +17,10 @@ from vpm.errors import MissingExtraError
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
     from matplotlib.figure import Figure
+    from matplotlib.projections.polar import _AxisWrapper
+    from matplotlib.ticker import _DummyAxis
 
 Array = NDArray[np.float64]
 
@@ -44,7 +48,8 @@ _STYLE: Mapping[str, Any] = {
     "axes.titlesize": 10,
     "axes.titlecolor": INK,
     "axes.formatter.limits": (-3, 4),
-    "axes.formatter.use_mathtext": True,
+    "axes.formatter.useoffset": False,
+    "axes.formatter.use_mathtext": False,  # no formula is parsed, so none may be written
     "figure.dpi": 110,
     "figure.facecolor": "white",
     "font.size": 9,
@@ -64,8 +69,12 @@ _STYLE: Mapping[str, Any] = {
     "ytick.labelsize": 8.5,
 }
 
-#: Points that a line keeps; the rest cannot be seen and would only make files large.
-MOST_POINTS = 4000
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+#: Points that a line keeps, two for each of as many strips as a wide picture tells apart: the rest makes files large.
+MOST_POINTS = 1200
+#: Resolution of clouds of points, dots per inch.
+RASTER = 110
 
 
 @contextmanager
@@ -84,9 +93,47 @@ def styled(draw: Callable[P, R]) -> Callable[P, R]:
     @wraps(draw)
     def inner(*args: P.args, **kwargs: P.kwargs) -> R:
         with _style():
-            return draw(*args, **kwargs)
+            from matplotlib.figure import Figure
+
+            result = draw(*args, **kwargs)
+            if isinstance(result, Figure):
+                _write_powers(result)
+            return result
 
     return inner
+
+
+def _write_powers(figure: Figure) -> None:
+    """Powers of ten at logarithmic axes as letters, ``2×10⁻³``: matplotlib writes them as formulas, which stay raw."""
+    from matplotlib.ticker import Formatter, LogFormatterSciNotation
+
+    class Powers(Formatter):
+        def __init__(self, inner: LogFormatterSciNotation, *, between: bool) -> None:
+            self.inner, self.between = inner, between
+
+        def set_axis(self, axis: Axis | _DummyAxis | _AxisWrapper | None) -> None:
+            super().set_axis(axis)
+            self.inner.set_axis(axis)
+
+        def set_locs(self, locs: list[float]) -> None:
+            self.inner.set_locs(locs)
+
+        def __call__(self, x: float, pos: int | None = None) -> str:
+            text = plain_power(self.inner(x, pos))
+            return "" if self.between and "×" in text and text[0] not in "25" else text  # more would overlap
+
+    for axes in figure.axes:
+        for axis in (axes.xaxis, axes.yaxis):
+            if isinstance(major := axis.get_major_formatter(), LogFormatterSciNotation):
+                axis.set_major_formatter(Powers(major, between=False))
+            if isinstance(minor := axis.get_minor_formatter(), LogFormatterSciNotation):
+                axis.set_minor_formatter(Powers(minor, between=True))
+
+
+def plain_power(formula: str) -> str:
+    r"""``2×10⁻³`` from ``$\mathdefault{2\times10^{-3}}$``."""
+    inside = re.sub(r"\$\\mathdefault\{(.*)\}\$", r"\1", formula).replace(r"\times", "×")
+    return re.sub(r"\^\{([^}]*)\}", lambda power: power[1].replace("−", "-").translate(_RAISED), inside)
 
 
 def panels(
@@ -112,27 +159,37 @@ def panels(
 
 
 @styled
-def figure_to_svg(figure: Figure) -> str:
+def figure_to_svg(figure: Figure, words: str = "") -> str:
     """SVG of a figure, as an element to put into an HTML page.
 
-    Figures that are made alike give the same text. Letters are drawn as shapes, so that they look alike everywhere.
+    Figures that are made alike give the same text. Letters are drawn as shapes, so that they look alike everywhere; on
+    a page, where there are words beside them, they are letters, which takes a third of the room.
 
     Parameters
     ----------
     figure : Figure
+    words : str
+        What is to be seen, for those who do not see it.
 
     Returns
     -------
     str
         ``<svg ...> ... </svg>`` without the XML declaration; names inside are told apart from those of other figures.
     """
+    from matplotlib import rc_context
+
     buffer = StringIO()
-    figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
+    nobody = dict.fromkeys(("Date", "Creator", "Format", "Type"))
+    with rc_context({"svg.fonttype": "none"} if words else {}):
+        figure.savefig(buffer, format="svg", metadata=nobody, dpi=RASTER)
     text = buffer.getvalue()
     svg = text[text.index("<svg") :].strip()
+    # A hundredth of a point is a hundredth of what anybody sees.
+    svg = re.sub(r'(?<= )(d|x|y)="[^"]*"', lambda place: re.sub(r"\d+\.\d{3,}", _hundredths, place[0]), svg)
     mark = f"f{_checksum(svg):08x}-"
     svg = re.sub(r'\bid="', f'id="{mark}', svg)
-    return re.sub(r'(url\(#|href="#)', lambda match: match.group(1) + mark, svg)
+    svg = re.sub(r'(url\(#|href="#)', lambda match: match.group(1) + mark, svg)
+    return svg.replace("<svg", f'<svg role="img" aria-label="{escape(words)}"', 1) if words else svg
 
 
 def thinned(time: Array, *columns: Array) -> tuple[Array, ...]:
@@ -142,24 +199,37 @@ def thinned(time: Array, *columns: Array) -> tuple[Array, ...]:
     ----------
     time : ndarray, shape (N,)
     *columns : ndarray, shape (N,)
-        Thinned alike, each stretch at the extremes of each of the columns.
+        Thinned alike, each stretch at the extremes of each of the columns; a gap, NaN, stays one.
     """
     if time.size <= MOST_POINTS or not columns:
         return (time, *columns)
     stretch = -(-2 * len(columns) * time.size // MOST_POINTS)
     whole = time.size // stretch * stretch
-    base = np.arange(0, whole, stretch)
-    picks = []
+    picks = [np.array([0, time.size - 1])]
     for column in columns:
-        blocks = column[:whole].reshape(-1, stretch)
-        picks += [base + np.argmin(blocks, axis=1), base + np.argmax(blocks, axis=1)]
-    keep = np.unique(np.concatenate([*picks, np.arange(whole, time.size)]))
+        picks += [*_extremes(column[:whole], stretch, 0), *_extremes(column[whole:], time.size - whole, whole)]
+    keep = np.unique(np.concatenate(picks))
     return (time[keep], *(column[keep] for column in columns))
+
+
+def _extremes(column: Array, stretch: int, first: int) -> Iterator[NDArray[np.int64]]:
+    """Places of the least and the largest value of each stretch and of its first gap, counted from ``first`` on."""
+    if not column.size:
+        return
+    blocks = column.reshape(-1, stretch)
+    base, gaps = first + stretch * np.arange(len(blocks)), np.isnan(blocks)
+    for sign in (1.0, -1.0):
+        yield base + np.argmin(np.where(gaps, np.inf, sign * blocks), axis=1)
+    yield (base + np.argmax(gaps, axis=1))[gaps.any(axis=1)]
 
 
 def label(quantity: str, unit: str) -> str:
     """``position [m]``; no brackets for a pure number."""
     return f"{quantity} [{unit}]" if unit not in {"", "1"} else quantity
+
+
+def _hundredths(number: re.Match[str]) -> str:
+    return f"{float(number[0]):.2f}".rstrip("0").rstrip(".")
 
 
 def _checksum(text: str) -> int:

@@ -106,7 +106,7 @@ class PictureLike(Protocol):
 
     @property
     def before(self) -> Array:
-        """Residual of the nominal model, shape (N,)."""
+        """Residual of the nominal model, shape (N,); NaN where a sample does not count."""
 
     @property
     def recalibrated(self) -> Array:
@@ -140,7 +140,8 @@ def plot_comparison(comparison: ComparisonLike) -> Figure:
             row[2].remove()
             continue
         name = f"{velocity} [{comparison.state_units[velocity]}]"
-        draw_residual_against(row[2], comparison.state[velocity], {"": each.residual}, name, unit=each.unit)
+        moving = comparison.state[velocity]
+        draw_residual_against(row[2], moving, {"": each.residual}, name, unit=each.unit, velocity=moving)
         row[2].set_title("residual and its mean over velocity")
     title = f"{comparison.model_name} against {comparison.experiment_name}, {comparison.mode.replace('_', ' ')}"
     figure.suptitle(title, fontsize=11, x=0.01, ha="left")
@@ -162,8 +163,11 @@ def plot_pictures(pictures: Sequence[PictureLike]) -> Figure:
         stages = {"before": each.before, "recalibrated": each.recalibrated, "with the effects": each.after}
         draw_residual_time(row[0], each.time, stages, each.unit)
         unit = each.coordinate_unit
-        draw_residual_against(row[1], each.velocity, stages, f"velocity [{unit}/s]", unit=each.unit)
-        draw_residual_against(row[2], each.position, stages, f"position [{unit}]", unit=each.unit)
+        for axis, values, name in (
+            (row[1], each.velocity, f"velocity [{unit}/s]"),
+            (row[2], each.position, f"position [{unit}]"),
+        ):
+            draw_residual_against(axis, values, stages, name, unit=each.unit, velocity=each.velocity)
         row[0].set_title(each.channel)
     if pictures:
         lines, names = axes[0][0].get_legend_handles_labels()

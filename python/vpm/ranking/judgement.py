@@ -46,6 +46,13 @@ class Judgement(Storable):
     alone: float = 0.0
     overtone: bool = False
 
+    @property
+    def words(self) -> str:
+        """``removes 3 % of the error power``, or adds it where the share is negative."""
+        if self.least < 0.0:
+            return f"adds {_percent(-self.least)} to the error power"
+        return f"removes {_percent(self.least)} of the error power"
+
     def counts(self, settings: Settings) -> bool:
         """Whether that is more than chance, and more than what laws are wrong by."""
         return not self.lacks(settings)
@@ -58,10 +65,10 @@ class Judgement(Storable):
     def lacks(self, settings: Settings) -> str:
         """What is missing to that, in words; "" where it counts."""
         if self.least <= settings.worth:
-            return f"it removes {_percent(self.least)} of the error power; {_percent(settings.worth)} are needed"
+            return f"it {self.words}; {_percent(settings.worth)} have to go"
         if self.score <= settings.score:
             return (
-                f"it removes {_percent(self.least)} of the error power, but not from piece after piece: "
+                f"it {self.words}, but not from piece after piece: "
                 f"{self.score:.2g} standard deviations, {settings.score:g} are needed"
             )
         if self.size <= settings.slight:

@@ -4,27 +4,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from importlib.resources import files
-from math import isnan
 from os import PathLike
 from pathlib import Path
 
-import numpy as np
-
-from vpm.catalogue import EFFECTS
-from vpm.catalogue.signature import signature_of
-from vpm.discrepancy import Diagnosis, Evidence
+from vpm.discrepancy import Diagnosis
 from vpm.errors import MissingExtraError
 from vpm.files import write_text
-from vpm.plot import (
-    figure_to_svg,
-    plot_candidates,
-    plot_evidence,
-    plot_gap,
-    plot_residual_against,
-    plot_residual_time,
-)
-from vpm.report.story import VERDICT_WORDS
+from vpm.numbers import percent, short
+from vpm.report.pictures import Drawn, drawn, finding, pictures, within
+from vpm.report.words import VERDICT_WORDS, estimate, last_stage, probability, refitted, step_name, took
 from vpm.simplify import Ladder
+
+#: Characters that the pictures of a page may take together: a page stays below a megabyte.
+ROOM = 850_000
 
 
 @dataclass(frozen=True)
@@ -76,7 +68,7 @@ def render_html(diagnosis: Diagnosis, ladder: Ladder | None = None) -> str:
     Returns
     -------
     str
-        A complete HTML document.
+        A complete HTML document, which is well-formed XML too.
 
     Raises
     ------
@@ -88,55 +80,28 @@ def render_html(diagnosis: Diagnosis, ladder: Ladder | None = None) -> str:
     except ImportError as error:
         raise MissingExtraError("jinja2", "report") from error
     environment = Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
-    environment.filters["percent"] = lambda share: f"{100.0 * share:.2f} %"
-    environment.filters["short"] = lambda value: "–" if isnan(value) else f"{value:.4g}"
+    environment.filters.update(percent=percent, short=short, took=took, probability=probability, step=step_name)
+    environment.globals.update(estimate=estimate)
     template = environment.from_string((files("vpm.report") / "report.html.jinja").read_text(encoding="utf-8"))
-    words = VERDICT_WORDS[diagnosis.verdict]
-    way_down = figure_to_svg(ladder.plot()) if ladder is not None else ""
+    evidence = {(e.effect, e.site): finding(e, n) for n, e in enumerate(diagnosis.evidence, 1)}
+    shown, left_out = within(ROOM - sum(len(one.svg) for one in evidence.values()), pictures(diagnosis))
     return template.render(
         d=diagnosis,
-        words=words,
-        evidence=_evidence(diagnosis),
-        figures=_figures(diagnosis),
+        words=VERDICT_WORDS[diagnosis.verdict],
+        evidence=evidence,
+        pictures=shown,
+        left_out=left_out,
+        refitted=refitted(diagnosis),
+        last_stage=last_stage(diagnosis),
         ladder=ladder,
-        way_down=way_down,
+        way_down=_way_down(ladder) if ladder is not None else None,
     )
 
 
-def _evidence(diagnosis: Diagnosis) -> dict[tuple[str, str], tuple[str, str]]:
-    """Picture and caption of each finding, by effect and site."""
-    return {(e.effect, e.site): (figure_to_svg(plot_evidence(e)), _caption(e)) for e in diagnosis.evidence}
-
-
-def _caption(evidence: Evidence) -> str:
-    """What is to be seen, what is drawn, and what it is not."""
-    entry = EFFECTS.get(evidence.effect)
-    looks = (entry.signature if entry is not None else signature_of(evidence.effect)).looks
-    law = f" {entry.law}" if entry is not None else ""
-    unit = evidence.unit
-    before, after = (float(np.sqrt(np.mean(r**2))) for r in (evidence.without, evidence.repaired))
-    floor = "" if isnan(evidence.noise_floor) else f"; noise alone leaves {evidence.noise_floor:.3g} {unit}"
-    return (
-        f"{evidence.effect} at {evidence.site} on {evidence.record}, which was never fitted. What it looks like: "
-        f"{looks[0].lower()}{looks[1:]}. Points: residual of {evidence.channel} at the retained samples, without the "
-        f"effect (all other parameters as fitted with it) and with it. Black: the fitted law{law}. Root mean square "
-        f"{before:.3g} {unit} without it, {after:.3g} {unit} with it{floor}."
+def _way_down(ladder: Ladder) -> Drawn:
+    chosen = ladder.chosen
+    words = (
+        f"Error against the time of a step for {len(ladder.rungs)} models; the chosen one has an error of "
+        f"{percent(chosen.error)} at {short(1e6 * chosen.seconds)} µs."
     )
-
-
-def _figures(diagnosis: Diagnosis) -> list[tuple[str, str]]:
-    """Captions and SVG pictures."""
-    pictures = [("Gap on unseen data at each stage, relative to the measured signal", plot_gap(diagnosis.gap))]
-    for p in diagnosis.pictures:
-        stages = {"recalibrated": p.recalibrated, "with the accepted effects": p.after}
-        name = f"{p.channel}, first unseen record"
-        pictures.append((f"{name}: residual over time", plot_residual_time(p.time, stages, p.unit)))
-        for axis, values, unit in (
-            ("velocity", p.velocity, f"{p.coordinate_unit}/s"),
-            ("position", p.position, p.coordinate_unit),
-        ):
-            figure = plot_residual_against(values, stages, f"{axis} [{unit}]", p.unit)
-            pictures.append((f"{name}: residual against {axis}", figure))
-    if diagnosis.candidates:
-        pictures.append(("Candidates: what each would explain", plot_candidates(diagnosis.candidates)))
-    return [(caption, figure_to_svg(figure)) for caption, figure in pictures]
+    return drawn("picture-ladder", "The way down", "Error against the time of a step", words, ladder.plot())

@@ -2,20 +2,14 @@
 
 from __future__ import annotations
 
-from math import isnan
 from typing import TYPE_CHECKING
 
-from vpm.discrepancy import AcceptedEffect, ChannelGap, Diagnosis, Step
+from vpm.discrepancy import ChannelGap, Diagnosis
+from vpm.numbers import percent, short
+from vpm.report.words import VERDICT_WORDS, estimate, probability, step_name, took
 
 if TYPE_CHECKING:
     from rich.console import Console
-
-VERDICT_WORDS = {
-    "effect_found": "An effect is missing in the model, and the data name it.",
-    "parameters_only": "Nothing is missing: the known parameters only had other values.",
-    "no_disagreement": "Model and data agree.",
-    "unexplained": "Something is missing, and no effect of the catalogue explains it.",
-}
 
 
 def print_story(diagnosis: Diagnosis, console: Console) -> None:
@@ -42,27 +36,18 @@ def _verdict(d: Diagnosis) -> list[str]:
 
 
 def _effects(d: Diagnosis) -> list[str]:
-    lines = ["effects, in the order of acceptance:"] if d.effects else []
+    lines = [f"effects, {d.order}:"] if d.effects else []
     for number, effect in enumerate(d.effects, 1):
-        lines.append(
-            f"  {number}. {effect.name} at {effect.site}: took {100 * effect.gain:.1f} % of the unseen mean square "
-            f"({effect.score:.1f} standard deviations)"
-        )
-        if not isnan(effect.evidence_nats):
-            lines.append(f"       evidence {effect.evidence_nats:.4g} nats, probability {_probability(effect)}")
-        lines += [f"       {p.dotted} = {p.value:.5g} {_spread(p.std)}{p.unit}" for p in effect.parameters]
+        lines.append(f"  {number}. {effect.name} at {effect.site}: {took(effect)}")
+        lines += [f"       {text}" for text in (probability(effect),) if text]
+        lines += [f"       {p.dotted} = {estimate(p.value, p.std, p.unit)}" for p in effect.parameters]
         lines += [f"       {note}" for note in effect.notes]
     return lines
 
 
-def _probability(effect: AcceptedEffect) -> str:
-    own, whole = effect.probability, effect.class_probability
-    return f"{own:.2f}, {whole:.2f} with what is not told from it" if whole > own else f"{own:.2f}"
-
-
 def _steps(d: Diagnosis) -> list[str]:
-    rows = [f"  {_step_name(step):44s} {100 * step.unseen_error:6.2f} %" for step in d.steps]
-    return ["error on unseen data, step by step (share of the measured effort):", *rows]
+    rows = [f"  {step_name(step):44s} {percent(step.unseen_error):>10s}" for step in d.steps]
+    return ["error on unseen data, in the order in which the model changed (share of the measured effort):", *rows]
 
 
 def _gaps(d: Diagnosis) -> list[str]:
@@ -99,22 +84,13 @@ def _notes(d: Diagnosis) -> list[str]:
     return [*(f"note: {note}" for note in d.notes), f"took {d.seconds:.1f} s"]
 
 
-def _step_name(step: Step) -> str:
-    signs = {"recalibrated": "recalibrated parameters", "added": "+ ", "removed": "- "}
-    return signs[step.change] + (f"{step.effect} at {step.site}" if step.effect else "")
-
-
-def _spread(std: float) -> str:
-    return f"± {std:.2g} " if std > 0.0 else "(held) "
-
-
 def _cell(value: float, width: int = 11) -> str:
-    return f"{value:>{width}.4g}"
+    return f"{short(value):>{width}s}"
 
 
 def _share(value: float, gap: ChannelGap, width: int = 11) -> str:
-    return f"{100 * value / gap.signal:>{width - 2}.3g} %" if gap.signal > 0.0 else " " * width
+    return f"{percent(gap.share(value)):>{width}s}"
 
 
 def _floor(gap: ChannelGap) -> str:
-    return f"{'-':>12s}" if isnan(gap.noise_floor) else f"{gap.noise_floor:>12.4g}"
+    return _cell(gap.noise_floor, 12)

@@ -1,0 +1,112 @@
+"""Where a diagnosis comes from: program, files with their checksums, and the settings that are not the usual ones."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
+from datetime import UTC, datetime
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+from vpm.experiment import Experiment
+from vpm.model import Model
+from vpm.results import Storable
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class Source(Storable):
+    """Something that was read.
+
+    Attributes
+    ----------
+    role : {"model", "fitted", "unseen"}
+    name : str
+    path : str
+        File; empty for what was made in a program.
+    sha256 : str
+        Of the file, or of the text or the numbers of what was made in a program.
+    """
+
+    role: str
+    name: str
+    path: str
+    sha256: str
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class Provenance(Storable):
+    """What a diagnosis was made by and of.
+
+    Attributes
+    ----------
+    version : str
+        Of vpm.
+    date : str
+        When it ended, UTC.
+    command : str
+    sources : tuple of Source
+    settings : dict of str to str
+        Those that differ from their defaults.
+    """
+
+    version: str
+    date: str
+    command: str
+    sources: tuple[Source, ...]
+    settings: dict[str, str]
+
+    def to_dict(self) -> dict[str, object]:
+        """Plain text."""
+        return {**self.to_stored(), "sources": [dict(source.to_stored()) for source in self.sources]}
+
+
+def provenance(
+    model: Model,
+    fitted: Sequence[Experiment],
+    unseen: Sequence[Experiment],
+    command: str,
+    settings: Mapping[str, tuple[object, object]],
+) -> Provenance:
+    """Provenance of what is done now.
+
+    Parameters
+    ----------
+    model : Model
+    fitted, unseen : sequence of Experiment
+    command : str
+    settings : mapping of str to (object, object)
+        Value and default of each.
+    """
+    text = model.to_toml().encode()
+    sources = [Source("model", model.name, model.path or "", _checksum(model.path, text))]
+    for role, records in (("fitted", fitted), ("unseen", unseen)):
+        sources += [Source(role, e.name, e.path or "", _checksum(e.path, _numbers(e))) for e in records]
+    told = {name: repr(value) for name, (value, default) in settings.items() if value != default}
+    return Provenance(_version(), f"{datetime.now(UTC):%Y-%m-%d %H:%M:%S} UTC", command, tuple(sources), told)
+
+
+def own_settings(given: object, name: str) -> dict[str, tuple[object, object]]:
+    """Fields of a settings dataclass with their defaults, for `provenance`."""
+    usual = type(given)()
+    return {f"{name}.{f.name}": (getattr(given, f.name), getattr(usual, f.name)) for f in fields(given)}  # type: ignore[arg-type]
+
+
+def _checksum(path: str | None, otherwise: bytes) -> str:
+    """Of a file; of ``otherwise`` where there is none, or none any more."""
+    try:
+        content = otherwise if path is None else Path(path).read_bytes()
+    except OSError:
+        content = otherwise
+    return hashlib.sha256(content).hexdigest()
+
+
+def _numbers(record: Experiment) -> bytes:
+    return record.time.tobytes() + record.data.tobytes()
+
+
+def _version() -> str:
+    try:
+        return version("vpm-dynamics")
+    except PackageNotFoundError:
+        return "unknown"

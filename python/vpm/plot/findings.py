@@ -1,0 +1,192 @@
+"""Pictures of a diagnosis: measured and simulated, residuals of one joint, correlation of what was fitted."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vpm.plot.signals import (
+    amplitude_density,
+    draw_correlation,
+    draw_residual_against,
+    draw_residual_time,
+    legend_above,
+)
+from vpm.plot.style import BLUE, INK, ORANGE, SOFT, label, panels, styled, thinned
+from vpm.plot.summaries import PictureLike
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Array = NDArray[np.float64]
+
+#: Samples of a segment of a spectrum: a picture shows no finer lines; and points that are few enough to have a mark.
+MOST_IN_SEGMENT, FEW = 2048, 40
+#: Parameters beyond which a matrix of correlations shows no numbers in its fields.
+MOST_NUMBERS = 14
+
+
+class TraceLike(Protocol):
+    """One channel of a record, measured and simulated."""
+
+    @property
+    def channel(self) -> str:
+        """Name."""
+
+    @property
+    def unit(self) -> str:
+        """Its unit."""
+
+    @property
+    def time(self) -> Array:
+        """Shape (n,), s."""
+
+    @property
+    def measured(self) -> Array:
+        """Shape (n,)."""
+
+    @property
+    def before(self) -> Array:
+        """Simulated by the nominal model; NaN where it does not count."""
+
+    @property
+    def after(self) -> Array:
+        """Simulated by the repaired model; NaN where it does not count."""
+
+
+class MeasuredLike(PictureLike, Protocol):
+    """Residuals of one joint with the measured effort."""
+
+    @property
+    def measured(self) -> Array:
+        """Effort of the actuators, shape (n,)."""
+
+
+@styled
+def plot_traces(traces: Sequence[TraceLike]) -> Figure:
+    """Draw channels over time: measured pale and broad, simulated before and after on it.
+
+    Parameters
+    ----------
+    traces : sequence of Trace
+    """
+    figure, axes = panels(max(1, len(traces)), height=2.1, share_x=True)
+    for row, trace in zip(axes, traces, strict=False):
+        axis = row[0]
+        time, measured, before, after = thinned(trace.time, trace.measured, trace.before, trace.after)
+        axis.plot(time, measured, color=SOFT, alpha=0.5, linewidth=3.2, label="measured")
+        axis.plot(time, before, color=ORANGE, linewidth=1.0, linestyle="--", label="simulated before")
+        axis.plot(time, after, color=BLUE, linewidth=1.0, label="simulated after")
+        axis.set_ylabel(label(trace.channel, trace.unit))
+        axis.margins(x=0.01)
+    legend_above(axes[0][0], 3, right=True)
+    axes[-1][0].set_xlabel("time [s]")
+    return figure
+
+
+@styled
+def plot_joint_over_time(picture: MeasuredLike, stages: Mapping[str, Array]) -> Figure:
+    """Draw the effort of a joint, measured and as each stage needs it, and below it the residual of each stage.
+
+    Parameters
+    ----------
+    picture : Picture
+    stages : mapping of str to ndarray, shape (n,)
+        Residuals; NaN, where a sample does not count, leaves a gap.
+    """
+    figure, axes = panels(2, height=2.2, share_x=True)
+    above, below = axes[0][0], axes[1][0]
+    time, measured = thinned(picture.time, picture.measured)
+    above.plot(time, measured, color=SOFT, alpha=0.5, linewidth=3.2, label="measured")
+    last = list(stages)[-1]
+    for name, residual in stages.items():
+        time, needed = thinned(picture.time, picture.measured - residual)
+        color, line = (BLUE, "-") if name == last else (ORANGE, "--")
+        above.plot(time, needed, color=color, linestyle=line, linewidth=1.0, label=f"needed, {name}")
+    above.set_ylabel(label(picture.channel, picture.unit))
+    legend_above(above, 3, right=True)
+    draw_residual_time(below, picture.time, stages, picture.unit)
+    return figure
+
+
+@styled
+def plot_joint_over_state(picture: PictureLike, stages: Mapping[str, Array]) -> Figure:
+    """Draw the residual of a joint against velocity and position; forward and backward have means of their own.
+
+    Parameters
+    ----------
+    picture : Picture
+    stages : mapping of str to ndarray, shape (n,)
+    """
+    figure, axes = panels(1, 2, height=3.2, width=11.0)
+    unit = picture.coordinate_unit
+    for axis, values, name in zip(
+        axes[0],
+        (picture.velocity, picture.position),
+        (f"velocity [{unit}/s]", f"position [{unit}]"),
+        strict=True,
+    ):
+        draw_residual_against(axis, values, stages, name, unit=picture.unit, velocity=picture.velocity)
+    lines, names = axes[0][0].get_legend_handles_labels()
+    figure.legend(lines, names, loc="outside upper left", ncols=2, title="> forward, < backward", alignment="left")
+    return figure
+
+
+@styled
+def plot_joint_noise(
+    stages: Mapping[str, Array], correlation: tuple[Array, Array, Array], rate: float, unit: str
+) -> Figure:
+    """Draw what is left: correlation of the last stage with its own past and its 95 % band, and spectra of all stages.
+
+    Parameters
+    ----------
+    stages : mapping of str to ndarray, shape (n,)
+        NaN where a sample does not count.
+    correlation : (ndarray, ndarray, ndarray)
+        Lags in s, values, and half the width of the band at each.
+    rate : float
+        Hz.
+    unit : str
+        Of the residual.
+    """
+    figure, axes = panels(1, 2, height=3.0, width=11.0)
+    draw_correlation(axes[0][0], *correlation, "correlation with its own past")
+    right = axes[0][1]
+    for (name, values), color in zip(stages.items(), (ORANGE, BLUE)[-len(stages) :], strict=True):
+        frequency, density = amplitude_density(values, rate, MOST_IN_SEGMENT)
+        there = density > 0.0
+        if there.any():
+            mark = ".-" if frequency.size < FEW else "-"
+            right.loglog(frequency[there], density[there], mark, color=color, label=name)
+    right.set_xlabel("frequency [Hz]")
+    right.set_ylabel(label("density", f"{unit}/√Hz"))
+    legend_above(right, 2, right=True)
+    return figure
+
+
+@styled
+def plot_parameter_correlation(names: Sequence[str], correlation: Array) -> Figure:
+    """Draw the correlation matrix of fitted parameters, with its numbers where there is room.
+
+    Parameters
+    ----------
+    names : sequence of str
+    correlation : ndarray, shape (p, p)
+    """
+    figure, axes = panels(1, height=0.8 + 0.34 * len(names), width=min(11.0, 4.4 + 0.55 * len(names)))
+    axis = axes[0][0]
+    shown = axis.imshow(correlation, cmap="RdBu_r", vmin=-1.0, vmax=1.0, aspect="auto")
+    if len(names) <= MOST_NUMBERS:
+        for row, values in enumerate(correlation):
+            for column, value in enumerate(values):
+                color = "white" if abs(value) > 0.6 else INK
+                axis.text(column, row, f"{value:.2f}", ha="center", va="center", fontsize=8, color=color)
+    axis.set_yticks(range(len(names)), names)
+    axis.set_xticks(range(len(names)), [str(number) for number in range(1, len(names) + 1)])
+    axis.set_yticklabels([f"{name}  {number}" for number, name in enumerate(names, 1)])
+    axis.grid(visible=False)
+    figure.colorbar(shown, ax=axis, label="correlation")
+    return figure
