@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from scipy.linalg import expm
 from typer.testing import CliRunner
 
+from test_ball_joints import top
 from test_frictions import geared
 from test_sides import rubbing_on_both_sides
 from vpm import Model, Simulation
@@ -473,3 +474,14 @@ def test_what_cannot_be_is_refused_in_one_sentence(emps: Model) -> None:
         }
     )
     assert "no rates in continuous time" in refused(lambda: c_source(sampled))
+
+
+@WITHOUT_COMPILER
+def test_rates_of_a_ball_joint_at_its_singularity_are_no_numbers(tmp_path: Path) -> None:
+    model = top()
+    library = Library(c_source(model, name="m"), tmp_path)
+    for angle in (0.3, np.pi / 2 - 1e-3, np.pi / 2 - 1e-5, np.pi / 2):
+        state, rates = np.array([0.1, angle, 0.2, 1.0, 2.0, 3.0]), np.zeros(6)
+        library.call("evaluate_rates", state, np.zeros(1), library.constants(), library.work, rates)
+        assert np.isfinite(rates).all() == (angle < np.pi / 2 - 1e-4)
+        assert np.isnan(rates).all() == (angle > np.pi / 2 - 1e-4)

@@ -2,6 +2,7 @@
 //!
 //! The same description is built over any number type: values, or values with exact derivatives with respect to the parameters.
 
+mod balls;
 mod check;
 mod connections;
 mod controllers;
@@ -22,6 +23,7 @@ pub use tree_effects::TreeEffect;
 
 use crate::actuator::hydraulic::Supply;
 use crate::actuator::{Actuator, Drive, Target};
+use crate::ball::Ball;
 use crate::beam::BeamEntry;
 use crate::body::{Body, PointMass, Weld};
 use crate::bushing::BushingEntry;
@@ -98,12 +100,18 @@ pub struct Description {
     /// Load cells.
     #[serde(default)]
     pub load_cells: Vec<LoadCell>,
+    /// Joints of three angles.
+    #[serde(default)]
+    pub balls: Vec<Ball>,
     /// Number of elastic coordinates of each beam, known once the beams are built.
     #[serde(skip)]
     elastic: Vec<usize>,
     /// What of the machine was recorded.
     #[serde(skip)]
     recorded: Cache,
+    /// The same of the machine whose ball joints turn freely.
+    #[serde(skip)]
+    turned: Cache,
 }
 
 impl Description {
@@ -198,6 +206,7 @@ impl Description {
             contacts: self.contacts.len(),
             bushings: self.bushings.len(),
             load_cells: self.load_cells.len(),
+            balls: self.balls.len(),
         }
     }
 
@@ -219,7 +228,7 @@ impl Description {
     pub fn system<S: Scalar>(&self, theta: &[S]) -> Result<System<S>> {
         let values: Vec<f64> = theta.iter().map(Scalar::inspect).collect();
         self.check_values(&values)?;
-        System::new(self.machine(theta, &values)?)
+        Ok(System::new(self.machine(theta, &values)?)?.with_balls(self.balls.iter().map(|ball| (ball, false))))
     }
 
     /// What somebody needs who runs the machine with the checked parameters `theta`, of these `values`.
@@ -330,7 +339,7 @@ impl Build for &Description {
         let model = self.model(theta)?;
         let connections = self.connections(theta, &model)?;
         let machine = Dynamics::new(model, effects, actuators, supplies).connected(connections);
-        Ok(machine.remembering(self.memories_of(theta)))
+        Ok(machine.remembering(self.memories_of(theta)).with_balls(self.balls.clone()))
     }
 
     fn sensors<S: Scalar>(&self, theta: &[S]) -> Vec<Sensor<S>> {
@@ -354,6 +363,14 @@ impl EffectEntry {
         match self {
             Self::Joint { seat, .. } | Self::Memory { seat, .. } => Some(seat),
             Self::Payload { .. } | Self::Tree(_) => None,
+        }
+    }
+
+    /// The joint with which the rotor turns that it adds, if it is such an effect.
+    fn rotor(&self) -> Option<usize> {
+        match self {
+            Self::Tree(TreeEffect::RotorInertia { joint, .. }) => Some(*joint),
+            _ => None,
         }
     }
 

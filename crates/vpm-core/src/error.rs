@@ -332,6 +332,17 @@ pub enum Error {
         /// The name given.
         name: String,
     },
+    /// A ball joint whose angles are no coordinates.
+    #[error(
+        "joint `{joint}` is at the singularity of its angles: the second is {angle:.4} degrees, where their accelerations have no bound; \
+         take a state away from 90 degrees, or turn the frame of the joint"
+    )]
+    Angles {
+        /// Name of the joint.
+        joint: String,
+        /// Its second angle, degrees.
+        angle: f64,
+    },
     /// The caller asked to stop.
     #[error("the computation was interrupted; start it again to get its result")]
     Interrupted,

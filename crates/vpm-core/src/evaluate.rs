@@ -1,5 +1,6 @@
 //! A machine in a single state: accelerations, mass matrix, energy, rest, vibrations, Jacobians.
 
+use crate::ball::check_angles;
 use crate::description::Description;
 use crate::error::{Error, Result};
 use crate::statics::Statics;
@@ -16,6 +17,7 @@ pub fn accelerations(
 ) -> Result<Vec<f64>> {
     Table::vector("effort", effort, description.n_joints(), "joint")?;
     let mut dynamics = prepare(description, theta, [("position", position), ("velocity", velocity)])?;
+    check_angles(&description.balls, position)?;
     Ok(dynamics.accelerations(position, velocity, effort).to_vec())
 }
 

@@ -5,6 +5,7 @@
 
 pub mod actuator;
 pub mod algebra;
+pub mod ball;
 pub mod beam;
 pub mod body;
 pub mod bushing;

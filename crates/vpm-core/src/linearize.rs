@@ -1,5 +1,6 @@
 //! The linear machine near a state: exact derivatives of its rates and outputs.
 
+use crate::ball::check_angles;
 use crate::description::Description;
 use crate::error::{Error, Result};
 use crate::scalar::Dual;
@@ -42,6 +43,7 @@ pub fn linearize(description: &Description, theta: &[f64], state: &[f64], inputs
     description.refuse_sampled(NO_LINEAR_MODEL, "linearise the machine with an ideal drive in its place")?;
     check_state("state", description, state)?;
     Table::vector("inputs", inputs, description.n_inputs(), "actuator and logged supply")?;
+    check_angles(&description.balls, state)?;
     let mut tangent = Tangent::new(description, theta)?;
     let (nx, nu, ny) = (state.len(), inputs.len(), description.n_outputs());
     let zeros = |rows: usize, columns: usize| vec![0.0; rows * columns];

@@ -8,7 +8,7 @@ use crate::integrator::Integrator;
 use crate::ode::Ode;
 use crate::sensor::Sensor;
 use crate::simulate::{
-    SampledDrives, Stepping, check_pistons, check_state, check_step, halted, output_name, state_name,
+    SampledDrives, Stepping, check_pistons, check_state, check_step, halted, output_name, state_name, trouble_in_words,
 };
 use crate::system::System;
 use crate::table::Table;
@@ -31,6 +31,9 @@ pub struct Live {
     integrator: Integrator<f64>,
     sensors: Vec<Sensor<f64>>,
     sampled: SampledDrives,
+    /// The state in the coordinates of the steps.
+    local: Vec<f64>,
+    /// The same as users know it.
     state: Vec<f64>,
     rate: Vec<f64>,
     outputs: Vec<f64>,
@@ -46,7 +49,7 @@ impl Live {
     pub fn new(description: Arc<Description>, theta: &[f64], state: &[f64], stepping: Stepping) -> Result<Self> {
         check_state("state", &description, state)?;
         check_step(&description, theta, stepping, state)?;
-        let mut system: System<f64> = description.system(theta)?;
+        let mut system: System<f64> = description.stepped(theta)?;
         system.make_for(stepping.method)?;
         let (dim, sensors) = (system.dim(), description.sensors(theta));
         let depth = depth(&description, theta, stepping.time_step)?;
@@ -58,6 +61,7 @@ impl Live {
             integrator: Integrator::new(stepping.method, dim),
             sensors,
             sampled: SampledDrives::new(&description, stepping.time_step)?,
+            local: vec![0.0; dim],
             state: vec![0.0; dim],
             rate: vec![0.0; dim],
             outputs: vec![0.0; outputs],
@@ -120,10 +124,16 @@ impl Live {
 
     /// Begins again in `state` at time zero, with no command and nothing remembered.
     pub fn reset(&mut self, state: &[f64]) -> Result<()> {
+        check_state("state", &self.description, state)?;
+        let mut start = state.to_vec();
+        self.system.enter(&mut start);
         let Self { description, theta, system, .. } = self;
-        check_state("state", description, state)?;
-        check_pistons(description, theta, system.dynamics(), state)?;
-        self.state.copy_from_slice(state);
+        if let Err(error) = check_pistons(description, theta, system.dynamics(), &start) {
+            self.local.copy_from_slice(&self.state);
+            self.system.enter(&mut self.local);
+            return Err(error);
+        }
+        self.local = start;
         self.sample = 0;
         self.integrator.reset();
         self.commands.fill(0.0);
@@ -154,7 +164,7 @@ impl Live {
         self.hold()?;
         let (pieces, sample) = ((self.stepping.time_step, self.stepping.substeps), self.sample);
         self.integrator
-            .advance(&mut self.system, &mut self.state, pieces, &|| false)
+            .advance(&mut self.system, &mut self.local, pieces, &|| false)
             .map_err(|halt| halted(&self.description, self.stepping, sample, halt, (Vec::new(), Vec::new())))?;
         self.sample += 1;
         self.observe()?;
@@ -178,8 +188,8 @@ impl Live {
 
     /// As [`Live::hold`] before the first command.
     fn rest(&mut self) {
-        if !self.sampled.is_empty() && self.state.iter().all(|number| number.is_finite()) {
-            let (state, width) = (&self.state, self.outputs.len());
+        if !self.sampled.is_empty() && self.local.iter().all(|number| number.is_finite()) {
+            let (state, width) = (&self.local, self.outputs.len());
             self.system.observe_motion(state, &mut self.truth[..width]);
         }
         for number in 0..self.description.n_inputs() {
@@ -198,13 +208,18 @@ impl Live {
     }
 
     fn observe(&mut self) -> Result<()> {
-        if let Some(place) = self.state.iter().position(|state| !state.is_finite()) {
+        self.system.show(&self.local, &mut self.state);
+        if let Some(place) = self.local.iter().position(|state| !state.is_finite()) {
             return Err(self.diverged(&state_name(&self.description, place)));
+        }
+        if let Some(trouble) = self.system.trouble() {
+            let (what, event, repair) = trouble_in_words(&self.description, trouble);
+            return Err(self.lost(what, event, repair));
         }
         let (layout, width) = (self.description.layout(), self.outputs.len());
         let row = self.sample % self.depth * width;
         let truth = &mut self.truth[row..row + width];
-        self.system.sample(&self.state, &mut self.rate, truth);
+        self.system.sample(&self.local, &mut self.rate, truth);
         // The command that is still held at the end of its interval; none before the first.
         let held = self.sample.saturating_sub(1) % self.depth * self.description.n_inputs();
         let channels = self.truth[row + layout.actuators()..row + layout.lines()].chunks_exact_mut(2);
@@ -226,14 +241,20 @@ impl Live {
 
     #[cold]
     fn diverged(&self, what: &str) -> Error {
+        let repair = "reset the simulation and use more substeps, the integrator linearly_implicit or adaptive, or smaller commands";
+        self.lost(format!("the {what}"), Diverged::NOT_FINITE.to_owned(), repair)
+    }
+
+    #[cold]
+    fn lost(&self, what: String, event: String, repair: &'static str) -> Error {
         Error::Diverged(Box::new(Diverged {
-            what: format!("the {what}"),
-            event: Diverged::NOT_FINITE.to_owned(),
+            what,
+            event,
             time: self.time(),
             sample_index: self.sample,
             method: self.stepping.method.to_string(),
             step: self.stepping.step(),
-            repair: "reset the simulation and use more substeps, the integrator linearly_implicit or adaptive, or smaller commands",
+            repair,
             outputs: Vec::new(),
             states: Vec::new(),
         }))

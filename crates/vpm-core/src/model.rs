@@ -18,7 +18,7 @@ use crate::error::Result;
 use crate::joint::{Joint, JointKind};
 use crate::line::LinePart;
 use crate::scalar::Scalar;
-use crate::spatial::{Matrix3, Pose, SpatialInertia, Vector3};
+use crate::spatial::{Matrix3, Pose, Quaternion, SpatialInertia, Vector3};
 use crate::transmission::Ratio;
 
 /// A tree of rigid bodies and beams. Joint `k` carries body `k`; the coordinates are those of the joints, then the elastic ones of
@@ -55,6 +55,8 @@ pub struct Model<S> {
     /// The block of the mass matrix that each coordinate is in.
     blocks: Vec<usize>,
     couples: bool,
+    /// Joints that begin at an orientation held beside the coordinates, with that.
+    turned: Vec<(usize, Quaternion<S>)>,
 }
 
 /// A node of the tree, which comes after all that it hangs on.
@@ -78,6 +80,8 @@ pub(crate) struct Link<S> {
     pub(crate) inertia: SpatialInertia<S>,
     /// Inertia of the rotor, which feels the joint's acceleration alone.
     pub(crate) rotor: S,
+    /// Of a screw alone: a rotation before its own, in aligned axes.
+    turn: Option<Quaternion<S>>,
 }
 
 /// What a user sees of one body: its own frame, as described.
@@ -346,6 +350,43 @@ impl<S: Scalar> Model<S> {
     }
 }
 
+impl<S: Scalar> Model<S> {
+    /// Lets the joint `k`, which turns, begin at an orientation that is held beside the coordinates; at first there is none.
+    ///
+    /// It becomes a screw without pitch: the same motion, out of the way of the joints that are in almost every machine.
+    pub(crate) fn turn_freely(&mut self, k: usize) {
+        self.links[k].kind = JointKind::Helical { pitch: 0.0 };
+        self.turned.push((k, Quaternion::identity()));
+        self.orient(4 * self.turned.len() - 4, S::one());
+    }
+
+    /// The orientation from which a joint begins.
+    pub(crate) fn orientation(&self, k: usize) -> Quaternion<S> {
+        let own = self.turned.iter().find(|(joint, _)| *joint == k);
+        own.map_or(Quaternion::identity(), |(_, orientation)| *orientation)
+    }
+
+    /// How many numbers [`Model::orient`] takes.
+    #[inline]
+    pub(crate) fn n_orientations(&self) -> usize {
+        4 * self.turned.len()
+    }
+
+    /// Holds a number of an orientation from which a joint begins: w, x, y, z of each unit quaternion.
+    pub(crate) fn orient(&mut self, place: usize, number: S) {
+        let (link, turn) = &mut self.turned[place / 4];
+        let Quaternion { real, vector } = turn;
+        match place % 4 {
+            0 => *real = number,
+            1 => vector.x = number,
+            2 => vector.y = number,
+            _ => vector.z = number,
+        }
+        let aligned = lift(self.frames[*link].joint.alignment()).transpose_mul(turn.vector);
+        self.links[*link].turn = Some(Quaternion { real: turn.real, vector: aligned });
+    }
+}
+
 impl<S: Scalar> Wire<S> {
     /// Whether it weighs anything.
     #[inline]
@@ -372,6 +413,7 @@ impl<S: Scalar> Link<S> {
             translation: parent_alignment.transpose_mul(frame.translation),
             inertia: to_aligned.inertia(inertia),
             rotor,
+            turn: None,
         }
     }
 
@@ -390,6 +432,12 @@ impl<S: Scalar> Link<S> {
     /// The pose of a screw; out of the way of the other two kinds, which are in almost every machine.
     #[cold]
     fn screwed(&self, q: S, pitch: f64) -> Pose<S> {
+        if let Some(turn) = self.turn {
+            let [x, y, z] = (lift(self.rotation) * turn.rotation()).columns;
+            let (sine, cosine) = q.sin_cos();
+            let rotation = Matrix3::from_columns(x * cosine + y * sine, y * cosine - x * sine, z);
+            return Pose::new(rotation, Vector3::from_f64(self.translation.to_array()));
+        }
         let along = scaled(self.rotation.columns[2], q * pitch);
         Pose::new(self.turned(q), Vector3::from_f64(self.translation.to_array()) + along)
     }

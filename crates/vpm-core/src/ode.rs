@@ -75,6 +75,13 @@ pub trait Ode<S> {
     /// move at the rates in `x`. A semi-implicit step asks for it when it knows the new rates of the coordinates.
     fn along_path(&mut self, _x: &[S], _step: f64, _rates: &mut [S]) {}
 
+    /// Takes note that a step has led to `x`, a `step` (s) of fixed length or one of controlled error, before the next begins there. A system
+    /// whose coordinates are local may go on in others.
+    ///
+    /// Law: a one-step method in local coordinates keeps its order (Munthe-Kaas 1999; Hairer, Lubich & Wanner 2006, "Geometric Numerical
+    /// Integration", section IV.8).
+    fn arrive(&mut self, _x: &mut [S], _step: Option<f64>) {}
+
     /// Writes a natural size of every state, in its unit: what a change of the state is small beside. Step control takes it for absolute
     /// tolerances.
     fn scales(&self, scales: &mut [f64]) {

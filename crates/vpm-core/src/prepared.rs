@@ -1,5 +1,6 @@
 //! A machine with fixed parameters and all its buffers, for many fast evaluations: what a controller asks at every sample.
 
+use crate::ball::check_angles;
 use crate::description::Description;
 use crate::error::{Error, Result};
 use crate::system::{Build, Dynamics};
@@ -44,6 +45,7 @@ impl Prepared {
     #[inline]
     pub fn forward_dynamics(&mut self, q: &[f64], v: &[f64], tau: &[f64]) -> Result<&[f64]> {
         self.expect([("position", q), ("velocity", v), ("effort", tau)])?;
+        check_angles(&self.dynamics.balls, q)?;
         sound("acceleration", self.dynamics.forward_dynamics(q, v, tau))
     }
 

@@ -123,6 +123,13 @@ pub enum Channel {
         /// Which component.
         component: Component,
     },
+    /// Orientation of a ball joint, or angular velocity of its child.
+    Ball {
+        /// Number of the ball joint.
+        ball: usize,
+        /// Which number.
+        quantity: BallQuantity,
+    },
     /// Reaction wrench at a joint, on the child, in its axes.
     LoadCell {
         /// Number of the load cell.
@@ -174,6 +181,26 @@ pub enum ContactQuantity {
     Fz,
 }
 
+/// What a ball joint shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum BallQuantity {
+    /// Real part of the unit quaternion of the child in the frame of the joint.
+    Qw,
+    /// First component of its vector.
+    Qx,
+    /// Second component of its vector.
+    Qy,
+    /// Third component of its vector.
+    Qz,
+    /// First component of the angular velocity of the child in the frame of the joint, in axes of the child, rad/s.
+    Wx,
+    /// Second component of it, rad/s.
+    Wy,
+    /// Third component of it, rad/s.
+    Wz,
+}
+
 /// A component of a wrench.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -197,7 +224,7 @@ pub enum Component {
 /// In this order: position, velocity, acceleration, effort of each joint; command, force of each actuator; length, rate, force of each
 /// line; strain of each gauge; x, y, z, rx, ry, rz of each marker; spool, pressure a, pressure b, flow a, flow b of each hydraulic drive;
 /// current of each motor; pressure, flow of each supply; depth, normal force, fx, fy, fz of each contact; mx, my, mz, fx, fy, fz of each
-/// bushing and of each load cell.
+/// bushing and of each load cell; qw, qx, qy, qz, wx, wy, wz of each ball joint.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Layout {
     /// Joints.
@@ -222,6 +249,8 @@ pub struct Layout {
     pub bushings: usize,
     /// Load cells.
     pub load_cells: usize,
+    /// Ball joints.
+    pub balls: usize,
 }
 
 impl Layout {
@@ -275,9 +304,14 @@ impl Layout {
         self.bushings() + 6 * self.bushings
     }
 
+    /// Where the outputs of the ball joints begin.
+    pub fn balls(self) -> usize {
+        self.load_cells() + 6 * self.load_cells
+    }
+
     /// Number of all outputs.
     pub fn count(self) -> usize {
-        self.load_cells() + 6 * self.load_cells
+        self.balls() + 7 * self.balls
     }
 }
 
@@ -306,6 +340,7 @@ impl Channel {
             Self::Supply { supply, quantity } => layout.supplies() + 2 * supply + quantity as usize,
             Self::Contact { contact, quantity } => layout.contacts() + 5 * contact + quantity as usize,
             Self::Bushing { bushing, component } => layout.bushings() + 6 * bushing + component as usize,
+            Self::Ball { ball, quantity } => layout.balls() + 7 * ball + quantity as usize,
             Self::LoadCell { load_cell, component } => layout.load_cells() + 6 * load_cell + component as usize,
         }
     }

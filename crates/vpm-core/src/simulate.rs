@@ -30,7 +30,7 @@ use crate::error::{Diverged, Error, Result};
 use crate::integrator::{Halt, Method};
 use crate::scalar::Scalar;
 use crate::sensitivity::{Interrupt, Job, LANES, Pair, differentiate_by};
-use crate::system::Build;
+use crate::system::{Build, Trouble};
 use crate::table::Table;
 use sampled::Astray;
 
@@ -188,9 +188,19 @@ struct Simulation<'a> {
     plan: Plan<'a>,
 }
 
+impl<'a> Simulation<'a> {
+    /// What corrects states corrects angles.
+    fn stepper<S: Scalar>(&self, theta: &[S]) -> Result<Stepper<'a, S>> {
+        match self.plan.gains {
+            Some(_) => Stepper::of(&self.setting, &self.plan, theta, self.setting.description.system(theta)?),
+            None => Stepper::new(&self.setting, &self.plan, theta),
+        }
+    }
+}
+
 impl Job for Simulation<'_> {
     fn run<S: Scalar>(&self, theta: &[S]) -> Result<Pair<S>> {
-        Stepper::new(&self.setting, &self.plan, theta)?.by_code().run(self.setting.interrupt)
+        self.stepper(theta)?.by_code().run(self.setting.interrupt)
     }
 }
 
@@ -254,6 +264,31 @@ pub(crate) fn leapt<S: Scalar>(stepper: &Stepper<'_, S>, what: String, beyond: f
     let event = format!("is {beyond:.6} m beyond the end of its stroke, where these steps leapt over its stop,");
     let repair = "use the integrator adaptive, or guarded where the time of a step has a bound";
     lost(stepper.stepping(), what, (event, repair), at, stepper.before(at.0))
+}
+
+/// A ball joint whose coordinates failed on the way to sample `row`.
+pub(crate) fn troubled<S: Scalar>(stepper: &Stepper<'_, S>, trouble: Trouble, row: usize, start: usize) -> Error {
+    let (what, event, repair) = trouble_in_words(stepper.description(), trouble);
+    lost(stepper.stepping(), what, (event, repair), (row, start), stepper.before(row))
+}
+
+/// Which joint, what happened to it and what helps.
+pub(crate) fn trouble_in_words(description: &Description, trouble: Trouble) -> (String, String, &'static str) {
+    let (Trouble::Singular(number, angle) | Trouble::Leap(number, angle)) = trouble;
+    let ball = &description.balls[number];
+    let (what, degrees) = (format!("joint `{}`", ball.name), angle.to_degrees());
+    if let Trouble::Leap(..) = trouble {
+        let event = format!("turns by {:.0} degrees in a single step", degrees.abs());
+        return (what, event, "use more substeps or shorter samples");
+    }
+    let name = &description.bodies[ball.angles[1][0]].joint.name;
+    let why = description.hindrance(ball).unwrap_or_else(|| "its angles are the coordinates here".to_owned());
+    let event = format!("comes too near to the singularity of its angles (`{name}` is {degrees:.3} degrees; {why})");
+    (
+        what,
+        event,
+        "turn the frame of the joint so that this angle stays away from 90 degrees, or take off what needs its angles",
+    )
 }
 
 /// What went astray at sample `row` of a piece that begins at `start`; `tables` are the outputs and states of its samples until then.

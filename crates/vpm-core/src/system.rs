@@ -19,6 +19,7 @@ mod slopes;
 mod stages;
 mod step;
 mod stiff;
+mod turning;
 
 pub use connections::Connections;
 pub(crate) use counted::{Calls, Counted, Matrix};
@@ -32,11 +33,13 @@ pub use ode::System;
 pub(crate) use recorded::Recording;
 pub use recorded::{Kind, Placed, Places};
 pub(crate) use routine::{Routine, code_pays, code_pays_in_fits};
+pub(crate) use turning::Trouble;
 
 use std::sync::Arc;
 
 use crate::actuator::hydraulic::Supply;
 use crate::actuator::{Actuator, Drive, Target};
+use crate::ball::Ball;
 use crate::contact::ContactFriction;
 use crate::data::Data;
 use crate::dynamics::articulated::articulated;
@@ -89,6 +92,8 @@ pub struct Dynamics<S> {
     pub(crate) connections: Connections<S>,
     /// Effects that remember.
     pub(crate) memories: Memories<S>,
+    /// Joints of three angles.
+    pub(crate) balls: Vec<Ball>,
 }
 
 impl<S: Scalar> Dynamics<S> {
@@ -119,6 +124,7 @@ impl<S: Scalar> Dynamics<S> {
             loads: zeros(model.n_coordinates()),
             connections: Connections::default(),
             memories: Memories::new(Vec::new()),
+            balls: Vec::new(),
             model,
             effects,
             actuators,
@@ -130,6 +136,12 @@ impl<S: Scalar> Dynamics<S> {
     #[must_use]
     pub fn connected(self, connections: Connections<S>) -> Self {
         Self { connections, ..self }
+    }
+
+    /// With joints of three angles.
+    #[must_use]
+    pub(crate) fn with_balls(self, balls: Vec<Ball>) -> Self {
+        Self { balls, ..self }
     }
 
     /// With effects that remember.

@@ -83,6 +83,8 @@ def structure_text(checked: Checked) -> str:
     }
     if document.transmissions:  # older programs know no such key
         content["transmissions"] = [_transmission(name, structure, index) for name in document.transmissions]
+    if structure.balls:
+        content["balls"] = [{"name": name, "angles": list(map(list, of))} for name, of in structure.balls.items()]
     if not document.velocity_terms:
         content["drop_velocity_terms"] = True
     if omitted := omissions(structure):
@@ -258,6 +260,8 @@ def _channel(channel: str, structure: Structure) -> dict[str, Any]:
     for what, (names, quantities) in drives.items():
         if owner in names and kind in quantities:
             return {"kind": what, what: names.index(owner), "quantity": kind}
+    if owner in structure.balls:
+        return {"kind": "ball", "ball": list(structure.balls).index(owner), "quantity": kind}
     if kind == "current":
         return {"kind": kind, "dc_motor": structure.driven_by("dc_motor").index(owner)}
     what, names = next((what, names) for what, names in owners.items() if owner in names)

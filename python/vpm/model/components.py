@@ -253,7 +253,8 @@ class Components(DriveComponents):
         vector rx, ry, rz in the world; per hydraulic actuator spool, pressure_a, pressure_b, flow_a, flow_b; per motor
         current; per supply pressure, flow; per contact depth, normal_force and the force fx, fy, fz in world axes; per
         bushing the wrench mx, my, mz, fx, fy, fz on A in its axes; per load cell the reaction mx, my, mz, fx, fy, fz on
-        the child in its axes.
+        the child in its axes; per spherical or free joint the unit quaternion qw, qx, qy, qz of the child in the frame
+        of the joint, and its angular velocity wx, wy, wz in its own axes.
         """
         return self._checked.structure.outputs
 

@@ -11,7 +11,8 @@
 
 The lower pairs: F. Reuleaux, "Theoretische Kinematik", 1875; angles of the spherical joint as Cardan angles in J.
 Wittenburg, "Dynamics of Multibody Systems", 2008, section 2.1.2. These have a singularity at ``_y`` (``_ry``) = 90
-degrees.
+degrees. Whoever steps the machine in time turns spherical and free joints by unit quaternions, if nothing needs their
+angles, and shows angles; elsewhere a state near the singularity is refused (crates/vpm-core/src/description/balls.rs).
 """
 
 from __future__ import annotations
@@ -35,6 +36,9 @@ _SUFFIXES: Mapping[JointType, tuple[str, ...]] = {
     "free": ("_x", "_y", "_z", "_rx", "_ry", "_rz"),
     "fixed": (),
 }
+
+#: Joints that turn anyhow, by three angles.
+ANGULAR: tuple[JointType, ...] = ("spherical", "free")
 
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 

@@ -9,7 +9,7 @@ from typing import Literal
 
 from vpm.catalogue import JointKind, SiteKind
 from vpm.errors import ModelError, near_match
-from vpm.model.expand import Coordinate, Direction, coordinates, plane, unit
+from vpm.model.expand import ANGULAR, Coordinate, Direction, X, Y, Z, coordinates, plane, unit
 from vpm.model.pose import Pose, denavit_hartenberg, pose
 from vpm.model.schema import Document, Joint
 from vpm.model.splitting import bendings, deflections, flexed, name_behind
@@ -38,6 +38,11 @@ SHAFT_UNITS: Mapping[str, str] = {"position": "rad", "velocity": "rad/s", "effor
 GAUGE_UNITS: Mapping[str, str] = {"strain": "1"}
 CONTACT_UNITS: Mapping[str, str] = {"depth": "m", "normal_force": "N", "fx": "N", "fy": "N", "fz": "N"}
 WRENCH_UNITS: Mapping[str, str] = {"mx": "N m", "my": "N m", "mz": "N m", "fx": "N", "fy": "N", "fz": "N"}
+#: Of a ball joint: unit quaternion of the child in the frame of the joint, angular velocity in axes of the child.
+BALL_UNITS: Mapping[str, str] = {
+    **dict.fromkeys(("qw", "qx", "qy", "qz"), "1"),
+    **dict.fromkeys(("wx", "wy", "wz"), "rad/s"),
+}
 MARKER_UNITS: Mapping[str, str] = {"x": "m", "y": "m", "z": "m", "rx": "rad", "ry": "rad", "rz": "rad"}
 
 COORDINATE_UNIT: Mapping[JointKind, str] = {"prismatic": "m", "revolute": "rad", "helical": "rad"}
@@ -97,6 +102,11 @@ class Axis:
     def name(self) -> str:
         """Name of the joint."""
         return self.coordinate.name
+
+    @property
+    def turns(self) -> bool:
+        """Whether it turns and does nothing else."""
+        return self.coordinate.kind == "revolute"
 
     @property
     def carrier(self) -> str:
@@ -240,6 +250,18 @@ class Structure:
         return self.joints[mount.index] if mount.kind == "body" else None
 
     @cached_property
+    def balls(self) -> Mapping[str, tuple[tuple[int, ...], ...]]:
+        """Joints that turn anyhow, with the numbers of the coordinates of their three angles.
+
+        An angle has more than one where effects split it.
+        """
+        return {name: self._angles(name) for name, joint in self.document.joints.items() if joint.type in ANGULAR}
+
+    def _angles(self, joint: str) -> tuple[tuple[int, ...], ...]:
+        turning = [(k, axis) for k, axis in enumerate(self.axes) if axis.joint == joint and axis.turns]
+        return tuple(tuple(k for k, axis in turning if axis.coordinate.direction == way) for way in (X, Y, Z))
+
+    @cached_property
     def wires(self) -> tuple[str, ...]:
         """Lines, then transmissions: along what of the core forces act, by their numbers there."""
         return (*self.document.lines, *self.document.transmissions)
@@ -269,6 +291,7 @@ class Structure:
             (tuple(document.contacts), tuple(CONTACT_UNITS)),
             (tuple(document.bushings), tuple(WRENCH_UNITS)),
             (tuple(document.load_cells), tuple(WRENCH_UNITS)),
+            (tuple(self.balls), tuple(BALL_UNITS)),
         ]
         return tuple(f"{owner}.{channel}" for owners, channels in groups for owner in owners for channel in channels)
 
@@ -314,7 +337,7 @@ class Structure:
             return DRIVE_UNITS[name]
         if owner in self.document.actuators:
             return self._actuator_unit(owner, name)
-        return {**LINE_UNITS, **GAUGE_UNITS, **MARKER_UNITS, **CONTACT_UNITS, **WRENCH_UNITS}[name]
+        return {**LINE_UNITS, **GAUGE_UNITS, **MARKER_UNITS, **CONTACT_UNITS, **WRENCH_UNITS, **BALL_UNITS}[name]
 
     def _actuator_unit(self, actuator: str, channel: str) -> str:
         if channel == "force":

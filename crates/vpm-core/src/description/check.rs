@@ -112,6 +112,14 @@ fn used_parameters(description: &Description) -> Vec<(String, usize)> {
 
 fn sites(description: &Description) -> Result<()> {
     let joints = description.n_joints();
+    for ball in &description.balls {
+        let what = format!("joint `{}`", ball.name);
+        ball.angles.iter().flatten().try_for_each(|&joint| within(&what, "joint", joint, joints))?;
+        if ball.angles.iter().any(Vec::is_empty) {
+            let message = format!("{what} has an angle without coordinate; name one for each angle");
+            return Err(Error::Description { message });
+        }
+    }
     for shaft in &description.transmissions {
         let (what, own) = (format!("transmission `{}`", shaft.name), &shaft.ratios);
         own.iter().try_for_each(|entry| within(&what, "joint", entry.joint, joints))?;
@@ -203,6 +211,7 @@ pub(super) fn channel(what: &str, channel: Channel, description: &Description) -
         Channel::Supply { supply, .. } => within(what, "supply", supply, layout.supplies),
         Channel::Contact { contact, .. } => within(what, "contact", contact, description.contacts.len()),
         Channel::Bushing { bushing, .. } => within(what, "bushing", bushing, description.bushings.len()),
+        Channel::Ball { ball, .. } => within(what, "ball joint", ball, description.balls.len()),
         Channel::LoadCell { load_cell, .. } => within(what, "load cell", load_cell, description.load_cells.len()),
     }
 }

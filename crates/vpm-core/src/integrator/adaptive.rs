@@ -201,6 +201,7 @@ impl<S: Scalar> Adaptive<S> {
             let length = taken * (CAUTION / verdict.error.sqrt().sqrt()).clamp(SHORTER, longest);
             if verdict.error <= 1.0 || (taken <= floor && verdict.error.is_finite()) {
                 x.copy_from_slice(&self.next);
+                ode.arrive(x, (floor > 0.0).then_some(taken));
                 gone = if taken < left { gone + taken } else { duration };
                 // A step that the end cut short says nothing against the longer one.
                 step = floor.max(if taken < step { step.max(length) } else { length });

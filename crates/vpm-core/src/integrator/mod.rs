@@ -195,8 +195,10 @@ impl<S: Scalar> Integrator<S> {
                 if let Err(Halt::Stuck(stuck)) = method.advance(ode, x, step, &|| false) {
                     x[stuck.state] = S::from_f64(f64::NAN);
                 }
+                return;
             }
         }
+        ode.arrive(x, Some(step));
     }
 
     /// Moves `x` on by `duration` (s) in that many equal `pieces`, and asks now and then whether to stop.

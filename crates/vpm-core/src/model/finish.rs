@@ -91,6 +91,7 @@ impl<S: Scalar> Assembly<'_, S> {
             gauges: self.parts.gauges.iter().map(|gauge| self.strip(gauge)).collect(),
             beams: self.beams,
             n_coordinates,
+            turned: Vec::new(),
         })
     }
 

@@ -1,6 +1,7 @@
 //! Runs along a motion: the answer of what does not follow it, sample by sample.
 
-use super::{Run, Setting, halted, lost, names};
+use super::{Run, Setting, halted, lost, names, trouble_in_words};
+use crate::ball::Ball;
 use crate::error::{Diverged, Error, Result};
 use crate::integrator::{Halt, Integrator, Stuck};
 use crate::motion::{JointMotion, StrainRates, position_sensors, state_sensors, strain_sensors};
@@ -9,7 +10,7 @@ use crate::scalar::Scalar;
 use crate::sensitivity::{Interrupt, Job, Pair, differentiate, differentiate_by};
 use crate::sensor::Sensor;
 use crate::statics::settled;
-use crate::system::{Following, Guidance, code_pays};
+use crate::system::{Following, Guidance, Trouble, code_pays};
 use crate::table::Table;
 
 /// A motion and what answers to it, all checked.
@@ -238,10 +239,29 @@ impl<'a, S: Scalar> Way<'a, S> {
             let channels = outputs[layout.actuators()..layout.lines()].chunks_exact_mut(2).enumerate();
             channels.for_each(|(actuator, channels)| channels[0] = S::from_f64(inputs.at(row, actuator)));
         }
+        self.watch(row)?;
+        let state = &self.states[row * dim..(row + 1) * dim];
+        let outputs = &self.truth[row * width..row * width + n_outputs];
         let wrong = |number: &S| !number.is_finite();
         let place = state.iter().position(wrong).map(|place| names::state_name(description, place));
         let place = place.or_else(|| outputs.iter().position(wrong).map(|c| names::output_name(description, c)));
         place.map_or(Ok(()), |name| Err(self.diverged(&name, row)))
+    }
+
+    /// Complains about a ball joint that answers to the motion too near to the singularity of its angles.
+    fn watch(&self, row: usize) -> Result<()> {
+        let Setting { description, stepping, .. } = self.guide.setting;
+        let (dim, n) = (description.n_states(), description.n_coordinates());
+        let (q, rest) = self.states[row * dim..(row + 1) * dim].split_at(n);
+        let answers = |ball: &Ball| ball.angles.iter().flatten().any(|place| self.machine.free().contains(place));
+        for (number, ball) in description.balls.iter().enumerate().filter(|(_, ball)| answers(ball)) {
+            let (angle, near) = ball.nearness(q, &rest[..n], Some(stepping.time_step));
+            if near {
+                let (what, event, repair) = trouble_in_words(description, Trouble::Singular(number, angle));
+                return Err(lost(stepping, what, (event, repair), (row, 0), self.before(row)));
+            }
+        }
+        Ok(())
     }
 
     /// Puts the measured states of drives in the place of their own; tells whether there are any.

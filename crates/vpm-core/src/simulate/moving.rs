@@ -177,6 +177,11 @@ impl<S: Scalar> Ode<S> for Moving<'_, S> {
         self.system.along_path(&x[..dim], step, &mut rates[..dim]);
     }
 
+    fn arrive(&mut self, x: &mut [S], step: Option<f64>) {
+        let dim = self.system.dim();
+        self.system.arrive(&mut x[..dim], step);
+    }
+
     fn scales(&self, scales: &mut [f64]) {
         let (machine, time) = scales.split_at_mut(self.system.dim());
         self.system.scales(machine);

@@ -117,6 +117,10 @@ pub(crate) fn output_name(description: &Description, column: usize) -> String {
         let names: Vec<_> = d.bushings.iter().map(|bushing| bushing.name.as_str()).collect();
         return pick(layout.bushings(), &WRENCH, "bushing", &names);
     }
-    let names: Vec<_> = d.load_cells.iter().map(|cell| cell.name.as_str()).collect();
-    pick(layout.load_cells(), &WRENCH, "load cell", &names)
+    if column < layout.balls() {
+        let names: Vec<_> = d.load_cells.iter().map(|cell| cell.name.as_str()).collect();
+        return pick(layout.load_cells(), &WRENCH, "load cell", &names);
+    }
+    let names: Vec<_> = d.balls.iter().map(|ball| ball.name.as_str()).collect();
+    pick(layout.balls(), &["qw", "qx", "qy", "qz", "wx", "wy", "wz"], "joint", &names)
 }

@@ -172,7 +172,8 @@ impl<'a> Filter<'a> {
         let (nx, m) = (plan.initial.len(), readings.channels.len());
         let variance = DVector::from_iterator(nx, noise.first.iter().map(|deviation| deviation * deviation));
         Ok(Self {
-            stepper: Stepper::new(setting, plan, &theta)?,
+            // Covariances are those of the angles.
+            stepper: Stepper::of(setting, plan, &theta, setting.description.system(&theta)?)?,
             readings,
             noise,
             time_step: setting.stepping.time_step,

@@ -19,10 +19,11 @@ pub fn resolution(
     duration: f64,
 ) -> Result<Resolution> {
     check_state("state", description, state)?;
-    let mut system: System<f64> = description.system(theta)?;
+    let mut state = state.to_vec();
+    let mut system: System<f64> = description.stepped_from(theta, &mut state)?;
     let dim = description.n_states();
     let (mut jacobian, mut sizes) = (vec![0.0; dim * dim], vec![0.0; dim]);
-    system.without_dry_friction(state, &mut jacobian);
+    system.without_dry_friction(&state, &mut jacobian);
     system.scales(&mut sizes);
     let (method, step) = (stepping.method, stepping.step());
     let implicit = method == Method::Additive || description.n_elastic() > 0;

@@ -27,12 +27,13 @@ pub(crate) fn check_step(description: &Description, theta: &[f64], stepping: Ste
     if !explicit || state.iter().any(|number| !number.is_finite()) {
         return Ok(());
     }
-    let mut system: System<f64> = description.system(theta)?;
+    let mut state = state.to_vec();
+    let mut system: System<f64> = description.stepped_from(theta, &mut state)?;
     let (n, dim) = (description.n_coordinates(), description.n_states());
     let (mut jacobian, mut elastic, mut sizes) = (vec![0.0; dim * dim], vec![0.0; 2 * n * n], vec![0.0; dim]);
-    system.without_friction(state, &mut jacobian);
+    system.without_friction(&state, &mut jacobian);
     system.scales(&mut sizes);
-    let elasticity = system.elasticity(state, &mut elastic).then_some(&*elastic);
+    let elasticity = system.elasticity(&state, &mut elastic).then_some(&*elastic);
     let names: Vec<String> = (0..dim).map(|place| state_name(description, place)).collect();
     let rates = Rates { jacobian: &jacobian, coordinates: n, elasticity, sizes: &sizes, names: &names };
     check_rates(stepping.method, stepping.step(), &rates)
@@ -45,13 +46,15 @@ fn check_additive(description: &Description, theta: &[f64], stepping: Stepping, 
     if direct && free || state.iter().any(|number| !number.is_finite()) {
         return Ok(());
     }
-    let mut system: System<f64> = description.system(theta)?;
+    let lifted: Vec<Dual<f64, LANES>> = theta.iter().map(|&value| Dual::constant(value)).collect();
+    let mut start: Vec<_> = state.iter().map(|&value| Dual::constant(value)).collect();
+    let mut duals: System<Dual<f64, LANES>> = description.stepped_from(&lifted, &mut start)?;
+    let mut state = state.to_vec();
+    let mut system: System<f64> = description.stepped_from(theta, &mut state)?;
     let dim = description.n_states();
     let (mut jacobian, mut sizes) = (vec![0.0; dim * dim], vec![0.0; dim]);
-    system.jacobian(state, &mut jacobian);
+    system.jacobian(&state, &mut jacobian);
     system.scales(&mut sizes);
-    let lifted: Vec<Dual<f64, LANES>> = theta.iter().map(|&value| Dual::constant(value)).collect();
-    let mut duals: System<Dual<f64, LANES>> = description.system(&lifted)?;
     let mut integrator = Integrator::new(stepping.method, dim);
     let derivative = |step: f64| {
         let mut matrix = vec![0.0; dim * dim];
@@ -95,9 +98,10 @@ pub(crate) fn check_structure(
     if !explicit || description.n_elastic() == 0 && !connected || state.iter().any(|number| !number.is_finite()) {
         return Ok(());
     }
-    let mut system: System<f64> = description.system(theta)?;
+    let mut state = state.to_vec();
+    let mut system: System<f64> = description.stepped_from(theta, &mut state)?;
     let n = description.n_coordinates();
-    let implicit = stepping.method == Method::SemiImplicit && system.elasticity(state, &mut vec![0.0; 2 * n * n]);
+    let implicit = stepping.method == Method::SemiImplicit && system.elasticity(&state, &mut vec![0.0; 2 * n * n]);
     if implicit && !connected {
         return Ok(()); // beams are taken implicitly
     }

@@ -8,7 +8,7 @@ use super::moving::Courses;
 use super::names::{output_name, state_name};
 use super::observer::Gains;
 use super::sampled::{Astray, SampledDrives};
-use super::{Setting, Stepping, diverged, halted, leapt, strayed};
+use super::{Setting, Stepping, diverged, halted, leapt, strayed, troubled};
 use crate::delay::SampleDelay;
 use crate::description::Description;
 use crate::error::Result;
@@ -86,8 +86,12 @@ pub(crate) struct Stepper<'a, S> {
 
 impl<'a, S: Scalar> Stepper<'a, S> {
     pub(crate) fn new(setting: &Setting<'a>, plan: &Plan<'a>, theta: &[S]) -> Result<Self> {
+        Self::of(setting, plan, theta, setting.description.stepped(theta)?)
+    }
+
+    /// As [`Stepper::new`], with the machine in a form of its own.
+    pub(crate) fn of(setting: &Setting<'a>, plan: &Plan<'a>, theta: &[S], mut system: System<S>) -> Result<Self> {
         let description = setting.description;
-        let mut system = description.system(theta)?;
         system.make_for(setting.stepping.method)?;
         let (dim, rows, zero) = (system.dim(), plan.horizon, S::zero());
         // A closed loop begins with its disturbances, to which the controllers add.
@@ -187,6 +191,7 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         for (state, &value) in self.state.iter_mut().zip(initial) {
             *state = S::from_f64(value);
         }
+        self.system.enter(&mut self.state);
         self.integrator.reset();
         self.sampled.restart();
         if let Some(control) = &mut self.control {
@@ -200,8 +205,11 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         if let Some(place) = self.state.iter().position(|state| !state.is_finite()) {
             return Err(diverged(self, self.state_name(place), row, start));
         }
+        if let Some(trouble) = self.system.trouble() {
+            return Err(troubled(self, trouble, row, start));
+        }
         self.check_stops(row, start)?;
-        self.states[row * dim..(row + 1) * dim].copy_from_slice(&self.state);
+        self.system.show(&self.state, &mut self.states[row * dim..(row + 1) * dim]);
         self.control(row, start);
         self.hold(row, start).map_err(|astray| strayed(self, astray, (row, start)))?;
         self.record(row, start);

@@ -131,6 +131,10 @@ impl Ode<f64> for Counted<'_> {
         self.system.along_path(x, step, rates);
     }
 
+    fn arrive(&mut self, x: &mut [f64], step: Option<f64>) {
+        self.system.arrive(x, step);
+    }
+
     fn scales(&self, scales: &mut [f64]) {
         self.system.scales(scales);
     }

@@ -70,7 +70,20 @@ impl<S: Scalar> Dynamics<S> {
 
     /// Holds what input `number` amounts to, see [`super::System::input`].
     pub fn hold(&mut self, number: usize, input: S) {
-        self.inputs[number] = input;
+        match number.checked_sub(self.inputs.len()) {
+            None => self.inputs[number] = input,
+            Some(place) => self.model.orient(place, input),
+        }
+    }
+
+    /// How many inputs it holds.
+    pub(crate) fn n_inputs(&self) -> usize {
+        self.inputs.len()
+    }
+
+    /// How many numbers it holds: inputs, then orientations of joints that turn freely.
+    pub(crate) fn n_held(&self) -> usize {
+        self.inputs.len() + self.model.n_orientations()
     }
 
     /// Adds what the drives push to the efforts `loads` on all coordinates, after [`Dynamics::drive`] in the same state.

@@ -2,11 +2,12 @@
 
 use super::Dynamics;
 use super::connections::into_body;
+use crate::ball::angular_velocity;
 use crate::contact::ContactFriction;
 use crate::dynamics::{Motion, frames, lines, poses, reactions, shafts};
 use crate::scalar::Scalar;
 use crate::sensor::Layout;
-use crate::spatial::Pose;
+use crate::spatial::{Pose, Quaternion};
 
 impl<S: Scalar> Dynamics<S> {
     /// Where the outputs are.
@@ -23,6 +24,7 @@ impl<S: Scalar> Dynamics<S> {
             contacts: self.connections.contacts.len(),
             bushings: self.connections.bushings.len(),
             load_cells: self.connections.cells.len(),
+            balls: self.balls.len(),
         }
     }
 
@@ -41,6 +43,7 @@ impl<S: Scalar> Dynamics<S> {
     /// The outputs that the state alone decides: positions and velocities, lines, strains, markers.
     pub fn observe_motion(&mut self, x: &[S], outputs: &mut [S]) {
         let (n, layout) = (self.coordinates(), self.layout());
+        self.observe_balls(&x[..n], &x[n..2 * n], &mut outputs[layout.balls()..]);
         if layout.lines + layout.gauges + layout.markers > 0 || !self.connections.is_free() {
             let (q, v) = x[..2 * n].split_at(n);
             let Self { model, data, .. } = self;
@@ -74,6 +77,16 @@ impl<S: Scalar> Dynamics<S> {
         }
         connections.observe_contacts(data, &mut outputs[layout.contacts()..layout.bushings()]);
         connections.observe_bushings(data, &mut outputs[layout.bushings()..layout.load_cells()]);
+    }
+
+    /// Orientations of ball joints, and angular velocities of what they carry.
+    fn observe_balls(&self, q: &[S], v: &[S], outputs: &mut [S]) {
+        for (channels, ball) in outputs.chunks_exact_mut(7).zip(&self.balls) {
+            let (angles, rates) = (ball.of(q), ball.of(v));
+            let orientation = self.model.orientation(ball.angles[0][0]).then(Quaternion::from_angles(angles));
+            channels[..4].copy_from_slice(&orientation.to_array());
+            channels[4..].copy_from_slice(&angular_velocity(angles, rates).to_array());
+        }
     }
 
     /// The reactions at the load cells' joints in the motion `[q, v, a]`, with the forces that stand on the lines.

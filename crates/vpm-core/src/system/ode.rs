@@ -4,8 +4,10 @@ use super::additive::{Split, Stage};
 use super::memory::Memories;
 use super::recorded::Kind;
 use super::routine::{Routines, kind_of};
+use super::turning::{Trouble, Turning};
 use super::{Dynamics, Machine, Matrix, drives, stiff};
 use crate::actuator::Actuator;
+use crate::ball::Ball;
 use crate::effect::MemoryChords;
 use crate::error::Result;
 use crate::integrator::Method;
@@ -39,6 +41,8 @@ pub struct System<S> {
     ready: bool,
     /// Whether linearly implicit steps run as a whole.
     whole: bool,
+    /// Ball joints.
+    turning: Turning<S>,
 }
 
 impl<S: Scalar> System<S> {
@@ -59,12 +63,55 @@ impl<S: Scalar> System<S> {
             rates: vec![S::zero(); dynamics.dim()],
             ready: false,
             whole: false,
+            turning: Turning::new(std::iter::empty()),
             dynamics,
         };
         if !Self::is_plain() {
             system.routines.make(&Kind::Rates)?;
         }
         Ok(system)
+    }
+
+    /// With ball joints, each with whether it turns freely.
+    #[must_use]
+    pub(crate) fn with_balls<'a>(self, balls: impl Iterator<Item = (&'a Ball, bool)>) -> Self {
+        Self { turning: Turning::new(balls), ..self }
+    }
+
+    /// Takes over a state as users know it: brings it into the coordinates in which the machine goes on.
+    pub(crate) fn enter(&mut self, x: &mut [S]) {
+        self.turn(|turning, n, hold| turning.enter(x, n, hold));
+    }
+
+    /// Writes the state `x` as users know it into `shown`.
+    pub(crate) fn show(&self, x: &[S], shown: &mut [S]) {
+        shown.copy_from_slice(x);
+        self.turning.show(x, self.dynamics.coordinates(), shown);
+    }
+
+    /// Keeps its coordinates from now on, however far steps lead.
+    pub(crate) fn rest(&mut self) {
+        self.turning.rest();
+    }
+
+    /// What became of the coordinates of a ball joint since the last [`System::enter`], if they failed.
+    #[inline]
+    pub(crate) fn trouble(&self) -> Option<Trouble> {
+        self.turning.trouble()
+    }
+
+    /// Does something with the ball joints, which may hold other orientations after it.
+    fn turn(&mut self, work: impl FnOnce(&mut Turning<S>, usize, &mut dyn FnMut(usize, S))) {
+        if self.turning.is_empty() {
+            return;
+        }
+        let (n, Self { turning, dynamics, routines, ready, .. }) = (self.dynamics.coordinates(), self);
+        *ready = false;
+        let first = dynamics.n_inputs();
+        work(turning, n, &mut |place, number: S| {
+            dynamics.hold(first + place, number.re());
+            routines.hold(first + place, number);
+        });
     }
 
     /// Whether it runs in plain numbers.
@@ -181,6 +228,7 @@ impl<S: Scalar> System<S> {
             debug_assert!(false, "samples are asked for before they are made");
             outputs.fill(S::from_f64(f64::NAN));
         }
+        self.turning.show_outputs(x, self.dynamics.coordinates(), Some(dxdt), outputs);
     }
 
     /// The outputs that the state alone decides; others stay or become zero.
@@ -191,6 +239,7 @@ impl<S: Scalar> System<S> {
         } else {
             self.routines.copy(&Kind::Motion, x, &[], outputs);
         }
+        self.turning.show_outputs(x, self.dynamics.coordinates(), None, outputs);
     }
 
     /// Length of each line per unit of each coordinate at `q`: the lever arms of its force, lines x n.
@@ -332,6 +381,10 @@ impl<S: Scalar> Ode<S> for System<S> {
         }
         self.ready = false;
         self.routines.matrix(&Kind::Prepared, x, matrix, x.len(), rates);
+    }
+
+    fn arrive(&mut self, x: &mut [S], step: Option<f64>) {
+        self.turn(|turning, n, hold| turning.arrive(x, n, step, hold));
     }
 
     fn turns(&self) -> bool {

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use super::additive::{Split, Stage};
 use super::guided::{Guidance, Guided, Part};
 use super::{Build, Dynamics, step, stiff};
+use crate::ball::LEAST;
 use crate::contact::ContactFriction;
 use crate::effect::{JointEffect, MemoryChords, Seat};
 use crate::error::{Error, Result};
@@ -243,7 +244,7 @@ fn outputs(build: impl Build<Error = Error>, places: Places, parameters: &[Recor
     let inputs = |first: usize, count: usize| (first..first + count).map(|place| input(place, 0.0)).collect::<Vec<_>>();
     let mut dynamics: Dynamics<Recorded> = build.dynamics(parameters)?;
     let x = inputs(0, places.states);
-    for number in 0..places.inputs.min(dynamics.inputs.len()) {
+    for number in 0..places.inputs.min(dynamics.n_held()) {
         dynamics.hold(number, input(places.states + number, 0.0));
     }
     let zeros = |count: usize| vec![Recorded::default(); count];
@@ -337,6 +338,13 @@ impl Dynamics<Recorded> {
         }
         let mut outputs = vec![Recorded::default(); layout.count()];
         self.rhs(x, rates);
+        for ball in &self.balls {
+            // No number where the angles are no coordinates.
+            let square = ball.of(x)[1].cos().powi(2);
+            for rate in &mut *rates {
+                *rate = square.if_less((LEAST * LEAST).into(), || (square - LEAST * LEAST).sqrt(), || *rate);
+            }
+        }
         self.observe(x, rates, &mut outputs);
         for (channels, command) in outputs[layout.actuators()..layout.lines()].chunks_exact_mut(2).zip(commands) {
             channels[0] = command;
