@@ -23,8 +23,9 @@ class _Straight:
     motions = (SimpleNamespace(joints=("hinge",)),)
 
     def evaluate(
-        self, model: Model, theta: np.ndarray, columns: Sequence[int] = (), origin: np.ndarray | None = None
+        self, model: Model, theta: np.ndarray, columns: Sequence[int] = (), *_: object
     ) -> tuple[np.ndarray, np.ndarray]:
+        """The same with an origin as without: it is its own tangent."""
         return np.array([theta[model.index(NAME)] - 2.0]), np.ones((1, 1))[:, : len(columns)]
 
 

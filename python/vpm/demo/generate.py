@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from vpm.demo.hidden import HIDDEN
 from vpm.demo.machine import SAMPLE_TIME, Machine, State, advance
+from vpm.files import make_folder, replacing, write_text
 
 SEED = 20
 """Seed of the shipped log's encoder noise."""
@@ -131,7 +132,7 @@ def write_log(path: Path, rows: npt.NDArray[np.float64]) -> None:
     """
     lines = [",".join(COLUMNS)]
     lines += [f"{time:.3f},{q:.6f},{u:.4f},{wanted:.6f}" for time, q, u, wanted in rows.tolist()]
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
+    write_text(path, "\n".join(lines) + "\n")
 
 
 def truth(hidden: str) -> str:
@@ -187,18 +188,21 @@ def generate(folder: Path, hidden: str = "coulomb_friction", seed: int = SEED) -
     ------
     ValueError
         If `hidden` is not a name in `HIDDEN`.
+    FileError
+        A file cannot be written; what was there is there still.
     """
     if hidden not in HIDDEN:
         raise ValueError(f"'{hidden}' is no effect that the demo can hide; take one of: {', '.join(HIDDEN)}.")
     machine = HIDDEN[hidden].machine
     noise = np.random.default_rng(seed)
-    folder.mkdir(parents=True, exist_ok=True)
+    make_folder(folder)
     write_log(folder / "train.csv", record(machine, train_reference, 15.0, noise))
     write_log(folder / "validation.csv", record(machine, validation_reference, 10.0, noise))
-    (folder / "truth.toml").write_text(truth(hidden), encoding="utf-8", newline="\n")
+    write_text(folder / "truth.toml", truth(hidden))
     model = Path(__file__).with_name("model.toml")
     if folder.resolve() != model.parent.resolve():
-        shutil.copyfile(model, folder / "model.toml")
+        with replacing(folder / "model.toml") as beside:
+            shutil.copyfile(model, beside)
 
 
 def main() -> None:

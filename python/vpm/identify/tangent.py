@@ -107,7 +107,7 @@ def estimate_on_tangent(
 
 
 def _on_the_way(start: Array, end: Array, share: float) -> Array:
-    """Values after a share of the way, never beyond its ends: a sum that is rounded may pass a bound at which one lies."""
+    """Values after a share of the way, never beyond its ends: a rounded sum may pass a bound at which one lies."""
     return np.clip(start + share * (end - start), np.minimum(start, end), np.maximum(start, end))
 
 

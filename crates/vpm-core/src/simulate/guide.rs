@@ -1,6 +1,6 @@
 //! Runs along a motion: the answer of what does not follow it, sample by sample.
 
-use super::{Run, Setting, halted, lost, names};
+use super::{Bounds, Run, Setting, halted, lost, names};
 use crate::error::{Diverged, Error, Result};
 use crate::integrator::{Halt, Integrator, Stuck};
 use crate::motion::{JointMotion, StrainRates, position_sensors, state_sensors, strain_sensors};
@@ -80,6 +80,7 @@ struct Way<'a, S> {
     of_gauges: Vec<Option<Sensor<S>>>,
     of_states: Vec<Option<Sensor<S>>>,
     machine: Following<S>,
+    bounds: Bounds,
     integrator: Integrator<S>,
     /// State of what answers.
     state: Vec<S>,
@@ -110,6 +111,7 @@ impl<'a, S: Scalar> Way<'a, S> {
             integrator: Integrator::new(stepping.method, machine.dim()),
             state: zeros(machine.dim()),
             measured: zeros(machine.dim()),
+            bounds: Bounds::new(description, theta, machine.dynamics()),
             machine,
             seen: zeros(seen),
             given: Vec::new(),
@@ -238,10 +240,13 @@ impl<'a, S: Scalar> Way<'a, S> {
             let channels = outputs[layout.actuators()..layout.lines()].chunks_exact_mut(2).enumerate();
             channels.for_each(|(actuator, channels)| channels[0] = S::from_f64(inputs.at(row, actuator)));
         }
-        let wrong = |number: &S| !number.is_finite();
-        let place = state.iter().position(wrong).map(|place| names::state_name(description, place));
-        let place = place.or_else(|| outputs.iter().position(wrong).map(|c| names::output_name(description, c)));
-        place.map_or(Ok(()), |name| Err(self.diverged(&name, row)))
+        if let Some(place) = self.bounds.outside(state) {
+            let complaint = self.bounds.complaint(description, place, state[place]);
+            return Err(self.diverged(complaint, row));
+        }
+        let Some(column) = outputs.iter().position(|number| !number.is_finite()) else { return Ok(()) };
+        let what = format!("the {}", names::output_name(description, column));
+        Err(self.diverged((what, Diverged::NOT_FINITE.to_owned()), row))
     }
 
     /// Puts the measured states of drives in the place of their own; tells whether there are any.
@@ -267,13 +272,12 @@ impl<'a, S: Scalar> Way<'a, S> {
         (outputs, self.states[..row * description.n_states()].iter().map(Scalar::re).collect())
     }
 
-    fn diverged(&self, name: &str, row: usize) -> Error {
+    fn diverged(&self, (what, event): (String, String), row: usize) -> Error {
         let repair = if self.guidance.drives {
             "use the integrator adaptive, and check the motion for jumps"
         } else {
             "use more substeps or the integrator linearly_implicit, and check the motion for jumps"
         };
-        let event = (Diverged::NOT_FINITE.to_owned(), repair);
-        lost(self.guide.setting.stepping, format!("the {name}"), event, (row, 0), self.before(row))
+        lost(self.guide.setting.stepping, what, (event, repair), (row, 0), self.before(row))
     }
 }
