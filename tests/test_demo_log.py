@@ -169,3 +169,18 @@ def test_model_file_knows_what_is_known_and_misses_what_is_hidden() -> None:
 def test_an_effect_that_cannot_be_hidden_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="'rust' is no effect that the demo can hide; take one of: coulomb_"):
         generate.generate(tmp_path, "rust")
+
+
+def test_a_full_disk_leaves_the_log_that_was_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    log = tmp_path / "train.csv"
+    log.write_text("old", encoding="utf-8")
+
+    def half(self: Path, text: str, **_: object) -> int:
+        self.write_bytes(text[: len(text) // 2].encode())
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Path, "write_text", half)
+    with pytest.raises(OSError, match="No space left"):
+        generate.write_log(log, np.zeros((3, 4)))
+    assert log.read_bytes() == b"old"
+    assert [path.name for path in tmp_path.iterdir()] == ["train.csv"]

@@ -197,3 +197,13 @@ def test_examples_run_and_plot(
     runpy.run_path(str(ROOT / "examples" / script / "run.py"), run_name="__main__")
     assert {path.name for path in tmp_path.iterdir()} == pictures
     assert all(path.stat().st_size > 5000 for path in tmp_path.iterdir())
+
+
+def test_a_cylinder_without_a_lever_is_refused_with_the_angles() -> None:
+    leg = Leg.hyq()
+    from dataclasses import replace
+
+    hip = replace(leg.parameters.hip, attachment=replace(leg.parameters.hip.attachment, base_angle=0.0))
+    level = Leg(replace(leg.parameters, hip=hip))
+    with pytest.raises(ModelError, match="the cylinder of the hip has no lever at hip 90 deg and knee -60 deg"):
+        level.cylinder_forces([np.pi / 2.0, -np.pi / 3.0], [1.0, 1.0])

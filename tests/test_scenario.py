@@ -6,6 +6,7 @@ import _thread
 import math
 import time
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 from threading import Timer
 from typing import Any
@@ -17,9 +18,10 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 import vpm
+from command_line import vpm as command
 from vpm.errors import ModelError, ScenarioError
 from vpm.plot.scenarios import readable_unit
-from vpm.scenario import Scenario, ScenarioRun, signals
+from vpm.scenario import Scenario, ScenarioInterruptedError, ScenarioRun, signals
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -292,6 +294,45 @@ def test_ctrl_c_stops_all_runs(folder: Path) -> None:
     with pytest.raises(KeyboardInterrupt):
         made.run()
     assert time.monotonic() - begin < 3.0
+
+
+TWO = (
+    PLAIN
+    + """
+[[runs]]
+name = "again"
+model = "sled.toml"
+"""
+)
+
+
+def test_ctrl_c_keeps_the_runs_that_were_finished(folder: Path) -> None:
+    def stop(*_: int) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(ScenarioInterruptedError) as caught:
+        scenario(folder, TWO).run(progress=stop, workers=1)
+    result = caught.value.result
+    assert "bare" in result.runs
+    assert {*result.runs, *result.failures} == {"bare", "again"}
+    assert set(result.failures.values()) <= {"it was interrupted"}
+    np.testing.assert_array_equal(result["bare"].values, scenario(folder).run()["bare"].values)
+
+
+def test_the_command_writes_the_runs_that_were_finished(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (folder / "two.toml").write_text(TWO, encoding="utf-8")
+    whole = Scenario.run
+
+    def stopped(self: Scenario, **_: Any) -> ScenarioRun:
+        result = whole(self)
+        runs = {"bare": result["bare"]}
+        raise ScenarioInterruptedError(replace(result, runs=runs, failures={"again": "it was interrupted"}))
+
+    monkeypatch.setattr(Scenario, "run", stopped)
+    done = command("simulate", "two.toml", "--out", "two.npz", cwd=folder)
+    assert done.returncode == 130
+    assert "failed: it was interrupted" in done.stdout
+    assert list(ScenarioRun.load(folder / "two.npz").runs) == ["bare"]
 
 
 def test_the_result_has_the_manners_of_results(folder: Path, tmp_path: Path) -> None:

@@ -30,7 +30,7 @@ __all__ = [
 ]
 
 class Diverged(CoreError):
-    """A simulation left the finite numbers, or no step of ``adaptive`` can follow it.
+    """A simulation left the bounds of its states, or no step of ``adaptive`` can follow it.
 
     Attributes
     ----------
@@ -318,15 +318,31 @@ class System:
         integrator: str,
         duration: float,
     ) -> tuple[float, NDArray[np.float64]]:
-        """What steps damp because they do not resolve it, in a run of ``duration`` (s) about ``state``.
+        """What steps do not resolve in a run of ``duration`` (s) about ``state``.
 
         Returns
         -------
         limit : float
-            Frequency above which an undamped vibration loses more than a tenth of its amplitude, Hz; infinite if none.
-        damped : ndarray, shape (m, 4)
-            Each mode of a damping ratio below 0.1 that does: frequency (Hz), damping ratio, time (s; that of the run,
-            or in which the mode falls to 1/e by itself if that is shorter), share that the method leaves in that time.
+            Frequency above which amplitude or frequency of an undamped vibration is off by a tenth, Hz; or infinite.
+        modes : ndarray, shape (m, 5)
+            Each mode of a damping ratio below 0.1 that is, and each that grows: frequency (Hz), damping ratio, time (s;
+            that of the run, or in which the mode falls to 1/e by itself if that is shorter), share that the method
+            leaves in that time, shift of its frequency as a share of it.
+        """
+    def unstuck(
+        self,
+        theta: ArrayLike,
+        state: ArrayLike,
+        time_step: float,
+        substeps: int,
+        integrator: str,
+    ) -> list[tuple[str, float]]:
+        """Where dry friction of joints does not bring to rest in these steps what it brakes, about ``state``.
+
+        Returns
+        -------
+        list of tuple
+            The place in words; the slope of friction at rest times the step over the inertia that it moves.
         """
     def simulate_closed_loop(
         self,

@@ -21,6 +21,20 @@ from vpm.simulate import MODES, Run, Setup, simulate
 PATIENCE = 0.1
 
 
+class BatchInterruptedError(KeyboardInterrupt):
+    """Ctrl-C while simulations ran side by side.
+
+    Attributes
+    ----------
+    outcomes : tuple of Run, VpmError or None
+        In the order of the jobs; None for those that were not finished.
+    """
+
+    def __init__(self, outcomes: Iterable[Run | VpmError | None]) -> None:
+        super().__init__("interrupted")
+        self.outcomes = tuple(outcomes)
+
+
 @dataclass(frozen=True)
 class Trial:
     """One simulation of a batch.
@@ -76,8 +90,8 @@ def simulate_batch(
     ------
     SimulationError
         Mode or number of workers is impossible.
-    KeyboardInterrupt
-        Ctrl-C; all trials stop.
+    BatchInterruptedError
+        Ctrl-C, a `KeyboardInterrupt` with what was finished; all other trials stop.
     """
     if mode not in MODES:
         raise SimulationError(f"unknown mode '{mode}'; choose one of {', '.join(MODES)}")
@@ -110,8 +124,8 @@ def side_by_side(
     ------
     SimulationError
         The number of workers is impossible.
-    KeyboardInterrupt
-        Ctrl-C; all jobs stop.
+    BatchInterruptedError
+        Ctrl-C, a `KeyboardInterrupt` with what was finished; all other jobs stop.
     """
     workers = (os.cpu_count() or 1) if workers is None else workers
     if workers < 1:
@@ -132,11 +146,18 @@ def _run_all(
         futures = [pool.submit(_kept, job) for job in jobs]
         try:
             _watch(futures, progress)
-        except BaseException:
+        except BaseException as reason:
             stop.set()
             pool.shutdown(wait=False, cancel_futures=True)
+            if isinstance(reason, KeyboardInterrupt):
+                raise BatchInterruptedError(map(_finished, futures)) from reason
             raise
     return [future.result() for future in futures]
+
+
+def _finished(future: Future[Run | VpmError]) -> Run | VpmError | None:
+    done = future.done() and not future.cancelled() and future.exception() is None
+    return future.result() if done else None
 
 
 def _watch(futures: Sequence[Future[Run | VpmError]], progress: Callable[[int, int], object] | None) -> None:

@@ -225,7 +225,8 @@ def simulate(
         )
     else:
         machine, record = load_pair(model, log, channels, interpolate)
-        with warnings_told():
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", ValidityWarning)  # they stand in the messages of the run
             run = simulate_log(
                 machine, record, mode or "free_run", integrator=integrator or "auto", hold=hold or HOLDS[0]
             )
@@ -234,17 +235,24 @@ def simulate(
 
 
 def _simulate_scenario(path: Path, out: Path | None, plot: Path | None) -> None:
-    from vpm.scenario import Scenario
+    from vpm.scenario import Scenario, ScenarioInterruptedError
 
-    scenario = Scenario.load(path)
+    scenario, stopped = Scenario.load(path), False
     with progress() as tell, warnings.catch_warnings():
         warnings.simplefilter("ignore", ValidityWarning)  # they stand in the notes of the runs
         tell(f"{scenario.name}: {len(scenario.models)} runs")
-        result = scenario.run(progress=lambda done, total: tell(f"{done} of {total} runs"))
+        try:
+            result = scenario.run(progress=lambda done, total: tell(f"{done} of {total} runs"))
+        except ScenarioInterruptedError as interrupt:
+            if not interrupt.result.runs:
+                raise
+            result, stopped = interrupt.result, True
     console.print(str(result), markup=False)
     if out is not None:
         result.save(out)
     save_plot(result.plot, plot, path)
+    if stopped:
+        raise KeyboardInterrupt
     if result.failures:
         raise VpmError(
             f"{path}: {len(result.failures)} of {len(scenario.models)} runs failed: {'; '.join(result.told)}"
@@ -255,6 +263,8 @@ def _tell_run(run: Run, record: Experiment, out: Path | None) -> None:
     from vpm.compare import compare as compare_run
 
     console.print(repr(run), markup=False)
+    for message in run.messages:
+        console.print(f"note: {message}", markup=False)
     try:
         console.print(str(compare_run(run, record)), markup=False)
     except VpmError as error:  # commands alone are enough to simulate

@@ -143,14 +143,14 @@ class IdentificationError(VpmError):
 
 
 class DivergedError(SimulationError):
-    """A simulation left the finite numbers.
+    """A simulation left the bounds of its states: numbers that are none, or larger than the machine allows.
 
     Attributes
     ----------
     run : object or None
-        The partial run, up to the last finite sample.
+        The partial run, up to the last sample before.
     time : float or None
-        Time of the first sample that is not finite (s).
+        Time of the first sample that is missing (s).
     """
 
     def __init__(self, message: str, *, run: object = None, time: float | None = None) -> None:

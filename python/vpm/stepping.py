@@ -14,7 +14,7 @@ from vpm.errors import DivergedError, SimulationError, near_match
 from vpm.model import Model
 from vpm.numbers import array_of
 from vpm.simulate import AUTOMATIC, Resolution, Run, Setup, judged
-from vpm.simulate.resolution import resolution
+from vpm.simulate.resolution import outermost, resolution
 
 if TYPE_CHECKING:
     from vpm._core import Snapshot
@@ -123,11 +123,11 @@ class Simulation:
 
     @property
     def resolution(self) -> Resolution:
-        """What the steps damp of vibrations about the state where it is, over one second.
+        """What the steps do not resolve about the state where it is, over one second.
 
-        `Run.resolution` says it of a run, about its first state and over its own time.
+        `Run.resolution` says it of a run, over its own time.
         """
-        return resolution(self._model, self.state, self._time_step, self._setup, 1.0)
+        return resolution(self._model, self.state[None, :], self._time_step, self._setup, 1.0)
 
     # ---- where it is -------------------------------------------------------------------------------------------------
 
@@ -175,7 +175,7 @@ class Simulation:
         SimulationError
             The number of commands is wrong or one is not finite.
         DivergedError
-            The state left the finite numbers; only `reset` leads on.
+            A state left its bounds; all stays at the sample before, and only `reset` or `restore` leads on.
         """
         from vpm._core import Diverged
 
@@ -183,7 +183,7 @@ class Simulation:
         try:
             self._outputs = self._core.step(command)
         except Diverged as error:
-            raise DivergedError(str(error), time=self.time) from None
+            raise DivergedError(str(error), time=error.sample_index * self._time_step) from None
         except ValueError as error:
             raise SimulationError(str(error)) from None
         return self._outputs
@@ -208,7 +208,7 @@ class Simulation:
         SimulationError
             A size or a number is wrong.
         DivergedError
-            The state left the finite numbers.
+            A state left its bounds.
 
         Warns
         -----
@@ -219,7 +219,8 @@ class Simulation:
         self._passed.clear()
         about = self.state
         rows = self._controlled(inputs, duration) if callable(inputs) else self._driven(inputs)
-        steps = resolution(self._model, about, self._time_step, self._setup, len(rows) * self._time_step)
+        passed = self._outermost(about, rows)
+        steps = resolution(self._model, passed, self._time_step, self._setup, len(rows) * self._time_step)
         time = begin + self._time_step * np.arange(1.0, len(rows) + 1.0)
         run = Run(
             self._model.name,
@@ -305,7 +306,7 @@ class Simulation:
         try:
             rows = self._core.run(table)
         except Diverged as error:
-            raise DivergedError(str(error), time=self.time) from None
+            raise DivergedError(str(error), time=error.sample_index * self._time_step) from None
         except ValueError as error:
             raise SimulationError(str(error)) from None
         self._outputs = self._core.outputs
@@ -326,6 +327,15 @@ class Simulation:
         if self._limited:
             self._passed.append(self.state)
         return outputs
+
+    def _outermost(self, about: Array, rows: Array) -> Array:
+        """The state at which a run began, then with the joints as its rows show them where one is farthest out."""
+        joints = self._model.joints
+        places = rows[:, [self._columns[f"{name}.position"] for name in joints]]
+        found = outermost(places)
+        states = np.tile(about, (len(found) + 1, 1))
+        states[1:, : len(joints)] = places[found]
+        return states
 
     def _has_limited_links(self) -> bool:
         if not self._model.core.n_elastic:

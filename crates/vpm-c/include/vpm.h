@@ -18,7 +18,7 @@ typedef enum {
    */
   VPM_INVALID = 1,
   /*
-   The motion has left all bounds; `vpm_reset` the simulation before the next step.
+   A state has left its bounds; all stays at the sample before, until `vpm_reset`.
    */
   VPM_DIVERGED = 2,
   /*

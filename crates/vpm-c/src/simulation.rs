@@ -20,7 +20,7 @@ pub enum VpmStatus {
     VpmOk = 0,
     /// An argument is wrong, for example null, infinite or not a number; the simulation is as it was.
     VpmInvalid = 1,
-    /// The motion has left all bounds; `vpm_reset` the simulation before the next step.
+    /// A state has left its bounds; all stays at the sample before, until `vpm_reset`.
     VpmDiverged = 2,
     /// A fault of the library itself; close the simulation and report the message.
     VpmFault = 3,

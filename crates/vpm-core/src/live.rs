@@ -8,7 +8,8 @@ use crate::integrator::Integrator;
 use crate::ode::Ode;
 use crate::sensor::Sensor;
 use crate::simulate::{
-    SampledDrives, Stepping, check_pistons, check_state, check_step, halted, output_name, state_name, trouble_in_words,
+    Bounds, SampledDrives, Stepping, check_pistons, check_state, check_step, halted, output_name, repair,
+    trouble_in_words,
 };
 use crate::system::System;
 use crate::table::Table;
@@ -21,7 +22,8 @@ const LONGEST_DELAY: f64 = 1e6;
 /// A machine under commands that come one by one, with the memory that its delays need.
 ///
 /// At sample k the state is x_k; [`Live::step`] holds a command from there to sample k + 1 and shows what the sensors see at its end,
-/// the command still held. Positions and velocities are those of a free run; a step allocates nothing.
+/// the command still held. Positions and velocities are those of a free run; a step allocates nothing. A step that fails leaves state,
+/// outputs and time those of the sample before, and every later step fails like it until [`Live::reset`].
 #[derive(Clone, Debug)]
 pub struct Live {
     description: Arc<Description>,
@@ -31,12 +33,17 @@ pub struct Live {
     integrator: Integrator<f64>,
     sensors: Vec<Sensor<f64>>,
     sampled: SampledDrives,
+    bounds: Bounds,
     /// The state in the coordinates of the steps.
     local: Vec<f64>,
     /// The same as users know it.
     state: Vec<f64>,
     rate: Vec<f64>,
     outputs: Vec<f64>,
+    /// State and outputs on their way to the next sample.
+    next: (Vec<f64>, Vec<f64>),
+    /// Why it cannot go on.
+    lost: Option<Error>,
     /// Inputs and true channels of the last samples, sample k in row `k % depth`.
     commands: Vec<f64>,
     truth: Vec<f64>,
@@ -53,18 +60,22 @@ impl Live {
         system.make_for(stepping.method)?;
         let (dim, sensors) = (system.dim(), description.sensors(theta));
         let depth = depth(&description, theta, stepping.time_step)?;
+        let bounds = Bounds::new(&description, theta, system.dynamics());
         let (outputs, inputs) = (description.n_outputs(), description.n_inputs());
         let mut live = Self {
             stepping,
             theta: theta.to_vec(),
             system,
             integrator: Integrator::new(stepping.method, dim),
+            bounds,
             sensors,
             sampled: SampledDrives::new(&description, stepping.time_step)?,
             local: vec![0.0; dim],
             state: vec![0.0; dim],
             rate: vec![0.0; dim],
             outputs: vec![0.0; outputs],
+            next: (vec![0.0; dim], vec![0.0; outputs]),
+            lost: None,
             commands: vec![0.0; depth * inputs],
             truth: vec![0.0; depth * outputs],
             depth,
@@ -140,7 +151,8 @@ impl Live {
         self.feed();
         self.sampled.restart();
         self.rest();
-        self.observe()
+        self.lost = self.observe(0).err();
+        self.lost.clone().map_or(Ok(()), Err)
     }
 
     /// Puts logged supplies at their own pressure, until one is given.
@@ -158,6 +170,17 @@ impl Live {
     /// at its end.
     pub fn step(&mut self, inputs: &[f64]) -> Result<&[f64]> {
         Table::vector("inputs", inputs, self.description.n_inputs(), INPUT)?;
+        if let Some(error) = &self.lost {
+            return Err(error.clone());
+        }
+        if let Err(error) = self.go_on(inputs) {
+            self.lost = Some(error.clone());
+            return Err(error);
+        }
+        Ok(&self.outputs)
+    }
+
+    fn go_on(&mut self, inputs: &[f64]) -> Result<()> {
         let width = inputs.len();
         let row = self.sample % self.depth;
         self.commands[row * width..(row + 1) * width].copy_from_slice(inputs);
@@ -166,9 +189,7 @@ impl Live {
         self.integrator
             .advance(&mut self.system, &mut self.local, pieces, &|| false)
             .map_err(|halt| halted(&self.description, self.stepping, sample, halt, (Vec::new(), Vec::new())))?;
-        self.sample += 1;
-        self.observe()?;
-        Ok(&self.outputs)
+        self.observe(sample + 1)
     }
 
     /// Puts on actuators and supplies what the inputs until now amount to over the coming interval; sampled drives that are due act.
@@ -207,51 +228,53 @@ impl Live {
         system.input(number, *sample, self.stepping.time_step, command)
     }
 
-    fn observe(&mut self) -> Result<()> {
-        self.system.show(&self.local, &mut self.state);
-        if let Some(place) = self.local.iter().position(|state| !state.is_finite()) {
-            return Err(self.diverged(&state_name(&self.description, place)));
+    /// Comes to the next state at `sample`, if it and what the sensors show there are what they can be.
+    fn observe(&mut self, sample: usize) -> Result<()> {
+        if let Some(place) = self.bounds.outside(&self.local) {
+            let (what, event) = self.bounds.complaint(&self.description, place, self.local[place]);
+            return Err(self.astray(sample, what, event, repair(self.stepping.method)));
         }
         if let Some(trouble) = self.system.trouble() {
             let (what, event, repair) = trouble_in_words(&self.description, trouble);
-            return Err(self.lost(what, event, repair));
+            return Err(self.astray(sample, what, event, repair));
         }
-        let (layout, width) = (self.description.layout(), self.outputs.len());
-        let row = self.sample % self.depth * width;
+        let (state, outputs) = (&mut self.next.0, &mut self.next.1);
+        self.system.show(&self.local, state);
+        let (layout, width) = (self.description.layout(), outputs.len());
+        let row = sample % self.depth * width;
         let truth = &mut self.truth[row..row + width];
         self.system.sample(&self.local, &mut self.rate, truth);
         // The command that is still held at the end of its interval; none before the first.
-        let held = self.sample.saturating_sub(1) % self.depth * self.description.n_inputs();
+        let held = sample.saturating_sub(1) % self.depth * self.description.n_inputs();
         let channels = self.truth[row + layout.actuators()..row + layout.lines()].chunks_exact_mut(2);
         for (channels, &command) in channels.zip(&self.commands[held..]) {
             channels[0] = command;
         }
-        self.outputs.copy_from_slice(&self.truth[row..row + width]);
+        outputs.copy_from_slice(&self.truth[row..row + width]);
         for sensor in &self.sensors {
             let column = sensor.channel.column(layout);
             let truth = |sample: usize| self.truth[(sample % self.depth) * width + column];
-            self.outputs[column] = sensor.read(self.sample, self.stepping.time_step, truth);
+            outputs[column] = sensor.read(sample, self.stepping.time_step, truth);
         }
         // A state may be finite still where its rate is not.
-        match self.outputs.iter().position(|output| !output.is_finite()) {
-            Some(column) => Err(self.diverged(&output_name(&self.description, column))),
-            None => Ok(()),
+        if let Some(column) = outputs.iter().position(|output| !output.is_finite()) {
+            let what = format!("the {}", output_name(&self.description, column));
+            let event = Diverged::NOT_FINITE.to_owned();
+            return Err(self.astray(sample, what, event, repair(self.stepping.method)));
         }
+        std::mem::swap(&mut self.state, &mut self.next.0);
+        std::mem::swap(&mut self.outputs, &mut self.next.1);
+        self.sample = sample;
+        Ok(())
     }
 
     #[cold]
-    fn diverged(&self, what: &str) -> Error {
-        let repair = "reset the simulation and use more substeps, the integrator linearly_implicit or adaptive, or smaller commands";
-        self.lost(format!("the {what}"), Diverged::NOT_FINITE.to_owned(), repair)
-    }
-
-    #[cold]
-    fn lost(&self, what: String, event: String, repair: &'static str) -> Error {
+    fn astray(&self, sample: usize, what: String, event: String, repair: &'static str) -> Error {
         Error::Diverged(Box::new(Diverged {
             what,
             event,
-            time: self.time(),
-            sample_index: self.sample,
+            time: sample as f64 * self.stepping.time_step,
+            sample_index: sample,
             method: self.stepping.method.to_string(),
             step: self.stepping.step(),
             repair,

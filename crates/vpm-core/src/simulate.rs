@@ -1,6 +1,7 @@
 //! Simulation of a whole record: free run on commands, closed loop on references, restarts from many samples.
 
 mod along;
+mod bounds;
 mod control;
 mod guide;
 mod hold;
@@ -15,11 +16,12 @@ mod start;
 mod stepper;
 
 pub use along::{Along, drives_along};
+pub(crate) use bounds::{Bounds, repair};
 pub use hold::{Course, Hold, Inputs};
 pub(crate) use names::{output_name, state_name};
 pub use observer::{Filtered, Gains, Noise, Readings, filter, observe};
 pub use prescribed::{observed, prescribed};
-pub use resolution::resolution;
+pub use resolution::{Unstuck, resolution, unstuck};
 pub(crate) use sampled::SampledDrives;
 pub(crate) use stability::{check_step, check_structure};
 pub(crate) use start::check_pistons;
@@ -253,10 +255,15 @@ pub(crate) fn strayed<S: Scalar>(stepper: &Stepper<'_, S>, astray: Astray, (row,
     }
 }
 
-/// What stopped being finite, in the words of the model.
-pub(crate) fn diverged<S: Scalar>(stepper: &Stepper<'_, S>, what: String, row: usize, start: usize) -> Error {
-    let (event, repair) = (Diverged::NOT_FINITE.to_owned(), repair(stepper.stepping().method));
-    lost(stepper.stepping(), what, (event, repair), (row, start), stepper.before(row))
+/// What left its bounds and how, in the words of the model.
+pub(crate) fn diverged<S: Scalar>(
+    stepper: &Stepper<'_, S>,
+    (what, event): (String, String),
+    row: usize,
+    start: usize,
+) -> Error {
+    let event = (event, repair(stepper.stepping().method));
+    lost(stepper.stepping(), what, event, (row, start), stepper.before(row))
 }
 
 /// A piston that steps of a fixed length carried `beyond` (m) the end of its stroke, as no stop lets it: the steps leapt over the impact.
@@ -310,22 +317,6 @@ fn lost(
         outputs,
         states,
     }))
-}
-
-/// What helps against a state that is not finite.
-fn repair(method: Method) -> &'static str {
-    match method {
-        Method::LinearlyImplicit | Method::Rosenbrock => {
-            "use more substeps or the integrator adaptive, or check the signs and sizes of the parameters"
-        }
-        Method::Rk4 | Method::SemiImplicit | Method::Additive => {
-            "use more substeps or the integrator linearly_implicit"
-        }
-        Method::Guarded => {
-            "use more substeps or the integrator adaptive, or check the signs and sizes of the parameters"
-        }
-        Method::Adaptive { .. } => "check the signs and sizes of the parameters",
-    }
 }
 
 /// What the step control could not follow on the way from a sample (number `sample`, counted with its time from the beginning), in the

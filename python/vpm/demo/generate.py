@@ -7,7 +7,6 @@ Run it with ``python -m vpm.demo.generate --hidden torque_ripple --out some-fold
 
 import argparse
 import math
-import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -131,7 +130,17 @@ def write_log(path: Path, rows: npt.NDArray[np.float64]) -> None:
     """
     lines = [",".join(COLUMNS)]
     lines += [f"{time:.3f},{q:.6f},{u:.4f},{wanted:.6f}" for time, q, u, wanted in rows.tolist()]
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
+    _write(path, "\n".join(lines) + "\n")
+
+
+def _write(path: Path, text: str) -> None:
+    """Write beside the place and move into it; by itself, as the demo's log is made without the rest of vpm."""
+    beside = path.with_name(f".{path.name}.part")
+    try:
+        beside.write_text(text, encoding="utf-8", newline="\n")
+        beside.replace(path)
+    finally:
+        beside.unlink(missing_ok=True)
 
 
 def truth(hidden: str) -> str:
@@ -187,6 +196,8 @@ def generate(folder: Path, hidden: str = "coulomb_friction", seed: int = SEED) -
     ------
     ValueError
         If `hidden` is not a name in `HIDDEN`.
+    OSError
+        A file cannot be written; what was there is there still.
     """
     if hidden not in HIDDEN:
         raise ValueError(f"'{hidden}' is no effect that the demo can hide; take one of: {', '.join(HIDDEN)}.")
@@ -195,10 +206,10 @@ def generate(folder: Path, hidden: str = "coulomb_friction", seed: int = SEED) -
     folder.mkdir(parents=True, exist_ok=True)
     write_log(folder / "train.csv", record(machine, train_reference, 15.0, noise))
     write_log(folder / "validation.csv", record(machine, validation_reference, 10.0, noise))
-    (folder / "truth.toml").write_text(truth(hidden), encoding="utf-8", newline="\n")
+    _write(folder / "truth.toml", truth(hidden))
     model = Path(__file__).with_name("model.toml")
     if folder.resolve() != model.parent.resolve():
-        shutil.copyfile(model, folder / "model.toml")
+        _write(folder / "model.toml", model.read_text(encoding="utf-8"))
 
 
 def main() -> None:

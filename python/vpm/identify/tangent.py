@@ -84,9 +84,9 @@ def estimate_on_tangent(
     flying = flying and has_hidden(model, data.motions[0].joints)
     for _ in range(FLYING if flying else TANGENTS):
         rough = estimate(at, Tangent(data, origin), free, bounds=bounds, tolerance=tolerance)
-        start, step = at.theta[columns], rough.values - at.theta[columns]
         for share in SHARES:
-            reached = at.with_parameters(dict(zip(free, map(float, start + share * step), strict=True)))
+            values = _on_the_way(at.theta[columns], rough.values, share)
+            reached = at.with_parameters(dict(zip(free, map(float, values), strict=True)))
             residual = _residual(data, reached)
             if residual @ residual <= cost * (1.0 + OFF**2):
                 break
@@ -104,6 +104,11 @@ def estimate_on_tangent(
             break
         cost, at, origin = float(residual @ residual), reached, reached.theta
     return replace(rough, values=reached.theta[columns], residual=residual, early=early)
+
+
+def _on_the_way(start: Array, end: Array, share: float) -> Array:
+    """Values after a share of the way, never beyond its ends: a rounded sum may pass a bound at which one lies."""
+    return np.clip(start + share * (end - start), np.minimum(start, end), np.maximum(start, end))
 
 
 def _residual(data: InverseDynamicsProblem, model: Model) -> Array:

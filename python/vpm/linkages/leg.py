@@ -191,8 +191,23 @@ class Leg:
         return self._rows(self._core.accelerations, angles, rates, torques)
 
     def cylinder_forces(self, angles: ArrayLike, torques: ArrayLike) -> Array:
-        """Cylinder forces (N) that give joint torques (N m), ``F = tau / (ds/dq)``, shape (2,) or (N, 2)."""
-        return self._rows(self._core.cylinder_forces, angles, torques)
+        """Cylinder forces (N) that give joint torques (N m), ``F = tau / (ds/dq)``, shape (2,) or (N, 2).
+
+        Raises
+        ------
+        ModelError
+            A cylinder has no lever at these angles, so that no force gives a torque.
+        """
+        forces = self._rows(self._core.cylinder_forces, angles, torques)
+        lost = np.argwhere(~np.isfinite(np.atleast_2d(forces)))
+        if lost.size:
+            row, joint = map(int, lost[0])
+            at = np.degrees(np.atleast_2d(np.asarray(angles, dtype=float))[row])
+            raise ModelError(
+                f"{self.name}: the cylinder of the {('hip', 'knee')[joint]} has no lever at hip {at[0]:.4g} deg and "
+                f"knee {at[1]:.4g} deg, so that no force gives its torque; move away from these angles"
+            )
+        return forces
 
     def joint_torques(self, angles: ArrayLike, forces: ArrayLike) -> Array:
         """Joint torques (N m) of cylinder forces (N), ``tau = F ds/dq``, shape (2,) or (N, 2)."""

@@ -1,6 +1,6 @@
 """Scenarios: tests without a log, one file for what drives a machine, how it starts, and what is compared."""
 
-from vpm.scenario.outcome import ScenarioRun
+from vpm.scenario.outcome import ScenarioInterruptedError, ScenarioRun
 from vpm.scenario.scenario import Scenario
 
-__all__ = ["Scenario", "ScenarioRun"]
+__all__ = ["Scenario", "ScenarioInterruptedError", "ScenarioRun"]

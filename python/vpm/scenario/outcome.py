@@ -136,15 +136,9 @@ class ScenarioRun(Result):
                 for row in self.extremes(name):
                     numbers = " ".join(f"{number:12.5g}" for number in row[2:])
                     yield f"  {row.channel:32s} {numbers} {row.unit if row.unit != '1' else ''}".rstrip()
-                yield from (f"  note: {note}" for note in self._notes(name))
+                yield from (f"  note: {note}" for note in self.runs[name].messages)
             if name in self.failures:
                 yield f"  failed: {self.failures[name]}"
-
-    def _notes(self, name: str) -> tuple[str, ...]:
-        """What to know of a run before its numbers are trusted: its notes, and what its steps damp."""
-        run = self.runs[name]
-        steps = run.resolution
-        return run.notes if steps is None or not steps.frequencies.size else (*run.notes, str(steps))
 
     def _headline(self) -> Mapping[str, object]:
         shown: dict[str, object] = {"name": self.name, "runs": tuple(self.runs), "samples": self.time.size}
@@ -152,7 +146,7 @@ class ScenarioRun(Result):
 
     def _repr_html_(self) -> str:
         rows: list[tuple[object, ...]] = [(name, *row) for name in self.runs for row in self.extremes(name)]
-        rows += [(name, note, "", "", "", "") for name in self.runs for note in self._notes(name)]
+        rows += [(name, note, "", "", "", "") for name in self.runs for note in self.runs[name].messages]
         rows += [(name, f"failed: {reason}", "", "", "", "") for name, reason in self.failures.items()]
         return html_table(self.name, ("run", "channel", "unit", "min", "max", "final"), rows)
 
@@ -167,3 +161,17 @@ class ScenarioRun(Result):
             parts = [run[channel] if channel in run.channels else np.full(run.time.size, np.nan) for run in runs]
             columns[channel] = np.concatenate(parts)
         return columns
+
+
+class ScenarioInterruptedError(KeyboardInterrupt):
+    """Ctrl-C while the runs of a scenario went on.
+
+    Attributes
+    ----------
+    result : ScenarioRun
+        The runs that were finished; all others stand in its ``failures``.
+    """
+
+    def __init__(self, result: ScenarioRun) -> None:
+        super().__init__("interrupted")
+        self.result = result

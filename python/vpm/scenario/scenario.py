@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property, partial
 from os import PathLike
@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from vpm.batch import side_by_side
+from vpm.batch import BatchInterruptedError, side_by_side
 from vpm.errors import DivergedError, ScenarioError, SimulationError, VpmError, near_match
 from vpm.experiment import Experiment
 from vpm.model import Model
@@ -25,7 +25,7 @@ from vpm.scenario.form import schema_problems
 from vpm.scenario.inputs import given_inputs
 from vpm.scenario.machine import machines
 from vpm.scenario.messages import in_file, raise_first, refuse
-from vpm.scenario.outcome import ScenarioRun
+from vpm.scenario.outcome import ScenarioInterruptedError, ScenarioRun
 from vpm.scenario.panels import checked_columns, checked_panels
 from vpm.scenario.schema import Document
 from vpm.scenario.start import held_inputs, start_state
@@ -222,14 +222,21 @@ class Scenario:
 
         Raises
         ------
-        KeyboardInterrupt
-            Ctrl-C; all runs stop.
+        ScenarioInterruptedError
+            Ctrl-C, a `KeyboardInterrupt` with the runs that were finished; all others stop.
         """
         inputs = {name: self.experiment(name) for name in self._models}
         jobs = [partial(self._one, name, inputs[name]) for name in self._models]
-        found = dict(zip(self._models, side_by_side(jobs, workers, progress), strict=True))
+        try:
+            return self._result(inputs, side_by_side(jobs, workers, progress))
+        except BatchInterruptedError as stopped:
+            raise ScenarioInterruptedError(self._result(inputs, stopped.outcomes)) from stopped
+
+    def _result(self, inputs: dict[str, Experiment], outcomes: Sequence[Run | VpmError | None]) -> ScenarioRun:
+        found = dict(zip(self._models, outcomes, strict=True))
         runs = dict(_finished(found, inputs))
         failures = {name: str(error) for name, error in found.items() if isinstance(error, VpmError)}
+        failures |= {name: "it was interrupted" for name, outcome in found.items() if outcome is None}
         return ScenarioRun(self.name, self._clock.time, runs, inputs, failures, self._panels, dict(self._columns))
 
     def _one(self, name: str, inputs: Experiment) -> Run:
@@ -275,7 +282,9 @@ def _setup(document: Document) -> Setup:
         refuse(("integrator",), f"is wrong: {error}")
 
 
-def _finished(found: Mapping[str, Run | VpmError], inputs: Mapping[str, Experiment]) -> Iterator[tuple[str, Run]]:
+def _finished(
+    found: Mapping[str, Run | VpmError | None], inputs: Mapping[str, Experiment]
+) -> Iterator[tuple[str, Run]]:
     """Runs that came somewhere, with notes on references that the scenario does not give."""
     for name, outcome in found.items():
         run = outcome.run if isinstance(outcome, DivergedError) else outcome

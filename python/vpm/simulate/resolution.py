@@ -1,4 +1,4 @@
-"""What steps damp because they do not resolve it."""
+"""What steps do not resolve, and what they make of it."""
 
 from __future__ import annotations
 
@@ -17,21 +17,26 @@ Array = NDArray[np.float64]
 
 
 class Modes(NamedTuple):
-    """What a linear machine's vibrations lose to steps; see `Resolution`."""
+    """What steps make of a linear machine's vibrations and of dry friction; see `Resolution`."""
 
     limit: float
     frequencies: Array
     ratios: Array
     times: Array
     left: Array
+    shifts: Array
+    sites: tuple[str, ...]
+    turns: Array
 
 
 class Resolution(Storable):
-    """What the steps of a run damp because they do not resolve it; as a text one sentence.
+    """What the steps of a run do not resolve; as a text one sentence.
 
-    Modes are those of the linear machine about the first state, without dry friction. One is listed if its own damping
-    ratio is below 0.1 and the method takes more than a tenth of its amplitude. They are worked out when somebody looks:
-    a batch pays for no run that nobody asks.
+    Modes are those of the linear machine without dry friction, about the first state or about one where a joint is
+    farthest out: that with the fastest of them, for end stops and other springs stiffen there. One is listed if its own
+    damping ratio is below 0.1 and the method takes more than a tenth of its amplitude or moves its frequency by more,
+    or if the method lets it grow. Dry friction is listed where steps of the method do not bring to rest what it brakes.
+    All of it is worked out when somebody looks: a batch pays for no run that nobody asks.
 
     Parameters
     ----------
@@ -57,15 +62,15 @@ class Resolution(Storable):
 
     @property
     def limit(self) -> float:
-        """Frequency above which an undamped vibration loses more than a tenth of its amplitude over the run, Hz.
+        """Frequency above which an undamped vibration is off by a tenth, Hz; infinite if there is none.
 
-        Infinite if there is none.
+        Off is its amplitude at the end of the run, or its frequency.
         """
         return self._modes.limit
 
     @property
     def frequencies(self) -> Array:
-        """Modes that are damped, shape (m,), Hz, slowest first."""
+        """Modes that are not resolved, shape (m,), Hz, slowest first; of a decay its rate over 2 pi."""
         return self._modes.frequencies
 
     @property
@@ -80,8 +85,31 @@ class Resolution(Storable):
 
     @property
     def left(self) -> Array:
-        """Share of its amplitude that the method leaves of each over that time, shape (m,), beside its own damping."""
+        """Share of its amplitude that the method leaves of each over that time, shape (m,), beside its own damping.
+
+        Above 1 where the method lets a mode grow.
+        """
         return self._modes.left
+
+    @property
+    def shifts(self) -> Array:
+        """By which share of its frequency the method makes each mode faster, shape (m,)."""
+        return self._modes.shifts
+
+    @property
+    def sites(self) -> tuple[str, ...]:
+        """Where dry friction does not bring to rest what it brakes, k places in words."""
+        return self._modes.sites
+
+    @property
+    def turns(self) -> Array:
+        """Slope of that friction at rest times the step over the inertia that it moves, shape (k,)."""
+        return self._modes.turns
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether the steps resolve all modes and all dry friction."""
+        return not self.frequencies.size and not self.sites
 
     @cached_property
     def _modes(self) -> Modes:
@@ -103,24 +131,53 @@ class Resolution(Storable):
     def __str__(self) -> str:
         """One sentence."""
         steps = f"{self.integrator}, {1e3 * self.step:.3g} ms"
-        if not self.frequencies.size:
+        if self.is_complete:
             return steps
-        told = f"{self.frequencies[0]:.3g} Hz: to {self.left[0]:.2g} in {self.times[0]:.2g} s"
-        others = f", and {self.frequencies.size - 1} more up to {self.frequencies[-1]:.3g} Hz"
-        told += others if self.frequencies.size > 1 else ""
-        return f"{steps}: modes above {self.limit:.3g} Hz are damped ({told}); more substeps or adaptive resolve them"
+        faults = "; ".join(fault for fault in (self._vibrations(), self._friction()) if fault)
+        return f"{steps}: {faults}; more substeps or adaptive resolve them"
+
+    def _vibrations(self) -> str:
+        count = self.frequencies.size
+        if not count:
+            return ""
+        others = f", and {count - 1} more up to {self.frequencies[-1]:.3g} Hz" if count > 1 else ""
+        return f"modes above {self.limit:.3g} Hz are not resolved ({self._fate()}{others})"
+
+    def _fate(self) -> str:
+        """What becomes of the slowest mode."""
+        frequency, left, time = self.frequencies[0], self.left[0], self.times[0]
+        if left > 1.0:
+            return f"{frequency:.3g} Hz: grows"
+        if abs(self.shifts[0]) > 1.0 - left:
+            return f"{frequency:.3g} Hz: becomes {frequency * (1.0 + self.shifts[0]):.3g} Hz"
+        return f"{frequency:.3g} Hz: to {left:.2g} in {time:.2g} s"
+
+    def _friction(self) -> str:
+        if not self.sites:
+            return ""
+        worst = float(np.max(self.turns))
+        sites = " and ".join(self.sites)
+        return f"dry friction of {sites} stops it in {1.0 / worst:.2g} steps, so that it creeps or chatters"
 
     def _headline(self) -> Mapping[str, object]:
         return {"steps": str(self)}
 
 
-def resolution(model: Model, state: Array, dt: float, setup: Setup, duration: float) -> Resolution:
-    """What steps damp in a run of ``duration`` (s) that begins in ``state``.
+def outermost(places: Array) -> list[int]:
+    """Rows of the places of joints, shape (N, n), in which one of them is farthest out, ascending."""
+    if not places.size:
+        return []
+    return sorted({*places.argmin(axis=0).tolist(), *places.argmax(axis=0).tolist()})
+
+
+def resolution(model: Model, states: Array, dt: float, setup: Setup, duration: float) -> Resolution:
+    """What steps do not resolve in a run of ``duration`` (s) that begins in the first of ``states``.
 
     Parameters
     ----------
     model : Model
-    state : ndarray, shape (nx,)
+    states : ndarray, shape (k, nx)
+        The first one, and others that the run passes.
     dt : float
         Time between samples, s.
     setup : Setup
@@ -129,7 +186,12 @@ def resolution(model: Model, state: Array, dt: float, setup: Setup, duration: fl
     method = setup.method(model)
 
     def modes() -> Modes:
-        limit, damped = model.core.resolution(model.theta, state, dt, setup.substeps, method, duration)
-        return Modes(float(limit), *damped.T.copy())
+        core, theta, steps = model.core, model.theta, (dt, setup.substeps, method)
+        each = [core.resolution(theta, state, *steps, duration) for state in states]
+        limit, found = max(each, key=lambda one: float(np.max(one[1][:, 0], initial=0.0)))
+        friction = core.unstuck(theta, states[0], *steps)
+        sites, turns = tuple(site for site, _ in friction), np.array([turn for _, turn in friction])
+        frequencies, ratios, times, left, shifts = found.T.copy()
+        return Modes(float(limit), frequencies, ratios, times, left, shifts, sites, turns)
 
     return Resolution(method, dt / setup.substeps, modes)

@@ -46,7 +46,7 @@ class Run(Result):
     notes : tuple of str
         What to know before the numbers are trusted: one sentence each, none as a rule.
     resolution : Resolution or None
-        What the steps damp because they do not resolve it, worked out when somebody looks; None where no run goes
+        What the steps do not resolve, worked out when somebody looks; None where no run goes
         through (restarts, inverse dynamics, prescribed motion, what diverged).
     """
 
@@ -68,6 +68,12 @@ class Run(Result):
         if channel not in self.channels:
             raise SimulationError(f"the run has no channel '{channel}'; it has {', '.join(self.channels)}")
         return self.values[:, self.channels.index(channel)]
+
+    @property
+    def messages(self) -> tuple[str, ...]:
+        """What to know before the numbers are trusted: `notes`, and what the steps do not resolve."""
+        steps = self.resolution
+        return self.notes if steps is None or steps.is_complete else (*self.notes, str(steps))
 
     def _headline(self) -> Mapping[str, object]:
         return {

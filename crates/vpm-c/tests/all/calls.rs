@@ -136,7 +136,18 @@ fn a_motion_that_diverges_is_told_and_can_begin_again() {
     let mut outputs = [0.0; 6];
     let end = (0..100).map(|_| axis.step(f64::MAX, &mut outputs)).find(|&status| status != VpmStatus::VpmOk);
     assert_eq!(end, Some(VpmStatus::VpmDiverged), "{}", axis.message());
+    assert!(axis.message().contains("at which its body is as fast as light"), "{}", axis.message());
+    // What is shown is the sample before, and stays so.
+    assert_eq!(axis.step(0.0, &mut outputs), VpmStatus::VpmDiverged);
+    let (mut state, mut seen) = ([f64::NAN; 2], [f64::NAN; 6]);
     // SAFETY: an open simulation, and arrays of its sizes.
+    unsafe {
+        assert_eq!(vpm_state(axis.0, state.as_mut_ptr()), VpmStatus::VpmOk);
+        assert_eq!(vpm_outputs(axis.0, seen.as_mut_ptr()), VpmStatus::VpmOk);
+    }
+    assert!(state.iter().all(|number| number.abs() < 3e8), "{state:?}");
+    assert!(seen.iter().all(|number| number.is_finite()), "{seen:?}");
+    // SAFETY: as before.
     unsafe { assert_eq!(vpm_reset(axis.0, ptr::null()), VpmStatus::VpmOk) };
     assert_eq!(axis.step(0.1, &mut outputs), VpmStatus::VpmOk);
 }

@@ -1,4 +1,4 @@
-//! What a method of fixed steps damps because it does not resolve it.
+//! What a method of fixed steps damps, shifts or lets grow because it does not resolve it.
 //!
 //! For analysis beside a run: this allocates.
 
@@ -11,31 +11,36 @@ use crate::ode::Ode;
 
 /// Damping ratio below which a mode counts as lightly damped: it rings for more than a period and a half.
 pub const LIGHT: f64 = 0.1;
-/// Share of its amplitude that a mode may lose to the method unsaid.
+/// Share of its amplitude that a mode may lose to the method unsaid, or of its frequency.
 pub const LOST: f64 = 0.1;
+/// By how much a step may let a mode grow unsaid: rounding.
+const GROWN: f64 = 1e-9;
 /// Largest product of angular frequency and step that is looked at, and how finely.
 const REACH: f64 = 10.0;
 const GRID: f64 = 0.05;
 
-/// A lightly damped mode that the method damps besides.
+/// A lightly damped mode that the method damps besides or moves to another frequency; or any that it lets grow.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Damped {
-    /// Its frequency in Hz.
+    /// Its frequency in Hz; of a decay its rate over 2 pi.
     pub frequency: f64,
     /// Its own damping ratio.
     pub ratio: f64,
-    /// The time that counts in s: that of the run, or in which the mode falls to 1/e by itself if that is shorter.
+    /// The time that counts in s: that of the run, or in which the mode falls to 1/e by itself if that is shorter and it does not grow.
     pub time: f64,
-    /// Share of its amplitude that the method leaves of it in that time.
+    /// Share of its amplitude that the method leaves of it in that time; of one that grows, what becomes of it, without its own damping.
     pub left: f64,
+    /// By which share of its frequency the method makes it faster; 0 for what grows.
+    pub shift: f64,
 }
 
 /// What a method resolves over a run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Resolution {
-    /// Frequency in Hz above which an undamped vibration loses more than [`LOST`]; infinite if there is none.
+    /// Frequency in Hz above which the amplitude or the frequency of an undamped vibration is off by more than [`LOST`]; infinite if there
+    /// is none.
     pub limit: f64,
-    /// The lightly damped modes that lose more than that, slowest first.
+    /// The lightly damped modes that are off by more than that and all that grow, slowest first.
     pub damped: Vec<Damped>,
 }
 
@@ -56,8 +61,9 @@ impl Resolution {
     /// Of the linear system `x' = A x`, A (`jacobian`) row by row, in states of these natural `sizes`.
     ///
     /// Law: a mode `e^(s t)` is a damped oscillator. The method itself makes one step of it; the eigenvalue g of what that does to its
-    /// state leaves `(|g| e^(-h Re s))^(t/h)` of its amplitude over a time t, beside its own damping. Forces that a method takes
-    /// explicitly and others that it takes implicitly are not told apart.
+    /// state leaves `(|g| e^(-h Re s))^(t/h)` of its amplitude over a time t, beside its own damping, and makes its frequency
+    /// `arg g / (h Im s)` times as high. It grows where `|g| > 1` and `Re s <= 0`. Forces that a method takes explicitly and others that it
+    /// takes implicitly are not told apart.
     /// Steps of controlled error resolve what they meet; guarded ones are those of the Rosenbrock method.
     /// Checked: closed forms of the stability functions, runs of a spring.
     pub fn new(jacobian: &[f64], sizes: &[f64], steps: Steps) -> Result<Self> {
@@ -72,25 +78,48 @@ impl Resolution {
         }
         let n = sizes.len();
         let scaled = DMatrix::from_fn(n, n, |i, j| jacobian[i * n + j] * sizes[j] / sizes[i]);
-        let damped = eigenvalues(scaled)?.into_iter().filter(|value| value.im > 0.0).map(|value| steps.damped(value));
-        let mut damped: Vec<_> = damped.filter(|mode| mode.ratio < LIGHT && mode.left < 1.0 - LOST).collect();
+        let all = eigenvalues(scaled)?.into_iter().filter(|value| value.im >= 0.0 && value.norm() > 0.0);
+        let mut damped: Vec<_> = all.filter_map(|value| steps.grown(value).or_else(|| steps.damped(value))).collect();
         damped.sort_by(|a, b| a.frequency.total_cmp(&b.frequency));
         Ok(Self { limit: steps.limit(), damped })
     }
 }
 
 impl Steps {
-    fn damped(&self, value: Complex<f64>) -> Damped {
+    /// A lightly damped vibration of which the method makes another one.
+    fn damped(&self, value: Complex<f64>) -> Option<Damped> {
         let (size, ratio) = (value.norm(), -value.re / value.norm());
+        if value.im == 0.0 || ratio >= LIGHT {
+            return None;
+        }
         let own = if ratio > 0.0 { (ratio * size).recip() } else { f64::INFINITY };
         let time = self.duration.min(own);
-        let factor = self.growth(size * self.step, ratio) * (-value.re * self.step).exp();
-        Damped { frequency: value.im / std::f64::consts::TAU, ratio, time, left: factor.powf(time / self.step) }
+        let turn = self.turn(size * self.step, ratio);
+        let left = (turn.norm() * (-value.re * self.step).exp()).powf(time / self.step);
+        let shift = turn.arg().abs() / (value.im * self.step) - 1.0;
+        let mode = Damped { frequency: value.im / std::f64::consts::TAU, ratio, time, left, shift };
+        (left < 1.0 - LOST || shift.abs() > LOST).then_some(mode)
     }
 
-    /// Frequency in Hz above which the method takes more than the share from an undamped vibration.
+    /// What does not grow by itself and does by the method.
+    fn grown(&self, value: Complex<f64>) -> Option<Damped> {
+        let (size, ratio) = (value.norm(), -value.re / value.norm());
+        let growth = match value.im == 0.0 {
+            true => self.decay(size * self.step),
+            false => self.turn(size * self.step, ratio).norm(),
+        };
+        let left = growth.powf(self.duration / self.step);
+        let mode = Damped { frequency: size / std::f64::consts::TAU, ratio, time: self.duration, left, shift: 0.0 };
+        (ratio >= 0.0 && growth > 1.0 + GROWN && left > 1.0 + LOST).then_some(mode)
+    }
+
+    /// Frequency in Hz above which the method makes another vibration of an undamped one.
     fn limit(&self) -> f64 {
-        let lost = |reach: f64| self.growth(reach, 0.0).powf(self.duration / self.step) < 1.0 - LOST;
+        let lost = |reach: f64| {
+            let turn = self.turn(reach, 0.0);
+            let left = turn.norm().powf(self.duration / self.step);
+            (left - 1.0).abs() > LOST || (turn.arg().abs() / reach - 1.0).abs() > LOST
+        };
         let first = (1..=(REACH / GRID) as u32).map(|k| f64::from(k) * GRID).find(|&reach| lost(reach));
         let Some(mut high) = first else { return f64::INFINITY };
         let mut low = high - GRID;
@@ -101,24 +130,95 @@ impl Steps {
         high / (std::f64::consts::TAU * self.step)
     }
 
-    /// By how much one step of `reach` radians makes an oscillator of that damping ratio grow.
-    fn growth(&self, reach: f64, ratio: f64) -> f64 {
-        let mut oscillator = Oscillator { ratio, implicit: self.implicit };
-        let mut integrator = Integrator::new(self.method, 2);
-        let columns = [[1.0, 0.0], [0.0, 1.0]].map(|mut x| {
-            integrator.step(&mut oscillator, &mut x, reach);
-            x
-        });
-        let [[a, c], [b, d]] = columns;
+    /// What one step of `reach` radians multiplies an oscillator of that damping ratio with.
+    fn turn(&self, reach: f64, ratio: f64) -> Complex<f64> {
+        let [[a, c], [b, d]] = self.columns(1.0, 2.0 * ratio, reach);
         let (half, product) = (0.5 * (a + d), a * d - b * c);
         let square = half * half - product;
-        if square < 0.0 { product.sqrt() } else { half.abs() + square.sqrt() }
+        match square < 0.0 {
+            true => Complex::new(half, (-square).sqrt()),
+            false => Complex::from(half + square.sqrt().copysign(half)),
+        }
+    }
+
+    /// By how much one step of `reach` time constants makes a decay grow.
+    fn decay(&self, reach: f64) -> f64 {
+        let [[a, c], [b, d]] = self.columns(0.0, 1.0, reach);
+        // The other factor is that of the place, which is 1.
+        (a * d - b * c).abs()
+    }
+
+    /// The derivative of the state after a step by the state before.
+    fn columns(&self, stiffness: f64, damping: f64, reach: f64) -> [[f64; 2]; 2] {
+        let mut oscillator = Oscillator { stiffness, damping, implicit: self.implicit };
+        let mut integrator = Integrator::new(self.method, 2);
+        [[1.0, 0.0], [0.0, 1.0]].map(|mut x| {
+            integrator.step(&mut oscillator, &mut x, reach);
+            x
+        })
     }
 }
 
-/// `q'' + 2 ratio q' + q = 0`.
+/// Whether steps bring a joint to rest that dry friction brakes, and keep it there. `turn` is the slope of the friction at rest, times the
+/// step, over the inertia that it moves: the steps in which friction at that slope stops the joint.
+///
+/// Law: `v' = -turn tanh(v)` in steps of 1, v over the width in which friction turns around, from speeds that friction takes ten steps to
+/// stop. The method itself makes the steps. What does not stay below 1 creeps or chatters, by a share of what friction brakes in a step.
+/// [`Method::Additive`] takes friction where it leads to, and steps of controlled error follow it: both always do. Guarded steps are those
+/// of the Rosenbrock method, for they let such errors pass.
+/// Checked: runs of a slider with each method.
+pub fn sticks(method: Method, turn: f64) -> bool {
+    if turn <= 1.0 || matches!(method, Method::Additive | Method::Adaptive { .. }) {
+        return true;
+    }
+    let method = if method == Method::Guarded { Method::Rosenbrock } else { method };
+    let mut joint = Braked { turn };
+    (0..8).all(|phase| {
+        let mut integrator = Integrator::new(method, 2);
+        let mut x = [0.0, turn * (10.0 + f64::from(phase) / 8.0)];
+        (0..60).for_each(|_| integrator.step(&mut joint, &mut x, 1.0));
+        x[1].abs() <= 1.0
+    })
+}
+
+/// `q'' = -turn tanh(q')`.
+struct Braked {
+    turn: f64,
+}
+
+impl Braked {
+    fn matrix(slope: f64, matrix: &mut [f64]) {
+        matrix.copy_from_slice(&[0.0, 1.0, 0.0, -slope]);
+    }
+}
+
+impl Ode<f64> for Braked {
+    fn dim(&self) -> usize {
+        2
+    }
+
+    fn coordinates(&self) -> usize {
+        1
+    }
+
+    fn rhs(&mut self, x: &[f64], dxdt: &mut [f64]) {
+        dxdt.copy_from_slice(&[x[1], -self.turn * x[1].tanh()]);
+    }
+
+    fn jacobian(&mut self, x: &[f64], jacobian: &mut [f64]) {
+        Self::matrix(self.turn * x[1].cosh().powi(-2), jacobian);
+    }
+
+    fn iteration_matrix(&mut self, x: &[f64], matrix: &mut [f64]) {
+        let chord = if x[1] == 0.0 { 1.0 } else { x[1].tanh() / x[1] };
+        Self::matrix(self.turn * chord, matrix);
+    }
+}
+
+/// `q'' + damping q' + stiffness q = 0`.
 struct Oscillator {
-    ratio: f64,
+    stiffness: f64,
+    damping: f64,
     implicit: bool,
 }
 
@@ -132,15 +232,15 @@ impl Ode<f64> for Oscillator {
     }
 
     fn rhs(&mut self, x: &[f64], dxdt: &mut [f64]) {
-        dxdt.copy_from_slice(&[x[1], -x[0] - 2.0 * self.ratio * x[1]]);
+        dxdt.copy_from_slice(&[x[1], -self.stiffness * x[0] - self.damping * x[1]]);
     }
 
     fn jacobian(&mut self, _: &[f64], jacobian: &mut [f64]) {
-        jacobian.copy_from_slice(&[0.0, 1.0, -1.0, -2.0 * self.ratio]);
+        jacobian.copy_from_slice(&[0.0, 1.0, -self.stiffness, -self.damping]);
     }
 
     fn elasticity(&mut self, _: &[f64], block: &mut [f64]) -> bool {
-        block.copy_from_slice(&[-1.0, -2.0 * self.ratio]);
+        block.copy_from_slice(&[-self.stiffness, -self.damping]);
         self.implicit
     }
 }

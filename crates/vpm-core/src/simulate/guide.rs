@@ -1,6 +1,6 @@
 //! Runs along a motion: the answer of what does not follow it, sample by sample.
 
-use super::{Run, Setting, halted, lost, names, trouble_in_words};
+use super::{Bounds, Run, Setting, halted, lost, names, trouble_in_words};
 use crate::ball::Ball;
 use crate::error::{Diverged, Error, Result};
 use crate::integrator::{Halt, Integrator, Stuck};
@@ -81,6 +81,7 @@ struct Way<'a, S> {
     of_gauges: Vec<Option<Sensor<S>>>,
     of_states: Vec<Option<Sensor<S>>>,
     machine: Following<S>,
+    bounds: Bounds,
     integrator: Integrator<S>,
     /// State of what answers.
     state: Vec<S>,
@@ -111,6 +112,7 @@ impl<'a, S: Scalar> Way<'a, S> {
             integrator: Integrator::new(stepping.method, machine.dim()),
             state: zeros(machine.dim()),
             measured: zeros(machine.dim()),
+            bounds: Bounds::new(description, theta, machine.dynamics()),
             machine,
             seen: zeros(seen),
             given: Vec::new(),
@@ -242,10 +244,13 @@ impl<'a, S: Scalar> Way<'a, S> {
         self.watch(row)?;
         let state = &self.states[row * dim..(row + 1) * dim];
         let outputs = &self.truth[row * width..row * width + n_outputs];
-        let wrong = |number: &S| !number.is_finite();
-        let place = state.iter().position(wrong).map(|place| names::state_name(description, place));
-        let place = place.or_else(|| outputs.iter().position(wrong).map(|c| names::output_name(description, c)));
-        place.map_or(Ok(()), |name| Err(self.diverged(&name, row)))
+        if let Some(place) = self.bounds.outside(state) {
+            let complaint = self.bounds.complaint(description, place, state[place]);
+            return Err(self.diverged(complaint, row));
+        }
+        let Some(column) = outputs.iter().position(|number| !number.is_finite()) else { return Ok(()) };
+        let what = format!("the {}", names::output_name(description, column));
+        Err(self.diverged((what, Diverged::NOT_FINITE.to_owned()), row))
     }
 
     /// Complains about a ball joint that answers to the motion too near to the singularity of its angles.
@@ -287,13 +292,12 @@ impl<'a, S: Scalar> Way<'a, S> {
         (outputs, self.states[..row * description.n_states()].iter().map(Scalar::re).collect())
     }
 
-    fn diverged(&self, name: &str, row: usize) -> Error {
+    fn diverged(&self, (what, event): (String, String), row: usize) -> Error {
         let repair = if self.guidance.drives {
             "use the integrator adaptive, and check the motion for jumps"
         } else {
             "use more substeps or the integrator linearly_implicit, and check the motion for jumps"
         };
-        let event = (Diverged::NOT_FINITE.to_owned(), repair);
-        lost(self.guide.setting.stepping, format!("the {name}"), event, (row, 0), self.before(row))
+        lost(self.guide.setting.stepping, what, (event, repair), (row, 0), self.before(row))
     }
 }

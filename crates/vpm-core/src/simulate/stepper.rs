@@ -2,16 +2,17 @@
 
 use std::mem::take;
 
+use super::bounds::{Bounds, of_what};
 use super::control::{Control, reading};
 use super::hold::{Course, Hold, Inputs};
 use super::moving::Courses;
-use super::names::{output_name, state_name};
+use super::names::output_name;
 use super::observer::Gains;
 use super::sampled::{Astray, SampledDrives};
 use super::{Setting, Stepping, diverged, halted, leapt, strayed, troubled};
 use crate::delay::SampleDelay;
 use crate::description::Description;
-use crate::error::Result;
+use crate::error::{Diverged, Result};
 use crate::integrator::{Integrator, Method};
 use crate::ode::Ode;
 use crate::scalar::Scalar;
@@ -68,6 +69,7 @@ pub(crate) struct Stepper<'a, S> {
     sampled: SampledDrives,
     /// Inputs that move between samples, if they do.
     courses: Option<Courses<S>>,
+    bounds: Bounds,
     state: Vec<S>,
     /// Coordinates in plain numbers.
     place: Vec<f64>,
@@ -94,6 +96,7 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         let description = setting.description;
         system.make_for(setting.stepping.method)?;
         let (dim, rows, zero) = (system.dim(), plan.horizon, S::zero());
+        let bounds = Bounds::new(description, theta, system.dynamics());
         // A closed loop begins with its disturbances, to which the controllers add.
         let (given, control) = match plan.drive {
             Drive::Commands(inputs) => (inputs.table, None),
@@ -111,6 +114,7 @@ impl<'a, S: Scalar> Stepper<'a, S> {
             stepping: setting.stepping,
             integrator: Integrator::new(setting.stepping.method, dim + usize::from(courses.is_some())),
             courses,
+            bounds,
             sensors: sensors.collect(),
             control,
             sampled: SampledDrives::new(description, setting.stepping.time_step)?,
@@ -202,8 +206,9 @@ impl<'a, S: Scalar> Stepper<'a, S> {
     /// Everything that happens at a sample: measure, command, hold, evaluate, record. `start` is the piece's place in the record.
     pub(crate) fn sample(&mut self, row: usize, start: usize) -> Result<()> {
         let dim = self.state.len();
-        if let Some(place) = self.state.iter().position(|state| !state.is_finite()) {
-            return Err(diverged(self, self.state_name(place), row, start));
+        if let Some(place) = self.bounds.outside(&self.state) {
+            let complaint = self.bounds.complaint(self.description, place, self.state[place]);
+            return Err(diverged(self, complaint, row, start));
         }
         if let Some(trouble) = self.system.trouble() {
             return Err(troubled(self, trouble, row, start));
@@ -217,7 +222,8 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         self.read(row);
         let width = self.description.n_outputs();
         if let Some(column) = self.outputs[row * width..(row + 1) * width].iter().position(|out| !out.is_finite()) {
-            return Err(diverged(self, self.output_name(column, row * width), row, start));
+            let what = of_what(&output_name(self.description, column), self.outputs[row * width + column]);
+            return Err(diverged(self, (what, Diverged::NOT_FINITE.to_owned()), row, start));
         }
         Ok(())
     }
@@ -372,16 +378,6 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         let values = |numbers: &[S], width: usize| numbers[..row * width].iter().map(Scalar::re).collect();
         (values(&self.outputs, self.description.n_outputs()), values(&self.states, self.state.len()))
     }
-
-    /// A state in words.
-    fn state_name(&self, place: usize) -> String {
-        of_what(&state_name(self.description, place), self.state[place])
-    }
-
-    /// An output in words, of the row whose numbers begin at `row`.
-    fn output_name(&self, column: usize, row: usize) -> String {
-        of_what(&output_name(self.description, column), self.outputs[row + column])
-    }
 }
 
 impl Stepper<'_, f64> {
@@ -414,12 +410,4 @@ impl Stepper<'_, f64> {
         });
         seconds
     }
-}
-
-/// The quantity itself, or only its derivative with respect to a parameter.
-fn of_what<S: Scalar>(name: &str, number: S) -> String {
-    if number.inspect().is_finite() && !number.is_finite() {
-        return format!("the derivative of the {name} with respect to a parameter");
-    }
-    format!("the {name}")
 }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::guided::{Guidance, Guided, Part};
 use super::recorded::Kind;
 use super::routine::{Routines, kind_of};
-use super::{Machine, drives};
+use super::{Dynamics, Machine, drives};
 use crate::actuator::Actuator;
 use crate::error::Result;
 use crate::integrator::Method;
@@ -104,6 +104,11 @@ impl<S: Scalar> Following<S> {
 
     fn kind(&self, part: Part) -> Kind {
         Kind::Guided(self.guidance.clone(), part)
+    }
+
+    /// The machine in plain numbers.
+    pub(crate) fn dynamics(&self) -> &Dynamics<f64> {
+        &self.laws.dynamics
     }
 
     /// Free coordinates: passive joints, then elastic ones.

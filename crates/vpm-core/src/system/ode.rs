@@ -439,13 +439,8 @@ impl<S: Scalar> Ode<S> for System<S> {
         }
     }
 
-    /// A hundredth for coordinates, 1 for rates, of the drives what is natural for each.
     fn scales(&self, scales: &mut [f64]) {
-        let n = self.coordinates();
-        let (motion, internal) = scales.split_at_mut(2 * n);
-        motion[..n].fill(1e-2);
-        motion[n..].fill(1.0);
-        self.dynamics.drive_scales(internal);
+        self.dynamics.scales(scales);
     }
 
     /// By machine code of the whole step, if there is some.

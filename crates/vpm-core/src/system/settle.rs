@@ -77,6 +77,15 @@ impl<S: Scalar> Dynamics<S> {
         }
     }
 
+    /// Natural sizes of all states: a hundredth for coordinates, 1 for rates, of the drives what is natural for each.
+    pub(crate) fn scales(&self, scales: &mut [f64]) {
+        let n = self.coordinates();
+        let (motion, internal) = scales.split_at_mut(2 * n);
+        motion[..n].fill(1e-2);
+        motion[n..].fill(1.0);
+        self.drive_scales(internal);
+    }
+
     /// Natural sizes of the states of drives and supplies, in SI units.
     pub(crate) fn drive_scales(&self, scales: &mut [f64]) {
         const STRETCH: f64 = 1e-3;

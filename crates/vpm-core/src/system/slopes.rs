@@ -5,7 +5,11 @@ use super::connections::{PlacedBushing, PlacedContact};
 use crate::bushing::Bushing;
 use crate::contact::ContactFriction;
 use crate::dynamics::{for_each_column, poses};
+use crate::effect::{JointEffect, Seat};
 use crate::spatial::{Pose, Twist};
+
+/// A velocity at which dry friction has turned around, m/s or rad/s.
+const FAST: f64 = 1e3;
 
 impl Dynamics<f64> {
     /// Adds to `stiffness` and `damping` (n x n) those of contacts and bushings, after [`Dynamics::terms`] at the same state.
@@ -20,6 +24,16 @@ impl Dynamics<f64> {
         for bushing in &self.connections.bushings {
             self.add_bushing(bushing, stiffness, damping);
         }
+    }
+
+    /// The seat of each effect, and its resistance at rest and `q` less that of fast motion: the slope of dry friction, N s/m or N m s/rad.
+    pub(crate) fn dry_slopes(&self, q: &[f64]) -> Vec<(&Seat<f64>, f64)> {
+        let slope = |(seat, effect): &'_ (Seat<f64>, JointEffect<f64>)| {
+            let (law, q, u) = (effect.law(), seat.of(q), seat.load(&self.efforts));
+            let [rest, fast] = [0.0, FAST].map(|v| law.resistance(q, v) + law.resistance_per_load(v, u) * u.abs());
+            rest - fast
+        };
+        self.effects.iter().map(|effect| (&effect.0, slope(effect))).collect()
     }
 
     fn add_contact(&self, contact: &PlacedContact<f64>, stiffness: &mut [f64], damping: &mut [f64]) {

@@ -3,10 +3,11 @@
 use numpy::{PyArray1, PyArray2, PyArray3, PyArray4, PyArrayMethods};
 use pyo3::prelude::*;
 use vpm_core::description::Description;
+use vpm_core::integrator::resolution::Damped;
 use vpm_core::motion::{JointMotion, StrainRates};
 use vpm_core::sensitivity::Interrupt;
 use vpm_core::simulate::{
-    Hold, Inputs, Run, Setting, Stepping, closed_loop, drives_along, free_run, observed, resolution, restarts,
+    Hold, Inputs, Run, Setting, Stepping, closed_loop, drives_along, free_run, observed, resolution, restarts, unstuck,
 };
 
 use super::System;
@@ -98,8 +99,8 @@ impl System {
         })
     }
 
-    /// What steps damp because they do not resolve it, in a run of `duration` (s) about `state`: the frequency above which vibrations lose
-    /// more than a tenth (Hz), and for each lightly damped mode that does (m, 4): frequency, damping ratio, time, share that is left.
+    /// What steps do not resolve in a run of `duration` (s) about `state`: the frequency above which vibrations are off by more than a tenth
+    /// (Hz); for each mode that is or that grows (m, 5): frequency, damping ratio, time, share that is left, shift of its frequency.
     #[expect(clippy::too_many_arguments, reason = "the arguments of the Python function")]
     fn resolution<'py>(
         &self,
@@ -117,8 +118,29 @@ impl System {
             let Setting { description, theta, stepping, .. } = request.setting(&self.description, interrupt);
             resolution(description, theta, state.values(), stepping, duration)
         })?;
-        let rows = found.damped.iter().flat_map(|mode| [mode.frequency, mode.ratio, mode.time, mode.left]).collect();
-        Ok((found.limit, matrix(py, rows, [found.damped.len(), 4])?))
+        let row = |mode: &Damped| [mode.frequency, mode.ratio, mode.time, mode.left, mode.shift];
+        let rows = found.damped.iter().flat_map(row).collect();
+        Ok((found.limit, matrix(py, rows, [found.damped.len(), 5])?))
+    }
+
+    /// Where dry friction of joints does not bring to rest in these steps what it brakes, about `state`: the place in words, and the slope of
+    /// friction at rest times the step over the inertia that it moves.
+    fn unstuck(
+        &self,
+        py: Python<'_>,
+        theta: &Any<'_>,
+        state: &Any<'_>,
+        time_step: f64,
+        substeps: i64,
+        integrator: &str,
+    ) -> PyResult<Vec<(String, f64)>> {
+        let request = Request::new(self, theta, (time_step, substeps, integrator), &[])?;
+        let state = Numbers::vector("state", state)?;
+        let found = self.compute(py, |interrupt| {
+            let Setting { description, theta, stepping, .. } = request.setting(&self.description, interrupt);
+            unstuck(description, theta, state.values(), stepping)
+        })?;
+        Ok(found.into_iter().map(|friction| (friction.site, friction.turn)).collect())
     }
 
     /// Closed loop on references, with disturbances added to the commands: as `simulate`.

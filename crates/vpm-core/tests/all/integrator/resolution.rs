@@ -8,8 +8,9 @@ use serde_json::{Value, json};
 use vpm_core::Error;
 use vpm_core::description::Description;
 use vpm_core::integrator::Method;
+use vpm_core::integrator::resolution::sticks;
 use vpm_core::samples::{double_pendulum, slider};
-use vpm_core::simulate::{Hold, Stepping, resolution};
+use vpm_core::simulate::{Hold, Stepping, resolution, unstuck};
 
 /// A mass of 1 kg on a spring with a damper.
 fn oscillator(frequency: f64, ratio: f64) -> Machine {
@@ -47,7 +48,58 @@ fn a_fast_spring_is_told_to_die() {
     for method in [Method::Adaptive { tolerance: 1e-6 }, Method::SemiImplicit] {
         let stepping = Stepping::new(1e-4, 1, method).unwrap();
         let found = resolution(&d, &machine.values, &[1.0, 0.0], stepping, 0.5).unwrap();
-        assert!(found.damped.is_empty() && found.limit.is_infinite(), "{}: {found:?}", method.name());
+        assert!(found.damped.is_empty() && found.limit > 312.0, "{}: {found:?}", method.name());
+    }
+}
+
+#[test]
+fn explicit_steps_that_move_a_frequency_or_let_it_grow_are_told() {
+    // Symplectic steps turn by the angle a with 2 sin(a / 2) = h omega.
+    let machine = oscillator(312.0, 0.0);
+    let stepping = Stepping::new(1e-3, 1, Method::SemiImplicit).unwrap();
+    let reach = std::f64::consts::TAU * 0.312;
+    let found = resolution(&machine.build(), &machine.values, &[1.0, 0.0], stepping, 0.5).unwrap();
+    let [mode] = found.damped[..] else { panic!("{found:?}") };
+    close(mode.shift, 2.0 * (0.5 * reach).asin() / reach - 1.0, 1e-6);
+    close(mode.left, 1.0, 1e-9);
+    // Beyond h omega = 2 they grow, and so do those of rk4 beyond 2.83, also where the spring is damped well.
+    for (method, hertz, ratio, grows) in [
+        (Method::SemiImplicit, 330.0, 0.0, true),
+        (Method::Rk4, 460.0, 0.0, true),
+        (Method::Rk4, 900.0, 0.5, true),
+        (Method::Rk4, 200.0, 0.5, false),
+        (Method::LinearlyImplicit, 900.0, 0.5, false),
+    ] {
+        let machine = oscillator(hertz, ratio);
+        let stepping = Stepping::new(1e-3, 1, method).unwrap();
+        let found = resolution(&machine.build(), &machine.values, &[1.0, 0.0], stepping, 0.5).unwrap();
+        assert_eq!(found.damped.iter().any(|mode| mode.left > 1.0), grows, "{} {hertz}: {found:?}", method.name());
+    }
+}
+
+#[test]
+fn friction_that_does_not_stick_is_told() {
+    // A slider of 1 kg that 1 N brakes, from 0.01 m/s, in 300 steps of 1 ms.
+    for method in Method::ALL {
+        for turn in [0.5_f64, 1.5, 2.0, 50.0, 5e3] {
+            let width = 1e-3 / turn;
+            let mut machine = Machine::new(&slider(1.0));
+            machine.effect("coulomb_friction", 0, &[("coulomb", 1.0), ("transition_velocity", width)]);
+            machine.actuator(0, &[("gain", 1.0)]);
+            let bench = Bench::new(&machine, 1e-3, 1, method);
+            let largest = |from: f64| {
+                let run = bench.free(&[0.0, from], &[0.0; 300]);
+                run.states.chunks_exact(2).rev().take(20).map(|state| state[1].abs()).fold(0.0, f64::max)
+            };
+            let rests = (0..8).all(|k| largest(1e-2 + f64::from(k) * 1.25e-4) <= width);
+            let found = unstuck(&bench.description, &bench.theta, &[0.0, 0.01], bench.stepping).unwrap();
+            assert_eq!(found.is_empty(), rests, "{} {turn}: {found:?}", method.name());
+            assert_eq!(sticks(method, turn), rests, "{} {turn}", method.name());
+            for friction in found {
+                close(friction.turn, turn, 1e-6);
+                assert_eq!(friction.site, format!("joint `{}`", bench.description.bodies[0].joint.name));
+            }
+        }
     }
 }
 

@@ -83,8 +83,30 @@ fn a_diverged_simulation_says_so_and_starts_again_after_a_reset() {
     let theta = description.parameters.clone();
     let stepping = Stepping::new(0.01, 1, Method::Rk4).unwrap();
     let mut live = Live::new(Arc::new(description), &theta, &[0.1, 0.0], stepping).unwrap();
-    let error = (0..1000).find_map(|_| live.step(&[0.0]).err()).unwrap();
-    assert!(matches!(error, Error::Diverged(_)), "{error}");
+    // Every sample before is one that the machine could be at: its rate below c / r, r = 1 m.
+    let (mut before, mut error) = (live.state().to_vec(), None);
+    for _ in 0..1000 {
+        error = live.step(&[0.0]).err();
+        if error.is_some() {
+            break;
+        }
+        before = live.state().to_vec();
+        assert!(before[1].abs() < 3e8, "{before:?}");
+    }
+    let Some(Error::Diverged(lost)) = error else { panic!("{error:?}") };
+    let sentence = lost.to_string();
+    for words in
+        ["the velocity of joint", "beyond 2.9979e8, at which its body is as fast as light", "more substeps", "units"]
+    {
+        assert!(sentence.contains(words), "{sentence}");
+    }
+    // What went astray is not shown, and it does not come back by itself.
+    let time = live.time();
+    assert_eq!(lost.time, time + 0.01);
+    assert_eq!(live.step(&[0.0]).unwrap_err(), Error::Diverged(lost));
+    assert_eq!((live.state(), live.time()), (&*before, time));
+    assert!(live.outputs().iter().all(|output| output.is_finite()));
+    assert!(live.reset(&[1e300, 0.0]).unwrap_err().to_string().contains("beyond 4.5036e13, where rounding hides"));
     live.reset(&[0.0, 0.0]).unwrap();
     assert!(live.step(&[0.0]).is_ok());
 }
