@@ -294,6 +294,28 @@ def test_errors_are_one_sentence(words: tuple[str | Path, ...], sentence: str) -
     assert "Traceback" not in done.stderr
 
 
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("info", "{}"),
+        ("simulate", "{}"),
+        ("simulate", "--plot", "{}", MODEL),
+        ("simulate", STEP, "--out", "{}"),
+        ("compare", MODEL, "*{}"),
+        ("diagnose", MODEL, "{}"),
+        ("demo", "--out", "{}"),
+        ("demo", "--out", "{}/report"),
+        ("prove", "--folder", "{}"),
+        ("report", "{}"),
+    ],
+)
+def test_a_name_that_no_file_can_have_is_one_sentence(words: tuple[str | Path, ...]) -> None:
+    done = vpm(*(str(word).format("a" * 300) for word in words))
+    assert done.returncode != 0
+    assert len(done.stderr.strip().splitlines()) == 1
+    assert "Traceback" not in done.stderr
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of another kind")
 def test_interrupting_a_long_command_ends_it_at_once() -> None:
     command = [sys.executable, "-m", "vpm", "budget", str(MODEL), "--steps", "2000000000"]

@@ -145,6 +145,38 @@ def test_ctrl_c_ends_with_the_exit_code_of_shells(tmp_path: Path, words: list[st
     assert "stopped by Ctrl-C" in told
 
 
+#: Presses Ctrl-C when the command line loads a module of this name for the first time.
+PRESSED = """
+import os, signal, sys
+module = sys.argv.pop(1)
+class Press:
+    def find_spec(self, name, *_):
+        if name == module:
+            sys.meta_path.remove(self)
+            os.kill(os.getpid(), signal.SIGINT)
+sys.meta_path.insert(0, Press())
+from vpm.__main__ import main
+main()
+"""
+
+
+@POSIX
+@pytest.mark.parametrize("module", ["vpm.cli", "typer", "vpm.command", "numpy", "vpm._core", "pydantic"])
+def test_ctrl_c_while_the_commands_are_loaded_is_one_sentence(module: str) -> None:
+    command = [sys.executable, "-c", PRESSED, module, "info", MODEL]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 130
+    assert done.stderr == "stopped by Ctrl-C\n"
+
+
+@POSIX
+def test_a_command_that_a_script_put_into_the_background_stays_deaf_to_ctrl_c() -> None:
+    command = ["sh", "-c", "trap '' INT; exec \"$@\"", "sh", sys.executable, "-c", PRESSED, "numpy", "info", MODEL]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0
+    assert "demo arm" in done.stdout
+
+
 def test_output_to_a_file_gets_a_line_for_each_stage_and_for_long_silence(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

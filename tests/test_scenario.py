@@ -364,6 +364,7 @@ SERVED = [{"name": "servo", "model": "servo.toml"}]
             'runs[0].sets is not a known key; did you mean "set"?',
         ),
         ({"runs": [{"name": "a", "model": "slet.toml"}]}, 'did you mean "sled.toml"?'),
+        ({"runs": [{"name": "a", "model": "a" * 300}]}, "runs[0].model cannot be read: "),
         (
             {"runs": [{"name": "a", "model": "sled.toml"}, {"name": "a", "model": "sled.toml"}]},
             'runs[1].name is "a", which another run is called already',
