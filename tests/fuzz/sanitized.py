@@ -24,7 +24,14 @@ STRICT = (*WATCHED, "-fno-sanitize-recover=all", "-fno-omit-frame-pointer")
 LARGE = 500_000
 #: Levels of flexible links whose source is not so large.
 COARSE = {"tudor/tudor": "bezier(3)", "flexible_pendulum/flexible_pendulum": "bezier(3)"}
-VALGRIND = ("valgrind", "--quiet", "--error-exitcode=9", "--leak-check=full")
+VALGRIND = (
+    "valgrind",
+    "--quiet",
+    "--error-exitcode=9",
+    "--leak-check=full",
+    "--show-leak-kinds=definite",
+    "--errors-for-leak-kinds=definite",
+)
 
 
 def run(what: str, command: list[str], folder: Path) -> bool:
