@@ -38,7 +38,14 @@ fn called(content: &str) {
     // What the caller gives follows from the text, so that a case can be repeated.
     let mut place = content.len();
     let mut given = |count: usize| -> Vec<f64> {
-        (0..count).map(|_| NUMBERS[{ place = place.wrapping_mul(31).wrapping_add(7); place } % NUMBERS.len()]).collect()
+        (0..count)
+            .map(|_| {
+                NUMBERS[{
+                    place = place.wrapping_mul(31).wrapping_add(7);
+                    place
+                } % NUMBERS.len()]
+            })
+            .collect()
     };
     // SAFETY: an open simulation, closed once; as many places as its counts say.
     unsafe {
