@@ -9,7 +9,7 @@
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .SUFFIXES:
-.PHONY: help demo test test-rust test-python test-nightly fuzz reference validation lint lint-rust lint-python bench peers chirp narx-peers bench-counts c-library bench-diagnosis bench-lisdd docs docs-rust figures package clean
+.PHONY: help demo test test-rust test-python test-nightly fuzz fuzz-files fuzz-c fuzz-rust reference validation lint lint-rust lint-python bench peers chirp narx-peers bench-counts c-library bench-diagnosis bench-lisdd docs docs-rust figures package clean
 
 PYTHON ?= python3
 DEMO_OUT ?= demo-report
@@ -49,8 +49,23 @@ test-python: $(VENV)/.installed
 test-nightly: $(VENV)/.installed ## the claims of some tests on many more cases, which takes minutes
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses auto --dist worksteal -m nightly $(PYTEST_ARGS)
 
-fuzz: $(VENV)/.installed ## CASES damaged files from seed FIRST on: refused, or finite numbers within limits
+fuzz: fuzz-files fuzz-c fuzz-rust ## all of the following three
+
+fuzz-files: $(VENV)/.installed ## CASES damaged files from seed FIRST on: refused, or finite numbers within limits
 	cd tests && OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 ../$(BIN)/python -m fuzz $(CASES) $(FIRST)
+
+fuzz-c: $(VENV)/.installed ## the C library and C source of the examples, watched by address and behaviour sanitizers
+	cargo build --release --package vpm-c $(CARGO_ARGS)
+	cd tests && ../$(BIN)/python -m fuzz.sanitized ../target/release/libvpm.a
+
+# In the folder target of the workspace, which has most of it; `cargo +nightly fuzz run compiled` of cargo-fuzz works too.
+fuzz-rust: $(VENV)/.installed ## libFuzzer on what the core reads from texts, CASES for each target
+	cd tests && ../$(BIN)/python -m fuzz.seeds ../fuzz/corpus
+	cd fuzz && RUSTC_WRAPPER='$(CURDIR)/fuzz/instrumented' CARGO_TARGET_DIR='$(CURDIR)/target' cargo build --release
+	for target in description compiled c_interface; do \
+	  target/release/$$target -runs=$(CASES) -seed=$(FIRST) -max_len=100000 -timeout=3600 -rss_limit_mb=2048 \
+	    -artifact_prefix=fuzz/ -print_final_stats=1 fuzz/corpus/$$target || exit 1; \
+	done
 
 lint: lint-rust lint-python ## formatting, static checks and types, all as errors
 

@@ -2,12 +2,14 @@
 
 import os
 import signal
+import sys
 import tempfile
 from pathlib import Path
 
 import pytest
 from hypothesis import settings
 
+from limits import Limits
 from shared_cases import FOLDER
 from vpm.model import Model
 
@@ -26,6 +28,12 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 if "PYTEST_XDIST_WORKER" not in os.environ:
     _share = tempfile.TemporaryDirectory(prefix="vpm-tests-")
     os.environ[FOLDER] = _share.name
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    if sys.platform == "linux":  # reads /proc
+        config.pluginmanager.register(Limits(), "limits")
+
 
 ROOT = Path(__file__).resolve().parent.parent
 

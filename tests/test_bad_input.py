@@ -17,10 +17,12 @@ from numpy.typing import NDArray
 
 import vpm
 from vpm import demo, results
+from vpm._core import System
 from vpm.errors import CoreError, ExperimentError, ModelError, ScenarioError, SimulationError, UnitError, VpmError
 from vpm.experiment import Experiment
 from vpm.experiment.readers import open_log
 from vpm.model import Model
+from vpm.realtime import compile_model
 from vpm.scenario import Scenario
 from vpm.simulate import Setup
 from vpm.units import parse_unit
@@ -213,6 +215,15 @@ def test_every_class_of_results_is_listed_and_no_other_is_imported(tmp_path: Pat
     run = subprocess.run(words, capture_output=True, text=True, check=True)
     assert "which is not known here" in run.stdout
     assert run.stdout.endswith("False False\n")
+
+
+def test_a_ratio_of_an_effect_refers_to_a_parameter() -> None:
+    model = Model.load(EXAMPLES / "wrist" / "wrist.toml")
+    content = json.loads(compile_model(model, 1000.0).text)["description"]
+    (effect, *_) = (effect for effect in content["effects"] if "ratios" in effect)
+    effect["ratios"][0]["ratio"] = 2**63 - 1
+    with pytest.raises(CoreError, match="refers to parameter number 9223372036854775807, but there are"):
+        System(json.dumps(content))
 
 
 def test_no_byte_of_a_matlab_file_ends_the_process(tmp_path: Path) -> None:

@@ -51,6 +51,6 @@ def test_outcomes_stand_in_the_order_of_the_items_and_the_longest_begins_first()
 
 
 def test_as_many_items_run_at_a_time_as_there_are_workers() -> None:
-    together = Barrier(3, timeout=10.0)
+    together = Barrier(3, timeout=600.0)
     found = SideBySide(3)("work", lambda item: np.array([item, together.wait() >= 0]), [1, 2, 3], str, lambda n: -n)
     assert [int(one[0]) for one in found if not isinstance(one, Failure)] == [1, 2, 3]

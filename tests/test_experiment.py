@@ -177,10 +177,10 @@ def test_a_large_log_is_read_fast(tmp_path: Path) -> None:
     np.savetxt(path, table, delimiter=",", header="time,a,b,c,d", comments="", fmt="%.9g")
     seconds = []
     for _ in range(3):
-        start = stopwatch.perf_counter()
+        start = stopwatch.process_time()
         Experiment.load(path)
-        seconds.append(stopwatch.perf_counter() - start)
-    assert min(seconds) < 0.5  # 0.05 s on a quiet machine
+        seconds.append(stopwatch.process_time() - start)
+    assert min(seconds) < 0.5  # a tenth of it on most machines
 
 
 # ---- what is refused -------------------------------------------------------------------------------------------------

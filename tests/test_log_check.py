@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 import textbook_arm
 import vpm
 from command_line import vpm as run_vpm
+from vpm import demo
 from vpm.errors import ExperimentError, ModelError
 from vpm.log_check import Finding, Settings
 from vpm.log_check.correction import Correction
@@ -348,3 +349,15 @@ def test_says_which_entry_it_cannot_replace() -> None:
     spread = '[channels."one.position"]\ncolumn = "q1"\nunit = "rad"\n'
     with pytest.raises(ModelError, match=r"the entry of one\.position does not stand on a line of its own"):
         corrected_text(spread, {"one.position": line_of("one.position", entry)}, "arm.toml")
+
+
+# The fit before it weighs by a noise of nothing, and NumPy warns of that: a mistake of its own, not what is tried here.
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+def test_a_channel_that_is_drawn_to_the_last_digit_is_no_infinite_knowledge() -> None:
+    """An encoder that stands still is followed to rounding, beside which no slope of the model may overflow."""
+    arm = vpm.Model.load(demo.MODEL)
+    log = vpm.Experiment.load(demo.TRAIN, model=arm)
+    data = log.data[:399].copy()
+    data[:, log.channels.index("shoulder.position")] = 1.0
+    stuck = vpm.Experiment("stuck", log.time[:399], data, log.channels, log.units)
+    assert any("shoulder.position" in finding.channels for finding in vpm.check_log(arm, stuck, workers=1).findings)

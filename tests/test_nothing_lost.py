@@ -16,6 +16,7 @@ import pytest
 from rich.console import Console
 from typer.testing import CliRunner
 
+from interrupting import running, work
 from vpm import command, demo
 from vpm.cli import app
 from vpm.diagnosing import diagnose
@@ -133,15 +134,47 @@ def test_every_place_to_write_to_is_tried_before_anything_is_read(tmp_path: Path
 @pytest.mark.parametrize("words", [["budget", MODEL, "--steps", "100000000", "--latency", "0"], ["demo", "--out", "r"]])
 def test_ctrl_c_ends_with_the_exit_code_of_shells(tmp_path: Path, words: list[str]) -> None:
     program = [sys.executable, "-c", "import vpm.cli; print('begun', flush=True); vpm.cli.main()", *words]
-    with subprocess.Popen(program, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=tmp_path) as running:
-        assert running.stdout is not None
-        assert running.stdout.readline() == "begun\n"
-        time.sleep(1.0)
-        running.send_signal(signal.SIGINT)
-        told = running.communicate(timeout=120)[1]
-    assert running.returncode == 130
+    with running(program, tmp_path) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "begun\n"
+        work(process, 1.0)
+        process.send_signal(signal.SIGINT)
+        told = process.communicate()[1]
+    assert process.returncode == 130
     assert "Traceback" not in told
     assert "stopped by Ctrl-C" in told
+
+
+#: Presses Ctrl-C when the command line loads a module of this name for the first time.
+PRESSED = """
+import os, signal, sys
+module = sys.argv.pop(1)
+class Press:
+    def find_spec(self, name, *_):
+        if name == module:
+            sys.meta_path.remove(self)
+            os.kill(os.getpid(), signal.SIGINT)
+sys.meta_path.insert(0, Press())
+from vpm.__main__ import main
+main()
+"""
+
+
+@POSIX
+@pytest.mark.parametrize("module", ["vpm.cli", "typer", "vpm.command", "numpy", "vpm._core", "pydantic"])
+def test_ctrl_c_while_the_commands_are_loaded_is_one_sentence(module: str) -> None:
+    command = [sys.executable, "-c", PRESSED, module, "info", MODEL]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 130
+    assert done.stderr == "stopped by Ctrl-C\n"
+
+
+@POSIX
+def test_a_command_that_a_script_put_into_the_background_stays_deaf_to_ctrl_c() -> None:
+    command = ["sh", "-c", "trap '' INT; exec \"$@\"", "sh", sys.executable, "-c", PRESSED, "numpy", "info", MODEL]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0
+    assert "demo arm" in done.stdout
 
 
 def test_output_to_a_file_gets_a_line_for_each_stage_and_for_long_silence(
@@ -152,14 +185,13 @@ def test_output_to_a_file_gets_a_line_for_each_stage_and_for_long_silence(
         tell("looking")
         for done in range(1, 100):
             each("round 1", "friction", done, 99)
-        deadline = time.monotonic() + 30.0
         told = ""
-        while "after" not in told and time.monotonic() < deadline:
+        while "round 1 99 of 99: friction (after " not in told:
             time.sleep(0.01)
             told += capsys.readouterr().err
-    lines = told.splitlines()
-    assert lines[:2] == ["looking", "round 1 1 of 99: friction"]
-    assert lines[2].startswith("round 1 99 of 99: friction (after ")
+    # On a busy machine a silence may come between any two of them.
+    stages = [line for line in told.splitlines() if "(after " not in line]
+    assert stages == ["looking", "round 1 1 of 99: friction"]
 
 
 @pytest.mark.parametrize(("names", "broken"), [("ranking", "_examined"), ("search", "_settled")])

@@ -145,6 +145,22 @@ def test_damaged_files_are_named(tmp_path: Path) -> None:
         Sample.load(path)
 
 
+@pytest.mark.parametrize("value", [None, "much", (1.0,), True, np.zeros(2)])
+def test_a_field_of_another_type_is_named(tmp_path: Path, value: object) -> None:
+    path = Other(value).save(tmp_path / "file.npz")  # type: ignore[arg-type]
+    with pytest.raises(VpmError, match=r"Other\.value cannot be .*; write it anew"):
+        Other.load(path)
+
+
+def test_an_array_whose_head_is_damaged_is_named(tmp_path: Path) -> None:
+    """NumPy reads the head as Python's text, and a bracket without its other half is no end of it."""
+    with zipfile.ZipFile(tmp_path / "file.npz", "w") as archive:
+        head = b"{'descr': '<f8', 'fortran_order': False, 'shape': ((((, }".ljust(117) + b"\n"
+        archive.writestr("header.npy", b"\x93NUMPY\x01\x00" + len(head).to_bytes(2, "little") + head)
+    with pytest.raises(VpmError, match="cannot be read as a saved result"):
+        Other.load(tmp_path / "file.npz")
+
+
 def test_pickled_objects_are_never_read(tmp_path: Path) -> None:
     np.savez(tmp_path / "evil.npz", header=np.array([{"a": 1}], dtype=object))
     with pytest.raises(VpmError, match="plain arrays"):

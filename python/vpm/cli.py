@@ -46,18 +46,15 @@ from vpm.command import (
     warnings_told,
     writable,
 )
-from vpm.errors import ValidityWarning, VpmError
+from vpm.errors import INTERRUPTED, ValidityWarning, VpmError
 from vpm.excite_command import app as excite_app
+from vpm.files import exists
 from vpm.simulate import HOLDS, INTEGRATORS, Setup
 
 if TYPE_CHECKING:
     from vpm.experiment import Experiment
     from vpm.model import Model
     from vpm.simulate import Run
-
-
-#: Exit code after Ctrl-C, as shells have it: 128 and the number of the signal.
-INTERRUPTED = 130
 
 
 class _Commands(TyperGroup):
@@ -85,7 +82,7 @@ def _with_picture(words: list[str]) -> list[str]:
     for word, following in zip(words, [*words[1:], ""], strict=True):
         full.append(word)
         picture = Path(following).suffix.lower() in PICTURES
-        other = not following or following.startswith("-") or Path(following).is_file()
+        other = not following or following.startswith("-") or exists(following)
         if word == "--plot" and other and not picture:
             full.append(BESIDE)
     return full
@@ -121,7 +118,9 @@ def main() -> None:
         pressed.set()
         signal.default_int_handler(number, frame)
 
-    before = signal.signal(signal.SIGINT, press)
+    before = signal.getsignal(signal.SIGINT)
+    if before is not signal.SIG_IGN:  # as a shell starts background work of a script
+        signal.signal(signal.SIGINT, press)
     code: str | int | None = 0
     try:
         app()
@@ -132,6 +131,9 @@ def main() -> None:
         code = 1
     except KeyboardInterrupt:
         pressed.set()
+    except Exception:  # a library that was being loaded may make one of Ctrl-C
+        if not pressed.is_set():
+            raise
     finally:
         signal.signal(signal.SIGINT, before)
     if pressed.is_set():

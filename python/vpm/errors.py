@@ -8,6 +8,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from difflib import SequenceMatcher, get_close_matches
 
+#: Exit code of a command after Ctrl-C, as shells have it: 128 and the number of the signal.
+INTERRUPTED = 130
+
 
 class VpmError(ValueError):
     """Something in the input cannot be right; the message is one sentence with the repair in it."""

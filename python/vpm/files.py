@@ -134,13 +134,21 @@ def probe_folder(path: str | PathLike[str]) -> None:
         As `probe_file`.
     """
     target = Path(os.path.realpath(path))
-    there = next(folder for folder in (target, *target.parents) if folder.exists())
     try:
+        there = next(folder for folder in (target, *target.parents) if folder.exists())
         if not there.is_dir():
             raise NotADirectoryError(0, f"{there} is a file")
         _probe(there)
     except OSError as error:
         raise _unwritable(path, error) from error
+
+
+def exists(path: str | PathLike[str]) -> bool:
+    """Whether there is a file or a folder of this name; what can be no name is none."""
+    try:
+        return Path(path).exists()
+    except (OSError, ValueError):
+        return False
 
 
 def unreadable(path: str | PathLike[str]) -> str:

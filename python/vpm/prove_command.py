@@ -13,7 +13,7 @@ import typer
 
 from vpm.command import console, errors, writable
 from vpm.errors import DiagnosisError
-from vpm.files import write_text
+from vpm.files import exists, write_text
 
 EXAMPLES = (
     "Example:  vpm prove --machine axis_linear --effect coulomb_friction --seeds 0-4 --each 5\n\n"
@@ -116,7 +116,7 @@ def numbers(text: str) -> tuple[int, ...]:
 
 def _proving_ground(folder: Path) -> tuple[ModuleType, ModuleType, ModuleType]:
     """Modules of the proving ground, which is no part of the installed package."""
-    if not (folder / "blind" / "proving.py").is_file():
+    if not exists(folder / "blind" / "proving.py"):
         raise DiagnosisError(
             f"{folder} holds no proving ground, which is part of the source only: run vpm prove in a checkout of the "
             "repository, or say where its tests are with --folder"

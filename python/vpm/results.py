@@ -37,11 +37,13 @@ from dataclasses import fields, is_dataclass
 from importlib import import_module
 from os import PathLike
 from pathlib import Path
+from tokenize import TokenError
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
 from vpm.errors import MissingExtraError, VpmError
+from vpm.fields import misfit
 from vpm.files import replacing, unreadable
 
 if TYPE_CHECKING:
@@ -55,6 +57,7 @@ _HEADER = "header"
 _BROKEN = (
     *(OSError, EOFError, MemoryError, NotImplementedError, RuntimeError),
     *(struct.error, zipfile.BadZipFile, zlib.error),
+    *(SyntaxError, TokenError),  # NumPy reads the head of an array as Python's text
 )
 _MISFIT = (ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError)
 _TAG = "$"
@@ -259,6 +262,9 @@ class Result(Storable):
             raise VpmError(f"{path} has format {version}, and this version reads up to {FORMAT}; use a newer version")
         try:
             result = _decode(content, arrays, path)
+            if isinstance(result, Result):
+                # Entries that do not go together are found now, and not by the one who looks at it.
+                _ = repr(result), result._repr_html_()
         except VpmError:
             raise
         except _MISFIT as error:
@@ -366,7 +372,16 @@ def _decode(value: object, arrays: Mapping[str, np.ndarray[Any, Any]], path: obj
     if isinstance(content, list):
         return tuple(_decode(item, arrays, path) for item in content)
     items = {key: _decode(item, arrays, path) for key, item in dict(content or {}).items()}
-    return _stored_class(name, path).from_stored(items) if kind == "object" else items
+    return _built(_stored_class(name, path), items, path) if kind == "object" else items
+
+
+def _built(kind: type[Storable], items: Mapping[str, Any], path: object) -> Storable:
+    """Object of a stored class, whose fields are of their types."""
+    built = kind.from_stored(items)
+    if field := misfit(built):
+        value = _short(getattr(built, field))
+        raise VpmError(f"{path} does not fit its class: {kind.__name__}.{field} cannot be {value}; write it anew")
+    return built
 
 
 def _stored_class(name: str, path: object) -> type[Storable]:

@@ -1,4 +1,4 @@
-"""``python -m fuzz CASES [FIRST]`` in the folder of the tests: many cases, and the seeds of what went wrong."""
+"""``python -m fuzz CASES [FIRST [DOOR]]`` in the folder of the tests: many cases, and the seeds of what went wrong."""
 
 import sys
 
@@ -7,12 +7,16 @@ from fuzz.watch import watched
 STEP = 2000
 
 if __name__ == "__main__":
-    cases, first = int(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else 1
-    failed = 0
-    for begin in range(first, first + cases, STEP):
-        found = watched(begin, min(STEP, first + cases - begin))
+    given = dict(zip(("cases", "first", "door"), sys.argv[1:], strict=False))
+    begin, door, failed = int(given.get("first", 1)), given.get("door", ""), 0
+    end = begin + int(given["cases"])
+    for seed in range(begin, end, STEP):
+        found = watched(seed, min(STEP, end - seed), door)
         failed += len(found.wrong)
-        print(f"seeds from {begin}: {dict(found.counts)}", flush=True)
-        for seed, words in found.wrong.items():
-            print(f"  {seed}: {words}", flush=True)
+        print(
+            f"seeds from {seed}: {' '.join(f'{what}={count}' for what, count in sorted(found.counts.items()))}",
+            flush=True,
+        )
+        for case, words in found.wrong.items():
+            print(f"  {case}: {words}", flush=True)
     sys.exit(1 if failed else 0)

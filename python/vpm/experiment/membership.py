@@ -10,6 +10,7 @@ from pathlib import Path
 
 from vpm.errors import ExperimentError
 from vpm.experiment.record import Experiment
+from vpm.files import exists
 
 
 def check_channels(first: Experiment, record: Experiment) -> None:
@@ -39,7 +40,7 @@ def shared(records: Sequence[Experiment]) -> list[Experiment]:
 
 def files_of(path: str | PathLike[str]) -> list[Path]:
     """The file, or all that fit a pattern in the order of their names."""
-    if not has_magic(str(path)) or Path(path).exists():
+    if not has_magic(str(path)) or exists(path):
         return [Path(path)]
     found = sorted(glob(str(path), recursive=True))  # noqa: PTH207  Path.glob refuses absolute patterns
     if not found:

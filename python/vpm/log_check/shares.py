@@ -286,7 +286,9 @@ class Tangent:
 
     def _weighed(self, rows: NDArray[np.intp]) -> tuple[Array, Array]:
         """Slopes in sizes of what is left of each channel, sample by sample and channel by channel, and these sizes."""
-        sizes = np.sqrt(np.mean(self.residual[self.seen] ** 2, axis=0)) + 1e-300
+        # What is drawn to the last digit is known no better than to rounding: squares of its slopes stay finite.
+        rounding = np.finfo(np.float64).eps * np.max(np.abs(self.slopes), axis=(0, 2), initial=0.0)
+        sizes = np.sqrt(np.mean(self.residual[self.seen] ** 2, axis=0)) + rounding + 1e-150
         slopes = self.slopes[rows] / sizes[:, None]
         return slopes.reshape(-1, slopes.shape[2]), sizes
 

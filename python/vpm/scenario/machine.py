@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from vpm.errors import ModelError, near_match
+from vpm.files import unreadable
 from vpm.model import Model
 from vpm.model.messages import place
 from vpm.model.writer import plain
@@ -39,6 +40,8 @@ def machines(entries: tuple[RunEntry, ...], folder: Path) -> Mapping[str, Model]
         if entry.name in found:
             refuse((*keys, "name"), f'is "{entry.name}", which another run is called already; give it another name')
         path = folder / entry.model
+        if reason := unreadable(path):
+            refuse((*keys, "model"), f"cannot be read: {reason}")
         if not path.is_file():
             nearby = sorted(file.name for file in folder.glob("*.toml"))
             repair = near_match(entry.model, nearby, what="the files beside the scenario are")

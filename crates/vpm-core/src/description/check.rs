@@ -92,7 +92,12 @@ fn used_parameters(description: &Description) -> Vec<(String, usize)> {
         transmission.map(&mut |&index| used.push((format!("transmission `{}`", transmission.name), index)));
     }
     for (number, effect) in description.effects.iter().enumerate() {
-        used.extend(effect.domains().into_iter().map(|(&index, _)| (format!("effect number {number}"), index)));
+        let what = format!("effect number {number}");
+        used.extend(effect.domains().into_iter().map(|(&index, _)| (what.clone(), index)));
+        // The ratios of a shaft have no domain of their own here.
+        if let Some(seat) = effect.seat() {
+            seat.map(&mut |&index| used.push((what.clone(), index)));
+        }
     }
     for actuator in &description.actuators {
         actuator.map(&mut |&index| used.push((format!("actuator `{}`", actuator.name), index)));

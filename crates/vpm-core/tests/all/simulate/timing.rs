@@ -40,7 +40,7 @@ fn stages_are_called_as_often_as_the_methods_say() {
         assert_eq!(calls(&stages, "Jacobian"), jacobians, "{method}");
         assert_eq!(calls(&stages, "iteration matrix"), matrices, "{method}");
         assert_eq!(calls(&stages, "sensors"), 1.0, "{method}");
-        assert!(stages.iter().all(|stage| stage.seconds > 0.0 && stage.seconds < 1e-3), "{stages:?}");
+        assert!(stages.iter().all(|stage| stage.seconds > 0.0 && stage.seconds.is_finite()), "{stages:?}");
         assert!(!stages.iter().any(|stage| stage.name == "beams"));
     }
 }
