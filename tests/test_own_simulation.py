@@ -1,0 +1,126 @@
+"""Fits of balances beside what these leave of the model's own simulation, on a pendulum that numpy integrates."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from fit_machines import sines
+from vpm import Experiment, Model, Setup, identify
+from vpm.identify import InverseDynamicsProblem, gaps
+from vpm.identify.own_simulation import own_residual
+
+Array = NDArray[np.float64]
+
+DT, STEPS, NOISE, MACHINES = 0.002, 8, 2e-5, 40
+#: Inertia about the hinge (kg m^2), viscous (N m s) and dry friction (N m).
+TRUTH = {"pendulum.inertia.yy": 0.03, "hinge.friction.viscous": 0.12, "hinge.friction.coulomb": 0.25}
+#: Weight at its lever (N m), and speed at which dry friction turns round (rad/s).
+WEIGHT, TURN = 1.5, 0.01
+MODEL = Model.from_toml(
+    f"""
+    name = "pendulum"
+    gravity = [0.0, 0.0, -10.0]
+    bodies.pendulum = {{ mass = 1.0, center_of_mass = [0.0, 0.0, -0.15], inertia = [0.01, 0.01, 0.01, 0.0, 0.0, 0.0] }}
+    joints.hinge = {{ type = "revolute", parent = "world", child = "pendulum", axis = [0.0, 1.0, 0.0] }}
+    actuators.drive = {{ joint = "hinge", gain = 1.0, command_unit = "N m" }}
+    effects = [
+        {{ type = "viscous_friction", at = "hinge", viscous = 0.1 }},
+        {{ type = "coulomb_friction", at = "hinge", coulomb = 0.2, transition_velocity = {TURN} }},
+    ]
+    """
+)
+#: Of the body about its own centre: the rest is its mass at the lever.
+OWN = TRUTH["pendulum.inertia.yy"] - 1.0 * 0.15**2
+FREE = tuple(TRUTH)
+EXPECTED = np.array([OWN, *list(TRUTH.values())[1:]])
+
+
+def logs(machines: int, seed: int, seconds: float = 12.0) -> list[Experiment]:
+    """Logs of a pendulum under a controller, by the classical method of Runge and Kutta, side by side."""
+    random, samples = np.random.default_rng(seed), round(seconds / DT)
+    wanted = sines(random, samples, machines, 0.35, 0.25)
+    inertia, viscous, dry = TRUTH.values()
+
+    def rates(q: Array, v: Array, effort: Array) -> tuple[Array, Array]:
+        return v, (effort - WEIGHT * np.sin(q) - viscous * v - dry * np.tanh(v / TURN)) / inertia
+
+    q, v, h = np.zeros(machines), np.zeros(machines), DT / STEPS
+    seen, commands = np.empty((samples, machines)), np.empty((samples, machines))
+    for k in range(samples):
+        seen[k] = q + NOISE * random.standard_normal(machines)
+        speed = (seen[k] - seen[k - 1]) / DT if k else np.zeros(machines)
+        commands[k] = effort = 12.0 * (wanted[k] - seen[k]) - 0.05 * speed
+        for _ in range(STEPS):
+            a = rates(q, v, effort)
+            b = rates(q + 0.5 * h * a[0], v + 0.5 * h * a[1], effort)
+            c = rates(q + 0.5 * h * b[0], v + 0.5 * h * b[1], effort)
+            d = rates(q + h * c[0], v + h * c[1], effort)
+            q, v = (x + h / 6.0 * (a[i] + 2.0 * b[i] + 2.0 * c[i] + d[i]) for i, x in enumerate((q, v)))
+    time = DT * np.arange(samples)
+    return [
+        Experiment.from_arrays(
+            time, {"hinge.position": seen[:, n], "drive.command": commands[:, n]}, {}, name=f"log {n}", model=MODEL
+        )
+        for n in range(machines)
+    ]
+
+
+@pytest.fixture(scope="module")
+def some() -> list[Experiment]:
+    return logs(MACHINES, seed=72)
+
+
+def test_dry_friction_that_turns_round_biases_no_interval(some: list[Experiment]) -> None:
+    """Of forty intervals at 95 %, fewer than 32 hold the truth with a chance of 1e-3."""
+    fits = [identify(MODEL, log, FREE) for log in some]
+    held = [(fit.intervals[:, 0] <= EXPECTED) & (fit.intervals[:, 1] >= EXPECTED) for fit in fits]
+    assert np.all(np.sum(held, axis=0) >= 32)
+    assert not [warning for fit in fits for warning in fit.warnings if "repeats with the motion" in warning]
+    errors = [fit["pendulum.inertia.yy"] / OWN - 1.0 for fit in fits]
+    assert np.sqrt(np.mean(np.square(errors))) < 1e-3  # 4e-3 by the plain balance
+
+
+def test_what_is_left_of_a_log_is_what_was_expected(some: list[Experiment]) -> None:
+    """At the true values nothing but noise is left beyond that."""
+    true = MODEL.with_parameters(dict(zip(FREE, EXPECTED.tolist(), strict=True)))
+    data = InverseDynamicsProblem(true, some[:1])
+    left, expected = data.evaluate(true, true.theta)[0], own_residual(true, data)
+    assert expected is not None
+    assert np.std(left - expected) < 0.5 * np.std(left)
+    assert np.array_equal(data.less(expected).evaluate(true, true.theta)[0], left - expected)
+
+
+def test_the_error_that_is_told_is_that_of_the_log(some: list[Experiment]) -> None:
+    fit = identify(MODEL, some[0], FREE)
+    data = InverseDynamicsProblem(fit.model, some[:1])
+    residual = data.evaluate(fit.model, fit.model.theta)[0]
+    assert fit.after["hinge.effort"][0] == pytest.approx(gaps(data, residual)["hinge.effort"][0], rel=1e-9)
+
+
+def test_a_fit_repeats_to_the_last_digit(some: list[Experiment]) -> None:
+    first, second = (identify(MODEL, some[0], FREE) for _ in range(2))
+    assert np.array_equal(first.values, second.values)
+
+
+def test_nothing_is_expected_of_a_model_that_leaves_its_log(some: list[Experiment]) -> None:
+    """Its drive pulls the other way, and no slow controller keeps it there."""
+    heavy = MODEL.with_parameters({"hinge.friction.coulomb": 50.0})
+    assert own_residual(heavy, InverseDynamicsProblem(heavy, some[:1])) is None
+
+
+def test_nothing_is_expected_where_commands_run_between_samples(some: list[Experiment]) -> None:
+    data = InverseDynamicsProblem(MODEL, some[:1], hold="first_order")
+    assert own_residual(MODEL, data) is None
+    fit = identify(MODEL, some[0], FREE, setup=Setup(hold="first_order"))
+    assert np.all(np.isfinite(fit.std))
+
+
+def test_another_record_is_compared_as_the_first_one_is(some: list[Experiment]) -> None:
+    data = InverseDynamicsProblem(MODEL, some[:1])
+    same = data.on([replace(some[0], name="again")])
+    assert same.blocks == data.blocks
+    np.testing.assert_array_equal(same.evaluate(MODEL, MODEL.theta)[0], data.evaluate(MODEL, MODEL.theta)[0])
