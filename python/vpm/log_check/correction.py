@@ -81,17 +81,17 @@ class Correction:
     def sentence(self, units: Mapping[str, str]) -> str:
         """What is wrong, for people; ``units`` are those that were read."""
         names = _listed(self.channels)
-        are = "is" if len(self.channels) == 1 else "are"
+        are, have = ("is", "has") if len(self.channels) == 1 else ("are", "have")
         if self.swap:
             return f"{names} are in each other's place"
         if self.delay:
             several, way = len(self.channels) > 1, "late" if self.delay > 0.0 else "early"
             return f"{names} {'come' if several else 'comes'} {1e3 * abs(self.delay):.3g} ms {way}"
-        turned = " and has the opposite sign" if self.factor < 0.0 else ""
+        turned = f" and {have} the opposite sign" if self.factor < 0.0 else ""
         if self.unit:
             return f"{names} {are} in {self.unit}, not in {units[self.channels[0]]}{turned}"
         if self.factor == -1.0:
-            return f"{names} {'has' if len(self.channels) == 1 else 'have'} the opposite sign"
+            return f"{names} {have} the opposite sign"
         size = abs(self.factor)
         by = f"{1.0 / size:.4g} times too large" if size < 1.0 else f"{size:.4g} times too small"
         return f"{names} {are} {by}{turned}"

@@ -97,7 +97,7 @@ class Explainer:
         tried = self._ordered("trying", self.judge.guessed, pairs, part)
         few = [pair for pair, shares in tried if shares.cost < before.cost][: self.settings.fitted]
         for pair, after in self._ordered("fitting", self.judge.fitted, few, part)[:1]:
-            if all(self._explains(one, left, after) for one in pair):
+            if all(self._explains(one, left, after, len(pair)) for one in pair):
                 both = Explanation(pair.first, left, after, self._affected(pair.first, after), at_once=True)
                 both = replace(both, is_of_values=self._is_of_values(pair.first, left, after))
                 return [replace(both, correction=one, affected=self._affected(one, after)) for one in pair]
@@ -112,7 +112,7 @@ class Explainer:
             corrected = correction.applied(part)
             second = self._best(self._ended(corrected, used, after), after)
             again = second is not None and second.correction.channels == correction.channels
-            if second is not None and not again and self._explains(correction, left, second.after):
+            if second is not None and not again and self._explains(correction, left, second.after, 2):
                 pairs.append(
                     [
                         Explanation(correction, left, after, self._affected(correction, after), ()),
@@ -228,13 +228,16 @@ class Explainer:
         tried = self._ordered("refining", lambda record: self.judge.measured(record, at.values), finer, part)
         return tried[0][0] if tried else correction
 
-    def _explains(self, correction: Correction, before: Shares, after: Shares) -> bool:
-        """Whether a correction explains what a model leaves, or by which values it leaves nothing."""
+    def _explains(self, correction: Correction, before: Shares, after: Shares, count: int = 1) -> bool:
+        """Whether a correction explains what a model leaves, or by which values it leaves nothing.
+
+        As one of a ``count``, each of which has to earn its tenth: there are many pairs, and some do well by chance.
+        """
         if self._is_of_values(correction, before, after):
             return True
         affected = self._affected(correction, after)
         gain = after.logarithm(affected) - before.logarithm(affected)
-        if after.cost > before.cost or gain > math.log(self.settings.better):
+        if after.cost > before.cost or gain > count * math.log(self.settings.better):
             return False
         return not correction.delay or self._is_throughout(affected, before, after)
 
