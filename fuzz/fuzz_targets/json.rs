@@ -79,7 +79,9 @@ fn change(whole: &mut Value, dice: &mut Dice) {
 /// Mostly a change of the document, sometimes one of its bytes: the new size of `data`.
 pub fn mutate(data: &mut [u8], size: usize, most: usize, seed: u32) -> usize {
     let mut dice = Dice(u64::from(seed) << 1 | 1);
-    (0..3).for_each(|_| drop(dice.below(2)));
+    (0..3).for_each(|_| {
+        dice.below(2);
+    });
     let document = serde_json::from_slice::<Value>(&data[..size]).ok().filter(|_| dice.below(5) > 0);
     let Some(mut document) = document else { return fuzzer_mutate(data, size, most) };
     for _ in 0..=dice.below(3) {
