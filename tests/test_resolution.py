@@ -197,6 +197,6 @@ def test_the_command_says_it_beside_its_numbers(tmp_path: Path) -> None:
     (tmp_path / "log.csv").write_text(f"time,drive.command\n{rows}\n", encoding="utf-8")
     done = vpm("simulate", "model.toml", "log.csv", "--integrator", "rk4", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
-    assert "note: rk4, 1 ms: modes above" in done.stdout
+    assert "warning: rk4, 1 ms: modes above" in done.stdout
     done = vpm("simulate", "model.toml", "log.csv", "--integrator", "adaptive", cwd=tmp_path)
     assert "note:" not in done.stdout

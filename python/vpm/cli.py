@@ -266,7 +266,7 @@ def _tell_run(run: Run, record: Experiment, out: Path | None) -> None:
 
     console.print(repr(run), markup=False)
     for message in run.messages:
-        console.print(f"note: {message}", markup=False)
+        console.print(f"warning: {message}", markup=False)
     try:
         console.print(str(compare_run(run, record)), markup=False)
     except VpmError as error:  # commands alone are enough to simulate

@@ -20,7 +20,7 @@ from vpm.discrepancy.by_ranking import free_joints, observed_gaps, searched, why
 from vpm.discrepancy.by_ranking import notes as notes_of
 from vpm.discrepancy.candidates import asked_for, slow_speeds
 from vpm.discrepancy.choice import Accepted
-from vpm.discrepancy.confirmation import Data, Judged, is_clear, judge, weaker
+from vpm.discrepancy.confirmation import Data, Judged, is_clear, judge, judged_anyhow, weaker
 from vpm.discrepancy.contacts import with_told_contacts
 from vpm.discrepancy.diagnosis import (
     AcceptedEffect,
@@ -214,15 +214,7 @@ def _diagnosis(
     say("comparing the nominal model with the data")
     nominal = _nominal(model, data, notes)
     say("recalibrating the nominal parameters")
-    free = model.adjustable
-    if not free:
-        notes.append("the model file gives no parameter an uncertainty, so none was recalibrated")
-    transitions = _transitions(model, data.training)
-    data.training.workers = worker_count(each.workers)
-    bounds = {**_within_reach(model, free), **transitions}
-    recalibrated = judge(model, (*free, *transitions), data, bounds)
-    data.training.workers = 1  # candidates share the cores from here on
-    notes.extend(moved_far(model, recalibrated))
+    recalibrated = _recalibrated(model, data, notes, each)
     found, ambiguous, late = _named(ranking, recalibrated, data, by, say, each, notes)
     try:
         say("measuring the noise floor")
@@ -502,6 +494,22 @@ def _nominal(model: Model, data: Data, notes: list[str]) -> Judged:
         return judge(model, (), replace(data, simulation=None), {})
 
 
+def _recalibrated(model: Model, data: Data, notes: list[str], each: SideBySide) -> Judged:
+    """The model with its uncertain parameters fitted, compared by effort alone where it cannot simulate the records."""
+    free = model.adjustable
+    if not free:
+        notes.append("the model file gives no parameter an uncertainty, so none was recalibrated")
+    transitions = _transitions(model, data.training)
+    data.training.workers = worker_count(each.workers)
+    bounds = {**_within_reach(model, free), **transitions}
+    recalibrated, stopped = judged_anyhow(model, (*free, *transitions), data, bounds)
+    data.training.workers = 1  # candidates share the cores from here on
+    if stopped:
+        notes.append(f"the recalibrated model could not simulate the unseen records: {stopped}")
+    notes.extend(moved_far(model, recalibrated))
+    return recalibrated
+
+
 def _transitions(model: Model, data: InverseDynamicsProblem) -> dict[str, tuple[float, float]]:
     """Transition velocities of the dry friction that the model has, with bounds from the data.
 
@@ -554,13 +562,15 @@ def _gaps(
         before, known, after = (float(stage[channel][0] * factor) for stage, factor in zip(stages, own, strict=True))
         signal, noise = _signal(data.unseen, channel), float(floor.get(channel, np.nan) * own[-1])
         result[channel] = ChannelGap(before, known, after, noise, unit, signal, data.unseen.mode)
-    if data.simulation is not None and nominal.simulated is not None:
-        simulated = [gaps(data.simulation, j.simulated) for j in judged if j.simulated is not None]
+    simulation = data.simulation
+    simulated = [] if simulation is None else [gaps(simulation, j.simulated) for j in judged if j.simulated is not None]
+    # A stage that ran away from the records has nothing to be compared.
+    if simulation is not None and len(simulated) == len(judged):
         for channel, (_, _, unit) in simulated[0].items():
             before, known, after = (stage[channel][0] for stage in simulated)
-            signal = _signal(data.simulation, channel)
-            key = f"{channel} ({data.simulation.mode})"
-            result[key] = ChannelGap(before, known, after, np.nan, unit, signal, data.simulation.mode)
+            signal = _signal(simulation, channel)
+            key = f"{channel} ({simulation.mode})"
+            result[key] = ChannelGap(before, known, after, np.nan, unit, signal, simulation.mode)
     return result
 
 

@@ -33,6 +33,8 @@ DAMPING = float(np.sqrt(0.5))
 AWAY = 0.3
 #: Where dry friction turns round, longer steps would be an error of the simulation that a fit takes for the machine's.
 METHOD = "adaptive(1e-7)"
+#: A model that leaves so many times more of a log than of its own simulation lacks something, which is more than this.
+ALIKE = 2.0
 #: Simulated logs with noise of their own; their mean adds a part of the variance that is one over their number.
 DRAWS = 6
 
@@ -51,7 +53,7 @@ def own_residual(model: Model, data: InverseDynamicsProblem, seed: int = 0) -> A
     Returns
     -------
     ndarray or None
-        None where the model does not stay by its records, or has states that these do not show.
+        None where the model does not stay by its records or lacks something, or has states that these do not show.
     """
     held = data.hold == HOLDS[0]
     if not held or has_own_drives(model) or any(has_hidden(model, m.joints) for m in data.motions):
@@ -67,8 +69,10 @@ def own_residual(model: Model, data: InverseDynamicsProblem, seed: int = 0) -> A
         noisy = [_noisy(one, e, random) for one, e in zip(simulated, data.experiments, strict=True) if one is not None]
         # What is relative to the delivered effort is made so afterwards, with what is expected taken off.
         left.append(InverseDynamicsProblem.evaluate(data.on(noisy), model, model.theta)[0])
-    mean = np.mean(left, axis=0)
-    return mean if np.all(np.isfinite(mean)) else None
+    of_log = InverseDynamicsProblem.evaluate(data, model, model.theta)[0]
+    if not np.linalg.norm(of_log) <= ALIKE * np.linalg.norm(left) / np.sqrt(DRAWS):
+        return None
+    return np.asarray(np.mean(left, axis=0))
 
 
 def _simulated(model: Model, log: Experiment, m: Motion) -> Experiment | None:

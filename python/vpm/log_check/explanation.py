@@ -98,9 +98,7 @@ class Explainer:
         few = [pair for pair, shares in tried if shares.cost < before.cost][: self.settings.fitted]
         for pair, after in self._ordered("fitting", self.judge.fitted, few, part)[:1]:
             if all(self._explains(one, left, after, len(pair)) for one in pair):
-                both = Explanation(pair.first, left, after, self._affected(pair.first, after), at_once=True)
-                both = replace(both, is_of_values=self._is_of_values(pair.first, left, after))
-                return [replace(both, correction=one, affected=self._affected(one, after)) for one in pair]
+                return [Explanation(one, left, after, self._affected(one, after), at_once=True) for one in pair]
         return []
 
     def _one_by_one(
@@ -233,7 +231,7 @@ class Explainer:
 
         As one of a ``count``, each of which has to earn its tenth: there are many pairs, and some do well by chance.
         """
-        if self._is_of_values(correction, before, after):
+        if count == 1 and self._is_of_values(correction, before, after):
             return True
         affected = self._affected(correction, after)
         gain = after.logarithm(affected) - before.logarithm(affected)
@@ -247,7 +245,7 @@ class Explainer:
         Of delays that says nothing: what a model lacks moves its parameters as well, and looks late.
         """
         settings = self.settings
-        if correction.delay or before.far <= settings.far or after.far > settings.far:
+        if correction.delay or before.far <= settings.far or after.chance < settings.believable:
             return False
         doubtful = before.above(settings.doubtful) | after.above(settings.doubtful)
         return before.unlikely - after.unlikely > settings.likelier and not doubtful

@@ -55,7 +55,9 @@ class Settings:
     far : float
         Stated deviations of a parameter of the model by which the model file rules a value out.
     likelier : float
-        A mistake also explains a record if its correction makes the values that explain it likelier by so many nats.
+        A mistake also explains a record if its correction makes the values that explain it likelier by so many nats,
+    believable : float
+        and leaves such values that larger deviations have at least this chance.
     branches : int
         Corrections with each of which another one is tried where none explains a record alone.
     rounds : int
@@ -112,6 +114,7 @@ class Settings:
     hopeful: float = 3.0
     far: float = 5.0
     likelier: float = 10.0
+    believable: float = 1e-3
     branches: int = 3
     rounds: int = 3
     smallest: float = 2.0

@@ -53,6 +53,8 @@ class Shares:
         Its name.
     unlikely : float
         How unlikely the model file makes its parameters, as half the sum of the squares of these deviations (nats).
+    chance : float
+        Of deviations as large as these.
     floor : float
         Shares below this are as good as nothing.
     """
@@ -64,6 +66,7 @@ class Shares:
     far: float = 0.0
     farthest: str = ""
     unlikely: float = 0.0
+    chance: float = 1.0
     floor: float = 0.0
 
     @property
@@ -131,6 +134,8 @@ class Judge:
 
     def fitted(self, record: Experiment) -> Shares:
         """Shares when the uncertain parameters of the model, and friction of its joints, have been fitted."""
+        from scipy.stats import chi2  # slow to import, and seldom needed
+
         observer = self._observer(record)
         try:
             observed = self._observed(record, observer)
@@ -145,7 +150,8 @@ class Judge:
         own = {name: far for name, far in moved if not self._is_added(name)}
         farthest = max(own, key=lambda name: own[name], default="")
         unlikely = sum(far**2 for far in own.values()) / 2.0
-        return replace(shares, far=own.get(farthest, 0.0), farthest=farthest, unlikely=unlikely)
+        chance = float(chi2.sf(2.0 * unlikely, max(len(own), 1)))
+        return replace(shares, far=own.get(farthest, 0.0), farthest=farthest, unlikely=unlikely, chance=chance)
 
     def tangent(self, record: Experiment, shares: Shares) -> Tangent | None:
         """How what is left changes with the parameters, about the values of a fit; None where that cannot be told."""
