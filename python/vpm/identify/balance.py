@@ -96,7 +96,7 @@ class InverseDynamicsProblem:
         self.workers = 1
         self.blocks = self._lay_out(model)
         #: What is left at the true values, as far as that is known; see `vpm.identify.own_simulation`.
-        self.expected: Array | None = None
+        self.expected: Array | float = 0.0
 
     def _motions(self, experiments: Sequence[Experiment], cutoffs: Sequence[float | None]) -> tuple[Motion, ...]:
         return tuple(
@@ -113,7 +113,7 @@ class InverseDynamicsProblem:
         vars(same).update(
             experiments=tuple(experiments),
             motions=motions,
-            expected=None,
+            expected=0.0,
             _whole=tuple(replace(m, edge=0) for m in motions),
             _memories=tuple(memories),
             _compared=tuple(self._measured(m, e) for m, e in pairs),
@@ -172,8 +172,7 @@ class InverseDynamicsProblem:
         for measured, answer in zip(self._compared, in_order(jobs, self.workers), strict=True):
             residuals.append(np.hstack([(answer.applied - answer.required)[:, self._joints], measured - answer.seen]))
             jacobians.append(-np.concatenate([answer.balance[:, self._joints], answer.slopes], axis=1))
-        residual = self._stack(residuals)
-        return residual if self.expected is None else residual - self.expected, self._stack(jacobians)
+        return self._stack(residuals) - self.expected, self._stack(jacobians)
 
     def _hold_gains(self, model: Model) -> dict[str, float]:
         """How firmly gauges hold links, the same for all records and for all models that are compared."""

@@ -318,8 +318,7 @@ def _beside_own(
 def _expected(data: AnyProblem) -> Array | float:
     """What was taken off the residual."""
     plain = data.untied if isinstance(data, TiedProblem) else data
-    taken = plain.expected if isinstance(plain, InverseDynamicsProblem) else None
-    return 0.0 if taken is None else taken
+    return plain.expected if isinstance(plain, InverseDynamicsProblem) else 0.0
 
 
 def _moved(model: Model, best: Estimate, ties: Mapping[str, str]) -> Model:

@@ -10,6 +10,7 @@ B. Efron and R. Tibshirani, *An Introduction to the Bootstrap*, 1993, chapter 10
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -59,14 +60,15 @@ def own_residual(model: Model, data: InverseDynamicsProblem, seed: int = 0) -> A
     if not held or has_own_drives(model) or any(has_hidden(model, m.joints) for m in data.motions):
         return None
     try:
-        simulated = [_simulated(model, e, m) for e, m in zip(data.experiments, data.motions, strict=True)]
+        made = [_simulated(model, e, m) for e, m in zip(data.experiments, data.motions, strict=True)]
     except (VpmError, ArithmeticError):
         return None
-    if not all(simulated):
+    simulated = [one for one in made if one is not None]
+    if len(simulated) < len(made):
         return None
-    random, left = np.random.default_rng(seed), []
+    levels, random, left = [_noise(e) for e in data.experiments], np.random.default_rng(seed), []
     for _ in range(DRAWS):
-        noisy = [_noisy(one, e, random) for one, e in zip(simulated, data.experiments, strict=True) if one is not None]
+        noisy = [_noisy(one, level, random) for one, level in zip(simulated, levels, strict=True)]
         # What is relative to the delivered effort is made so afterwards, with what is expected taken off.
         left.append(InverseDynamicsProblem.evaluate(data.on(noisy), model, model.theta)[0])
     of_log = InverseDynamicsProblem.evaluate(data, model, model.theta)[0]
@@ -80,8 +82,7 @@ def _simulated(model: Model, log: Experiment, m: Motion) -> Experiment | None:
     for band in BANDS:
         made = _drawn(model, log, m, band)
         channels = [f"{joint}.position" for joint in model.joints]
-        away = [np.std(made[channel] - log[channel]) <= AWAY * np.std(log[channel]) for channel in channels]
-        if all(away):
+        if all(np.std(made[channel] - log[channel]) <= AWAY * np.std(log[channel]) for channel in channels):
             return made
     return None
 
@@ -122,10 +123,15 @@ def _commands_per_effort(model: Model, m: Motion) -> Array:
     return np.asarray(np.linalg.pinv(np.column_stack(columns)))
 
 
-def _noisy(made: Experiment, log: Experiment, random: np.random.Generator) -> Experiment:
-    """With noise like that of the positions of the log."""
+def _noise(log: Experiment) -> dict[int, float]:
+    """Noise of the positions of a log, by the places of their channels."""
+    places = [place for place, name in enumerate(log.channels) if name.endswith(".position")]
+    return {place: noise_std(log.data[:, place]) for place in places}
+
+
+def _noisy(made: Experiment, levels: Mapping[int, float], random: np.random.Generator) -> Experiment:
+    """With noise of these levels."""
     data = np.array(made.data)
-    for place, channel in enumerate(made.channels):
-        if channel.endswith(".position"):
-            data[:, place] += noise_std(log[channel]) * random.standard_normal(len(data))
+    for place, level in levels.items():
+        data[:, place] += level * random.standard_normal(len(data))
     return replace(made, data=data)
