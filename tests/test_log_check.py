@@ -23,6 +23,13 @@ Array = NDArray[np.float64]
 Columns = dict[str, Array]
 
 MODEL = vpm.Model.from_toml(textbook_arm.FILE)
+SLIDE = vpm.Model.from_toml("""
+    name = "slide"
+    gravity = [0.1, 0.0, -9.81]
+    bodies.table = { mass = { value = 2.0, uncertainty = 0.2 } }
+    joints.slide = { type = "prismatic", parent = "world", child = "table", axis = [1.0, 0.0, 0.0] }
+    actuators.drive = { joint = "slide", gain = 1.0, command_unit = "N" }
+""")
 PLAIN = textbook_arm.Arm()
 #: Faults of the machine itself, none of which is a mistake of the log.
 FAULTS = {
@@ -50,7 +57,7 @@ def exchanged(first: str, second: str) -> Callable[[Columns], Columns]:
 def stamped_late(column: str, samples: int) -> Callable[[Columns], Columns]:
     return lambda columns: {
         **columns,
-        column: np.concatenate([np.full(samples, columns[column][0]), columns[column][:-samples]]),
+        column: np.interp(np.arange(columns["t"].size) - samples, np.arange(columns["t"].size), columns[column]),
     }
 
 
@@ -119,6 +126,44 @@ def test_no_machine_moves_before_its_command(logs: dict[str, Columns]) -> None:
     assert one.delay == pytest.approx(0.02, abs=0.002)
 
 
+@pytest.mark.parametrize("samples", [-25, 20])
+def test_a_long_delay_is_found_to_a_tenth_of_a_sample(logs: dict[str, Columns], samples: int) -> None:
+    """A command 80 ms late, an encoder 100 ms early: far from what is linear in a delay."""
+    column, channel = ("i2", "m2.command") if samples > 0 else ("q1", "one.position")
+    first, *_ = vpm.check_log(MODEL, record(stamped_late(column, samples)(logs["none"])), workers=1).mistakes
+    assert (first.kind, first.channels) == ("delay", (channel,))
+    assert first.delay == pytest.approx(samples / 250.0, abs=4e-4)
+
+
+def test_constant_forces_and_drag_do_not_hide_a_delay() -> None:
+    """A slide with a push of a spring and drag of air that nobody wrote down; its command is stamped 30 ms late."""
+    time = np.arange(0.0, 10.0, 0.004)
+    way, speed, acceleration = (
+        sum(size * w**order * np.sin(w * time + order * np.pi / 2.0) for size, w in ((0.1, 2.0), (0.03, 9.0)))
+        for order in range(3)
+    )
+    force = 2.1 * acceleration + 3.0 * speed + 1.0 + 4.0 * speed * np.abs(speed)
+    noise = 1e-6 * np.random.default_rng(4).standard_normal(time.size)
+    log = vpm.Experiment.from_arrays(
+        time, {"slide.position": way + noise, "drive.command": np.interp(time - 0.03, time, force)}, {}, model=SLIDE
+    )
+    first, *_ = vpm.check_log(SLIDE, log, workers=1).findings
+    assert first.kind == "delay"
+    assert "slide.position comes 30 ms early" in first.sentence
+    assert "drive.command comes 30 ms late" in first.sentence
+
+
+def test_a_pressure_ten_times_too_large_is_named_although_the_first_state_was_drawn_from_it() -> None:
+    from blind import proving
+
+    case = proving.make([proving.Job("servo_cylinder", "none", (), 3, 1.0)])[0][1]
+    assert case is not None
+    log = case.train[0]
+    wrong = log.with_channel("servo.pressure_b", 10.0 * log["servo.pressure_b"], "Pa")
+    (one,) = vpm.check_log(case.model(), wrong, workers=1).mistakes
+    assert (one.channels, one.factor) == (("servo.pressure_b",), pytest.approx(0.1))
+
+
 @pytest.mark.parametrize("samples", [25, 220, 500])
 def test_a_short_log_says_nothing_of_delays(logs: dict[str, Columns], samples: int) -> None:
     short = record({name: column[:samples] for name, column in logs["friction"].items()})
@@ -164,21 +209,14 @@ def test_a_value_that_the_file_rules_out_is_no_explanation(logs: dict[str, Colum
 
 def test_a_mirror_image_that_explains_nearly_everything_is_not_believed() -> None:
     """A slide on a slope, written in a frame turned round: only its weight tells, and that is small."""
-    slide = """
-        name = "slide"
-        gravity = [0.1, 0.0, -9.81]
-        bodies.table = { mass = { value = 2.0, uncertainty = 0.2 } }
-        joints.slide = { type = "prismatic", parent = "world", child = "table", axis = [1.0, 0.0, 0.0] }
-        actuators.drive = { joint = "slide", gain = 1.0, command_unit = "N" }
-    """
-    model, time = vpm.Model.from_toml(slide), np.arange(0.0, 8.0, 0.004)
+    time = np.arange(0.0, 8.0, 0.004)
     way = 0.1 * np.sin(5.0 * time) + 0.05 * np.sin(11.0 * time)
     acceleration = -2.5 * np.sin(5.0 * time) - 6.05 * np.sin(11.0 * time)
     force = 2.1 * (acceleration - 0.1)
     noise = 1e-6 * np.random.default_rng(4).standard_normal((2, time.size))
     for sign in (1.0, -1.0):
         columns = {"slide.position": sign * way + noise[0], "drive.command": sign * force + noise[1]}
-        found = vpm.check_log(model, vpm.Experiment.from_arrays(time, columns, {}, model=model), workers=1)
+        found = vpm.check_log(SLIDE, vpm.Experiment.from_arrays(time, columns, {}, model=SLIDE), workers=1)
         assert [one.channels for one in found.mistakes] == ([] if sign > 0.0 else [tuple(columns)])
 
 
@@ -246,6 +284,12 @@ def test_a_joint_at_rest_is_no_sensor_that_stood_still() -> None:
     values = swing(0.0)
     values[: len(values) // 2] = values[len(values) // 2]
     assert odd(values) == []
+
+
+def test_a_rest_before_the_motion_is_no_sensor_that_stood_still() -> None:
+    """Noise below the step of an encoder does not move it at rest, though hardly two samples are alike in motion."""
+    values = np.concatenate([np.zeros(40), swing(2e-5)[1000:] - swing(0.0)[1000]])
+    assert odd(np.round(values / 1e-4) * 1e-4) == []
 
 
 def test_finds_spikes() -> None:

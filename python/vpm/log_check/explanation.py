@@ -5,19 +5,17 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
 from vpm.discrepancy.side_by_side import Failure, SideBySide
 from vpm.experiment import Experiment
-from vpm.log_check.correction import TIME, Correction, Pair
+from vpm.log_check.correction import Correction, Pair
 from vpm.log_check.corrections import delays, of_two, scales
-from vpm.log_check.shares import Judge, Shares
+from vpm.log_check.shares import FORCES, Judge, Shares
 
 Change = TypeVar("Change", Correction, Pair)
-#: Multiples of a delay that are tried next.
-FINER = (0.5, 0.65, 0.8, 0.9, 0.95, 1.0, 1.05, 1.1, 1.2, 1.35, 1.5)
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +51,14 @@ class Explanation:
         return not any(one.is_possible for one in (self.correction, *self.rivals))
 
 
+class _Trial(NamedTuple):
+    """A correction with what is left before and after it."""
+
+    correction: Correction
+    before: Shares
+    after: Shares
+
+
 class Explainer:
     """Tries corrections of records.
 
@@ -80,9 +86,9 @@ class Explainer:
             What is left of the record as it is.
         """
         ended = self._ended(part, used, left)
-        if (best := self._best(ended, left)) is not None:
-            return [self._by_turns(best, part)]
-        return self._at_once(part, used, left) or self._one_by_one(ended, part, used, left)
+        if (best := self._best(ended, used)) is not None:
+            return [best]
+        return self._at_once(part, used, left) or self._one_by_one(ended, part, used)
 
     def _at_once(self, part: Experiment, used: Sequence[str], left: Shares) -> list[Explanation]:
         """Two corrections of a joint of which each alone explains nothing, for the other one hides what it does."""
@@ -101,67 +107,63 @@ class Explainer:
                 return [Explanation(one, left, after, self._affected(one, after), at_once=True) for one in pair]
         return []
 
-    def _one_by_one(
-        self, ended: Sequence[tuple[Correction, Shares]], part: Experiment, used: Sequence[str], left: Shares
-    ) -> list[Explanation]:
+    def _one_by_one(self, ended: Sequence[_Trial], part: Experiment, used: Sequence[str]) -> list[Explanation]:
         """Two corrections of which the first one leaves less, though not little."""
         pairs = []
-        for correction, after in ended[: self.settings.branches]:
+        for correction, before, after in ended[: self.settings.branches]:
             corrected = correction.applied(part)
-            second = self._best(self._ended(corrected, used, after), after)
+            second = self._best(self._ended(corrected, used, after), used)
             again = second is not None and second.correction.channels == correction.channels
-            if second is not None and not again and self._explains(correction, left, second.after, 2):
-                pairs.append(
-                    [
-                        Explanation(correction, left, after, self._affected(correction, after), ()),
-                        self._by_turns(second, corrected),
-                    ]
-                )
+            if second is not None and not again and self._explains(correction, before, second.after, 2):
+                first = Explanation(correction, before, after, self._affected(correction, after), ())
+                pairs.append([first, second])
         return min(pairs, key=lambda pair: pair[-1].after.order, default=[])
 
-    def _ended(self, part: Experiment, used: Sequence[str], left: Shares) -> list[tuple[Correction, Shares]]:
-        """Corrections with what is left after each, the model fitted, the least first."""
-        return self._ordered("fitting", self.judge.fitted, self._finalists(part, used, left), part)
+    def _ended(self, part: Experiment, used: Sequence[str], left: Shares) -> list[_Trial]:
+        """Corrections with what is left before and after each, the model fitted, the least first."""
 
-    def _best(self, ended: Sequence[tuple[Correction, Shares]], left: Shares) -> Explanation | None:
+        def ended(correction: Correction) -> _Trial:
+            return _Trial(correction, left, self.judge.fitted(correction.applied(part)))
+
+        found = self.each("fitting", ended, self._finalists(part, used, left), self._words)
+        if left.above(self.settings.negligible) and part.duration * self.settings.band >= self.settings.periods:
+            found = [*found, *self._late(part, used)]
+        return sorted((one for one in found if not isinstance(one, Failure)), key=lambda one: one.after.order)
+
+    def _best(self, ended: Sequence[_Trial], used: Sequence[str]) -> Explanation | None:
         """The first of several corrections, if it explains what was left, with those that do as well."""
         if not ended:
             return None
-        (correction, after), *others = ended
+        (correction, before, after), *others = ended
         close = after.cost - math.log(self.settings.alike)
         rivals: list[Correction] = []
-        for other, shares in others:
-            if shares.cost <= close and not any(_is_same(other, one) for one in (correction, *rivals)):
-                rivals.append(other)
-        if not self._explains(correction, left, after) or any(_is_no_scale(correction, other) for other in rivals):
+        for other in others:
+            if other.after.cost <= close and not any(_is_same(other.correction, one) for one in (correction, *rivals)):
+                rivals.append(other.correction)
+        if not self._explains(correction, before, after) or any(_is_no_scale(correction, other) for other in rivals):
             return None
-        affected, of_values = self._affected(correction, after), self._is_of_values(correction, left, after)
-        return Explanation(correction, left, after, affected, tuple(rivals), of_values)
+        affected, of_values = self._affected(correction, after), self._is_of_values(correction, before, after)
+        found = Explanation(correction, before, after, affected, tuple(rivals), of_values)
+        return self._mirrored(found, used)
 
-    def _by_turns(self, found: Explanation, part: Experiment) -> Explanation:
-        """A delay as the record has it; delay and parameters are fitted by turns."""
-        for _ in range(self.settings.rounds if found.correction.delay else 0):
-            finer = self._refined(found.correction, found.after, part)
-            after = self.judge.fitted(finer.applied(part))
-            if after.order >= found.after.order or not self._explains(finer, found.before, after):
-                break
-            found = replace(found, correction=finer, after=after)
-        return found
+    def _mirrored(self, found: Explanation, used: Sequence[str]) -> Explanation:
+        """With the other side of a delay: that some channels are late, or all others early, no log can tell apart."""
+        correction = found.correction
+        others = tuple(name for name in used if name not in correction.channels)
+        if others not in {one.channels for one in delays(self.model, used, self.settings)} or not correction.delay:
+            return found
+        mirror = replace(correction, channels=others, delay=-correction.delay)
+        rivals = (one for one in found.rivals if set(one.channels) != set(others))
+        return replace(found, rivals=(mirror, *rivals))
 
     def _finalists(self, part: Experiment, used: Sequence[str], left: Shares) -> list[Correction]:
-        """Corrections for which the model is worth a fit."""
-        settings, found = self.settings, list[Correction]()
-        some = left.above(settings.negligible)
-        everything = list(scales(self.model, used, self.units, settings))
+        """Corrections for which the model is worth a fit; see `_late` for delays."""
+        some = left.above(self.settings.negligible)
+        everything = list(scales(self.model, used, self.units, self.settings))
         tried = self._about(everything, self._doubtful(left), left)
-        if not left.above(settings.lost):  # with a wrong clock the model explains nothing
-            tried = [one for one in tried if one.channels != (TIME,)]
         # The mirror image of a machine explains most of a log as well as the machine does.
         tried += self._about((one for one in everything if one.is_mirror), some, left)
-        found += self._hopeful(list(dict.fromkeys(tried)), part, self.judge.guessed(part)) if tried else []
-        if some and part.duration * settings.band >= settings.periods:
-            found += self._late(self._about(delays(self.model, used, settings), some, left), part, left)
-        return list(dict.fromkeys(found))
+        return self._hopeful(list(dict.fromkeys(tried)), part, self.judge.guessed(part)) if tried else []
 
     def _doubtful(self, left: Shares) -> set[str]:
         """Channels that the model does not explain; all where its file rules out the values by which it does."""
@@ -192,22 +194,35 @@ class Explainer:
 
         return self._few(self.each("trying", measure, corrections, self._words), before)
 
-    def _late(self, corrections: Sequence[Correction], part: Experiment, left: Shares) -> list[Correction]:
+    def _late(self, part: Experiment, used: Sequence[str]) -> list[_Trial]:
         """The few delays that promise to leave least if parameters give way: friction looks much like a delay."""
-        tangent = self.judge.tangent(part, left)
+        left = self.judge.fitted(part, FORCES)
+        tangent = self.judge.tangent(part, left, FORCES)
         if tangent is None:
             return []
+        some = left.above(self.settings.negligible)
+        corrections = self._about(delays(self.model, used, self.settings), some, left)
 
         def measure(correction: Correction) -> tuple[Correction, Shares]:
-            corrected = correction.applied(part)
-            there = self.judge.measured(corrected, left.values)
-            if there.residual is None:
-                return correction, there
-            shares, share = tangent.promised(corrected, part, there.residual)
-            delay = float(np.clip(share * correction.delay, -self.settings.latest, self.settings.latest))
-            return (replace(correction, delay=delay), shares) if abs(delay) > 0.5 * part.dt else (correction, left)
+            shares = left
+            for _ in range(self.settings.rounds):  # by secants: a long delay is not linear in what it leaves
+                corrected = correction.applied(part)
+                there = self.judge.measured(corrected, left.values)
+                if there.residual is None:
+                    return correction, there
+                shares, share = tangent.promised(corrected, part, there.residual)
+                delay = self._possible(share * correction.delay)
+                if abs(delay) <= 0.5 * part.dt:
+                    return correction, left
+                near = abs(delay - correction.delay) < self.settings.settled * part.dt
+                correction = replace(correction, delay=delay)
+                if near:
+                    break
+            return correction, shares
 
-        return self._few(self.each("trying", measure, corrections, self._words), left)
+        few = self._few(self.each("trying", measure, corrections, self._words), left)
+        found = self.each("refining", lambda one: self._settled(one, part, left), few, self._words)
+        return [one for one in found if not isinstance(one, Failure) and abs(one.correction.delay) > 0.5 * part.dt]
 
     def _few(self, tried: Sequence[tuple[Correction, Shares] | Failure], before: Shares) -> list[Correction]:
         """The corrections that leave least, one of each kind, and less than is left without any."""
@@ -220,11 +235,32 @@ class Explainer:
                 hopeful.append(correction)
         return hopeful[: self.settings.finalists]
 
+    def _settled(self, correction: Correction, part: Experiment, left: Shares) -> _Trial:
+        """A delay with what is left before and after it is corrected; it and the parameters give way by turns."""
+        shares = self.judge.fitted(correction.applied(part), FORCES)
+        for _ in range(self.settings.rounds):
+            finer = self._refined(correction, shares, part)
+            after = self.judge.fitted(finer.applied(part), FORCES)
+            if after.order >= shares.order:
+                break
+            moved = abs(finer.delay - correction.delay)
+            correction, shares = finer, after
+            if moved < self.settings.settled * part.dt:
+                break
+        return _Trial(correction, left, shares)
+
     def _refined(self, correction: Correction, at: Shares, part: Experiment) -> Correction:
-        """A delay as the record has it, by the values of the parameters with which something was left."""
-        finer = [replace(correction, delay=share * correction.delay) for share in FINER]
-        tried = self._ordered("refining", lambda record: self.judge.measured(record, at.values), finer, part)
-        return tried[0][0] if tried else correction
+        """A delay by which less is left if the parameters give way, from where they are fitted to another one."""
+        corrected, farther = correction.applied(part), replace(correction, delay=1.1 * correction.delay)
+        tangent, moved = self.judge.tangent(corrected, at, FORCES), farther.applied(part)
+        there = self.judge.measured(moved, at.values)
+        if tangent is None or there.residual is None:
+            return correction
+        _, share = tangent.promised(moved, corrected, there.residual)
+        return replace(correction, delay=self._possible((1.0 + 0.1 * share) * correction.delay))
+
+    def _possible(self, delay: float) -> float:
+        return float(np.clip(delay, -self.settings.latest, self.settings.latest))
 
     def _explains(self, correction: Correction, before: Shares, after: Shares, count: int = 1) -> bool:
         """Whether a correction explains what a model leaves, or by which values it leaves nothing.

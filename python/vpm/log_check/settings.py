@@ -32,10 +32,10 @@ class Settings:
     doubtful : float
         Share of the error power of free masses that a model may leave of a channel. Where it leaves more, after its
         uncertain parameters and the friction of its joints were fitted, units, signs and names of channels are tried.
-    lost : float
-        Such a share of which a wrong clock leaves more, of one channel at least.
     negligible : float
         Such a share that is as good as nothing.
+    quiet : float
+        A channel has noise if that is more than such a share of its usual steps, and more than the digits show.
     better : float
         A mistake explains a record if its correction leaves at most this share of the channels that it affects.
     periods : float
@@ -68,6 +68,8 @@ class Settings:
         Delays of channels that are tried, s: by these the change of what is left is taken as linear.
     latest : float
         Longest delay that is told, s.
+    settled : float
+        A delay is as the record has it when it moves by less, in samples.
     stuck : int
         Samples of one value, in a channel with noise, that no sensor gives by chance.
     jump : float
@@ -102,8 +104,8 @@ class Settings:
     fewest: int = 20
     judged: int = 200
     doubtful: float = 0.1
-    lost: float = 0.8
-    negligible: float = 1e-3
+    negligible: float = 1e-5
+    quiet: float = 1e-3
     better: float = 0.1
     periods: float = 2.0
     pieces: int = 3
@@ -118,8 +120,9 @@ class Settings:
     branches: int = 3
     rounds: int = 3
     smallest: float = 2.0
-    delays: tuple[float, ...] = (0.005, 0.02, 0.06)
+    delays: tuple[float, ...] = (0.01, 0.05)
     latest: float = 0.1
+    settled: float = 0.1
     stuck: int = 20
     jump: float = 3.0
     clipped: float = 0.01

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -26,6 +26,10 @@ from vpm.weighing.priors import Prior
 Array = NDArray[np.float64]
 #: Friction that a joint may have without being described: nothing of it passes for a mistake of a log.
 FRICTION = ("viscous_friction", "coulomb_friction")
+#: Nor do these pass for a delay. They may hide a sign: where a machine is heavy, a constant force is its mirror image.
+FORCES = (*FRICTION, "asymmetric_friction", "quadratic_drag", "bias_force")
+#: Powers of speed that these go with, by their parameters.
+POWERS = {"viscous": 1, "viscous_difference": 1, "drag": 2}
 #: Speed at which dry friction turns round, as a share of the usual speed of the joint.
 TRANSITION = 0.02
 #: Pieces of a record between whose ends speeds are measured, which noise hardly moves.
@@ -47,6 +51,8 @@ class Shares:
         What is left of the channels; None where the model runs away from the record.
     free : ndarray, shape (m,)
         What free masses leave of each channel, as a sum of squares.
+    seen : ndarray of int
+        Samples that count.
     far : float
         By how many of its stated deviations a parameter of the model was moved, the farthest one.
     farthest : str
@@ -63,6 +69,7 @@ class Shares:
     values: Array
     residual: Array | None = None
     free: Array = field(default_factory=lambda: np.ones(1))
+    seen: NDArray[np.intp] = field(default_factory=lambda: np.arange(0))
     far: float = 0.0
     farthest: str = ""
     unlikely: float = 0.0
@@ -90,7 +97,7 @@ class Shares:
 
 
 class Judge:
-    """Measures records by a model, to which friction was added at each joint without any.
+    """Measures records by a model, to which friction and other forces were added at each joint without them.
 
     An observer of stated bandwidth keeps the model on the record, see `vpm.ranking.observed.Observed`.
 
@@ -105,7 +112,7 @@ class Judge:
         self.settings, self.setup = settings, setup
         present = {(effect.name, effect.at) for effect in model.effects}
         joints = [name for name in model.joints if name not in model.added_joints]
-        self.added = tuple((name, at) for at in joints for name in FRICTION if (name, at) not in present)
+        self.added = tuple((name, at) for at in joints for name in FORCES if (name, at) not in present)
         for name, at in self.added:
             model = model.with_effect(name, at)
         self.model = model
@@ -132,15 +139,15 @@ class Judge:
             values[self.model.index(parameter)] = structure.priors[parameter].spread
         return min(plain, self.measured(record, values), key=lambda shares: shares.order)
 
-    def fitted(self, record: Experiment) -> Shares:
-        """Shares when the uncertain parameters of the model, and friction of its joints, have been fitted."""
+    def fitted(self, record: Experiment, forces: Collection[str] = FRICTION) -> Shares:
+        """Shares when the uncertain parameters of the model, and such forces of its joints, have been fitted."""
         from scipy.stats import chi2  # slow to import, and seldom needed
 
         observer = self._observer(record)
         try:
             observed = self._observed(record, observer)
             fitter = Fitter(observed, RankingSettings(bands=(observer.band,)))
-            structure = self._structure(record)
+            structure = self._structure(record, forces)
             fitted = fitter.fitted(structure, observer, View(fitter.noise_of(structure, observer)))
         except ASTRAY:
             return self.measured(record)
@@ -153,9 +160,11 @@ class Judge:
         chance = float(chi2.sf(2.0 * unlikely, max(len(own), 1)))
         return replace(shares, far=own.get(farthest, 0.0), farthest=farthest, unlikely=unlikely, chance=chance)
 
-    def tangent(self, record: Experiment, shares: Shares) -> Tangent | None:
+    def tangent(self, record: Experiment, shares: Shares, forces: Collection[str] = FRICTION) -> Tangent | None:
         """How what is left changes with the parameters, about the values of a fit; None where that cannot be told."""
-        observer, structure = self._observer(record), replace(self._structure(record), theta=shares.values)
+        if shares.residual is None:
+            return None
+        observer, structure = self._observer(record), replace(self._structure(record, forces), theta=shares.values)
         try:
             fitter = Fitter(self._observed(record, observer), RankingSettings(bands=(observer.band,)))
             followed = fitter.followed(structure, observer, tuple(structure.priors))
@@ -163,8 +172,7 @@ class Judge:
             return None
         if not np.all(np.isfinite(followed.jacobian)):
             return None
-        seen = _seen(fitter.observed)
-        return Tangent(structure, seen, followed.residual, followed.jacobian * structure.slopes, shares)
+        return Tangent(structure, followed.residual, followed.jacobian * structure.slopes, shares)
 
     def unseen(self, tangent: Tangent) -> list[str]:
         """Uncertain parameters of the model of which a record says next to nothing."""
@@ -179,15 +187,16 @@ class Judge:
             return None
         corrected = correction.applied(record)
         rows, shares = rows_of(corrected, record), dict(before.by_channel)
+        kept = np.isin(rows, before.seen)
         for place, name in enumerate(before.by_channel):
             if name in correction.channels:
-                reading, shown = corrected[name], record[name][rows] - before.residual[rows, place]
+                reading, shown = corrected[name][kept], (record[name] - before.residual[:, place])[rows[kept]]
                 free = float(np.sum((reading - np.mean(reading)) ** 2))
                 shares[name] = _share(float(np.sum((reading - shown) ** 2)), free)
         return replace(before, by_channel=shares)
 
-    def _structure(self, record: Experiment) -> Structure:
-        """The model with friction at each joint that begins at nothing."""
+    def _structure(self, record: Experiment, forces: Collection[str] = FRICTION) -> Structure:
+        """The model with forces at each joint that begin at nothing."""
         model = self.model
         priors, values = stated(model), model.theta.copy()
         for name, joint in self.added:
@@ -196,8 +205,8 @@ class Judge:
             for short, parameter in effect.parameter_names.items():
                 if effect.type.parameter(short).shape:
                     values[model.index(parameter)] = TRANSITION * speed
-                else:
-                    size = effort / speed if name == "viscous_friction" else effort
+                elif name in forces:
+                    size = effort / speed ** POWERS.get(short, 0)
                     priors[parameter] = Prior(0.0, size, *effect.type.parameter(short).physical)
         return Structure(model, values, priors)
 
@@ -232,7 +241,7 @@ class Judge:
         with np.errstate(all="ignore"):
             told = map(_share, np.sum(residual[seen] ** 2, axis=0).tolist(), free.tolist())
         shares = dict(zip(observed.records[0].channels, told, strict=True))
-        return Shares(shares, values, residual, free, floor=self.settings.negligible)
+        return Shares(shares, values, residual, free, seen, floor=self.settings.negligible)
 
     def _lost(self, record: Experiment, values: Array) -> Shares:
         """Where the model runs away from a record."""
@@ -247,8 +256,6 @@ class Tangent:
     Attributes
     ----------
     structure : Structure
-    seen : ndarray of int
-        Samples that count.
     residual : ndarray, shape (N, m)
     slopes : ndarray, shape (N, m, k)
         Derivatives by deviations of the priors.
@@ -257,7 +264,6 @@ class Tangent:
     """
 
     structure: Structure
-    seen: NDArray[np.intp]
     residual: Array
     slopes: Array
     shares: Shares
@@ -265,7 +271,7 @@ class Tangent:
     @property
     def deviations(self) -> Array:
         """Standard deviations of the parameters, as shares of those that the model file states (k,)."""
-        slopes, _ = self._weighed(self.seen)
+        slopes, _ = self._weighed(self.shares.seen)
         normal = slopes.T @ slopes + np.eye(slopes.shape[1])
         sizes = 1.0 / np.sqrt(np.diag(normal))
         spread = np.diag(np.linalg.pinv(normal * np.outer(sizes, sizes), hermitian=True))
@@ -277,7 +283,7 @@ class Tangent:
         ``residual`` is what the same values of the parameters leave of the corrected record.
         """
         rows = rows_of(corrected, record)
-        kept = np.flatnonzero(np.isin(rows, self.seen))
+        kept = np.flatnonzero(np.isin(rows, self.shares.seen))
         slopes, sizes = self._weighed(rows[kept])
         before, after = (part / sizes for part in (self.residual[rows[kept]], residual[kept]))
         along = (after - before).reshape(-1, 1)
@@ -286,7 +292,7 @@ class Tangent:
         pull = columns.T @ before.ravel() + np.append(self.structure.standard, 0.0)
         move = -np.linalg.solve(normal, pull)
         left = (before.ravel() + columns @ move).reshape(before.shape) * sizes
-        scale = self.shares.free * len(kept) / len(self.seen)
+        scale = self.shares.free * len(kept) / len(self.shares.seen)
         told = map(_share, np.sum(left**2, axis=0).tolist(), scale.tolist())
         return replace(self.shares, by_channel=dict(zip(self.shares.by_channel, told, strict=True))), float(move[-1])
 
@@ -294,7 +300,7 @@ class Tangent:
         """Slopes in sizes of what is left of each channel, sample by sample and channel by channel, and these sizes."""
         # What is drawn to the last digit is known no better than to rounding: squares of its slopes stay finite.
         rounding = np.finfo(np.float64).eps * np.max(np.abs(self.slopes), axis=(0, 2), initial=0.0)
-        sizes = np.sqrt(np.mean(self.residual[self.seen] ** 2, axis=0)) + rounding + 1e-150
+        sizes = np.sqrt(np.mean(self.residual[self.shares.seen] ** 2, axis=0)) + rounding + 1e-150
         slopes = self.slopes[rows] / sizes[:, None]
         return slopes.reshape(-1, slopes.shape[2]), sizes
 

@@ -13,8 +13,8 @@ from vpm.log_check.finding import Finding
 from vpm.log_check.settings import Settings
 
 Array = NDArray[np.float64]
-#: Differences that take the motion out of a spectrum, and its octaves that are looked at.
-ORDER, OCTAVES = 4, 4
+#: Differences that take the motion out of a spectrum, its octaves that are looked at, and pieces of the record.
+ORDER, OCTAVES, PIECES = 4, 4, 5
 
 
 def odd_stretches(
@@ -79,37 +79,46 @@ def _of_sensor(record: Experiment, name: str, settings: Settings) -> Iterator[Fi
 def _cut_off(values: Array, step: float, settings: Settings) -> bool:
     """Whether the noise of a channel is the same in two octaves and then falls: a filter does that, no machine.
 
-    Motion that is the same in two octaves falls as well, but to the noise of the sensor, which then stays; behind a
-    filter there is nothing but rounding to that ``step``. Numbers of a simulation have no noise: their spectrum ends
-    where their digits do.
+    Noise is as loud at all times; what a machine or its oil does in an octave comes and goes with the motion. Motion
+    falls as well, but to the noise of the sensor, which then stays; behind a filter there is nothing but rounding to
+    that ``step``. Numbers of a simulation have no noise: their spectrum ends where their digits do.
     """
-    window = np.hanning(len(values) - ORDER)
-    lines = np.abs(np.fft.rfft(np.diff(values, n=ORDER) * window)) ** 2
+    if len(values) < settings.judged * PIECES:
+        return False
+    powers, window = _powers(values)
+    levels, last = np.median(powers, axis=0), powers[:, -1]
+    steady = np.max(powers, axis=0) < settings.level**2 * np.min(powers, axis=0)
+    digits = len(values) / PIECES * (settings.digits * np.finfo(np.float64).eps * float(np.max(np.abs(values)))) ** 2
+    rounding = max(settings.level * window * step**2 / 12.0, digits)
+    if steady[-1] and steady[-2] and _is_flat(levels[-2:], settings) and float(np.median(last)) > rounding:
+        return False
+    for place in range(2, len(levels)):
+        noise = levels[place - 2 : place]
+        falls = levels[place:].min() < settings.filtered * noise[-1]
+        if steady[place - 2 : place].all() and _is_flat(noise, settings) and noise[-1] > digits and falls:
+            return True
+    return False
+
+
+def _powers(values: Array) -> tuple[Array, float]:
+    """Spectral power by piece and octave, the last one halved, and that of white noise of variance one."""
+    pieces = np.array_split(np.diff(values, n=ORDER), PIECES)
+    found = [_octaves(piece, len(pieces[-1])) for piece in pieces]
+    return np.array(found), float(np.sum(np.hanning(len(pieces[-1])) ** 2))
+
+
+def _octaves(piece: Array, count: int) -> list[float]:
+    lines = np.abs(np.fft.rfft(piece[:count] * np.hanning(count))) ** 2
     # Differences weigh white noise by frequency, which is taken out again.
     turns = np.pi * np.arange(1, len(lines)) / (2 * (len(lines) - 1))
     lines[1:] /= (2.0 * np.sin(turns)) ** (2 * ORDER)
-    count = len(lines)
+    most = len(lines)
+    ends = [most >> octave for octave in range(OCTAVES, 0, -1)] + [3 * most // 4, most]
+    return [float(np.median(lines[low:high])) for low, high in pairwise(ends)]
 
-    def powers(ends: list[int]) -> list[float]:
-        return [float(np.median(lines[low:high])) for low, high in pairwise(ends)]
 
-    levels, last = (
-        powers([count >> octave for octave in range(OCTAVES, -1, -1)]),
-        powers([count // 2, 3 * count // 4, count]),
-    )
-    digits = len(values) * (settings.digits * np.finfo(np.float64).eps * float(np.max(np.abs(values)))) ** 2
-    rounding = max(settings.level * float(np.sum(window**2)) * step**2 / 12.0, digits)
-
-    def is_flat(before: float, level: float) -> bool:
-        return max(level, before) < settings.level * min(level, before)
-
-    if is_flat(*last) and last[-1] > rounding:
-        return False
-    for place, (before, level) in enumerate(pairwise(levels), 2):
-        falls = min(levels[place:], default=level) < settings.filtered * level
-        if is_flat(before, level) and level > digits and falls:
-            return True
-    return False
+def _is_flat(levels: Array, settings: Settings) -> bool:
+    return float(levels.max()) < settings.level * float(levels.min())
 
 
 def _frozen(values: Array, settings: Settings) -> slice | None:
@@ -129,11 +138,10 @@ def _frozen(values: Array, settings: Settings) -> slice | None:
 
 def _is_noisy(values: Array, settings: Settings) -> bool:
     """Whether noise moves a channel from sample to sample, so that no rest of the machine repeats a value."""
-    return (
-        values.size > settings.fewest
-        and float(np.mean(np.diff(values) == 0.0)) < settings.negligible
-        and (noise_std(values) > settings.negligible * float(np.median(np.abs(np.diff(values)))))
-    )
+    if values.size <= settings.fewest:
+        return False
+    usual = float(np.median(np.abs(np.diff(values))))
+    return noise_std(values) > max(quantisation_step(values) or 0.0, settings.quiet * usual)
 
 
 def _longest(same: NDArray[np.bool_]) -> slice:
