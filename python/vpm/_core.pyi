@@ -333,11 +333,12 @@ class System:
         self,
         theta: ArrayLike,
         state: ArrayLike,
+        commands: ArrayLike,
         time_step: float,
         substeps: int,
         integrator: str,
     ) -> list[tuple[str, float]]:
-        """Where dry friction of joints does not bring to rest in these steps what it brakes, about ``state``.
+        """Where dry friction does not bring to rest in these steps what it brakes, at ``state`` under ``commands``.
 
         Returns
         -------

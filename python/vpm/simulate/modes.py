@@ -27,7 +27,7 @@ from vpm.initial import initial_state as start
 from vpm.initial import joint_motion, measured_states, whole_motion
 from vpm.model import Model
 from vpm.simulate.inputs import check_controllers, held_inputs, references_of, restart_grid, uncontrolled
-from vpm.simulate.resolution import outermost, resolution
+from vpm.simulate.resolution import resolution
 from vpm.simulate.run import Run, SimulatedArrays, judged, run_of
 from vpm.simulate.setup import AUTOMATIC, HOLDS, Setup
 
@@ -99,9 +99,9 @@ def simulate(
     if mode == "prescribed_motion" or len(arrays.states) == 0:
         return run
     duration = len(arrays.states) * experiment.dt
-    states = arrays.states
-    passed = states[[0, *outermost(states[:, : len(model.joints)])]]
-    return replace(run, resolution=resolution(model, passed, experiment.dt, setup, duration))
+    commands = arrays.outputs[:, [model.output_channels.index(name) for name in model.input_channels]]
+    steps = resolution(model, arrays.states, commands, experiment.dt, setup, duration)
+    return replace(run, resolution=steps)
 
 
 def simulate_arrays(

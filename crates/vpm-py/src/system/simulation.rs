@@ -123,22 +123,25 @@ impl System {
         Ok((found.limit, matrix(py, rows, [found.damped.len(), 5])?))
     }
 
-    /// Where dry friction of joints does not bring to rest in these steps what it brakes, about `state`: the place in words, and the slope of
-    /// friction at rest times the step over the inertia that it moves.
+    /// Where dry friction does not bring to rest in these steps what it brakes, at rest about `state` under `commands`: the place in words, and
+    /// the slope of friction at rest times the step over the inertia that it moves.
+    #[expect(clippy::too_many_arguments, reason = "the arguments of the Python function")]
     fn unstuck(
         &self,
         py: Python<'_>,
         theta: &Any<'_>,
         state: &Any<'_>,
+        commands: &Any<'_>,
         time_step: f64,
         substeps: i64,
         integrator: &str,
     ) -> PyResult<Vec<(String, f64)>> {
         let request = Request::new(self, theta, (time_step, substeps, integrator), &[])?;
         let state = Numbers::vector("state", state)?;
+        let commands = Numbers::vector("commands", commands)?;
         let found = self.compute(py, |interrupt| {
             let Setting { description, theta, stepping, .. } = request.setting(&self.description, interrupt);
-            unstuck(description, theta, state.values(), stepping)
+            unstuck(description, theta, state.values(), commands.values(), stepping)
         })?;
         Ok(found.into_iter().map(|friction| (friction.site, friction.turn)).collect())
     }
