@@ -2,7 +2,9 @@
 
 use serde::Deserialize;
 
-use crate::effect::{CoulombFriction, Domain, Law};
+use crate::effect::CoulombFriction;
+use crate::effect::Domain;
+use crate::effect::Law;
 use crate::scalar::Scalar;
 
 /// Motor with permanent magnets, or a servo motor seen along its torque axis, behind a gear with losses. The command is a voltage.
