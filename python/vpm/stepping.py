@@ -14,7 +14,7 @@ from vpm.errors import DivergedError, SimulationError, near_match
 from vpm.model import Model
 from vpm.numbers import array_of
 from vpm.simulate import AUTOMATIC, Resolution, Run, Setup, judged
-from vpm.simulate.resolution import resolution
+from vpm.simulate.resolution import outermost, resolution
 
 if TYPE_CHECKING:
     from vpm._core import Snapshot
@@ -338,12 +338,12 @@ class Simulation:
 
         Of the states that followed, its rows show some; the others are taken for those of the beginning.
         """
-        shown = [(place, self._columns.get(name)) for place, name in enumerate(self._model.state_names)]
-        states = np.tile(about, (len(rows) + 1, 1))
-        for place, column in shown:
-            if column is not None:
-                states[1:, place] = rows[:, column]
-        commands = rows[[0, *range(len(rows))]][:, self._commanded]
+        shown = [place for place, name in enumerate(self._model.state_names) if name in self._columns]
+        columns = [self._columns[self._model.state_names[place]] for place in shown]
+        found = outermost(rows[:, columns + self._commanded])
+        states = np.tile(about, (len(found) + 1, 1))
+        states[1:, shown] = rows[np.ix_(found, columns)]
+        commands = rows[np.ix_([0, *found], self._commanded)]
         duration = len(rows) * self._time_step
         return resolution(self._model, states, commands, self._time_step, self._setup, duration)
 
