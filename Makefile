@@ -24,6 +24,9 @@ BIN := $(VENV)/bin
 # With it every command compiles the bindings against the same interpreter, so that cargo builds them once.
 export PYO3_PYTHON = $(CURDIR)/$(BIN)/python
 
+# Processor time of one program of Rust tests, s: an endless loop ends with SIGXCPU.
+RUST_SECONDS := 3600
+
 RUST_SOURCES := Cargo.toml $(wildcard Cargo.lock) \
 	$(shell find crates -path '*/src/*' -name '*.rs' -o -name 'Cargo.toml')
 
@@ -36,8 +39,10 @@ demo: $(VENV)/.installed ## find the hidden effect in a recorded log; the report
 
 test: test-rust test-python ## all tests, Rust and Python
 
+# What is compiled first has no limit. Of a program beyond it, the tests that run "for over 60 seconds" have been named before.
 test-rust: | $(VENV)/.tools-found
-	cargo test $(CARGO_ARGS)
+	cargo test --no-run $(CARGO_ARGS)
+	ulimit -S -t $(RUST_SECONDS); cargo test $(CARGO_ARGS)
 
 reference: | $(VENV)/.tools-found ## integrators against an adaptive solver, which takes minutes to build
 	cargo test --features reference --test reference $(CARGO_ARGS)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scipy.linalg import expm
 from typer.testing import CliRunner
 
-from test_ball_joints import top
+from test_ball_joints import FRICTION, OVER, start, top
 from test_frictions import geared
 from test_sides import rubbing_on_both_sides
 from vpm import Model, Simulation
@@ -82,12 +82,12 @@ class Library:
         whole = np.array((ctypes.c_longlong * (3 + columns + first[-1])).in_dll(self.core, f"{self.name}_{name}"))
         return rows, columns, first, whole[3 + columns :]
 
-    def call(self, name: str, *arguments: Array | float) -> None:
+    def call(self, name: str, *arguments: Array | float) -> int:
         def given(one: Array | float) -> object:
             return ctypes.c_double(one) if isinstance(one, float) else one.ctypes.data_as(ctypes.c_void_p)
 
         function = getattr(self.core, f"{self.name}_{name}")
-        function(*map(given, arguments))
+        return int(function(*map(given, arguments)))
 
     def full(self, name: str, entries: Array) -> Array:
         rows, columns, first, row = self.pattern(name)
@@ -476,12 +476,114 @@ def test_what_cannot_be_is_refused_in_one_sentence(emps: Model) -> None:
     assert "no rates in continuous time" in refused(lambda: c_source(sampled))
 
 
+#: What the functions return: all is well, and the angles of a ball joint are no coordinates there.
+OK, NO_ANGLES = 0, 2
+
+
 @WITHOUT_COMPILER
-def test_rates_of_a_ball_joint_at_its_singularity_are_no_numbers(tmp_path: Path) -> None:
+def test_rates_of_a_ball_joint_at_its_singularity_are_no_numbers_and_the_status_says_so(tmp_path: Path) -> None:
     model = top()
-    library = Library(c_source(model, name="m"), tmp_path)
+    written = c_source(model, name="m")
+    library = Library(written, tmp_path)
     for angle in (0.3, np.pi / 2 - 1e-3, np.pi / 2 - 1e-5, np.pi / 2):
-        state, rates = np.array([0.1, angle, 0.2, 1.0, 2.0, 3.0]), np.zeros(6)
-        library.call("evaluate_rates", state, np.zeros(1), library.constants(), library.work, rates)
-        assert np.isfinite(rates).all() == (angle < np.pi / 2 - 1e-4)
-        assert np.isnan(rates).all() == (angle > np.pi / 2 - 1e-4)
+        state, rates, outputs = np.array([0.1, angle, 0.2, 1.0, 2.0, 3.0]), np.zeros(6), np.zeros(len(model.channels))
+        point = (state, np.zeros(1), library.constants(), library.work)
+        expected = OK if angle < np.pi / 2 - 1e-4 else NO_ANGLES
+        assert library.call("evaluate_rates", *point, rates) == expected
+        assert np.isfinite(rates).all() == (expected == OK)
+        assert np.isnan(rates).all() == (expected == NO_ANGLES)
+        assert library.call("evaluate_outputs", *point, outputs) == expected
+        # What follows from angles and rates alone is right everywhere.
+        names = list(model.output_channels)
+        turning = [outputs[names.index(f"ball.{axis}")] for axis in ("wx", "wy", "wz")]
+        sb, cb, sc, cc = np.sin(angle), np.cos(angle), np.sin(0.2), np.cos(0.2)
+        np.testing.assert_allclose(turning, [cb * cc + 2.0 * sc, 2.0 * cc - cb * sc, sb + 3.0], rtol=1e-13)
+    assert "NAME" not in written.header + written.source
+
+
+THROWN = {
+    "name": "thrown",
+    "gravity": [0.0, 0.0, -9.81],
+    "bodies": {
+        "body": {"mass": 2.0, "center_of_mass": [0.1, 0.2, 0.3], "inertia": [1.0, 2.0, 2.5, 0.0, 0.0, 0.0]},
+        "arm": {"mass": 0.5, "center_of_mass": [0.0, 0.0, 0.2], "inertia": [0.02, 0.03, 0.01, 0.0, 0.0, 0.0]},
+    },
+    "joints": {
+        "ball": {"type": "free", "parent": "world", "child": "body"},
+        "elbow": {"type": "revolute", "parent": "body", "child": "arm", "axis": [0.0, 1.0, 0.0]},
+    },
+    "actuators": {"motor": {"joint": "elbow", "gain": 1.0}},
+}
+
+
+@WITHOUT_COMPILER
+@pytest.mark.parametrize("method", ["rk4", "rosenbrock"])
+def test_bodies_tumble_in_c_as_in_the_core(method: str, tmp_path: Path) -> None:
+    """One past the singularity of its angles again and again, with an arm that a motor moves; one right through it."""
+    begun = start(np.array([0.2, 1.4, -0.4]), np.array([1.0, 5.0, 0.5]))
+    thrown = {name.replace("ball_", "ball_r"): value for name, value in begun.items()}
+    for model, first, angle in ((Model.from_dict(THROWN), thrown, "ball_ry"), (top(), OVER, "ball_y")):
+        written = c_source(model, name="m", parameters=["body.mass"])
+        library = Library(written, tmp_path / angle)
+        assert not re.search(r"\b(malloc|calloc|realloc|free|alloca)\s*\(", written.source)
+        place, step, command = model.state_names.index(f"{angle}.position"), 2e-3, np.full(len(model.inputs), 0.1)
+        sim, found = Simulation(model, step, integrator=method, state=first), model.state(first)
+        cosines = []
+        for _ in range(2000):
+            before = found.copy()
+            point = (before, command, library.constants(), step, library.work)
+            assert library.call(f"step_{method}", *point, found) == OK
+            sim.step(command)
+            near(model, found, sim.state, 1e-10)
+            cosines.append(np.cos(found[place]))
+        assert np.count_nonzero(np.abs(cosines) < 0.05) > 20
+        assert (min(cosines) < 0.0) == (angle == "ball_y")
+        # The next state may take the place of the last.
+        library.call(f"step_{method}", *point, before)
+        np.testing.assert_array_equal(before, found)
+
+
+@WITHOUT_COMPILER
+@pytest.mark.parametrize("method", ["rk4", "rosenbrock"])
+def test_steps_that_need_an_angle_are_right_or_say_that_they_are_not(method: str, tmp_path: Path) -> None:
+    model = top(effects=[FRICTION])
+    library = Library(c_source(model, name="m"), tmp_path)
+    sim, found, ended = Simulation(model, 1e-3, integrator=method, state=OVER), model.state(OVER), ""
+    while not ended:
+        before = found.copy()
+        status = library.call(f"step_{method}", before, np.zeros(1), library.constants(), 1e-3, library.work, found)
+        try:
+            sim.step()
+        except VpmError as error:
+            ended = str(error)
+        else:
+            assert status == OK
+            near(model, found, sim.state, 1e-10)
+    assert "comes too near to the singularity" in ended
+    assert status == NO_ANGLES
+    np.testing.assert_array_equal(found, before)
+    # A step over the singularity is none, however far beyond it ends.
+    assert (
+        library.call(f"step_{method}", before, np.zeros(1), library.constants(), 0.5, library.work, found) == NO_ANGLES
+    )
+
+
+@WITHOUT_COMPILER
+def test_a_step_that_turns_a_joint_too_far_says_so(tmp_path: Path) -> None:
+    library = Library(c_source(top(), name="m"), tmp_path)
+    state = top().state({"ball_y.velocity": 100.0})
+    for step, status in ((9e-3, OK), (1.1e-2, NO_ANGLES)):
+        found = state.copy()
+        assert library.call("step_rk4", state, np.zeros(1), library.constants(), step, library.work, found) == status
+        assert np.array_equal(found, state) == (status != OK)
+
+
+@WITHOUT_COMPILER
+def test_casadi_functions_of_a_ball_joint_fail_at_its_singularity(tmp_path: Path, casadi: ModuleType) -> None:
+    library = Library(c_source(top(), name="m"), tmp_path)
+    rates = casadi.external("m_rates", str(library.path))
+    state = np.array([0.1, 0.3, 0.2, 1.0, 2.0, 3.0])
+    assert np.isfinite(np.array(rates(state, []))).all()
+    state[1] = np.pi / 2
+    with pytest.raises(RuntimeError):
+        rates(state, [])

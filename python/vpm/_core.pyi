@@ -333,11 +333,12 @@ class System:
         self,
         theta: ArrayLike,
         state: ArrayLike,
+        commands: ArrayLike,
         time_step: float,
         substeps: int,
         integrator: str,
     ) -> list[tuple[str, float]]:
-        """Where dry friction of joints does not bring to rest in these steps what it brakes, about ``state``.
+        """Where dry friction does not bring to rest in these steps what it brakes, at ``state`` under ``commands``.
 
         Returns
         -------
@@ -467,12 +468,13 @@ class System:
         passive: Sequence[int] = ...,
         strain_rate: ArrayLike | None = ...,
         strain_gain: ArrayLike | None = ...,
+        first: int = ...,
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """Joints follow a measured motion (N, n), beams respond from rest; position sensors are undone.
 
         Joints in ``passive`` move freely with their effects, from rest; their columns of the motion mean nothing.
         A damper of ``strain_gain`` (gauges,), J s, between each gauge and its measured ``strain_rate`` (N, gauges),
-        1/s, holds the beams; 0 for gauges that were not logged.
+        1/s, holds the beams; 0 for gauges that were not logged. Messages count samples from ``first`` on.
 
         Returns
         -------

@@ -127,7 +127,8 @@ class Simulation:
 
         `Run.resolution` says it of a run, over its own time.
         """
-        return resolution(self._model, self.state[None, :], self._time_step, self._setup, 1.0)
+        commands = self._outputs[None, self._commanded]
+        return resolution(self._model, self.state[None, :], commands, self._time_step, self._setup, 1.0)
 
     # ---- where it is -------------------------------------------------------------------------------------------------
 
@@ -219,8 +220,7 @@ class Simulation:
         self._passed.clear()
         about = self.state
         rows = self._controlled(inputs, duration) if callable(inputs) else self._driven(inputs)
-        passed = self._outermost(about, rows)
-        steps = resolution(self._model, passed, self._time_step, self._setup, len(rows) * self._time_step)
+        steps = self._unresolved(about, rows) if len(rows) else None
         time = begin + self._time_step * np.arange(1.0, len(rows) + 1.0)
         run = Run(
             self._model.name,
@@ -232,7 +232,7 @@ class Simulation:
             rows,
             np.full(rows.shape, np.nan),
             settings={"integrator": self._setup.integrator, "substeps": self._setup.substeps},
-            resolution=steps if len(rows) else None,
+            resolution=steps,
         )
         return judged(self._model, run, np.array(self._passed)) if self._passed else run
 
@@ -328,14 +328,24 @@ class Simulation:
             self._passed.append(self.state)
         return outputs
 
-    def _outermost(self, about: Array, rows: Array) -> Array:
-        """The state at which a run began, then with the joints as its rows show them where one is farthest out."""
-        joints = self._model.joints
-        places = rows[:, [self._columns[f"{name}.position"] for name in joints]]
-        found = outermost(places)
+    @cached_property
+    def _commanded(self) -> list[int]:
+        """Columns of the outputs that show what is held."""
+        return [self._columns[name] for name in self._model.input_channels]
+
+    def _unresolved(self, about: Array, rows: Array) -> Resolution:
+        """What the steps of a run did not resolve that began in the state ``about``.
+
+        Of the states that followed, its rows show some; the others are taken for those of the beginning.
+        """
+        shown = [place for place, name in enumerate(self._model.state_names) if name in self._columns]
+        columns = [self._columns[self._model.state_names[place]] for place in shown]
+        found = outermost(rows[:, columns + self._commanded])
         states = np.tile(about, (len(found) + 1, 1))
-        states[1:, : len(joints)] = places[found]
-        return states
+        states[1:, shown] = rows[np.ix_(found, columns)]
+        commands = rows[np.ix_([0, *found], self._commanded)]
+        duration = len(rows) * self._time_step
+        return resolution(self._model, states, commands, self._time_step, self._setup, duration)
 
     def _has_limited_links(self) -> bool:
         if not self._model.core.n_elastic:

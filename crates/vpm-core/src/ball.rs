@@ -13,12 +13,16 @@ use crate::spatial::{Matrix3, Vector3};
 
 /// Least cosine of the second angle that is shown, about the root of the rounding of a number: angles then tell the orientation, and with
 /// their rates the angular velocity, to eight digits everywhere.
-const SHOWN: f64 = 1e-8;
-/// Least cosine of the second angle where angles are coordinates: below, a mass matrix has lost half of its digits.
+pub(crate) const SHOWN: f64 = 1e-8;
+/// Least cosine of the second angle where angles are coordinates: a mass matrix loses as many digits as its square has zeros, here half of
+/// the sixteen that a number has.
 pub(crate) const LEAST: f64 = 1e-4;
-
-/// In how many steps of fixed length a joint has to be away from the singularity still, as fast as its first two angles turn the child.
-const STEPS: f64 = 10.0;
+/// How many steps of fixed length a joint has to be away from the singularity, as fast as its first two angles turn the child: the rates of
+/// the angles go with the inverse of the distance, so that one step changes them by a tenth at most.
+pub(crate) const STEPS_AWAY: f64 = 10.0;
+/// Largest second angle (rad) of a single step of a joint that turns freely: its cosine, by which the rates of the angles are divided, is
+/// then a half at least.
+pub(crate) const LARGEST_TURN: f64 = std::f64::consts::FRAC_PI_3;
 
 /// A joint of three angles about x, y and z, each axis turned by the angles before.
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
@@ -42,7 +46,7 @@ impl Ball {
         let [angles, rates] = [self.of(q), self.of(v)].map(|numbers| numbers.map(|number| number.re()));
         let cosine = angles[1].cos();
         let turning = rates[1].hypot(rates[0] * cosine);
-        (angles[1], cosine.abs() < LEAST.max(step.map_or(0.0, |step| STEPS * step * turning)))
+        (angles[1], cosine.abs() < LEAST.max(step.map_or(0.0, |step| STEPS_AWAY * step * turning)))
     }
 
     /// The coordinates of the angles, if nothing divides them.

@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 from pydantic import ValidationError
 
-from vpm.errors import UnitError, near_match
+from vpm.errors import ModelError, UnitError, near_match
 from vpm.model.beam_check import beam_problems, size_problems
 from vpm.model.checked import Checked, Rule
 from vpm.model.connection_check import complete_contacts, connection_problems, connection_value_problems
@@ -17,12 +17,12 @@ from vpm.model.effects import complete_effects, effect_problems
 from vpm.model.form import schema_problems
 from vpm.model.messages import Problem, check_plain, place, raise_first
 from vpm.model.omissions import omission_problems
-from vpm.model.parameters import Parameter, slots, table
+from vpm.model.parameters import Parameter, effect_slots, slots, table
 from vpm.model.references import gauge_problems, reference_problems
 from vpm.model.sampled_files import with_files
-from vpm.model.schema import Document
+from vpm.model.schema import Document, EffectEntry
 from vpm.model.sensor_noise import noise_problems
-from vpm.model.splitting import stop_problems
+from vpm.model.splitting import reshapes, stop_problems
 from vpm.model.structure import Structure, build_structure
 from vpm.model.tree import joint_problems, name_problems, tree_problems
 from vpm.units import parse_unit, require_dimension
@@ -71,16 +71,54 @@ def check_document(content: Mapping[str, object], path: str | None = None) -> Ch
     found = tuple(slots(document, structure))
     _stop_at([problem for slot in found for problem in slot.problems()], path)
     parameters = table(list(found))
-    judged = [rule.judge(parameters) for rule in _rules(document, structure)]
+    judged = [rule.judge(document, parameters) for rule in _rules(structure)]
     _stop_at([problem for _, problems in judged for problem in problems], path)
     return Checked(document, structure, found, parameters, tuple(rule for rule, _ in judged))
 
 
-def _rules(document: Document, structure: Structure) -> Iterator[Rule]:
+def check_effect(checked: Checked, content: Mapping[str, object]) -> Checked | None:
+    """Check one effect more of a checked document, and of the rest what reads effects.
+
+    Parameters
+    ----------
+    checked : Checked
+    content : mapping
+        Of the effect, as `tomllib` gives it.
+
+    Returns
+    -------
+    Checked or None
+        None where the effect divides the machine, or where something is wrong: `check_document` tells what.
+    """
+    try:
+        check_plain(content)
+        added = EffectEntry.model_validate(content)
+    except (ModelError, ValidationError):
+        return None
+    if reshapes(added, checked.base):
+        return None
+    document = checked.base.model_copy(update={"effects": (*checked.base.effects, added)})
+    structure = checked.structure.with_document(document)
+    if any(drive_problems(document, structure)) or any(effect_problems(document, structure)):
+        return None
+    document = complete_effects(document, structure)
+    structure = checked.structure.with_document(document)
+    found = tuple(effect_slots(len(document.effects) - 1, document.effects[-1], structure))
+    if any(problem for slot in found for problem in slot.problems()):
+        return None
+    parameters = {**checked.parameters, **table(list(found))}
+    judged = [rule.judge(document, parameters) if rule.of_effects else (rule, []) for rule in checked.rules]
+    if any(problems for _, problems in judged):
+        return None
+    rules = tuple(rule for rule, _ in judged)
+    return Checked(document, structure, (*checked.slots, *found), parameters, rules, checked.changed)
+
+
+def _rules(structure: Structure) -> Iterator[Rule]:
     """What has to hold between parameters, in the order in which it is told."""
     yield from (Rule(partial(_inertia_problems, body)) for body in structure.bodies)
-    for problems in (size_problems, value_problems, connection_value_problems, stop_problems):
-        yield Rule(partial(problems, document))
+    yield from map(Rule, (size_problems, value_problems, connection_value_problems))
+    yield Rule(stop_problems, of_effects=True)
 
 
 def _stop_at(problems: list[Problem], path: str | None) -> None:
@@ -124,7 +162,7 @@ def _channel_problems(document: Document, structure: Structure) -> Iterator[Prob
             yield Problem(place("channels", name, "unit"), f"is wrong: {error}")
 
 
-def _inertia_problems(body: str, parameters: Mapping[str, Parameter]) -> Iterator[Problem]:
+def _inertia_problems(body: str, _: Document, parameters: Mapping[str, Parameter]) -> Iterator[Problem]:
     """Conditions on the inertia about the centre of mass: no negative principal moment, and the triangle inequality.
 
     Principal moments are integrals of squared distances, for example of y^2 + z^2, so none exceeds the sum of the other

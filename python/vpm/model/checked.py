@@ -50,18 +50,21 @@ class Rule:
     Attributes
     ----------
     problems : callable
-        What breaks it, of parameters by name.
+        What breaks it, of a document and of its parameters by name.
+    of_effects : bool
+        Whether it is one on effects, so that one more can break it.
     names : frozenset of str
         Parameters that it read when it held: while these keep their values it holds.
     """
 
-    problems: Callable[[Parameters], Iterable[Problem]]
+    problems: Callable[[Document, Parameters], Iterable[Problem]]
+    of_effects: bool = False
     names: frozenset[str] = frozenset()
 
-    def judge(self, parameters: Parameters) -> tuple[Rule, list[Problem]]:
+    def judge(self, document: Document, parameters: Parameters) -> tuple[Rule, list[Problem]]:
         """The rule with what it read, and what breaks it."""
         read = _Read(parameters)
-        found = list(self.problems(read))
+        found = list(self.problems(document, read))
         return replace(self, names=frozenset(read.names)), found
 
 
@@ -110,7 +113,7 @@ class Checked:
             if rule.names.isdisjoint(values):
                 rules.append(rule)
                 continue
-            judged, problems = rule.judge(moved.parameters)
+            judged, problems = rule.judge(self.base, moved.parameters)
             if problems:
                 return None
             rules.append(judged)

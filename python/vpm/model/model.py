@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from vpm.catalogue import SITE_KINDS, Side, effect_type
 from vpm.errors import CoreError, ModelError, near_match
 from vpm.files import write_text
-from vpm.model.check import check_document
+from vpm.model.check import check_document, check_effect
 from vpm.model.checked import Checked
 from vpm.model.compile import described, structure_text
 from vpm.model.cores import core_of
@@ -271,9 +271,14 @@ class Model(Evaluations, Storable):
             known = parameter.shape and (parameter.name in values or not parameter.learnt)
             number = number_of(given, f"{parameter.name} of {name}", ModelError)
             entry[parameter.name] = number if known else {"value": number, "uncertainty": math.inf}
-        content = self.to_dict()
-        content.setdefault("effects", []).append(entry)
-        return type(self)(content)
+        checked = check_effect(self._checked, entry)
+        if checked is None:
+            content = self.to_dict()
+            content.setdefault("effects", []).append(entry)
+            return type(self)(content)
+        model = object.__new__(type(self))
+        model.__dict__.update(_checked=checked, _path=None)
+        return model
 
     def _motor_side(self, effect: str, at: str) -> float:
         """Inertia to begin with before a spring or play: a share of what the joint moves, none where a rotor is known.

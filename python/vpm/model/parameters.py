@@ -204,7 +204,7 @@ def slots(document: Document, structure: Structure) -> Iterator[Slot]:
         yield from _controller_slots(name, controller, structure)
     yield from _connection_slots(document)
     for position, entry in enumerate(document.effects):
-        yield from _effect_slots(position, entry, structure)
+        yield from effect_slots(position, entry, structure)
 
 
 def _body_slots(name: str, document: Document) -> Iterator[Slot]:
@@ -284,7 +284,8 @@ def _connection_slots(document: Document) -> Iterator[Slot]:
         yield Slot(f"{name}.{row.suffix}", keys, row.quantity, row.unit, row.bounds, row.kind, row.impossible)
 
 
-def _effect_slots(position: int, entry: EffectEntry, structure: Structure) -> Iterator[Slot]:
+def effect_slots(position: int, entry: EffectEntry, structure: Structure) -> Iterator[Slot]:
+    """Parameters of the effect at one position of a complete document."""
     effect, given = EFFECTS[entry.type], entry.values
     for parameter in parameters_of(entry):
         yield Slot(

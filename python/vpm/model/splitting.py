@@ -44,6 +44,11 @@ def splits_joint(entry: EffectEntry, document: Document) -> bool:
     return entry.type == "joint_compliance"
 
 
+def reshapes(entry: EffectEntry, document: Document) -> bool:
+    """Whether the machine with this effect more has other joints or beams."""
+    return entry.type == "link_flexibility" or splits_joint(entry, document)
+
+
 def deflections(document: Document) -> Mapping[str, str]:
     """Coordinates that are split, each with the name of the joint behind it."""
     return {entry.at: name_behind(entry.at) for entry in document.effects if splits_joint(entry, document)}

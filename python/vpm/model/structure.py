@@ -183,6 +183,12 @@ class Structure:
         elastic = [f"{name}.{own}" for name, beam in beams for own in beam.detail.coordinates(beam.deforms)]
         return (*self.joints, *elastic)
 
+    def with_document(self, document: Document) -> Structure:
+        """The same of a document that has other effects, none of which reshapes the machine."""
+        other = replace(self, document=flexed(document))
+        other.__dict__.update((name, answer) for name, answer in self.__dict__.items() if name not in other.__dict__)
+        return other
+
     def mounted(self, parent: str, at: float | None, placed: Pose) -> Frame:
         """Frame that is fixed to a body, a beam or the world."""
         return _mounted(parent, at, placed, self.frames, self.beams, self.document)

@@ -27,7 +27,7 @@ from vpm.initial import initial_state as start
 from vpm.initial import joint_motion, measured_states, whole_motion
 from vpm.model import Model
 from vpm.simulate.inputs import check_controllers, held_inputs, references_of, restart_grid, uncontrolled
-from vpm.simulate.resolution import outermost, resolution
+from vpm.simulate.resolution import resolution
 from vpm.simulate.run import Run, SimulatedArrays, judged, run_of
 from vpm.simulate.setup import AUTOMATIC, HOLDS, Setup
 
@@ -99,9 +99,9 @@ def simulate(
     if mode == "prescribed_motion" or len(arrays.states) == 0:
         return run
     duration = len(arrays.states) * experiment.dt
-    states = arrays.states
-    passed = states[[0, *outermost(states[:, : len(model.joints)])]]
-    return replace(run, resolution=resolution(model, passed, experiment.dt, setup, duration))
+    commands = arrays.outputs[:, [model.output_channels.index(name) for name in model.input_channels]]
+    steps = resolution(model, arrays.states, commands, experiment.dt, setup, duration)
+    return replace(run, resolution=steps)
 
 
 def simulate_arrays(
@@ -126,16 +126,17 @@ def simulate_arrays(
     theta = model.theta if theta is None else theta
     try:
         if mode == "prescribed_motion":
-            return _prescribed(model, followed or joint_motion(experiment, model, cutoff), theta, list(columns), setup)
+            followed = followed or joint_motion(experiment, model, cutoff)
+            return _prescribed(model, followed, theta, list(columns), setup)
         return _dispatch(model, experiment, mode, theta, list(columns), setup, cutoff, initial_state)
     except Diverged as error:
-        partial = SimulatedArrays(
-            error.outputs, np.zeros((*error.outputs.shape, 0)), np.arange(len(error.outputs)), np.zeros(1, np.int64)
-        )
+        # Behind the settling of the filter of a motion that the run follows.
+        first = 0 if followed is None else followed.edge
+        rows = first + np.arange(len(error.outputs))
+        partial = SimulatedArrays(error.outputs, np.zeros((*error.outputs.shape, 0)), rows, np.zeros(1, np.int64))
         run = run_of(model, experiment, mode, partial, setup)
-        raise DivergedError(
-            str(error), run=run, time=float(experiment.time[0]) + len(run.time) * experiment.dt
-        ) from None
+        time = float(experiment.time[0]) + (first + len(run.time)) * experiment.dt
+        raise DivergedError(str(error), run=run, time=time) from None
     except (CoreError, np.linalg.LinAlgError) as error:  # sizes, numbers and steps that no simulation can take
         raise SimulationError(f"{experiment.name}: {error}") from error
 
@@ -205,7 +206,7 @@ def _prescribed(model: Model, m: Motion, theta: Array, columns: list[int], setup
         motion[order][:, followed] = values[m.kept]
     q, v, a = motion
     outputs, states, jacobian = model.core.simulate_prescribed(
-        theta, q, v, a, m.dt, setup.substeps, setup.method(model, guided=True), columns, passive
+        theta, q, v, a, m.dt, setup.substeps, setup.method(model, guided=True), columns, passive, first=m.edge
     )
     rows = np.arange(len(m.time))[m.kept]
     return SimulatedArrays(outputs, jacobian, rows, np.zeros(1, dtype=np.int64), states)

@@ -36,7 +36,9 @@ class Resolution(Storable):
     farthest out: that with the fastest of them, for end stops and other springs stiffen there. One is listed if its own
     damping ratio is below 0.1 and the method takes more than a tenth of its amplitude or moves its frequency by more,
     or if the method lets it grow. Dry friction is listed where steps of the method do not bring to rest what it brakes.
-    All of it is worked out when somebody looks: a batch pays for no run that nobody asks.
+    That of joints, shafts, drives and seals counts, with memory and without, at the first state and where a state of a
+    drive or a command is farthest out, for there it may rub most. All of it is worked out when somebody looks: a batch
+    pays for no run that nobody asks.
 
     Parameters
     ----------
@@ -103,7 +105,10 @@ class Resolution(Storable):
 
     @property
     def turns(self) -> Array:
-        """Slope of that friction at rest times the step over the inertia that it moves, shape (k,)."""
+        """Slope of that friction at rest times the step over the inertia that it moves, shape (k,).
+
+        Of friction that bends before it slides, its stiffness times the square of the step over that inertia.
+        """
         return self._modes.turns
 
     @property
@@ -164,34 +169,42 @@ class Resolution(Storable):
 
 
 def outermost(places: Array) -> list[int]:
-    """Rows of the places of joints, shape (N, n), in which one of them is farthest out, ascending."""
+    """Rows of numbers, shape (N, n), in which one of them is farthest out, ascending."""
     if not places.size:
         return []
     return sorted({*places.argmin(axis=0).tolist(), *places.argmax(axis=0).tolist()})
 
 
-def resolution(model: Model, states: Array, dt: float, setup: Setup, duration: float) -> Resolution:
+def resolution(model: Model, states: Array, commands: Array, dt: float, setup: Setup, duration: float) -> Resolution:
     """What steps do not resolve in a run of ``duration`` (s) that begins in the first of ``states``.
 
     Parameters
     ----------
     model : Model
-    states : ndarray, shape (k, nx)
-        The first one, and others that the run passes.
+    states : ndarray, shape (N, nx)
+        Those of the run.
+    commands : ndarray, shape (N, nu)
+        What is held from each of them on.
     dt : float
         Time between samples, s.
     setup : Setup
     duration : float
     """
-    method = setup.method(model)
+    method, internal = setup.method(model), states[:, 2 * model.core.n_coordinates :]
+    passed = states[[0, *outermost(states[:, : len(model.joints)])]]
+    rows = [0, *outermost(np.hstack([internal, commands]))]
+    loaded = list(zip(states[rows], commands[rows], strict=True))
 
     def modes() -> Modes:
         core, theta, steps = model.core, model.theta, (dt, setup.substeps, method)
-        each = [core.resolution(theta, state, *steps, duration) for state in states]
+        each = [core.resolution(theta, state, *steps, duration) for state in passed]
         limit, found = max(each, key=lambda one: float(np.max(one[1][:, 0], initial=0.0)))
-        friction = core.unstuck(theta, states[0], *steps)
-        sites, turns = tuple(site for site, _ in friction), np.array([turn for _, turn in friction])
+        turns: dict[str, float] = {}
+        for state, command in loaded:
+            for site, turn in core.unstuck(theta, state, command, *steps):
+                turns[site] = max(turn, turns.get(site, 0.0))
         frequencies, ratios, times, left, shifts = found.T.copy()
-        return Modes(float(limit), frequencies, ratios, times, left, shifts, sites, turns)
+        friction = tuple(turns), np.array(list(turns.values()), dtype=np.float64)
+        return Modes(float(limit), frequencies, ratios, times, left, shifts, *friction)
 
     return Resolution(method, dt / setup.substeps, modes)

@@ -2,7 +2,9 @@
 
 use serde::Deserialize;
 
+use crate::effect::CoulombFriction;
 use crate::effect::Domain;
+use crate::effect::Law;
 use crate::scalar::Scalar;
 
 /// Motor with permanent magnets, or a servo motor seen along its torque axis, behind a gear with losses. The command is a voltage.
@@ -80,6 +82,13 @@ impl<S: Scalar> DcMotor<S> {
     pub fn effort(&self, current: S, rate: S) -> S {
         let driving = self.gear_ratio * self.torque_constant * current;
         driving - (S::one() - self.efficiency) * driving.abs() * (rate / self.transition_velocity).tanh()
+    }
+
+    /// Resistance of the gear in N m s/rad at `rate` (rad/s), the chord from rest, where the motor gives `driving` (N m) to the joint.
+    #[inline]
+    pub fn gear_resistance(&self, driving: S, rate: S) -> S {
+        let coulomb = (S::one() - self.efficiency) * driving.abs();
+        CoulombFriction { coulomb, transition_velocity: self.transition_velocity }.resistance(S::zero(), rate)
     }
 
     /// di/dt in A/s at `current` (A) under `voltage` (V), the joint turning with `rate` (rad/s).

@@ -150,6 +150,21 @@ impl<S: Scalar> Actuator<S> {
         self.friction.as_ref().map_or_else(S::zero, |law| -law.effort_under(S::zero(), rate, force))
     }
 
+    /// Resistance of all that rubs in it at `rate`, the chord from rest, where its drive gives `force` at rest.
+    pub(crate) fn resistance(&self, force: S, rate: S) -> S {
+        let own = match &self.drive {
+            Drive::Hydraulic(law) => law.cylinder.seal.resistance(rate),
+            Drive::DcMotor(law) => law.gear_resistance(force, rate),
+            _ => S::zero(),
+        };
+        own + self.friction_chord(force, rate)
+    }
+
+    /// Whether all that rubs in it comes behind the law of its drive, which does not know of it.
+    pub(crate) fn friction_is_apart(&self) -> bool {
+        !matches!(self.drive, Drive::DcMotor(_))
+    }
+
     /// Its resistance there, the chord from rest.
     #[inline]
     pub fn friction_chord(&self, force: S, rate: S) -> S {

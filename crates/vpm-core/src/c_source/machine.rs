@@ -18,6 +18,25 @@ pub(super) struct Derivatives {
     entries: Vec<Node>,
 }
 
+/// Ball joints: which coordinates are their angles.
+pub(super) struct Balls {
+    /// Number of coordinates of the machine.
+    pub(super) coordinates: usize,
+    /// How many of them turn freely in a step; they come first.
+    pub(super) free: usize,
+    /// The coordinates of each angle of each: one as a rule, more where effects divide it.
+    pub(super) angles: Vec<[Vec<usize>; 3]>,
+}
+
+impl Balls {
+    fn new(description: &Description) -> Self {
+        let (free, watched): (Vec<_>, Vec<_>) =
+            description.balls.iter().partition(|ball| description.hindrance(ball).is_none());
+        let angles = free.iter().chain(&watched).map(|ball| ball.angles.clone()).collect();
+        Self { coordinates: description.n_coordinates(), free: free.len(), angles }
+    }
+}
+
 /// A machine's functions in C, with what belongs to them.
 pub(super) struct Machine {
     pub(super) nx: usize,
@@ -30,6 +49,7 @@ pub(super) struct Machine {
     pub(super) outputs: Derivatives,
     /// Prepares, then gives rates, outputs, rates with their derivatives, outputs with theirs.
     pub(super) functions: [Source; 5],
+    pub(super) balls: Balls,
 }
 
 impl Pattern {
@@ -40,10 +60,11 @@ impl Pattern {
 }
 
 impl Derivatives {
-    fn new(graph: &mut Graph, numbers: &[Node], places: Places) -> Self {
-        let widths = [places.states, places.inputs, places.parameters];
+    fn new(graph: &mut Graph, numbers: &[Node], places: Places, nu: usize) -> Self {
+        let widths = [places.states, nu, places.parameters];
+        let before = places.states + nu;
         let inputs: Vec<u32> =
-            (0..places.implicit()).chain(places.first_parameter()..places.count()).map(|place| place as u32).collect();
+            (0..before).chain(places.first_parameter()..places.count()).map(|place| place as u32).collect();
         let derivative = graph.derive(numbers, &inputs);
         let mut order: Vec<_> = (0..derivative.entries.len()).collect();
         order.sort_by_key(|&entry| (derivative.places[entry].1, derivative.places[entry].0));
@@ -67,10 +88,11 @@ impl Derivatives {
 impl Machine {
     pub(super) fn new(description: &Description, theta: &[f64], free: &[usize], name: &str) -> Result<Self> {
         let (places, Recording { mut graph, values, .. }) = recorded(description, theta, free)?;
-        let Places { states: nx, inputs: nu, parameters: np, .. } = places;
+        let Places { states: nx, parameters: np, .. } = places;
+        let (nu, balls) = (description.n_inputs(), Balls::new(description));
         let (rates, outputs) = values.split_at(nx);
-        let of_rates = Derivatives::new(&mut graph, rates, places);
-        let of_outputs = Derivatives::new(&mut graph, outputs, places);
+        let of_rates = Derivatives::new(&mut graph, rates, places, nu);
+        let of_outputs = Derivatives::new(&mut graph, outputs, places, nu);
         let all = [&values, &of_rates.entries, &of_outputs.entries].map(Vec::as_slice).concat();
         let stages = Program::new(&graph, &all, places.count()).split(|input| input >= places.first_parameter());
         let mut point = vec![0.0; places.first_parameter()];
@@ -80,9 +102,10 @@ impl Machine {
         Evaluator::new(&stages.seldom).run(&point, &mut constants);
         constants.splice(0..0, point.drain(places.first_parameter()..));
         let (ny, entries) = (outputs.len(), of_rates.entries.len());
+        let turned = (if balls.angles.is_empty() { "" } else { "q" }, 4 * balls.free);
         // Between inputs and parameters stands what additive steps take.
-        let steps = ("", places.first_parameter() - nx - nu);
-        let arguments = [("x", nx), ("u", nu), steps, ("c", np + passed)];
+        let steps = ("", places.first_parameter() - places.implicit());
+        let arguments = [("x", nx), ("u", nu), turned, steps, ("c", np + passed)];
         let often = |what: &str, numbers: Vec<usize>, blocks: &[Block<'_>]| {
             stages.often.part(numbers).to_c(&format!("{name}_run_{what}"), &arguments, blocks)
         };
@@ -101,7 +124,7 @@ impl Machine {
             often("rates_jacobian", (0..nx).chain(first..first + entries).collect(), &[dx, dx_x, dx_u, dx_p]),
             often("outputs_jacobian", (nx..first).chain(first + entries..all.len()).collect(), &[y, y_x, y_u, y_p]),
         ];
-        Ok(Self { nx, nu, ny, np, constants, rates: of_rates, outputs: of_outputs, functions })
+        Ok(Self { nx, nu, ny, np, constants, rates: of_rates, outputs: of_outputs, functions, balls })
     }
 
     /// How many numbers the functions need to hand on.
@@ -110,12 +133,9 @@ impl Machine {
     }
 }
 
-/// Rates and outputs over states, inputs and the parameters at the places `free`, as numbers of a graph.
+/// Rates and outputs over states, inputs, orientations of ball joints and the parameters at the places `free`, as numbers of a graph.
 fn recorded(description: &Description, theta: &[f64], free: &[usize]) -> Result<(Places, Recording)> {
-    let recorded = |free: &[usize]| {
-        let places = Places { parameters: free.len(), ..description.places() };
-        Recording::new(description, places, (theta, free), &Kind::Readings).map(|recording| (places, recording))
-    };
+    let recorded = |free: &[usize]| description.recorded_turned((theta, free), &Kind::Readings);
     let (places, recording) = recorded(free)?;
     let Some(decision) = recording.graph.decisions().first() else { return Ok((places, recording)) };
     let decides = |&&one: &&usize| recorded(&[one]).is_ok_and(|(_, own)| !own.graph.decisions().is_empty());

@@ -8,16 +8,19 @@
 mod externals;
 mod machine;
 
+use std::f64::consts::{PI, TAU};
 use std::fmt::Write;
 
+use crate::ball;
 use crate::description::Description;
 use crate::error::{Error, Result};
 use crate::graph::literal;
 use crate::integrator::RODAS4P2;
-use machine::{Derivatives, Machine, Pattern};
+use machine::{Balls, Derivatives, Machine, Pattern};
 
 const HEADER: &str = include_str!("template.h");
 const FUNCTIONS: &str = include_str!("template.c");
+const BALLS: &str = include_str!("balls.c");
 
 /// What a machine is called in C.
 #[derive(Clone, Debug)]
@@ -53,7 +56,8 @@ pub fn files(description: &Description, theta: &[f64], free: &[usize], names: &N
     let machine = Machine::new(description, theta, free, name)?;
     let (declarations, externals) = externals::externals(&machine, name);
     let of = |what: &str| what.replace("NAME", name);
-    let header = of(&HEADER.replace("SIZES\n", &sizes(&machine))).replace("EXTERNALS\n", &declarations);
+    let header = with_limits(&HEADER.replace("SIZES\n", &sizes(&machine)));
+    let header = of(&header).replace("EXTERNALS\n", &declarations);
     let mut source = format!("#include \"{name}.h\"\n\n#include <math.h>\n#include <stddef.h>\n\n");
     let free_names: Vec<_> = free.iter().map(|&place| description.parameter_names[place].clone()).collect();
     for (what, list) in
@@ -75,7 +79,8 @@ pub fn files(description: &Description, theta: &[f64], free: &[usize], names: &N
         }
     }
     machine.functions.iter().for_each(|function| source.push_str(&function.text));
-    source.push_str(&of(&functions(machine.np > 0)));
+    source.push_str(&of(&balls(&machine.balls)));
+    source.push_str(&of(&functions(machine.np > 0, !machine.balls.angles.is_empty())));
     source.push('\n');
     source.push_str(&externals);
     Ok(Files { header, source })
@@ -104,9 +109,11 @@ fn check(description: &Description, free: &[usize], names: &Names) -> Result<()>
 }
 
 fn sizes(machine: &Machine) -> String {
-    let &Machine { nx, nu, ny, np, .. } = machine;
+    let &Machine { nx, nu, ny, np, ref balls, .. } = machine;
     let [rates, outputs] = [&machine.rates, &machine.outputs].map(|of| of.patterns.each_ref().map(Pattern::len));
     let run = machine.work();
+    // Where a step begins: its state, and the orientations there.
+    let begin = if balls.angles.is_empty() { 0 } else { nx + 4 * balls.free };
     let step = nx * nx + 7 * nx + rates.iter().sum::<usize>();
     let sizes = [
         ("NX", nx),
@@ -121,7 +128,7 @@ fn sizes(machine: &Machine) -> String {
         ("NNZ_OUTPUTS_U", outputs[1]),
         ("NNZ_OUTPUTS_P", outputs[2]),
         ("NW_RUN", run),
-        ("NW", run + step.max(3 * nx).max(1)),
+        ("NW", run + begin + step.max(3 * nx).max(1)),
         ("NW_EXTERNAL", run + externals::work(machine)),
         ("LONGEST", nx.max(nu).max(np).max(1)),
     ];
@@ -146,8 +153,43 @@ fn patterns(text: &mut String, name: &str, derivatives: &Derivatives) {
     }
 }
 
-/// The functions that are the same for every machine.
-fn functions(parameters: bool) -> String {
+/// Limits of ball joints in place of their names.
+fn with_limits(text: &str) -> String {
+    let limits = [
+        ("LEAST_COSINE", ball::LEAST),
+        ("SHOWN_COSINE", ball::SHOWN),
+        ("STEPS_AWAY", ball::STEPS_AWAY),
+        ("LARGEST_TURN", ball::LARGEST_TURN),
+        ("HALF_TURN", PI),
+        ("FULL_TURN", TAU),
+    ];
+    limits.into_iter().fold(text.to_owned(), |text, (name, value)| text.replace(name, &literal(value)))
+}
+
+/// What takes care of ball joints in steps; nothing where there are none.
+fn balls(balls: &Balls) -> String {
+    if balls.angles.is_empty() {
+        return String::new();
+    }
+    let (mut first, mut places) = (vec![0], Vec::new());
+    for coordinates in balls.angles.iter().flatten() {
+        places.extend_from_slice(coordinates);
+        first.push(places.len());
+    }
+    let list = |numbers: &[usize]| numbers.iter().map(usize::to_string).collect::<Vec<_>>().join(", ");
+    // C knows no table without entries.
+    let upright = vec!["1.0, 0.0, 0.0, 0.0"; balls.free.max(1)].join(", ");
+    with_limits(BALLS)
+        .replace("= COORDINATES", &format!("= {}", balls.coordinates))
+        .replace("= BALLS", &format!("= {}", balls.angles.len()))
+        .replace("= FREE_BALLS", &format!("= {}", balls.free))
+        .replace("{FIRST}", &format!("{{{}}}", list(&first)))
+        .replace("{PLACES}", &format!("{{{}}}", list(&places)))
+        .replace("{UPRIGHT}", &format!("{{{upright}}}"))
+}
+
+/// The functions that are the same for every machine, but for what `turning` ball joints and `parameters` add.
+fn functions(parameters: bool, turning: bool) -> String {
     let rows = |table: &[[f64; 6]; 6]| {
         let rows: Vec<_> = table.iter().map(|row| format!("{{{}}}", row.map(literal).join(", "))).collect();
         format!("{{\n        {}}}", rows.join(",\n        "))
@@ -156,6 +198,20 @@ fn functions(parameters: bool) -> String {
         .replace("GAMMA", &literal(RODAS4P2.gamma))
         .replace("DISTANCE", &rows(&RODAS4P2.distance))
         .replace("COUPLING", &rows(&RODAS4P2.coupling));
+    let of_balls = |own: &str, none: &str| if turning { own.to_owned() } else { none.to_owned() };
+    for place in ["x", "NAME_given(arg[0])"] {
+        text = text.replace(&format!("STATUS({place})"), &of_balls(&format!("NAME_near({place}, 0, 0.0)"), "NAME_OK"));
+    }
+    text = text.replace("AT_ANGLES ", &of_balls("NAME_upright, ", "")).replace("IN_STEP ", &of_balls("q, ", ""));
+    for place in ["sum + NAME_NX", "dx_p + NAME_NNZ_RATES_P"] {
+        let own = format!("double *begin = {place}, *q = begin + NAME_NX;\n    NAME_enter(x, begin, q);");
+        text = text.replace(&format!("BEGIN({place})"), &of_balls(&own, "const double *begin = x;"));
+    }
+    for result in ["sum", "stage"] {
+        let copied = format!("for (k = 0; k < NAME_NX; ++k) next[k] = {result}[k];\n    return NAME_OK;");
+        let own = format!("return NAME_arrive(x, q, h, {result}, next);");
+        text = text.replace(&format!("END({result})"), &of_balls(&own, &copied));
+    }
     for place in 2..5 {
         let given = |list: &str| if parameters { format!("{list}[{place}]") } else { "NULL".to_owned() };
         text = text.replace(&format!("PARAMETERS({place})"), &given("arg"));

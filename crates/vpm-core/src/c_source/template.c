@@ -5,26 +5,30 @@ void NAME_prepare(const double *p, double *w, double *c)
     NAME_run_prepare(p, w, c + NAME_NP);
 }
 
-void NAME_evaluate_rates(const double *x, const double *u, const double *c, double *w, double *dx)
+int NAME_evaluate_rates(const double *x, const double *u, const double *c, double *w, double *dx)
 {
-    NAME_run_rates(x, u, c, w, dx);
+    NAME_run_rates(x, u, AT_ANGLES c, w, dx);
+    return STATUS(x);
 }
 
-void NAME_evaluate_outputs(const double *x, const double *u, const double *c, double *w, double *y)
+int NAME_evaluate_outputs(const double *x, const double *u, const double *c, double *w, double *y)
 {
-    NAME_run_outputs(x, u, c, w, y);
+    NAME_run_outputs(x, u, AT_ANGLES c, w, y);
+    return STATUS(x);
 }
 
-void NAME_evaluate_rates_jacobian(const double *x, const double *u, const double *c, double *w, double *dx, double *dx_x, double *dx_u,
-                                  double *dx_p)
+int NAME_evaluate_rates_jacobian(const double *x, const double *u, const double *c, double *w, double *dx, double *dx_x, double *dx_u,
+                                 double *dx_p)
 {
-    NAME_run_rates_jacobian(x, u, c, w, dx, dx_x, dx_u, dx_p);
+    NAME_run_rates_jacobian(x, u, AT_ANGLES c, w, dx, dx_x, dx_u, dx_p);
+    return STATUS(x);
 }
 
-void NAME_evaluate_outputs_jacobian(const double *x, const double *u, const double *c, double *w, double *y, double *y_x, double *y_u,
-                                    double *y_p)
+int NAME_evaluate_outputs_jacobian(const double *x, const double *u, const double *c, double *w, double *y, double *y_x, double *y_u,
+                                   double *y_p)
 {
-    NAME_run_outputs_jacobian(x, u, c, w, y, y_x, y_u, y_p);
+    NAME_run_outputs_jacobian(x, u, AT_ANGLES c, w, y, y_x, y_u, y_p);
+    return STATUS(x);
 }
 
 void NAME_dense(const casadi_int *pattern, const double *entries, double *matrix)
@@ -37,20 +41,21 @@ void NAME_dense(const casadi_int *pattern, const double *entries, double *matrix
 }
 
 /* Hairer, Norsett & Wanner 1993, Solving Ordinary Differential Equations I, table II.1.2. */
-void NAME_step_rk4(const double *x, const double *u, const double *c, double h, double *w, double *next)
+int NAME_step_rk4(const double *x, const double *u, const double *c, double h, double *w, double *next)
 {
     static const double weight[4] = {1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0}, distance[4] = {0.5, 0.5, 1.0, 0.0};
     double *rate = w + NAME_NW_RUN, *stage = rate + NAME_NX, *sum = stage + NAME_NX;
     int i, k;
-    for (k = 0; k < NAME_NX; ++k) stage[k] = sum[k] = x[k];
+    BEGIN(sum + NAME_NX)
+    for (k = 0; k < NAME_NX; ++k) stage[k] = sum[k] = begin[k];
     for (i = 0; i < 4; ++i) {
-        NAME_run_rates(stage, u, c, w, rate);
+        NAME_run_rates(stage, u, IN_STEP c, w, rate);
         for (k = 0; k < NAME_NX; ++k) {
             sum[k] += h * weight[i] * rate[k];
-            stage[k] = x[k] + h * distance[i] * rate[k];
+            stage[k] = begin[k] + h * distance[i] * rate[k];
         }
     }
-    for (k = 0; k < NAME_NX; ++k) next[k] = sum[k];
+    END(sum)
 }
 
 /* Gaussian elimination with the largest pivot of each column, in place; 1 if a column has none. */
@@ -102,19 +107,20 @@ int NAME_step_rosenbrock(const double *x, const double *u, const double *c, doub
     double *stage = w + NAME_NW_RUN, *matrix = stage + NAME_NX, *increments = matrix + NAME_NX * NAME_NX, *dx_x = increments + 6 * NAME_NX;
     double *dx_u = dx_x + NAME_NNZ_RATES_X, *dx_p = dx_u + NAME_NNZ_RATES_U;
     int pivot[NAME_NX + 1], i, j, k;
-    NAME_run_rates_jacobian(x, u, c, w, increments, dx_x, dx_u, dx_p);
+    BEGIN(dx_p + NAME_NNZ_RATES_P)
+    NAME_run_rates_jacobian(begin, u, IN_STEP c, w, increments, dx_x, dx_u, dx_p);
     NAME_dense(NAME_rates_by_x, dx_x, matrix);
     for (k = 0; k < NAME_NX * NAME_NX; ++k) matrix[k] *= -gamma * h;
     for (k = 0; k < NAME_NX; ++k) matrix[k * NAME_NX + k] += 1.0;
-    if (NAME_factorise(matrix, pivot) != 0) return 1;
-    for (k = 0; k < NAME_NX; ++k) stage[k] = x[k];
+    if (NAME_factorise(matrix, pivot) != 0) return NAME_SINGULAR_MATRIX;
+    for (k = 0; k < NAME_NX; ++k) stage[k] = begin[k];
     for (i = 0; i < 6; ++i) {
         double *increment = increments + i * NAME_NX;
         if (i > 0) {
-            for (k = 0; k < NAME_NX; ++k) stage[k] = x[k];
+            for (k = 0; k < NAME_NX; ++k) stage[k] = begin[k];
             for (j = 0; j < i; ++j)
                 for (k = 0; k < NAME_NX; ++k) stage[k] += distance[i][j] * increments[j * NAME_NX + k];
-            NAME_run_rates(stage, u, c, w, increment);
+            NAME_run_rates(stage, u, IN_STEP c, w, increment);
         }
         for (k = 0; k < NAME_NX; ++k) increment[k] *= h;
         for (j = 0; j < i; ++j)
@@ -123,8 +129,8 @@ int NAME_step_rosenbrock(const double *x, const double *u, const double *c, doub
         NAME_solve(matrix, pivot, increment);
     }
     /* The last stage stands where the companion of third order ends. */
-    for (k = 0; k < NAME_NX; ++k) next[k] = stage[k] + increments[5 * NAME_NX + k];
-    return 0;
+    for (k = 0; k < NAME_NX; ++k) stage[k] += increments[5 * NAME_NX + k];
+    END(stage)
 }
 
 /* What CasADi and acados leave out is zero. */
@@ -179,16 +185,16 @@ int NAME_rates(const casadi_real **arg, casadi_real **res, casadi_int *iw, casad
 {
     const double *c = NAME_prepared(PARAMETERS(2), &w);
     (void)iw; (void)mem;
-    if (res[0] != NULL) NAME_run_rates(NAME_given(arg[0]), NAME_given(arg[1]), c, w, res[0]);
-    return 0;
+    if (res[0] != NULL) NAME_run_rates(NAME_given(arg[0]), NAME_given(arg[1]), AT_ANGLES c, w, res[0]);
+    return STATUS(NAME_given(arg[0]));
 }
 
 int NAME_outputs(const casadi_real **arg, casadi_real **res, casadi_int *iw, casadi_real *w, int mem)
 {
     const double *c = NAME_prepared(PARAMETERS(2), &w);
     (void)iw; (void)mem;
-    if (res[0] != NULL) NAME_run_outputs(NAME_given(arg[0]), NAME_given(arg[1]), c, w, res[0]);
-    return 0;
+    if (res[0] != NULL) NAME_run_outputs(NAME_given(arg[0]), NAME_given(arg[1]), AT_ANGLES c, w, res[0]);
+    return STATUS(NAME_given(arg[0]));
 }
 
 int jac_NAME_rates(const casadi_real **arg, casadi_real **res, casadi_int *iw, casadi_real *w, int mem)
@@ -198,8 +204,8 @@ int jac_NAME_rates(const casadi_real **arg, casadi_real **res, casadi_int *iw, c
     double *dx_x = NAME_result(res[0], NAME_NNZ_RATES_X, &scratch), *dx_u = NAME_result(res[1], NAME_NNZ_RATES_U, &scratch);
     double *dx_p = NAME_result(RESULT(2), NAME_NNZ_RATES_P, &scratch);
     (void)iw; (void)mem;
-    NAME_run_rates_jacobian(NAME_given(arg[0]), NAME_given(arg[1]), c, w, dx, dx_x, dx_u, dx_p);
-    return 0;
+    NAME_run_rates_jacobian(NAME_given(arg[0]), NAME_given(arg[1]), AT_ANGLES c, w, dx, dx_x, dx_u, dx_p);
+    return STATUS(NAME_given(arg[0]));
 }
 
 int jac_NAME_outputs(const casadi_real **arg, casadi_real **res, casadi_int *iw, casadi_real *w, int mem)
@@ -209,8 +215,8 @@ int jac_NAME_outputs(const casadi_real **arg, casadi_real **res, casadi_int *iw,
     double *y_x = NAME_result(res[0], NAME_NNZ_OUTPUTS_X, &scratch), *y_u = NAME_result(res[1], NAME_NNZ_OUTPUTS_U, &scratch);
     double *y_p = NAME_result(RESULT(2), NAME_NNZ_OUTPUTS_P, &scratch);
     (void)iw; (void)mem;
-    NAME_run_outputs_jacobian(NAME_given(arg[0]), NAME_given(arg[1]), c, w, y, y_x, y_u, y_p);
-    return 0;
+    NAME_run_outputs_jacobian(NAME_given(arg[0]), NAME_given(arg[1]), AT_ANGLES c, w, y, y_x, y_u, y_p);
+    return STATUS(NAME_given(arg[0]));
 }
 
 /* acados' explicit forward sensitivities: (x, Sx, Su, u, p) -> (f, A Sx, A Su + B). */
@@ -222,7 +228,7 @@ int NAME_expl_vde_forw(const casadi_real **arg, casadi_real **res, casadi_int *i
     double *dx_p = NAME_result(NULL, NAME_NNZ_RATES_P, &scratch);
     casadi_int j, k;
     (void)iw; (void)mem;
-    NAME_run_rates_jacobian(NAME_given(arg[0]), NAME_given(arg[3]), c, w, dx, dx_x, dx_u, dx_p);
+    NAME_run_rates_jacobian(NAME_given(arg[0]), NAME_given(arg[3]), AT_ANGLES c, w, dx, dx_x, dx_u, dx_p);
     if (res[1] != NULL) {
         for (k = 0; k < NAME_NX * NAME_NX; ++k) res[1][k] = 0.0;
         NAME_add_product(NAME_rates_by_x, dx_x, arg[1], NAME_NX, res[1]);
@@ -234,7 +240,7 @@ int NAME_expl_vde_forw(const casadi_real **arg, casadi_real **res, casadi_int *i
             for (k = first[j]; k < first[j + 1]; ++k) res[2][j * NAME_NX + row[k]] = dx_u[k];
         NAME_add_product(NAME_rates_by_x, dx_x, arg[2], NAME_NU, res[2]);
     }
-    return 0;
+    return STATUS(NAME_given(arg[0]));
 }
 
 /* acados' explicit adjoint sensitivities: (x, lambda, u, p) -> [A' lambda; B' lambda]. */
@@ -245,10 +251,10 @@ int NAME_expl_vde_adj(const casadi_real **arg, casadi_real **res, casadi_int *iw
     double *dx_x = NAME_result(NULL, NAME_NNZ_RATES_X, &scratch), *dx_u = NAME_result(NULL, NAME_NNZ_RATES_U, &scratch);
     double *dx_p = NAME_result(NULL, NAME_NNZ_RATES_P, &scratch);
     (void)iw; (void)mem;
-    NAME_run_rates_jacobian(NAME_given(arg[0]), NAME_given(arg[2]), c, w, dx, dx_x, dx_u, dx_p);
+    NAME_run_rates_jacobian(NAME_given(arg[0]), NAME_given(arg[2]), AT_ANGLES c, w, dx, dx_x, dx_u, dx_p);
     if (res[0] != NULL) {
         NAME_adjoint(NAME_rates_by_x, dx_x, NAME_given(arg[1]), res[0]);
         NAME_adjoint(NAME_rates_by_u, dx_u, NAME_given(arg[1]), res[0] + NAME_NX);
     }
-    return 0;
+    return STATUS(NAME_given(arg[0]));
 }

@@ -9,7 +9,7 @@ use crate::model::Omissions;
 use crate::mount::Mount;
 use crate::scalar::Scalar;
 use crate::sensor::Sensor;
-use crate::system::{Build, Dynamics, Kind, Machine, Placed, Places, Recorder, System};
+use crate::system::{Build, Dynamics, Kind, Machine, Placed, Places, Recorder, Recording, System};
 
 /// The machine with its free ball joints turning from orientations that stand among its inputs.
 #[derive(Clone, Debug)]
@@ -41,6 +41,13 @@ impl Description {
         system.enter(state);
         system.rest();
         Ok(system)
+    }
+
+    /// A function of the machine whose free ball joints turn from orientations that follow its inputs, with the parameters at the places
+    /// `free` as inputs. At orientations of no rotation it is that of the machine in its angles.
+    pub(crate) fn recorded_turned(&self, given: (&[f64], &[usize]), kind: &Kind) -> Result<(Places, Recording)> {
+        let places = Places { parameters: given.1.len(), ..self.places_of_turned() };
+        Recording::new(&Turned(self.clone()), places, given, kind).map(|recording| (places, recording))
     }
 
     /// What keeps a ball joint from turning freely: whatever needs its angles for coordinates.

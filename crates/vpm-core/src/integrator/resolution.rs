@@ -15,6 +15,12 @@ pub const LIGHT: f64 = 0.1;
 pub const LOST: f64 = 0.1;
 /// By how much a step may let a mode grow unsaid: rounding.
 const GROWN: f64 = 1e-9;
+/// Steps in which friction brakes a joint on trial: more than any method takes to forget how it began.
+const BRAKING: f64 = 10.0;
+/// Steps after which the joint has to rest: those of the braking, and as many again several times for what creeps.
+const WAITING: usize = 60;
+/// Speeds at which the braking begins, evenly over what friction takes off in a step: one alone could end at rest by luck.
+const PHASES: u32 = 8;
 /// Largest product of angular frequency and step that is looked at, and how finely.
 const REACH: f64 = 10.0;
 const GRID: f64 = 0.05;
@@ -159,31 +165,68 @@ impl Steps {
     }
 }
 
+/// How implicit steps take the friction of a law.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Taken {
+    /// By its chord from rest, in additive steps too: friction of joints and shafts.
+    #[default]
+    Implicitly,
+    /// By its chord, but explicitly in additive steps: friction of seals, and of drives in proportion to their effort.
+    ByChord,
+    /// By its tangent, and explicitly in additive steps: what is part of the law of a drive, as the gear of a motor.
+    ByTangent,
+}
+
 /// Whether steps bring a joint to rest that dry friction brakes, and keep it there. `turn` is the slope of the friction at rest, times the
 /// step, over the inertia that it moves: the steps in which friction at that slope stops the joint.
 ///
 /// Law: `v' = -turn tanh(v)` in steps of 1, v over the width in which friction turns around, from speeds that friction takes ten steps to
 /// stop. The method itself makes the steps. What does not stay below 1 creeps or chatters, by a share of what friction brakes in a step.
-/// [`Method::Additive`] takes friction where it leads to, and steps of controlled error follow it: both always do. Guarded steps are those
-/// of the Rosenbrock method, for they let such errors pass.
+/// Steps of controlled error follow friction: they always do, and so does [`Method::Additive`] where it takes it implicitly. Guarded steps
+/// are those of the Rosenbrock method, for they let such errors pass.
 /// Checked: runs of a slider with each method.
-pub fn sticks(method: Method, turn: f64) -> bool {
-    if turn <= 1.0 || matches!(method, Method::Additive | Method::Adaptive { .. }) {
+pub fn sticks(method: Method, turn: f64, taken: Taken) -> bool {
+    let followed = match method {
+        Method::Additive => taken == Taken::Implicitly,
+        _ => matches!(method, Method::Adaptive { .. }),
+    };
+    if turn <= 1.0 || followed {
         return true;
     }
     let method = if method == Method::Guarded { Method::Rosenbrock } else { method };
-    let mut joint = Braked { turn };
-    (0..8).all(|phase| {
-        let mut integrator = Integrator::new(method, 2);
-        let mut x = [0.0, turn * (10.0 + f64::from(phase) / 8.0)];
-        (0..60).for_each(|_| integrator.step(&mut joint, &mut x, 1.0));
-        x[1].abs() <= 1.0
+    rests::<2>(method, &mut Braked { turn, chord: taken != Taken::ByTangent }, turn, 1.0)
+}
+
+/// Whether steps bring a joint to rest that friction brakes which bends before it slides. `stiffness` is that of the bending, times the
+/// square of the step, over the inertia that it moves; `damping` its resistance to bending, times the step, over that inertia.
+///
+/// Law: as [`sticks`], with `v' = -stiffness z - damping z'` and `z' = v - |v| z` (Dahl), v over the way that it bends in a step: friction that
+/// has stopped a joint stores no more than what moves it by the root of the stiffness. What stays faster is driven by the steps.
+/// [`Method::Additive`] takes such friction where it leads to, and errors that grow so fast are seen by all steps that look at them.
+/// Checked: runs of a slider with each method.
+pub fn bends(method: Method, [stiffness, damping]: [f64; 2]) -> bool {
+    if stiffness <= 0.0 || matches!(method, Method::Additive | Method::Adaptive { .. } | Method::Guarded) {
+        return true;
+    }
+    rests::<3>(method, &mut Bristles { stiffness, damping }, stiffness, stiffness.sqrt())
+}
+
+/// Whether steps of 1 brake a joint to `slowest`, whatever its phase, where friction takes off `braked` of its speed in each.
+fn rests<const STATES: usize>(method: Method, joint: &mut impl Ode<f64>, braked: f64, slowest: f64) -> bool {
+    (0..PHASES).all(|phase| {
+        let mut integrator = Integrator::new(method, STATES);
+        let mut x = [0.0; STATES];
+        x[1] = braked * (BRAKING + f64::from(phase) / f64::from(PHASES));
+        (0..WAITING).for_each(|_| integrator.step(joint, &mut x, 1.0));
+        x[1].abs() <= slowest
     })
 }
 
 /// `q'' = -turn tanh(q')`.
 struct Braked {
     turn: f64,
+    /// Whether its chord stands for it in an iteration matrix.
+    chord: bool,
 }
 
 impl Braked {
@@ -210,8 +253,53 @@ impl Ode<f64> for Braked {
     }
 
     fn iteration_matrix(&mut self, x: &[f64], matrix: &mut [f64]) {
+        if !self.chord {
+            return self.jacobian(x, matrix);
+        }
         let chord = if x[1] == 0.0 { 1.0 } else { x[1].tanh() / x[1] };
         Self::matrix(self.turn * chord, matrix);
+    }
+}
+
+/// `q'' = -stiffness z - damping z'`, `z' = q' - |q'| z`.
+struct Bristles {
+    stiffness: f64,
+    damping: f64,
+}
+
+impl Bristles {
+    /// Derivatives of the bending by velocity and bending, then those of the velocity.
+    fn matrix(&self, [by_v, by_z]: [f64; 2], matrix: &mut [f64]) {
+        let Self { stiffness, damping } = self;
+        matrix.copy_from_slice(&[0.0, 1.0, 0.0, 0.0, -damping * by_v, -stiffness - damping * by_z, 0.0, by_v, by_z]);
+    }
+}
+
+impl Ode<f64> for Bristles {
+    fn dim(&self) -> usize {
+        3
+    }
+
+    fn coordinates(&self) -> usize {
+        1
+    }
+
+    fn rhs(&mut self, x: &[f64], dxdt: &mut [f64]) {
+        let bending = x[1] - x[1].abs() * x[2];
+        dxdt.copy_from_slice(&[x[1], -self.stiffness * x[2] - self.damping * bending, bending]);
+    }
+
+    fn jacobian(&mut self, x: &[f64], jacobian: &mut [f64]) {
+        self.matrix([1.0 - x[1].signum() * x[2], -x[1].abs()], jacobian);
+    }
+
+    fn iteration_matrix(&mut self, x: &[f64], matrix: &mut [f64]) {
+        self.matrix([1.0, -x[1].abs()], matrix);
+    }
+
+    fn along_path(&mut self, x: &[f64], step: f64, rates: &mut [f64]) {
+        let way = x[1] * step;
+        rates[2] = (way.signum() - x[2]) * -(-way.abs()).exp_m1() / step;
     }
 }
 

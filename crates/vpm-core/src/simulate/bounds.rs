@@ -149,6 +149,20 @@ pub(crate) fn repair(method: Method) -> &'static str {
     }
 }
 
+/// The same along a motion, with drives that answer to it or without.
+pub(super) fn repair_along(method: Method, drives: bool) -> &'static str {
+    match method {
+        Method::Adaptive { .. } => "check units and jumps of the motion",
+        _ if drives => "use the integrator adaptive, and check units and jumps of the motion",
+        Method::LinearlyImplicit | Method::Rosenbrock | Method::Guarded => {
+            "use more substeps or the integrator adaptive, and check units and jumps of the motion"
+        }
+        Method::Rk4 | Method::SemiImplicit | Method::Additive => {
+            "use more substeps or the integrator linearly_implicit, and check units and jumps of the motion"
+        }
+    }
+}
+
 /// The rate of a joint, m/s or rad/s, at which its body is as fast as light; infinite for one that no rate moves.
 fn fastest(body: &Body<f64>) -> f64 {
     let Some(inertia) = body.inertia.filter(|_| body.joint.kind != JointKind::Prismatic) else {

@@ -1,5 +1,6 @@
 //! Runs along a motion: the answer of what does not follow it, sample by sample.
 
+use super::bounds::repair_along;
 use super::{Bounds, Run, Setting, halted, lost, names, trouble_in_words};
 use crate::ball::Ball;
 use crate::error::{Diverged, Error, Result};
@@ -17,6 +18,8 @@ use crate::table::Table;
 pub(super) struct Guide<'a> {
     pub(super) setting: Setting<'a>,
     pub(super) motion: JointMotion<'a>,
+    /// Number of the first sample of the motion in its record, for messages.
+    pub(super) first: usize,
     /// Joints that do not follow, ascending.
     pub(super) passive: &'a [usize],
     pub(super) strains: Option<StrainRates<'a>>,
@@ -164,7 +167,7 @@ impl<'a, S: Scalar> Way<'a, S> {
                         Halt::Stuck(stuck) => Halt::Stuck(Stuck { state: self.machine.place(stuck.state), ..stuck }),
                         Halt::Interrupted => halt,
                     };
-                    halted(description, stepping, row, halt, self.before(row + 1))
+                    halted(description, stepping, self.guide.first + row, halt, self.before(row + 1))
                 })?;
             }
         }
@@ -263,7 +266,7 @@ impl<'a, S: Scalar> Way<'a, S> {
             let (angle, near) = ball.nearness(q, &rest[..n], Some(stepping.time_step));
             if near {
                 let (what, event, repair) = trouble_in_words(description, Trouble::Singular(number, angle));
-                return Err(lost(stepping, what, (event, repair), (row, 0), self.before(row)));
+                return Err(lost(stepping, what, (event, repair), (row, self.guide.first), self.before(row)));
             }
         }
         Ok(())
@@ -293,11 +296,8 @@ impl<'a, S: Scalar> Way<'a, S> {
     }
 
     fn diverged(&self, (what, event): (String, String), row: usize) -> Error {
-        let repair = if self.guidance.drives {
-            "use the integrator adaptive, and check the motion for jumps"
-        } else {
-            "use more substeps or the integrator linearly_implicit, and check the motion for jumps"
-        };
-        lost(self.guide.setting.stepping, what, (event, repair), (row, 0), self.before(row))
+        let Guide { setting: Setting { stepping, .. }, first, .. } = *self.guide;
+        let event = (event, repair_along(stepping.method, self.guidance.drives));
+        lost(stepping, what, event, (row, first), self.before(row))
     }
 }

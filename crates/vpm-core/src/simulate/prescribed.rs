@@ -15,10 +15,10 @@ use crate::table::Table;
 /// gravity. The outputs `effort` of the joints are the efforts that the motion needs, with those of the effects taken off; the actuators
 /// do nothing. Checked: a motion simulated from efforts gives those efforts back, with all joints or some of them following.
 pub fn prescribed(setting: Setting<'_>, motion: JointMotion<'_>, passive: &[usize]) -> Result<Run> {
-    observed(setting, motion, passive, None)
+    observed(setting, (motion, 0), passive, None)
 }
 
-/// As [`prescribed`], with beams held to what their gauges showed.
+/// As [`prescribed`], of a motion that begins at the sample `first` of its record, with beams held to what their gauges showed.
 ///
 /// Law: a force `c C^T (e' - C v)` more on the elastic coordinates, `C v` being the rate of strain at a gauge, `e'` the measured one and
 /// `c` its gain: a damper between the beam and the measured one, which takes the energy out of whatever they differ by and nothing where
@@ -26,7 +26,7 @@ pub fn prescribed(setting: Setting<'_>, motion: JointMotion<'_>, passive: &[usiz
 /// of the motion. Checked: a free motion gives its own efforts back, with gauges that hold.
 pub fn observed(
     setting: Setting<'_>,
-    motion: JointMotion<'_>,
+    (motion, first): (JointMotion<'_>, usize),
     passive: &[usize],
     strains: Option<StrainRates<'_>>,
 ) -> Result<Run> {
@@ -52,5 +52,5 @@ pub fn observed(
         let driven: Vec<usize> = (0..joints).filter(|joint| !passive.contains(joint)).collect();
         check_structure(setting.description, setting.theta, setting.stepping, &state, &driven)?;
     }
-    Guide { setting, motion, passive: &passive, strains, drives: None }.run()
+    Guide { setting, motion, first, passive: &passive, strains, drives: None }.run()
 }

@@ -33,6 +33,11 @@ impl<S: Scalar> Memories<S> {
         &self.values
     }
 
+    /// Each with its seat, its law and its memory.
+    pub(super) fn iter(&self) -> impl Iterator<Item = (&Seat<S>, &MemoryEffect<S>, S)> {
+        self.laws.iter().zip(&self.values).map(|((seat, effect), &value)| (seat, effect, value))
+    }
+
     /// Where each of them is.
     pub(super) fn seats(&self) -> impl Iterator<Item = &Seat<S>> {
         self.laws.iter().map(|(seat, _)| seat)

@@ -1,15 +1,32 @@
-//! Stiffness and damping that contacts and bushings give the coordinates, for the check of explicit steps.
+//! What contacts, bushings and friction are to steps: stiffness, damping, and the slope where friction turns around.
 
 use super::Dynamics;
 use super::connections::{PlacedBushing, PlacedContact};
+use crate::actuator::Target;
 use crate::bushing::Bushing;
 use crate::contact::ContactFriction;
 use crate::dynamics::{for_each_column, poses};
-use crate::effect::{JointEffect, Seat};
+use crate::effect::Seat;
+use crate::integrator::resolution::Taken;
 use crate::spatial::{Pose, Twist};
 
 /// A velocity at which dry friction has turned around, m/s or rad/s.
 const FAST: f64 = 1e3;
+
+/// Dry friction of one place at rest, in N s/m, N/m and N s/m or their like.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Rubbing {
+    /// By how much its own coordinate moves with each of the machine.
+    pub(crate) along: Vec<f64>,
+    /// Resistance at rest less that of fast motion: the slope of friction that turns around with the velocity.
+    pub(crate) slope: f64,
+    /// Stiffness of what bends before it slides.
+    pub(crate) stiffness: f64,
+    /// Its resistance to bending.
+    pub(crate) damping: f64,
+    /// How steps take it.
+    pub(crate) taken: Taken,
+}
 
 impl Dynamics<f64> {
     /// Adds to `stiffness` and `damping` (n x n) those of contacts and bushings, after [`Dynamics::terms`] at the same state.
@@ -26,14 +43,35 @@ impl Dynamics<f64> {
         }
     }
 
-    /// The seat of each effect, and its resistance at rest and `q` less that of fast motion: the slope of dry friction, N s/m or N m s/rad.
-    pub(crate) fn dry_slopes(&self, q: &[f64]) -> Vec<(&Seat<f64>, f64)> {
-        let slope = |(seat, effect): &'_ (Seat<f64>, JointEffect<f64>)| {
+    /// What rubs at rest and `q`, after [`Dynamics::rhs`] in that state: effects, those that remember, and actuators, in their order.
+    pub(crate) fn rubbing(&self, q: &[f64]) -> Vec<Rubbing> {
+        let zeros = || vec![0.0; self.coordinates()];
+        let at = |seat: &Seat<f64>| {
+            let mut along = zeros();
+            seat.push(&mut along[..self.joints()], 1.0);
+            along
+        };
+        let effects = self.effects.iter().map(|(seat, effect)| {
             let (law, q, u) = (effect.law(), seat.of(q), seat.load(&self.efforts));
             let [rest, fast] = [0.0, FAST].map(|v| law.resistance(q, v) + law.resistance_per_load(v, u) * u.abs());
-            rest - fast
-        };
-        self.effects.iter().map(|effect| (&effect.0, slope(effect))).collect()
+            Rubbing { along: at(seat), slope: rest - fast, ..Rubbing::default() }
+        });
+        let memories = self.memories.iter().map(|(seat, effect, memory)| {
+            let [rest, fast] = [0.0, FAST].map(|v| effect.law().chords(v, memory));
+            let (slope, stiffness) = (rest.resistance - fast.resistance, rest.push * rest.gain);
+            Rubbing { along: at(seat), slope, stiffness, damping: fast.resistance, ..Rubbing::default() }
+        });
+        let actuators = self.actuators.iter().zip(&self.driven).map(|(actuator, &force)| {
+            let mut along = zeros();
+            match actuator.on {
+                Target::Joint(joint) => along[joint] = 1.0,
+                Target::Line(line) => self.data.line_load(line, 1.0, &mut along),
+            }
+            let [rest, fast] = [0.0, FAST].map(|v| actuator.resistance(force, v));
+            let taken = if actuator.friction_is_apart() { Taken::ByChord } else { Taken::ByTangent };
+            Rubbing { along, slope: rest - fast, taken, ..Rubbing::default() }
+        });
+        effects.chain(memories).chain(actuators).collect()
     }
 
     fn add_contact(&self, contact: &PlacedContact<f64>, stiffness: &mut [f64], damping: &mut [f64]) {

@@ -2,12 +2,10 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use crate::ball::{Ball, accelerations, angles, angular_velocity, rates};
+use crate::ball::{Ball, LARGEST_TURN, accelerations, angles, angular_velocity, rates};
 use crate::scalar::Scalar;
 use crate::spatial::{Quaternion, Vector3};
 
-/// Largest second angle (rad) of a single step: beyond, the coordinates of the step come near to their own singularity.
-const LONGEST: f64 = PI / 3.0;
 /// What became of the coordinates of a ball joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Trouble {
@@ -108,7 +106,7 @@ impl<S: Scalar> Turning<S> {
         let (q, v) = x.split_at_mut(n);
         for (place, joint) in self.free.iter_mut().enumerate() {
             let [local, rates] = [&*q, &*v].map(|numbers| joint.places.map(|place| numbers[place]));
-            if local[1].re().abs() > LONGEST {
+            if local[1].re().abs() > LARGEST_TURN {
                 self.trouble.get_or_insert(Trouble::Leap(joint.number, local[1].re()));
             }
             joint.orientation = joint.orientation.then(Quaternion::from_angles(local)).normalised();

@@ -123,22 +123,25 @@ impl System {
         Ok((found.limit, matrix(py, rows, [found.damped.len(), 5])?))
     }
 
-    /// Where dry friction of joints does not bring to rest in these steps what it brakes, about `state`: the place in words, and the slope of
-    /// friction at rest times the step over the inertia that it moves.
+    /// Where dry friction does not bring to rest in these steps what it brakes, at rest about `state` under `commands`: the place in words, and
+    /// the slope of friction at rest times the step over the inertia that it moves.
+    #[expect(clippy::too_many_arguments, reason = "the arguments of the Python function")]
     fn unstuck(
         &self,
         py: Python<'_>,
         theta: &Any<'_>,
         state: &Any<'_>,
+        commands: &Any<'_>,
         time_step: f64,
         substeps: i64,
         integrator: &str,
     ) -> PyResult<Vec<(String, f64)>> {
         let request = Request::new(self, theta, (time_step, substeps, integrator), &[])?;
         let state = Numbers::vector("state", state)?;
+        let commands = Numbers::vector("commands", commands)?;
         let found = self.compute(py, |interrupt| {
             let Setting { description, theta, stepping, .. } = request.setting(&self.description, interrupt);
-            unstuck(description, theta, state.values(), stepping)
+            unstuck(description, theta, state.values(), commands.values(), stepping)
         })?;
         Ok(found.into_iter().map(|friction| (friction.site, friction.turn)).collect())
     }
@@ -206,7 +209,7 @@ impl System {
 
     /// Joints but for `passive` ones follow a motion (N, n_joints), these and beams respond from rest: outputs, states and derivatives
     /// as in `simulate`. Beams are held to the rates of strain (N, gauges) that gauges of some gain showed.
-    #[pyo3(signature = (theta, position, velocity, acceleration, time_step, substeps, integrator, sensitivities=vec![], passive=vec![], strain_rate=None, strain_gain=None))]
+    #[pyo3(signature = (theta, position, velocity, acceleration, time_step, substeps, integrator, sensitivities=vec![], passive=vec![], strain_rate=None, strain_gain=None, first=0))]
     #[expect(clippy::too_many_arguments, reason = "the arguments of the Python function")]
     fn simulate_prescribed<'py>(
         &self,
@@ -222,12 +225,14 @@ impl System {
         passive: Vec<i64>,
         strain_rate: Option<&Any<'py>>,
         strain_gain: Option<&Any<'py>>,
+        first: i64,
     ) -> PyResult<(Table<'py>, Table<'py>, Cube<'py>)> {
         let request = Request::new(self, theta, (time_step, substeps, integrator), &sensitivities)?;
         let position = Numbers::table("position", position)?;
         let velocity = Numbers::table("velocity", velocity)?;
         let acceleration = Numbers::table("acceleration", acceleration)?;
         let passive = places("passive", &passive)?;
+        let first = arrays::place("first", first)?;
         let rate = strain_rate.map(|array| Numbers::table("strain_rate", array)).transpose()?;
         let gain = strain_gain.map(|array| Numbers::vector("strain_gain", array)).transpose()?;
         let run = self.compute(py, |interrupt| {
@@ -240,7 +245,7 @@ impl System {
                 (Some(rate), Some(gain)) => Some(StrainRates { rate: rate.as_table()?, gain: gain.values() }),
                 _ => None,
             };
-            observed(request.setting(&self.description, interrupt), motion, &passive, strains)
+            observed(request.setting(&self.description, interrupt), (motion, first), &passive, strains)
         })?;
         self.run(py, run, [self.description.n_outputs(), sensitivities.len()])
     }

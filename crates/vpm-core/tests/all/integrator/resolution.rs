@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 use vpm_core::Error;
 use vpm_core::description::Description;
 use vpm_core::integrator::Method;
-use vpm_core::integrator::resolution::sticks;
+use vpm_core::integrator::resolution::{Taken, bends, sticks};
 use vpm_core::samples::{double_pendulum, slider};
 use vpm_core::simulate::{Hold, Stepping, resolution, unstuck};
 
@@ -92,14 +92,46 @@ fn friction_that_does_not_stick_is_told() {
                 run.states.chunks_exact(2).rev().take(20).map(|state| state[1].abs()).fold(0.0, f64::max)
             };
             let rests = (0..8).all(|k| largest(1e-2 + f64::from(k) * 1.25e-4) <= width);
-            let found = unstuck(&bench.description, &bench.theta, &[0.0, 0.01], bench.stepping).unwrap();
+            let found = unstuck(&bench.description, &bench.theta, &[0.0, 0.01], &[0.0], bench.stepping).unwrap();
             assert_eq!(found.is_empty(), rests, "{} {turn}: {found:?}", method.name());
-            assert_eq!(sticks(method, turn), rests, "{} {turn}", method.name());
+            assert_eq!(sticks(method, turn, Taken::Implicitly), rests, "{} {turn}", method.name());
             for friction in found {
                 close(friction.turn / turn, 1.0, 1e-6);
                 assert_eq!(friction.site, format!("joint `{}`", bench.description.bodies[0].joint.name));
             }
         }
+    }
+}
+
+#[test]
+fn friction_that_bends_and_does_not_stick_is_told() {
+    // The same slider on bristles, whose stiffness times the square of a step over its mass is the turn; damped by 0 or 0.7.
+    for (method, turn, ratio) in Method::ALL
+        .into_iter()
+        .flat_map(|method| [0.5_f64, 3.0, 50.0, 500.0].map(|turn| (method, turn)))
+        .flat_map(|(method, turn)| [0.0, 0.7].map(|ratio| (method, turn, ratio)))
+    {
+        let way = 1e-6 / turn;
+        let numbers = [
+            ("coulomb", 1.0),
+            ("displacement", way),
+            ("damping", 2.0 * ratio / way.sqrt()),
+            ("excess", 0.0),
+            ("stribeck_velocity", 0.01),
+        ];
+        let mut machine = Machine::new(&slider(1.0));
+        machine.effect("lugre_friction", 0, &numbers).actuator(0, &[("gain", 1.0)]);
+        let bench = Bench::new(&machine, 1e-3, 1, method);
+        let slow = |from: f64| {
+            let Ok(run) = bench.try_free(&[0.0, from, 0.0], &[0.0; 300]) else { return false };
+            run.states.chunks_exact(3).rev().take(20).all(|state| state[1].abs() <= way.sqrt())
+        };
+        let rests = (0..8).all(|k| slow(1e-2 + f64::from(k) * 1.25e-4));
+        let what = format!("{} {turn} {ratio}", method.name());
+        assert_eq!(bends(method, [turn, 2.0 * ratio * turn.sqrt()]), rests, "{what}");
+        let found = unstuck(&bench.description, &bench.theta, &[0.0, 0.01, 0.0], &[0.0], bench.stepping).unwrap();
+        assert_eq!(found.is_empty(), rests, "{what}: {found:?}");
+        found.iter().for_each(|friction| close(friction.turn / turn, 1.0, 1e-6));
     }
 }
 

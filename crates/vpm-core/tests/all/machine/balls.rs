@@ -16,10 +16,10 @@ use vpm_core::spatial::{Quaternion, Vector3};
 
 const MOMENTS: [f64; 3] = [1.0, 2.0, 2.5];
 /// Three angles, then their rates: it turns about its middle axis, and over, again and again.
-const START: [f64; 6] = [0.2, 1.4, -0.4, 3.0, 2.0, -1.0];
+pub(crate) const START: [f64; 6] = [0.2, 1.4, -0.4, 3.0, 2.0, -1.0];
 
 /// A body that turns about its centre of mass, nothing acting on it.
-fn content() -> Value {
+pub(crate) fn content() -> Value {
     let turns = |k: usize, on: Value, inertia: Value| {
         let mut axis = [0.0; 3];
         axis[k] = 1.0;
@@ -38,7 +38,7 @@ fn content() -> Value {
         "balls": [{"name": "ball", "angles": [[0], [1], [2]]}]})
 }
 
-fn built(content: &Value) -> Result<Description> {
+pub(crate) fn built(content: &Value) -> Result<Description> {
     Description::from_json(&content.to_string())
 }
 
@@ -49,7 +49,7 @@ fn with_friction() -> Result<Description> {
     built(&content)
 }
 
-fn live(description: Description, start: &[f64], step: f64, method: Method) -> Result<Live> {
+pub(crate) fn live(description: Description, start: &[f64], step: f64, method: Method) -> Result<Live> {
     let theta = description.parameters.clone();
     Live::new(Arc::new(description), &theta, start, Stepping::new(step, 1, method)?)
 }

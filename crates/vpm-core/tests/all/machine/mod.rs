@@ -1,6 +1,6 @@
 //! Machines from descriptions: parts, reactions, single evaluations, linear models.
 
-mod balls;
+pub(crate) mod balls;
 mod flexible;
 mod linearize;
 mod load_cells;

@@ -130,7 +130,7 @@ fn gauges_that_hold_agree_with_and_without_derivatives() -> Result<()> {
                 Setting { description: &d, theta: &d.parameters, stepping, sensitivities: by, interrupt: &|| false };
             let moving = JointMotion { position: table(0)?, velocity: table(1)?, acceleration: table(2)? };
             let strains = StrainRates { rate: Table::new("rate", &rate, rows, 1)?, gain: &[gain] };
-            observed(setting, moving, &[PLAY, 2], Some(strains))
+            observed(setting, (moving, 0), &[PLAY, 2], Some(strains))
         };
         let (plain, lifted) = (run(&[], 50.0, 20)?, run(&[d.beams[0].material.young], 50.0, 20)?);
         let apart =

@@ -2,6 +2,7 @@
 //! numbers and the integrators.
 
 use crate::common;
+use crate::machine::balls;
 
 use std::fs;
 use std::io::Write as _;
@@ -14,7 +15,7 @@ use serde_json::json;
 use vpm_core::c_source::{Files, Names, files};
 use vpm_core::description::Description;
 use vpm_core::graph::{Call, Evaluator, Function, Graph, Node, Program, literal};
-use vpm_core::integrator::{Rk4, Rosenbrock};
+use vpm_core::integrator::{Method, Rk4, Rosenbrock};
 use vpm_core::linearize::linearize;
 use vpm_core::samples::{Random, arm7, pendulum};
 use vpm_core::scalar::Search;
@@ -318,6 +319,58 @@ fn pressures_that_are_searched_for_say_the_same_in_c() {
             let [place, speed, current] = [0.01, 0.1, 4e-3].map(|size| size * random.symmetric());
             [vec![MIDDLE + place, speed], vec![current]]
         });
+    }
+}
+
+/// Reads a state and a step; prints the state after each of a thousand steps by both methods, each with what the step returned.
+const STEPS: &str = r#"
+#include "m.h"
+#include <stdio.h>
+int main(void)
+{
+    double x[m_NX], next[m_NX], u[1] = {0.0}, h, w[m_NW];
+    int method, k, i, status;
+    for (k = 0; k < m_NX; ++k) if (scanf("%lf", x + k) != 1) return 1;
+    if (scanf("%lf", &h) != 1) return 1;
+    for (method = 0; method < 2; ++method) {
+        for (k = 0; k < m_NX; ++k) next[k] = x[k];
+        for (k = 0; k < 1000; ++k) {
+            if (method == 0) status = m_step_rk4(next, u, m_constants, h, w, next);
+            else status = m_step_rosenbrock(next, u, m_constants, h, w, next);
+            for (i = 0; i < m_NX; ++i) printf("%.17g\n", next[i]);
+            printf("%d\n", status);
+        }
+    }
+    return 0;
+}
+"#;
+
+#[test]
+fn bodies_tumble_in_c_as_in_the_core() {
+    let Some(folder) = folder("tumbling") else { return };
+    let content = balls::content();
+    write(&balls::built(&content).unwrap(), &[], &folder);
+    fs::write(folder.join("steps.c"), STEPS).unwrap();
+    compile(&folder, &["steps.c", "m.c"], "steps", &["-std=c99"]);
+    if Command::new("c++").arg("--version").output().is_ok() {
+        compile(&folder, &["-x", "c++", "steps.c", "m.c"], "as_cpp", &["-std=c++11"]);
+    }
+    // The second begins at the singularity itself.
+    for start in [balls::START, [0.2, std::f64::consts::FRAC_PI_2, -0.4, 0.5, 2.0, -1.0]] {
+        let found = run(&folder, "steps", &[start.as_slice(), &[2e-3]].concat());
+        let mut rows = found.chunks_exact(7);
+        for method in [Method::Rk4, Method::Rosenbrock] {
+            let mut over = false;
+            let mut live = balls::live(balls::built(&content).unwrap(), &start, 2e-3, method).unwrap();
+            for _ in 0..1000 {
+                let row = rows.next().unwrap();
+                live.step(&[]).unwrap();
+                over |= live.state()[1].cos() < 0.1;
+                same(&row[..6], live.state(), 1e-10, method.name());
+                assert_eq!(row[6], 0.0);
+            }
+            assert!(over, "{} stays away from the singularity", method.name());
+        }
     }
 }
 
