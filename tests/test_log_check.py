@@ -144,9 +144,9 @@ def test_constant_forces_and_drag_do_not_hide_a_delay() -> None:
     )
     force = 2.1 * acceleration + 3.0 * speed + 1.0 + 4.0 * speed * np.abs(speed)
     noise = 1e-6 * np.random.default_rng(4).standard_normal(time.size)
-    log = vpm.Experiment.from_arrays(
-        time, {"slide.position": way + noise, "drive.command": np.interp(time - 0.03, time, force)}, {}, model=SLIDE
-    )
+    held = np.interp(time + 0.002 - 0.03, time, force)  # for a whole sample, so that of its middle
+    columns = {"slide.position": way + noise, "drive.command": held}
+    log = vpm.Experiment.from_arrays(time, columns, {}, model=SLIDE)
     first, *_ = vpm.check_log(SLIDE, log, workers=1).findings
     assert first.kind == "delay"
     assert "slide.position comes 30 ms early" in first.sentence
