@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from vpm.catalogue.formula import Formula
-from vpm.catalogue.signature import Signature, signature_of
+from vpm.catalogue.signature import ANYWHERE, Signature
 from vpm.errors import ModelError, near_match
 
 #: A cylinder is a hydraulic actuator with its valve, named as it.
@@ -156,8 +156,8 @@ class EffectType:
         Effect that has to be at the same site before this one is worth looking for: it is a correction of that one.
     screened : bool
         Whether a search tries it; a ranking tries all that have a law.
-    shows : Signature or None
-        Where it shows, for an entry without a row in `vpm.catalogue.signature`.
+    signature : Signature
+        Where it shows: the state that its picture is drawn over, and what is to be seen there.
     formula : Formula or None
         Law of an entry that a user wrote, see `vpm.catalogue.register`.
     motor_side_alone : bool
@@ -187,7 +187,7 @@ class EffectType:
     confused_with: Mapping[str, str]
     requires: str | None = None
     screened: bool = True
-    shows: Signature | None = None
+    signature: Signature = ANYWHERE
     formula: Formula | None = None
     motor_side_alone: bool = False
     link_side_alone: bool = False
@@ -221,11 +221,6 @@ class EffectType:
     def adds_inertia(self) -> bool:
         """Whether a mass or an inertia is among its parameters."""
         return any(parameter.scale in {"mass", "inertia"} for parameter in self.parameters)
-
-    @property
-    def signature(self) -> Signature:
-        """Where it shows: the state that its picture is drawn over, and what is to be seen there."""
-        return self.shows or signature_of(self.name)
 
     @property
     def title(self) -> str:
