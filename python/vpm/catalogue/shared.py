@@ -12,6 +12,8 @@ from vpm.catalogue.kinds import ANY, NOT_NEGATIVE, EffectParameter, Range, Scale
 
 #: Transition velocity where none is given: prismatic (m/s), revolute (rad/s).
 TRANSITION = (1e-3, 1e-2)
+#: Bounds of a transition velocity, a detail of small speeds, as shares of the largest speed.
+SLOW = (2e-4, 0.1)
 #: Stribeck velocity where none is given: prismatic (m/s), revolute (rad/s).
 STRIBECK = (1e-2, 1e-1)
 #: Way over which a contact closes where none is given: prismatic (m), revolute (rad).

@@ -1,7 +1,10 @@
 """Actuator lag: a drive that follows its command as a system of first order."""
 
+import math
+
 from vpm.catalogue.kinds import ABOVE_ZERO, POSITIVE, EffectType, nonlinear
 from vpm.catalogue.signature import Signature
+from vpm.catalogue.traits import Tried
 
 EFFECT = EffectType(
     name="actuator_lag",
@@ -30,6 +33,8 @@ EFFECT = EffectType(
         "sensor_delay": "they agree for slow motion; steps and fast motion part them",
         "viscous_friction": "both weaken fast motion; steady motion at several speeds shows the friction alone",
     },
+    late="lag",
+    tried=(Tried("time_constant", "interval", (1.0, 4.0, 16.0), (0.02, math.inf)),),
     signature=Signature(
         ("command_rate",),
         "A loop around a line over the rate of the command, open for fast commands",

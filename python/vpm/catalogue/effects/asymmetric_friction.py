@@ -41,5 +41,6 @@ EFFECT = EffectType(
         ),
     },
     contains=("bias_force",),
+    fixed=("transition_velocity",),
     signature=Signature(("velocity",), "Levels or slopes that differ between the two directions", SLOW_AND_FAST),
 )

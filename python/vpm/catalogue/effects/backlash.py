@@ -65,6 +65,9 @@ EFFECT = EffectType(
         "joint_compliance": "they agree where the load never changes its sign; reversals and small motion part them",
     },
     contains=("rotor_inertia",),
+    motion="deflection",
+    impacts=True,
+    fixed=("damping", "width"),
     signature=Signature(
         ("position", "effort"),
         "A flat part where nothing is passed on, with a step wherever the effort changes its sign",

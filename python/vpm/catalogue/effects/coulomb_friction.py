@@ -1,8 +1,9 @@
 """Coulomb friction: dry surfaces resist alike at every speed."""
 
 from vpm.catalogue.kinds import NOT_NEGATIVE, EffectType, size
-from vpm.catalogue.shared import SLOW_AND_FAST, transition
+from vpm.catalogue.shared import SLOW, SLOW_AND_FAST, transition
 from vpm.catalogue.signature import Signature
+from vpm.catalogue.traits import Tried
 
 EFFECT = EffectType(
     name="coulomb_friction",
@@ -29,6 +30,9 @@ EFFECT = EffectType(
         "dead_zone": "they agree wherever command and velocity have the same sign; braking parts them",
         "hysteresis": "they agree but for the way after a reversal; short strokes and slow reversals part them",
     },
+    sticks=True,
+    usual=True,
+    tried=(Tried("transition_velocity", "speed", (0.002, 0.01, 0.04), SLOW),),
     signature=Signature(
         ("velocity",), "Two levels of opposite sign, one for each direction, with a step at rest", SLOW_AND_FAST
     ),

@@ -2,6 +2,7 @@
 
 from vpm.catalogue.kinds import ANY, EffectType, shape, size
 from vpm.catalogue.signature import Signature
+from vpm.catalogue.traits import Tried
 
 EFFECT = EffectType(
     name="cubic_spring",
@@ -31,6 +32,7 @@ EFFECT = EffectType(
     impossible="either sign is possible: beside a spring a negative one makes it softer on its way",
     confused_with={},
     screened=False,
+    tried=(Tried("rest", "way", (0.0,), (-10.0, 10.0)),),
     signature=Signature(
         ("position",), "A cubic parabola that crosses zero at the place of rest", "Slow motion over the whole way"
     ),

@@ -44,6 +44,7 @@ EFFECT = EffectType(
         "spring": "they agree over a way beyond the end alone; motion on both sides of it parts them",
         "saturation": "both stop the motion at large commands; the same command in the middle of the way parts them",
     },
+    impacts=True,
     signature=Signature(
         ("position",),
         "Nothing, and beyond one place a steep wall",

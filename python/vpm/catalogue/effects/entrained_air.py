@@ -48,6 +48,8 @@ EFFECT = EffectType(
         "valve_dynamics": "both delay the force behind the command; the spool or both pressures part them",
         "actuator_lag": "both delay the force behind the command; pressures at a loaded piston part them",
     },
+    # Data hardly show in which way air is compressed.
+    fixed=("exponent", "reference_pressure"),
     signature=Signature(
         ("pressure_difference", "time"),
         "An error of the pressures that is large where the pressure is low",

@@ -2,6 +2,7 @@
 
 from vpm.catalogue.kinds import NOT_NEGATIVE, EffectType, shape, size
 from vpm.catalogue.signature import Signature
+from vpm.catalogue.traits import Tried
 
 #: Pre-sliding way where none is given: prismatic (m), revolute (rad).
 _PRESLIDING = (1e-3, 1e-2)
@@ -54,6 +55,11 @@ EFFECT = EffectType(
         "stribeck_friction": "both shape the start of a motion; starts at several accelerations part speed from way",
         "spring": "they agree over ways that are too short to slide; a longer way parts them",
     },
+    sticks=True,
+    tried=(
+        Tried("displacement", "travel", (0.004, 0.02, 0.1), (0.0, 2.0), sampled=True),
+        Tried("shape", "one", (), (0.0, 20.0)),
+    ),
     signature=Signature(
         ("position",),
         "A loop that is run through in the same sense at every speed",

@@ -17,5 +17,6 @@ EFFECT = EffectType(
         "actuator_lag": "they agree for slow commands; steps and fast commands part them",
         "sensor_delay": "from commands to readings only their sum shows; a second sensor or time stamps part them",
     },
+    late="delay",
     signature=Signature(("command_rate",), "A straight line over the rate of the command", "Steps and fast commands"),
 )

@@ -44,6 +44,7 @@ EFFECT = EffectType(
         "actuator_lag": "both delay the motion of the link; free vibration after a stop shows the spring alone",
     },
     contains=("rotor_inertia",),
+    motion="deflection",
     signature=Signature(
         ("frequency",),
         "A peak at the resonance of load and motor against each other",

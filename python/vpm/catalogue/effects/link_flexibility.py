@@ -52,6 +52,7 @@ EFFECT = EffectType(
         "joint_compliance": "behind one motor both are a spring; a strain gauge or the motion of the tip parts them",
     },
     contains=("rotor_inertia",),
+    motion="bending",
     signature=Signature(
         ("frequency",),
         "A peak at the first natural frequency of the link",

@@ -3,6 +3,7 @@
 from vpm.catalogue.kinds import ABOVE_ZERO, EffectType, nonlinear
 from vpm.catalogue.shared import NEVER
 from vpm.catalogue.signature import Signature
+from vpm.catalogue.traits import Tried
 
 EFFECT = EffectType(
     name="saturation",
@@ -28,6 +29,7 @@ EFFECT = EffectType(
         "supply_drop": "both limit the speed; a log of the pressure at the valve parts them",
         "viscous_friction": "both weaken large commands; large commands at low speed part them",
     },
+    tried=(Tried("limit", "command", (0.95, 0.7, 0.4), (0.02, 1.0)),),
     signature=Signature(
         ("command",),
         "Nothing up to the limit, and beyond it a straight line",

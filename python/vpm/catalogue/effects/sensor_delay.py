@@ -16,6 +16,7 @@ EFFECT = EffectType(
         "input_delay": "from commands to readings only their sum shows; a second sensor or time stamps part them",
         "actuator_lag": "they agree for slow motion; steps and fast motion part them",
     },
+    late="delay",
     signature=Signature(
         ("command_rate",),
         "A straight line over the rate of the command",

@@ -27,6 +27,7 @@ EFFECT = EffectType(
         "payload": "both scale the effort that an acceleration needs; a record with a known load parts them",
         "viscous_friction": "both scale the effort that a speed needs; a reference length parts them",
     },
+    scales=True,
     signature=Signature(
         ("effort", "position"), "A straight line over the effort that the motion needs", "A way of known length"
     ),

@@ -2,6 +2,7 @@
 
 from vpm.catalogue.kinds import ANY, NOT_NEGATIVE, EffectType, shape, size
 from vpm.catalogue.signature import Signature
+from vpm.catalogue.traits import Tried
 
 EFFECT = EffectType(
     name="spring",
@@ -38,6 +39,7 @@ EFFECT = EffectType(
         "torque_ripple": "they agree over less than a quarter of a period; a longer way parts them",
         "hysteresis": "they agree over ways that are too short to slide; a longer way parts them",
     },
+    tried=(Tried("rest", "way", (0.0,), (-10.0, 10.0)),),
     signature=Signature(
         ("position",), "A straight line that crosses zero at the place of rest", "Slow motion over the whole way"
     ),

@@ -3,6 +3,7 @@
 from vpm.catalogue.kinds import NOT_NEGATIVE, EffectType, shape, size
 from vpm.catalogue.shared import STRIBECK, transition
 from vpm.catalogue.signature import Signature
+from vpm.catalogue.traits import Tried
 
 EFFECT = EffectType(
     name="stribeck_friction",
@@ -40,6 +41,11 @@ EFFECT = EffectType(
         "hysteresis": "both shape the start of a motion; starts at several accelerations part speed from way",
     },
     requires="coulomb_friction",
+    sticks=True,
+    close_to_rest=True,
+    # Beyond 0.3 of the largest speed it is no excess close to rest any more.
+    tried=(Tried("stribeck_velocity", "speed", (0.015, 0.05, 0.15), (2e-3, 0.3)),),
+    fixed=("transition_velocity",),
     signature=Signature(
         ("velocity",),
         "A hump on both sides of rest that is gone at higher speed",

@@ -25,6 +25,7 @@ EFFECT = EffectType(
     confused_with={
         "viscous_friction": "both calm vibrations; friction also brakes motion that does not bend the link",
     },
+    damps=True,
     signature=Signature(
         ("frequency",),
         "A resonance that is lower and broader than modelled",

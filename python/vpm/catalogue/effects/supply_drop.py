@@ -3,6 +3,7 @@
 from vpm.catalogue.kinds import EffectType, shape
 from vpm.catalogue.shared import over_described
 from vpm.catalogue.signature import Signature
+from vpm.catalogue.traits import Tried
 
 #: Time in which hoses and filters lose their pressure when nothing better is known, s.
 _HOSES = 0.02
@@ -37,6 +38,8 @@ EFFECT = EffectType(
         "saturation": "both limit the speed; a log of the pressure at the valve parts them",
         "viscous_friction": "both weaken fast motion; the pressures of both chambers part them",
     },
+    # Hoses and filters lose their pressure within these.
+    tried=(Tried("time_constant", "one", (0.01, 0.05, 0.2), (1e-3, 5.0)),),
     signature=Signature(
         ("flow",),
         "An error of the pressures that grows with the flow that is drawn",

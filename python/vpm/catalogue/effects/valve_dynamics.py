@@ -27,6 +27,7 @@ EFFECT = EffectType(
         "input_delay": "they agree for slow commands; steps and fast commands part them",
         "entrained_air": "both delay the force behind the command; the spool or both pressures part them",
     },
+    late="spool",
     signature=Signature(
         ("frequency", "command_rate"),
         "An error that grows with frequency up to the bandwidth of the valve",

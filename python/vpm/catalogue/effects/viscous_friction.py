@@ -29,5 +29,6 @@ EFFECT = EffectType(
         "saturation": "both weaken large commands; large commands at low speed part them",
         "sensor_gain": "both scale the effort that a speed needs; a reference length parts them",
     },
+    usual=True,
     signature=Signature(("velocity",), "A straight line through zero", "Motion at several constant speeds"),
 )

@@ -3,6 +3,7 @@
 from vpm.catalogue.kinds import ABOVE_ZERO, NOT_NEGATIVE, EffectType, shape, size
 from vpm.catalogue.shared import transition
 from vpm.catalogue.signature import Signature
+from vpm.catalogue.traits import Tried
 
 EFFECT = EffectType(
     name="warming_friction",
@@ -48,6 +49,7 @@ EFFECT = EffectType(
     confused_with={},
     screened=False,
     memory="warming.memory",
+    tried=(Tried("time_constant", "record", (0.1, 0.4), (0.01, 1.0)),),
     signature=Signature(
         ("time", "velocity"),
         "Levels for each direction that come together over time",
