@@ -35,6 +35,7 @@ __all__ = [
     "register",
     "signature_of",
     "unregister",
+    "without_law",
 ]
 
 _ENTRIES = {effect.name: effect for effect in BUILT_IN}
@@ -70,6 +71,11 @@ def signature_of(name: str) -> Signature:
     name : str
     """
     return EFFECTS[name].signature if name in EFFECTS else ANYWHERE
+
+
+def without_law() -> EffectType:
+    """The entry by which a diagnosis describes what it cannot name."""
+    return next(effect for effect in EFFECTS.values() if not effect.has_law)
 
 
 def effects_for_site(kind: str) -> tuple[EffectType, ...]:

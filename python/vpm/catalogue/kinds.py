@@ -191,11 +191,6 @@ class EffectType(Traits):
         return any(parameter.scale in {"mass", "inertia"} for parameter in self.parameters)
 
     @property
-    def is_rotor(self) -> bool:
-        """Whether it is nothing but an inertia on the motor side of a joint."""
-        return self.site == "joint" and self.adds_inertia and not self.motion
-
-    @property
     def title(self) -> str:
         """Name in words: ``"Coulomb friction"``."""
         words = self.name.replace("_", " ")

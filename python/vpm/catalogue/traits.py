@@ -38,6 +38,8 @@ class Traits:
     """The motion that nobody measures which it adds: of a link against its motor, or of a link that bends."""
     impacts: bool = False
     """Whether its sides come into contact and part again: those of a play, or of a way and its end."""
+    rotor: bool = False
+    """Whether it is nothing but an inertia that turns with the motor."""
     sticks: bool = False
     """Whether a joint can stick by it where it turns round, so that what is late is timed in clear motion."""
     close_to_rest: bool = False

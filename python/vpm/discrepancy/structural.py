@@ -83,7 +83,7 @@ def beyond(effect: EffectType, site: str, model: Model, measured: Sequence[str],
     remembering = [f"{entry.type.title} at {entry.at}" for entry in model.effects if entry.type.memory]
     split_off = {model.joint_behind(entry.at) for entry in model.effects if entry.type.splits}
     alone = tuple(joint for joint in model.joints if joint not in split_off) == tuple(measured)
-    lone = alone and not has_own_drives(model) and not any(entry.type.is_rotor for entry in model.effects)
+    lone = alone and not has_own_drives(model) and not any(entry.type.rotor for entry in model.effects)
     known = simulated or lone
     if effect.memory and tuple(model.joints) != tuple(measured) and not known:
         return "its memory cannot be balanced beside what moves unseen in this model"

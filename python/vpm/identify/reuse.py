@@ -90,7 +90,7 @@ def _split(shape: Shape, joints: tuple[str, ...], wound: bool) -> Parts | None:
         return None  # what acts behind a spring moves it
     if tuple(joint for joint in model.joints if joint not in flying) != joints:
         return None
-    if not model.core.n_elastic and (not plays or any(e.type.is_rotor for e in model.effects)):
+    if not model.core.n_elastic and (not plays or any(e.type.rotor for e in model.effects)):
         return None  # a rotor is what flies against
     aside = [e for e in model.effects if e.type.site in {"joint", "actuator"} and not e.type.splits]
     if len(aside) + len(plays) < sum(e.type.site in {"joint", "actuator"} for e in model.effects):

@@ -27,6 +27,7 @@ EFFECT = EffectType(
         "joint_compliance": "far below the resonance only the inertias show; faster motion parts them",
     },
     exact=True,
+    rotor=True,
     signature=Signature(
         ("acceleration",),
         "A straight line through zero over the acceleration of the motor",
