@@ -224,7 +224,7 @@ def draw(name: str) -> Figure:
 
 INTRODUCTION = """# The catalogue of effects
 
-<!-- Written by docs/figures/effects.py (make figures) from vpm.catalogue: change it there. -->
+<!-- Written by docs/figures/effects.py (make figures) from vpm.catalogue.effects, a file each: change it there. -->
 
 Every effect that a model file may contain and a diagnosis may name. Each section has the law; its parameters (bounds
 are what physics allows; *slanted* is what shapes a law whose size another parameter gives); what the effect adds to a
