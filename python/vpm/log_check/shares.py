@@ -10,6 +10,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from vpm.catalogue import EFFECTS
 from vpm.experiment import Experiment
 from vpm.log_check.correction import Correction
 from vpm.log_check.settings import Settings
@@ -24,8 +25,6 @@ from vpm.simulate import Setup
 from vpm.weighing.priors import Prior
 
 Array = NDArray[np.float64]
-#: Friction that a joint may have without being described: nothing of it passes for a mistake of a log.
-FRICTION = ("viscous_friction", "coulomb_friction")
 #: Speed at which dry friction turns round, as a share of the usual speed of the joint.
 TRANSITION = 0.02
 #: Pieces of a record between whose ends speeds are measured, which noise hardly moves.
@@ -105,7 +104,9 @@ class Judge:
         self.settings, self.setup = settings, setup
         present = {(effect.name, effect.at) for effect in model.effects}
         joints = [name for name in model.joints if name not in model.added_joints]
-        self.added = tuple((name, at) for at in joints for name in FRICTION if (name, at) not in present)
+        # Friction that is not described does not pass for a mistake of a log.
+        usual = [name for name, effect in EFFECTS.items() if effect.usual]
+        self.added = tuple((name, at) for at in joints for name in usual if (name, at) not in present)
         for name, at in self.added:
             model = model.with_effect(name, at)
         self.model = model
@@ -122,13 +123,13 @@ class Judge:
 
     def guessed(self, record: Experiment) -> Shares:
         """Shares at the values of the model, with no dry friction or as much as is usual, whichever leaves less."""
-        plain, dry = self.measured(record), [joint for name, joint in self.added if name == "coulomb_friction"]
+        plain, dry = self.measured(record), [key for key in self.added if EFFECTS[key[0]].sticks]
         if not dry:
             return plain
         structure = self._structure(record)
         values = structure.theta.copy()
-        for joint in dry:
-            parameter = self.model.effect("coulomb_friction", joint).parameter_names["coulomb"]
+        for key in dry:
+            parameter = self.model.effect(*key).parameter_names["coulomb"]
             values[self.model.index(parameter)] = structure.priors[parameter].spread
         return min(plain, self.measured(record, values), key=lambda shares: shares.order)
 
@@ -194,11 +195,12 @@ class Judge:
             effort, speed = self._usual(record, joint)
             effect = model.effect(name, joint)
             for short, parameter in effect.parameter_names.items():
-                if effect.type.parameter(short).shape:
+                entry = effect.type.parameter(short)
+                if entry.shape:
                     values[model.index(parameter)] = TRANSITION * speed
                 else:
-                    size = effort / speed if name == "viscous_friction" else effort
-                    priors[parameter] = Prior(0.0, size, *effect.type.parameter(short).physical)
+                    size = effort / speed if entry.scale == "effort_per_speed" else effort
+                    priors[parameter] = Prior(0.0, size, *entry.physical)
         return Structure(model, values, priors)
 
     def _usual(self, record: Experiment, joint: str) -> tuple[float, float]:
