@@ -13,7 +13,6 @@ EFFECT = EffectType(
     name="backlash",
     site="joint",
     group="backlash",
-    motor_side_alone=True,
     parameters=(
         shape(
             "gap",
@@ -68,6 +67,7 @@ EFFECT = EffectType(
     motion="deflection",
     impacts=True,
     fixed=("damping", "width"),
+    motor_side_alone=True,
     signature=Signature(
         ("position", "effort"),
         "A flat part where nothing is passed on, with a step wherever the effort changes its sign",

@@ -7,7 +7,6 @@ from vpm.catalogue.traits import Tried
 EFFECT = EffectType(
     name="cubic_spring",
     site="joint",
-    link_side_alone=True,
     group="cubic_spring",
     parameters=(
         size(
@@ -33,6 +32,7 @@ EFFECT = EffectType(
     confused_with={},
     screened=False,
     tried=(Tried("rest", "way", (0.0,), (-10.0, 10.0)),),
+    link_side_alone=True,
     signature=Signature(
         ("position",), "A cubic parabola that crosses zero at the place of rest", "Slow motion over the whole way"
     ),

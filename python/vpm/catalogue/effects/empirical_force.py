@@ -30,7 +30,6 @@ EFFECT = EffectType(
     name="empirical_force",
     site="joint",
     group="empirical",
-    motor_side_alone=True,
     parameters=(
         _shape("middle", "{C}", "middle of the range of positions that was seen", 0.0, ANY),
         _shape("reach", "{C}", "half of that range", None),
@@ -52,6 +51,7 @@ EFFECT = EffectType(
     impossible="either sign is possible: it is a fit",
     confused_with={},
     screened=False,
+    motor_side_alone=True,
     signature=Signature(
         ("velocity", "position", "acceleration", "effort", "command"),
         "Whatever the sparse formula says over the states that it was found in",

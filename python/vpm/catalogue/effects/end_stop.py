@@ -7,7 +7,6 @@ from vpm.catalogue.signature import Signature
 EFFECT = EffectType(
     name="end_stop",
     site="joint",
-    link_side_alone=True,
     group="end_stop",
     parameters=(
         size(
@@ -45,6 +44,7 @@ EFFECT = EffectType(
         "saturation": "both stop the motion at large commands; the same command in the middle of the way parts them",
     },
     impacts=True,
+    link_side_alone=True,
     signature=Signature(
         ("position",),
         "Nothing, and beyond one place a steep wall",

@@ -11,7 +11,6 @@ EFFECT = EffectType(
     name="hysteresis",
     site="joint",
     group="hysteresis",
-    memory="memory",
     parameters=(
         size(
             "force",
@@ -60,6 +59,7 @@ EFFECT = EffectType(
         Tried("displacement", "travel", (0.004, 0.02, 0.1), (0.0, 2.0), sampled=True),
         Tried("shape", "one", (), (0.0, 20.0)),
     ),
+    memory="memory",
     signature=Signature(
         ("position",),
         "A loop that is run through in the same sense at every speed",

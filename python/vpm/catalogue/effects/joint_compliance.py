@@ -8,7 +8,6 @@ EFFECT = EffectType(
     name="joint_compliance",
     site="joint",
     group="compliance",
-    motor_side_alone=True,
     parameters=(
         nonlinear(
             "stiffness",
@@ -45,6 +44,7 @@ EFFECT = EffectType(
     },
     contains=("rotor_inertia",),
     motion="deflection",
+    motor_side_alone=True,
     signature=Signature(
         ("frequency",),
         "A peak at the resonance of load and motor against each other",

@@ -7,7 +7,6 @@ EFFECT = EffectType(
     name="rotor_inertia",
     site="joint",
     group="rotor",
-    motor_side_alone=True,
     parameters=(
         size(
             "inertia",
@@ -28,6 +27,7 @@ EFFECT = EffectType(
     },
     exact=True,
     rotor=True,
+    motor_side_alone=True,
     signature=Signature(
         ("acceleration",),
         "A straight line through zero over the acceleration of the motor",

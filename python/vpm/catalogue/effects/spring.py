@@ -7,7 +7,6 @@ from vpm.catalogue.traits import Tried
 EFFECT = EffectType(
     name="spring",
     site="joint",
-    link_side_alone=True,
     group="spring",
     parameters=(
         size(
@@ -40,6 +39,7 @@ EFFECT = EffectType(
         "hysteresis": "they agree over ways that are too short to slide; a longer way parts them",
     },
     tried=(Tried("rest", "way", (0.0,), (-10.0, 10.0)),),
+    link_side_alone=True,
     signature=Signature(
         ("position",), "A straight line that crosses zero at the place of rest", "Slow motion over the whole way"
     ),
