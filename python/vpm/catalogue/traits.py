@@ -59,7 +59,7 @@ class Traits:
     takes_effort: bool = False
     """Whether it does nothing at a joint on which no actuator acts itself."""
     beside_others: bool = False
-    """Whether it is looked for at an actuator beside others alone: elsewhere it is what an effect of the joint is."""
+    """Whether it is looked for at an actuator on a line or beside others alone: elsewhere it is one of the joint."""
     memory: str = ""
     """What the memory of its law, a state of the machine, is called at its site; "" if it has none."""
     exact: bool = False
