@@ -9,6 +9,7 @@ import pytest
 
 import vpm
 from shared_cases import shared_case
+from vpm.catalogue import EFFECTS
 from vpm.discrepancy import overlooked, told_apart
 from vpm.discrepancy.choice import Accepted
 from vpm.discrepancy.confirmation import Data, Trial
@@ -64,7 +65,7 @@ def test_what_runs_find_late_is_chosen_among_all_that_is(monkeypatch: pytest.Mon
     """Of a delay and a lag the criterion of one run says little; their difference along the reference is asked."""
 
     def entry(name: str) -> Accepted:
-        return cast("Accepted", SimpleNamespace(key=(name, "drive"), trial=name))
+        return cast("Accepted", SimpleNamespace(effect=EFFECTS[name], trial=name))
 
     chosen = entry("input_delay")
     monkeypatch.setattr(overlooked, "choose", lambda trials, _: chosen if "input_delay" in trials else None)

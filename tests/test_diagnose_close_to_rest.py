@@ -8,8 +8,9 @@ import pytest
 import vpm
 from shared_cases import shared_case
 from vpm.discrepancy.own_run import as_it_is, misfit
-from vpm.discrepancy.sticking import CLOSE_TO_REST
 from vpm.simulate import Setup
+
+CLOSE_TO_REST = "stribeck_friction"
 
 
 def test_what_a_balance_hardly_sees_is_told_by_runs() -> None:

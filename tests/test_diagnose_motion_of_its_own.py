@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import vpm
+from vpm.catalogue import EFFECTS
 from vpm.discrepancy.candidates import Candidate
 from vpm.discrepancy.confirmation import is_clear
 from vpm.discrepancy.first_step import softened
@@ -125,9 +126,8 @@ def test_what_takes_little_has_to_meet_motions_of_their_own_once(
 
 
 def promise(name: str, drop: float, free: tuple[str, ...] = ("stiffness",)) -> Probe:
-    effect: Any = SimpleNamespace(name=name)
     unused: Any = None
-    return Probe(Candidate(effect, "axis", ()), unused, free, (), (), {}, {}, drop)
+    return Probe(Candidate(EFFECTS[name], "axis", ()), unused, free, (), (), {}, {}, drop)
 
 
 def test_a_link_that_bends_at_its_root_is_the_twin_of_a_drive_that_winds_up() -> None:

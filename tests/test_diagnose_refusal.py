@@ -10,7 +10,9 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
+from vpm.catalogue import EFFECTS
 from vpm.demo import MODEL
+from vpm.discrepancy.candidates import Candidate
 from vpm.discrepancy.confirmation import Trial
 from vpm.discrepancy.refusal import (
     NEGLIGIBLE,
@@ -35,7 +37,7 @@ def gained() -> Gain:
 def trial(value: float) -> Trial:
     """A refitted gain of the demonstration arm's encoder that explains much in every view."""
     model = Model.load(MODEL).with_effect("sensor_gain", at="encoder", value=value)
-    candidate = SimpleNamespace(effect=SimpleNamespace(name="sensor_gain", site="sensor"), site="encoder")
+    candidate = Candidate(EFFECTS["sensor_gain"], "encoder", ({},))
     judged = SimpleNamespace(model=model, bounds={})
     return cast(
         "Trial",
@@ -98,9 +100,7 @@ def test_a_hysteresis_within_two_samples_is_dry_friction_unless_that_is_fitted_b
     name = "shoulder.hysteresis.displacement"
     one = trial(1.1)
     held = {
-        "probe": SimpleNamespace(
-            candidate=SimpleNamespace(effect=SimpleNamespace(name="hysteresis", site="joint"), site="shoulder")
-        ),
+        "probe": SimpleNamespace(candidate=Candidate(EFFECTS["hysteresis"], "shoulder", ({},))),
         "judged": SimpleNamespace(
             model=model,
             bounds={name: (1e-4, 1.0)},
@@ -167,7 +167,7 @@ def test_a_spring_that_its_damper_holds_back_winds_nothing_up(ratio: float, beli
     plain = Model.load(MODEL)
     damping = 2.0 * ratio * (stiffness * moved(plain, "shoulder")) ** 0.5
     model = plain.with_effect("joint_compliance", at="shoulder", stiffness=stiffness, damping=damping)
-    candidate = SimpleNamespace(effect=SimpleNamespace(name="joint_compliance", site="joint"), site="shoulder")
+    candidate = Candidate(EFFECTS["joint_compliance"], "shoulder", ({},))
     told = {
         "probe": SimpleNamespace(candidate=candidate),
         "judged": SimpleNamespace(model=model, bounds={}),

@@ -13,6 +13,7 @@ import pytest
 import vpm
 from balances import balances
 from shared_cases import shared_case
+from vpm.catalogue import EFFECTS
 from vpm.discrepancy import standing
 from vpm.discrepancy.ambiguity import Rivals
 from vpm.discrepancy.candidates import candidates
@@ -128,11 +129,11 @@ def test_what_is_late_is_chosen_again_beside_effects_that_came_later(
     """An encoder is late, and its drive was blamed while another effect was missing."""
 
     def trial(name: str, site: str) -> SimpleNamespace:
-        candidate = SimpleNamespace(key=(name, site), effect=SimpleNamespace(name=name))
+        candidate = SimpleNamespace(key=(name, site), effect=EFFECTS[name])
         return SimpleNamespace(probe=SimpleNamespace(candidate=candidate))
 
     def entry(name: str, site: str) -> SimpleNamespace:
-        return SimpleNamespace(key=(name, site), trial=trial(name, site))
+        return SimpleNamespace(key=(name, site), effect=EFFECTS[name], trial=trial(name, site))
 
     delay, ripple = entry("input_delay", "first"), entry("torque_ripple", "elbow")
     own, right, other = trial("input_delay", "first"), trial("sensor_delay", "encoder_1"), trial("spring", "elbow")

@@ -15,7 +15,6 @@ from blind import Case
 from shared_cases import shared_case
 from vpm.discrepancy.confirmation import Data, judge
 from vpm.discrepancy.driven import Runs, Verdict, compare_driven, inexact, part
-from vpm.discrepancy.motion_only import LATE
 from vpm.discrepancy.own_run import as_it_is, own_run, spectra, weighted
 from vpm.discrepancy.refusal import NEGLIGIBLE
 from vpm.identify import InverseDynamicsProblem, OutputErrorProblem
@@ -23,6 +22,9 @@ from vpm.model import Model
 from vpm.simulate import Setup
 
 Array = NDArray[np.float64]
+
+#: A lag, and the delays that it may be taken for.
+LATE = ("actuator_lag", "input_delay", "sensor_delay")
 
 
 def fitted_late(case: Case) -> tuple[Data, list[vpm.discrepancy.confirmation.Judged]]:

@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 
 import vpm
 from vpm.catalogue import EFFECTS, EffectParameter, EffectType
-from vpm.catalogue.unscreened import UNSCREENED_EFFECTS
 from vpm.discrepancy.view import View
 from vpm.identify import InverseDynamicsProblem
 from vpm.plot.style import BLUE, SOFT, label, panels, styled
@@ -225,7 +224,7 @@ def draw(name: str) -> Figure:
 
 INTRODUCTION = """# The catalogue of effects
 
-<!-- Written by docs/figures/effects.py (make figures) from vpm.catalogue: change it there. -->
+<!-- Written by docs/figures/effects.py (make figures) from vpm.catalogue.effects, a file each: change it there. -->
 
 Every effect that a model file may contain and a diagnosis may name. Each section has the law; its parameters (bounds
 are what physics allows; *slanted* is what shapes a law whose size another parameter gives); what the effect adds to a
@@ -260,7 +259,7 @@ def _section(effect: EffectType) -> list[str]:
         f"{effect.title[0].upper()}{effect.title[1:]}, at {_article(effect.site)}: `{effect.law}`",
         "",
     ]
-    if effect in UNSCREENED_EFFECTS:
+    if not effect.screened and effect.has_law:
         lines += ["A search does not try it; a ranking does.", ""]
     elif not effect.screened:
         lines += ["A diagnosis does not try it, but describes by it what it cannot name.", ""]

@@ -518,7 +518,8 @@ def _transitions(model: Model, data: InverseDynamicsProblem) -> dict[str, tuple[
     found = {}
     for effect in model.effects:
         name = effect.parameter_names.get("transition_velocity")
-        if effect.name == "coulomb_friction" and name is not None and effect.at in data.joints:
+        dry = effect.type.sticks and not effect.type.close_to_rest
+        if dry and name is not None and effect.at in data.joints:
             joint = data.joints.index(effect.at)
             speeds = np.concatenate([np.abs(data.state(record)[1][:, joint]) for record in range(len(data.motions))])
             found[name] = slow_speeds(float(np.quantile(speeds, 0.999)))

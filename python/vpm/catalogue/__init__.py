@@ -1,4 +1,4 @@
-"""The catalogue of physical effects: one table that says everything about each of them.
+"""The catalogue of physical effects: one file says everything about each of them, in `vpm.catalogue.effects`.
 
 An effect is an ordinary component of a model, with a type, a site and parameters. The model file accepts what stands
 here, the diagnosis tries what it marks as screened, and the report speaks in the words that stand here. The laws are
@@ -14,15 +14,10 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from types import MappingProxyType
 
-from vpm.catalogue.elsewhere import ACTUATOR_EFFECTS, BODY_EFFECTS, SENSOR_EFFECTS
-from vpm.catalogue.empirical import EMPIRICAL_EFFECTS
-from vpm.catalogue.hydraulic import CYLINDER_EFFECTS, SUPPLY_EFFECTS
-from vpm.catalogue.joint import JOINT_EFFECTS
+from vpm.catalogue.effects import BUILT_IN
 from vpm.catalogue.kinds import POSITIVE, SITE_KINDS, EffectParameter, EffectType, JointKind, Scale, Side, SiteKind
-from vpm.catalogue.link import LINK_EFFECTS
 from vpm.catalogue.own import entry_of
-from vpm.catalogue.unscreened import UNSCREENED_EFFECTS
-from vpm.catalogue.world import WORLD_EFFECTS
+from vpm.catalogue.signature import ANYWHERE, Signature
 from vpm.errors import ModelError, near_match
 
 __all__ = [
@@ -38,22 +33,12 @@ __all__ = [
     "effect_type",
     "effects_for_site",
     "register",
+    "signature_of",
     "unregister",
+    "without_law",
 ]
 
-_BUILT_IN = (
-    *JOINT_EFFECTS,
-    *BODY_EFFECTS,
-    *LINK_EFFECTS,
-    *WORLD_EFFECTS,
-    *ACTUATOR_EFFECTS,
-    *CYLINDER_EFFECTS,
-    *SUPPLY_EFFECTS,
-    *SENSOR_EFFECTS,
-    *UNSCREENED_EFFECTS,
-    *EMPIRICAL_EFFECTS,
-)
-_ENTRIES = {effect.name: effect for effect in _BUILT_IN}
+_ENTRIES = {effect.name: effect for effect in BUILT_IN}
 #: Every effect by name, in the order in which a page should list them; `register` adds to it.
 EFFECTS: Mapping[str, EffectType] = MappingProxyType(_ENTRIES)
 
@@ -76,6 +61,21 @@ def effect_type(name: str) -> EffectType:
     except KeyError:
         repair = near_match(name, EFFECTS, what="the catalogue has")
         raise ModelError(f'there is no effect "{name}"; {repair}', where=name) from None
+
+
+def signature_of(name: str) -> Signature:
+    """Where an effect shows; anywhere for one that the catalogue does not have any more.
+
+    Parameters
+    ----------
+    name : str
+    """
+    return EFFECTS[name].signature if name in EFFECTS else ANYWHERE
+
+
+def without_law() -> EffectType:
+    """The entry by which a diagnosis describes what it cannot name."""
+    return next(effect for effect in EFFECTS.values() if not effect.has_law)
 
 
 def effects_for_site(kind: str) -> tuple[EffectType, ...]:

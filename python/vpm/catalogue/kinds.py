@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 from vpm.catalogue.formula import Formula
-from vpm.catalogue.signature import Signature, signature_of
+from vpm.catalogue.signature import ANYWHERE, Signature
+from vpm.catalogue.traits import Traits
 from vpm.errors import ModelError, near_match
 
 #: A cylinder is a hydraulic actuator with its valve, named as it.
@@ -132,8 +133,8 @@ class EffectParameter:
 
 
 @dataclass(frozen=True, kw_only=True)
-class EffectType:
-    """One physical effect.
+class EffectType(Traits):
+    """One physical effect: its words and numbers, and its traits.
 
     Attributes
     ----------
@@ -152,29 +153,10 @@ class EffectType:
         What a value outside the physical range would mean.
     confused_with : mapping of str to str
         Effects that records may not tell from this one, and what tells them apart.
-    requires : str or None
-        Effect that has to be at the same site before this one is worth looking for: it is a correction of that one.
-    screened : bool
-        Whether a search tries it; a ranking tries all that have a law.
-    shows : Signature or None
-        Where it shows, for an entry without a row in `vpm.catalogue.signature`.
+    signature : Signature
+        Where it shows: the state that its picture is drawn over, and what is to be seen there.
     formula : Formula or None
         Law of an entry that a user wrote, see `vpm.catalogue.register`.
-    motor_side_alone : bool
-        Whether, at a joint with a compliance or backlash, it belongs to the motor side or to the spring itself.
-    link_side_alone : bool
-        Whether the link alone has it, and never the shaft of a transmission: links run into ends and hang on springs.
-    memory : str
-        What the memory of its law, a state of the machine, is called at its site; "" if it has none.
-    contains : tuple of str
-        Plainer effects that it is at some values of its parameters.
-    exact : bool
-        Whether mechanics alone gives its law, so that no machine differs from it by its shape.
-    takes_effort : bool
-        Whether it does nothing at a joint on which no actuator acts itself.
-    beside_others : bool
-        Whether a diagnosis looks for it at an actuator on a line or on a joint with other ones alone: elsewhere it is
-        what an effect of the joint is.
     """
 
     name: str
@@ -185,17 +167,8 @@ class EffectType:
     sentence: str
     impossible: str
     confused_with: Mapping[str, str]
-    requires: str | None = None
-    screened: bool = True
-    shows: Signature | None = None
+    signature: Signature = ANYWHERE
     formula: Formula | None = None
-    motor_side_alone: bool = False
-    link_side_alone: bool = False
-    memory: str = ""
-    contains: tuple[str, ...] = ()
-    exact: bool = False
-    takes_effort: bool = False
-    beside_others: bool = False
 
     @property
     def has_law(self) -> bool:
@@ -213,19 +186,9 @@ class EffectType:
         return any(parameter.name == "transition_velocity" for parameter in self.parameters)
 
     @property
-    def has_play(self) -> bool:
-        """Whether there is a gap within which its sides move without each other."""
-        return any(parameter.name == "gap" for parameter in self.parameters)
-
-    @property
     def adds_inertia(self) -> bool:
         """Whether a mass or an inertia is among its parameters."""
         return any(parameter.scale in {"mass", "inertia"} for parameter in self.parameters)
-
-    @property
-    def signature(self) -> Signature:
-        """Where it shows: the state that its picture is drawn over, and what is to be seen there."""
-        return self.shows or signature_of(self.name)
 
     @property
     def title(self) -> str:

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from vpm.demo.hidden import HIDDEN
+from vpm.demo.hidden import DEFAULT, HIDDEN
 from vpm.demo.machine import SAMPLE_TIME, Machine, State, advance
 
 SEED = 20
@@ -180,7 +180,7 @@ def truth(hidden: str) -> str:
     return "\n".join(lines) + "\n"
 
 
-def generate(folder: Path, hidden: str = "coulomb_friction", seed: int = SEED) -> None:
+def generate(folder: Path, hidden: str = DEFAULT, seed: int = SEED) -> None:
     """Write the demo's files: ``train.csv``, ``validation.csv``, ``truth.toml`` and a copy of ``model.toml``.
 
     Parameters
@@ -216,7 +216,7 @@ def main() -> None:
     """Read the command line and write the files."""
     parser = argparse.ArgumentParser(description="Make a log of a machine with a hidden effect.")
     parser.add_argument("--out", type=Path, default=Path(__file__).parent, help="folder to write to")
-    parser.add_argument("--hidden", choices=sorted(HIDDEN), default="coulomb_friction", help="the hidden effect")
+    parser.add_argument("--hidden", choices=sorted(HIDDEN), default=DEFAULT, help="the hidden effect")
     parser.add_argument("--seed", type=int, default=SEED, help="seed of the encoder noise")
     arguments = parser.parse_args()
     generate(arguments.out, arguments.hidden, arguments.seed)

@@ -12,7 +12,6 @@ from vpm.discrepancy.confirmation import Data, Judged, Trial, confirm, judge
 from vpm.discrepancy.diagnosis import Ambiguity
 from vpm.discrepancy.finer import seen_beside
 from vpm.discrepancy.refusal import LEAST_GAIN
-from vpm.discrepancy.round import HEAVY
 from vpm.discrepancy.screening import Probe, impossible_values, probe, refit_effort, screening_effort
 from vpm.discrepancy.search import Tried
 from vpm.discrepancy.side_by_side import Failure, SideBySide
@@ -167,7 +166,7 @@ def _others(without: Judged, data: Data, entry: Accepted, effects: Sequence[str]
 
 def _could_do(model: Model, entry: Accepted, candidate: Candidate) -> bool:
     """Whether a candidate acts near an effect; where links bend, a spring more would not have been tried beside it."""
-    heavier = candidate.effect.name in HEAVY and entry.key[0] not in HEAVY
+    heavier = bool(candidate.effect.motion) and not entry.effect.motion
     return _near(candidate, entry) and not (heavier and bends(model))
 
 

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vpm.catalogue import EFFECTS, EffectType
+from vpm.catalogue.shared import SLOW
+from vpm.catalogue.traits import Seen
 from vpm.discrepancy.limit import seen_limit
 from vpm.discrepancy.structural import (
-    STRUCTURAL,
     beyond,
     logged_swing,
     sites_worth_trying,
@@ -28,20 +31,8 @@ Array = NDArray[np.float64]
 #: Name of an effect and where it sits.
 Key = tuple[str, str]
 
-#: Transition and Stribeck velocities tried, as shares of the largest speed in the data.
-TRANSITION_SHARES = (0.002, 0.01, 0.04)
-STRIBECK_SHARES = (0.015, 0.05, 0.15)
-#: Beyond this share of the largest speed it is no excess close to rest any more.
-HIGHEST_STRIBECK = 0.3
-#: Lags tried, in sampling intervals, and saturation limits, as shares of the largest command.
-LAG_INTERVALS = (1.0, 4.0, 16.0)
-LIMIT_SHARES = (0.95, 0.7, 0.4)
-#: Ways over which a hysteresis turns round that are tried, as shares of the travel.
-PRESLIDING_SHARES = (0.004, 0.02, 0.1)
-#: Times tried in which hoses and filters lose their pressure, s.
-DROP_TIMES = (0.01, 0.05, 0.2)
-#: Times after which a machine is warm, as shares of the longest record.
-WARMING_SHARES = (0.1, 0.4)
+#: Short name of the speed at which a friction law bends; where it is fixed, it is that of the dry friction beside.
+TRANSITION = "transition_velocity"
 #: Number of ripple periods proposed by the periodogram.
 PERIODS = 3
 
@@ -84,7 +75,7 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Excitation:
-    """How far the data move one joint or actuator, and the number of that among the inputs."""
+    """How far the data move one joint or actuator, the number of that among the inputs, and the longest record."""
 
     speed: float
     middle: float
@@ -92,6 +83,21 @@ class Excitation:
     interval: float
     command: float
     input: int
+    record: float
+
+    def multiple(self, of: Seen, share: float) -> float:
+        """A share of what the data show."""
+        if of == "way":
+            return self.middle + share * self.travel
+        scales: dict[Seen, float] = {
+            "speed": self.speed,
+            "travel": self.travel,
+            "interval": self.interval,
+            "command": self.command,
+            "record": self.record,
+            "one": 1.0,
+        }
+        return share * scales[of]
 
 
 def asked_for(effects: Sequence[str] | None) -> tuple[str, ...]:
@@ -168,48 +174,47 @@ def _absent(model: Model, effects: Sequence[str] | None) -> list[tuple[EffectTyp
 
 
 def _candidate(effect: EffectType, site: str, model: Model, data: InverseDynamicsProblem, residual: Array) -> Candidate:
-    joint = joint_at(model, site) or model.joints[0]
     seen = _excitation(data, model, site, site if effect.site in {"actuator", "cylinder"} else None)
-    if effect.name in STRUCTURAL:
-        found = structural_starts(effect.name, site, model, seen.travel, logged_swing(data, model, site))
-        fixed = ("damping", "width") if effect.name == "backlash" else ()
-        return Candidate(effect, site, *found, fixed, neutral=False)
-    if effect.name == "end_stop":
+    if effect.motion:
+        found = structural_starts(effect, site, model, seen.travel, logged_swing(data, model, site))
+        return Candidate(effect, site, *found, effect.fixed, neutral=False)
+    if effect.stops:
         where, _, values = _over_way(data, model, site, residual)
         return Candidate(effect, site, *stop_starts(where, values, seen.middle, seen.travel, softest(model, site)))
-    if effect.name == "coulomb_friction":
-        return Candidate(effect, site, _grid("transition_velocity", TRANSITION_SHARES, seen.speed), _slow(seen))
-    if effect.name == "asymmetric_friction":
-        # What was fitted of the dry friction without it may be far too wide: it makes up for what is missing.
-        velocities = {_known_transition(model, site, seen), slow_speeds(seen.speed)[0]}
-        starts = tuple({"transition_velocity": velocity} for velocity in sorted(velocities, reverse=True))
-        return Candidate(effect, site, starts, _slow(seen), fixed=("transition_velocity",))
-    if effect.name == "stribeck_friction":
-        velocity = _known_transition(model, site, seen)
-        starts = tuple({"stribeck_velocity": s * seen.speed, "transition_velocity": velocity} for s in STRIBECK_SHARES)
-        bounds = {"stribeck_velocity": (2e-3 * seen.speed, HIGHEST_STRIBECK * seen.speed), **_slow(seen)}
-        return Candidate(effect, site, starts, bounds, fixed=("transition_velocity",))
     if any(parameter.name == "period" and not parameter.optional for parameter in effect.parameters):
         return _periodic(effect, site, data, model, residual)
-    if effect.name in {"spring", "cubic_spring"}:
-        return Candidate(effect, site, ({"rest": seen.middle},), {"rest": _around(seen)})
-    if effect.name == "hysteresis":
-        # A way that is passed between two samples cannot be told from dry friction.
-        least = min(seen.speed * seen.interval, 0.5 * seen.travel)
-        starts = tuple({"displacement": max(share * seen.travel, least)} for share in PRESLIDING_SHARES)
-        return Candidate(effect, site, starts, {"displacement": (least, 2.0 * seen.travel), "shape": (0.0, 20.0)})
-    if effect.name == "payload":
+    if effect.site == "body":
         return Candidate(effect, site, _payload_places(model, site))
-    if effect.name in {"actuator_lag", "saturation"}:
-        limited = effect.name == "saturation"
-        guessed = seen_limit(data, joint, seen.input, residual) if limited else None
-        return _in_drive(effect, site, seen, guessed)
-    if effect.name in {"supply_drop", "warming_friction"}:
-        return _fading(effect, site, max(m.dt * len(m.time) for m in data.motions))
-    if effect.name == "entrained_air":
-        # Data hardly show in which way air is compressed.
-        return Candidate(effect, site, ({},), fixed=("exponent", "reference_pressure"))
-    return Candidate(effect, site, ({},))
+    return _tried(effect, site, model, seen, partial(seen_limit, data, residual=residual))
+
+
+def _tried(
+    effect: EffectType, site: str, model: Model, seen: Excitation, limit: Callable[[str, int], float | None]
+) -> Candidate:
+    """With the start values and bounds that the catalogue gives; a ``limit`` of commands is guessed from data too."""
+    # A way that is passed between two samples cannot be told from dry friction.
+    least = min(seen.speed * seen.interval, 0.5 * seen.travel)
+    grids, bounds = list[list[tuple[str, float]]](), dict[str, tuple[float, float]]()
+    for tried in effect.tried:
+        values = [seen.multiple(tried.of, share) for share in tried.shares]
+        low, high = (seen.multiple(tried.of, share) for share in tried.within)
+        if tried.sampled:
+            low, values = max(low, least), [max(value, least) for value in values]
+        if tried.of == "command":
+            guessed = limit(joint_at(model, site) or model.joints[0], seen.input)
+            values += [] if guessed is None else [guessed]
+        bounds[tried.parameter] = low, high
+        if values:
+            grids.append([(tried.parameter, value) for value in values])
+    starts = tuple(dict(start) for start in product(*grids))
+    if TRANSITION in effect.fixed:
+        # What was fitted of the dry friction without it may be far too wide: it makes up for what is missing.
+        velocities = {_known_transition(model, site, seen), *(() if effect.tried else slow_speeds(seen.speed)[:1])}
+        bends = sorted(velocities, reverse=True)
+        starts = tuple({**start, TRANSITION: velocity} for start in starts for velocity in bends)
+        bounds[TRANSITION] = slow_speeds(seen.speed)
+    neutral = all(effect.parameter(name).shape for start in starts for name in start)
+    return Candidate(effect, site, starts, bounds, effect.fixed, neutral)
 
 
 def _periodic(effect: EffectType, site: str, data: InverseDynamicsProblem, model: Model, residual: Array) -> Candidate:
@@ -222,25 +227,6 @@ def _periodic(effect: EffectType, site: str, data: InverseDynamicsProblem, model
     return Candidate(effect, site, tuple({"period": p} for p in periods), bounds)
 
 
-def _in_drive(effect: EffectType, site: str, seen: Excitation, guessed: float | None) -> Candidate:
-    """Lag and limit of a drive, which are never quite without effect; a limit is ``guessed`` from the residual too."""
-    if effect.name == "actuator_lag":
-        name, bounds = "time_constant", (0.02 * seen.interval, np.inf)
-        values = [n * seen.interval for n in LAG_INTERVALS]
-    else:
-        name, bounds = "limit", (0.02 * seen.command, seen.command)
-        values = [share * seen.command for share in LIMIT_SHARES] + ([] if guessed is None else [guessed])
-    return Candidate(effect, site, tuple({name: value} for value in values), {name: bounds}, neutral=False)
-
-
-def _fading(effect: EffectType, site: str, longest: float) -> Candidate:
-    """What comes or goes with a time constant; warmth that outlasts the ``longest`` record, s, is no change."""
-    if effect.name == "warming_friction":
-        bounds = {"time_constant": (0.01 * longest, longest)}
-        return Candidate(effect, site, _grid("time_constant", WARMING_SHARES, longest), bounds)
-    return Candidate(effect, site, _grid("time_constant", DROP_TIMES, 1.0), {"time_constant": (1e-3, 5.0)})
-
-
 def _payload_places(model: Model, body: str) -> tuple[Mapping[str, float], ...]:
     """At the origin of the body, at its centre of mass, and twice as far out."""
     if body in model.beams:  # in the frame of its tip
@@ -250,21 +236,9 @@ def _payload_places(model: Model, body: str) -> tuple[Mapping[str, float], ...]:
     return tuple({axis: factor * value for axis, value in centre.items()} for factor in factors)
 
 
-def _grid(name: str, shares: Sequence[float], size: float) -> tuple[Mapping[str, float], ...]:
-    return tuple({name: share * size} for share in shares)
-
-
-def _slow(seen: Excitation) -> dict[str, tuple[float, float]]:
-    return {"transition_velocity": slow_speeds(seen.speed)}
-
-
 def slow_speeds(fastest: float) -> tuple[float, float]:
     """Bounds of a transition velocity, a detail of small speeds: between 1/5000 and 1/10 of the largest."""
-    return 2e-4 * fastest, 0.1 * fastest
-
-
-def _around(seen: Excitation) -> tuple[float, float]:
-    return seen.middle - 10.0 * seen.travel, seen.middle + 10.0 * seen.travel
+    return SLOW[0] * fastest, SLOW[1] * fastest
 
 
 def _known_transition(model: Model, site: str, seen: Excitation) -> float:
@@ -312,6 +286,7 @@ def _excitation(data: InverseDynamicsProblem, model: Model, site: str, actuator:
         min(m.dt for m in data.motions),
         max(command, 1e-12),
         column,
+        max(m.dt * len(m.time) for m in data.motions),
     )
 
 

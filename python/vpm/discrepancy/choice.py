@@ -7,19 +7,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vpm.catalogue import EFFECTS
+from vpm.catalogue import EFFECTS, EffectType
 from vpm.catalogue.kinds import Side
+from vpm.catalogue.traits import Late
 from vpm.discrepancy.candidates import Candidate, Key
 from vpm.discrepancy.confirmation import Data, Trial
 from vpm.discrepancy.driven import ODDS, Runs, compare_driven
-from vpm.discrepancy.motion_only import LATE_OR_SLOW
 from vpm.discrepancy.own_reading import read_by_itself
 from vpm.discrepancy.refusal import LEAST_GAIN
 from vpm.discrepancy.structural import coupled
 from vpm.identify import Gain
 
-#: What comes late; each of the others of its kind is slow and looks late.
-DELAYS = ("input_delay", "sensor_delay")
+#: What comes late, and what is slow and looks late.
+KINDS: tuple[Late, ...] = ("delay", "lag", "spool")
 #: An instrument is blamed for what the machine may have done only if it leaves less than this share of the gap.
 SENSOR_SHARE = 0.25
 #: What leaves up to so many times as much as the best explains the data as well, if it is also little of the whole gap.
@@ -50,6 +50,11 @@ class Accepted:
         return self.trial.probe.candidate.key
 
     @property
+    def effect(self) -> EffectType:
+        """Entry of the catalogue."""
+        return self.trial.probe.candidate.effect
+
+    @property
     def label(self) -> str:
         """``effect at site``."""
         return self.trial.probe.candidate.label
@@ -78,24 +83,23 @@ def _late_or_slow(chosen: Trial, believed: Sequence[Trial], data: Data) -> Trial
 
     A delay shifts in time; a lag does so too and weakens what is fast, which has to be seen.
     """
-    if _name(chosen) not in LATE_OR_SLOW:
+    if not _late(chosen):
         return chosen
     alike = [t for t in believed if _left(t) <= SAME * _left(chosen)]
-    slow = [(name,) for name in LATE_OR_SLOW if name not in DELAYS]
-    kinds = [[t for t in alike if _name(t) in kind] for kind in (DELAYS, *slow)]
+    kinds = [[t for t in alike if _late(t) == kind] for kind in KINDS]
     rest = [min(kind, key=_evidence) for kind in kinds if kind]
     best, runs = rest.pop(0), Runs(data)
     for rival in rest:
         told = compare_driven(rival.judged, best.judged, data, runs)
         if told is None:
             return chosen
-        if told.prefers_first(ODDS if _name(best) in DELAYS else 1.0):
+        if told.prefers_first(ODDS if _late(best) == "delay" else 1.0):
             best = rival
     return best
 
 
-def _name(trial: Trial) -> str:
-    return trial.probe.candidate.effect.name
+def _late(trial: Trial) -> Late:
+    return trial.probe.candidate.effect.late
 
 
 def _first_named(equals: Sequence[Trial]) -> Trial:

@@ -49,8 +49,6 @@ FEW_EVALUATIONS = 6
 SLOW_GAIN, SLOW_EVALUATIONS = 0.01, 10
 #: Of two candidates, one that leaves so many times what the other leaves is not the one that comes in.
 HOPELESS = 10.0
-#: Dotted name, behind the site, of the width of a play; a joint that winds up first looks like one that sticks.
-PLAY, WOUND_UP = ".backlash.gap", "joint_compliance"
 
 
 @dataclass(frozen=True)
@@ -386,7 +384,7 @@ def _slow_gain(current: Judged, unseen: Array, data: InverseDynamicsProblem) -> 
 
 def _timed(current: Judged, judged: Judged, data: Data, probe: Probe) -> tuple[Timed | None, OwnRun | None]:
     """A late drive or instrument on a machine with dry friction, timed in motion, and the run that timed it if any."""
-    if not is_late(probe.candidate.effect.name, current.model) or has_tangent(probe.model, data.training):
+    if not is_late(probe.candidate.effect, current.model) or has_tangent(probe.model, data.training):
         return None, None
     before, late = (current.model, current.free), (judged.model, judged.free)
     return timed_alone(before, late, data.training, data.unseen, data.simulation, judged.bounds)
@@ -406,7 +404,7 @@ def _away_gain(current: Judged, judged: Judged, data: InverseDynamicsProblem, pr
     Where a joint with dry friction turns round it sticks for a while, which no smooth law follows, and a late drive or
     sensor imitates that, or a spring in the joint that winds up meanwhile; elsewhere they cannot.
     """
-    imitates = probe.candidate.effect.site in {"actuator", "sensor"} or probe.candidate.effect.name == WOUND_UP
+    imitates = probe.candidate.effect.site in {"actuator", "sensor"} or probe.candidate.effect.winds_up
     if not is_dry(current.model) or not imitates:
         return None
     counted = np.ones(current.unseen.size)
@@ -482,7 +480,8 @@ def is_clear(judged: Judged, own: tuple[str, ...]) -> bool:
     where there is no size, there is no shape to be uncertain of. The size of a play is its width, however hard its
     contacts are: what is as hard as rigid has a stiffness that no data bound from above.
     """
-    size = [n for n in own if n.endswith(PLAY)]
+    widths = {effect.parameter_names["gap"] for effect in judged.model.effects if effect.type.has_play}
+    size = [n for n in own if n in widths]
     size = size or [n for n in own if judged.model.parameters[n].kind == "linear"] or list(own)
     shape = [judged.free.index(name) for name in own if name not in size]
     index = [judged.free.index(name) for name in size]

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.linalg import block_diag
 
+from vpm.catalogue import without_law
 from vpm.catalogue.empirical import TERMS
 from vpm.discrepancy.confirmation import Data, Judged, judge
 from vpm.discrepancy.dependence import Rhythm, Shares, busiest_joint, rhythm, shares
@@ -252,7 +253,7 @@ def _depends(states: Shares) -> str:
 def _say(channel: str, states: Shares, text: str, ratio: float) -> str:
     return (
         f"Of the residual of {channel}: {_depends(states)}. A fit, which is no physics, brings it down to "
-        f"{100 * ratio:.0f} % on unseen data and stands in the repaired model as empirical_force: {text}."
+        f"{100 * ratio:.0f} % on unseen data and stands in the repaired model as {without_law().name}: {text}."
     )
 
 

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from vpm.catalogue import without_law
 from vpm.catalogue.empirical import TERMS
 from vpm.discrepancy.confirmation import Data, Judged
 from vpm.discrepancy.periods import harmonic_periods
@@ -61,7 +62,7 @@ class Formula:
     def add_to(self, model: Model) -> Model:
         """The model with these terms at zero size."""
         for joint, terms in self.terms.items():
-            model = model.with_effect("empirical_force", at=joint, **self.shapes[joint], **dict.fromkeys(terms, 0.0))
+            model = model.with_effect(without_law().name, at=joint, **self.shapes[joint], **dict.fromkeys(terms, 0.0))
         return model
 
 
@@ -210,6 +211,6 @@ def _columns(
     base: Judged, data: InverseDynamicsProblem, joint: str, shapes: Mapping[str, float], terms: Sequence[str]
 ) -> Array:
     """Derivatives of the residual by coefficients, at zero size."""
-    model = base.model.with_effect("empirical_force", at=joint, **shapes, **dict.fromkeys(terms, 0.0))
+    model = base.model.with_effect(without_law().name, at=joint, **shapes, **dict.fromkeys(terms, 0.0))
     _, columns = data.evaluate(model, model.theta, [model.index(f"{joint}.empirical.{term}") for term in terms])
     return columns

@@ -16,19 +16,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d
 
+from vpm.catalogue import EffectType
 from vpm.identify import Gain, InverseDynamicsProblem, estimate, gain, segments
 from vpm.identify.identifiability import column_lengths
 from vpm.model import Model
 
 Array = NDArray[np.float64]
 
-#: Effects under which a joint can stick, and the share of its largest speed below which it may.
-DRY = ("coulomb_friction", "stribeck_friction", "hysteresis")
+#: Share of its largest speed below which a joint may stick.
 CREEPING = 0.05
-#: A lag, and the delays that it may be taken for.
-LATE = ("actuator_lag", "input_delay", "sensor_delay")
-#: The same of the command, with the spool that is slow to follow it.
-LATE_OR_SLOW = (*LATE, "valve_dynamics")
 #: Samples in clear motion that a fit needs, for each fitted number.
 FEWEST = 10
 #: A parameter that shows less of itself in motion than this share of its regressor's power stays as it is.
@@ -71,12 +67,12 @@ class Timed:
 
 def is_dry(model: Model) -> bool:
     """Whether a joint of a model can stick."""
-    return any(effect.name in DRY for effect in model.effects)
+    return any(effect.type.sticks for effect in model.effects)
 
 
-def is_late(effect: str, model: Model) -> bool:
+def is_late(effect: EffectType, model: Model) -> bool:
     """Whether an effect comes late in a model that can stick, so that it has to be timed where nothing does."""
-    return effect in LATE and is_dry(model)
+    return effect.shifts and is_dry(model)
 
 
 def in_motion(problem: InverseDynamicsProblem) -> Array:

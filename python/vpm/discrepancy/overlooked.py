@@ -16,7 +16,7 @@ from vpm.catalogue import EFFECTS
 from vpm.discrepancy.choice import Accepted, choose
 from vpm.discrepancy.confirmation import Data, Trial, confirm, judge
 from vpm.discrepancy.elimination import Stage
-from vpm.discrepancy.motion_only import LATE_OR_SLOW, WITHIN
+from vpm.discrepancy.motion_only import WITHIN
 from vpm.discrepancy.own_run import OwnRun, misfit
 from vpm.discrepancy.refusal import WORTH_A_NAME, Thresholds, impossible_trial
 from vpm.discrepancy.runs import WORTH_A_FIT, Told, compared, criterion, first_run, fitted_run
@@ -24,13 +24,10 @@ from vpm.discrepancy.screening import Probe, impossible_values
 from vpm.discrepancy.search import Search
 from vpm.discrepancy.short_list import same_models
 from vpm.discrepancy.side_by_side import SideBySide
-from vpm.discrepancy.structural import in_series
 from vpm.errors import VpmError
 
 #: Effects that are asked for, of those that take most of the training residual.
 ASKED = 3
-#: What falls into chaos in runs.
-PLAY = "backlash"
 #: So many of those that promise most in their runs are fitted.
 FITTED = 2
 
@@ -70,7 +67,7 @@ def overlooked(found: Search, data: Data, each: SideBySide) -> Search:
 
 def _best(more: Sequence[Accepted], data: Data) -> Accepted:
     """The first, or the one of those that come late or slow as it does that is chosen among such."""
-    late = [entry for entry in more if entry.key[0] in LATE_OR_SLOW]
+    late = [entry for entry in more if entry.effect.late]
     if len(late) < 2 or more[0] is not late[0]:
         return more[0]
     return choose([entry.trial for entry in late], data)
@@ -83,7 +80,8 @@ def _promising(found: Search) -> list[Probe]:
     """
     present = {entry.key for entry in found.accepted} | found.gone
     refused = [p for p in found.over.probes if p.candidate.key not in present]
-    springs = sorted((p for p in refused if _is_spring(p)), key=lambda p: list(EFFECTS).index(p.candidate.effect.name))
+    springs = [p for p in refused if p.candidate.effect.elastic]
+    springs.sort(key=lambda p: list(EFFECTS).index(p.candidate.effect.name))
     twins = same_models(springs)
     springs = [p for p in springs if p.candidate.key not in twins]
     shares = {p.candidate.key: _taken(p, found.over.trials) for p in refused}
@@ -92,13 +90,8 @@ def _promising(found: Search) -> list[Probe]:
 
 
 def _possible(probe: Probe) -> bool:
-    elsewhere = _is_spring(probe) or probe.candidate.effect.name == PLAY
-    return bool(probe.free) and not impossible_values(probe) and not elsewhere
-
-
-def _is_spring(probe: Probe) -> bool:
-    name = probe.candidate.effect.name
-    return name != PLAY and bool(in_series(name))
+    # Springs are asked for with all others of their kind, and a play falls into chaos in runs.
+    return bool(probe.free) and not impossible_values(probe) and not probe.candidate.effect.motion
 
 
 def _taken(probe: Probe, tried: Sequence[Trial]) -> float:
@@ -113,7 +106,7 @@ def _taken(probe: Probe, tried: Sequence[Trial]) -> float:
 
 def _run(found: Search, data: Data, before: OwnRun, probe: Probe) -> _Asked | str:
     """The run of a model with one effect more, as it was fitted to the balance; or why there is none."""
-    if _is_spring(probe):
+    if probe.candidate.effect.elastic:
         run = _sprung(found, data, before, probe)
         return "no run with it does better" if run is None else _Asked(probe, None, run)
     known = (trial for trial in found.over.trials if trial.probe is probe)

@@ -64,7 +64,7 @@ class _Look:
 def is_read_off(model: Model, data: InverseDynamicsProblem, candidate: Candidate) -> bool:
     """Whether a candidate is a play that the measured motion shows: between ideal drives and links that do not bend."""
     measured = candidate.site in data.motions[0].joints
-    return candidate.effect.name == "backlash" and measured and not (bends(model) or has_own_drives(model))
+    return candidate.effect.has_play and measured and not (bends(model) or has_own_drives(model))
 
 
 def believed(model: Model, nominal: Model, free: Sequence[str]) -> Model:
@@ -83,7 +83,8 @@ def believed(model: Model, nominal: Model, free: Sequence[str]) -> Model:
 
 def only_winds_up(model: Model, site: str, data: InverseDynamicsProblem) -> str:
     """Why a fitted play is none, or "": under the effort its contacts give way further than the link flies."""
-    gap, stiffness = (model.parameters[f"{site}.backlash.{name}"] for name in ("gap", "stiffness"))
+    play = next(effect.parameter_names for effect in model.effects if effect.type.has_play and effect.at == site)
+    gap, stiffness = (model.parameters[play[name]] for name in ("gap", "stiffness"))
     if site not in data.joints:
         return ""
     effort = max(data.efforts(record)[data.joints.index(site)].scale for record in range(len(data.motions)))
@@ -138,13 +139,16 @@ class _Search:
         self.residual, self.power = residual, float(self._left(residual))
 
     def __call__(self, gap: float, frequency: float, damping: float) -> _Look:
-        model = self.model.with_effect("backlash", at=self.candidate.site, **self.values(gap, frequency, damping))
+        model = self._with(self.values(gap, frequency, damping))
         try:
             residual, _ = self.data.evaluate(model, model.theta)
         except DivergedError:
             return _Look(gap, frequency, damping, math.inf)
         left = float(self._left(residual))
         return _Look(gap, frequency, damping, left if math.isfinite(left) else math.inf)
+
+    def _with(self, values: Mapping[str, float]) -> Model:
+        return self.model.with_effect(self.candidate.effect.name, at=self.candidate.site, **values)
 
     def best(self, so_far: _Look, tried: Sequence[_Look]) -> _Look:
         """What leaves least of those and the one before."""
@@ -180,7 +184,7 @@ class _Search:
         contacts = sorted({self.slowed(frequency) for frequency in SURVEYED})
         widths, frequencies = (each.ravel() for each in np.meshgrid(SHARES * self.travel, contacts))
         start = self.values(float(widths[0]), contacts[0], SURVEYED_DAMPING)
-        model = self.model.with_effect("backlash", at=self.candidate.site, **start)
+        model = self._with(start)
         dampings = np.full_like(widths, SURVEYED_DAMPING)
         left = self._left(
             self.residual[:, None] + flights(model, self.candidate.site, self.data, widths, frequencies, dampings)

@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 from scipy.special import stdtrit
 
 from vpm.discrepancy.confirmation import Trial
-from vpm.discrepancy.motion_only import LATE_OR_SLOW
 from vpm.discrepancy.screening import Probe, impossible_values
 from vpm.discrepancy.structural import coupled, moved
 from vpm.identify import Gain
@@ -38,8 +37,8 @@ NEGLIGIBLE = 0.005
 MAGNIFIED = 4.0
 #: One-sided 95 % quantile of the normal distribution: a simulation that is worse by less is worse by chance.
 NORMAL_95_ONE_SIDED = 1.6448536269514722
-#: A spring in series, and from which damping ratio on it is none.
-WINDS_UP, CREEPS = "joint_compliance", 5.0
+#: Damping ratio from which on a spring in series is none.
+CREEPS = 5.0
 #: Samples that what builds up over a way has to last, to be seen to build up.
 SAMPLED = 2.0
 #: Drop of the training mean square below which a candidate is not refitted at all.
@@ -135,7 +134,7 @@ def explains_most(trial: Trial) -> bool:
     Where there are peers on its clock, a shift of all commands tells what is physics.
     """
     candidate = trial.probe.candidate
-    late = candidate.effect.name in LATE_OR_SLOW and not has_peers(trial.judged.model, candidate.site)
+    late = bool(candidate.effect.late) and not has_peers(trial.judged.model, candidate.site)
     return late and trial.unseen.relative >= MOST_OF_IT
 
 
@@ -207,9 +206,10 @@ def _no_way(trial: Trial) -> str:
     slowly, and take many samples for a way that they pass in one at full speed.
     """
     candidate, bounds = trial.probe.candidate, trial.judged.bounds
-    if candidate.effect.name != "hysteresis":
+    way = next((tried.parameter for tried in candidate.effect.tried if tried.sampled), None)
+    if way is None:
         return ""
-    name = f"{candidate.site}.hysteresis.displacement"
+    name = trial.judged.model.effect(*candidate.key).parameter_names[way]
     parameter = trial.judged.model.parameters[name]
     least = bounds[name][0]
     fit = trial.judged.fit
@@ -227,11 +227,10 @@ def _no_way(trial: Trial) -> str:
 def _creeps(trial: Trial) -> str:
     """A spring in series that its damper holds back does not wind up: it slips as a fluid coupling does."""
     candidate, model = trial.probe.candidate, trial.judged.model
-    if candidate.effect.name != WINDS_UP:
+    if not candidate.effect.winds_up:
         return ""
-    stiffness, damping = (
-        model.parameters[f"{candidate.site}.compliance.{name}"].value for name in ("stiffness", "damping")
-    )
+    names = model.effect(*candidate.key).parameter_names
+    stiffness, damping = (model.parameters[names[name]].value for name in ("stiffness", "damping"))
     ratio = damping / (2.0 * math.sqrt(max(stiffness, 1e-300) * moved(trial.judged.model, candidate.site)))
     if ratio <= CREEPS:
         return ""
@@ -246,7 +245,7 @@ def _trifling_gain(trial: Trial) -> str:
 
     A gain scales whatever else of its signal the model has not quite right, and imitates some of it.
     """
-    if trial.probe.candidate.effect.name != "sensor_gain":
+    if not trial.probe.candidate.effect.scales:
         return ""
     name, drop = trial.parameters[0], trial.unseen.relative
     value = trial.judged.model.parameters[name].value
@@ -266,7 +265,7 @@ def _trifling_size(trial: Trial) -> str:
     Where an effort is the small difference of large readings, as of the pressures on both sides of a piston, a gain
     that is hardly wrong leaves a gap that is not small: one that explains most of such a gap is believed.
     """
-    if trial.probe.candidate.effect.name != "sensor_gain":
+    if not trial.probe.candidate.effect.scales:
         return ""
     name = trial.parameters[0]
     value = trial.judged.model.parameters[name].value

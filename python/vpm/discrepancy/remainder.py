@@ -17,7 +17,6 @@ from vpm.discrepancy.band import below, motion_band
 from vpm.discrepancy.confirmation import Data, Judged
 from vpm.discrepancy.diagnosis import Empirical
 from vpm.discrepancy.empirical import describe
-from vpm.discrepancy.motion_only import LATE
 from vpm.discrepancy.refusal import WORTH_A_NAME, Thresholds
 from vpm.discrepancy.seals import Seals, seals
 from vpm.discrepancy.timing import in_time
@@ -114,7 +113,7 @@ def _described(base: Judged, data: Data) -> Described:
 def _before(recalibrated: Judged, final: Judged, data: Data) -> Array:
     """What the recalibrated model leaves, less a shift within the sampling interval unless that is what was named."""
     known = {effect.key for effect in recalibrated.model.effects}
-    late = any(effect.name in LATE and effect.key not in known for effect in final.model.effects)
+    late = any(effect.type.shifts and effect.key not in known for effect in final.model.effects)
     return recalibrated.unseen if late else in_time(recalibrated, data).unseen
 
 

@@ -20,8 +20,6 @@ Array = NDArray[np.float64]
 
 #: Ratio of a residual to the noise in it up to which it is noise alone.
 NOISE_ONLY = 1.2
-#: Effects that only make links ring less.
-DAMPING = ("structural_damping",)
 
 
 def noise_alone(model: Model, data: Data, unseen: Array) -> bool:
@@ -34,8 +32,7 @@ def noise_alone(model: Model, data: Data, unseen: Array) -> bool:
 
 def only_ringing(current: Judged, data: Data, trial: Trial) -> str:
     """Why a trial that would be believed only damps what noise makes ring, or ""."""
-    name = trial.probe.candidate.effect.name
-    if data.simulation is None or not bends(current.model) or name not in DAMPING:
+    if data.simulation is None or not bends(current.model) or not trial.probe.candidate.effect.damps:
         return ""
     before, after = _ringing(current.model, data), _ringing(trial.judged.model, data)
     weights = {block.channel: block.weight**2 for block in data.unseen.blocks}

@@ -8,11 +8,12 @@ from functools import cached_property, partial
 
 import numpy as np
 
+from vpm.catalogue import EFFECTS
 from vpm.discrepancy.candidates import Candidate, Key, candidates, joint_at, left_out
 from vpm.discrepancy.choice import Accepted, choose
 from vpm.discrepancy.confirmation import Data, Judged, Trial, confirm, finished
 from vpm.discrepancy.diagnosis import RankedCandidate
-from vpm.discrepancy.motion_only import LATE_OR_SLOW, in_motion, is_late
+from vpm.discrepancy.motion_only import in_motion, is_late
 from vpm.discrepancy.own_run import OwnRun
 from vpm.discrepancy.play import is_read_off, only_winds_up
 from vpm.discrepancy.refusal import (
@@ -37,8 +38,6 @@ from vpm.identify import gain, segments
 from vpm.identify.along import bends, has_own_drives
 from vpm.identify.tangent import drives_on_tangent
 
-#: Effects that add a motion nobody measures, which has to be simulated for every probe.
-HEAVY = ("joint_compliance", "backlash", "link_flexibility")
 #: Where links bend already, the noise of the measured motion rings in them: a spring more has to promise this share of
 #: the residual, and only the best is refitted.
 RINGING, FEW = 0.2, 1
@@ -67,7 +66,7 @@ class Round:
     def light(self, effects: Sequence[str] | None, without: set[Key]) -> Accepted | None:
         """The best of the candidates whose regressor follows from the measured motion alone."""
         self.screen(effects, without, heavy=False)
-        if self._promising and self._promising[0].candidate.effect.name == "backlash":
+        if self._promising and self._promising[0].candidate.effect.has_play:
             # What winds up passes for play, and has to compete with it.
             light = self._promising
             self.screen(effects, without, heavy=True)
@@ -139,7 +138,7 @@ class Round:
         would: what explains little has to compete with it. Where links bend already, or drives have states, its probes
         take long, and come after all others.
         """
-        tried = any(name in HEAVY[:1] for name, _ in self._ranking)
+        tried = any(EFFECTS[name].winds_up for name, _ in self._ranking)
         return best.trial.there.relative < CLEAR_GAIN and not tried and not self._takes_long()
 
     def _takes_long(self) -> bool:
@@ -182,18 +181,19 @@ class Round:
             self._promising = [one for one in self._promising if one.drop >= RINGING][:FEW]
 
     def _is_heavy(self, candidate: Candidate) -> bool:
-        """Whether it adds a motion that nobody measures; where the log holds that motion, it is evidence like any.
+        """Whether it adds a motion that nobody measures, which has to be simulated for every probe.
 
-        So is the bending of a rigid beam beside others that bend, and a play between links that do not, which its
-        flights tell at once: light effects would only imitate them.
+        Where the log holds that motion, it is evidence like any. So is the bending of a rigid beam beside others that
+        bend, and a play between links that do not, which its flights tell at once: light effects would only imitate
+        them.
         """
-        model, name = self.current.model, candidate.effect.name
-        if bends(model) and name == "link_flexibility" and candidate.site in model.beams:
+        model, motion = self.current.model, candidate.effect.motion
+        if bends(model) and motion == "bending" and candidate.site in model.beams:
             return False
         if is_read_off(model, self.data.training, candidate):
             return False
         logged = {f"{candidate.site}_{suffix}.position" for suffix in ("bending", "deflection")}
-        return name in HEAVY and not logged & set(self.data.training.shown)
+        return bool(motion) and not logged & set(self.data.training.shown)
 
     def confirm(self) -> None:
         """Refit with the most promising ones and judge them on unseen data."""
@@ -205,9 +205,9 @@ class Round:
         believed = {trial.probe.candidate.key for trial in self._believed}
         again = [one for one in short_list if twins.get(one.candidate.key) in believed]
         self._refit(again)
-        if any(name in LATE_OR_SLOW for name, _ in believed):
+        if any(EFFECTS[name].late for name, _ in believed):
             # Which of them it is no promise tells, so that all of its kind compete with it.
-            kin = [one for one in self._promising if one.candidate.effect.name in LATE_OR_SLOW]
+            kin = [one for one in self._promising if one.candidate.effect.late]
             kin = [one for one in kin if one not in short_list]
             self._refit(kin)
             short_list = [*short_list, *kin]
@@ -290,7 +290,7 @@ class Round:
         What sticks is late in a balance of effort, and so imitates it, but not in a run; nor does a run know or mind to
         which of two samples a command was logged.
         """
-        late = is_late(trial.probe.candidate.effect.name, trial.judged.model) and not self._takes_long()
+        late = is_late(trial.probe.candidate.effect, trial.judged.model) and not self._takes_long()
         if not late or refuse_trial(replace(trial, asked=True), thresholds) or self.alone_run is None:
             return False
         return asks_for(self.alone_run, trial, self.data, thresholds)
@@ -308,7 +308,7 @@ class Round:
         before, unseen = self.timed.unseen, told.unseen
         if slow_shows_it(trial, thresholds):
             before, unseen = (slow(self.data.unseen, each) for each in (before, unseen))
-        if is_late(trial.probe.candidate.effect.name, trial.judged.model):
+        if is_late(trial.probe.candidate.effect, trial.judged.model):
             # What sticks is late by itself, with a shift as without: what is late is judged where nothing sticks.
             before, unseen = (in_motion(self.data.unseen) * each for each in (before, unseen))
         timed = gain(before, unseen, segments(self.data.unseen))

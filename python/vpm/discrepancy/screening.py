@@ -155,7 +155,7 @@ def _looked_for(base: Baseline, data: InverseDynamicsProblem, candidate: Candida
 
 def screening_effort(candidate: Candidate) -> float:
     """Guess of the time that `probe` takes, in starts that do nothing: a play is searched by its flights."""
-    searched = 50.0 if candidate.effect.name == "backlash" else 0.0
+    searched = 50.0 if candidate.effect.has_play else 0.0
     return searched + len(candidate.starts) * (1.0 if candidate.neutral else 2.0)
 
 
@@ -233,7 +233,7 @@ def _probe_start(
             estimates[where] = first + (estimates[where] - first) / estimates[size]
             deviations[where] /= abs(estimates[size])
     for name in free:
-        if _short(model, candidate, name) in in_series(candidate.effect.name):
+        if _short(model, candidate, name) in in_series(candidate.effect):
             estimates[name], deviations[name] = softened(
                 model.parameters[name].value, estimates[name], deviations[name]
             )
@@ -263,7 +263,7 @@ def _stepped(
 
 def _losses(model: Model, candidate: Candidate, names: Sequence[str]) -> list[int]:
     """Places of the losses of a spring in series among parameters."""
-    own = set(_added(model, candidate)) if in_series(candidate.effect.name) else set()
+    own = set(_added(model, candidate)) if in_series(candidate.effect) else set()
     return [i for i, name in enumerate(names) if name in own and _short(model, candidate, name) in LOSSES]
 
 

@@ -24,7 +24,8 @@ def same_models(short_list: Sequence[Probe]) -> dict[Key, Key]:
     found: dict[Key, Key] = {}
     for place, one in enumerate(short_list):
         for other in short_list[:place]:
-            heavy = {one.candidate.effect.name, other.candidate.effect.name} == {"joint_compliance", "link_flexibility"}
+            pair = one.candidate.effect, other.candidate.effect
+            heavy = all(effect.elastic for effect in pair) and pair[0].motion != pair[1].motion
             same = len(one.free) == len(other.free) and abs(one.drop - other.drop) <= TWIN * abs(other.drop)
             if heavy and same and other.candidate.key not in found:
                 found[one.candidate.key] = other.candidate.key

@@ -21,7 +21,7 @@ AVERAGED = 0.25
 
 def has_impacts(model: Model) -> bool:
     """Whether links hit their contacts in it, in which single impacts are known less well than their mean."""
-    return any(effect.name == "backlash" for effect in model.effects)
+    return any(effect.type.has_play for effect in model.effects)
 
 
 def slow(problem: InverseDynamicsProblem, residual: Array) -> Array:

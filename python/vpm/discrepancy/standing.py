@@ -18,7 +18,6 @@ from vpm.discrepancy.confirmation import Data, Judged, Trial, confirm, finished,
 from vpm.discrepancy.diagnosis import RefusedEffect
 from vpm.discrepancy.elimination import Stage
 from vpm.discrepancy.finer import contains
-from vpm.discrepancy.motion_only import LATE_OR_SLOW
 from vpm.discrepancy.refusal import LEAST_GAIN, NORMAL_95_ONE_SIDED, Thresholds, refuse_trial
 from vpm.discrepancy.screening import probe
 from vpm.discrepancy.search import Search
@@ -57,7 +56,7 @@ def replaced(found: Search, known: Sequence[Rivals], data: Data) -> tuple[Search
 
 def _preferred(final: Judged, entry: Accepted, trial: Trial, data: Data, thresholds: Thresholds) -> float:
     """Standard deviations by which the unseen data prefer a rival, 0 if not beyond chance or not in every view."""
-    if {trial.probe.candidate.effect.name, entry.key[0]} <= set(LATE_OR_SLOW):
+    if trial.probe.candidate.effect.late and entry.effect.late:
         return 0.0  # their runs along the reference said which, and the balance knows less of it
     if not alike(trial.probe.candidate, entry.trial.probe.candidate) or refuse_trial(trial, thresholds):
         return 0.0
@@ -89,12 +88,12 @@ def timed_again(found: Search, known: Sequence[Rivals], data: Data) -> tuple[Sea
     for place, entry in enumerate(found.accepted):
         without = known[place].without
         chosen_last = found.last is not None and found.last.key == entry.key
-        if entry.key[0] not in LATE_OR_SLOW or len(found.accepted) < 2 or chosen_last or without is None:
+        if not entry.effect.late or len(found.accepted) < 2 or chosen_last or without is None:
             continue
         others = [
             t
             for t in known[place].tried
-            if t.probe.candidate.effect.name in LATE_OR_SLOW
+            if t.probe.candidate.effect.late
             and t.probe.candidate.key not in found.gone
             and not refuse_trial(t, thresholds)
         ]

@@ -28,8 +28,6 @@ from vpm.model import Model
 
 Array = NDArray[np.float64]
 
-#: What acts where a joint lets go; the catalogue asks for the friction that it is an excess of.
-CLOSE_TO_REST = "stribeck_friction"
 #: Share of the change from one run to another from which on records ask for it rather than for none.
 LEAST_ASKED = 0.5
 #: Starts that are fitted to the end, of those that fit best as they are.
@@ -61,7 +59,7 @@ def asks_runs(current: Judged, data: Data, probe: Probe) -> bool:
 
     Links that bend and drives with states take too long for that.
     """
-    if probe.candidate.effect.name != CLOSE_TO_REST or not probe.free or impossible_values(probe):
+    if not probe.candidate.effect.close_to_rest or not probe.free or impossible_values(probe):
         return False
     closed = data.simulation is not None and data.simulation.mode == "closed_loop"
     return closed and not bends(current.model) and not has_own_drives(current.model)
@@ -197,7 +195,7 @@ def _told(current: Judged, trial: Trial, answer: Asked, data: Data) -> Trial:
 def _with_effect(model: Model, candidate: Candidate, values: dict[str, float]) -> Model:
     """A model with friction close to rest, of which the sign changes with the speed as that of its Coulomb friction."""
     transition = model.parameters[f"{candidate.site}.friction.transition_velocity"].value
-    return model.with_effect(CLOSE_TO_REST, at=candidate.site, transition_velocity=transition).with_parameters(values)
+    return model.with_effect(*candidate.key, transition_velocity=transition).with_parameters(values)
 
 
 def _starts(before: OwnRun, trial: Trial) -> list[tuple[float, Model]]:

@@ -15,17 +15,12 @@ from vpm.catalogue import EFFECTS, EffectType
 from vpm.experiment.signal import differentiate
 from vpm.identify import InverseDynamicsProblem
 from vpm.identify.along import has_own_drives
-from vpm.identify.reuse import SPLITTING
 from vpm.model import Model
 from vpm.model.splitting import name_behind
 
 Array = NDArray[np.float64]
 
-#: Effects whose start values are read here.
-STRUCTURAL = frozenset({"joint_compliance", "backlash", "link_flexibility"})
-#: Effects that add coordinates that nobody measures.
-HIDING = STRUCTURAL
-#: Their springs, which lie between motor and link, so that a softer one does more.
+#: Springs in series with a motion of their own, which lie between motor and link, so that a softer one does more.
 SERIES = "stiffness"
 #: What of these springs turns motion into heat, by short names.
 LOSSES = ("damping", "time")
@@ -39,8 +34,6 @@ CONTACT_FREQUENCY = 50.0
 GAP_SHARES = (5e-4, 3e-3, 1.5e-2)
 #: Places of a stop, as shares of the half travel from its middle.
 STOP_SHARES = (0.6, 0.8, 0.95)
-#: Dotted names, behind the site, of the ends of a stop.
-END, OTHER_END = ".end_stop.low", ".end_stop.high"
 #: Places of a stop compared on either side, the largest share of the samples that may lie beyond one, and the fewest.
 STOP_PLACES, BEYOND_MOST, BEYOND_LEAST = 30, 0.3, 3
 
@@ -65,16 +58,17 @@ def sites_worth_trying(effect: EffectType, model: Model) -> tuple[str, ...]:
         moved = {name: set(model.joints_of_actuator(name)) for name in model.actuators}
         shared = {site for site in sites if any(moved[site] & moved[name] for name in moved if name != site)}
         return tuple(site for site in sites if site in shared or model.line_of_actuator(site) is not None)
-    if effect.name == "link_flexibility":
+    if effect.motion == "bending":
         stiff = tuple(site for site in sites if model.levels.get(site, "rigid") == "rigid")
         if not model.core.n_elastic:
             return stiff
         # Beside links that bend, the spring at the root of a body is that of the joint before it, which is tried.
-        wound = set(sites_worth_trying(EFFECTS["joint_compliance"], model))
+        springs = (one for one in EFFECTS.values() if one.winds_up)
+        wound = {site for one in springs for site in sites_worth_trying(one, model)}
         return tuple(site for site in stiff if site in model.beams or model.joint_before(site) not in wound)
-    if effect.name == "structural_damping":
+    if effect.damps:
         return tuple(site for site in sites if model.levels[site] != "rigid")
-    if effect.name in {"backlash", "joint_compliance"}:
+    if effect.splits:
         return tuple(site for site in sites if site in model.driven_joints and not model.joint_behind(site))
     return sites
 
@@ -87,17 +81,17 @@ def beyond(effect: EffectType, site: str, model: Model, measured: Sequence[str],
     is ``simulated``.
     """
     remembering = [f"{entry.type.title} at {entry.at}" for entry in model.effects if entry.type.memory]
-    split_off = {model.joint_behind(entry.at) for entry in model.effects if entry.name in SPLITTING}
+    split_off = {model.joint_behind(entry.at) for entry in model.effects if entry.type.splits}
     alone = tuple(joint for joint in model.joints if joint not in split_off) == tuple(measured)
-    lone = alone and not has_own_drives(model) and not any(entry.name == "rotor_inertia" for entry in model.effects)
+    lone = alone and not has_own_drives(model) and not any(entry.type.rotor for entry in model.effects)
     known = simulated or lone
     if effect.memory and tuple(model.joints) != tuple(measured) and not known:
         return "its memory cannot be balanced beside what moves unseen in this model"
-    if effect.name not in HIDING:
+    if not effect.motion:
         return ""
-    if remembering and not (known and effect.name in SPLITTING):
+    if remembering and not (known and effect.splits):
         return f"what moves unseen cannot be balanced beside the memory of the {remembering[0]}"
-    split = [(entry.name, entry.at) for entry in model.effects if entry.name in HIDING]
+    split = [(entry.name, entry.at) for entry in model.effects if entry.type.motion]
     whole = model
     for key in split:
         whole = whole.without_effect(*key)
@@ -107,9 +101,9 @@ def beyond(effect: EffectType, site: str, model: Model, measured: Sequence[str],
     return ""
 
 
-def in_series(effect: str) -> tuple[str, ...]:
+def in_series(effect: EffectType) -> tuple[str, ...]:
     """Short names of the parameters of an effect that do less the larger they are."""
-    return (SERIES,) if effect in STRUCTURAL else ()
+    return (SERIES,) if effect.motion else ()
 
 
 def coupled(model: Model) -> bool:
@@ -145,13 +139,15 @@ def logged_swing(data: InverseDynamicsProblem, model: Model, site: str) -> tuple
 
 
 def structural_starts(
-    effect: str, site: str, model: Model, travel: float, swing: tuple[float, float] | None = None
+    effect: EffectType, site: str, model: Model, travel: float, swing: tuple[float, float] | None = None
 ) -> tuple[Starts, Bounds]:
     """Start values and bounds by short name.
 
     Parameters
     ----------
-    effect, site : str
+    effect : EffectType
+        With a motion of its own.
+    site : str
     model : Model
     travel : float
         Half range of the joint's travel in the data.
@@ -161,7 +157,7 @@ def structural_starts(
     inertia = moved(model, site)
     held = (softest(model, site), math.inf)
     share = (LEAST_DRIVEN * inertia, math.inf)  # without any inertia before it a spring has nothing to swing against
-    if effect == "backlash":
+    if effect.has_play:
         stiffness = inertia * (2.0 * math.pi * CONTACT_FREQUENCY) ** 2
         damping = 2.0 * CONTACT * math.sqrt(stiffness * inertia)
         common = {"stiffness": stiffness, "damping": damping}
@@ -175,7 +171,7 @@ def structural_starts(
         return tuple({**common, "gap": gap, "width": 0.05 * gap} for gap in gaps), bounds
     stiffnesses = [inertia * (2.0 * math.pi * frequency) ** 2 for frequency in FREQUENCIES]
     known = [(swing[0] * inertia, swing[1] * inertia)] if swing is not None else []
-    if effect == "link_flexibility":
+    if effect.motion == "bending":
         read = tuple({"stiffness": k, "time": c / k} for k, c in known)
         times = [LOOSE / (math.pi * frequency) for frequency in FREQUENCIES]
         return (*read, *({"stiffness": k, "time": t} for k, t in zip(stiffnesses, times, strict=True))), {
@@ -261,9 +257,9 @@ def ends_apart(
 ) -> dict[str, tuple[float, float]]:
     """Bounds that keep both ends of a stop, where both are free, on their sides of its middle."""
     apart = dict(bounds)
-    for low in (name for name in free if name.endswith(END)):
-        high = low.removesuffix(END) + OTHER_END
-        if high not in free:
+    for stop in (effect.parameter_names for effect in model.effects if effect.type.stops):
+        low, high = stop["low"], stop["high"]
+        if low not in free or high not in free:
             continue
         lower, upper = model.parameters[low], model.parameters[high]
         middle = 0.5 * (lower.value + upper.value)

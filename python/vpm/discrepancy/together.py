@@ -11,10 +11,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from vpm.catalogue import EFFECTS
 from vpm.discrepancy.candidates import Key
 from vpm.discrepancy.choice import Accepted, cost
 from vpm.discrepancy.confirmation import Data, Judged, Trial, judge, shrinkage
-from vpm.discrepancy.motion_only import LATE_OR_SLOW
 from vpm.discrepancy.refusal import CLEAR_GAIN, refuse_trial
 from vpm.discrepancy.round import Round
 from vpm.errors import DivergedError
@@ -68,7 +68,8 @@ def together(
     name, site = lead.probe.candidate.key
     judged = _without(partner.trial.judged, (name, site), data)
     # What comes late or slow is told from others of its kind again, with the partner in its place.
-    names = [one for one in (LATE_OR_SLOW if name in LATE_OR_SLOW else (name,)) if effects is None or one in effects]
+    kin = [one for one, entry in EFFECTS.items() if entry.late] if lead.probe.candidate.effect.late else [name]
+    names = [one for one in kin if effects is None or one in effects]
     beside = outcome.after(judged)
     second = beside.light(names, without)
     first = replace(partner.trial, judged=judged)

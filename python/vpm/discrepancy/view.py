@@ -7,8 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from vpm.catalogue import EFFECTS
-from vpm.catalogue.signature import signature_of
+from vpm.catalogue import EFFECTS, signature_of
 from vpm.identify import InverseDynamicsProblem
 from vpm.identify.along import Response, respond
 from vpm.model import Model

@@ -31,7 +31,7 @@ DAMPINGS = (0.1, 0.3)
 def is_looked_for(model: Model, data: InverseDynamicsProblem, candidate: Candidate) -> bool:
     """Whether a candidate winds up between an ideal drive and links that do not bend, where a look takes little."""
     measured = candidate.site in data.motions[0].joints
-    return candidate.effect.name == "joint_compliance" and measured and not (bends(model) or has_own_drives(model))
+    return candidate.effect.winds_up and measured and not (bends(model) or has_own_drives(model))
 
 
 def best_start(

@@ -343,7 +343,7 @@ def _hidden(
     for order, values in enumerate((m.position, m.velocity, m.acceleration)):
         motion[order][:, measured] = values
     method = "linearly_implicit" if has_own_drives(model) else setup.method(model, guided=True)
-    plays = any(effect.name == "backlash" for effect in model.effects)
+    plays = any(effect.type.has_play for effect in model.effects)
     substeps = max(setup.substeps, math.ceil(m.dt / IN_PLAY - 1e-6)) if plays else setup.substeps
     stepping = (m.dt, substeps, method, list(columns), passive, *(hold.arguments(model) if hold else ()))
     outputs, _, jacobian = model.core.simulate_prescribed(theta, motion[0], motion[1], motion[2], *stepping)

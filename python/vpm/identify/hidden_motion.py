@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from vpm.experiment import Motion
 from vpm.identify.drive_answers import picked
 from vpm.identify.drive_memory import DriveMemory
-from vpm.identify.reuse import SPLITTING, Kept, Parts, parts_of, split
+from vpm.identify.reuse import Kept, Parts, parts_of, split
 from vpm.model import Model
 
 Array = NDArray[np.float64]
@@ -62,7 +62,7 @@ def with_hidden(
     parts = parts_of(model, m.joints)
     if parts is None:
         # A joint that winds up has no tangent, but laws on its measured side do not feel that either.
-        parts, origin = split(model, m.joints, SPLITTING), None
+        parts, origin = split(model, m.joints, wound=True), None
     if parts is None:
         outputs, jacobian = bend(model, theta, columns)
     else:

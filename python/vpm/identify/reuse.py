@@ -24,8 +24,6 @@ from vpm.model.effects import Effect
 
 Array = NDArray[np.float64]
 
-#: Effects of joints that add a motion of their own, and those that weigh the acceleration: the tree has them.
-SPLITTING = frozenset({"joint_compliance", "backlash"})
 #: Simulations that are kept for each record: those of one round of a search.
 KEPT = 48
 #: Values that have moved by no more than this share of themselves leave derivatives good enough for a first look: by
@@ -74,26 +72,27 @@ def parts_of(model: Model, joints: tuple[str, ...]) -> Parts | None:
     memory along, and the measured joint, on the side of the motor, is the one that remembers.
     """
     remembers = any(effect.type.memory for effect in model.effects)
-    return split(model, joints, SPLITTING if remembers else frozenset({"backlash"}))
+    return split(model, joints, wound=remembers)
 
 
-def split(model: Model, joints: tuple[str, ...], splits: frozenset[str]) -> Parts | None:
-    """The same where all ``splits``, effects that bring a coordinate of their own, count as plays do."""
-    return _split(Shape(model), joints, splits)
+def split(model: Model, joints: tuple[str, ...], *, wound: bool) -> Parts | None:
+    """The same where joints that are ``wound`` up count as plays do, or do not."""
+    return _split(Shape(model), joints, wound)
 
 
 @lru_cache(maxsize=128)
-def _split(shape: Shape, joints: tuple[str, ...], splits: frozenset[str]) -> Parts | None:
+def _split(shape: Shape, joints: tuple[str, ...], wound: bool) -> Parts | None:
     model = shape.model
-    plays = [e for e in model.effects if e.name in splits and model.joint_behind(e.at)]
+    splitting = [e for e in model.effects if e.type.has_play or (wound and e.type.splits)]
+    plays = [e for e in splitting if model.joint_behind(e.at)]
     flying = {model.joint_behind(e.at) for e in plays}
     if any(e.side == "link" and model.joint_behind(e.at) for e in model.effects):
         return None  # what acts behind a spring moves it
     if tuple(joint for joint in model.joints if joint not in flying) != joints:
         return None
-    if not model.core.n_elastic and (not plays or any(e.name == "rotor_inertia" for e in model.effects)):
+    if not model.core.n_elastic and (not plays or any(e.type.rotor for e in model.effects)):
         return None  # a rotor is what flies against
-    aside = [e for e in model.effects if e.type.site in {"joint", "actuator"} and e.name not in SPLITTING]
+    aside = [e for e in model.effects if e.type.site in {"joint", "actuator"} and not e.type.splits]
     if len(aside) + len(plays) < sum(e.type.site in {"joint", "actuator"} for e in model.effects):
         return None
     content = model.to_dict()
@@ -109,7 +108,7 @@ def _split(shape: Shape, joints: tuple[str, ...], splits: frozenset[str]) -> Par
     read = [effect for effect in model.effects if effect.type.site == "sensor"]
     felt |= {model.index(name) for effect in read for name in effect.parameter_names.values()}
     # With rigid links; a beam that bends by an effect does so at every level.
-    bent = [*plays, *(effect for effect in model.effects if effect.name == "link_flexibility")]
+    bent = [*plays, *(effect for effect in model.effects if effect.type.motion == "bending")]
     rigid = bool(model.core.n_elastic)
     whole, shell = (_without(content, effects, rigid=rigid) for effects in (bent, [*bent, *aside]))
     of_laws, of_shell = (np.array([model.index(n) for n in m.parameter_names], dtype=np.int64) for m in (whole, shell))

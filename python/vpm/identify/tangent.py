@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 TANGENTS, SHARES = 8, (1.0, 0.5, 0.25, 0.125)
 #: The same where a link flies through a play: impacts shift in time, of which a tangent knows little, and the start was
 #: read off the flights.
-FLYING, PLAY = 2, "backlash"
+FLYING = 2
 #: What the tangent may be off by where the fit ends, as a share of the residual: its sum of squares is then within the
 #: square of it of the least one.
 OFF = 0.03
@@ -80,7 +80,7 @@ def estimate_on_tangent(
     residual, _ = data.evaluate(model, model.theta)
     cost, at, columns = float(residual @ residual), model, [model.index(name) for name in free]
     early = False
-    flying = any(effect.name == PLAY for effect in model.effects) and not bends(model)
+    flying = any(effect.type.has_play for effect in model.effects) and not bends(model)
     flying = flying and has_hidden(model, data.motions[0].joints)
     for _ in range(FLYING if flying else TANGENTS):
         rough = estimate(at, Tangent(data, origin), free, bounds=bounds, tolerance=tolerance)

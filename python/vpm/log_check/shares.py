@@ -10,6 +10,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from vpm.catalogue import EFFECTS
 from vpm.experiment import Experiment
 from vpm.log_check.correction import Correction
 from vpm.log_check.settings import Settings
@@ -25,11 +26,11 @@ from vpm.weighing.priors import Prior
 
 Array = NDArray[np.float64]
 #: Friction that a joint may have without being described: nothing of it passes for a mistake of a log.
-FRICTION = ("viscous_friction", "coulomb_friction")
+FRICTION = tuple(name for name, effect in EFFECTS.items() if effect.usual == "friction")
 #: Nor do these pass for a delay. They may hide a sign: where a machine is heavy, a constant force is its mirror image.
-FORCES = (*FRICTION, "asymmetric_friction", "quadratic_drag", "bias_force")
-#: Powers of speed that these go with, by their parameters.
-POWERS = {"viscous": 1, "viscous_difference": 1, "drag": 2}
+FORCES = tuple(name for name, effect in EFFECTS.items() if effect.usual)
+#: Powers of speed that what it resists goes with.
+POWERS = {"effort_per_speed": 1, "effort_per_speed_squared": 2}
 #: Speed at which dry friction turns round, as a share of the usual speed of the joint.
 TRANSITION = 0.02
 #: Pieces of a record between whose ends speeds are measured, which noise hardly moves.
@@ -129,13 +130,13 @@ class Judge:
 
     def guessed(self, record: Experiment) -> Shares:
         """Shares at the values of the model, with no dry friction or as much as is usual, whichever leaves less."""
-        plain, dry = self.measured(record), [joint for name, joint in self.added if name == "coulomb_friction"]
+        plain, dry = self.measured(record), [key for key in self.added if EFFECTS[key[0]].sticks]
         if not dry:
             return plain
         structure = self._structure(record)
         values = structure.theta.copy()
-        for joint in dry:
-            parameter = self.model.effect("coulomb_friction", joint).parameter_names["coulomb"]
+        for key in dry:
+            parameter = self.model.effect(*key).parameter_names["coulomb"]
             values[self.model.index(parameter)] = structure.priors[parameter].spread
         return min(plain, self.measured(record, values), key=lambda shares: shares.order)
 
@@ -203,11 +204,12 @@ class Judge:
             effort, speed = self._usual(record, joint)
             effect = model.effect(name, joint)
             for short, parameter in effect.parameter_names.items():
-                if effect.type.parameter(short).shape:
+                entry = effect.type.parameter(short)
+                if entry.shape:
                     values[model.index(parameter)] = TRANSITION * speed
                 elif name in forces:
-                    size = effort / speed ** POWERS.get(short, 0)
-                    priors[parameter] = Prior(0.0, size, *effect.type.parameter(short).physical)
+                    size = effort / speed ** POWERS.get(entry.scale, 0)
+                    priors[parameter] = Prior(0.0, size, *entry.physical)
         return Structure(model, values, priors)
 
     def _usual(self, record: Experiment, joint: str) -> tuple[float, float]:

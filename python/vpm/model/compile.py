@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vpm.catalogue import EFFECTS
+from vpm.catalogue import EFFECTS, effects_for_site
 from vpm.model.beam import End, Gauge, Line, Marker, Section, sections_of
 from vpm.model.checked import Checked
 from vpm.model.connection_compile import (
@@ -193,16 +193,16 @@ def _end(end: End, structure: Structure) -> dict[str, Any]:
 def _actuator(name: str, structure: Structure, index: Mapping[str, int]) -> dict[str, Any]:
     actuator = structure.document.actuators[name]
     friction = optional_json(f"{name}.friction", ("driving", "driven", "transition_velocity"), index)
+    # What spoils a command is a key of its drive, called like the group of its one parameter.
+    numbers = {effect.group: effect.parameters for effect in effects_for_site("actuator")}
+    faults = {key: index.get(f"{name}.{own[0].suffix}") for key, own in numbers.items() if len(own) == 1}
     return {
         "name": name,
         "on": {"joint": structure.joints.index(actuator.joint)}
         if actuator.joint is not None
         else {"line": structure.wires.index(actuator.line or actuator.transmission or "")},
         "drive": drive_json(name, actuator, structure, index),
-        "delay": index.get(f"{name}.delay.time"),
-        "dead_zone": index.get(f"{name}.dead_zone.width"),
-        "saturation": index.get(f"{name}.saturation.limit"),
-        "lag": index.get(f"{name}.lag.time_constant"),
+        **faults,
         **({} if friction is None else {"friction": friction}),
     }
 

@@ -17,8 +17,6 @@ from vpm.model.splitting import name_behind
 
 #: Drives whose effort follows from the command alone.
 DIRECT = frozenset({"ideal", "narx", "maxwell_narx"})
-#: Effects with springs that take hold at once.
-IMPACTS = frozenset({"backlash", "end_stop"})
 
 
 class Components(DriveComponents):
@@ -145,10 +143,10 @@ class Components(DriveComponents):
         ideal and sampled ones.
         """
         document = self._checked.document
-        effects = {effect.type for effect in document.effects}
+        hits = any(effect.traits.impacts for effect in document.effects)
         elastic = any(level != "rigid" for level in self.levels.values())
         direct = all(entry.type in DIRECT and not self._rubs(name) for name, entry in document.actuators.items())
-        return elastic and direct and not document.contacts and not document.bushings and not effects & IMPACTS
+        return elastic and direct and not document.contacts and not document.bushings and not hits
 
     @property
     def first_order_beams(self) -> frozenset[str]:

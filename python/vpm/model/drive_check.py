@@ -126,8 +126,9 @@ def _spool_keys(keys: tuple[str, ...], valve: Valve) -> Iterator[Problem]:
 
 
 def _late_spool(name: str, valve: Valve, document: Document) -> Iterator[Problem]:
-    if valve.spool == "static" and any(e.type == "valve_dynamics" and e.at == name for e in document.effects):
-        rest = "is static, but the effect valve_dynamics makes it slower; remove one of them"
+    slower = [e.type for e in document.effects if e.traits.late == "spool" and e.at == name]
+    if valve.spool == "static" and slower:
+        rest = f"is static, but the effect {slower[0]} makes it slower; remove one of them"
         yield Problem(place("actuators", name, "valve", "spool"), rest)
 
 

@@ -24,6 +24,8 @@ DRIVE_STATES: Mapping[str, tuple[str, ...]] = {
     "dc_motor": ("current",),
     "maxwell": ("stretch",),
 }
+#: What is lost of a supply's pressure on the way to the valves: group of the parameters, and state.
+DROP = "drop"
 #: States of a cylinder by how its pressures come about.
 OIL_STATES: Mapping[str, tuple[str, ...]] = {
     "chambers": ("chamber_a", "chamber_b"),
@@ -171,7 +173,7 @@ class DriveComponents:
     def has_lag(self, actuator: str) -> bool:
         """Whether an actuator follows its command with a lag, which adds a state."""
         self._known(actuator, self.actuators, "actuator")
-        return any(e.type == "actuator_lag" and e.at == actuator for e in self._checked.document.effects)
+        return any(e.traits.late == "lag" and e.at == actuator for e in self._checked.document.effects)
 
     @cached_property
     def internal_names(self) -> tuple[str, ...]:
@@ -198,8 +200,8 @@ class DriveComponents:
         document = self._checked.document
         if document.supplies[supply].source == "sagging":
             yield f"{supply}.pressure"
-        if any(e.type == "supply_drop" and e.at == supply for e in document.effects):
-            yield f"{supply}.drop"
+        if any(EFFECTS[e.type].group == DROP and e.at == supply for e in document.effects):
+            yield f"{supply}.{DROP}"
 
     def internal_unit(self, state: str) -> str:
         """SI unit of a state of `internal_names`."""

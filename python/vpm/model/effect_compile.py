@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from vpm.catalogue import EFFECTS
 from vpm.model.effects import Effect
 from vpm.model.splitting import bendings, deflections
 from vpm.model.structure import Structure
@@ -61,9 +62,10 @@ def _on_joint(
     seat: dict[str, Any] = {"joint": places.index(before)}
     if effect.side == "link" and behind is not None:
         seat["behind"] = places.index(behind)
-    if effect.name not in {"joint_compliance", "backlash", "link_flexibility"}:
+    if not effect.type.motion:
         return [_law(effect, seat, numbers)]
-    inertia = {"type": "rotor_inertia", "joint": places.index(before), "inertia": numbers.pop("inertia")}
+    rotor = next(name for name, one in EFFECTS.items() if one.rotor)
+    inertia = {"type": rotor, "joint": places.index(before), "inertia": numbers.pop("inertia")}
     return [{"type": effect.name, "joint": places.index(behind or before), **numbers}, inertia]
 
 

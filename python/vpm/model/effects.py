@@ -68,7 +68,7 @@ def effect_problems(document: Document, structure: Structure) -> Iterator[Proble
             sites = (*sites, *document.transmissions)
         if entry.at in document.transmissions and entry.at not in sites:
             rest = f'is "{entry.at}", a transmission, but {effect.name} sits at {_a(effect.site)} alone'
-            repair = "drive_friction of its actuator follows the load" if effect.takes_effort else _shaft_repair(effect)
+            repair = _shaft_repair(effect)
             yield Problem(place(*keys, "at"), f"{rest}; {repair}")
         elif entry.at not in sites:
             repair = near_match(entry.at, sites, what="it has")
@@ -96,7 +96,10 @@ def _a(site: str) -> str:
 
 
 def _shaft_repair(effect: EffectType) -> str:
-    if effect.name == "rotor_inertia":
+    if effect.takes_effort:
+        of_drive = next(name for name, one in EFFECTS.items() if one.beside_others)
+        return f"{of_drive} of its actuator follows the load"
+    if effect.rotor:
         return "give the inertia of the transmission"
     return f"put it at {_a(effect.site)}, or leave it out"
 

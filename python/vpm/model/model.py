@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, NoReturn, Self, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from vpm.catalogue import SITE_KINDS, Side, effect_type
+from vpm.catalogue import SITE_KINDS, EffectType, Side, effect_type
 from vpm.errors import CoreError, ModelError, near_match
 from vpm.files import write_text
 from vpm.model.check import check_document, check_effect
@@ -266,7 +266,7 @@ class Model(Evaluations, Storable):
             if given is None:
                 continue  # the check below says what is missing
             if parameter.scale == "inertia" and parameter.shape and parameter.name not in values:
-                given = self._motor_side(name, at)
+                given = self._motor_side(effect, at)
             # Nobody knows beforehand at which velocity a friction law bends; places and periods are told.
             known = parameter.shape and (parameter.name in values or not parameter.learnt)
             number = number_of(given, f"{parameter.name} of {name}", ModelError)
@@ -280,13 +280,13 @@ class Model(Evaluations, Storable):
         model.__dict__.update(_checked=checked, _path=None)
         return model
 
-    def _motor_side(self, effect: str, at: str) -> float:
+    def _motor_side(self, effect: EffectType, at: str) -> float:
         """Inertia to begin with before a spring or play: a share of what the joint moves, none where a rotor is known.
 
         Of what the joint moves when all joints stand at zero.
         """
         joint = self._checked.structure.turned.get(at, at)
-        if joint not in self.joints or (effect == "backlash" and not self._is_driven(joint)):
+        if joint not in self.joints or (effect.has_play and not self._is_driven(joint)):
             return 0.0
         known = [f"{joint}.rotor_inertia", f"{joint}.rotor.inertia"]
         known += [f"{name}.rotor_inertia" for name in self.actuators if self._drives(name, joint)]

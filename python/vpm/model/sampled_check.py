@@ -23,7 +23,7 @@ def sampled_problems(document: Document, structure: Structure) -> Iterator[Probl
         if not isinstance(actuator, SAMPLED):
             continue
         for position, effect in enumerate(document.effects):
-            if effect.type == "actuator_lag" and effect.at == name:
+            if effect.traits.late == "lag" and effect.at == name:
                 rest = f'is a lag at "{name}", a {actuator.type}, which sees its own samples and no lag between them; '
                 yield Problem(place("effects", position), f"{rest}remove it, or identify it with the model")
         if isinstance(actuator, Narx):

@@ -10,7 +10,8 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
-from vpm.catalogue import Side
+from vpm.catalogue import EFFECTS, Side
+from vpm.catalogue.traits import Traits
 from vpm.model.beam import Beam, Gauge, Line, Marker
 from vpm.model.contact import Bushing, Contact, LoadCell
 from vpm.model.controller import TYPES, Controller
@@ -104,6 +105,11 @@ class EffectEntry(BaseModel):
     def owner(self) -> str:
         """What the dotted names of its parameters begin with."""
         return self.at if self.side == "motor" else f"{self.at}.{self.side}"
+
+    @property
+    def traits(self) -> Traits:
+        """What it does; nothing if the catalogue does not have it."""
+        return EFFECTS.get(self.type, Traits())
 
     @property
     def values(self) -> dict[str, Quantity]:

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
 
+from vpm.catalogue import effect_type
 from vpm.model.drives import Actuator, DcMotor
 from vpm.model.messages import Problem, place
 from vpm.model.schema import Document, EffectEntry
@@ -39,9 +40,9 @@ def splits_joint(entry: EffectEntry, document: Document) -> bool:
 
     A joint without an actuator may be the play itself.
     """
-    if entry.type == "backlash":
+    if entry.traits.has_play:
         return any(entry.at in joints_turned(actuator, document) for actuator in document.actuators.values())
-    return entry.type == "joint_compliance"
+    return entry.traits.splits
 
 
 def reshapes(entry: EffectEntry, document: Document) -> bool:
@@ -56,13 +57,13 @@ def deflections(document: Document) -> Mapping[str, str]:
 
 def bendings(document: Document) -> Mapping[str, str]:
     """Bodies that bend, each with the name of the joint at its root."""
-    bent = (entry.at for entry in document.effects if entry.type == "link_flexibility" and entry.at in document.bodies)
+    bent = (entry.at for entry in document.effects if entry.traits.motion == "bending" and entry.at in document.bodies)
     return {at: f"{at}_bending" for at in bent}
 
 
 def flexed(document: Document) -> Document:
     """The document with the levels of detail that its effects ask for."""
-    bent = {entry.at for entry in document.effects if entry.type == "link_flexibility"}
+    bent = {entry.at for entry in document.effects if entry.traits.motion == "bending"}
     rigid = [name for name, beam in document.beams.items() if name in bent and beam.detail.name == "rigid"]
     if not rigid:
         return document
@@ -81,7 +82,7 @@ def splitting_problems(document: Document, names: Mapping[str, str]) -> Iterator
     """
     split: dict[str, int] = {}
     for position, entry in enumerate(document.effects):
-        bends = entry.type == "link_flexibility" and entry.at in names
+        bends = entry.traits.motion == "bending" and entry.at in names
         if not (bends or splits_joint(entry, document)):
             continue
         where, joint = place("effects", position), names[entry.at] if bends else entry.at
@@ -107,8 +108,9 @@ def splitting_problems(document: Document, names: Mapping[str, str]) -> Iterator
 def stop_problems(document: Document, parameters: Mapping[str, Parameter]) -> Iterator[Problem]:
     """End stops that leave no way between them."""
     for position, entry in enumerate(document.effects):
-        if entry.type == "end_stop":
-            low, high = (parameters[f"{entry.owner}.end_stop.{end}"].value for end in ("low", "high"))
+        if entry.traits.stops:
+            group = effect_type(entry.type).group
+            low, high = (parameters[f"{entry.owner}.{group}.{end}"].value for end in ("low", "high"))
             if low >= high:
                 rest = f"is {low:g}, but the upper end is {high:g} (SI); the lower one has to be below"
                 yield Problem(place("effects", position, "low"), rest)
@@ -119,7 +121,7 @@ def _has_rotor(document: Document, joint: str) -> bool:
     described = document.joints.get(joint)
     if described is not None and described.rotor_inertia is not None and described.rotor_inertia.value > 0.0:
         return True
-    if any(entry.type == "rotor_inertia" and entry.at == joint for entry in document.effects):
+    if any(entry.traits.rotor and entry.at == joint for entry in document.effects):
         return True
     shafts = (shaft for shaft in document.transmissions.values() if joint in shaft.ratios)
     if any(shaft.inertia is not None and shaft.inertia.value > 0.0 for shaft in shafts):

@@ -8,7 +8,6 @@ from weakref import WeakKeyDictionary
 
 from vpm.catalogue.kinds import Side
 from vpm.discrepancy.candidates import Candidate, Key
-from vpm.identify.reuse import SPLITTING
 from vpm.model import Model
 from vpm.ranking.sizes import Sizes
 from vpm.ranking.structure import Structure, sides_taken
@@ -45,7 +44,7 @@ class Extensions:
         """
         made = self._made.setdefault(structure.model, {})
         kind = (candidate.key, side, frozenset(start))
-        splits = candidate.effect.name in SPLITTING
+        splits = candidate.effect.splits
         if splits and side == "link":
             structure = structure.beside(candidate.site, side)
         own: Side = "motor" if splits else side
@@ -75,6 +74,6 @@ class Extensions:
 def sides_of(candidate: Candidate, model: Model) -> tuple[Side, ...]:
     """Sides of a joint on which an effect may sit, or what it splits there may stay."""
     site = candidate.site
-    if candidate.effect.name in SPLITTING:
+    if candidate.effect.splits:
         return SIDES if sides_taken(model, site) else SIDES[:1]
     return SIDES if candidate.effect.has_sides and model.joint_behind(site) else SIDES[:1]

@@ -25,9 +25,9 @@ def started(candidate: Candidate, model: Model, sizes: Sizes) -> Candidate:
         (low, high), (first, last) = ends["period"], sizes.ways[candidate.site]
         ends["period"] = low, max(high, last - first)
     candidate = _placed(replace(candidate, bounds=ends), sizes)
-    if candidate.effect.name == "backlash":
+    if candidate.effect.has_play:
         return replace(candidate, starts=tuple(_backlash(start) for start in candidate.starts), fixed=())
-    if candidate.effect.name == "end_stop":
+    if candidate.effect.stops:
         seen = candidate.site in sizes.ways  # nobody knows where a joint ends that nobody sees
         starts = tuple(_stop(start, candidate.site, model, sizes) for start in candidate.starts if seen)
         return replace(candidate, starts=starts, neutral=False)

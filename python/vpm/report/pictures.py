@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from vpm.catalogue import EFFECTS
-from vpm.catalogue.signature import signature_of
+from vpm.catalogue import EFFECTS, signature_of
 from vpm.compare.correlation import gapped_autocorrelation
 from vpm.discrepancy import Diagnosis, Evidence
 from vpm.discrepancy.diagnosis import Picture, Trace

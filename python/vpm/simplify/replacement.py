@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from vpm.catalogue import effects_for_site
 from vpm.errors import ModelError
 from vpm.experiment import Experiment
 from vpm.model import Model
@@ -17,8 +18,6 @@ from vpm.simplify.reductions import Reduction
 
 #: The drive that stands for the cylinder alone: its controller stays. All others stand for both.
 TABLE = "table"
-#: Effects of the oil, which a table contains, and of the spool, which it cannot have.
-OF_OIL, OF_SPOOL = ("internal_leakage",), ("valve_dynamics",)
 #: What sensors can still show of a drive without spool and pressures.
 STILL_MEASURED = ("command", "force")
 #: Parts of a model file that one without such parts does not have.
@@ -72,7 +71,7 @@ def replaced(model: Model, drive: str, entry: str) -> Model:
     content, other = model.to_dict(), json.loads(entry)
     place = {key: value for key, value in content["actuators"][drive].items() if key in ("joint", "line")}
     content["actuators"][drive] = {**place, **other}
-    lost: tuple[str, ...] = (*OF_OIL, *OF_SPOOL)
+    lost = tuple(effect.name for effect in effects_for_site("cylinder"))
     if other["type"] != TABLE:
         lost = tuple(effect.name for effect in model.effects if effect.at == drive)
         content["controllers"] = _without_controller(model, content.get("controllers", {}), drive)

@@ -12,10 +12,11 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from vpm.catalogue import EFFECTS
 from vpm.errors import VpmError
 from vpm.model import Model
 from vpm.simplify.hydraulics import CLEARANCE, NO_STATE, hydraulic_drives, simpler
-from vpm.simplify.replacement import OF_OIL, OF_SPOOL, TABLE, Replacement
+from vpm.simplify.replacement import TABLE, Replacement
 from vpm.simulate import Run
 
 Array = NDArray[np.float64]
@@ -89,7 +90,7 @@ def _with_clearance(
 ) -> Model | None:
     """Model whose drive is quasi-static, with the clearance that suits best; None where none can be simulated."""
     content = model.to_dict()
-    content["effects"] = [e for e in content.get("effects", ()) if not (e["at"] == drive and e["type"] in OF_SPOOL)]
+    content["effects"] = [e for e in content.get("effects", ()) if not (e["at"] == drive and _is_of_spool(e["type"]))]
     reduced = simpler(type(model)(content), drive, NO_STATE)
     name = f"{drive}.valve.clearance"
     given = f"{drive}.valve.clearance" in model.parameters
@@ -140,6 +141,16 @@ def force_map(model: Model, drive: str, commands: Array, velocities: Array) -> A
     return efforts
 
 
+def _is_of_spool(effect: str) -> bool:
+    """Whether an effect slows the spool, which a table cannot have."""
+    return EFFECTS[effect].late == "spool"
+
+
+def _is_of_oil(effect: str) -> bool:
+    """Whether it is one of a cylinder's oil, which a table contains."""
+    return EFFECTS[effect].site == "cylinder" and not _is_of_spool(effect)
+
+
 def _rig(model: Model, drive: str) -> Model:
     """The drive alone, pushing a mass that nothing moves, its piston at mid-stroke at zero."""
     content = simpler(model, drive, NO_STATE).to_dict()
@@ -154,6 +165,6 @@ def _rig(model: Model, drive: str) -> Model:
             "joints": {"axis": {"type": "prismatic", "parent": "world", "child": "slide", "axis": [1.0, 0.0, 0.0]}},
             "supplies": {entry["supply"]: supply},
             "actuators": {drive: {**entry, "joint": "axis", "retracted_length": -0.5 * stroke}},
-            "effects": [e for e in content.get("effects", ()) if e["at"] == drive and e["type"] in OF_OIL],
+            "effects": [e for e in content.get("effects", ()) if e["at"] == drive and _is_of_oil(e["type"])],
         }
     )

@@ -1,10 +1,9 @@
-"""Effects of where the whole machine stands."""
-
-from __future__ import annotations
+"""Gravity tilt: the whole machine does not stand level."""
 
 import math
 
 from vpm.catalogue.kinds import ANY, EffectParameter, EffectType, nonlinear
+from vpm.catalogue.signature import Signature
 
 _UPRIGHT = (-0.5 * math.pi, 0.5 * math.pi)
 
@@ -14,7 +13,7 @@ def _angle(name: str, which: str) -> EffectParameter:
     return nonlinear(name, f"tilt.{name}", "rad", "one", meaning, neutral=0.0, physical=_UPRIGHT, evaluable=ANY)
 
 
-GRAVITY_TILT = EffectType(
+EFFECT = EffectType(
     name="gravity_tilt",
     site="world",
     group="tilt",
@@ -28,6 +27,7 @@ GRAVITY_TILT = EffectType(
         "sensor_offset": "a shifted zero of an angle turns gravity for all that hangs on it; other poses part them",
     },
     exact=True,
+    signature=Signature(
+        ("position",), "A sine over the pose, shifted against that of gravity", "Slow motion through several poses"
+    ),
 )
-
-WORLD_EFFECTS = (GRAVITY_TILT,)

@@ -1,18 +1,15 @@
-"""Effects of links as wholes: bending of what is described as rigid, damping of what is described as elastic.
+"""Link flexibility: bending of what is described as rigid.
 
 A rigid body that bends is a pseudo-rigid link: a torsion spring at its root carries its first mode (L. L. Howell,
 "Compliant Mechanisms", 2001, chapter 5). A rigid beam that bends becomes elastic itself, with two strain polynomials in
 each of its components, so that strain gauges on it show it too.
 """
 
-from __future__ import annotations
-
 from vpm.catalogue.kinds import NOT_NEGATIVE, POSITIVE, EffectType, nonlinear, shape
+from vpm.catalogue.shared import RIGID
+from vpm.catalogue.signature import Signature
 
-#: A stiffness that nothing bends, N m/rad.
-_RIGID = 1e9
-
-LINK_FLEXIBILITY = EffectType(
+EFFECT = EffectType(
     name="link_flexibility",
     site="link",
     group="flexibility",
@@ -23,7 +20,7 @@ LINK_FLEXIBILITY = EffectType(
             "N m/rad",
             "effort_per_coordinate",
             "moment at the root per angle of the line from root to tip; of a uniform beam 3 E I/length",
-            neutral=_RIGID,
+            neutral=RIGID,
             physical=(POSITIVE, float("inf")),
             evaluable=(POSITIVE, float("inf")),
         ),
@@ -55,30 +52,10 @@ LINK_FLEXIBILITY = EffectType(
         "joint_compliance": "behind one motor both are a spring; a strain gauge or the motion of the tip parts them",
     },
     contains=("rotor_inertia",),
-)
-
-STRUCTURAL_DAMPING = EffectType(
-    name="structural_damping",
-    site="beam",
-    group="structural_damping",
-    parameters=(
-        nonlinear(
-            "time",
-            "structural_damping.time",
-            "s",
-            "time",
-            "damping per stiffness beside what is described",
-            neutral=0.0,
-            physical=NOT_NEGATIVE,
-            evaluable=NOT_NEGATIVE,
-        ),
+    motion="bending",
+    signature=Signature(
+        ("frequency",),
+        "A peak at the first natural frequency of the link",
+        "A chirp or quick stops, with a strain gauge at the root",
     ),
-    law="D = D_described + time K",
-    sentence="{at} damps its vibrations by {time} more than described, in proportion to its stiffness.",
-    impossible="a negative damping would feed energy into the vibrations",
-    confused_with={
-        "viscous_friction": "both calm vibrations; friction also brakes motion that does not bend the link",
-    },
 )
-
-LINK_EFFECTS = (LINK_FLEXIBILITY, STRUCTURAL_DAMPING)

@@ -1,0 +1,76 @@
+"""Backlash: play in a gear, between contacts that close over a short way.
+
+At a driven joint it splits the joint, as a compliance does: the joint's own coordinate stays that of the motor side,
+which is measured and on which the actuator and all other effects of the joint act. The link hangs behind a joint
+without actuator, named like the joint with ``_deflection`` after it, whose coordinate is link side minus motor side.
+"""
+
+from vpm.catalogue.kinds import NOT_NEGATIVE, EffectType, shape, size
+from vpm.catalogue.shared import CONTACT, motor_inertia
+from vpm.catalogue.signature import Signature
+
+EFFECT = EffectType(
+    name="backlash",
+    site="joint",
+    group="backlash",
+    parameters=(
+        shape(
+            "gap",
+            "backlash.gap",
+            "{C}",
+            "coordinate",
+            "free way from contact to contact",
+            start=None,
+            bounds=NOT_NEGATIVE,
+        ),
+        size(
+            "stiffness",
+            "backlash.stiffness",
+            "{E}/{C}",
+            "effort_per_coordinate",
+            "effort per way beyond the play",
+            physical=NOT_NEGATIVE,
+        ),
+        size(
+            "damping",
+            "backlash.damping",
+            "{E} s/{C}",
+            "effort_per_speed",
+            "resistance per speed, within the play and beyond",
+            physical=NOT_NEGATIVE,
+        ),
+        size(
+            "contact_damping",
+            "backlash.contact_damping",
+            "{E} s/{C}",
+            "effort_per_speed",
+            "resistance per speed of a closed contact alone",
+            physical=NOT_NEGATIVE,
+        ),
+        shape("width", "backlash.width", "{C}", "coordinate", "way over which a contact closes", start=CONTACT),
+        motor_inertia("backlash.inertia"),
+    ),
+    law=(
+        "tau = -stiffness (q + 1/2 sqrt((q - 1/2 gap)^2 + width^2) - 1/2 sqrt((q + 1/2 gap)^2 + width^2))"
+        " - damping v - contact_damping (1 + 1/2 (q - 1/2 gap) / sqrt((q - 1/2 gap)^2 + width^2)"
+        " - 1/2 (q + 1/2 gap) / sqrt((q + 1/2 gap)^2 + width^2)) v"
+    ),
+    sentence=(
+        "{at} has a play of {gap} between contacts of {stiffness}, damped with {contact_damping}, and with {damping}"
+        " within it as well."
+    ),
+    impossible="a negative stiffness would pull the contacts into each other, a negative damping would feed energy in",
+    confused_with={
+        "joint_compliance": "they agree where the load never changes its sign; reversals and small motion part them",
+    },
+    contains=("rotor_inertia",),
+    motion="deflection",
+    impacts=True,
+    fixed=("damping", "width"),
+    motor_side_alone=True,
+    signature=Signature(
+        ("position", "effort"),
+        "A flat part where nothing is passed on, with a step wherever the effort changes its sign",
+        "Reversals under a small load, with a sensor on either side of the play",
+    ),
+)

@@ -1,0 +1,31 @@
+"""Bias force: a constant load, such as a weight on a rope."""
+
+from vpm.catalogue.kinds import EffectType, size
+from vpm.catalogue.signature import Signature
+
+EFFECT = EffectType(
+    name="bias_force",
+    site="joint",
+    group="bias",
+    parameters=(size("force", "bias.force", "{E}", "effort", "load that the drive has to overcome"),),
+    law="tau = -force",
+    sentence="{at} carries a constant load of {force}, in either direction and at rest.",
+    impossible="either sign is possible: it says in which direction the load pulls",
+    confused_with={
+        "gravity_tilt": "they agree where gravity's lever does not change; other poses part them",
+        "coulomb_friction": "motion in one direction alone does not part them; motion in both directions does",
+        "asymmetric_friction": (
+            "a constant load and a difference of Coulomb friction agree wherever the joint moves; only standstill and"
+            " starts from rest part them"
+        ),
+        "payload": "they agree where gravity's lever does not change; other poses or fast motion part them",
+        "sensor_offset": "through gravity or a spring a shifted zero acts like a load; other poses part them",
+        "spring": "they agree over a short way; motion over a longer way parts them",
+    },
+    usual="force",
+    signature=Signature(
+        ("time", "position"),
+        "One level that never changes",
+        "The same motion forward and back, and rest in several places",
+    ),
+)

@@ -1,0 +1,39 @@
+"""Coulomb friction: dry surfaces resist alike at every speed."""
+
+from vpm.catalogue.kinds import NOT_NEGATIVE, EffectType, size
+from vpm.catalogue.shared import SLOW, SLOW_AND_FAST, transition
+from vpm.catalogue.signature import Signature
+from vpm.catalogue.traits import Tried
+
+EFFECT = EffectType(
+    name="coulomb_friction",
+    site="joint",
+    group="friction",
+    parameters=(
+        size(
+            "coulomb",
+            "friction.coulomb",
+            "{E}",
+            "effort",
+            "resistance that does not depend on speed",
+            physical=NOT_NEGATIVE,
+        ),
+        transition("friction.transition_velocity"),
+    ),
+    law="tau = -coulomb tanh(v/transition_velocity)",
+    sentence="{at} resists motion with {coulomb} at any speed, against the direction of motion.",
+    impossible="a negative Coulomb friction would push along the motion and feed energy into it",
+    confused_with={
+        "bias_force": "motion in one direction alone does not part them; motion in both directions does",
+        "viscous_friction": "motion at one speed alone does not part them; records at several speeds do",
+        "stribeck_friction": "they differ only at low speed; slow motion and starts from rest part them",
+        "dead_zone": "they agree wherever command and velocity have the same sign; braking parts them",
+        "hysteresis": "they agree but for the way after a reversal; short strokes and slow reversals part them",
+    },
+    sticks=True,
+    usual="friction",
+    tried=(Tried("transition_velocity", "speed", (0.002, 0.01, 0.04), SLOW),),
+    signature=Signature(
+        ("velocity",), "Two levels of opposite sign, one for each direction, with a step at rest", SLOW_AND_FAST
+    ),
+)

@@ -1,0 +1,53 @@
+"""End stop: the ends of the way of a joint, which push back harder in impact."""
+
+from vpm.catalogue.kinds import ANY, NOT_NEGATIVE, EffectType, shape, size
+from vpm.catalogue.shared import CONTACT, NEVER
+from vpm.catalogue.signature import Signature
+
+EFFECT = EffectType(
+    name="end_stop",
+    site="joint",
+    group="end_stop",
+    parameters=(
+        size(
+            "stiffness",
+            "end_stop.stiffness",
+            "{E}/{C}",
+            "effort_per_coordinate",
+            "effort per way beyond an end",
+            physical=NOT_NEGATIVE,
+        ),
+        shape(
+            "damping",
+            "end_stop.damping",
+            "s/{C}",
+            "one_per_speed",
+            "share by which the effort grows per approaching speed",
+            start=0.0,
+            bounds=NOT_NEGATIVE,
+            learnt=True,
+        ),
+        shape("low", "end_stop.low", "{C}", "coordinate", "lower end of the way", start=-NEVER, bounds=ANY),
+        shape("high", "end_stop.high", "{C}", "coordinate", "upper end of the way", start=NEVER, bounds=ANY),
+        shape("width", "end_stop.width", "{C}", "coordinate", "way over which a contact closes", start=CONTACT),
+    ),
+    law=(
+        "tau = -stiffness (p(q - high) r(damping v) - p(low - q) r(-damping v)), p(x) = 1/2 (x + sqrt(x^2 + width^2)),"
+        " r(y) = 1 + y, rounded above 0"
+    ),
+    sentence=(
+        "{at} runs against stops at {low} and {high}, which push back with {stiffness}, harder by {damping} in impact."
+    ),
+    impossible="a negative stiffness would pull the joint beyond its end",
+    confused_with={
+        "spring": "they agree over a way beyond the end alone; motion on both sides of it parts them",
+        "saturation": "both stop the motion at large commands; the same command in the middle of the way parts them",
+    },
+    impacts=True,
+    link_side_alone=True,
+    signature=Signature(
+        ("position",),
+        "Nothing, and beyond one place a steep wall",
+        "Slow motion into the stop, and faster than that",
+    ),
+)

@@ -1,0 +1,22 @@
+"""Input delay: a drive that answers to its command after a while."""
+
+from vpm.catalogue.kinds import EffectType
+from vpm.catalogue.shared import delay
+from vpm.catalogue.signature import Signature
+
+EFFECT = EffectType(
+    name="input_delay",
+    site="actuator",
+    group="delay",
+    parameters=(delay("time between a command and its effect"),),
+    law="u_delayed(t) = u(t - time)",
+    sentence="{at} acts on a command {time} late.",
+    impossible="a negative delay would mean that the drive acts before it is told to: check the time stamps of the log",
+    confused_with={
+        "valve_dynamics": "they agree for slow commands; steps and fast commands part them",
+        "actuator_lag": "they agree for slow commands; steps and fast commands part them",
+        "sensor_delay": "from commands to readings only their sum shows; a second sensor or time stamps part them",
+    },
+    late="delay",
+    signature=Signature(("command_rate",), "A straight line over the rate of the command", "Steps and fast commands"),
+)

@@ -1,0 +1,53 @@
+"""Joint compliance: a drive that winds up; it splits its joint, and the link hangs behind, as with backlash."""
+
+from vpm.catalogue.kinds import ANY, NOT_NEGATIVE, EffectType, nonlinear, size
+from vpm.catalogue.shared import RIGID, motor_inertia
+from vpm.catalogue.signature import Signature
+
+EFFECT = EffectType(
+    name="joint_compliance",
+    site="joint",
+    group="compliance",
+    parameters=(
+        nonlinear(
+            "stiffness",
+            "compliance.stiffness",
+            "{E}/{C}",
+            "effort_per_coordinate",
+            "effort per wind-up between motor side and link side",
+            neutral=RIGID,
+            physical=NOT_NEGATIVE,
+            evaluable=ANY,
+        ),
+        size(
+            "damping",
+            "compliance.damping",
+            "{E} s/{C}",
+            "effort_per_speed",
+            "resistance per rate of the wind-up",
+            physical=NOT_NEGATIVE,
+            linear=False,
+        ),
+        motor_inertia("compliance.inertia"),
+    ),
+    law="tau = -stiffness d - damping dd/dt on the wind-up d, with inertia on the motor side",
+    sentence=(
+        "{at} is elastic between motor and link: it winds up with {stiffness}, damped with {damping}, with {inertia} on"
+        " the side of the motor."
+    ),
+    impossible="a negative stiffness would drive motor and link apart, a negative damping would feed energy in",
+    confused_with={
+        "backlash": "they agree where the load never changes its sign; reversals and small motion part them",
+        "link_flexibility": "behind one motor both are a spring; a strain gauge or the motion of the tip parts them",
+        "rotor_inertia": "far below the resonance only the inertias show; faster motion parts them",
+        "actuator_lag": "both delay the motion of the link; free vibration after a stop shows the spring alone",
+    },
+    contains=("rotor_inertia",),
+    motion="deflection",
+    motor_side_alone=True,
+    signature=Signature(
+        ("frequency",),
+        "A peak at the resonance of load and motor against each other",
+        "A chirp or a multisine through the resonance",
+    ),
+)

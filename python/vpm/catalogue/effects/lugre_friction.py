@@ -1,0 +1,78 @@
+"""LuGre friction: bristles that bend over short ways and slide over long ones."""
+
+from vpm.catalogue.kinds import NOT_NEGATIVE, EffectType, shape, size
+from vpm.catalogue.shared import STRIBECK
+from vpm.catalogue.signature import Signature
+
+#: Way over which bristles bend where none is given: prismatic (m), revolute (rad).
+_PRESLIDING = (1e-5, 1e-4)
+
+EFFECT = EffectType(
+    name="lugre_friction",
+    site="joint",
+    group="lugre",
+    parameters=(
+        size(
+            "coulomb",
+            "lugre.coulomb",
+            "{E}",
+            "effort",
+            "resistance in fast motion, but for its viscous part",
+            physical=NOT_NEGATIVE,
+        ),
+        size(
+            "damping",
+            "lugre.damping",
+            "{E} s/{C}",
+            "effort_per_speed",
+            "resistance of the bristles to bending",
+            physical=NOT_NEGATIVE,
+        ),
+        shape(
+            "displacement",
+            "lugre.displacement",
+            "{C}",
+            "coordinate",
+            "way over which the bristles bend; their stiffness is coulomb/displacement",
+            start=_PRESLIDING,
+            learnt=True,
+        ),
+        shape(
+            "excess",
+            "lugre.excess",
+            "1",
+            "one",
+            "share by which the resistance in slow motion is larger",
+            start=0.0,
+            bounds=NOT_NEGATIVE,
+            learnt=True,
+        ),
+        shape(
+            "stribeck_velocity",
+            "lugre.stribeck_velocity",
+            "{C}/s",
+            "speed",
+            "speed at which this share has fallen to 37 %",
+            start=STRIBECK,
+            learnt=True,
+        ),
+    ),
+    law=(
+        "tau = -coulomb z - damping displacement dz/dt, dz/dt = (v - |v| z/h)/displacement,"
+        " h = 1 + excess exp(-(v/stribeck_velocity)^2)"
+    ),
+    sentence=(
+        "{at} rubs as bristles do: they bend over ways of about {displacement}, damped with {damping}, and slide with"
+        " {coulomb} in fast motion."
+    ),
+    impossible="a negative friction of bristles would push along the motion and feed energy into it",
+    confused_with={},
+    screened=False,
+    memory="lugre.memory",
+    contains=("coulomb_friction",),
+    signature=Signature(
+        ("position", "velocity"),
+        "A loop over short ways, and over long ones levels with a hump close to rest",
+        "Slow reversals over ways of several lengths, and starts from rest",
+    ),
+)

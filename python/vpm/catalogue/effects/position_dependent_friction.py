@@ -1,0 +1,35 @@
+"""Friction that is not the same everywhere: dry friction that repeats over the way."""
+
+from vpm.catalogue.kinds import EffectType, shape, size
+from vpm.catalogue.shared import transition
+from vpm.catalogue.signature import Signature
+
+EFFECT = EffectType(
+    name="position_dependent_friction",
+    site="joint",
+    group="friction",
+    parameters=(
+        shape(
+            "period",
+            "friction.position_period",
+            "{C}",
+            "coordinate",
+            "way after which the level repeats; it follows from the machine: a turn of a shaft, screw or gear",
+            start=None,
+        ),
+        size("cosine", "friction.position_cosine", "{E}", "effort", "part of the level that is greatest at zero"),
+        size("sine", "friction.position_sine", "{E}", "effort", "part of the level that vanishes at zero"),
+        transition("friction.position_transition_velocity"),
+    ),
+    law="tau = -(cosine cos(2 pi q/period) + sine sin(2 pi q/period)) tanh(v/transition_velocity)",
+    sentence="{at} rubs differently along its way, by {cosine} (cosine) and {sine} (sine), every {period} alike.",
+    impossible="either sign is possible; the friction of each place as a whole has to stay above zero",
+    confused_with={},
+    requires="coulomb_friction",
+    screened=False,
+    signature=Signature(
+        ("position", "velocity"),
+        "A wave that repeats over the way and turns over with the direction",
+        "Slow motion at constant speed over many periods, forward and back",
+    ),
+)

@@ -1,0 +1,29 @@
+"""Quadratic drag: air and churned oil resist with the square of the speed."""
+
+from vpm.catalogue.kinds import NOT_NEGATIVE, EffectType, size
+from vpm.catalogue.signature import Signature
+
+EFFECT = EffectType(
+    name="quadratic_drag",
+    site="joint",
+    group="friction",
+    parameters=(
+        size(
+            "drag",
+            "friction.quadratic",
+            "{E} s^2/{C}^2",
+            "effort_per_speed_squared",
+            "resistance per square of the speed",
+            physical=NOT_NEGATIVE,
+        ),
+    ),
+    law="tau = -drag |v| v",
+    sentence="{at} resists motion in proportion to the square of its speed, with {drag}.",
+    impossible="a negative drag would feed energy into the motion instead of taking it out",
+    confused_with={},
+    screened=False,
+    usual="force",
+    signature=Signature(
+        ("velocity",), "A parabola that changes its sign at rest", "Fast motion at several constant speeds"
+    ),
+)

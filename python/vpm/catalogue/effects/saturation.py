@@ -1,0 +1,38 @@
+"""Saturation: the largest command that a drive follows."""
+
+from vpm.catalogue.kinds import ABOVE_ZERO, EffectType, nonlinear
+from vpm.catalogue.shared import NEVER
+from vpm.catalogue.signature import Signature
+from vpm.catalogue.traits import Tried
+
+EFFECT = EffectType(
+    name="saturation",
+    site="actuator",
+    group="saturation",
+    parameters=(
+        nonlinear(
+            "limit",
+            "saturation.limit",
+            "{U}",
+            "command",
+            "largest command that is followed",
+            neutral=NEVER,
+            physical=ABOVE_ZERO,
+            evaluable=ABOVE_ZERO,
+        ),
+    ),
+    law="u_out = min(max(u, -limit), limit)",
+    sentence="{at} does not follow commands beyond {limit}.",
+    impossible="a limit of zero or less would mean that the drive never acts",
+    confused_with={
+        "end_stop": "both stop the motion at large commands; the same command in the middle of the way parts them",
+        "supply_drop": "both limit the speed; a log of the pressure at the valve parts them",
+        "viscous_friction": "both weaken large commands; large commands at low speed part them",
+    },
+    tried=(Tried("limit", "command", (0.95, 0.7, 0.4), (0.02, 1.0)),),
+    signature=Signature(
+        ("command",),
+        "Nothing up to the limit, and beyond it a straight line",
+        "Commands up to the largest that the drive may take",
+    ),
+)

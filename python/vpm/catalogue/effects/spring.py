@@ -1,0 +1,46 @@
+"""Spring: it pulls a joint back to a place of rest, in proportion to its way."""
+
+from vpm.catalogue.kinds import ANY, NOT_NEGATIVE, EffectType, shape, size
+from vpm.catalogue.signature import Signature
+from vpm.catalogue.traits import Tried
+
+EFFECT = EffectType(
+    name="spring",
+    site="joint",
+    group="spring",
+    parameters=(
+        size(
+            "stiffness",
+            "spring.stiffness",
+            "{E}/{C}",
+            "effort_per_coordinate",
+            "restoring effort per way",
+            physical=NOT_NEGATIVE,
+        ),
+        shape(
+            "rest",
+            "spring.rest",
+            "{C}",
+            "coordinate",
+            "position without restoring effort",
+            start=0.0,
+            bounds=ANY,
+        ),
+    ),
+    law="tau = -stiffness (q - rest)",
+    sentence="{at} is pulled back towards {rest} with {stiffness}.",
+    impossible="a negative stiffness would push the joint away from its rest position",
+    confused_with={
+        "end_stop": "they agree over a way beyond the end alone; motion on both sides of it parts them",
+        "bias_force": "they agree over a short way; motion over a longer way parts them",
+        "payload": "near the hanging position gravity acts like a spring; large angles or fast motion part them",
+        "sensor_offset": "a shifted rest position and a shifted zero agree; a reference position parts them",
+        "torque_ripple": "they agree over less than a quarter of a period; a longer way parts them",
+        "hysteresis": "they agree over ways that are too short to slide; a longer way parts them",
+    },
+    tried=(Tried("rest", "way", (0.0,), (-10.0, 10.0)),),
+    link_side_alone=True,
+    signature=Signature(
+        ("position",), "A straight line that crosses zero at the place of rest", "Slow motion over the whole way"
+    ),
+)

@@ -1,0 +1,34 @@
+"""Viscous friction: oil and seals resist in proportion to the speed."""
+
+from vpm.catalogue.kinds import NOT_NEGATIVE, EffectType, size
+from vpm.catalogue.signature import Signature
+
+EFFECT = EffectType(
+    name="viscous_friction",
+    site="joint",
+    group="friction",
+    parameters=(
+        size(
+            "viscous",
+            "friction.viscous",
+            "{E} s/{C}",
+            "effort_per_speed",
+            "resistance per speed",
+            physical=NOT_NEGATIVE,
+        ),
+    ),
+    law="tau = -viscous v",
+    sentence="{at} resists motion in proportion to its speed, with {viscous}.",
+    impossible="a negative viscous friction would feed energy into the motion instead of taking it out",
+    confused_with={
+        "structural_damping": "both calm vibrations; friction also brakes motion that does not bend the link",
+        "internal_leakage": "both let a loaded piston give way; the pressures of both chambers part them",
+        "supply_drop": "both weaken fast motion; the pressures of both chambers part them",
+        "coulomb_friction": "motion at one speed alone does not part them; records at several speeds do",
+        "actuator_lag": "both weaken fast motion; steady motion at several speeds shows the friction alone",
+        "saturation": "both weaken large commands; large commands at low speed part them",
+        "sensor_gain": "both scale the effort that a speed needs; a reference length parts them",
+    },
+    usual="friction",
+    signature=Signature(("velocity",), "A straight line through zero", "Motion at several constant speeds"),
+)

@@ -1,0 +1,95 @@
+"""What several effects share: friction that bends with the speed, contacts, and what comes on top of a description.
+
+Smooth friction laws: the sign of the velocity is written tanh(v/vt), so that every law has derivatives; the transition
+velocity vt is far below the speeds of interest. Coulomb, viscous and Stribeck terms: B. Armstrong-Helouvry, P. Dupont
+and C. Canudas de Wit, "A survey of models, analysis tools and compensation methods for the control of machines with
+friction", Automatica 30 (1994).
+"""
+
+from __future__ import annotations
+
+from vpm.catalogue.kinds import ANY, NOT_NEGATIVE, EffectParameter, Range, Scale, nonlinear, shape, size
+
+#: Transition velocity where none is given: prismatic (m/s), revolute (rad/s).
+TRANSITION = (1e-3, 1e-2)
+#: Bounds of a transition velocity, a detail of small speeds, as shares of the largest speed.
+SLOW = (2e-4, 0.1)
+#: Stribeck velocity where none is given: prismatic (m/s), revolute (rad/s).
+STRIBECK = (1e-2, 1e-1)
+#: Way over which a contact closes where none is given: prismatic (m), revolute (rad).
+CONTACT = (1e-5, 1e-4)
+#: A stiffness that nothing winds up or bends; a place that no joint reaches, and a command that is never given.
+RIGID, NEVER = 1e9, 1e9
+#: Largest share of a load that inverse dynamics has one solution for.
+_SHARE = (0.0, 0.95)
+NEGATIVE_SHARE = "a negative share would give out more power than goes in"
+#: What excites friction of all kinds.
+SLOW_AND_FAST = "Motion in both directions at several constant speeds, with slow starts from rest"
+
+
+def transition(suffix: str) -> EffectParameter:
+    """Speed at which a friction law bends."""
+    return shape(
+        "transition_velocity",
+        suffix,
+        "{C}/s",
+        "speed",
+        "speed below which the law bends from one sign to the other",
+        start=TRANSITION,
+        learnt=True,
+    )
+
+
+def shares(driving: str, driven: str) -> tuple[EffectParameter, EffectParameter]:
+    """Shares of an effort that friction takes, each with its meaning."""
+
+    def share(name: str, meaning: str) -> EffectParameter:
+        return size(name, f"friction.{name}", "1", "one", meaning, physical=_SHARE, linear=False)
+
+    return share("driving", driving), share("driven", driven)
+
+
+def law_of_load(effort: str) -> str:
+    """Law of friction in proportion to an effort, which is said in words."""
+    return (
+        "tau = -|u| s (driving + driven + (driving - driven) s sign(u))/2, s = tanh(v/transition_velocity), "
+        f"u {effort}, each share within 0.95"
+    )
+
+
+def motor_inertia(suffix: str) -> EffectParameter:
+    """Inertia before a spring or play, which has nothing to swing against without."""
+    return shape(
+        "inertia",
+        suffix,
+        "{E} s^2/{C}",
+        "inertia",
+        "inertia on the motor side, as the joint feels it, beside a rotor_inertia that is described",
+        start=0.0,
+        bounds=NOT_NEGATIVE,
+        learnt=True,
+    )
+
+
+def delay(meaning: str) -> EffectParameter:
+    """Time by which something is late."""
+    return nonlinear(
+        "time", "delay.time", "s", "time", meaning, neutral=0.0, physical=NOT_NEGATIVE, evaluable=NOT_NEGATIVE
+    )
+
+
+def over_described(
+    name: str, suffix: str, unit: str, scale: Scale, meaning: str, typical: float, evaluable: Range = ANY
+) -> EffectParameter:
+    """Size of what comes on top of a described value of a hydraulic drive, so that its neutral value is zero."""
+    return nonlinear(
+        name,
+        suffix,
+        unit,
+        scale,
+        meaning,
+        neutral=0.0,
+        physical=NOT_NEGATIVE,
+        evaluable=evaluable,
+        typical=typical,
+    )
