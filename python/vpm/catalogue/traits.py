@@ -47,7 +47,7 @@ class Traits:
     close_to_rest: bool = False
     """Whether it acts while a joint lets go, which filtered records hardly show and runs of the model do."""
     usual: Usual = ""
-    """What every joint has some of, so that a log is not blamed for what it leaves; or for being late, where many have it."""
+    """What joints have of themselves: no log is blamed for what friction leaves, nor called late for a force."""
     late: Late = ""
     """How what it passes on comes late."""
     scales: bool = False

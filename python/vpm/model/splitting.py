@@ -47,7 +47,7 @@ def splits_joint(entry: EffectEntry, document: Document) -> bool:
 
 def reshapes(entry: EffectEntry, document: Document) -> bool:
     """Whether the machine with this effect more has other joints or beams."""
-    return entry.type == "link_flexibility" or splits_joint(entry, document)
+    return entry.traits.motion == "bending" or splits_joint(entry, document)
 
 
 def deflections(document: Document) -> Mapping[str, str]:
