@@ -35,9 +35,12 @@ Array = NDArray[np.float64]
 
 
 class _Law(NamedTuple):
-    """Regressors (n, k) of one effect, and whether they are one signal at other times."""
+    """Regressors (n, k) of one effect by each of some signals, and whether they are that signal at other times.
 
-    columns: Array
+    An effect shows in all of them; what one of them has in common with a residual, the others need not have.
+    """
+
+    columns: tuple[Array, ...]
     late: bool
 
 
@@ -87,10 +90,14 @@ def _judge(
     except VpmError:  # no motion can be had from this log
         added = []
     size = block.scale * block.weight
-    columns = [
-        _heard(law.columns, residual, slopes, counts, size, checks.clear) if law.late else law.columns for law in added
-    ]
-    tests = [explained_by(residual, slopes, each, counts) for each in columns]
+
+    def explained(law: _Law) -> tuple[float, float]:
+        columns = law.columns
+        if law.late:
+            columns = tuple(_heard(each, residual, slopes, counts, size, checks.clear) for each in columns)
+        return max((explained_by(residual, slopes, each, counts) for each in columns), key=lambda test: test[1])
+
+    tests = [explained(law) for law in added]
     share, chance = min(tests, key=lambda test: test[1], default=(0.0, 1.0))
     visible = explained_size(share, residual[counts], block.weight) / block.scale
     white = ljung_box(residual[counts], lags)
@@ -108,16 +115,20 @@ def _joints(model: Model, channel: str) -> tuple[str, ...]:
 
 
 def _of_balance(model: Model, problem: InverseDynamicsProblem, record: int, checks: Checks) -> Groups:
-    """Laws of the motion of joints and of the effort that it needs, as they are compared."""
+    """Laws of the motion of joints, of the effort that it needs and of that which drives deliver, as they are compared.
+
+    What a drive did without being told is in the one, and what its controller heard of noise in the other.
+    """
     motion = problem.state(record)
-    _, _, required = problem.effort(model, model.theta, record)
+    _, applied, required = problem.effort(model, model.theta, record)
+    efforts = [[of[:, k] for of in (required, applied) if np.any(of[:, k])] for k in range(len(problem.joints))]
 
     def groups(joints: Sequence[str], _: Block) -> list[_Law]:
         places = [problem.joints.index(joint) for joint in joints if joint in problem.joints]
         return [
             law
             for place in places or range(len(problem.joints))
-            for law in _laws([part[:, place] for part in motion], required[:, place], checks)
+            for law in _laws([part[:, place] for part in motion], efforts[place], checks)
         ]
 
     return groups
@@ -139,18 +150,18 @@ def _of_log(model: Model, record: Experiment, checks: Checks) -> Groups:
             law
             for k in places
             for command in [m.acceleration[:, k], *commands]
-            for law in _laws([seen(part[:, k]) for part in moved], seen(command), checks)
+            for law in _laws([seen(part[:, k]) for part in moved], [seen(command)], checks)
         ]
 
     return groups
 
 
-def _laws(motion: Sequence[Array], effort: Array, checks: Checks) -> list[_Law]:
+def _laws(motion: Sequence[Array], efforts: Sequence[Array], checks: Checks) -> list[_Law]:
     """What one effect each would add: springs, friction, masses, ripple; delays, compliance; backlash, dead zones."""
-    size = float(np.sqrt(np.mean(effort**2))) or 1.0
-    late = shifted(effort), shifted(np.tanh(effort / (SHARPNESS * size)))
+    sharp = [np.tanh(effort / (SHARPNESS * (float(np.sqrt(np.mean(effort**2))) or 1.0))) for effort in efforts]
+    late = [tuple(shifted(effort) for effort in each) for each in (efforts, sharp) if each]
     steady = [*(powers(part) for part in motion), *waves(motion[0], checks.waves, checks.waves_each)]
-    return [*(_Law(columns, False) for columns in steady), *(_Law(columns, True) for columns in late)]
+    return [*(_Law((columns,), False) for columns in steady), *(_Law(columns, True) for columns in late)]
 
 
 def _heard(late: Array, residual: Array, slopes: Array, counts: NDArray[np.bool_], size: float, clear: float) -> Array:
