@@ -27,7 +27,7 @@ from vpm.identify.prediction_error import PredictionErrorProblem
 from vpm.identify.problem import gaps
 from vpm.identify.remarks import constant_channels, contradictions, lost_channels, remarks, resting, touching
 from vpm.identify.sandwich import freedom, record_groups, sandwich
-from vpm.identify.settings import Checks, Fitting
+from vpm.identify.settings import Checks, Fitting, OwnSimulation
 from vpm.identify.shooting import ShootingProblem
 from vpm.identify.ties import TiedProblem, check_ties
 from vpm.identify.whiteness import Whiteness
@@ -46,8 +46,6 @@ FOLLOWING = frozenset({"inverse_dynamics", "prescribed_motion", "input_error"})
 RENEWALS, SETTLED = 4, 0.1
 #: Times that a fit beside unknown first states is begun again with what these do at its values, unless it has settled.
 ROUNDS = 8
-#: Most simulations of itself that correct a fit; one more where the last one moved a value by more than its deviation.
-REHEARSALS = 2
 #: What `Fit.first_states` says where no log says them.
 UNKNOWN = "unknown"
 
@@ -78,8 +76,9 @@ class Fit(Result):
         few samples; constant channels; a fit that Ctrl-C ended.
     whiteness : tuple of Whiteness
         What is left of each channel of each record, and how much of that the motion explains.
-    freedom : float
-        Degrees of freedom of Student's t in the intervals: fewer than samples, because neighbours resemble each other.
+    freedom : ndarray, shape (p,), or float
+        Degrees of freedom of Student's t in the intervals: fewer than samples, because neighbours resemble each other,
+        and fewer still where a few moments of the records decide.
     noise : dict
         ``{channel: standard deviation}`` that residuals were divided by, SI; empty where it was the signal's spread.
     states, states_std : dict
@@ -114,7 +113,7 @@ class Fit(Result):
     model: Model
     warnings: tuple[str, ...] = ()
     whiteness: tuple[Whiteness, ...] = ()
-    freedom: float = np.inf
+    freedom: Array | float = np.inf
     noise: dict[str, float] = field(default_factory=dict)
     states: dict[str, float] = field(default_factory=dict)
     states_std: dict[str, float] = field(default_factory=dict)
@@ -135,7 +134,8 @@ class Fit(Result):
     @property
     def intervals(self) -> Array:
         """95 % intervals, shape (p, 2)."""
-        half = stdtrit(self.freedom, 0.975) * self.std if np.isfinite(self.freedom) else ndtri(0.975) * self.std
+        known = np.isfinite(self.freedom)
+        half = np.where(known, stdtrit(np.where(known, self.freedom, 1.0), 0.975), ndtri(0.975)) * self.std
         return np.column_stack([self.values - half, self.values + half])
 
     def __getitem__(self, name: str) -> float:
@@ -263,9 +263,11 @@ def identify(
             found.evaluations,
         )
         fit = _with_details(fit_of(model, data, result, before, [e.name for e in records], ties or {}), data, found)
-    judged = whiteness(fit.model, records, data, result.residual, result.jacobian)
+    judged = whiteness(fit.model, records, data, result.residual, result.jacobian, checks or Checks())
     fit = replace(fit, setup=setup, fitting=fitting, ties=dict(ties or {}), whiteness=judged)
-    fit = replace(fit, freedom=freedom(data.blocks, len(names) + len(fit.states)))
+    unscaled = result.jacobian[: data.blocks[-1].samples.stop]
+    decided = freedom(unscaled / column_lengths(unscaled), data.blocks, len(names) + len(fit.states))[: len(names)]
+    fit = replace(fit, freedom=decided)
     return replace(fit, warnings=_told(model, records, data, fit, checks or Checks()))
 
 
@@ -301,7 +303,7 @@ def _beside_own(
     plain = data.untied if isinstance(data, TiedProblem) else data
     if best.interrupted or best.unseen or not isinstance(plain, InverseDynamicsProblem):
         return data, best
-    for _ in range(REHEARSALS):
+    for _ in range(OwnSimulation().rounds):
         fitted = _moved(model, best, ties)
         expected = own_residual(fitted, plain)
         if expected is None:

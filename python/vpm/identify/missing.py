@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import svd
 
 from vpm.errors import VpmError
 from vpm.experiment import Experiment
@@ -17,23 +19,37 @@ from vpm.identify.ties import TiedProblem
 from vpm.identify.whiteness import (
     SHARPNESS,
     Whiteness,
+    basis,
     default_lags,
     explained_by,
     explained_size,
     ljung_box,
     powers,
     shifted,
+    waves,
 )
 from vpm.initial import joint_motion
 from vpm.model import Model
 
 Array = NDArray[np.float64]
-#: Groups of regressors (n, k) of a record at the times of a block, for the joints named.
-Groups = Callable[[Sequence[str], Block], list[Array]]
+
+
+class _Law(NamedTuple):
+    """Regressors (n, k) of one effect by each of some signals, and whether they are that signal at other times.
+
+    An effect shows in all of them; what one of them has in common with a residual, the others need not have.
+    """
+
+    columns: tuple[Array, ...]
+    late: bool
+
+
+#: Laws of a record at the times of a block, for the joints named.
+Groups = Callable[[Sequence[str], Block], list[_Law]]
 
 
 def whiteness(
-    model: Model, records: Sequence[Experiment], data: AnyProblem, residual: Array, jacobian: Array
+    model: Model, records: Sequence[Experiment], data: AnyProblem, residual: Array, jacobian: Array, checks: Checks
 ) -> tuple[Whiteness, ...]:
     """Judge what is left of each channel of each record.
 
@@ -45,22 +61,25 @@ def whiteness(
     data : problem
     residual : ndarray, shape (n,)
     jacobian : ndarray, shape (n, p)
+    checks : Checks
     """
     untied = data.untied if isinstance(data, TiedProblem) else data
     groups = {
-        record.name: _of_balance(model, untied, number)
+        record.name: _of_balance(model, untied, number, checks)
         if isinstance(untied, InverseDynamicsProblem)
-        else _of_log(model, record)
+        else _of_log(model, record, checks)
         for number, record in enumerate(records)
     }
     judged = (
-        _judge(model, block, residual[block.samples], jacobian[block.samples], groups[block.experiment])
+        _judge(model, block, residual[block.samples], jacobian[block.samples], groups[block.experiment], checks)
         for block in data.blocks
     )
     return tuple(one for one in judged if one is not None)
 
 
-def _judge(model: Model, block: Block, residual: Array, slopes: Array, groups: Groups) -> Whiteness | None:
+def _judge(
+    model: Model, block: Block, residual: Array, slopes: Array, groups: Groups, checks: Checks
+) -> Whiteness | None:
     counts = block.moving > 0.0
     n = int(counts.sum())
     if n < FEWEST_SAMPLES or not np.all(np.isfinite(residual)) or block.scale == 0.0:
@@ -70,7 +89,15 @@ def _judge(model: Model, block: Block, residual: Array, slopes: Array, groups: G
         added = groups(_joints(model, block.channel), block)
     except VpmError:  # no motion can be had from this log
         added = []
-    tests = [explained_by(residual, slopes, columns, counts) for columns in added]
+    size = block.scale * block.weight
+
+    def explained(law: _Law) -> tuple[float, float]:
+        columns = law.columns
+        if law.late:
+            columns = tuple(_heard(each, residual, slopes, counts, size, checks.clear) for each in columns)
+        return max((explained_by(residual, slopes, each, counts) for each in columns), key=lambda test: test[1])
+
+    tests = [explained(law) for law in added]
     share, chance = min(tests, key=lambda test: test[1], default=(0.0, 1.0))
     visible = explained_size(share, residual[counts], block.weight) / block.scale
     white = ljung_box(residual[counts], lags)
@@ -87,47 +114,68 @@ def _joints(model: Model, channel: str) -> tuple[str, ...]:
     return tuple(model.joints)
 
 
-def _of_balance(model: Model, problem: InverseDynamicsProblem, record: int) -> Groups:
-    """Laws of the motion of joints and of the effort that it needs, as they are compared."""
-    motion = problem.state(record)
-    _, _, required = problem.effort(model, model.theta, record)
+def _of_balance(model: Model, problem: InverseDynamicsProblem, record: int, checks: Checks) -> Groups:
+    """Laws of the motion of joints, of the effort that it needs and of that which drives deliver, as they are compared.
 
-    def groups(joints: Sequence[str], _: Block) -> list[Array]:
+    What a drive did without being told is in the one, and what its controller heard of noise in the other.
+    """
+    motion = problem.state(record)
+    _, applied, required = problem.effort(model, model.theta, record)
+    efforts = [[of[:, k] for of in (required, applied) if np.any(of[:, k])] for k in range(len(problem.joints))]
+
+    def groups(joints: Sequence[str], _: Block) -> list[_Law]:
         places = [problem.joints.index(joint) for joint in joints if joint in problem.joints]
         return [
-            columns
+            law
             for place in places or range(len(problem.joints))
-            for columns in _laws([part[:, place] for part in motion], required[:, place])
+            for law in _laws([part[:, place] for part in motion], efforts[place], checks)
         ]
 
     return groups
 
 
-def _of_log(model: Model, record: Experiment) -> Groups:
+def _of_log(model: Model, record: Experiment, checks: Checks) -> Groups:
     """Laws of the motion of joints and of commands, at the times of a block."""
 
-    def groups(joints: Sequence[str], block: Block) -> list[Array]:
+    def groups(joints: Sequence[str], block: Block) -> list[_Law]:
         m = joint_motion(record, model)
         places = [m.joints.index(joint) for joint in joints if joint in m.joints] or list(range(len(m.joints)))
         commands = [record[channel] for channel in model.input_channels if channel in record]
+        moved = (m.position, m.velocity, m.acceleration)
 
         def seen(signal: Array) -> Array:
             return np.asarray(np.interp(block.time, record.time, signal))
 
         return [
-            columns
+            law
             for k in places
             for command in [m.acceleration[:, k], *commands]
-            for columns in _laws([seen(part[:, k]) for part in (m.position, m.velocity, m.acceleration)], seen(command))
+            for law in _laws([seen(part[:, k]) for part in moved], [seen(command)], checks)
         ]
 
     return groups
 
 
-def _laws(motion: Sequence[Array], effort: Array) -> list[Array]:
-    """What one effect each would add: springs, friction, masses; delays and compliance; backlash and dead zones."""
-    size = float(np.sqrt(np.mean(effort**2))) or 1.0
-    return [*(powers(part) for part in motion), shifted(effort), shifted(np.tanh(effort / (SHARPNESS * size)))]
+def _laws(motion: Sequence[Array], efforts: Sequence[Array], checks: Checks) -> list[_Law]:
+    """What one effect each would add: springs, friction, masses, ripple; delays, compliance; backlash, dead zones."""
+    sharp = [np.tanh(effort / (SHARPNESS * (float(np.sqrt(np.mean(effort**2))) or 1.0))) for effort in efforts]
+    late = [tuple(shifted(effort) for effort in each) for each in (efforts, sharp) if each]
+    steady = [*(powers(part) for part in motion), *waves(motion[0], checks.waves, checks.waves_each)]
+    return [*(_Law((columns,), False) for columns in steady), *(_Law(columns, True) for columns in late)]
+
+
+def _heard(late: Array, residual: Array, slopes: Array, counts: NDArray[np.bool_], size: float, clear: float) -> Array:
+    """Directions (n, k) of a signal at other times in which it stands clear of the noise.
+
+    An effort has in it what the residual is made of: noise of encoders, and all that a drive did without being told.
+    Where the rest of it is quiet, a few shifts of it would leave just that, and explain any residual by itself.
+    """
+    columns = late * counts[:, None]
+    known = basis(np.column_stack([slopes, late]) * counts[:, None])
+    left = (residual - known @ (known.T @ residual)) * counts
+    directions, sizes, _ = svd(columns, full_matrices=False)
+    least = clear * np.linalg.norm(left) / size * np.linalg.norm(columns) / np.sqrt(columns.shape[1] * counts.sum())
+    return np.asarray(directions[:, sizes > least])
 
 
 def missing_effects(judged: Sequence[Whiteness], checks: Checks) -> list[str]:

@@ -10,7 +10,7 @@ B. Efron and R. Tibshirani, *An Introduction to the Bootstrap*, 1993, chapter 10
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -18,29 +18,20 @@ from numpy.typing import NDArray
 
 from vpm.errors import VpmError
 from vpm.experiment import Experiment, Motion, noise_std
-from vpm.identify.along import has_hidden, has_own_drives
+from vpm.identify.along import bends, has_own_drives
 from vpm.identify.balance import InverseDynamicsProblem
+from vpm.identify.settings import OwnSimulation
+from vpm.initial import measured_states
 from vpm.model import Model
 from vpm.simulate import HOLDS
 from vpm.stepping import Simulation
 
 Array = NDArray[np.float64]
 
-#: Bandwidths with which a simulation is drawn to its log, Hz: the slower, the less it hears of the noise of the log.
-BANDS = (0.3, 1.0, 3.0)
-#: Damping of that.
-DAMPING = float(np.sqrt(0.5))
-#: Share of its motion by which a joint may be away from its log.
-AWAY = 0.3
-#: Where dry friction turns round, longer steps would be an error of the simulation that a fit takes for the machine's.
-METHOD = "adaptive(1e-7)"
-#: A model that leaves so many times more of a log than of its own simulation lacks something, which is more than this.
-ALIKE = 2.0
-#: Simulated logs with noise of their own; their mean adds a part of the variance that is one over their number.
-DRAWS = 6
 
-
-def own_residual(model: Model, data: InverseDynamicsProblem, seed: int = 0) -> Array | None:
+def own_residual(
+    model: Model, data: InverseDynamicsProblem, settings: OwnSimulation | None = None, seed: int = 0
+) -> Array | None:
     """What ``data`` leaves of simulations of ``model`` on the commands of its records, shape (n,).
 
     Parameters
@@ -48,67 +39,108 @@ def own_residual(model: Model, data: InverseDynamicsProblem, seed: int = 0) -> A
     model : Model
         At the values of a fit.
     data : InverseDynamicsProblem
+    settings : OwnSimulation, optional
     seed : int
         Of the noise.
 
     Returns
     -------
     ndarray or None
-        None where the model does not stay by its records or lacks something, or has states that these do not show.
+        None where the model does not stay by its records or lacks something, where nobody measured a joint, or where
+        drives have states of other kinds than cylinders.
     """
-    held = data.hold == HOLDS[0]
-    if not held or has_own_drives(model) or any(has_hidden(model, m.joints) for m in data.motions):
+    how = settings or OwnSimulation()
+    whole = all(tuple(model.joints) == tuple(m.joints) for m in data.motions)
+    if data.hold != HOLDS[0] or not whole or not _drawn_by_commands(model):
         return None
+    shown = (channel for channel in data.shown if channel in model.output_channels)
+    channels = (*(f"{joint}.position" for joint in model.joints), *shown)
     try:
-        made = [_simulated(model, e, m) for e, m in zip(data.experiments, data.motions, strict=True)]
-    except (VpmError, ArithmeticError):
+        made = [_simulated(model, e, m, channels, how) for e, m in zip(data.experiments, data.motions, strict=True)]
+    except (VpmError, ArithmeticError, np.linalg.LinAlgError):
         return None
     simulated = [one for one in made if one is not None]
     if len(simulated) < len(made):
         return None
-    levels, random, left = [_noise(e) for e in data.experiments], np.random.default_rng(seed), []
-    for _ in range(DRAWS):
-        noisy = [_noisy(one, level, random) for one, level in zip(simulated, levels, strict=True)]
-        # What is relative to the delivered effort is made so afterwards, with what is expected taken off.
-        left.append(InverseDynamicsProblem.evaluate(data.on(noisy), model, model.theta)[0])
+    levels, random, left = [_noise_levels(e, channels) for e in data.experiments], np.random.default_rng(seed), []
+    for _ in range(how.pairs):
+        noises = [_noise_like(one, level, random) for one, level in zip(simulated, levels, strict=True)]
+        for sign in (1.0, -1.0):
+            noisy = [replace(e, data=e.data + sign * noise) for e, noise in zip(simulated, noises, strict=True)]
+            # What is relative to the delivered effort is made so afterwards, with what is expected taken off.
+            left.append(InverseDynamicsProblem.evaluate(data.on(noisy), model, model.theta)[0])
     of_log = InverseDynamicsProblem.evaluate(data, model, model.theta)[0]
-    if not np.linalg.norm(of_log) <= ALIKE * np.linalg.norm(left) / np.sqrt(DRAWS):
+    if not np.linalg.norm(of_log) <= how.alike * np.linalg.norm(left) / np.sqrt(len(left)):
         return None
     return np.asarray(np.mean(left, axis=0))
 
 
-def _simulated(model: Model, log: Experiment, m: Motion) -> Experiment | None:
+def _drawn_by_commands(model: Model) -> bool:
+    """Whether all drives are ideal, whose commands push, or all are cylinders behind valves, whose commands move."""
+    return not has_own_drives(model) or all(model.actuator_type(name) == "hydraulic" for name in model.actuators)
+
+
+def _simulated(
+    model: Model, log: Experiment, m: Motion, channels: Sequence[str], how: OwnSimulation
+) -> Experiment | None:
     """The log as the model would have written it without noise; None where the model does not stay by it."""
-    for band in BANDS:
-        made = _drawn(model, log, m, band)
-        channels = [f"{joint}.position" for joint in model.joints]
-        if all(np.std(made[channel] - log[channel]) <= AWAY * np.std(log[channel]) for channel in channels):
+    for band in how.bands:
+        made = _drawn(model, log, m, channels, how, band)
+        joints = [f"{joint}.position" for joint in model.joints]
+        if all(np.std(made[channel] - log[channel]) <= how.away * np.std(log[channel]) for channel in joints):
             return made
     return None
 
 
-def _drawn(model: Model, log: Experiment, m: Motion, band: float) -> Experiment:
+def _drawn(
+    model: Model, log: Experiment, m: Motion, channels: Sequence[str], how: OwnSimulation, band: float
+) -> Experiment:
     """A simulation on the commands of a log, to which a slow controller adds what keeps it by the motion of the log."""
     omega, joints = 2.0 * np.pi * band, len(model.joints)
-    gains = _commands_per_effort(model, m) @ model.mass_matrix(np.mean(m.position, axis=0))
-    start = {f"{joint}.position": m.position[0, n] for n, joint in enumerate(model.joints)}
-    start |= {f"{joint}.velocity": m.velocity[0, n] for n, joint in enumerate(model.joints)}
-    sim = Simulation(model, m.dt, integrator=METHOD, state=start, compiled=True)
-    places = [sim.channels.index(f"{joint}.position") for joint in model.joints]
-    positions, commands = np.empty_like(m.position), np.empty_like(m.inputs)
+    by_position, by_velocity = _gains(model, m, omega, how.damping)
+    start = measured_states(model, log, model.theta, np.zeros(1, dtype=np.int64), m.cutoff, m)[0]
+    sim = Simulation(model, m.dt, integrator=how.method, state=start, compiled=True)
+    read = [sim.channels.index(channel) for channel in channels]
+    speeds = slice(len(model.coordinates), len(model.coordinates) + joints)
+    outputs, commands = np.empty((len(m.time), len(read))), np.empty_like(m.inputs)
     for k, (position, velocity, command) in enumerate(zip(m.position, m.velocity, m.inputs, strict=True)):
-        positions[k] = sim.outputs[places]
-        ahead = omega**2 * (position - positions[k])
-        ahead += 2.0 * DAMPING * omega * (velocity - sim.state[joints : 2 * joints])
-        commands[k] = command + gains @ ahead
+        outputs[k] = sim.outputs[read]
+        commands[k] = command + by_position @ (position - outputs[k, :joints])
+        if by_velocity is not None:
+            commands[k] += by_velocity @ (velocity - sim.state[speeds])
         sim.step(commands[k])
     data = np.array(log.data)
-    for n, joint in enumerate(model.joints):
-        data[:, log.channels.index(f"{joint}.position")] = positions[:, n]
-    for n, channel in enumerate(m.drivers):
-        if channel in log:
-            data[:, log.channels.index(channel)] = commands[:, n]
+    for values, names in ((outputs, channels), (commands, m.drivers)):
+        for column, channel in enumerate(names):
+            if channel in log:
+                data[:, log.channels.index(channel)] = values[:, column]
     return replace(log, data=data)
+
+
+def _gains(model: Model, m: Motion, omega: float, damping: float) -> tuple[Array, Array | None]:
+    """Commands per missing position and velocity (nu, n) that draw joints to a log at a bandwidth, rad/s."""
+    if has_own_drives(model):
+        return omega * _commands_per_velocity(model, m), None
+    pushing = _commands_per_effort(model, m) @ _mass_matrix(model, m)
+    return omega**2 * pushing, 2.0 * damping * omega * pushing
+
+
+def _mass_matrix(model: Model, m: Motion) -> Array:
+    """Inertia of the joints (n, n) in the middle of the motion, links held as they hang there."""
+    position, joints = np.mean(m.position, axis=0), len(model.joints)
+    coordinates = model.core.equilibrium(model.theta, position)[0] if bends(model) else position
+    return np.asarray(model.core.mass_matrix(model.theta, coordinates))[:joints, :joints]
+
+
+def _commands_per_velocity(model: Model, m: Motion) -> Array:
+    """By how much commands have to change for a velocity of each joint (nu, n), as they did along the log."""
+    commands, velocities = (values - np.mean(values, axis=0) for values in (m.inputs, m.velocity))
+    moved = np.zeros((len(model.joints), m.inputs.shape[1]))
+    for column, name in enumerate(model.actuators):
+        for joint in model.joints_of_actuator(name):
+            row, power = model.joints.index(joint), float(np.sum(commands[:, column] ** 2))
+            moved[row, column] = float(velocities[:, row] @ commands[:, column]) / max(power, 1e-300)
+    return np.asarray(np.linalg.pinv(moved))
 
 
 def _commands_per_effort(model: Model, m: Motion) -> Array:
@@ -117,21 +149,23 @@ def _commands_per_effort(model: Model, m: Motion) -> Array:
 
     def delivered(inputs: Array) -> Array:
         held = np.tile(inputs, (len(rest), 1))
+        if bends(model):
+            return np.asarray(model.core.delivered(model.theta, held, m.dt)[0][-1])
         return np.asarray(model.core.inverse_dynamics(model.theta, rest, rest, rest, held, m.dt, [])[1][-1])
 
     columns = [(delivered(step) - delivered(-step)) / (2.0 * max(np.sum(step), 1e-300)) for step in np.diag(sizes)]
     return np.asarray(np.linalg.pinv(np.column_stack(columns)))
 
 
-def _noise(log: Experiment) -> dict[int, float]:
-    """Noise of the positions of a log, by the places of their channels."""
-    places = [place for place, name in enumerate(log.channels) if name.endswith(".position")]
+def _noise_levels(log: Experiment, channels: Sequence[str]) -> dict[int, float]:
+    """Noise of some channels of a log, by their places."""
+    places = [log.channels.index(channel) for channel in channels]
     return {place: noise_std(log.data[:, place]) for place in places}
 
 
-def _noisy(made: Experiment, levels: Mapping[int, float], random: np.random.Generator) -> Experiment:
-    """With noise of these levels."""
-    data = np.array(made.data)
+def _noise_like(log: Experiment, levels: Mapping[int, float], random: np.random.Generator) -> Array:
+    """Noise of these levels, of the shape of the log's data."""
+    noise = np.zeros_like(log.data)
     for place, level in levels.items():
-        data[:, place] += level * random.standard_normal(len(data))
-    return replace(made, data=data)
+        noise[:, place] = level * random.standard_normal(len(noise))
+    return noise

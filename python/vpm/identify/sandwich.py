@@ -51,10 +51,7 @@ def sandwich(jacobian: Array, residual: Array, groups: Sequence[Sequence[slice]]
     -------
     ndarray, shape (p, p)
     """
-    bread = np.linalg.pinv(jacobian.T @ jacobian, hermitian=True)
-    left = 1.0 - np.einsum("ij,jk,ik->i", jacobian, bread, jacobian)
-    left[list(exact)] = 1.0
-    scores = jacobian * (residual / np.maximum(left, LEAST_LEFT))[:, None]
+    bread, scores = _bread_and_scores(jacobian, residual, exact)
     meat = scores[list(exact)].T @ scores[list(exact)]
     for group in groups:
         meat = meat + _long_run(np.sum([scores[rows] for rows in group], axis=0))
@@ -62,15 +59,50 @@ def sandwich(jacobian: Array, residual: Array, groups: Sequence[Sequence[slice]]
     return 0.5 * (covariance + covariance.T)
 
 
-def freedom(blocks: Sequence[Block], unknowns: int) -> float:
-    """Degrees of freedom of the covariance: those of Bartlett's weights, ``3/2 n / (lags + 1)``, at least 1.
+def white_sandwich(jacobian: Array, residual: Array) -> Array:
+    """The same for residuals (n,) that are unequal, but do not know of each other."""
+    bread, scores = _bread_and_scores(jacobian, residual)
+    return np.asarray(bread @ (scores.T @ scores) @ bread)
 
-    (M. Priestley, *Spectral Analysis and Time Series*, 1981, table 6.1, halved at frequency zero.) Samples that do not
-    count and the unknowns take theirs.
+
+def _bread_and_scores(jacobian: Array, residual: Array, exact: Sequence[int] = ()) -> tuple[Array, Array]:
+    """``(J'J)^-1``, and the scores with residuals divided by what a fit leaves of each."""
+    bread = np.asarray(np.linalg.pinv(jacobian.T @ jacobian, hermitian=True), dtype=np.float64)
+    left = 1.0 - np.einsum("ij,jk,ik->i", jacobian, bread, jacobian)
+    left[list(exact)] = 1.0
+    return bread, jacobian * (residual / np.maximum(left, LEAST_LEFT))[:, None]
+
+
+def freedom(jacobian: Array, blocks: Sequence[Block], unknowns: int) -> Array:
+    """Degrees of freedom (p,) of the variance of each estimate, at least 1.
+
+    ``(sum q)^2 / sum q^2`` of what stretches of the records share in it, as if all residuals were equally large (F.
+    Satterthwaite, *Biometrics* 2, 1946; R. Bell and D. McCaffrey, *Survey Methodology* 28, 2002): few where a few
+    moments decide, as those at which friction turns round. A stretch is as long as Bartlett's weights resemble: of
+    ``n`` equal samples there are ``3/2 n / (lags + 1)`` (M. Priestley, *Spectral Analysis and Time Series*, 1981, table
+    6.1, halved at frequency zero). Samples that do not count and the unknowns take theirs.
+
+    Parameters
+    ----------
+    jacobian : ndarray, shape (n, p)
+        Columns of similar length.
+    blocks : sequence of Block
+    unknowns : int
+        Parameters and first states.
     """
-    counted = [float(block.moving.sum()) for block in blocks]
-    share = max(0.0, 1.0 - unknowns / max(sum(counted), 1.0))
-    return max(1.0, share * sum(1.5 * n / (_lags(n) + 1.0) for n in counted if n > 0.0))
+    bread = np.linalg.pinv(jacobian.T @ jacobian, hermitian=True)
+    decided, shares = (jacobian @ bread) ** 2, []
+    for group in record_groups(blocks):
+        counts = np.any([block.moving > 0.0 for block in blocks if block.samples in group], axis=0)
+        rows = np.sum([decided[samples] for samples in group], axis=0)[counts]
+        if len(rows):
+            length = (_lags(len(rows)) + 1.0) / 1.5
+            shares.append(np.add.reduceat(rows, np.unique(np.arange(0.0, len(rows), length).astype(np.int64))))
+    counted = max(float(sum(block.moving.sum() for block in blocks)), 1.0)
+    stretches = np.concatenate(shares) if shares else np.zeros((1, decided.shape[1]))
+    squares = np.sum(stretches**2, axis=0)
+    free = np.sum(stretches, axis=0) ** 2 / np.where(squares > 0.0, squares, 1.0)
+    return np.asarray(np.maximum(1.0, max(0.0, 1.0 - unknowns / counted) * free))
 
 
 def _lags(samples: float) -> int:

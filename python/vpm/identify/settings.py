@@ -116,6 +116,11 @@ class Checks(Storable):
         is said.
     far : float
         Deviations, stated and estimated together, beyond which an estimate contradicts the model file.
+    clear : float
+        Times that an effort at other times has to be larger than the noise, in each direction, to be asked whether it
+        explains a residual.
+    waves, waves_each : int
+        Waves that laws of position have over its range, and how many are asked at a time: ripple of motors and teeth.
     begun : float
         Probability that first states are taken as unknown although those that the log suggests are right.
     """
@@ -123,11 +128,51 @@ class Checks(Storable):
     level: float = 1e-6
     visible: float = 2e-3
     far: float = 3.0
+    clear: float = 5.0
+    waves: int = 32
+    waves_each: int = 4
     begun: float = 0.05
 
     def __post_init__(self) -> None:
         """Check the numbers."""
-        _positive({"level": self.level, "visible": self.visible, "far": self.far, "begun": self.begun})
+        names = ("level", "visible", "far", "clear", "waves", "waves_each", "begun")
+        _positive({name: getattr(self, name) for name in names})
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class OwnSimulation(Storable):
+    """How a fit is compared with simulations of its own model, see `vpm.identify.own_simulation`.
+
+    Attributes
+    ----------
+    bands : tuple of float
+        Bandwidths with which a simulation is drawn to its log, Hz: the slower, the less it hears of the noise of the
+        log.
+    damping : float
+        Of that.
+    away : float
+        Share of its motion by which a joint may be away from its log.
+    method : str
+        Integrator. Where dry friction turns round, longer steps would be an error of the simulation that a fit takes
+        for the machine's.
+    alike : float
+        A model that leaves so many times more of a log than of its own simulation lacks something, which is more than
+        this.
+    pairs : int
+        Pairs of simulated logs, one with the noise of the other turned round. What is linear in noise cancels from
+        their mean, so that it adds next to nothing to the variance of a fit (antithetic variates: J. Hammersley and K.
+        Morton, *Proc. Cambridge Philosophical Society* 52, 1956).
+    rounds : int
+        Most simulations that correct a fit; one more where the last one moved a value by more than its deviation.
+    """
+
+    bands: tuple[float, ...] = (0.3, 1.0, 3.0)
+    damping: float = 0.5**0.5
+    away: float = 0.3
+    method: str = "adaptive(1e-7)"
+    alike: float = 2.0
+    pairs: int = 3
+    rounds: int = 2
 
 
 def _positive(numbers: Mapping[str, float]) -> None:
