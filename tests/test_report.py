@@ -13,6 +13,7 @@ import pytest
 
 import vpm
 from vpm.demo import MODEL, TRAIN, VALIDATION
+from vpm.discrepancy.diagnosis import RefusedEffect
 from vpm.numbers import percent, short
 from vpm.report.words import estimate, took
 
@@ -260,3 +261,14 @@ def test_numbers_are_rounded_in_one_way() -> None:
         *("30.45 %", "0.96 %", "0.015 %", "-25.00 %", "0.00 %", "0.00 %"),
     ]
     assert [percent(float("nan")), short(float("nan")), short(0.451234)] == ["–", "–", "0.4512"]
+
+
+def test_long_tables_are_cut_and_say_what_stands_elsewhere(diagnosis: vpm.Diagnosis) -> None:
+    """Hundreds of candidates of a large machine, and of each a reason; pictures make room for them."""
+    refused = vpm.discrepancy.Refused(
+        "spring", "axis", "no value of its parameters helps on the data that were not used"
+    )
+    many = replace(diagnosis, candidates=diagnosis.candidates[:1] * 9000, refused=(refused,) * 9000)
+    html = vpm.report(many)._repr_html_()
+    assert len(html.encode()) < LARGEST
+    assert html.count("8700 more stand in report.json") == 2

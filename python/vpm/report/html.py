@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.resources import files
 from os import PathLike
@@ -15,8 +16,10 @@ from vpm.report.pictures import Drawn, drawn, finding, pictures, within
 from vpm.report.words import VERDICT_WORDS, estimate, last_stage, probability, refitted, step_name, took
 from vpm.simplify import Ladder
 
-#: Characters that the pictures of a page may take together: a page stays below a megabyte.
-ROOM = 850_000
+#: Characters of a page beside the words of its pictures, so that it stays below a megabyte.
+ROOM = 950_000
+#: Rows of a table that grows with the machine; `report.json` has all.
+ROWS = 300
 
 
 @dataclass(frozen=True)
@@ -84,18 +87,22 @@ def render_html(diagnosis: Diagnosis, ladder: Ladder | None = None) -> str:
     environment.globals.update(estimate=estimate)
     template = environment.from_string((files("vpm.report") / "report.html.jinja").read_text(encoding="utf-8"))
     evidence = {(e.effect, e.site): finding(e, n) for n, e in enumerate(diagnosis.evidence, 1)}
-    shown, left_out = within(ROOM - sum(len(one.svg) for one in evidence.values()), pictures(diagnosis))
-    return template.render(
-        d=diagnosis,
-        words=VERDICT_WORDS[diagnosis.verdict],
-        evidence=evidence,
-        pictures=shown,
-        left_out=left_out,
-        refitted=refitted(diagnosis),
-        last_stage=last_stage(diagnosis),
-        ladder=ladder,
-        way_down=_way_down(ladder) if ladder is not None else None,
-    )
+
+    def page(shown: Sequence[Drawn], left_out: Sequence[Drawn]) -> str:
+        return template.render(
+            d=diagnosis,
+            words=VERDICT_WORDS[diagnosis.verdict],
+            evidence=evidence,
+            pictures=shown,
+            left_out=left_out,
+            rows=ROWS,
+            refitted=refitted(diagnosis),
+            last_stage=last_stage(diagnosis),
+            ladder=ladder,
+            way_down=_way_down(ladder) if ladder is not None else None,
+        )
+
+    return page(*within(ROOM - len(page((), ())), pictures(diagnosis)))
 
 
 def _way_down(ladder: Ladder) -> Drawn:
