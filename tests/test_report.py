@@ -265,9 +265,7 @@ def test_numbers_are_rounded_in_one_way() -> None:
 
 def test_long_tables_are_cut_and_say_what_stands_elsewhere(diagnosis: vpm.Diagnosis) -> None:
     """Hundreds of candidates of a large machine, and of each a reason; pictures make room for them."""
-    refused = vpm.discrepancy.Refused(
-        "spring", "axis", "no value of its parameters helps on the data that were not used"
-    )
+    refused = RefusedEffect("spring", "axis", "no value of its parameters helps on data that were not used for the fit")
     many = replace(diagnosis, candidates=diagnosis.candidates[:1] * 9000, refused=(refused,) * 9000)
     html = vpm.report(many)._repr_html_()
     assert len(html.encode()) < LARGEST
