@@ -43,14 +43,6 @@ def pseudo_inertia(ten: Array) -> Array:
     return np.block([[second, first[:, None]], [first[None, :], np.array([[mass]])]])
 
 
-def ten_parameters(matrix: Array) -> Array:
-    """The ten parameters (10,) of a pseudo-inertia (4, 4); linear, so that it serves for derivatives too."""
-    second = matrix[:3, :3]
-    inertia = np.trace(second) * np.eye(3) - second
-    entries = inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
-    return np.array([matrix[3, 3], *matrix[:3, 3], *entries])
-
-
 def fault(ten: Array) -> str:
     """What no body can have in ten parameters; empty if some body has them."""
     mass = float(ten[0])

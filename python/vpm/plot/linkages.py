@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from vpm.plot.style import BLUE, GREEN, INK, LINE, ORANGE, SOFT, panels, styled
+from vpm.plot.style import BLUE, GREEN, INK, ORANGE, panels, styled
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -129,41 +129,4 @@ def plot_shares(first: Array, second: Array, maps: Mapping[str, Array], title: s
     rows[0][0].set_ylabel("hip angle [deg]")
     figure.colorbar(mesh, ax=rows[0], label="largest share [%]", shrink=0.9)
     figure.suptitle(title, fontsize=11, x=0.01, ha="left")
-    return figure
-
-
-@styled
-def plot_planar_motion(
-    time: Array, angles: Array, reference: Array, tips: Array, strains: Array, gauges: Sequence[str]
-) -> Figure:
-    """Draw the motion of a planar arm: path of the tip, joint angles with their references, strains.
-
-    Parameters
-    ----------
-    time : ndarray, shape (N,)
-        In s.
-    angles, reference : ndarray, shape (N, n)
-        In rad.
-    tips : ndarray, shape (N, 2)
-        In m.
-    strains : ndarray, shape (N, G)
-    gauges : sequence of str
-    """
-    figure, rows = panels(1, 3, height=3.2, width=13.0)
-    path, turn, strain = rows[0]
-    path.plot(tips[:, 0], tips[:, 1], color=BLUE)
-    path.set_aspect("equal")
-    path.set_xlabel("x [m]")
-    path.set_ylabel("y [m]")
-    path.set_title("tip")
-    for k, colour in zip(range(angles.shape[1]), (BLUE, ORANGE), strict=False):
-        turn.plot(time, np.degrees(reference[:, k]), color=SOFT if k else LINE, linestyle="--")
-        turn.plot(time, np.degrees(angles[:, k]), color=colour, label=f"joint {k + 1}")
-    turn.set_title("joint angle [deg]; dashed: reference")
-    for k, name in enumerate(gauges):
-        strain.plot(time, 1e6 * strains[:, k], label=name)
-    strain.set_title("strain [1e-6]")
-    for axes in (turn, strain):
-        axes.set_xlabel("time [s]")
-        axes.legend()
     return figure
