@@ -6,8 +6,8 @@ no sensor gives. Each is drawn by the seed, forty to a machine, and planted on a
 that lacks an effect. It counts as named if the first finding has its kind and its channel. Without ``--planted`` logs
 are left as they are, and any mistake that is named is false.
 
-    python benches/log_check/log_check.py planted axis_linear arm2r --seeds 1-2
-    python benches/log_check/log_check.py clean axis_linear --seeds 1-20
+    python benches/log_check.py planted axis_linear arm2r --seeds 1-2
+    python benches/log_check.py clean axis_linear --seeds 1-20
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from pathlib import Path
 import numpy as np
 from scipy.signal import butter, lfilter
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent.parent / "tests"))
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
 
 from blind import proving
 from blind.case import Case
