@@ -47,7 +47,7 @@ class Traits:
     close_to_rest: bool = False
     """Whether it acts while a joint lets go, which filtered records hardly show and runs of the model do."""
     usual: Usual = ""
-    """What joints have of themselves: no log is blamed for what friction leaves, nor called late for a force."""
+    """What joints have of themselves, so that no log is blamed for it; a force may look like a wrong sign."""
     late: Late = ""
     """How what it passes on comes late."""
     scales: bool = False

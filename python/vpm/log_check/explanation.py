@@ -13,7 +13,7 @@ from vpm.discrepancy.side_by_side import Failure, SideBySide
 from vpm.experiment import Experiment
 from vpm.log_check.correction import Correction, Pair
 from vpm.log_check.corrections import delays, of_two, scales
-from vpm.log_check.shares import FORCES, Judge, Shares
+from vpm.log_check.shares import FORCES, FRICTION, Judge, Shares
 
 Change = TypeVar("Change", Correction, Pair)
 
@@ -121,13 +121,22 @@ class Explainer:
 
     def _ended(self, part: Experiment, used: Sequence[str], left: Shares) -> list[_Trial]:
         """Corrections with what is left before and after each, the model fitted, the least first."""
+        if not left.above(self.settings.negligible):
+            return []
+        freed = self.judge.fitted(part, FORCES)
 
         def ended(correction: Correction) -> _Trial:
-            return _Trial(correction, left, self.judge.fitted(correction.applied(part)))
+            corrected = correction.applied(part)
+            found = _Trial(correction, freed, self.judge.fitted(corrected, FORCES))
+            if not (correction.swap or correction.factor < 0.0):
+                return found
+            # A constant force is the mirror image of a weight, and may hide or explain it.
+            plain = _Trial(correction, left, self.judge.fitted(corrected, FRICTION))
+            return min(plain, found, key=lambda one: one.after.cost - one.before.cost)
 
         found = self.each("fitting", ended, self._finalists(part, used, left), self._words)
-        if left.above(self.settings.negligible) and part.duration * self.settings.band >= self.settings.periods:
-            found = [*found, *self._late(part, used)]
+        if part.duration * self.settings.band >= self.settings.periods:
+            found = [*found, *self._late(part, used, freed)]
         return sorted((one for one in found if not isinstance(one, Failure)), key=lambda one: one.after.order)
 
     def _best(self, ended: Sequence[_Trial], used: Sequence[str]) -> Explanation | None:
@@ -194,9 +203,8 @@ class Explainer:
 
         return self._few(self.each("trying", measure, corrections, self._words), before)
 
-    def _late(self, part: Experiment, used: Sequence[str]) -> list[_Trial]:
+    def _late(self, part: Experiment, used: Sequence[str], left: Shares) -> list[_Trial]:
         """The few delays that promise to leave least if parameters give way: friction looks much like a delay."""
-        left = self.judge.fitted(part, FORCES)
         tangent = self.judge.tangent(part, left, FORCES)
         if tangent is None:
             return []

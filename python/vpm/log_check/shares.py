@@ -27,7 +27,7 @@ from vpm.weighing.priors import Prior
 Array = NDArray[np.float64]
 #: Friction that a joint may have without being described: nothing of it passes for a mistake of a log.
 FRICTION = tuple(name for name, effect in EFFECTS.items() if effect.usual == "friction")
-#: Nor do these pass for a delay. They may hide a sign: where a machine is heavy, a constant force is its mirror image.
+#: Nor do these, unless a sign is in doubt: where a machine is heavy, a constant force is its mirror image.
 FORCES = tuple(name for name, effect in EFFECTS.items() if effect.usual)
 #: Powers of speed that what it resists goes with.
 POWERS = {"effort_per_speed": 1, "effort_per_speed_squared": 2}
