@@ -144,11 +144,12 @@ class Judge:
         """Shares when the uncertain parameters of the model, and such forces of its joints, have been fitted."""
         from scipy.stats import chi2  # slow to import, and seldom needed
 
-        observer = self._observer(record)
+        observer, structure = self._observer(record), self._structure(record, forces)
+        if set(forces) > set(FRICTION):  # from where fewer of them lead to: from nothing they may end elsewhere
+            structure = replace(structure, theta=self.fitted(record).values)
         try:
             observed = self._observed(record, observer)
             fitter = Fitter(observed, RankingSettings(bands=(observer.band,)))
-            structure = self._structure(record, forces)
             fitted = fitter.fitted(structure, observer, View(fitter.noise_of(structure, observer)))
         except ASTRAY:
             return self.measured(record)
