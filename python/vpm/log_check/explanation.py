@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import NamedTuple, TypeVar
 
 import numpy as np
@@ -13,7 +14,7 @@ from vpm.discrepancy.side_by_side import Failure, SideBySide
 from vpm.experiment import Experiment
 from vpm.log_check.correction import Correction, Pair
 from vpm.log_check.corrections import delays, of_two, scales
-from vpm.log_check.shares import FORCES, FRICTION, Judge, Shares
+from vpm.log_check.shares import FORCES, FRICTION, Judge, Shares, Tangent
 
 Change = TypeVar("Change", Correction, Pair)
 
@@ -204,33 +205,38 @@ class Explainer:
         return self._few(self.each("trying", measure, corrections, self._words), before)
 
     def _late(self, part: Experiment, used: Sequence[str], left: Shares) -> list[_Trial]:
-        """The few delays that promise to leave least if parameters give way: friction looks much like a delay."""
-        tangent = self.judge.tangent(part, left, FORCES)
-        if tangent is None:
-            return []
+        """The few delays that promise to leave least if parameters give way: friction looks much like a delay.
+
+        From fitted values, and from those of the model: a long delay drives fitted ones far away.
+        """
         some = left.above(self.settings.negligible)
         corrections = self._about(delays(self.model, used, self.settings), some, left)
-
-        def measure(correction: Correction) -> tuple[Correction, Shares]:
-            shares = left
-            for _ in range(self.settings.rounds):  # by secants: a long delay is not linear in what it leaves
-                corrected = correction.applied(part)
-                there = self.judge.measured(corrected, left.values)
-                if there.residual is None:
-                    return correction, there
-                shares, share = tangent.promised(corrected, part, there.residual)
-                delay = self._possible(share * correction.delay)
-                if abs(delay) <= 0.5 * part.dt:
-                    return correction, left
-                near = abs(delay - correction.delay) < self.settings.settled * part.dt
-                correction = replace(correction, delay=delay)
-                if near:
-                    break
-            return correction, shares
-
-        few = self._few(self.each("trying", measure, corrections, self._words), left)
+        tried: list[tuple[Correction, Shares] | Failure] = []
+        for at in (left, self.judge.measured(part)):
+            if (tangent := self.judge.tangent(part, at, FORCES)) is not None:
+                promised = partial(self._promised, part=part, tangent=tangent)
+                tried += self.each("trying", promised, corrections, self._words)
+        few = self._few(tried, left)
         found = self.each("refining", lambda one: self._settled(one, part, left), few, self._words)
         return [one for one in found if not isinstance(one, Failure) and abs(one.correction.delay) > 0.5 * part.dt]
+
+    def _promised(self, correction: Correction, part: Experiment, tangent: Tangent) -> tuple[Correction, Shares]:
+        """A delay by which a tangent promises to leave least, by secants: what is left is not linear in a long one."""
+        shares = tangent.shares
+        for _ in range(self.settings.rounds):
+            corrected = correction.applied(part)
+            there = self.judge.measured(corrected, tangent.shares.values)
+            if there.residual is None:
+                return correction, there
+            shares, share = tangent.promised(corrected, part, there.residual)
+            delay = self._possible(share * correction.delay)
+            if abs(delay) <= 0.5 * part.dt:
+                return correction, tangent.shares
+            near = abs(delay - correction.delay) < self.settings.settled * part.dt
+            correction = replace(correction, delay=delay)
+            if near:
+                break
+        return correction, shares
 
     def _few(self, tried: Sequence[tuple[Correction, Shares] | Failure], before: Shares) -> list[Correction]:
         """The corrections that leave least, one of each kind, and less than is left without any."""
