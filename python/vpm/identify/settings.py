@@ -139,8 +139,8 @@ class Checks(Storable):
         _positive({name: getattr(self, name) for name in names})
 
 
-@dataclass(frozen=True, repr=False, eq=False)
-class OwnSimulation(Storable):
+@dataclass(frozen=True)
+class OwnSimulation:
     """How a fit is compared with simulations of its own model, see `vpm.identify.own_simulation`.
 
     Attributes

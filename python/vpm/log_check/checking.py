@@ -128,7 +128,7 @@ class _Check:
             for one in explanations:
                 changed = one.correction.entries(table)
                 table = {**table, **changed}
-                found.append(_finding(one, units, changed, record.name))
+                found.append(_finding(one, units, changed, record.name, self.settings))
                 part, left = one.correction.applied(part), one.after
             if not explanations:
                 break
@@ -153,12 +153,19 @@ def _beginning(record: Experiment, outputs: Sequence[str], settings: Settings) -
     return replace(record, time=record.time[kept], data=record.data[kept])
 
 
-def _finding(found: Explanation, units: Mapping[str, str], changed: Mapping[str, ChannelEntry], record: str) -> Finding:
+def _finding(
+    found: Explanation,
+    units: Mapping[str, str],
+    changed: Mapping[str, ChannelEntry],
+    record: str,
+    settings: Settings,
+) -> Finding:
     """What is said of a correction that explains a record."""
     correction, before, after = found.correction, found.before.by_channel, found.after.by_channel
     said = ", or ".join(one.sentence(units) for one in (correction, *found.rivals))
-    if not found.is_mistake:
+    if found.is_possible:
         said += " (a clock of the log, or a delay of the machine or of its sensors)"
+    harms = not correction.delay or max(before[name] for name in found.affected) > settings.harmless
     place = min(found.affected, key=lambda name: after[name] / max(before[name], 1e-300))
     lines = {channel: line_of(channel, entry) for channel, entry in changed.items()}
     return Finding(
@@ -167,7 +174,7 @@ def _finding(found: Explanation, units: Mapping[str, str], changed: Mapping[str,
         (record,),
         f"{said}; {_evidence(found, place)}",
         f"write {' and '.join(lines.values())}" if lines else correction.repair,
-        found.is_mistake,
+        harms and not found.is_possible,
         correction.factor,
         correction.delay,
         (before[place], after[place]),

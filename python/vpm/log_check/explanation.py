@@ -47,9 +47,9 @@ class Explanation:
     at_once: bool = False
 
     @property
-    def is_mistake(self) -> bool:
-        """Whether no machine does that by itself."""
-        return not any(one.is_possible for one in (self.correction, *self.rivals))
+    def is_possible(self) -> bool:
+        """Whether a machine may do that by itself."""
+        return any(one.is_possible for one in (self.correction, *self.rivals))
 
 
 class _Trial(NamedTuple):
@@ -218,7 +218,8 @@ class Explainer:
                 tried += self.each("trying", promised, corrections, self._words)
         few = self._few(tried, left)
         found = self.each("refining", lambda one: self._settled(one, part, left), few, self._words)
-        return [one for one in found if not isinstance(one, Failure) and abs(one.correction.delay) > 0.5 * part.dt]
+        least = self.settings.held * part.dt
+        return [one for one in found if not isinstance(one, Failure) and abs(one.correction.delay) > least]
 
     def _promised(self, correction: Correction, part: Experiment, tangent: Tangent) -> tuple[Correction, Shares]:
         """A delay by which a tangent promises to leave least, by secants: what is left is not linear in a long one."""
@@ -230,7 +231,7 @@ class Explainer:
                 return correction, there
             shares, share = tangent.promised(corrected, part, there.residual)
             delay = self._possible(share * correction.delay)
-            if abs(delay) <= 0.5 * part.dt:
+            if abs(delay) <= self.settings.held * part.dt:
                 return correction, tangent.shares
             near = abs(delay - correction.delay) < self.settings.settled * part.dt
             correction = replace(correction, delay=delay)

@@ -68,6 +68,10 @@ class Settings:
         Delays of channels that are tried, s: by these the change of what is left is taken as linear.
     latest : float
         Longest delay that is told, s.
+    held : float
+        Delays of fewer samples are how commands are held from one sample to the next.
+    harmless : float
+        Share of a channel up to which what a delay leaves harms no conclusion: it is told, but is no mistake.
     settled : float
         A delay is as the record has it when it moves by less, in samples.
     stuck : int
@@ -122,6 +126,8 @@ class Settings:
     smallest: float = 2.0
     delays: tuple[float, ...] = (0.01, 0.05)
     latest: float = 0.1
+    held: float = 0.75
+    harmless: float = 1e-3
     settled: float = 0.1
     stuck: int = 20
     jump: float = 3.0
