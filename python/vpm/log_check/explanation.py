@@ -89,6 +89,8 @@ class Explainer:
         ended = self._ended(part, used, left)
         if (best := self._best(ended, used)) is not None:
             return [best]
+        if not left.above(self.settings.harmless):
+            return []
         return self._at_once(part, used, left) or self._one_by_one(ended, part, used)
 
     def _at_once(self, part: Experiment, used: Sequence[str], left: Shares) -> list[Explanation]:
@@ -207,19 +209,22 @@ class Explainer:
     def _late(self, part: Experiment, used: Sequence[str], left: Shares) -> list[_Trial]:
         """The few delays that promise to leave least if parameters give way: friction looks much like a delay.
 
-        From fitted values, and from those of the model: a long delay drives fitted ones far away.
+        From fitted values, else from those of the model: a long delay drives fitted ones far away.
         """
         some = left.above(self.settings.negligible)
         corrections = self._about(delays(self.model, used, self.settings), some, left)
-        tried: list[tuple[Correction, Shares] | Failure] = []
-        for at in (left, self.judge.measured(part)):
-            if (tangent := self.judge.tangent(part, at, FORCES)) is not None:
-                promised = partial(self._promised, part=part, tangent=tangent)
-                tried += self.each("trying", promised, corrections, self._words)
-        few = self._few(tried, left)
-        found = self.each("refining", lambda one: self._settled(one, part, left), few, self._words)
-        least = self.settings.held * part.dt
-        return [one for one in found if not isinstance(one, Failure) and abs(one.correction.delay) > least]
+        least, found = self.settings.held * part.dt, list[_Trial]()
+        for fitted in (True, False):
+            at = left if fitted else self.judge.measured(part)
+            if (tangent := self.judge.tangent(part, at, FORCES)) is None:
+                continue
+            promised = partial(self._promised, part=part, tangent=tangent)
+            few = self._few(self.each("trying", promised, corrections, self._words), left)
+            settled = self.each("refining", lambda one: self._settled(one, part, left), few, self._words)
+            found += [one for one in settled if not isinstance(one, Failure) and abs(one.correction.delay) > least]
+            if any(self._explains(*one) for one in found) or not left.above(self.settings.harmless):
+                break
+        return found
 
     def _promised(self, correction: Correction, part: Experiment, tangent: Tangent) -> tuple[Correction, Shares]:
         """A delay by which a tangent promises to leave least, by secants: what is left is not linear in a long one."""

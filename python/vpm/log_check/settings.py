@@ -71,7 +71,8 @@ class Settings:
     held : float
         Delays of fewer samples are how commands are held from one sample to the next.
     harmless : float
-        Share of a channel up to which what a delay leaves harms no conclusion: it is told, but is no mistake.
+        Share of a channel that harms no conclusion. A delay that leaves no more is told, but is no mistake; of such
+        ones no two are tried.
     settled : float
         A delay is as the record has it when it moves by less, in samples.
     stuck : int
