@@ -12,7 +12,7 @@ import numpy as np
 
 from vpm.discrepancy.side_by_side import Failure, SideBySide
 from vpm.experiment import Experiment
-from vpm.log_check.correction import Correction, Pair
+from vpm.log_check.correction import TIME, Correction, Pair
 from vpm.log_check.corrections import delays, of_two, scales
 from vpm.log_check.shares import FORCES, FRICTION, Judge, Shares, Tangent
 
@@ -173,6 +173,8 @@ class Explainer:
         some = left.above(self.settings.negligible)
         everything = list(scales(self.model, used, self.units, self.settings))
         tried = self._about(everything, self._doubtful(left), left)
+        if not left.above(self.settings.lost):  # with a wrong clock the model explains nothing
+            tried = [one for one in tried if one.channels != (TIME,)]
         # The mirror image of a machine explains most of a log as well as the machine does.
         tried += self._about((one for one in everything if one.is_mirror), some, left)
         return self._hopeful(list(dict.fromkeys(tried)), part, self.judge.guessed(part)) if tried else []

@@ -32,6 +32,9 @@ class Settings:
     doubtful : float
         Share of the error power of free masses that a model may leave of a channel. Where it leaves more, after its
         uncertain parameters and the friction of its joints were fitted, units, signs and names of channels are tried.
+    lost : float
+        Such a share of which a wrong clock leaves more, of one channel at least: a motion that is all friction looks
+        alike at any speed.
     negligible : float
         Such a share that is as good as nothing.
     quiet : float
@@ -109,6 +112,7 @@ class Settings:
     fewest: int = 20
     judged: int = 200
     doubtful: float = 0.1
+    lost: float = 0.8
     negligible: float = 1e-5
     quiet: float = 1e-3
     better: float = 0.1
