@@ -3,7 +3,7 @@
 Other code simulates the machines, those of the proving ground. Mistakes are what people make who write channel tables
 and loggers: units read as others, factors, signs, exchanged channels, clocks, delays up to 100 ms, and stretches that
 no sensor gives. Each is drawn by the seed, forty to a machine, and planted on a machine with nothing missing and on one
-that lacks an effect. It counts as named if the first finding has its kind and its channel. Without ``--planted`` logs
+that lacks an effect. It counts as named if the first finding has its kind and its channel. With ``clean`` logs
 are left as they are, and any mistake that is named is false.
 
     python benches/log_check.py planted axis_linear arm2r --seeds 1-2

@@ -130,12 +130,12 @@ class Explainer:
 
         def ended(correction: Correction) -> _Trial:
             corrected = correction.applied(part)
-            found = _Trial(correction, freed, self.judge.fitted(corrected, FORCES))
+            plain = self.judge.fitted(corrected, FRICTION)
+            found = _Trial(correction, freed, self.judge.fitted(corrected, FORCES, plain))
             if not (correction.swap or correction.factor < 0.0):
                 return found
             # A constant force is the mirror image of a weight, and may hide or explain it.
-            plain = _Trial(correction, left, self.judge.fitted(corrected, FRICTION))
-            return min(plain, found, key=lambda one: one.after.cost - one.before.cost)
+            return min(_Trial(correction, left, plain), found, key=lambda one: one.after.cost - one.before.cost)
 
         found = self.each("fitting", ended, self._finalists(part, used, left), self._words)
         if part.duration * self.settings.band >= self.settings.periods:

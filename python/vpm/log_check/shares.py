@@ -140,13 +140,16 @@ class Judge:
             values[self.model.index(parameter)] = structure.priors[parameter].spread
         return min(plain, self.measured(record, values), key=lambda shares: shares.order)
 
-    def fitted(self, record: Experiment, forces: Collection[str] = FRICTION) -> Shares:
-        """Shares when the uncertain parameters of the model, and such forces of its joints, have been fitted."""
+    def fitted(self, record: Experiment, forces: Collection[str] = FRICTION, plain: Shares | None = None) -> Shares:
+        """Shares when the uncertain parameters of the model, and such forces of its joints, have been fitted.
+
+        ``plain`` is what friction alone leaves of the record, if that is known.
+        """
         from scipy.stats import chi2  # slow to import, and seldom needed
 
         observer, structure = self._observer(record), self._structure(record, forces)
         if set(forces) > set(FRICTION):  # from where fewer of them lead to: from nothing they may end elsewhere
-            structure = replace(structure, theta=self.fitted(record).values)
+            structure = replace(structure, theta=(plain or self.fitted(record)).values)
         try:
             observed = self._observed(record, observer)
             fitter = Fitter(observed, RankingSettings(bands=(observer.band,)))
