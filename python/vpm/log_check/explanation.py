@@ -14,7 +14,7 @@ from vpm.discrepancy.side_by_side import Failure, SideBySide
 from vpm.experiment import Experiment
 from vpm.log_check.correction import TIME, Correction, Pair
 from vpm.log_check.corrections import delays, of_two, scales
-from vpm.log_check.shares import FORCES, FRICTION, Judge, Shares, Tangent
+from vpm.log_check.shares import FORCES, Judge, Shares, Tangent
 
 Change = TypeVar("Change", Correction, Pair)
 
@@ -111,9 +111,10 @@ class Explainer:
         return []
 
     def _one_by_one(self, ended: Sequence[_Trial], part: Experiment, used: Sequence[str]) -> list[Explanation]:
-        """Two corrections of which the first one leaves less, though not little."""
+        """Two corrections of which the first one leaves less than none does, though not little."""
         pairs = []
-        for correction, before, after in ended[: self.settings.branches]:
+        firsts = [one for one in ended if one.after.cost < one.before.cost + math.log(self.settings.alike)]
+        for correction, before, after in firsts[: self.settings.branches]:
             corrected = correction.applied(part)
             second = self._best(self._ended(corrected, used, after), used)
             again = second is not None and second.correction.channels == correction.channels
@@ -124,14 +125,16 @@ class Explainer:
 
     def _ended(self, part: Experiment, used: Sequence[str], left: Shares) -> list[_Trial]:
         """Corrections with what is left before and after each, the model fitted, the least first."""
-        if not left.above(self.settings.negligible):
+        if not left.above(self.settings.negligible) and left.far <= self.settings.far:
             return []
-        freed = self.judge.fitted(part, FORCES)
+        tangent = self.judge.freed(part, left)
+        freed = left if tangent is None else tangent.shares
 
         def ended(correction: Correction) -> _Trial:
             corrected = correction.applied(part)
-            plain = self.judge.fitted(corrected, FRICTION)
-            found = _Trial(correction, freed, self.judge.fitted(corrected, FORCES, plain))
+            plain = self.judge.fitted(corrected)
+            easier = self.judge.freed(corrected, plain)
+            found = _Trial(correction, freed, plain if easier is None else easier.shares)
             if not (correction.swap or correction.factor < 0.0):
                 return found
             # A constant force is the mirror image of a weight, and may hide or explain it.
@@ -139,8 +142,13 @@ class Explainer:
 
         found = self.each("fitting", ended, self._finalists(part, used, left), self._words)
         if part.duration * self.settings.band >= self.settings.periods:
-            found = [*found, *self._late(part, used, freed)]
-        return sorted((one for one in found if not isinstance(one, Failure)), key=lambda one: one.after.order)
+            found = [*found, *self._late(part, used, tangent, freed)]
+        ended_well = sorted((one for one in found if not isinstance(one, Failure)), key=lambda one: one.after.order)
+        different: list[_Trial] = []
+        for trial in ended_well:
+            if not any(_is_same(trial.correction, other.correction) for other in different):
+                different.append(trial)
+        return different
 
     def _best(self, ended: Sequence[_Trial], used: Sequence[str]) -> Explanation | None:
         """The first of several corrections, if it explains what was left, with those that do as well."""
@@ -148,14 +156,11 @@ class Explainer:
             return None
         (correction, before, after), *others = ended
         close = after.cost - math.log(self.settings.alike)
-        rivals: list[Correction] = []
-        for other in others:
-            if other.after.cost <= close and not any(_is_same(other.correction, one) for one in (correction, *rivals)):
-                rivals.append(other.correction)
+        rivals = tuple(other.correction for other in others if other.after.cost <= close)
         if not self._explains(correction, before, after) or any(_is_no_scale(correction, other) for other in rivals):
             return None
         affected, of_values = self._affected(correction, after), self._is_of_values(correction, before, after)
-        found = Explanation(correction, before, after, affected, tuple(rivals), of_values)
+        found = Explanation(correction, before, after, affected, rivals, of_values)
         return self._mirrored(found, used)
 
     def _mirrored(self, found: Explanation, used: Sequence[str]) -> Explanation:
@@ -208,7 +213,7 @@ class Explainer:
 
         return self._few(self.each("trying", measure, corrections, self._words), before)
 
-    def _late(self, part: Experiment, used: Sequence[str], left: Shares) -> list[_Trial]:
+    def _late(self, part: Experiment, used: Sequence[str], tangent: Tangent | None, left: Shares) -> list[_Trial]:
         """The few delays that promise to leave least if parameters give way: friction looks much like a delay.
 
         From fitted values, else from those of the model: a long delay drives fitted ones far away.
@@ -216,13 +221,13 @@ class Explainer:
         some = left.above(self.settings.negligible)
         corrections = self._about(delays(self.model, used, self.settings), some, left)
         least, found = self.settings.held * part.dt, list[_Trial]()
-        for fitted in (True, False):
-            at = left if fitted else self.judge.measured(part)
-            if (tangent := self.judge.tangent(part, at, FORCES)) is None:
+        for at in (tangent, None):
+            if (near := at or self.judge.tangent(part, self.judge.measured(part), FORCES)) is None:
                 continue
-            promised = partial(self._promised, part=part, tangent=tangent)
+            promised = partial(self._promised, part=part, tangent=near)
             few = self._few(self.each("trying", promised, corrections, self._words), left)
-            settled = self.each("refining", lambda one: self._settled(one, part, left), few, self._words)
+            settle = partial(self._settled, part=part, tangent=near, left=left)
+            settled = self.each("refining", settle, few, self._words)
             found += [one for one in settled if not isinstance(one, Failure) and abs(one.correction.delay) > least]
             if any(self._explains(*one) for one in found) or not left.above(self.settings.harmless):
                 break
@@ -257,29 +262,10 @@ class Explainer:
                 hopeful.append(correction)
         return hopeful[: self.settings.finalists]
 
-    def _settled(self, correction: Correction, part: Experiment, left: Shares) -> _Trial:
-        """A delay with what is left before and after it is corrected; it and the parameters give way by turns."""
-        shares = self.judge.fitted(correction.applied(part), FORCES)
-        for _ in range(self.settings.rounds):
-            finer = self._refined(correction, shares, part)
-            after = self.judge.fitted(finer.applied(part), FORCES)
-            if after.order >= shares.order:
-                break
-            moved = abs(finer.delay - correction.delay)
-            correction, shares = finer, after
-            if moved < self.settings.settled * part.dt:
-                break
-        return _Trial(correction, left, shares)
-
-    def _refined(self, correction: Correction, at: Shares, part: Experiment) -> Correction:
-        """A delay by which less is left if the parameters give way, from where they are fitted to another one."""
-        corrected, farther = correction.applied(part), replace(correction, delay=1.1 * correction.delay)
-        tangent, moved = self.judge.tangent(corrected, at, FORCES), farther.applied(part)
-        there = self.judge.measured(moved, at.values)
-        if tangent is None or there.residual is None:
-            return correction
-        _, share = tangent.promised(moved, corrected, there.residual)
-        return replace(correction, delay=self._possible((1.0 + 0.1 * share) * correction.delay))
+    def _settled(self, correction: Correction, part: Experiment, tangent: Tangent, left: Shares) -> _Trial:
+        """A delay with what is left before and after it is corrected, fitted with the parameters and all forces."""
+        finer, after = self.judge.late(part, correction, tangent)
+        return _Trial(finer, left, after)
 
     def _possible(self, delay: float) -> float:
         return float(np.clip(delay, -self.settings.latest, self.settings.latest))

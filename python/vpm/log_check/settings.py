@@ -63,6 +63,8 @@ class Settings:
         and leaves such values that larger deviations have at least this chance.
     branches : int
         Corrections with each of which another one is tried where none explains a record alone.
+    steps : int
+        Most steps of a fit: by secants they are cheap, and long delays are far from where derivatives were worked out.
     rounds : int
         Most mistakes of a record that are found one after the other.
     smallest : float
@@ -77,7 +79,7 @@ class Settings:
         Share of a channel that harms no conclusion. A delay that leaves no more is told, but is no mistake; of such
         ones no two are tried.
     settled : float
-        A delay is as the record has it when it moves by less, in samples.
+        A delay is as the record has it when it moves by less, in samples, while it is looked for.
     stuck : int
         Samples of one value, in a channel with noise, that no sensor gives by chance.
     jump : float
@@ -127,6 +129,7 @@ class Settings:
     likelier: float = 10.0
     believable: float = 1e-3
     branches: int = 3
+    steps: int = 16
     rounds: int = 3
     smallest: float = 2.0
     delays: tuple[float, ...] = (0.01, 0.05)

@@ -13,26 +13,28 @@ from numpy.typing import NDArray
 from vpm.catalogue import EFFECTS
 from vpm.experiment import Experiment
 from vpm.log_check.correction import Correction
+from vpm.log_check.late import Late, with_delay, without_delay
 from vpm.log_check.settings import Settings
 from vpm.model import Model
 from vpm.observer import measured_outputs
-from vpm.ranking.fit import ASTRAY, Fitter, View
+from vpm.ranking.fit import ASTRAY, Fitter, Followed, View
+from vpm.ranking.noise_model import white_noise
 from vpm.ranking.observed import Observed, Observer, is_position
 from vpm.ranking.settings import Settings as RankingSettings
 from vpm.ranking.sizes import stated
 from vpm.ranking.structure import Structure
 from vpm.simulate import Setup
-from vpm.weighing.priors import Prior
+from vpm.weighing.priors import Prior, natural_sizes
 
 Array = NDArray[np.float64]
 #: Friction that a joint may have without being described: nothing of it passes for a mistake of a log.
 FRICTION = tuple(name for name, effect in EFFECTS.items() if effect.usual == "friction")
 #: Nor do these, unless a sign is in doubt: where a machine is heavy, a constant force is its mirror image.
 FORCES = tuple(name for name, effect in EFFECTS.items() if effect.usual)
-#: Powers of speed that what it resists goes with.
-POWERS = {"effort_per_speed": 1, "effort_per_speed_squared": 2}
 #: Speed at which dry friction turns round, as a share of the usual speed of the joint.
 TRANSITION = 0.02
+#: How often derivatives are worked out in a fit of all forces.
+TURNS = 2
 #: Pieces of a record between whose ends speeds are measured, which noise hardly moves.
 PIECES = 200
 
@@ -97,6 +99,15 @@ class Shares:
         return self.cost, self.logarithm(self.by_channel)
 
 
+class _Near(Structure):
+    """A structure whose springs rest near the middle of the motion, as likely as the prior says."""
+
+    @property
+    def leaning(self) -> list[tuple[int, int]]:
+        """None."""
+        return []
+
+
 class Judge:
     """Measures records by a model, to which friction and other forces were added at each joint without them.
 
@@ -122,7 +133,7 @@ class Judge:
         """Shares at given values of the parameters, by default those of the model, without friction that was added."""
         observer, values = self._observer(record), self.model.theta if values is None else values
         try:
-            observed = self._observed(record, observer)
+            observed = self._observed(record)
             residual, _ = observed.follow(self.model, values, observer)
         except ASTRAY:
             return self._lost(record, values)
@@ -140,44 +151,85 @@ class Judge:
             values[self.model.index(parameter)] = structure.priors[parameter].spread
         return min(plain, self.measured(record, values), key=lambda shares: shares.order)
 
-    def fitted(self, record: Experiment, forces: Collection[str] = FRICTION, plain: Shares | None = None) -> Shares:
-        """Shares when the uncertain parameters of the model, and such forces of its joints, have been fitted.
-
-        ``plain`` is what friction alone leaves of the record, if that is known.
-        """
-        from scipy.stats import chi2  # slow to import, and seldom needed
-
-        observer, structure = self._observer(record), self._structure(record, forces)
-        if set(forces) > set(FRICTION):  # from where fewer of them lead to: from nothing they may end elsewhere
-            structure = replace(structure, theta=(plain or self.fitted(record)).values)
+    def fitted(self, record: Experiment) -> Shares:
+        """Shares when the uncertain parameters of the model, and friction of its joints, have been fitted."""
+        observer, structure, observed = self._observer(record), self._structure(record), self._observed(record)
         try:
-            observed = self._observed(record, observer)
-            fitter = Fitter(observed, RankingSettings(bands=(observer.band,)))
-            fitted = fitter.fitted(structure, observer, View(fitter.noise_of(structure, observer)))
+            fitter = Fitter(observed, observed.settings)
+            found = fitter.fitted(structure, observer, View(fitter.noise_of(structure, observer)))
         except ASTRAY:
             return self.measured(record)
-        found = fitted.structure
-        shares = self._shares(observed, fitted.residual, observer, found.theta)
-        moved = zip(found.priors, np.abs(found.standard).tolist(), strict=True)
-        own = {name: far for name, far in moved if not self._is_added(name)}
-        farthest = max(own, key=lambda name: own[name], default="")
-        unlikely = sum(far**2 for far in own.values()) / 2.0
-        chance = float(chi2.sf(2.0 * unlikely, max(len(own), 1)))
-        return replace(shares, far=own.get(farthest, 0.0), farthest=farthest, unlikely=unlikely, chance=chance)
+        shares = self._shares(observed, found.residual, observer, found.structure.theta)
+        return self._believed(shares, found.structure)
 
-    def tangent(self, record: Experiment, shares: Shares, forces: Collection[str] = FRICTION) -> Tangent | None:
-        """How what is left changes with the parameters, about the values of a fit; None where that cannot be told."""
-        if shares.residual is None:
+    def tangent(self, record: Experiment, at: Shares, forces: Collection[str] = FRICTION) -> Tangent | None:
+        """How what is left changes with the parameters, about some values of them; None where that cannot be told."""
+        if at.residual is None:
             return None
-        observer, structure = self._observer(record), replace(self._structure(record, forces), theta=shares.values)
+        observer, structure = self._observer(record), replace(self._structure(record, forces), theta=at.values)
+        observed = self._observed(record)
         try:
-            fitter = Fitter(self._observed(record, observer), RankingSettings(bands=(observer.band,)))
+            fitter = Fitter(observed, observed.settings)
             followed = fitter.followed(structure, observer, tuple(structure.priors))
         except ASTRAY:
             return None
         if not np.all(np.isfinite(followed.jacobian)):
             return None
-        return Tangent(structure, followed.residual, followed.jacobian * structure.slopes, shares)
+        return Tangent(structure, followed.residual, followed.jacobian * structure.slopes, at)
+
+    def freed(self, record: Experiment, plain: Shares) -> Tangent | None:
+        """A tangent where all forces have been fitted, from where friction alone left ``plain``.
+
+        Derivatives cost most: secants correct them on the way. They are worked out once more in between, for no tangent
+        says where a spring rests that is not there yet.
+        """
+        observed, observer, found = self._observed(record), self._observer(record), None
+        for _ in range(TURNS):
+            start = self.tangent(record, plain if found is None else found.shares, FORCES)
+            if start is None:
+                break
+            found = self._descended(observed, observer, start)
+        return found
+
+    def _descended(self, observed: Observed, observer: Observer, start: Tangent) -> Tangent:
+        """The tangent where secants lead from another one."""
+        noise = white_noise(start.residual, observed.parts)
+        fitted, slopes = Fitter(observed, observed.settings).moved(start.followed(observer), View(noise))
+        sizes, kept = np.array(noise.deviations)[:, None, None], np.zeros_like(start.slopes)
+        seen = _seen(observed)
+        kept[seen] = (slopes.reshape(len(sizes), -1, slopes.shape[1]) * sizes).transpose(1, 0, 2)
+        shares = self._shares(observed, fitted.residual, observer, fitted.structure.theta)
+        return Tangent(fitted.structure, fitted.residual, kept, self._believed(shares, fitted.structure))
+
+    def late(self, record: Experiment, correction: Correction, tangent: Tangent) -> tuple[Correction, Shares]:
+        """A delay that is fitted with the parameters and all forces, from the values of a tangent without it."""
+        observer, latest = self._observer(record), self.settings.latest
+        structure = with_delay(tangent.structure, correction.delay, latest)
+        try:
+            whole = Late(self.model, record, correction, latest, self._ranking(record), self.setup)
+            observed = whole.whole()
+            residual, slope = observed.follow(self.model, structure.theta, observer, [len(self.model.theta)])
+            known = tangent.slopes[whole.cut : whole.cut + len(residual)]
+            start = Tangent(structure, residual, np.concatenate([known, slope * latest], axis=2), tangent.shares)
+            view = View(white_noise(residual, observed.parts))
+            found, _ = Fitter(observed, observed.settings).moved(start.followed(observer), view, anew=True)
+        except ASTRAY:
+            return correction, self._lost(record, tangent.shares.values)
+        *values, delay = found.structure.theta.tolist()
+        finer = replace(correction, delay=delay)
+        shares = self.measured(finer.applied(record), np.array(values))
+        return finer, self._believed(shares, without_delay(found.structure))
+
+    def _believed(self, shares: Shares, structure: Structure) -> Shares:
+        """With how far the parameters of the model are from what its file states."""
+        from scipy.stats import chi2  # slow to import, and seldom needed
+
+        moved = zip(structure.priors, np.abs(structure.standard).tolist(), strict=True)
+        own = {name: far for name, far in moved if not self._is_added(name)}
+        farthest = max(own, key=lambda name: own[name], default="")
+        unlikely = sum(far**2 for far in own.values()) / 2.0
+        chance = float(chi2.sf(2.0 * unlikely, max(len(own), 1)))
+        return replace(shares, far=own.get(farthest, 0.0), farthest=farthest, unlikely=unlikely, chance=chance)
 
     def unseen(self, tangent: Tangent) -> list[str]:
         """Uncertain parameters of the model of which a record says next to nothing."""
@@ -205,26 +257,29 @@ class Judge:
         model = self.model
         priors, values = stated(model), model.theta.copy()
         for name, joint in self.added:
-            effort, speed = self._usual(record, joint)
+            sizes, shapes = self._usual(record, joint)
             effect = model.effect(name, joint)
             for short, parameter in effect.parameter_names.items():
                 entry = effect.type.parameter(short)
                 if entry.shape:
-                    values[model.index(parameter)] = TRANSITION * speed
+                    values[model.index(parameter)] = shapes[entry.scale]
+                    if name in forces and entry.scale == "coordinate":
+                        priors[parameter] = Prior(shapes[entry.scale], sizes[entry.scale], *entry.physical)
                 elif name in forces:
-                    size = effort / speed ** POWERS.get(entry.scale, 0)
-                    priors[parameter] = Prior(0.0, size, *entry.physical)
-        return Structure(model, values, priors)
+                    priors[parameter] = Prior(0.0, sizes[entry.scale], *entry.physical)
+        return _Near(model, values, priors)
 
-    def _usual(self, record: Experiment, joint: str) -> tuple[float, float]:
-        """Effort and speed of a joint that are nothing unusual: its mass turned round on the way that is seen."""
+    def _usual(self, record: Experiment, joint: str) -> tuple[dict[str, float], dict[str, float]]:
+        """Sizes of forces at a joint that are nothing unusual, and shapes: its mass turned round on the way seen."""
         place, channel = self.model.coordinates.index(joint), f"{joint}.position"
         if channel not in record or np.ptp(record[channel]) == 0.0:
-            return 1.0, 1.0
+            return natural_sizes(1.0, 1.0, 1.0), {"speed": TRANSITION, "coordinate": 0.0}
         ends = np.linspace(0, len(record) - 1, min(PIECES, len(record))).astype(int)
-        way, speed = np.std(record[channel]), np.std(np.diff(record[channel][ends]) / np.diff(record.time[ends]))
+        way, speed = np.std(record[channel]), np.std(np.diff(record[channel][ends]) / np.diff(record.time[ends])) + 1e-9
         masses, weights = self._at_rest
-        return float(masses[place] * speed**2 / way + weights[place]) + 1e-9, float(speed) + 1e-9
+        effort = float(masses[place] * speed**2 / way + weights[place]) + 1e-9
+        middle = float(np.mean(record[channel]))
+        return natural_sizes(effort, float(speed), float(way)), {"speed": TRANSITION * speed, "coordinate": middle}
 
     @cached_property
     def _at_rest(self) -> tuple[Array, Array]:
@@ -238,8 +293,11 @@ class Judge:
     def _observer(self, record: Experiment) -> Observer:
         return Observer(min(self.settings.band, self.settings.turn / record.dt), fine=False)
 
-    def _observed(self, record: Experiment, observer: Observer) -> Observed:
-        return Observed(self.model, [record], RankingSettings(bands=(observer.band,)), self.setup)
+    def _ranking(self, record: Experiment) -> RankingSettings:
+        return RankingSettings(bands=(self._observer(record).band,), iterations=self.settings.steps)
+
+    def _observed(self, record: Experiment) -> Observed:
+        return Observed(self.model, [record], self._ranking(record), self.setup).whole()
 
     def _shares(self, observed: Observed, residual: Array, observer: Observer, values: Array) -> Shares:
         drawn, seen = observed.drawn(observer.band), _seen(observed)
@@ -273,6 +331,11 @@ class Tangent:
     residual: Array
     slopes: Array
     shares: Shares
+
+    def followed(self, observer: Observer) -> Followed:
+        """Where a fit begins that need not work out its first derivatives."""
+        names, jacobian = tuple(self.structure.priors), self.slopes / self.structure.slopes
+        return Followed(self.structure, observer, names, self.residual, jacobian)
 
     @property
     def deviations(self) -> Array:
@@ -318,8 +381,7 @@ def rows_of(part: Experiment, record: Experiment) -> NDArray[np.intp]:
 
 def _seen(observed: Observed) -> NDArray[np.intp]:
     """Samples that count: all but the beginning, which the first state decides."""
-    parts = (*observed.parts, *observed.held_back)
-    return np.sort(np.concatenate([np.arange(part.start, part.stop) for part in parts]))
+    return np.concatenate([np.arange(part.start, part.stop) for part in observed.parts])
 
 
 def _share(left: float, free: float) -> float:

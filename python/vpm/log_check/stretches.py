@@ -79,9 +79,11 @@ def _of_sensor(record: Experiment, name: str, settings: Settings) -> Iterator[Fi
 def _cut_off(values: Array, step: float, settings: Settings) -> bool:
     """Whether the noise of a channel is the same in two octaves and then falls: a filter does that, no machine.
 
-    Noise is as loud at all times; what a machine or its oil does in an octave comes and goes with the motion. Motion
-    falls as well, but to the noise of the sensor, which then stays; behind a filter there is nothing but rounding to
-    that ``step``. Numbers of a simulation have no noise: their spectrum ends where their digits do.
+    Or whether it falls as far between the last two bands: a machine would have to answer like the ninth power of a
+    frequency, and a resonance rises before it falls. Noise is as loud at all times; what a machine or its oil does
+    in an octave comes and goes with the motion. Motion falls as well, but to the noise of the sensor, which then stays;
+    behind a filter there is nothing but rounding to that ``step``. Numbers of a simulation have no noise: their
+    spectrum ends where their digits do.
     """
     if len(values) < settings.judged * PIECES:
         return False
@@ -92,6 +94,9 @@ def _cut_off(values: Array, step: float, settings: Settings) -> bool:
     rounding = max(settings.level * window * step**2 / 12.0, digits)
     if steady[-1] and steady[-2] and _is_flat(levels[-2:], settings) and float(np.median(last)) > rounding:
         return False
+    steep = levels[-1] < settings.filtered * levels[-2] and levels[-2] < levels[-3]
+    if steady[-1] and steady[-2] and steep and levels[-2] > digits:
+        return True
     for place in range(2, len(levels)):
         noise = levels[place - 2 : place]
         falls = levels[place:].min() < settings.filtered * noise[-1]
@@ -104,11 +109,16 @@ def _powers(values: Array) -> tuple[Array, float]:
     """Spectral power by piece and octave, the last one halved, and that of white noise of variance one."""
     pieces = np.array_split(np.diff(values, n=ORDER), PIECES)
     found = [_octaves(piece, len(pieces[-1])) for piece in pieces]
-    return np.array(found), float(np.sum(np.hanning(len(pieces[-1])) ** 2))
+    return np.array(found), float(np.sum(_window(len(pieces[-1])) ** 2))
+
+
+def _window(count: int) -> Array:
+    """One whose leakage falls fast enough that no motion is taken for noise at other frequencies."""
+    return np.asarray(np.hanning(count) ** 3)
 
 
 def _octaves(piece: Array, count: int) -> list[float]:
-    lines = np.abs(np.fft.rfft(piece[:count] * np.hanning(count))) ** 2
+    lines = np.abs(np.fft.rfft(piece[:count] * _window(count))) ** 2
     # Differences weigh white noise by frequency, which is taken out again.
     turns = np.pi * np.arange(1, len(lines)) / (2 * (len(lines) - 1))
     lines[1:] /= (2.0 * np.sin(turns)) ** (2 * ORDER)

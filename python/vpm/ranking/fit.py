@@ -127,14 +127,26 @@ class Fitter:
         """
         names = tuple(name for name in structure.priors if name not in view.known)
         now = self.followed(structure.at(structure.standard), observer, names, residual)
-        return self._descended(now, view, goal)
+        return self._descended(now, view, goal)[0]
 
-    def moved(self, start: Followed, view: View) -> Fitted:
-        """The same near where a fit to other stretches ended, of which all derivatives are known: secants will do."""
-        return self._descended(start, view, anew=False)
+    def moved(self, start: Followed, view: View, anew: bool = False) -> tuple[Fitted, Array]:
+        """The same from where all derivatives are known, as near the end of another fit: secants will do.
 
-    def _descended(self, now: Followed, view: View, goal: float = math.inf, anew: bool = True) -> Fitted:
-        before, fresh = self.cost(now.structure, now.residual, view.noise), True
+        With ``anew`` they are worked out again where these lead nowhere.
+
+        Returns
+        -------
+        fitted : Fitted
+        slopes : ndarray, shape (n, k)
+            Change of the prediction errors by deviations of the priors, by the last secant.
+        """
+        return self._descended(start, view, fresh=False, anew=anew)
+
+    def _descended(
+        self, now: Followed, view: View, goal: float = math.inf, fresh: bool = True, anew: bool = True
+    ) -> tuple[Fitted, Array]:
+        """The descent from known derivatives: ``fresh`` ones, or those of elsewhere, worked out ``anew`` or not."""
+        before = self.cost(now.structure, now.residual, view.noise)
         errors, slopes = view.errors(now, self.observed.parts)
         for _ in range(self.settings.iterations if now.structure.priors else 0):
             move, gain = self._step(now.structure, view, errors, slopes)
@@ -152,7 +164,7 @@ class Fitter:
             if fresh:
                 now = self.followed(now.structure, now.observer, now.names, now.residual)
                 errors, slopes = view.errors(now, self.observed.parts)
-        return Fitted(now.structure, now.observer, now.residual, before)
+        return Fitted(now.structure, now.observer, now.residual, before), slopes
 
     def finished(self, found: Fitted, view: View) -> Fitted:
         """Fitted on, by all derivatives, until nothing is gained any more."""

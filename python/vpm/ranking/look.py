@@ -194,7 +194,7 @@ class Look:
     def _held_back(self, start: Followed, part: int) -> Array:
         """Squares of a part of the record that is held back, fitted to the others from where a fit ended."""
         other = Fitter(self._fitter.observed.holding_back(part), self.settings)
-        moved = other.moved(start, View(self.view.noise))
+        moved, _ = other.moved(start, View(self.view.noise))
         return other.observed.squares(moved.residual, self.view.noise)[1]
 
     @cached_property

@@ -104,6 +104,12 @@ class Observed:
         other.parts, other.held_back = _divided(self._stretches, part)
         return other
 
+    def whole(self) -> Observed:
+        """The same with nothing held back."""
+        other = copy.copy(self)
+        other.parts, other.held_back = [slice(int(ends[0]), int(ends[-1])) for ends in self._stretches], []
+        return other
+
     @cached_property
     def firsts(self) -> Firsts:
         """First states that nobody measures, as far as the model moves them; none where it runs away."""
