@@ -13,7 +13,7 @@ from pkgutil import walk_packages
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 import vpm
 from vpm import demo, results
@@ -164,6 +164,25 @@ def test_records_are_checked_as_files_are_however_they_are_made(
     object.__setattr__(good, "data", data)
     with pytest.raises(ExperimentError, match=words):
         Experiment.load(good.save(tmp_path / "made.npz"))
+
+
+@pytest.mark.parametrize(
+    ("time", "data", "words"),
+    [
+        (TIME, np.full((100, 1), 1j), r"data is no array of numbers \(it holds complex128\)"),
+        (
+            np.arange(100).astype("M8[ms]"),
+            np.zeros((100, 1)),
+            r"time is no array of numbers \(it holds datetime64\[ms\]\)",
+        ),
+        (TIME, np.ma.masked_equal(np.arange(100)[:, None], 7), r'sample 7: the channel "x" is nan'),
+    ],
+    ids=["complex", "dates", "masked"],
+)
+def test_numbers_that_say_more_than_numbers_are_refused(time: ArrayLike, data: ArrayLike, words: str) -> None:
+    """Imaginary parts and masks got lost, and milliseconds were taken for seconds."""
+    with pytest.raises(ExperimentError, match=words):
+        Experiment("made", np.asarray(time), np.asanyarray(data), ("x",), ("1",))
 
 
 @pytest.mark.parametrize("stamp", ["15.0e4", "1e7", "1e300"])

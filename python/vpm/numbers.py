@@ -28,10 +28,14 @@ def array_of(given: ArrayLike, what: str, error: type[VpmError] = VpmError) -> N
     Raises
     ------
     VpmError
-        It holds something else than numbers, or its rows differ in length.
+        It holds something else than real numbers, or its rows differ in length.
     """
     try:
-        return np.asarray(given, dtype=np.float64)
+        array = np.asanyarray(given)
+        if array.dtype.kind in "cmM":  # imaginary parts would be lost, and ticks of a clock count as seconds
+            raise TypeError(f"it holds {array.dtype}")
+        array = array.astype(np.float64, copy=False)
+        return np.asarray(array.filled(np.nan) if isinstance(array, np.ma.MaskedArray) else array)
     except (TypeError, ValueError, OverflowError) as reason:
         raise error(f"{what} is no array of numbers ({reason}); give numbers in rows of equal length") from reason
 
