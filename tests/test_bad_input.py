@@ -7,9 +7,12 @@ import subprocess
 import sys
 import tomllib
 from collections.abc import Callable
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from pkgutil import walk_packages
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -18,10 +21,20 @@ from numpy.typing import ArrayLike, NDArray
 import vpm
 from vpm import demo, results
 from vpm._core import System
-from vpm.errors import CoreError, ExperimentError, ModelError, ScenarioError, SimulationError, UnitError, VpmError
+from vpm.errors import (
+    CoreError,
+    DiagnosisError,
+    ExperimentError,
+    ModelError,
+    ScenarioError,
+    SimulationError,
+    UnitError,
+    VpmError,
+)
 from vpm.experiment import Experiment
 from vpm.experiment.readers import open_log
 from vpm.model import Model
+from vpm.ranking.fit import bounded_step
 from vpm.realtime import compile_model
 from vpm.scenario import Scenario
 from vpm.simulate import Setup
@@ -183,6 +196,28 @@ def test_numbers_that_say_more_than_numbers_are_refused(time: ArrayLike, data: A
     """Imaginary parts and masks got lost, and milliseconds were taken for seconds."""
     with pytest.raises(ExperimentError, match=words):
         Experiment("made", np.asarray(time), np.asanyarray(data), ("x",), ("1",))
+
+
+@pytest.mark.parametrize("place", [0.0, 0.3])
+def test_a_machine_that_stands_shows_no_effect(arm: Model, place: float) -> None:
+    """A stuck encoder was an inertia, a tilt of gravity and a lag; zeros ended in a division by zero."""
+    channels = {"shoulder.position": np.full(2000, place), "motor.command": np.sin(0.1 * np.arange(2000))}
+    stuck = Experiment.from_arrays(np.arange(2000) / 500.0, channels, {"motor.command": "A"}, name="stuck", model=arm)
+    words = f"no joint moves in stuck: shoulder.position is {place:g} rad all the time"
+    for ask in (vpm.rank, partial(vpm.diagnose, check=False), partial(vpm.diagnose, check=False, names="search")):
+        with pytest.raises(DiagnosisError, match=words):
+            ask(arm, [stuck])
+    told = str(vpm.compare(vpm.simulate(arm, stuck, "inverse_dynamics"), stuck))
+    assert "inf" not in told
+
+
+def test_no_step_is_measured_by_errors_of_zero() -> None:
+    """Infinite numbers went on to LAPACK, which wrote to the terminal."""
+    structure: Any = SimpleNamespace(
+        standard=np.zeros(2), leaning=(), ends=np.tile([-1.0, 1.0], (2, 1)), model=SimpleNamespace(name="arm")
+    )
+    with pytest.raises(VpmError, match="arm: the records leave no error that a step could be measured by"):
+        bounded_step(structure, np.zeros(5), np.full((5, 2), 1e10), 1.0)
 
 
 @pytest.mark.parametrize("stamp", ["15.0e4", "1e7", "1e300"])

@@ -119,6 +119,8 @@ def drawable(path: Path | None) -> Path | None:
     """The same for a picture, whose ending says its format."""
     if path is not None and path.suffix.lower() not in PICTURES:
         raise VpmError(f"{path} is no name of a picture; give it one of the endings {', '.join(PICTURES)}")
+    if str(path) == BESIDE:  # it gets its name later
+        return fillable(Path.cwd()) and path
     return writable(path)
 
 

@@ -62,9 +62,9 @@ def short(value: float) -> str:
 def percent(share: float) -> str:
     """A share with two decimals, as texts, tables and pictures show it; two digits where that would hide it.
 
-    Less than a millionth is nothing.
+    Less than a millionth is nothing. A share of nothing is not known.
     """
-    if np.isnan(share):
+    if not np.isfinite(share):
         return UNKNOWN
     if abs(share) < 1e-6:
         return "0.00 %"
