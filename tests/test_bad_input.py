@@ -7,21 +7,34 @@ import subprocess
 import sys
 import tomllib
 from collections.abc import Callable
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from pkgutil import walk_packages
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 import vpm
 from vpm import demo, results
 from vpm._core import System
-from vpm.errors import CoreError, ExperimentError, ModelError, ScenarioError, SimulationError, UnitError, VpmError
+from vpm.errors import (
+    CoreError,
+    DiagnosisError,
+    ExperimentError,
+    ModelError,
+    ScenarioError,
+    SimulationError,
+    UnitError,
+    VpmError,
+)
 from vpm.experiment import Experiment
 from vpm.experiment.readers import open_log
 from vpm.model import Model
+from vpm.ranking.fit import bounded_step
 from vpm.realtime import compile_model
 from vpm.scenario import Scenario
 from vpm.simulate import Setup
@@ -164,6 +177,47 @@ def test_records_are_checked_as_files_are_however_they_are_made(
     object.__setattr__(good, "data", data)
     with pytest.raises(ExperimentError, match=words):
         Experiment.load(good.save(tmp_path / "made.npz"))
+
+
+@pytest.mark.parametrize(
+    ("time", "data", "words"),
+    [
+        (TIME, np.full((100, 1), 1j), r"data is no array of numbers \(it holds complex128\)"),
+        (
+            np.arange(100).astype("M8[ms]"),
+            np.zeros((100, 1)),
+            r"time is no array of numbers \(it holds datetime64\[ms\]\)",
+        ),
+        (TIME, np.ma.masked_equal(np.arange(100)[:, None], 7), r'sample 7: the channel "x" is nan'),
+    ],
+    ids=["complex", "dates", "masked"],
+)
+def test_numbers_that_say_more_than_numbers_are_refused(time: ArrayLike, data: ArrayLike, words: str) -> None:
+    """Imaginary parts and masks got lost, and milliseconds were taken for seconds."""
+    with pytest.raises(ExperimentError, match=words):
+        Experiment("made", np.asarray(time), np.asanyarray(data), ("x",), ("1",))
+
+
+@pytest.mark.parametrize("place", [0.0, 0.3])
+def test_a_machine_that_stands_shows_no_effect(arm: Model, place: float) -> None:
+    """A stuck encoder was an inertia, a tilt of gravity and a lag; zeros ended in a division by zero."""
+    channels = {"shoulder.position": np.full(2000, place), "motor.command": np.sin(0.1 * np.arange(2000))}
+    stuck = Experiment.from_arrays(np.arange(2000) / 500.0, channels, {"motor.command": "A"}, name="stuck", model=arm)
+    words = f"no joint moves in stuck: shoulder.position is {place:g} rad all the time"
+    for ask in (vpm.rank, partial(vpm.diagnose, check=False), partial(vpm.diagnose, check=False, names="search")):
+        with pytest.raises(DiagnosisError, match=words):
+            ask(arm, [stuck])
+    told = str(vpm.compare(vpm.simulate(arm, stuck, "inverse_dynamics"), stuck))
+    assert "inf" not in told
+
+
+def test_no_step_is_measured_by_errors_of_zero() -> None:
+    """Infinite numbers went on to LAPACK, which wrote to the terminal."""
+    structure: Any = SimpleNamespace(
+        standard=np.zeros(2), leaning=(), ends=np.tile([-1.0, 1.0], (2, 1)), model=SimpleNamespace(name="arm")
+    )
+    with pytest.raises(VpmError, match="arm: the records leave no error that a step could be measured by"):
+        bounded_step(structure, np.zeros(5), np.full((5, 2), 1e10), 1.0)
 
 
 @pytest.mark.parametrize("stamp", ["15.0e4", "1e7", "1e300"])

@@ -54,6 +54,17 @@ def columns(run: vpm.Run, names: tuple[str, ...]) -> Array:
     return np.stack([run[name] for name in names], axis=1)
 
 
+def test_modes_of_rounding_are_no_modes() -> None:
+    """A body that floats has no vibration, and its eigenvalues are zero but for rounding."""
+    joint = {"type": "free", "parent": "world", "child": "body"}
+    model = top(center=0.1, gravity=9.81, joints={"ball": joint})
+    state = {"ball_rx.velocity": 4.0, "ball_ry.velocity": 6.0, "ball_rz.velocity": -3.0}
+    for method in ORDERS:
+        run = stepped(model, state, 0.5, method=method)
+        assert run.resolution is not None
+        assert run.resolution.is_complete, str(run.resolution)
+
+
 def rotations(run: vpm.Run) -> Rotation:
     return Rotation.from_quat(columns(run, QUATERNION), scalar_first=True)
 

@@ -121,6 +121,47 @@ def test_a_start_beyond_its_bound_is_refused(state: dict[str, float], words: str
     assert words in str(caught.value)
 
 
+LAGGING = """
+[[effects]]
+type = "warming_friction"
+at = "axis"
+coulomb = 1.0
+viscous = 0.0
+time_constant = 10.0
+"""
+
+
+def test_a_memory_starts_where_its_law_leads() -> None:
+    model = Model.from_toml(MACHINE.format(kind="prismatic", stiffness=1.0, arm=0.3) + LAGGING)
+    with pytest.raises(SimulationError, match=r"of an effect of joint `axis` starts at 1.0000e3, .* than 1.0000e0"):
+        Simulation(model, STEP, state={"axis.warming.memory": 1e3})
+    with pytest.raises(SimulationError, match=r"starts at -1.0000e3"):
+        Simulation(model, STEP).reset({"axis.warming.memory": -1e3})
+    # As far beyond as steps may be off.
+    assert np.isfinite(Simulation(model, STEP, state={"axis.warming.memory": 1.5}).step([0.0])).all()
+
+
+@pytest.mark.parametrize("damping", [0.2, 0.7, 3.0])
+def test_a_spool_starts_where_the_worst_command_drives_it(damping: float) -> None:
+    """A command that changes its sign with every half swing, from one end of the stroke to the other."""
+    rig = Model.load(EXAMPLES / "servo_cylinder/rig.toml").with_parameters({"servo.valve.damping": damping})
+    stroke, omega = (rig.parameters[f"servo.valve.{name}"].value for name in ("stroke", "frequency"))
+    place = speed = most = fastest = 0.0
+    step = 2e-4 / omega
+    for _ in range(300_000):
+        target = stroke if speed >= 0.0 else -stroke
+        speed += step * (omega**2 * (target - place) - 2.0 * damping * omega * speed)
+        place += step * speed
+        most, fastest = max(most, abs(place)), max(fastest, abs(speed))
+    for state, reach in (("servo.spool", most), ("servo.spool_rate", fastest)):
+        Simulation(rig, STEP, state={state: reach})
+        with pytest.raises(SimulationError, match="leads it no further than") as caught:
+            Simulation(rig, STEP, state={state: 10.0 * reach})
+        told = float(str(caught.value).partition("no further than ")[2].split()[0])
+        assert reach <= 1.001 * told
+        assert state == "servo.spool_rate" or told == pytest.approx(reach, rel=2e-3)
+
+
 def test_a_beam_bends_no_further_than_a_strain_of_one_and_oil_is_pressed_no_further_than_its_stroke() -> None:
     pendulum = Model.load(EXAMPLES / "flexible_pendulum/flexible_pendulum.toml")
     far = np.zeros(len(pendulum.state_names))

@@ -80,6 +80,14 @@ def test_singular_strokes_know_their_kind() -> None:
         assert (abs(value) > 1e6) if kind == "direct" else (abs(value) < 1e-6), (kind, stroke)
 
 
+def test_rods_that_reach_nothing_leave_no_singular_strokes() -> None:
+    loose = Karl(KarlGeometry(rods=(0.002, 0.001)))
+    assert len(loose.singularities().to_frame()) == 0
+    assert loose.summary == tuple(f"actuator {k}: no stroke assembles it; its rod is too short" for k in (1, 2))
+    with pytest.raises(ModelError, match="actuator 1 has 0 positive singular strokes"):
+        loose.plot()
+
+
 @pytest.mark.parametrize("definition", ["sum_of_norms", "norm_of_absolute_sum", "root_of_squares", "torque"])
 def test_shares_follow_their_definition(definition: linkages.leg.ShareDefinition) -> None:
     leg, q = Leg.hyq(), np.radians([20.0, -80.0])

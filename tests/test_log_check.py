@@ -348,16 +348,18 @@ def test_the_corrected_table_reads_the_corrected_record(correction: Correction, 
         np.testing.assert_allclose(told[channel], wanted[channel], atol=1e-12)
 
 
-def test_writes_the_corrected_entries_and_keeps_comments(tmp_path: Path) -> None:
+def test_writes_the_corrected_entries_and_keeps_comments_and_ends_of_lines(tmp_path: Path) -> None:
     model, log = tmp_path / "arm.toml", tmp_path / "log.csv"
-    model.write_text(textbook_arm.FILE, encoding="utf-8")
+    model.write_text(textbook_arm.FILE, encoding="utf-8-sig", newline="\r\n")
     wrong = both(scaled("q1", 180.0 / np.pi), scaled("q2", 180.0 / np.pi))
     log.write_text(textbook_arm.text(wrong(textbook_arm.log(PLAIN, 2))), encoding="utf-8")
     told = run_vpm("check", str(model), str(log))
     assert told.returncode == 1
     assert 'write "one.position" = { column = "q1", unit = "deg" }' in told.stdout
     assert run_vpm("check", str(model), str(log), "--fix").returncode == 0
-    text = model.read_text(encoding="utf-8")
+    text = model.read_bytes().decode("utf-8")
+    assert text.startswith("\ufeff")
+    assert text.count("\n") == text.count("\r\n") == textbook_arm.FILE.count("\n")
     assert '"one.position" = { column = "q1", unit = "deg" }  # the encoder at the base' in text
     assert '"two.position" = { column = "q2", unit = "deg" }' in text
     again = run_vpm("check", str(model), str(log))

@@ -571,6 +571,12 @@ def test_files_that_cannot_be_read_or_are_wrong_are_named(tmp_path: Path) -> Non
     assert str(caught.value).startswith(f"{wrong}: bodies.carriage.mass is -80 kg")
 
 
+def test_a_file_of_a_windows_editor_is_read(emps: Model, tmp_path: Path) -> None:
+    path = tmp_path / "model.toml"
+    path.write_bytes(b"\xef\xbb\xbf" + EMPS.replace("\n", "\r\n").encode())
+    assert Model.load(path) == emps
+
+
 def test_save_and_load(emps: Model, tmp_path: Path) -> None:
     path = emps.save(tmp_path / "saved.toml")
     loaded = Model.load(path)

@@ -22,11 +22,12 @@ from vpm.cli import app
 from vpm.diagnosing import diagnose
 from vpm.errors import SimulationError
 from vpm.experiment import Experiment
-from vpm.files import FileError, replacing, write_text
+from vpm.files import FileError, make_folder, probe_file, probe_folder, replacing, write_text
 from vpm.model import Model
 from vpm.report import print_story, write_report
 
 MODEL, LOG = str(demo.MODEL), str(demo.TRAIN)
+SCENARIO = Path(__file__).parents[1] / "examples" / "emps" / "step.toml"
 POSIX = pytest.mark.skipif(os.name != "posix", reason="needs limits and signals of POSIX")
 
 
@@ -84,6 +85,34 @@ def test_links_stay_links_and_modes_stay(tmp_path: Path) -> None:
     assert (tmp_path / "there").stat().st_mode & 0o777 == 0o600
     write_text(os.devnull, "nothing")
     assert not Path(os.devnull).is_file()
+
+
+def test_folders_behind_links_are_made_and_circles_are_refused(tmp_path: Path) -> None:
+    (tmp_path / "link").symlink_to("not/there")
+    make_folder(tmp_path / "link")
+    assert (tmp_path / "not" / "there").is_dir()
+    (tmp_path / "round").symlink_to("round")
+    for attempt in (make_folder, probe_folder, probe_file, lambda path: write_text(path, "new")):
+        with pytest.raises(FileError, match="lead round in a circle"):
+            attempt(tmp_path / "round")
+    assert (tmp_path / "round").is_symlink()
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a device that is full")
+def test_results_are_written_where_the_output_cannot_be(tmp_path: Path) -> None:
+    words = [sys.executable, "-m", "vpm", "simulate", str(SCENARIO), "--out", str(tmp_path / "runs.npz")]
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run(words, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert done.returncode == 1
+    assert "error: standard output cannot be written (no space left on device); send it elsewhere" in done.stderr
+    assert (tmp_path / "runs.npz").exists()
+
+
+def test_letters_that_a_terminal_does_not_have_become_marks() -> None:
+    environment = {**os.environ, "PYTHONIOENCODING": "ascii"}
+    words = [sys.executable, "-m", "vpm", "info", MODEL]
+    done = subprocess.run(words, env=environment, capture_output=True, text=True, check=False)
+    assert (done.returncode, "? 0.015" in done.stdout) == (0, True), done.stderr
 
 
 def test_an_error_while_writing_leaves_what_was_there(tmp_path: Path) -> None:

@@ -120,7 +120,7 @@ def test_tables(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_files_that_are_no_such_result(tmp_path: Path) -> None:
     path = Other(2.0).save(tmp_path / "other.npz")
-    with pytest.raises(VpmError, match=r"is a saved Other, not a Sample; use Other\.load"):
+    with pytest.raises(VpmError, match=r"holds a Other in place of a Sample; use Other\.load"):
         Sample.load(path)
     with pytest.raises(VpmError, match="does not exist"):
         Sample.load(tmp_path / "none.npz")
@@ -175,7 +175,7 @@ def test_pickled_objects_are_never_read(tmp_path: Path) -> None:
         ('{"format": 1, "content": {"$": "object vpm.nothing:X", "content": {}}}', "not known here"),
         ('{"format": 1, "content": {"$": "array", "content": "gone"}}', "does not fit this version"),
         ('{"format": 1, "content": {"$": "object vpm.model.model:Model", "content": {}}}', "does not fit this version"),
-        ('{"format": 1, "content": 3}', "is a saved int"),
+        ('{"format": 1, "content": 3}', "holds a int in place of"),
         ("no json", "unreadable"),
     ],
 )

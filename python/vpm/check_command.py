@@ -90,10 +90,12 @@ def _write(found: LogCheck, logs: int, table: Mapping[str, ChannelEntry], path: 
                 "of its own with --channels",
                 path=str(path),
             )
-    text, lines = path.read_text(encoding="utf-8"), corrected_lines(found.mistakes)
+    # As it is, so that lines end as they did.
+    text, lines = path.read_bytes().decode("utf-8"), corrected_lines(found.mistakes)
     if given:
         text = corrected_text(text, lines, path)
     else:
         whole = {name: line_of(name, entry) for name, entry in table.items()} | lines
-        text = "\n".join([text.rstrip(), "", "[channels]", *whole.values(), ""])
+        end = "\r\n" if "\r\n" in text else "\n"
+        text = end.join([text.rstrip(), "", "[channels]", *whole.values(), ""])
     write_text(path, text)

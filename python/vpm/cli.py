@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
 import warnings
 from collections.abc import Sequence
+from io import TextIOWrapper
 from pathlib import Path
 from threading import Event
 from time import perf_counter
@@ -122,6 +124,9 @@ def main() -> None:
     if before is not signal.SIG_IGN:  # as a shell starts background work of a script
         signal.signal(signal.SIGINT, press)
     code: str | int | None = 0
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):
+            stream.reconfigure(errors="replace")  # letters that the encoding of a terminal does not have
     try:
         app()
     except SystemExit as end:
@@ -139,7 +144,21 @@ def main() -> None:
     if pressed.is_set():
         errors.print("stopped by Ctrl-C")
         code = INTERRUPTED
+    if console.trouble or errors.trouble:
+        _tell_unwritten()
+        code = code or 1
     sys.exit(code)
+
+
+def _tell_unwritten() -> None:
+    """Say that the output could not be written, and let it go."""
+    for one, stream in ((console, sys.stdout), (errors, sys.stderr)):
+        if one.trouble:
+            # What is left in it would be tried again at the end, with a traceback.
+            os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
+    if reason := console.trouble:
+        what = reason.strerror or str(reason)
+        errors.print(f"error: standard output cannot be written ({what[:1].lower()}{what[1:]}); send it elsewhere")
 
 
 @app.command(epilog="Example:  vpm info examples/emps/model.toml")

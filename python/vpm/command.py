@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from threading import Event, Lock, Thread
 from time import perf_counter
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.console import Console
@@ -32,8 +32,30 @@ USUAL_EVALUATIONS = 15
 #: Longest silence of a long command whose output goes to a file, s.
 PERIOD = 10.0
 
-console = Console(highlight=False, soft_wrap=True)
-errors = Console(stderr=True, highlight=False, soft_wrap=True)
+
+class Output(Console):
+    """A console that falls silent where its file or its disk takes no more: what a command writes elsewhere counts.
+
+    Attributes
+    ----------
+    trouble : OSError or None
+        Why it fell silent.
+    """
+
+    trouble: OSError | None = None
+
+    def print(self, *objects: Any, **options: Any) -> None:  # noqa: ANN401
+        """As of any console."""
+        try:
+            super().print(*objects, **options)
+        except BrokenPipeError:  # whoever read it has seen enough
+            raise
+        except OSError as error:
+            self.trouble, self.quiet = error, True
+
+
+console = Output(highlight=False, soft_wrap=True)
+errors = Output(stderr=True, highlight=False, soft_wrap=True)
 
 ModelPath = Annotated[Path, typer.Argument(metavar="MODEL", help="Model file (TOML).")]
 FORMATS = "CSV, Parquet, MAT, HDF5, ROS bag, MCAP"
@@ -97,6 +119,8 @@ def drawable(path: Path | None) -> Path | None:
     """The same for a picture, whose ending says its format."""
     if path is not None and path.suffix.lower() not in PICTURES:
         raise VpmError(f"{path} is no name of a picture; give it one of the endings {', '.join(PICTURES)}")
+    if str(path) == BESIDE:  # it gets its name later
+        return fillable(Path.cwd()) and path
     return writable(path)
 
 

@@ -34,6 +34,7 @@ from vpm.discrepancy.empirical import beside
 from vpm.discrepancy.evidence import gather
 from vpm.discrepancy.filters import filters
 from vpm.discrepancy.floor import noise_floor
+from vpm.discrepancy.moving import check_moving
 from vpm.discrepancy.overlooked import overlooked
 from vpm.discrepancy.provenance import own_settings, provenance
 from vpm.discrepancy.remainder import Remainder, remainder
@@ -450,6 +451,7 @@ def _records(
     training = tuple(joints_from_shafts(record, model, free=model.adjustable) for record in as_records(experiments))
     if not training:
         raise DiagnosisError("no record was given; pass at least one experiment")
+    check_moving(model, training)
     if validate is not None:
         unseen = tuple(joints_from_shafts(record, model) for record in as_records(validate))
         if unseen:

@@ -53,9 +53,9 @@ def replacing(path: str | PathLike[str]) -> Iterator[Path]:
     FileError
         The place cannot be written to; what was there is there still.
     """
-    target = Path(os.path.realpath(path))
-    beside = target
+    beside = target = Path(path)
     try:
+        beside = target = _linked(path)
         _check_place(target)
         if not target.exists() or target.is_file():
             # Not named after the file, whose name may be as long as names can be.
@@ -97,12 +97,11 @@ def make_folder(path: str | PathLike[str]) -> Path:
     FileError
         It cannot be made, or a file is in its place.
     """
-    folder = Path(path)
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        _linked(path).mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise _unwritable(path, error) from error
-    return folder
+    return Path(path)
 
 
 def probe_file(path: str | PathLike[str]) -> None:
@@ -113,8 +112,8 @@ def probe_file(path: str | PathLike[str]) -> None:
     FileError
         Its folder is not there or not writable, its disk is full, or something else than a file is in its place.
     """
-    target = Path(os.path.realpath(path))
     try:
+        target = _linked(path)
         _check_place(target)
         if not target.exists() or target.is_file():
             _probe(target.parent)
@@ -133,8 +132,8 @@ def probe_folder(path: str | PathLike[str]) -> None:
     FileError
         As `probe_file`.
     """
-    target = Path(os.path.realpath(path))
     try:
+        target = _linked(path)
         there = next(folder for folder in (target, *target.parents) if folder.exists())
         if not there.is_dir():
             raise NotADirectoryError(0, f"{there} is a file")
@@ -163,6 +162,14 @@ def unreadable(path: str | PathLike[str]) -> str:
     except (OSError, ValueError) as error:  # a name that is too long, or that holds a zero
         return f"{str(path)[:80]!r} is no name of a file ({getattr(error, 'strerror', None) or error}); correct it"
     return f"{path} is a pipe or a device, which cannot be read as a file; save its content to a file and name that"
+
+
+def _linked(path: str | PathLike[str]) -> Path:
+    """Where links lead to, which need not be there."""
+    target = Path(os.path.realpath(path))
+    if target.is_symlink():
+        raise OSError(0, "its links lead round in a circle")
+    return target
 
 
 def _check_place(target: Path) -> None:

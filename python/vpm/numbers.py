@@ -28,10 +28,14 @@ def array_of(given: ArrayLike, what: str, error: type[VpmError] = VpmError) -> N
     Raises
     ------
     VpmError
-        It holds something else than numbers, or its rows differ in length.
+        It holds something else than real numbers, or its rows differ in length.
     """
     try:
-        return np.asarray(given, dtype=np.float64)
+        array = np.asanyarray(given)
+        if array.dtype.kind in "cmM":  # imaginary parts would be lost, and ticks of a clock count as seconds
+            raise TypeError(f"it holds {array.dtype}")
+        array = array.astype(np.float64, copy=False)
+        return np.asarray(array.filled(np.nan) if isinstance(array, np.ma.MaskedArray) else array)
     except (TypeError, ValueError, OverflowError) as reason:
         raise error(f"{what} is no array of numbers ({reason}); give numbers in rows of equal length") from reason
 
@@ -58,9 +62,9 @@ def short(value: float) -> str:
 def percent(share: float) -> str:
     """A share with two decimals, as texts, tables and pictures show it; two digits where that would hide it.
 
-    Less than a millionth is nothing.
+    Less than a millionth is nothing. A share of nothing is not known.
     """
-    if np.isnan(share):
+    if not np.isfinite(share):
         return UNKNOWN
     if abs(share) < 1e-6:
         return "0.00 %"

@@ -270,8 +270,9 @@ class Result(Storable):
         except _MISFIT as error:
             raise VpmError(f"{path} does not fit this version of its class: {error}; write it anew") from error
         if not isinstance(result, cls):
-            found = type(result).__name__
-            raise VpmError(f"{path} is a saved {found}, not a {cls.__name__}; use {found}.load")
+            found, wanted = type(result).__name__, cls.__name__
+            repair = f"use {found}.load" if isinstance(result, Result) else f"name a file that a {wanted} was saved in"
+            raise VpmError(f"{path} holds a {found} in place of a {wanted}; {repair}")
         return result
 
 

@@ -8,7 +8,7 @@ use crate::integrator::Integrator;
 use crate::ode::Ode;
 use crate::sensor::Sensor;
 use crate::simulate::{
-    Bounds, SampledDrives, Stepping, check_pistons, check_state, check_step, halted, output_name, repair,
+    Bounds, SampledDrives, Stepping, check_start, check_state, check_step, halted, output_name, repair,
     trouble_in_words,
 };
 use crate::system::System;
@@ -139,7 +139,7 @@ impl Live {
         let mut start = state.to_vec();
         self.system.enter(&mut start);
         let Self { description, theta, system, .. } = self;
-        if let Err(error) = check_pistons(description, theta, system.dynamics(), &start) {
+        if let Err(error) = check_start(description, theta, system.dynamics(), &start) {
             self.local.copy_from_slice(&self.state);
             self.system.enter(&mut self.local);
             return Err(error);

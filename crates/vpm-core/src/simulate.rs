@@ -24,7 +24,7 @@ pub use prescribed::{observed, prescribed};
 pub use resolution::{Unstuck, resolution, unstuck};
 pub(crate) use sampled::SampledDrives;
 pub(crate) use stability::{check_step, check_structure};
-pub(crate) use start::check_pistons;
+pub(crate) use start::check_start;
 pub(crate) use stepper::{Drive, Plan, Stepper};
 
 use crate::description::Description;
@@ -229,17 +229,17 @@ fn execute(setting: Setting<'_>, plan: Plan<'_>) -> Result<Run> {
     Ok(Run { outputs: pair.first, states: pair.second, jacobian })
 }
 
-/// Complains about a piston that starts outside of its stroke in one of the `initial` states.
+/// Complains about one of the `initial` states that the machine cannot be in, see [`check_start`].
 pub(crate) fn check_starts(setting: Setting<'_>, initial: &[f64]) -> Result<()> {
     let Setting { description, theta, .. } = setting;
-    if description.layout().hydraulics == 0 {
+    if description.n_states() == 2 * description.n_coordinates() {
         return Ok(());
     }
     description.check_values(theta)?;
     let mut dynamics = Build::dynamics(&description, theta)?;
     initial
         .chunks_exact(description.n_states().max(1))
-        .try_for_each(|state| check_pistons(description, theta, &mut dynamics, state))
+        .try_for_each(|state| check_start(description, theta, &mut dynamics, state))
 }
 
 /// A sampled drive whose effort went astray at sample `row` of the piece that begins at `start`.

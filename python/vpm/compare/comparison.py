@@ -73,9 +73,12 @@ class ChannelComparison(Storable):
 
     def __str__(self) -> str:
         """One line."""
+        share = "of a signal that does not change"
+        if np.isfinite(self.relative_error):
+            share = f"{self.relative_error:.3g} % of the signal, fit {self.fit:.4g} %"
         return (
-            f"{self.channel}: rms error {self.rmse:.4g} {self.unit}, {self.relative_error:.3g} % of the "
-            f"signal, fit {self.fit:.4g} %; largest {self.max_error:.3g} {self.unit} at {self.max_error_time:.4g} s, "
+            f"{self.channel}: rms error {self.rmse:.4g} {self.unit}, {share}; "
+            f"largest {self.max_error:.3g} {self.unit} at {self.max_error_time:.4g} s, "
             f"mean {self.bias:.3g} {self.unit}; {self.time.size} samples, {self.effective_samples:.0f} independent"
         )
 

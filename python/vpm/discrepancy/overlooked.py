@@ -142,6 +142,8 @@ def _accepted(found: Search, data: Data, asked: _Asked, told: Told) -> Accepted 
     bounds, values = dict(final.bounds if asked.trial is None else asked.trial.judged.bounds), {}
     for name in own:
         value, std = run.estimated(name)
+        if not np.isfinite(std):  # a dead zone that swallows every command, for instance: nothing says how wide it is
+            return None
         parameter = run.model.parameters[name]
         bounds[name] = max(parameter.minimum, value - WITHIN * std), min(parameter.maximum, value + WITHIN * std)
         values[name] = float(np.clip(value, *bounds[name]))

@@ -78,11 +78,12 @@ class OwnRun:
         return spectra(self.model, self.problem, np.column_stack([self.left, self.slopes]))
 
     def estimated(self, name: str) -> tuple[float, float]:
-        """A fitted parameter, and its standard deviation."""
+        """A fitted parameter, and its standard deviation: infinite where nothing in the run depends on it."""
         _, _, rows = least(self.spectra())
-        lengths = column_lengths(rows[:, 1:])
+        lengths, place = column_lengths(rows[:, 1:]), self.free.index(name)
+        if not np.any(rows[:, 1 + place]):
+            return self.model.parameters[name].value, np.inf
         triangle = np.linalg.qr(rows[:, 1:] / lengths, mode="r")
-        place = self.free.index(name)
         spread = float(np.linalg.norm(np.linalg.pinv(triangle, rcond=RANK)[place])) / float(lengths[place])
         return self.model.parameters[name].value, spread
 

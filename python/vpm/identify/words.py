@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from vpm.errors import IdentificationError
@@ -26,7 +27,7 @@ def told(fit: Fit) -> list[str]:
     lines += [f"first states: {fit.first_states}"] if fit.first_states else []
     lines += fit.warnings
     lines += [
-        f"residual {channel}: {rms:.4g} {unit}, {100 * share:.2f} % of the signal"
+        f"residual {channel}: {rms:.4g} {unit}, {_of_the_signal(share)}"
         for channel, (rms, share, unit) in fit.after.items()
     ]
     return lines
@@ -36,9 +37,13 @@ def told_unseen(judged: tuple[Gaps, Gaps]) -> list[str]:
     """Gaps on records that were never fitted, before and after, a line each."""
     before, after = judged
     return [
-        f"unseen {channel}: {rms:.4g} {unit}, {100 * share:.2f} % of the signal; before it {before[channel][0]:.4g}"
+        f"unseen {channel}: {rms:.4g} {unit}, {_of_the_signal(share)}; before it {before[channel][0]:.4g}"
         for channel, (rms, share, unit) in after.items()
     ]
+
+
+def _of_the_signal(share: float) -> str:
+    return f"{100 * share:.2f} % of the signal" if math.isfinite(share) else "of a signal that does not change"
 
 
 def told_intervals(

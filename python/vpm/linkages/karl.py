@@ -224,7 +224,8 @@ class Karl:
                 rows.append((actuator, "direct", "extended" if extended else "folded", stroke, angle))
             for stroke, angle in self._core.perpendiculars(actuator):
                 rows.append((actuator, "inverse", "perpendicular", stroke, angle))
-        actuators, kinds, forms, strokes, angles = zip(*rows, strict=True)
+        # Rods too short to reach their sliders leave none at all.
+        actuators, kinds, forms, strokes, angles = zip(*rows, strict=True) if rows else ((),) * 5
         where = tuple(self._where(*row) for row in rows)
         return KarlSingularities(actuators, kinds, forms, where, np.array(strokes), np.array(angles))
 
@@ -286,14 +287,20 @@ class Karl:
 
     @property
     def summary(self) -> tuple[str, ...]:
-        """Singular strokes, one sentence each."""
+        """Singular strokes, one sentence each; what can be assembled at some strokes only has some."""
         s = self.singularities()
+        apart = (
+            f"actuator {number + 1}: no stroke assembles it; its rod is too short"
+            for number in (0, 1)
+            if not s.of(number).size
+        )
         rows = zip(s.actuator, s.kind, s.arrangement, s.where, s.strokes, s.angles, strict=True)
-        return tuple(
+        singular = (
             f"actuator {actuator + 1}: {kind} singularity at {stroke:+.6f} m, {arrangement}, "
             f"joint at {np.degrees(angle):.3f} deg, {where}"
             for actuator, kind, arrangement, where, stroke, angle in rows
         )
+        return (*apart, *singular)
 
     def plot(self) -> Figure:
         """Reach, joint angles and transmission between the singular strokes; see `KarlWorkspace.plot`.

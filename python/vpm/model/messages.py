@@ -75,7 +75,7 @@ def read_toml(path: str | PathLike[str]) -> dict[str, Any]:
     if reason := unreadable(path):
         raise ModelError(reason, path=str(path))
     try:
-        text = Path(path).read_text(encoding="utf-8")
+        text = Path(path).read_text(encoding="utf-8-sig")  # editors of Windows write a mark before the text
     except FileNotFoundError:
         raise ModelError(f"{path} does not exist; check the path", path=str(path)) from None
     except UnicodeDecodeError as error:

@@ -275,7 +275,10 @@ def bounded_step(structure: Structure, errors: Array, slopes: Array, reach: floa
     z, scale = structure.standard, max(float(np.mean(errors**2)), 1e-300)
     far = np.isin(np.arange(len(z)), [place for _, place in structure.leaning])
     known = np.where(far, FAINT, 1.0)
-    normal = slopes.T @ slopes / scale + np.diag(known)
+    with np.errstate(over="ignore", invalid="ignore"):
+        normal = slopes.T @ slopes / scale + np.diag(known)
+    if not np.all(np.isfinite(normal)):  # as of a joint that stands, of which nothing is left to explain
+        raise VpmError(f"{structure.model.name}: the records leave no error that a step could be measured by")
     sizes = 1.0 / np.sqrt(np.diag(normal))
     root = np.linalg.cholesky(normal * np.outer(sizes, sizes) + 1e-12 * np.eye(len(z))).T
     pull = -(slopes.T @ errors / scale + known * z) * sizes

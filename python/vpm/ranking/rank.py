@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from threadpoolctl import threadpool_limits
 
 from vpm.discrepancy.candidates import asked_for
+from vpm.discrepancy.moving import check_moving
 from vpm.discrepancy.side_by_side import Progress, SideBySide
 from vpm.errors import DiagnosisError
 from vpm.experiment import Experiment, as_records, joints_from_shafts
@@ -67,7 +68,7 @@ def rank(
     Raises
     ------
     DiagnosisError
-        No record was given, or an effect is asked for that the catalogue does not have.
+        No record was given, none shows any motion, or an effect is asked for that the catalogue does not have.
     VpmError
         A channel is missing, or the model runs away from the records.
 
@@ -80,6 +81,7 @@ def rank(
     unseen = [joints_from_shafts(record, model) for record in as_records(() if validate is None else validate)]
     if not records:
         raise DiagnosisError("no record was given; pass at least one experiment")
+    check_moving(model, records)
     with threadpool_limits(1, user_api="blas"):
         each = SideBySide(workers, progress)
         names = asked_for(effects)

@@ -17,6 +17,10 @@ Array = NDArray[np.float64]
 DELAY = 5e-3
 
 
+#: Effort, speed and way of what stands, in SI units.
+LEAST = 1e-9
+
+
 class Sizes:
     """How large what the records show is, by joint and transmission: effort, speed and way."""
 
@@ -38,6 +42,11 @@ class Sizes:
             for place, name in enumerate(model.actuators)
         }
 
+    def moves(self, site: str) -> bool:
+        """Whether a joint or a transmission is seen to move."""
+        low, high = self.ways.get(site, (0.0, 0.0))
+        return high - low > LEAST
+
     def prior(self, candidate: Candidate, parameter: EffectParameter, value: float) -> Prior:
         """Prior of a parameter of an effect that begins at ``value``."""
         low, high = candidate.bounds.get(parameter.name, parameter.physical)
@@ -51,7 +60,7 @@ class Sizes:
         return Prior(value, FACTOR, max(low, 1e-12), high, logarithmic=True)
 
     def _size(self, site: str, scale: str) -> float:
-        effort, speed, way = (max(number, 1e-9) for number in self._shown(site))
+        effort, speed, way = (max(number, LEAST) for number in self._shown(site))
         sizes = {
             **natural_sizes(effort, speed, way),
             "channel": way,

@@ -28,7 +28,8 @@ def started(candidate: Candidate, model: Model, sizes: Sizes) -> Candidate:
     if candidate.effect.has_play:
         return replace(candidate, starts=tuple(_backlash(start) for start in candidate.starts), fixed=())
     if candidate.effect.stops:
-        seen = candidate.site in sizes.ways  # nobody knows where a joint ends that nobody sees
+        # Nobody knows where a joint ends that nobody sees, or that stands.
+        seen = sizes.moves(candidate.site)
         starts = tuple(_stop(start, candidate.site, model, sizes) for start in candidate.starts if seen)
         return replace(candidate, starts=starts, neutral=False)
     return candidate

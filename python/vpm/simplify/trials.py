@@ -240,6 +240,8 @@ class Trials:
         try:
             errors = self.judge.errors(model, setup)
             error, loudest = max((share, channel) for channel, share in errors.items())
+            if not np.isfinite(error):
+                self.reason = f"{loudest} does not change in the records, so that no error is a share of it"
             if not error < demanded:
                 return None
             seconds, slowest = self.timed(model, setup)

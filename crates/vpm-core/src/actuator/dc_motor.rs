@@ -80,8 +80,14 @@ impl<S: Scalar> DcMotor<S> {
     /// Effort on the joint in N m at `current` (A), the joint turning with `rate` (rad/s).
     #[inline]
     pub fn effort(&self, current: S, rate: S) -> S {
-        let driving = self.gear_ratio * self.torque_constant * current;
+        let driving = self.driving(current);
         driving - (S::one() - self.efficiency) * driving.abs() * (rate / self.transition_velocity).tanh()
+    }
+
+    /// Torque of the motor on the joint in N m before the gear takes its share.
+    #[inline]
+    pub fn driving(&self, current: S) -> S {
+        self.gear_ratio * self.torque_constant * current
     }
 
     /// Resistance of the gear in N m s/rad at `rate` (rad/s), the chord from rest, where the motor gives `driving` (N m) to the joint.
@@ -118,7 +124,7 @@ impl<S: Scalar> DcMotor<S> {
     /// Power in W that becomes heat at `current` (A) and `rate` (rad/s) of the joint: in the copper, and in the gear.
     #[inline]
     pub fn losses(&self, current: S, rate: S) -> (S, S) {
-        let driving = self.gear_ratio * self.torque_constant * current;
+        let driving = self.driving(current);
         (self.resistance * current * current, (driving - self.effort(current, rate)) * rate)
     }
 }

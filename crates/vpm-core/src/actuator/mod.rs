@@ -160,11 +160,6 @@ impl<S: Scalar> Actuator<S> {
         own + self.friction_chord(force, rate)
     }
 
-    /// Whether all that rubs in it comes behind the law of its drive, which does not know of it.
-    pub(crate) fn friction_is_apart(&self) -> bool {
-        !matches!(self.drive, Drive::DcMotor(_))
-    }
-
     /// Its resistance there, the chord from rest.
     #[inline]
     pub fn friction_chord(&self, force: S, rate: S) -> S {

@@ -81,6 +81,12 @@ pub trait MemoryLaw<S: Scalar> {
     /// velocity.
     fn advance(&self, z: S, way: S, time: S) -> S;
 
+    /// How far from zero it leads the memory at most.
+    #[inline]
+    fn reach(&self) -> S {
+        S::one()
+    }
+
     /// Effort, N or N m.
     #[inline]
     fn effort(&self, v: S, z: S) -> S {

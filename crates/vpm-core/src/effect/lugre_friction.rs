@@ -45,6 +45,11 @@ impl<S: Scalar> MemoryLaw<S> for LugreFriction<S> {
         let end = way.if_negative(|| -level, || level);
         z + (end - z) * slid
     }
+
+    #[inline]
+    fn reach(&self) -> S {
+        self.level(S::zero())
+    }
 }
 
 impl<S: Scalar> LugreFriction<S> {

@@ -51,6 +51,18 @@ pub enum DriveError {
         /// What to do.
         repair: &'static str,
     },
+    /// A state that the law of its drive or effect never leads to.
+    #[error(
+        "the {state} starts at {value:.4e}, but its law leads it no further than {reach:.4e} from zero; start within that"
+    )]
+    Start {
+        /// The state in words.
+        state: String,
+        /// Where it starts.
+        value: f64,
+        /// How far from zero its law leads at most.
+        reach: f64,
+    },
     /// A piston that starts outside of its cylinder.
     #[error(
         "the piston of actuator `{actuator}` starts {place:.6} m from mid-stroke, but its stroke ends at -{reach:.6} m and {reach:.6} m; start \

@@ -45,7 +45,8 @@ impl Why {
 /// - a beam of length L with coordinates q and stiffness K stores `1/2 q^T K q`. Stretched by 1, its strongest section stores `1/2 EA L`.
 ///   At a given `q_i` no beam stores less than `q_i^2 / (2 (K^-1)_ii)`, so that `|q_i| <= sqrt(EA L (K^-1)_ii)`.
 /// - oil of bulk modulus beta in a chamber whose volume goes from `line + A stroke` to `line` changes its pressure by
-///   `beta ln(1 + A stroke / line)`; the supply adds its own pressure. Another beta covers stops that yield and logged pressures.
+///   `beta ln(1 + A stroke / line)`; the supply adds its own pressure. Another beta covers stops that yield and logged pressures. A supply
+///   that sags is pressed no further than by its source and by what its cylinders send back.
 /// - every other state stays below its natural size (of [`crate::ode::Ode::scales`]) over the rounding error of a number: beyond, two
 ///   numbers that follow each other differ by more than that size.
 ///
@@ -78,18 +79,25 @@ impl Bounds {
                 bounds.limit(first + place, (2.0 * energy * softness).sqrt(), Why::Strain);
             }
         }
-        let mut place = 2 * n;
+        let (mut place, mut pressures) = (2 * n, vec![0.0_f64; dynamics.supplies.len()]);
         for actuator in &dynamics.actuators {
             if let Drive::Hydraulic(law) = &actuator.drive {
-                bounds.oil(place + usize::from(actuator.lag.is_some()), law, dynamics);
+                let pressure = bounds.oil(place + usize::from(actuator.lag.is_some()), law, dynamics);
+                pressures[law.supply] = pressures[law.supply].max(pressure);
             }
             place += actuator.n_states();
+        }
+        for (supply, pressed) in dynamics.supplies.iter().zip(pressures) {
+            if supply.is_sagging() {
+                bounds.limit(place, pressed.max(supply.pressure), Why::Oil);
+            }
+            place += supply.states().count();
         }
         bounds
     }
 
-    /// The pressures of a drive whose states begin at `first`.
-    fn oil(&mut self, first: usize, law: &HydraulicDrive<f64>, dynamics: &Dynamics<f64>) {
+    /// The pressures of a drive whose states begin at `first`, and the bound of them.
+    fn oil(&mut self, first: usize, law: &HydraulicDrive<f64>, dynamics: &Dynamics<f64>) -> f64 {
         let (supply, cylinder) = (&dynamics.supplies[law.supply], &law.cylinder);
         let areas = cylinder.areas();
         let ratio = |area: f64, line: f64| area * cylinder.stroke / line;
@@ -100,6 +108,7 @@ impl Bounds {
                 self.limit(first + place, pressure, Why::Oil);
             }
         }
+        pressure
     }
 
     /// Lowers a bound; a `most` that is no number says nothing.

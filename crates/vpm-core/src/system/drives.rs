@@ -151,7 +151,7 @@ impl<S: Scalar> Dynamics<S> {
                     rates[at] = law.current_rate(current, input, rate);
                     shown.currents[motors] = current;
                     (at, motors) = (at + 1, motors + 1);
-                    law.effort(current, rate)
+                    if seals[number].is_none() { law.effort(current, rate) } else { law.driving(current) }
                 }
                 Drive::SpringDamper(law) => {
                     let [length, rate] = moving();

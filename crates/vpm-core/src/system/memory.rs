@@ -38,6 +38,11 @@ impl<S: Scalar> Memories<S> {
         self.laws.iter().zip(&self.values).map(|((seat, effect), &value)| (seat, effect, value))
     }
 
+    /// How far from zero each law leads its memory at most.
+    pub(super) fn reaches(&self) -> impl Iterator<Item = S> {
+        self.laws.iter().map(|(_, effect)| effect.law().reach())
+    }
+
     /// Where each of them is.
     pub(super) fn seats(&self) -> impl Iterator<Item = &Seat<S>> {
         self.laws.iter().map(|(seat, _)| seat)

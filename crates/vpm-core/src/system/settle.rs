@@ -62,18 +62,26 @@ impl<S: Scalar> Dynamics<S> {
     /// Writes the resistances that stand for the friction of seals and drives in an iteration matrix at (q, v), after [`Dynamics::rhs`]
     /// there.
     pub(super) fn drive_chords(&self, q: &[S], v: &[S], chords: &mut [Option<S>]) {
-        let seal = |actuator: &Actuator<S>| match &actuator.drive {
-            Drive::Hydraulic(law) if law.cylinder.seal.is_there() => Some(law.cylinder.seal),
-            _ => None,
+        let rubs = |actuator: &Actuator<S>| match &actuator.drive {
+            Drive::Hydraulic(law) => actuator.friction.is_some() || law.cylinder.seal.is_there(),
+            Drive::DcMotor(_) => true,
+            _ => actuator.friction.is_some(),
         };
-        let rubs = |actuator: &Actuator<S>| actuator.friction.is_some() || seal(actuator).is_some();
         if self.ideal || !self.actuators.iter().any(rubs) {
             return;
         }
+        let mut currents = self.shown.currents.iter();
         for ((actuator, &force), chord) in self.actuators.iter().zip(&self.driven).zip(chords) {
             let [_, rate] = motion(actuator.on, q, v, &self.data.composite.lines);
-            let sealed = seal(actuator).map_or_else(S::zero, |seal| seal.resistance(rate));
-            *chord = Some(sealed + actuator.friction_chord(force, rate));
+            let own = match &actuator.drive {
+                Drive::Hydraulic(law) if law.cylinder.seal.is_there() => law.cylinder.seal.resistance(rate),
+                Drive::DcMotor(law) => {
+                    let current = currents.next().copied().unwrap_or_default();
+                    law.gear_resistance(law.driving(current), rate)
+                }
+                _ => S::zero(),
+            };
+            *chord = Some(own + actuator.friction_chord(force, rate));
         }
     }
 
@@ -88,32 +96,50 @@ impl<S: Scalar> Dynamics<S> {
 
     /// Natural sizes of the states of drives and supplies, in SI units.
     pub(crate) fn drive_scales(&self, scales: &mut [f64]) {
+        let mut scales = scales.iter_mut();
+        self.drive_sizes(|[size, _]| scales.next().into_iter().for_each(|scale| *scale = size));
+    }
+
+    /// Which of the states of drives, supplies and memories is out of reach in `states`, and how far its law leads at most: none that
+    /// is no more than its natural size beyond, which is what steps may be off.
+    pub(crate) fn out_of_reach(&self, states: &[f64]) -> Option<(usize, f64)> {
+        let (mut states, mut found) = (states.iter().enumerate(), None);
+        self.drive_sizes(|[size, reach]| {
+            let outside = states.next().filter(|(_, state)| state.abs() > reach + size);
+            found = found.or(outside.map(|(place, _)| (place, reach)));
+        });
+        found
+    }
+
+    /// Tells `next` the natural size of each state of drives, supplies and memories, in SI units, and how far from zero its law leads at most:
+    /// infinite where commands or motions have the last word.
+    fn drive_sizes(&self, mut next: impl FnMut([f64; 2])) {
         const STRETCH: f64 = 1e-3;
         const PRESSURE: f64 = 1e5;
-        let mut scales = scales.iter_mut();
-        let mut next = |value: f64| scales.next().into_iter().for_each(|scale| *scale = value);
+        let free = |size: f64| [size, f64::INFINITY];
         for actuator in &self.actuators {
             if actuator.lag.is_some() {
-                next(actuator.saturation.map_or(1.0, |saturation| saturation.limit.inspect()));
+                next(actuator.saturation.map_or(free(1.0), |saturation| [saturation.limit.inspect(); 2]));
             }
             match &actuator.drive {
                 Drive::Ideal(_) | Drive::SpringDamper(_) | Drive::Table(_) | Drive::Narx(_) | Drive::MaxwellNarx(_) => {
                 }
-                Drive::DcMotor(_) => next(1.0),
-                Drive::Maxwell(_) => next(STRETCH),
+                Drive::DcMotor(_) => next(free(1.0)),
+                Drive::Maxwell(_) => next(free(STRETCH)),
                 Drive::Hydraulic(law) => {
                     let stroke = law.valve.stroke.inspect();
                     let rate = law.valve.own_frequency().map_or(1.0, |frequency| stroke * frequency.inspect());
+                    let [place, speed] = law.valve.reach();
                     let size = |state: &&str| match *state {
-                        "spool" => stroke,
-                        "spool_rate" => rate,
-                        _ => PRESSURE,
+                        "spool" => [stroke, place.inspect()],
+                        "spool_rate" => [rate, speed.inspect()],
+                        _ => free(PRESSURE),
                     };
                     law.states().iter().map(size).for_each(&mut next);
                 }
             }
         }
-        self.supplies.iter().flat_map(|supply| supply.states()).for_each(|_| next(PRESSURE));
-        scales.for_each(|memory| *memory = 1.0);
+        self.supplies.iter().flat_map(|supply| supply.states()).for_each(|_| next(free(PRESSURE)));
+        self.memories.reaches().for_each(|reach| next([1.0, reach.inspect()]));
     }
 }

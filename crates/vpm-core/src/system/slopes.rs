@@ -68,8 +68,7 @@ impl Dynamics<f64> {
                 Target::Line(line) => self.data.line_load(line, 1.0, &mut along),
             }
             let [rest, fast] = [0.0, FAST].map(|v| actuator.resistance(force, v));
-            let taken = if actuator.friction_is_apart() { Taken::ByChord } else { Taken::ByTangent };
-            Rubbing { along, slope: rest - fast, taken, ..Rubbing::default() }
+            Rubbing { along, slope: rest - fast, taken: Taken::ByChord, ..Rubbing::default() }
         });
         effects.chain(memories).chain(actuators).collect()
     }
