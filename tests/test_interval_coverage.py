@@ -136,10 +136,10 @@ def test_links_and_cylinders_are_compared_with_their_own_simulation(machine: str
     case = next(c for seed in range(20) if (c := study.drawn(machines.Machine(**quiet), seed, 0)).present)
     true = case.model.with_parameters(dict(case.truth))
     data = InverseDynamicsProblem(true, [case.log])
-    expected, left = own_residual(true, data), data.evaluate(true, true.theta)[0]
-    assert expected is not None
+    own, left = own_residual(true, data), data.evaluate(true, true.theta)[0]
+    assert own is not None
     rows = data.blocks[0].samples
-    assert np.std((left - expected)[rows]) < 0.9 * np.std(left[rows])
+    assert np.std((left - own.expected)[rows]) < 0.9 * np.std(left[rows])
 
 
 def test_noise_that_a_balance_is_linear_in_leaves_no_trace_in_what_is_expected() -> None:
@@ -150,4 +150,18 @@ def test_noise_that_a_balance_is_linear_in_leaves_no_trace_in_what_is_expected()
     one, other = (own_residual(true, data, OwnSimulation(pairs=2), seed) for seed in (0, 1))
     assert one is not None
     assert other is not None
-    assert np.std(one - other) < 0.1 * np.std(data.evaluate(true, true.theta)[0] - one)
+    assert np.std(one.expected - other.expected) < 0.1 * np.std(data.evaluate(true, true.theta)[0] - one.expected)
+
+
+@pytest.mark.parametrize("machine", ["flexible_arm", "leg"])
+def test_the_noise_of_drives_is_seen_in_what_they_move(machine: str) -> None:
+    """Three logs each; sensors and the drive are as noisy as the simulation that wrote them was told."""
+    planted = machines.MACHINES[machine]
+    for seed in (1, 2, 3):
+        case = study.drawn(planted, seed, 0)
+        true = case.model.with_parameters(dict(case.truth))
+        own = own_residual(true, InverseDynamicsProblem(true, [case.log]))
+        assert own is not None
+        assert np.max(own.noise.drives) == pytest.approx(planted.command_noise, rel=0.3)
+        for channel, level in planted.noise.items():
+            assert own.noise.instruments[0, case.log.channels.index(channel)] == pytest.approx(level, rel=0.1)

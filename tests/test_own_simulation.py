@@ -88,10 +88,10 @@ def test_what_is_left_of_a_log_is_what_was_expected(some: list[Experiment]) -> N
     """At the true values nothing but noise is left beyond that."""
     true = MODEL.with_parameters(dict(zip(FREE, EXPECTED.tolist(), strict=True)))
     data = InverseDynamicsProblem(true, some[:1])
-    left, expected = data.evaluate(true, true.theta)[0], own_residual(true, data)
-    assert expected is not None
-    assert np.std(left - expected) < 0.5 * np.std(left)
-    assert np.array_equal(data.less(expected).evaluate(true, true.theta)[0], left - expected)
+    left, own = data.evaluate(true, true.theta)[0], own_residual(true, data)
+    assert own is not None
+    assert np.std(left - own.expected) < 0.5 * np.std(left)
+    assert np.array_equal(data.less(own.expected).evaluate(true, true.theta)[0], left - own.expected)
 
 
 def test_the_error_that_is_told_is_that_of_the_log(some: list[Experiment]) -> None:

@@ -20,13 +20,14 @@ from vpm.identify.estimation import Estimate, Progress, blinded, estimate, limit
 from vpm.identify.identifiability import Combination, column_lengths
 from vpm.identify.missing import missing_effects, whiteness
 from vpm.identify.moments import on_the_border
+from vpm.identify.noise_left import Noise, left
 from vpm.identify.objective import AnyProblem
 from vpm.identify.output_error import OutputErrorProblem
-from vpm.identify.own_simulation import own_residual
+from vpm.identify.own_simulation import Own, own_residual
 from vpm.identify.prediction_error import PredictionErrorProblem
 from vpm.identify.problem import gaps
 from vpm.identify.remarks import constant_channels, contradictions, lost_channels, remarks, resting, touching
-from vpm.identify.sandwich import freedom, record_groups, sandwich
+from vpm.identify.sandwich import freedom, pooled, record_groups, sandwich
 from vpm.identify.settings import Checks, Fitting, OwnSimulation
 from vpm.identify.shooting import ShootingProblem
 from vpm.identify.ties import TiedProblem, check_ties
@@ -239,13 +240,14 @@ def identify(
     check_ties(model, ties or {}, names)
     data = _with_own_gains(model, data, names, tolerance)
     before, _ = data.evaluate(model, model.theta)
+    own: Own | None = None
     if fitting is None:
         best = estimate(model, data, names, tolerance=tolerance, progress=progress, feasible=True)
         data, best, begun = _from_anywhere(model, data, best, tolerance, checks or Checks(), ties or {})
-        data, best = _beside_own(model, data, best, tolerance, ties or {})
+        data, best, own = _beside_own(model, data, best, tolerance, ties or {})
         result = _with_intervals(data, best)
-        left = replace(result, residual=result.residual + _expected(data))
-        fit = fit_of(model, data, left, before, [e.name for e in records], ties or {})
+        whole = replace(result, residual=result.residual + _expected(data))
+        fit = fit_of(model, data, whole, before, [e.name for e in records], ties or {})
         fit = replace(fit, evaluations=result.evaluations, ended="interrupted" if result.interrupted else "")
         fit = replace(fit, first_states=UNKNOWN if begun else "")
     else:
@@ -268,6 +270,8 @@ def identify(
     unscaled = result.jacobian[: data.blocks[-1].samples.stop]
     decided = freedom(unscaled / column_lengths(unscaled), data.blocks, len(names) + len(fit.states))[: len(names)]
     fit = replace(fit, freedom=decided)
+    if own is not None:
+        fit = _with_noise(fit, data, unscaled, own.noise)
     return replace(fit, warnings=_told(model, records, data, fit, checks or Checks()))
 
 
@@ -295,26 +299,39 @@ def _from_anywhere(
 
 def _beside_own(
     model: Model, data: AnyProblem, best: Estimate, tolerance: float, ties: Mapping[str, str]
-) -> tuple[AnyProblem, Estimate]:
+) -> tuple[AnyProblem, Estimate, Own | None]:
     """The fit of a balance of effort less what it leaves of the model's own simulation, where that can be told.
 
-    What the records do not show a correction would move without end.
+    What the records do not show a correction would move without end. With it comes the last simulation.
     """
     plain = data.untied if isinstance(data, TiedProblem) else data
+    last: Own | None = None
     if best.interrupted or best.unseen or not isinstance(plain, InverseDynamicsProblem):
-        return data, best
+        return data, best, None
     for _ in range(OwnSimulation().rounds):
         fitted = _moved(model, best, ties)
-        expected = own_residual(fitted, plain)
-        if expected is None:
+        own = own_residual(fitted, plain)
+        if own is None:
             break
-        before, less = best.values, plain.less(expected)
+        last, before, less = own, best.values, plain.less(own.expected)
         data = TiedProblem(less, ties) if ties else less
         best = estimate(fitted, data, best.names, tolerance=tolerance, feasible=True)
         seen = np.isfinite(best.std)
         if best.interrupted or np.all(np.abs(best.values - before)[seen] <= best.std[seen]):
             break
-    return data, best
+    return data, best, last
+
+
+def _with_noise(fit: Fit, data: AnyProblem, jacobian: Array, noise: Noise) -> Fit:
+    """The same with deviations that know how far the noise of the records moves the estimates."""
+    plain = data.untied if isinstance(data, TiedProblem) else data
+    if not isinstance(plain, InverseDynamicsProblem):
+        return fit
+    how, lengths = OwnSimulation(), column_lengths(jacobian)
+    drawn = left(fit.model, plain, noise, np.random.default_rng(0), how.draws)
+    errors = drawn @ np.linalg.pinv(jacobian / lengths).T / lengths
+    variance, decided = pooled(fit.std**2, np.asarray(fit.freedom), errors, how.contradicted)
+    return replace(fit, std=np.sqrt(variance), freedom=decided)
 
 
 def _expected(data: AnyProblem) -> Array | float:

@@ -10,16 +10,18 @@ B. Efron and R. Tibshirani, *An Introduction to the Bootstrap*, 1993, chapter 10
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vpm.errors import VpmError
-from vpm.experiment import Experiment, Motion, noise_std
+from vpm.experiment import Experiment, Motion
 from vpm.identify.along import bends, has_own_drives
 from vpm.identify.balance import InverseDynamicsProblem
+from vpm.identify.noise_left import Noise, compared, noise_of
 from vpm.identify.settings import OwnSimulation
 from vpm.initial import measured_states
 from vpm.model import Model
@@ -29,10 +31,17 @@ from vpm.stepping import Simulation
 Array = NDArray[np.float64]
 
 
+class Own(NamedTuple):
+    """What a balance leaves of simulations of its own model, shape (n,), and their noise."""
+
+    expected: Array
+    noise: Noise
+
+
 def own_residual(
     model: Model, data: InverseDynamicsProblem, settings: OwnSimulation | None = None, seed: int = 0
-) -> Array | None:
-    """What ``data`` leaves of simulations of ``model`` on the commands of its records, shape (n,).
+) -> Own | None:
+    """What ``data`` leaves of simulations of ``model`` on the commands of its records.
 
     Parameters
     ----------
@@ -45,7 +54,7 @@ def own_residual(
 
     Returns
     -------
-    ndarray or None
+    Own or None
         None where the model does not stay by its records or lacks something, where nobody measured a joint, or where
         drives have states of other kinds than cylinders.
     """
@@ -53,26 +62,34 @@ def own_residual(
     whole = all(tuple(model.joints) == tuple(m.joints) for m in data.motions)
     if data.hold != HOLDS[0] or not whole or not _drawn_by_commands(model):
         return None
-    shown = (channel for channel in data.shown if channel in model.output_channels)
-    channels = (*(f"{joint}.position" for joint in model.joints), *shown)
     try:
-        made = [_simulated(model, e, m, channels, how) for e, m in zip(data.experiments, data.motions, strict=True)]
+        return _own(model, data, how, np.random.default_rng(seed))
     except (VpmError, ArithmeticError, np.linalg.LinAlgError):
         return None
-    simulated = [one for one in made if one is not None]
-    if len(simulated) < len(made):
+
+
+def _own(model: Model, data: InverseDynamicsProblem, how: OwnSimulation, random: np.random.Generator) -> Own | None:
+    channels = tuple(name for name in compared(data) if name in model.output_channels)
+    logs = list(zip(data.experiments, data.motions, strict=True))
+    found = [_beside(model, log, m, channels, how) for log, m in logs]
+    guided = [one for one in found if one is not None]
+    if len(guided) < len(logs):
         return None
-    levels, random, left = [_noise_levels(e, channels) for e in data.experiments], np.random.default_rng(seed), []
+    noise, written = noise_of(model, data, [quiet for _, quiet in guided], random), []
     for _ in range(how.pairs):
-        noises = [_noise_like(one, level, random) for one, level in zip(simulated, levels, strict=True)]
+        both = noise.drawn(data.experiments, random)
         for sign in (1.0, -1.0):
-            noisy = [replace(e, data=e.data + sign * noise) for e, noise in zip(simulated, noises, strict=True)]
-            # What is relative to the delivered effort is made so afterwards, with what is expected taken off.
-            left.append(InverseDynamicsProblem.evaluate(data.on(noisy), model, model.theta)[0])
+            noisy = []
+            for (log, m), (band, quiet), (seen, told) in zip(logs, guided, both, strict=True):
+                made = _drawn(model, log, m, channels, how, band, sign * told) if np.any(told) else quiet
+                noisy.append(replace(made, data=made.data + sign * seen))
+            written.append(noisy)
+    # What is relative to the delivered effort is made so afterwards, with what is expected taken off.
+    left = [InverseDynamicsProblem.evaluate(data.on(made), model, model.theta)[0] for made in written]
     of_log = InverseDynamicsProblem.evaluate(data, model, model.theta)[0]
     if not np.linalg.norm(of_log) <= how.alike * np.linalg.norm(left) / np.sqrt(len(left)):
         return None
-    return np.asarray(np.mean(left, axis=0))
+    return Own(np.asarray(np.mean(left, axis=0)), noise)
 
 
 def _drawn_by_commands(model: Model) -> bool:
@@ -80,22 +97,25 @@ def _drawn_by_commands(model: Model) -> bool:
     return not has_own_drives(model) or all(model.actuator_type(name) == "hydraulic" for name in model.actuators)
 
 
-def _simulated(
+def _beside(
     model: Model, log: Experiment, m: Motion, channels: Sequence[str], how: OwnSimulation
-) -> Experiment | None:
-    """The log as the model would have written it without noise; None where the model does not stay by it."""
+) -> tuple[float, Experiment] | None:
+    """Bandwidth that keeps the model by a log, and the log as it would have been without noise; None without any."""
+    joints = [f"{joint}.position" for joint in model.joints]
     for band in how.bands:
-        made = _drawn(model, log, m, channels, how, band)
-        joints = [f"{joint}.position" for joint in model.joints]
+        made = _drawn(model, log, m, channels, how, band, np.zeros_like(log.data))
         if all(np.std(made[channel] - log[channel]) <= how.away * np.std(log[channel]) for channel in joints):
-            return made
+            return band, made
     return None
 
 
 def _drawn(
-    model: Model, log: Experiment, m: Motion, channels: Sequence[str], how: OwnSimulation, band: float
+    model: Model, log: Experiment, m: Motion, channels: Sequence[str], how: OwnSimulation, band: float, told: Array
 ) -> Experiment:
-    """A simulation on the commands of a log, to which a slow controller adds what keeps it by the motion of the log."""
+    """A simulation on the commands of a log, to which a slow controller adds what keeps it by the motion of the log.
+
+    Drives deliver beside their commands what is ``told`` in the columns of these, and the log does not tell.
+    """
     omega, joints = 2.0 * np.pi * band, len(model.joints)
     by_position, by_velocity = _gains(model, m, omega, how.damping)
     start = measured_states(model, log, model.theta, np.zeros(1, dtype=np.int64), m.cutoff, m)[0]
@@ -103,12 +123,16 @@ def _drawn(
     read = [sim.channels.index(channel) for channel in channels]
     speeds = slice(len(model.coordinates), len(model.coordinates) + joints)
     outputs, commands = np.empty((len(m.time), len(read))), np.empty_like(m.inputs)
+    untold = np.zeros_like(m.inputs)
+    for column, channel in enumerate(m.drivers):
+        if channel in log:
+            untold[:, column] = told[:, log.channels.index(channel)]
     for k, (position, velocity, command) in enumerate(zip(m.position, m.velocity, m.inputs, strict=True)):
         outputs[k] = sim.outputs[read]
         commands[k] = command + by_position @ (position - outputs[k, :joints])
         if by_velocity is not None:
             commands[k] += by_velocity @ (velocity - sim.state[speeds])
-        sim.step(commands[k])
+        sim.step(commands[k] + untold[k])
     data = np.array(log.data)
     for values, names in ((outputs, channels), (commands, m.drivers)):
         for column, channel in enumerate(names):
@@ -155,17 +179,3 @@ def _commands_per_effort(model: Model, m: Motion) -> Array:
 
     columns = [(delivered(step) - delivered(-step)) / (2.0 * max(np.sum(step), 1e-300)) for step in np.diag(sizes)]
     return np.asarray(np.linalg.pinv(np.column_stack(columns)))
-
-
-def _noise_levels(log: Experiment, channels: Sequence[str]) -> dict[int, float]:
-    """Noise of some channels of a log, by their places."""
-    places = [log.channels.index(channel) for channel in channels]
-    return {place: noise_std(log.data[:, place]) for place in places}
-
-
-def _noise_like(log: Experiment, levels: Mapping[int, float], random: np.random.Generator) -> Array:
-    """Noise of these levels, of the shape of the log's data."""
-    noise = np.zeros_like(log.data)
-    for place, level in levels.items():
-        noise[:, place] = level * random.standard_normal(len(noise))
-    return noise

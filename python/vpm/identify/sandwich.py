@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import fdtri
 
 from vpm.identify.problem import Block
 
@@ -103,6 +104,29 @@ def freedom(jacobian: Array, blocks: Sequence[Block], unknowns: int) -> Array:
     squares = np.sum(stretches**2, axis=0)
     free = np.sum(stretches, axis=0) ** 2 / np.where(squares > 0.0, squares, 1.0)
     return np.asarray(np.maximum(1.0, max(0.0, 1.0 - unknowns / counted) * free))
+
+
+def pooled(variance: Array, freedom: Array, drawn: Array, level: float) -> tuple[Array, Array]:
+    """Variances of estimates and their degrees of freedom, together with how far draws of noise move the estimates.
+
+    The sandwich knows whatever disturbed this one log, the draws how noise is spread over it: where a few moments
+    decide, one log holds too few of them to tell how large they might have been. Both are weighed by their degrees of
+    freedom, unless Fisher's test says that the log was disturbed by more than the noise: then the sandwich is right (T.
+    Bancroft, *Annals of Mathematical Statistics* 15, 1944).
+
+    Parameters
+    ----------
+    variance, freedom : ndarray, shape (p,)
+        Of the sandwich.
+    drawn : ndarray, shape (draws, p)
+        Errors of the estimates.
+    level : float
+        Of the test.
+    """
+    draws, by_noise = len(drawn), np.mean(drawn**2, axis=0)
+    more = variance > by_noise * fdtri(freedom, draws, 1.0 - level)
+    together = (freedom * variance + draws * by_noise) / (freedom + draws)
+    return np.where(more, variance, together), np.where(more, freedom, freedom + draws)
 
 
 def _lags(samples: float) -> int:

@@ -164,6 +164,10 @@ class OwnSimulation:
         Morton, *Proc. Cambridge Philosophical Society* 52, 1956).
     rounds : int
         Most simulations that correct a fit; one more where the last one moved a value by more than its deviation.
+    draws : int
+        Draws of the noise that tell how far it moves a fit.
+    contradicted : float
+        Probability that a log is taken to be noisier than the draws although it is not.
     """
 
     bands: tuple[float, ...] = (0.3, 1.0, 3.0)
@@ -173,6 +177,8 @@ class OwnSimulation:
     alike: float = 2.0
     pairs: int = 3
     rounds: int = 2
+    draws: int = 20
+    contradicted: float = 0.05
 
 
 def _positive(numbers: Mapping[str, float]) -> None:
