@@ -133,6 +133,8 @@ class Explainer:
         def ended(correction: Correction) -> _Trial:
             corrected = correction.applied(part)
             plain = self.judge.fitted(corrected)
+            if correction.channels == (TIME,):  # springs and friction that nobody described fit a motion at any speed
+                return _Trial(correction, left, plain)
             easier = self.judge.freed(corrected, plain)
             found = _Trial(correction, freed, plain if easier is None else easier.shares)
             if not (correction.swap or correction.factor < 0.0):
