@@ -144,13 +144,18 @@ class Explainer:
 
         found = self.each("fitting", ended, self._finalists(part, used, left), self._words)
         if part.duration * self.settings.band >= self.settings.periods:
-            found = [*found, *self._late(part, used, tangent, freed)]
+            found = [*found, *self._late(part, used, tangent, freed, self._known(found))]
         ended_well = sorted((one for one in found if not isinstance(one, Failure)), key=lambda one: one.after.order)
         different: list[_Trial] = []
         for trial in ended_well:
             if not any(_is_same(trial.correction, other.correction) for other in different):
                 different.append(trial)
         return different
+
+    def _known(self, found: Sequence[_Trial | Failure]) -> float:
+        """Cost of the best of some corrections that explain a record; infinite if none does."""
+        known = (one.after.cost for one in found if not isinstance(one, Failure) and self._explains(*one))
+        return min(known, default=math.inf)
 
     def _best(self, ended: Sequence[_Trial], used: Sequence[str]) -> Explanation | None:
         """The first of several corrections, if it explains what was left, with those that do as well."""
@@ -215,10 +220,13 @@ class Explainer:
 
         return self._few(self.each("trying", measure, corrections, self._words), before)
 
-    def _late(self, part: Experiment, used: Sequence[str], tangent: Tangent | None, left: Shares) -> list[_Trial]:
+    def _late(
+        self, part: Experiment, used: Sequence[str], tangent: Tangent | None, left: Shares, known: float
+    ) -> list[_Trial]:
         """The few delays that promise to leave least if parameters give way: friction looks much like a delay.
 
-        From fitted values, else from those of the model: a long delay drives fitted ones far away.
+        From fitted values, else from those of the model: a long delay drives fitted ones far away. They have to promise
+        about as little as the best correction that is ``known``.
         """
         some = left.above(self.settings.negligible)
         corrections = self._about(delays(self.model, used, self.settings), some, left)
@@ -227,11 +235,11 @@ class Explainer:
             if (near := at or self.judge.tangent(part, self.judge.measured(part), FORCES)) is None:
                 continue
             promised = partial(self._promised, part=part, tangent=near)
-            few = self._few(self.each("trying", promised, corrections, self._words), left)
+            few = self._few(self.each("trying", promised, corrections, self._words), left, known)
             settle = partial(self._settled, part=part, tangent=near, left=left)
             settled = self.each("refining", settle, few, self._words)
             found += [one for one in settled if not isinstance(one, Failure) and abs(one.correction.delay) > least]
-            if any(self._explains(*one) for one in found) or not left.above(self.settings.harmless):
+            if self._known(found) < math.inf or known < math.inf or not left.above(self.settings.harmless):
                 break
         return found
 
@@ -253,13 +261,16 @@ class Explainer:
                 break
         return correction, shares
 
-    def _few(self, tried: Sequence[tuple[Correction, Shares] | Failure], before: Shares) -> list[Correction]:
-        """The corrections that leave least, one of each kind, and less than is left without any."""
+    def _few(
+        self, tried: Sequence[tuple[Correction, Shares] | Failure], before: Shares, known: float = math.inf
+    ) -> list[Correction]:
+        """The corrections that leave least, one of each kind, and less than is left without any or with a known one."""
         pairs = [pair for pair in tried if not isinstance(pair, Failure) and pair[1].cost < before.cost]
         better = sorted(pairs, key=lambda pair: pair[1].order)
+        least = min([known, *(left.cost for _, left in better[:1])])
         hopeful: list[Correction] = []
         for correction, left in better:
-            near = left.cost <= better[0][1].cost + self.settings.hopeful
+            near = left.cost <= least + self.settings.hopeful
             if near and not any(_is_same(correction, other) for other in hopeful):
                 hopeful.append(correction)
         return hopeful[: self.settings.finalists]

@@ -181,7 +181,7 @@ class Judge:
         """A tangent where all forces have been fitted, from where friction alone left ``plain``.
 
         Derivatives cost most: secants correct them on the way. They are worked out once more in between, for no tangent
-        says where a spring rests that is not there yet.
+        says where a spring rests that is not there yet; where hardly anything was gained, there is none.
         """
         observed, observer, found = self._observed(record), self._observer(record), None
         for _ in range(TURNS):
@@ -189,6 +189,8 @@ class Judge:
             if start is None:
                 break
             found = self._descended(observed, observer, start)
+            if found.shares.cost > start.shares.cost + math.log(self.settings.alike):
+                break
         return found
 
     def _descended(self, observed: Observed, observer: Observer, start: Tangent) -> Tangent:
