@@ -8,6 +8,9 @@ use crate::scalar::{Dual, Scalar, seed};
 /// Parameters per pass: the gradient of a number then fills one 256-bit register.
 pub const LANES: usize = 4;
 
+/// The same of a simulation with more of them: what each pass does anew is most of its work, and more lanes do it less often.
+pub const WIDE: usize = 12;
+
 /// Asked now and then whether to stop; true stops the computation with [`Error::Interrupted`].
 pub type Interrupt<'a> = &'a (dyn Fn() -> bool + Sync);
 

@@ -31,7 +31,7 @@ use crate::description::Description;
 use crate::error::{Diverged, Error, Result};
 use crate::integrator::{Halt, Method};
 use crate::scalar::Scalar;
-use crate::sensitivity::{Interrupt, Job, LANES, Pair, differentiate_by};
+use crate::sensitivity::{Interrupt, Job, LANES, Pair, WIDE, differentiate_by};
 use crate::system::{Build, Trouble};
 use crate::table::Table;
 use sampled::Astray;
@@ -224,8 +224,11 @@ fn execute(setting: Setting<'_>, plan: Plan<'_>) -> Result<Run> {
         let places = |row: usize| gains.readings.channels.iter().map(move |channel| row * width + channel);
         (0..plan.horizon).flat_map(places).collect::<Vec<_>>()
     });
-    let (pair, jacobian) =
-        differentiate_by::<_, LANES>(&job, setting.theta, setting.sensitivities, measured.as_deref())?;
+    let (theta, sensitivities, places) = (setting.theta, setting.sensitivities, measured.as_deref());
+    let (pair, jacobian) = match sensitivities.len() {
+        0..=LANES => differentiate_by::<_, LANES>(&job, theta, sensitivities, places)?,
+        _ => differentiate_by::<_, WIDE>(&job, theta, sensitivities, places)?,
+    };
     Ok(Run { outputs: pair.first, states: pair.second, jacobian })
 }
 
