@@ -48,7 +48,7 @@ class Correction:
         ExperimentError
             The record is too short for a delay.
         """
-        if self.channels == (TIME,):
+        if self.is_clock:
             return replace(record, time=record.time * self.factor)
         if self.delay:
             return record.align(dict.fromkeys(self.channels, self.delay))
@@ -101,13 +101,18 @@ class Correction:
         """See `Finding.kind`."""
         if self.swap:
             return "swap"
-        if self.channels == (TIME,):
+        if self.is_clock:
             return "clock"
         if self.delay:
             return "delay"
         if self.unit:
             return "unit"
         return "sign" if self.factor == -1.0 else "scale"
+
+    @property
+    def is_clock(self) -> bool:
+        """Whether it changes the time of all channels."""
+        return self.channels == (TIME,)
 
     @property
     def is_mirror(self) -> bool:

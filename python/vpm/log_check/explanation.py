@@ -12,7 +12,7 @@ import numpy as np
 
 from vpm.discrepancy.side_by_side import Failure, SideBySide
 from vpm.experiment import Experiment
-from vpm.log_check.correction import TIME, Correction, Pair
+from vpm.log_check.correction import Correction, Pair
 from vpm.log_check.corrections import delays, of_two, scales
 from vpm.log_check.shares import FORCES, Judge, Shares, Tangent
 
@@ -133,7 +133,7 @@ class Explainer:
         def ended(correction: Correction) -> _Trial:
             corrected = correction.applied(part)
             plain = self.judge.fitted(corrected)
-            if correction.channels == (TIME,):  # springs and friction that nobody described fit a motion at any speed
+            if correction.is_clock:  # springs and friction that nobody described fit a motion at any speed
                 return _Trial(correction, left, plain)
             easier = self.judge.freed(corrected, plain)
             found = _Trial(correction, freed, plain if easier is None else easier.shares)
@@ -186,7 +186,7 @@ class Explainer:
         everything = list(scales(self.model, used, self.units, self.settings))
         tried = self._about(everything, self._doubtful(left), left)
         if not left.above(self.settings.lost):  # with a wrong clock the model explains nothing
-            tried = [one for one in tried if one.channels != (TIME,)]
+            tried = [one for one in tried if not one.is_clock]
         # The mirror image of a machine explains most of a log as well as the machine does.
         tried += self._about((one for one in everything if one.is_mirror), some, left)
         return self._hopeful(list(dict.fromkeys(tried)), part, self.judge.guessed(part)) if tried else []

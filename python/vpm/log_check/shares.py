@@ -99,15 +99,6 @@ class Shares:
         return self.cost, self.logarithm(self.by_channel)
 
 
-class _Near(Structure):
-    """A structure whose springs rest near the middle of the motion, as likely as the prior says."""
-
-    @property
-    def leaning(self) -> list[tuple[int, int]]:
-        """None."""
-        return []
-
-
 class Judge:
     """Measures records by a model, to which friction and other forces were added at each joint without them.
 
@@ -269,7 +260,7 @@ class Judge:
                         priors[parameter] = Prior(shapes[entry.scale], sizes[entry.scale], *entry.physical)
                 elif name in forces:
                     priors[parameter] = Prior(0.0, sizes[entry.scale], *entry.physical)
-        return _Near(model, values, priors)
+        return Structure(model, values, priors, free_places=False)
 
     def _usual(self, record: Experiment, joint: str) -> tuple[dict[str, float], dict[str, float]]:
         """Sizes of forces at a joint that are nothing unusual, and shapes: its mass turned round on the way seen."""

@@ -15,8 +15,6 @@ Array = NDArray[np.float64]
 
 #: Delay that is nothing unusual, s: a few intervals of a field bus.
 DELAY = 5e-3
-
-
 #: Effort, speed and way of what stands, in SI units.
 LEAST = 1e-9
 

@@ -60,6 +60,9 @@ class Structure:
         Shapes that records show between two ends alone: at one of these the effect is another one, or none.
     firsts : tuple of str
         Unknown first states, in their order.
+    free_places : bool
+        Whether places that records need not show, as of a spring that rests far away, may be anywhere; else they are as
+        likely as their prior says.
     """
 
     model: Model
@@ -68,6 +71,7 @@ class Structure:
     effects: tuple[Key, ...] = ()
     range_limited: tuple[str, ...] = ()
     firsts: tuple[str, ...] = ()
+    free_places: bool = True
 
     def place(self, name: str) -> int:
         """Where a parameter, or a first state, stands among the values."""
@@ -148,7 +152,7 @@ class Structure:
         Of a spring records tell the stiffness, and the product of that and the place where it rests.
         """
         names, found = list(self.priors), []
-        for effect in self.model.effects:
+        for effect in self.model.effects if self.free_places else ():
             own = [(effect.type.parameter(short), name) for short, name in effect.parameter_names.items()]
             places = [name for one, name in own if one.shape and tuple(one.physical) == ANYWHERE and name in names]
             sizes = [name for one, name in own if not one.shape and name in names]
