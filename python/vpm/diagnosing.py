@@ -10,7 +10,6 @@ from typing import Literal, TypeVar, get_args
 
 import numpy as np
 from numpy.typing import NDArray
-from threadpoolctl import threadpool_limits
 
 from vpm.catalogue import EFFECTS
 from vpm.discrepancy.ambiguity import Rivals, listed, rivals
@@ -54,6 +53,7 @@ from vpm.identify.fit import fit_of
 from vpm.identify.parallel import worker_count
 from vpm.log_check import refuse_mistakes
 from vpm.model import Model
+from vpm.one_thread import in_one_thread
 from vpm.ranking import Ranking, Settings, rank
 from vpm.simulate import Setup, judging_mode
 
@@ -91,6 +91,7 @@ Found = TypeVar("Found")
 _Records = tuple[tuple[Experiment, ...], tuple[Experiment, ...], list[str]]
 
 
+@in_one_thread
 def diagnose(
     model: Model,
     experiments: Experiment | Sequence[Experiment],
@@ -163,30 +164,28 @@ def diagnose(
     if names not in get_args(Names):
         raise DiagnosisError(f'names come from a "search" or a "ranking", not from "{names}"')
     worker_count(workers)
-    # Its linear algebra is small: with threads of its own it would only take the cores from candidates side by side.
-    with threadpool_limits(1, user_api="blas"):
-        records = _records(model, experiments, validate)
-        each = SideBySide(workers, progress)
-        odd: list[str] = []
-        if check:
-            if tell is not None:
-                tell("checking the channels of the logs")
-            given = [*as_records(experiments), *as_records(validate or ())]
-            found = refuse_mistakes(model, given, setup=setup, workers=workers, progress=progress)
-            odd = [str(one) for one in found if one.kind in NOTED]
-        most = max(LEAST_LIMIT, 2 * len(model.joints)) if limit is None else limit
-        diagnosis = _diagnosis(model, records, effects, cutoff, setup or Setup(), most, names, each, tell)
-        asked = {
-            "effects": (effects, None),
-            "cutoff": (cutoff, None),
-            "limit": (limit, None),
-            "names": (names, "ranking"),
-            "check": (check, True),
-            "workers": (workers, None),
-            **own_settings(setup or Setup(), "setup"),
-        }
-        made = provenance(model, as_records(experiments), as_records(validate or ()), "vpm.diagnose", asked)
-        return replace(diagnosis, notes=(*odd, *diagnosis.notes), provenance=made)
+    records = _records(model, experiments, validate)
+    each = SideBySide(workers, progress)
+    odd: list[str] = []
+    if check:
+        if tell is not None:
+            tell("checking the channels of the logs")
+        given = [*as_records(experiments), *as_records(validate or ())]
+        found = refuse_mistakes(model, given, setup=setup, workers=workers, progress=progress)
+        odd = [str(one) for one in found if one.kind in NOTED]
+    most = max(LEAST_LIMIT, 2 * len(model.joints)) if limit is None else limit
+    diagnosis = _diagnosis(model, records, effects, cutoff, setup or Setup(), most, names, each, tell)
+    asked = {
+        "effects": (effects, None),
+        "cutoff": (cutoff, None),
+        "limit": (limit, None),
+        "names": (names, "ranking"),
+        "check": (check, True),
+        "workers": (workers, None),
+        **own_settings(setup or Setup(), "setup"),
+    }
+    made = provenance(model, as_records(experiments), as_records(validate or ()), "vpm.diagnose", asked)
+    return replace(diagnosis, notes=(*odd, *diagnosis.notes), provenance=made)
 
 
 def _diagnosis(

@@ -33,6 +33,7 @@ from vpm.identify.shooting import ShootingProblem
 from vpm.identify.ties import TiedProblem, check_ties
 from vpm.identify.whiteness import Whiteness
 from vpm.model import Model
+from vpm.one_thread import in_one_thread
 from vpm.results import Result
 from vpm.simulate import Setup
 
@@ -171,6 +172,7 @@ class Fit(Result):
         return plot_parameters(self.names, self.values, self.std, self.start, self.units)
 
 
+@in_one_thread
 def identify(
     model: Model,
     experiments: Experiment | Sequence[Experiment],

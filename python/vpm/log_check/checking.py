@@ -19,9 +19,11 @@ from vpm.log_check.stretches import odd_stretches
 from vpm.log_check.table import line_of
 from vpm.model import ChannelEntry, Model
 from vpm.observer import measured_outputs
+from vpm.one_thread import in_one_thread
 from vpm.simulate import Setup
 
 
+@in_one_thread
 def check_log(
     model: Model,
     experiments: Experiment | Sequence[Experiment],

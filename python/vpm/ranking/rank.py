@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from threadpoolctl import threadpool_limits
-
 from vpm.discrepancy.candidates import asked_for
 from vpm.discrepancy.moving import check_moving
 from vpm.discrepancy.side_by_side import Progress, SideBySide
 from vpm.errors import DiagnosisError
 from vpm.experiment import Experiment, as_records, joints_from_shafts
 from vpm.model import Model
+from vpm.one_thread import in_one_thread
 from vpm.ranking.observed import Observed
 from vpm.ranking.result import Ranking
 from vpm.ranking.search import Search
@@ -19,6 +18,7 @@ from vpm.ranking.settings import Settings
 from vpm.simulate import Setup
 
 
+@in_one_thread
 def rank(
     model: Model,
     experiments: Experiment | Sequence[Experiment],
@@ -82,9 +82,8 @@ def rank(
     if not records:
         raise DiagnosisError("no record was given; pass at least one experiment")
     check_moving(model, records)
-    with threadpool_limits(1, user_api="blas"):
-        each = SideBySide(workers, progress)
-        names = asked_for(effects)
-        search = Search(model, records, names, settings or Settings(), setup, each, tell or (lambda _: None))
-        # What a validation record lacks is said before the search.
-        return search.run(Observed(model, unseen, search.settings, setup))
+    each = SideBySide(workers, progress)
+    names = asked_for(effects)
+    search = Search(model, records, names, settings or Settings(), setup, each, tell or (lambda _: None))
+    # What a validation record lacks is said before the search.
+    return search.run(Observed(model, unseen, search.settings, setup))
