@@ -448,6 +448,27 @@ def test_a_fit_stays_where_bodies_are_real() -> None:
     assert 0.17 < found.structure.values["arm.inertia.zz"] <= 0.2
 
 
+def test_a_fit_that_has_ended_is_not_worked_out_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One that was given up, or whose derivatives were taken as known, has not ended."""
+    structure, observer = structure_of(Model.from_toml(SLEDGE)), Observer(1.0)
+    fitter = fitter_of(structure.model)
+    noise = fitter.noise_of(structure, observer)
+    followed = fitter.followed(structure.at(structure.standard), observer, tuple(structure.priors))
+    slopes = noise.whitened(followed.jacobian, fitter.observed.parts).T
+    known = View(noise, dict(zip(followed.names, slopes, strict=True)))
+    found = fitter.fitted(structure, observer, View(noise))
+    assert found.ended
+    assert not fitter.fitted(structure, observer, known).ended
+    assert not fitter.fitted(structure, observer, View(noise), goal=-1e9).ended
+    assert fitter.finished(replace(found, ended=False), View(noise)).cost == pytest.approx(found.cost, abs=0.5)
+
+    def no_pass(*_: object) -> None:
+        raise AssertionError("a pass over the records is asked for")
+
+    monkeypatch.setattr(fitter, "_pass", no_pass)
+    assert fitter.finished(found, View(noise)) is found
+
+
 @given(st.floats(0.1, 10.0), st.floats(-5.0, 5.0), st.floats(-0.5, 5.0), st.floats(-3.0, 3.0))
 def test_a_spring_keeps_its_pull_where_a_step_moves_its_rest(
     size: float, rest: float, stiffer: float, further: float

@@ -302,10 +302,11 @@ class System:
         integrator: str,
         sensitivities: Sequence[int] = ...,
         hold: str = ...,
+        alone: bool = ...,
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """Follow ``readings`` (N, m) with given ``gains`` (N, nx * m); as `simulate`, before each correction.
 
-        Derivatives (N, m, k) are those of the measured outputs alone.
+        Derivatives (N, m, k) are those of the measured outputs alone; outputs are, too, where ``alone``.
         """
     def compile(self, theta: ArrayLike, integrator: str) -> str | None:
         """Make the machine code of steps by ``integrator``, as long runs do; or say why there is none."""

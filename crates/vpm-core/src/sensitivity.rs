@@ -8,19 +8,19 @@ use crate::scalar::{Dual, Scalar, seed};
 /// Parameters per pass: the gradient of a number then fills one 256-bit register.
 pub const LANES: usize = 4;
 
-/// The same of a simulation with more of them: what each pass does anew is most of its work, and more lanes do it less often.
-pub const WIDE: usize = 12;
+/// The same where there are more and little is kept of each sample: most of a pass is work that none of them adds to.
+pub(crate) const MANY: usize = 16;
 
 /// Asked now and then whether to stop; true stops the computation with [`Error::Interrupted`].
 pub type Interrupt<'a> = &'a (dyn Fn() -> bool + Sync);
 
-/// Two arrays that a computation fills; what they hold is its own affair.
+/// Two arrays that a computation fills; what they hold is its own affair. Nobody asks for derivatives of the second one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Pair<S> {
     /// The first array.
     pub first: Vec<S>,
     /// The second array.
-    pub second: Vec<S>,
+    pub second: Vec<f64>,
 }
 
 /// A computation that can run over any number type.
@@ -62,8 +62,8 @@ pub(crate) fn differentiate_by<J: Job, const N: usize>(
             entries.copy_from_slice(&pass.first[place].gradient[..entries.len()]);
         }
     }
-    let values = |numbers: &[Dual<f64, N>]| numbers.iter().map(|number| number.value).collect();
-    Ok((Pair { first: values(&one.first), second: values(&one.second) }, jacobian))
+    let first = one.first.iter().map(|number| number.value).collect();
+    Ok((Pair { first, second: one.second.clone() }, jacobian))
 }
 
 /// Whether all that is asked for are parameters.

@@ -309,6 +309,16 @@ impl Layout {
         self.load_cells() + 6 * self.load_cells
     }
 
+    /// Whether the state alone decides an output, see [`crate::system::Dynamics::observe_motion`]; not said of contacts and bushings.
+    pub(crate) fn is_of_motion(self, column: usize) -> bool {
+        match column {
+            _ if column < self.actuators() => column % 4 < 2,
+            _ if column < self.lines() => false,
+            _ if column < self.gauges() => (column - self.lines()) % 3 < 2,
+            _ => column < self.hydraulics() || column >= self.balls(),
+        }
+    }
+
     /// Number of all outputs.
     pub fn count(self) -> usize {
         self.balls() + 7 * self.balls

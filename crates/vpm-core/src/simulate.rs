@@ -31,7 +31,7 @@ use crate::description::Description;
 use crate::error::{Diverged, Error, Result};
 use crate::integrator::{Halt, Method};
 use crate::scalar::Scalar;
-use crate::sensitivity::{Interrupt, Job, LANES, Pair, WIDE, differentiate_by};
+use crate::sensitivity::{Interrupt, Job, LANES, MANY, Pair, differentiate_by};
 use crate::system::{Build, Trouble};
 use crate::table::Table;
 use sampled::Astray;
@@ -85,7 +85,7 @@ pub(crate) fn check_time_step(time_step: f64) -> Result<()> {
 /// What a simulation gives, each table row by row.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Run {
-    /// Outputs of each sample, in the order of [`crate::sensor::Layout`].
+    /// Outputs of each sample, in the order of [`crate::sensor::Layout`]; the measured ones, where an observer is asked for these alone.
     pub outputs: Vec<f64>,
     /// State of each sample.
     pub states: Vec<f64>,
@@ -220,14 +220,14 @@ fn execute(setting: Setting<'_>, plan: Plan<'_>) -> Result<Run> {
     }
     let job = Simulation { setting, plan };
     let width = setting.description.n_outputs();
-    let measured = plan.gains.map(|gains| {
+    let measured = plan.gains.filter(|gains| !gains.alone).map(|gains| {
         let places = |row: usize| gains.readings.channels.iter().map(move |channel| row * width + channel);
         (0..plan.horizon).flat_map(places).collect::<Vec<_>>()
     });
-    let (theta, sensitivities, places) = (setting.theta, setting.sensitivities, measured.as_deref());
-    let (pair, jacobian) = match sensitivities.len() {
-        0..=LANES => differentiate_by::<_, LANES>(&job, theta, sensitivities, places)?,
-        _ => differentiate_by::<_, WIDE>(&job, theta, sensitivities, places)?,
+    let (theta, by) = (setting.theta, setting.sensitivities);
+    let (pair, jacobian) = match plan.gains {
+        Some(Gains { alone: true, .. }) if by.len() > LANES => differentiate_by::<_, MANY>(&job, theta, by, None)?,
+        _ => differentiate_by::<_, LANES>(&job, theta, by, measured.as_deref())?,
     };
     Ok(Run { outputs: pair.first, states: pair.second, jacobian })
 }

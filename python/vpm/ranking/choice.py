@@ -73,7 +73,7 @@ def _is_richer(trial: Trial, other: Trial, settings: Settings) -> bool:
 def likely(fitted: Fitted, fitter: Fitter, noise: NoiseModel) -> Fitted:
     """At the values that are most likely under the noise, about which evidence is told; others leave least power."""
     cost = fitter.cost(fitted.structure, fitted.residual, noise)
-    return fitter.finished(replace(fitted, cost=cost), View(noise))
+    return fitter.finished(replace(fitted, cost=cost, ended=False), View(noise))
 
 
 def _with_evidence(several: Sequence[Trial], fitter: Fitter, noise: NoiseModel) -> tuple[list[Trial], list[Fitted]]:

@@ -61,12 +61,15 @@ class Fitted:
     residual : ndarray, shape (N, m)
     cost : float
         See `Fitter.cost`, under the view of the fit.
+    ended : bool
+        Whether all its derivatives, worked out anew under that view, lead nowhere any more.
     """
 
     structure: Structure
     observer: Observer
     residual: Array
     cost: float
+    ended: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,10 +151,12 @@ class Fitter:
         """The descent from known derivatives: ``fresh`` ones, or those of elsewhere, worked out ``anew`` or not."""
         before = self.cost(now.structure, now.residual, view.noise)
         errors, slopes = view.errors(now, self.observed.parts)
+        ended = False
         for _ in range(self.settings.iterations if now.structure.priors else 0):
             move, gain = self._step(now.structure, view, errors, slopes)
-            hopeful = gain >= self.settings.tolerance and before - self.settings.patience * gain <= goal
-            better = self._better(now, view.noise, move, before) if hopeful else None
+            hopeful = before - self.settings.patience * gain <= goal
+            worth = hopeful and gain >= self.settings.tolerance
+            better = self._better(now, view.noise, move, before) if worth else None
             slow = better is None or before - better[2] < self.settings.tolerance
             if better is not None:
                 move = better[0].standard - now.structure.standard
@@ -159,16 +164,19 @@ class Fitter:
                 errors = view.noise.whitened(now.residual, self.observed.parts)
                 slopes = by_secant(slopes, errors - last, move)
             if slow and (fresh or not anew):
+                ended = fresh and hopeful and not view.known
                 break
             fresh = slow
             if fresh:
                 now = self.followed(now.structure, now.observer, now.names, now.residual)
                 errors, slopes = view.errors(now, self.observed.parts)
-        return Fitted(now.structure, now.observer, now.residual, before), slopes
+        return Fitted(now.structure, now.observer, now.residual, before, ended), slopes
 
     def finished(self, found: Fitted, view: View) -> Fitted:
-        """Fitted on, by all derivatives, until nothing is gained any more."""
+        """Fitted on, by all derivatives, until nothing is gained any more, which a fit may know of itself."""
         for _ in range(self.settings.turns):
+            if found.ended:
+                break
             more = self.fitted(found.structure, found.observer, view, residual=found.residual)
             if found.cost - more.cost < self.settings.tolerance:
                 break

@@ -249,8 +249,9 @@ class Observed:
             self.setup.method(model, drawn=True),
             list(columns),
             self.setup.course,
+            alone=True,
         )
-        return outputs[:, places], states, slopes
+        return outputs, states, slopes
 
 
 def _divided(stretches: Sequence[NDArray[np.int_]], held: int) -> tuple[Parts, Parts]:

@@ -180,7 +180,7 @@ impl<'a, S: Scalar> Way<'a, S> {
                 outputs[row * width + column] = sensor.read(row, stepping.time_step, truth);
             }
         }
-        Ok(Pair { first: outputs, second: self.states })
+        Ok(Pair { first: outputs, second: self.states.iter().map(Scalar::re).collect() })
     }
 
     /// Numbers of a sample: outputs and, where drives answer, their efforts.

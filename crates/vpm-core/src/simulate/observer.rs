@@ -12,6 +12,7 @@ use super::{Drive, Inputs, Plan, Run, Setting, Stepper, check_state, check_step,
 use crate::error::{Error, Result};
 use crate::scalar::Dual;
 use crate::sensitivity::LANES;
+use crate::sensor::Layout;
 use crate::table::Table;
 
 /// A number with its derivatives along some of the states.
@@ -46,6 +47,15 @@ pub struct Gains<'a> {
     pub readings: Readings<'a>,
     /// Row k: states x channels, at sample k.
     pub gains: Table<'a>,
+    /// Whether no other output than those that were measured is asked for.
+    pub alone: bool,
+}
+
+impl Gains<'_> {
+    /// Whether the state alone decides all that is asked for: then samples need no rates.
+    pub(super) fn is_of_motion(&self, layout: Layout) -> bool {
+        self.alone && self.readings.channels.iter().all(|&channel| layout.is_of_motion(channel))
+    }
 }
 
 /// What a filter gives, each table row by row.

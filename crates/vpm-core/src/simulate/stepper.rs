@@ -1,6 +1,7 @@
 //! The loop over samples: what happens at a sample, and between two.
 
 use std::mem::take;
+use std::ops::Range;
 
 use super::bounds::{Bounds, of_what};
 use super::control::{Control, reading};
@@ -76,11 +77,21 @@ pub(crate) struct Stepper<'a, S> {
     rate: Vec<S>,
     /// Inputs of the whole record, row by row; given ones from the beginning, a controller's as time goes by.
     commands: Vec<S>,
-    /// True channels of the piece, row by row.
+    /// How many channels there are.
+    width: usize,
+    /// True channels, row by row, of as many of the last samples as somebody looks back on.
     truth: Vec<S>,
+    /// How many that are.
+    depth: usize,
     /// States of the piece, row by row.
-    states: Vec<S>,
-    /// Channels of the piece as the sensors show them, row by row.
+    states: Vec<f64>,
+    /// The state as users know it.
+    posture: Vec<S>,
+    /// Channels of a sample as the sensors show them.
+    shown: Vec<S>,
+    /// Those that are asked for, if these are not all.
+    asked: Option<&'a [usize]>,
+    /// What is asked for of the piece, row by row.
     outputs: Vec<S>,
     /// What the readings of a sample are more than its outputs.
     missed: Vec<S>,
@@ -94,6 +105,9 @@ impl<'a, S: Scalar> Stepper<'a, S> {
     /// As [`Stepper::new`], with the machine in a form of its own.
     pub(crate) fn of(setting: &Setting<'a>, plan: &Plan<'a>, theta: &[S], mut system: System<S>) -> Result<Self> {
         let description = setting.description;
+        if plan.gains.is_some_and(|gains| gains.is_of_motion(description.layout())) {
+            system = system.seen_in_motion();
+        }
         system.make_for(setting.stepping.method)?;
         let (dim, rows, zero) = (system.dim(), plan.horizon, S::zero());
         let bounds = Bounds::new(description, theta, system.dynamics());
@@ -106,8 +120,13 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         };
         let courses = (plan.hold() != Hold::ZeroOrder)
             .then(|| Courses::new(description.n_inputs(), dim, setting.stepping.time_step));
-        let layout = description.layout();
+        let (layout, width) = (description.layout(), description.n_outputs());
         let sensors = description.sensors(theta).into_iter().map(|sensor| (sensor.channel.column(layout), sensor));
+        let sensors: Vec<_> = sensors.collect();
+        let sampled = SampledDrives::new(description, setting.stepping.time_step)?;
+        let looks_back = control.is_some() || !sampled.is_empty() || sensors.iter().any(|(_, one)| one.delay.is_some());
+        let depth = if looks_back { rows.max(1) } else { 1 };
+        let asked = plan.gains.and_then(|gains| gains.alone.then_some(gains.readings.channels));
         Ok(Self {
             description,
             plan: *plan,
@@ -115,17 +134,22 @@ impl<'a, S: Scalar> Stepper<'a, S> {
             integrator: Integrator::new(setting.stepping.method, dim + usize::from(courses.is_some())),
             courses,
             bounds,
-            sensors: sensors.collect(),
+            sensors,
             control,
-            sampled: SampledDrives::new(description, setting.stepping.time_step)?,
+            sampled,
             system,
             state: vec![zero; dim],
             place: vec![0.0; description.n_coordinates()],
             rate: vec![zero; dim],
             commands: given.numbers().iter().map(|&command| S::from_f64(command)).collect(),
-            truth: vec![zero; rows * description.n_outputs()],
-            states: vec![zero; rows * dim],
-            outputs: vec![zero; rows * description.n_outputs()],
+            truth: vec![zero; depth * width],
+            states: vec![0.0; rows * dim],
+            posture: vec![zero; dim],
+            shown: vec![zero; width],
+            outputs: vec![zero; rows * asked.map_or(width, <[usize]>::len)],
+            width,
+            depth,
+            asked,
             missed: Vec::with_capacity(plan.gains.map_or(0, |gains| gains.readings.channels.len())),
         })
     }
@@ -214,15 +238,16 @@ impl<'a, S: Scalar> Stepper<'a, S> {
             return Err(troubled(self, trouble, row, start));
         }
         self.check_stops(row, start)?;
-        self.system.show(&self.state, &mut self.states[row * dim..(row + 1) * dim]);
+        self.system.show(&self.state, &mut self.posture);
+        let states = self.states[row * dim..(row + 1) * dim].iter_mut();
+        states.zip(&self.posture).for_each(|(state, number)| *state = number.re());
         self.control(row, start);
         self.hold(row, start).map_err(|astray| strayed(self, astray, (row, start)))?;
         self.record(row, start);
         self.system.depart(&self.rate);
         self.read(row);
-        let width = self.description.n_outputs();
-        if let Some(column) = self.outputs[row * width..(row + 1) * width].iter().position(|out| !out.is_finite()) {
-            let what = of_what(&output_name(self.description, column), self.outputs[row * width + column]);
+        if let Some(column) = self.shown.iter().position(|out| !out.is_finite()) {
+            let what = of_what(&output_name(self.description, column), self.shown[column]);
             return Err(diverged(self, (what, Diverged::NOT_FINITE.to_owned()), row, start));
         }
         Ok(())
@@ -240,8 +265,8 @@ impl<'a, S: Scalar> Stepper<'a, S> {
 
     /// Moves the state by the gains on what the readings of sample `row` are more than its outputs, if there are any.
     fn correct(&mut self, row: usize) {
-        let Some(Gains { readings, gains }) = self.plan.gains else { return };
-        let outputs = &self.outputs[row * self.description.n_outputs()..];
+        let Some(Gains { readings, gains, .. }) = self.plan.gains else { return };
+        let outputs = &self.shown;
         let measured = readings.channels.iter().zip(readings.table.row(row));
         let mut missed = take(&mut self.missed);
         missed.clear();
@@ -259,7 +284,7 @@ impl<'a, S: Scalar> Stepper<'a, S> {
     /// Moves positions that have not arrived at a late sensor by sample `row` as an observer has `moved` those of the machine: else it
     /// would answer that much later, and a late sensor would not be the same as a late command.
     pub(crate) fn correct_arriving(&mut self, row: usize, moved: impl Fn(usize) -> S) {
-        let (width, Self { sensors, truth, stepping, .. }) = (self.description.n_outputs(), self);
+        let (width, Self { sensors, truth, stepping, .. }) = (self.width, self);
         for (column, sensor) in &*sensors {
             if let (Channel::Position { joint }, Some(delay)) = (sensor.channel, sensor.delay) {
                 for sample in SampleDelay::new(delay, stepping.time_step).arriving(row) {
@@ -288,9 +313,8 @@ impl<'a, S: Scalar> Stepper<'a, S> {
 
     /// Shows the outputs at sample `row`, as sensors show them; from then on they are mere numbers for sensors that look back on them.
     pub(crate) fn settle(&mut self, row: usize, seen: impl FnOnce(&[S])) {
-        let width = self.description.n_outputs();
-        let own = row * width..(row + 1) * width;
-        seen(&self.outputs[own.clone()]);
+        seen(&self.shown);
+        let own = self.own(row);
         self.truth[own].iter_mut().for_each(|number| *number = number.frozen());
     }
 
@@ -313,12 +337,12 @@ impl<'a, S: Scalar> Stepper<'a, S> {
             // Forces under the commands that are still held.
             self.record(row, start);
         } else if self.control.is_some() || !self.sampled.is_empty() {
-            let width = self.description.n_outputs();
-            self.system.observe_motion(&self.state, &mut self.truth[row * width..(row + 1) * width]);
+            let own = self.own(row);
+            self.system.observe_motion(&self.state, &mut self.truth[own]);
         }
         let Drive::Loop { references, .. } = self.plan.drive else { return };
         let Self { control: Some(control), system, state, sensors, truth, commands, .. } = self else { return };
-        let (at, outputs) = ((row, self.stepping.time_step), (truth.as_slice(), self.description.n_outputs()));
+        let (at, outputs) = ((row, self.stepping.time_step), (truth.as_slice(), self.width));
         control.sample(row, references, (system, state), |column| reading(sensors, outputs, at, column));
         let first = row * references.columns();
         control.arrive(row, |actuator, command| commands[first + actuator] += command);
@@ -327,9 +351,9 @@ impl<'a, S: Scalar> Stepper<'a, S> {
     /// Holds what every input amounts to at sample `row` of the piece, and tells what it does until the next; the effort of a sampled
     /// drive is held until then.
     fn hold(&mut self, row: usize, start: usize) -> std::result::Result<(), Astray> {
+        let own = self.own(row);
         let Self { system, commands, stepping, description, sampled, courses, plan, truth, .. } = self;
-        let inputs = description.n_inputs();
-        let truth = &truth[row * description.n_outputs()..];
+        let (inputs, truth) = (description.n_inputs(), &truth[own]);
         for number in 0..inputs {
             let command = |sample: usize| commands[sample * inputs + number];
             let input = |row: usize| system.input(number, row + start, stepping.time_step, command);
@@ -346,14 +370,10 @@ impl<'a, S: Scalar> Stepper<'a, S> {
 
     /// Evaluates the machine at the sample and records all that happens there.
     fn record(&mut self, row: usize, start: usize) {
-        let width = self.description.n_outputs();
-        self.system.sample(&self.state, &mut self.rate, &mut self.truth[row * width..(row + 1) * width]);
-        self.record_commands(row, start);
-    }
-
-    fn record_commands(&mut self, row: usize, start: usize) {
+        let own = self.own(row);
+        self.system.sample(&self.state, &mut self.rate, &mut self.truth[own.clone()]);
         let (layout, inputs) = (self.description.layout(), self.description.n_inputs());
-        let truth = &mut self.truth[row * layout.count()..(row + 1) * layout.count()];
+        let truth = &mut self.truth[own];
         let commands = &self.commands[(row + start) * inputs..];
         for (channels, &command) in truth[layout.actuators()..].chunks_exact_mut(2).zip(commands).take(layout.actuators)
         {
@@ -363,20 +383,34 @@ impl<'a, S: Scalar> Stepper<'a, S> {
 
     /// Shows the row as the sensors do.
     fn read(&mut self, row: usize) {
-        let layout = self.description.layout();
-        let width = layout.count();
-        self.outputs[row * width..(row + 1) * width].copy_from_slice(&self.truth[row * width..(row + 1) * width]);
-        let Self { sensors, truth, outputs, stepping, .. } = self;
+        let own = self.own(row);
+        let Self { sensors, truth, shown, outputs, asked, stepping, width, depth, .. } = self;
+        shown.copy_from_slice(&truth[own]);
         for (column, sensor) in &*sensors {
-            let truth = |sample: usize| truth[sample * width + column];
-            outputs[row * width + column] = sensor.read(row, stepping.time_step, truth);
+            let truth = |sample: usize| truth[sample % *depth * *width + column];
+            shown[*column] = sensor.read(row, stepping.time_step, truth);
+        }
+        match asked {
+            Some(asked) => {
+                let outputs = outputs[row * asked.len()..].iter_mut();
+                outputs.zip(*asked).for_each(|(output, &channel)| *output = shown[channel]);
+            }
+            None => outputs[row * *width..(row + 1) * *width].copy_from_slice(shown),
         }
     }
 
-    /// Values of the samples before `row`: outputs and states.
+    /// Where the true channels of sample `row` stand.
+    #[inline]
+    fn own(&self, row: usize) -> Range<usize> {
+        let first = row % self.depth * self.width;
+        first..first + self.width
+    }
+
+    /// Values of the samples before `row`, if all outputs are asked for: outputs and states.
     pub(crate) fn before(&self, row: usize) -> (Vec<f64>, Vec<f64>) {
-        let values = |numbers: &[S], width: usize| numbers[..row * width].iter().map(Scalar::re).collect();
-        (values(&self.outputs, self.description.n_outputs()), values(&self.states, self.state.len()))
+        let rows = if self.asked.is_none() { row } else { 0 };
+        let outputs = self.outputs[..rows * self.width].iter().map(Scalar::re).collect();
+        (outputs, self.states[..rows * self.state.len()].to_vec())
     }
 }
 

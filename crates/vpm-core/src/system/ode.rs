@@ -41,6 +41,8 @@ pub struct System<S> {
     ready: bool,
     /// Whether linearly implicit steps run as a whole.
     whole: bool,
+    /// What samples ask for: all outputs with the rates, or those outputs that the state alone decides.
+    seen: Kind,
     /// Ball joints.
     turning: Turning<S>,
 }
@@ -63,6 +65,7 @@ impl<S: Scalar> System<S> {
             rates: vec![S::zero(); dynamics.dim()],
             ready: false,
             whole: false,
+            seen: Kind::Sample,
             turning: Turning::new(std::iter::empty()),
             dynamics,
         };
@@ -76,6 +79,12 @@ impl<S: Scalar> System<S> {
     #[must_use]
     pub(crate) fn with_balls<'a>(self, balls: impl Iterator<Item = (&'a Ball, bool)>) -> Self {
         Self { turning: Turning::new(balls), ..self }
+    }
+
+    /// The same, of which samples ask no more than outputs that the state alone decides.
+    #[must_use]
+    pub(crate) fn seen_in_motion(self) -> Self {
+        Self { seen: Kind::Motion, ..self }
     }
 
     /// Takes over a state as users know it: brings it into the coordinates in which the machine goes on.
@@ -124,7 +133,7 @@ impl<S: Scalar> System<S> {
     /// # Errors
     /// [`crate::error::Error::Unrecorded`] where a law decides by the value of a state.
     pub fn make_for(&mut self, method: Method) -> Result<()> {
-        let kinds = [Some(Kind::Sample), kind_of(method)].into_iter().flatten();
+        let kinds = [Some(self.seen.clone()), kind_of(method)].into_iter().flatten();
         for kind in kinds.filter(|kind| !self.is_direct(kind)).collect::<Vec<_>>() {
             self.routines.make(&kind)?;
         }
@@ -146,12 +155,12 @@ impl<S: Scalar> System<S> {
         self.ready = false;
         if !Self::is_plain() {
             // What has no code goes on operation by operation.
-            let kinds = [Some(Kind::Rates), Some(Kind::Sample), kind_of(method)].into_iter().flatten();
+            let kinds = [Some(Kind::Rates), Some(self.seen.clone()), kind_of(method)].into_iter().flatten();
             return kinds.map(|kind| self.routines.compile(&kind)).fold(Ok(()), std::result::Result::and);
         }
-        // An additive step begins with the rates of the sample before it.
-        let rates = Some(Kind::Rates).filter(|_| method != Method::Additive);
-        let needed: Vec<Kind> = rates.into_iter().chain([Kind::Sample]).collect();
+        // An additive step begins with the rates of the sample before it, if that has any.
+        let rates = Some(Kind::Rates).filter(|_| method != Method::Additive || self.seen != Kind::Sample);
+        let needed: Vec<Kind> = rates.into_iter().chain([self.seen.clone()]).collect();
         self.routines.compile_all(&needed)?;
         // A matrix alone that has no code is worked out as before.
         let kind = kind_of(method).filter(|kind| *kind != Kind::Elasticity);
@@ -165,7 +174,8 @@ impl<S: Scalar> System<S> {
     pub(crate) fn compile_steps(&mut self, method: Method) -> std::result::Result<(), String> {
         if method == Method::LinearlyImplicit && self.dynamics.is_well_scaled() && self.has_small_steps() {
             let made = self.routines.compile_within(&Kind::Step, MOST_OF_STEP);
-            if made.and_then(|()| self.routines.compile(&Kind::Sample)).is_ok() {
+            let seen = self.seen.clone();
+            if made.and_then(|()| self.routines.compile(&seen)).is_ok() {
                 (self.ready, self.whole) = (false, true);
                 return Ok(());
             }
@@ -213,8 +223,11 @@ impl<S: Scalar> System<S> {
         self.routines.hold(number, input);
     }
 
-    /// dx/dt and all true outputs at `x`.
+    /// dx/dt and all true outputs at `x`; where samples ask for less, no more than that.
     pub fn sample(&mut self, x: &[S], dxdt: &mut [S], outputs: &mut [S]) {
+        if self.seen == Kind::Motion {
+            return self.observe_motion(x, outputs);
+        }
         self.ready = false;
         let plain = (S::plain(x), S::plain_mut(dxdt), S::plain_mut(outputs));
         if let Some(routine) = self.routines.get(&Kind::Sample) {
@@ -233,7 +246,9 @@ impl<S: Scalar> System<S> {
 
     /// The outputs that the state alone decides; others stay or become zero.
     pub(crate) fn observe_motion(&mut self, x: &[S], outputs: &mut [S]) {
-        if let (Some(x), Some(outputs)) = (S::plain(x), S::plain_mut(outputs)) {
+        if let Some(routine) = self.routines.get(&Kind::Motion) {
+            outputs.copy_from_slice(routine.at(x));
+        } else if let (Some(x), Some(outputs)) = (S::plain(x), S::plain_mut(outputs)) {
             self.ready = false;
             self.dynamics.observe_motion(x, outputs);
         } else {
@@ -265,7 +280,7 @@ impl<S: Scalar> System<S> {
     /// system before makes it forget.
     pub(crate) fn depart(&mut self, rates: &[S]) {
         self.rates.copy_from_slice(rates);
-        self.ready = true;
+        self.ready = self.seen == Kind::Sample;
     }
 
     /// Takes note that the next step begins elsewhere than where the machine was last evaluated.

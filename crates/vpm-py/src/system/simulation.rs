@@ -52,8 +52,9 @@ impl System {
         run: Run,
         [differentiated, variables]: [usize; 2],
     ) -> PyResult<(Table<'py>, Table<'py>, Cube<'py>)> {
-        let (outputs, states) = (self.description.n_outputs(), self.description.n_states());
+        let states = self.description.n_states();
         let rows = run.states.len().checked_div(states).unwrap_or(0);
+        let outputs = run.outputs.len().checked_div(rows).unwrap_or(0);
         Ok((
             matrix(py, run.outputs, [rows, outputs])?,
             matrix(py, run.states, [rows, states])?,

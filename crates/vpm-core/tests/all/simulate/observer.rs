@@ -44,10 +44,20 @@ fn filtered(bench: &Bench, (inputs, readings): (&[f64], &[f64])) -> Filtered {
     filter(bench.setting(), &FIRST, Table::new("inputs", inputs, rows, 2).unwrap(), readings, noise).unwrap()
 }
 
-fn observed(bench: &Bench, (inputs, readings): (&[f64], &[f64]), gains: &[f64]) -> Run {
+fn observed(bench: &Bench, record: (&[f64], &[f64]), gains: &[f64]) -> Run {
+    observed_at(bench, &[0, 4], record, gains, false)
+}
+
+fn observed_at(
+    bench: &Bench,
+    channels: &[usize],
+    (inputs, readings): (&[f64], &[f64]),
+    gains: &[f64],
+    alone: bool,
+) -> Run {
     let rows = inputs.len() / 2;
-    let readings = Readings { channels: &[0, 4], table: Table::new("readings", readings, rows, 2).unwrap() };
-    let gains = Gains { readings, gains: Table::new("gains", gains, rows, 10).unwrap() };
+    let readings = Readings { channels, table: Table::new("readings", readings, rows, 2).unwrap() };
+    let gains = Gains { readings, gains: Table::new("gains", gains, rows, 10).unwrap(), alone };
     observe(bench.setting(), &FIRST, Table::new("inputs", inputs, rows, 2).unwrap(), gains).unwrap()
 }
 
@@ -120,6 +130,32 @@ fn derivatives_are_those_of_differences() {
     });
 }
 
+/// Asked for the measured outputs alone, samples need no rates where the state decides them: positions and velocities, and not the
+/// efforts of the last case. Short runs go by the laws, long ones by machine code.
+#[test]
+fn what_is_measured_is_the_same_without_all_else() {
+    for method in [Method::Rk4, Method::LinearlyImplicit, Method::Rosenbrock, Method::Additive, Method::SemiImplicit] {
+        for (channels, rows) in [([0, 4], 10), ([0, 4], 80), ([1, 5], 80), ([0, 7], 80)] {
+            let mut bench = Bench::new(&arm(), STEP, 2, method);
+            let (inputs, readings) = record(&bench, rows);
+            let gains = filtered(&bench, (&inputs, &readings)).gains;
+            for sensitivities in [0, 1, 9] {
+                bench.sensitivities = (0..sensitivities).collect();
+                let [all, alone] =
+                    [false, true].map(|alone| observed_at(&bench, &channels, (&inputs, &readings), &gains, alone));
+                let rows = all.outputs.chunks_exact(bench.description.n_outputs());
+                let measured: Vec<f64> = rows.flat_map(|row| channels.map(|channel| row[channel])).collect();
+                assert_eq!(alone.outputs.len(), measured.len());
+                for (own, full) in
+                    [(&alone.outputs, &measured), (&alone.states, &all.states), (&alone.jacobian, &all.jacobian)]
+                {
+                    own.iter().zip(full).for_each(|(&own, &full)| close(own, full, 1e-9 * (1.0 + full.abs())));
+                }
+            }
+        }
+    }
+}
+
 /// Forces and readings as the filter believes them: its innovations are as large as it says, one by one.
 #[test]
 fn innovations_are_as_large_as_they_are_said_to_be() {
@@ -186,6 +222,7 @@ fn a_late_sensor_is_observed_as_a_late_command() {
         let gains = Gains {
             readings: Readings { channels: &[0], table },
             gains: Table::new("gains", &gains, rows, 2).unwrap(),
+            alone: false,
         };
         let inputs = Table::new("inputs", &command, rows, 1).unwrap();
         let run = observe(bench.setting(), &[0.0, 0.0], inputs, gains).unwrap();
