@@ -294,6 +294,8 @@ def _nearest(counter: _Counter, found: Array, start: Array, low: Array, high: Ar
 
 def _refine(counter: _Counter, start: Array, low: Array, high: Array, tolerance: float, most: int) -> Array:
     residual, jacobian = counter(start)
+    if not np.all(np.isfinite(residual)):
+        return start
     lengths = column_lengths(jacobian)
     if not np.all(np.isfinite(lengths)):  # a motion that parts from its way ever faster leads nowhere
         return start
