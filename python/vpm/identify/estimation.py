@@ -264,9 +264,11 @@ def _linear_step(counter: _Counter, start: Array, low: Array, high: Array) -> Ar
         return start
     orthogonal, square = np.linalg.qr(jacobian / lengths)
     left, values, directions = np.linalg.svd(square, full_matrices=False)
-    # Along what nothing shows there is no reason to move: a quotient of two roundings would lead to 1e14.
-    blind = values < RANK_TOLERANCE * values[0]
-    square = np.where(blind, values[0], values)[:, None] * directions
+    # Along what nothing shows there is no reason to move, but to make way at a bound: a quotient of two roundings would
+    # lead to 1e14.
+    least = RANK_TOLERANCE * values[0]
+    blind = values < least
+    square = np.maximum(values, least)[:, None] * directions
     bounds = ((low - start) * lengths, (high - start) * lengths)
     # By active sets, which end: the reflective method may halve its steps for ever.
     target = np.where(blind, 0.0, -left.T @ (orthogonal.T @ residual))
