@@ -89,4 +89,7 @@ def watched(command: list[str], looks: int = LOOKS, period: float = PERIOD) -> i
 
 
 if __name__ == "__main__":
-    sys.exit(watched(sys.argv[1:]))
+    try:
+        sys.exit(watched(sys.argv[1:]))
+    except KeyboardInterrupt:  # which the command has heard too
+        sys.exit(130)
