@@ -39,10 +39,11 @@ demo: $(VENV)/.installed ## find the hidden effect in a recorded log; the report
 
 test: test-rust test-python ## all tests, Rust and Python
 
-# What is compiled first has no limit. Of a program beyond it, the tests that run "for over 60 seconds" have been named before.
+# What is compiled first has no limit. Of a program beyond it, or of one that stands still because its threads wait for each other, the
+# tests that run "for over 60 seconds" have been named before.
 test-rust: | $(VENV)/.tools-found
 	cargo test --no-run $(CARGO_ARGS)
-	ulimit -S -t $(RUST_SECONDS); cargo test $(CARGO_ARGS)
+	ulimit -S -t $(RUST_SECONDS); $(PYTHON) tests/stalls.py cargo test $(CARGO_ARGS)
 
 reference: | $(VENV)/.tools-found ## integrators against an adaptive solver, which takes minutes to build
 	cargo test --features reference --test reference $(CARGO_ARGS)

@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from limits import processes
+from stalls import processes
 
 #: Time between two looks, s.
 PERIOD = 0.02

@@ -1,4 +1,4 @@
-"""Limits of each test: its processor time, a long time by the clock as a last resort, and the end of what it started.
+"""Limits of each test: its processor time, looks in which it may stand still, and the end of what it started.
 
 By the clock, a test takes as long as other work on the machine makes it; its processor time is its own.
 """
@@ -20,44 +20,24 @@ from typing import NamedTuple
 import pytest
 
 from guard import MARK, end, marked
+from stalls import LOOKS, PERIOD, Process, Stall, below, processes
 
 #: Processor time that a test may take for its setup, its call or its teardown, with all its processes, s.
 PROCESSOR = 1200.0
-#: The same by the clock, for what waits for something that never comes, s.
-CLOCK = 7200.0
-#: Time between two looks, and between two attempts to end a test that swallows the first, s.
-PERIOD, AGAIN = 1.0, 10.0
+#: Time between two attempts to end a test that swallows the first, s.
+AGAIN = 10.0
 
 
-class Process(NamedTuple):
-    """A process as ``/proc`` tells of it."""
+class Begun(NamedTuple):
+    """Where a phase of a test began: processor time until then, s, and whether it stands still since."""
 
-    parent: int
-    seconds: float
-    ended: bool
-
-
-def processes() -> dict[int, Process]:
-    """All processes of the machine, with the processor time of each and of what it has waited for."""
-    tick, found = os.sysconf("SC_CLK_TCK"), {}
-    for folder in Path("/proc").glob("[0-9]*"):
-        try:
-            text = (folder / "stat").read_text(encoding="utf-8", errors="replace")
-        except OSError:  # ended meanwhile
-            continue
-        # The name of the program in brackets may hold anything.
-        state, parent, *fields = text.rpartition(")")[2].split()
-        found[int(folder.name)] = Process(int(parent), sum(map(int, fields[9:13])) / tick, state in "ZX")
-    return found
+    used: float
+    stall: Stall
 
 
-def below(top: int, among: dict[int, Process]) -> list[int]:
-    """Processes that one has started, directly or not."""
-    children: dict[int, list[int]] = {}
-    for number, process in among.items():
-        children.setdefault(process.parent, []).append(number)
-    found = children.get(top, [])
-    return found + [inner for number in found for inner in below(number, among)]
+def used() -> float:
+    """Processor time of this process and of those that it has waited for, s."""
+    return sum(os.times()[:4])
 
 
 class Limits:
@@ -65,14 +45,17 @@ class Limits:
 
     Parameters
     ----------
-    processor, clock : float
-        Limits of a setup, a call or a teardown, s.
+    processor : float
+        Of a setup, a call or a teardown, s.
+    looks : int
+        In how many looks in a row it may stand still.
     """
 
-    def __init__(self, processor: float = PROCESSOR, clock: float = CLOCK) -> None:
-        self._limits = processor, clock
-        self._begin: tuple[float, float] | None = None
-        self._beyond: tuple[float, float] | None = None
+    def __init__(self, processor: float = PROCESSOR, looks: int = LOOKS) -> None:
+        self._limits = processor, looks
+        # Objects, for two phases may begin at the same processor time.
+        self._begin: Begun | None = None
+        self._beyond: Begun | None = None
         self._reason = ""
         self._kept = self._started_guard()
         signal.signal(signal.SIGUSR1, self._stop)
@@ -94,11 +77,6 @@ class Limits:
         found = {*below(own, among), *marked(own)} - {self._kept.pid, getattr(tracker, "_pid", None)}
         return [number for number in found if number in among and not among[number].ended]
 
-    @staticmethod
-    def _used() -> tuple[float, float]:
-        """Processor time of this process and of those that it has waited for; time by the clock."""
-        return sum(os.times()[:4]), time.monotonic()
-
     def _watch(self) -> None:
         told = 0.0
         while True:
@@ -112,13 +90,13 @@ class Limits:
                 end(self._started(among))  # first, since the test may wait for them
                 signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGUSR1)
 
-    def _exceeded(self, begin: tuple[float, float], among: dict[int, Process]) -> str:
+    def _exceeded(self, begin: Begun, among: dict[int, Process]) -> str:
         """The limit that is exceeded, in words."""
-        processor, clock = (now - before for now, before in zip(self._used(), begin, strict=True))
-        processor += sum(among[number].seconds for number in self._started(among))
-        if processor > self._limits[0]:
+        spent = used() - begin.used + sum(among[number].seconds for number in self._started(among))
+        if spent > self._limits[0]:
             return f"took more than {self._limits[0]:g} s of processor time"
-        return f"took more than {self._limits[1]:g} s by the clock" if clock > self._limits[1] else ""
+        # Without the time of these looks.
+        return f"stood still in {self._limits[1]} looks" if begin.stall.is_there(spent - time.thread_time()) else ""
 
     def _stop(self, _number: int, _frame: FrameType | None) -> None:
         # Only within the phase that is meant: between two it would end the run.
@@ -126,7 +104,7 @@ class Limits:
             pytest.fail(self._reason)
 
     def _limited(self) -> Generator[None, object, object]:
-        self._begin = self._used()
+        self._begin = Begun(used(), Stall(self._limits[1]))
         try:
             return (yield)
         finally:

@@ -121,6 +121,18 @@ def test_a_start_beyond_its_bound_is_refused(state: dict[str, float], words: str
     assert words in str(caught.value)
 
 
+def test_a_line_loses_no_more_than_its_oil_can_be_pressed() -> None:
+    """Numbers of any size up to rounding passed for a loss of pressure."""
+    rig = Model.load(EXAMPLES / "servo_cylinder" / "rig.toml")
+    rig = rig.with_effect("supply_drop", "pump", resistance=1e9, time_constant=0.01)
+    # 160 bar, and 1.2 GPa times one and the logarithm of both volumes of the larger chamber, 201.06 mm^2 times 80 mm.
+    most = 160e5 + 1.2e9 * (1.0 + np.log1p(0.25 * np.pi * 0.016**2 * 0.08 / 2.9e-6))
+    Simulation(rig, STEP, state={"pump.drop": 0.999 * most})
+    for drop in (1.001 * most, -1.001 * most, 1e15):
+        with pytest.raises(SimulationError, match=r"drop of supply `pump` is .*, beyond .*, to which its stroke"):
+            Simulation(rig, STEP, state={"pump.drop": drop})
+
+
 LAGGING = """
 [[effects]]
 type = "warming_friction"

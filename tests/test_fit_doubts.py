@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from vpm.errors import IdentificationError
 from vpm.experiment import Experiment
 from vpm.identify import Checks, Fit, gaps, identify, identify_inertial, ljung_box, problem
 from vpm.identify.comparison import comparison
+from vpm.identify.estimation import _linear_step
 from vpm.identify.inertial_model import InertialModel, repaired
 from vpm.identify.words import told
 from vpm.model import Model
@@ -142,6 +144,29 @@ def test_a_gain_that_only_shows_beside_the_masses_stays_and_is_named(noisy: Expe
     assert fit["drive.gain"] == pytest.approx(4.0, rel=0.05)
     assert np.isinf(fit.std).all()
     assert any("drive.gain" in w and w.startswith("not identifiable") for w in fit.warnings)
+
+
+def test_a_first_step_does_not_move_what_nothing_shows() -> None:
+    """Columns that depend on each other but for rounding: the quotient of two roundings led to 1e11."""
+    random = np.random.default_rng(0)
+    two, noise = random.standard_normal((400, 2)), random.standard_normal((400, 3))
+    slopes = np.column_stack([two, two @ [0.3, 0.7]]) * (1.0 + 1e-14 * noise)
+    measured = two @ [1.0, 2.0] + 0.1 * random.standard_normal(400)
+
+    class Line:
+        def __call__(self, x: Array) -> tuple[Array, Array]:
+            return measured - slopes @ x, -slopes
+
+        def residual(self, x: Array) -> Array:
+            return np.asarray(measured - slopes @ x)
+
+    start, end = np.ones(3), np.full(3, np.inf)
+    found = _linear_step(cast("Any", Line()), start, -end, end)
+    shown = np.linalg.lstsq(two, measured, rcond=None)[0]
+    np.testing.assert_allclose(found[:2] + found[2] * np.array([0.3, 0.7]), shown, rtol=1e-9)
+    # Across what is shown, the plane of equal predictions: the step is square to it in natural units.
+    across = np.array([0.3, 0.7, -1.0]) * np.linalg.norm(slopes, axis=0) ** 2
+    assert abs((found - start) @ across) < 1e-6 * np.linalg.norm(across)
 
 
 def test_the_derivative_of_a_relative_balance_matches_differences(noisy: Experiment) -> None:

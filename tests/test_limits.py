@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from guard import MARK
-from limits import below, processes
+from stalls import below, processes, watched
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
 
@@ -24,17 +24,17 @@ sys.path.insert(0, {tests!r})
 from limits import Limits
 
 def pytest_configure(config):
-    config.pluginmanager.register(Limits({processor}, {clock}))
+    config.pluginmanager.register(Limits({processor}, {looks}))
 """
 BURN = [sys.executable, "-c", "while True: pass"]
 #: A program whose own program goes on without it.
 NEST = [sys.executable, "-c", f"import subprocess\nsubprocess.Popen({BURN!r})\nwhile True: pass"]
 
 
-def run(folder: Path, text: str, *words: str, processor: float = 600.0, clock: float = 6000.0) -> list[str]:
+def run(folder: Path, text: str, *words: str, processor: float = 600.0, looks: int = 6000) -> list[str]:
     """Command of a run of tests with limits."""
     text = f"import subprocess, sys, time\nimport pytest\nBURN, NEST = {BURN!r}, {NEST!r}\n{text}"
-    (folder / "conftest.py").write_text(CONFTEST.format(tests=str(TESTS), processor=processor, clock=clock))
+    (folder / "conftest.py").write_text(CONFTEST.format(tests=str(TESTS), processor=processor, looks=looks))
     (folder / "test_inner.py").write_text(text)
     return [sys.executable, "-m", "pytest", "-q", "-rfE", "--rootdir", str(folder), "-p", "no:cacheprovider", *words]
 
@@ -53,8 +53,12 @@ def begun_below(process: subprocess.Popen[bytes], count: int) -> list[int]:
 
 
 def burns(number: int) -> bool:
+    return does(number, b"while True: pass")
+
+
+def does(number: int, what: bytes) -> bool:
     try:
-        return b"while True: pass" in Path(f"/proc/{number}/cmdline").read_bytes()
+        return what in Path(f"/proc/{number}/cmdline").read_bytes()
     except OSError:
         return False
 
@@ -84,8 +88,21 @@ def test_too_much_processor_time_fails_by_name_and_the_run_goes_on(tmp_path: Pat
 
 def test_what_waits_for_nothing_fails_by_name(tmp_path: Path) -> None:
     text = "import threading\ndef test_waits(): threading.Event().wait()"
-    told = said(tmp_path, run(tmp_path, text, clock=2.0))
-    assert "FAILED test_inner.py::test_waits - Failed: took more than 2 s by the clock" in told
+    told = said(tmp_path, run(tmp_path, f"{text}\ndef test_after(): pass", looks=2))
+    assert "FAILED test_inner.py::test_waits - Failed: stood still in 2 looks" in told
+    assert "1 failed, 1 passed" in told
+
+
+def test_a_program_that_waits_for_nothing_is_ended_with_its_own() -> None:
+    wait = [sys.executable, "-c", "import threading; threading.Event().wait()"]
+    both = f"import subprocess\nsubprocess.run({wait!r})"
+    assert watched([sys.executable, "-c", both], looks=30, period=0.1) == 124
+    assert not any(does(number, b"threading.Event().wait()") for number in processes())
+
+
+def test_a_program_that_works_is_left_alone() -> None:
+    works = "import sys, time\nwhile time.process_time() < 4.0: pass\nsys.exit(3)"
+    assert watched([sys.executable, "-c", works], looks=30, period=0.1) == 3
 
 
 def test_what_a_test_starts_ends_with_it(tmp_path: Path) -> None:

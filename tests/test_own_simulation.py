@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from importlib import import_module
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -10,7 +12,9 @@ from numpy.typing import NDArray
 
 from fit_machines import sines
 from vpm import Experiment, Model, Setup, identify
+from vpm.errors import SimulationError
 from vpm.identify import InverseDynamicsProblem, gaps
+from vpm.identify.estimation import _refine
 from vpm.identify.own_simulation import own_residual
 
 Array = NDArray[np.float64]
@@ -124,3 +128,29 @@ def test_another_record_is_compared_as_the_first_one_is(some: list[Experiment]) 
     same = data.on([replace(some[0], name="again")])
     assert same.blocks == data.blocks
     np.testing.assert_array_equal(same.evaluate(MODEL, MODEL.theta)[0], data.evaluate(MODEL, MODEL.theta)[0])
+
+
+def test_noise_beside_which_the_model_runs_away_leaves_the_fit(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The error of a draw, which nobody asked for, ended the fit after its work."""
+    asked = []
+
+    def away(*_: object) -> Array:
+        asked.append(1)
+        raise SimulationError("the position leaves its bounds")
+
+    log = logs(1, 3)[0]
+    monkeypatch.setattr(import_module("vpm.identify.fit"), "left", away)
+    fit = identify(MODEL, log, free=FREE)
+    assert asked
+    assert np.all(np.abs(fit.values - EXPECTED) <= 5.0 * fit.std)
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_fit_stays_where_the_first_step_ended_in_no_number() -> None:
+    """Infinite times zero went on to linear algebra."""
+
+    def astray(_: Array) -> tuple[Array, Array]:
+        return np.array([np.inf, 1.0]), np.array([[0.0], [1.0]])
+
+    start = np.array([0.5])
+    assert _refine(cast("Any", astray), start, start - 1.0, start + 1.0, 1e-8, 10) is start

@@ -138,6 +138,16 @@ def test_implicit_steps_take_the_gear_of_a_motor_by_its_chord(width: float) -> N
         assert np.abs(run["axis.position"] - exact["axis.position"]).max() < 0.2 * (0.3 * STEP) * (ROWS * STEP)
 
 
+def test_steps_that_bring_to_rest_without_a_load_only_are_told() -> None:
+    """Half a newton on 0.8 N that turn round eight times in a step: from some speeds the steps never come to rest."""
+    model, experiment, rest = motor(1e-4)
+    states = [model.state({**rest, "axis.velocity": 0.01003 + 1.3e-4 * phase}) for phase in range(10)]
+    runs = [simulate(model, experiment, integrator="rosenbrock", initial_state=state) for state in states]
+    held = np.arctanh(0.5 / 0.8)
+    assert any(restless(run, (1.0 + held) * 1e-4) for run in runs)
+    assert all(told(run) == {"actuator `drive`": pytest.approx(8.0, rel=1e-3)} for run in runs)
+
+
 @pytest.mark.parametrize("integrator", ["rk4", "linearly_implicit", "rosenbrock", "additive"])
 def test_seals_that_steps_do_not_resolve_are_told(integrator: str) -> None:
     """The oil lets a cylinder creep whatever the steps are, so that only the exact run tells what they do."""

@@ -33,7 +33,7 @@ from vpm.discrepancy.empirical import beside
 from vpm.discrepancy.evidence import gather
 from vpm.discrepancy.filters import filters
 from vpm.discrepancy.floor import noise_floor
-from vpm.discrepancy.moving import check_moving
+from vpm.discrepancy.moving import check_moving, check_stuck
 from vpm.discrepancy.overlooked import overlooked
 from vpm.discrepancy.provenance import own_settings, provenance
 from vpm.discrepancy.remainder import Remainder, remainder
@@ -454,6 +454,7 @@ def _records(
     if validate is not None:
         unseen = tuple(joints_from_shafts(record, model) for record in as_records(validate))
         if unseen:
+            check_stuck(model, unseen)
             return training, unseen, []
     pairs = [e.split(1.0 - HELD_OUT) for e in training]
     note = f"no validation record was given: the last {100 * HELD_OUT:.0f} % of each record was kept out of the fit"

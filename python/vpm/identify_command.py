@@ -93,6 +93,7 @@ def identify(
     plot: Plot = None,
 ) -> None:
     """Fit parameters to one or several logs. Ctrl-C ends a fit and keeps the best until then."""
+    from vpm.discrepancy.moving import check_stuck
     from vpm.identify import Fitting, judged_on
     from vpm.identify import identify as fit_logs
     from vpm.identify.words import names, numbers, ranges, told, told_intervals, told_unseen
@@ -123,6 +124,7 @@ def identify(
     unseen = [load_record(path, machine, channels, interpolate) for path in validate or []]
     setup = Setup(integrator, substeps, horizon, settling, hold)
     if check:
+        check_stuck(machine, [*records, *unseen])
         refuse_mistakes(machine, [*records, *unseen], setup=setup, workers=workers or None)
     with fitting(starts) as tell:
         fit = fit_logs(

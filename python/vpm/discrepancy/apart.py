@@ -20,6 +20,8 @@ from vpm.model import Model
 
 #: A residual within this factor of the noise floor has nothing left to explain, unless it repeats.
 FLOOR_FACTOR = 1.3
+#: Smallest signal that divides: of a motor that is off there is none.
+TINY = 1e-300
 #: Where so much of what could be explained remains, what was found is not the explanation.
 MOSTLY_OPEN = 0.15
 
@@ -52,7 +54,7 @@ class Joints:
         still = {
             joint: share for joint, share in most.items() if left.present and _is_clear(told[joint].after, told[joint])
         }
-        worst = max(told, key=lambda joint: told[joint].recalibrated / told[joint].signal, default="")
+        worst = max(told, key=lambda joint: told[joint].recalibrated / max(told[joint].signal, TINY), default="")
         return cls(still, tuple(joint for joint in shares if joint not in most), worst)
 
     @property

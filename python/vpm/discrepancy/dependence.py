@@ -60,7 +60,7 @@ def busiest_joint(data: Data, final: Judged) -> int:
     sums = np.zeros(len(data.unseen.joints))
     for record in range(len(data.unseen.motions)):
         for column, block in enumerate(data.unseen.efforts(record)):
-            scale = max(block.scale * block.weight, 1e-300)
+            scale = (block.scale or 1.0) * block.weight  # of drives that are off there is no effort
             sums[column] += float(np.sum((final.unseen[block.samples] / scale) ** 2))
     return int(np.argmax(sums))
 

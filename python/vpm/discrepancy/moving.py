@@ -1,40 +1,94 @@
-"""Whether records show any motion at all."""
+"""Whether records show what the machine does: channels that stand still although it moves."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
-from vpm.errors import DiagnosisError
+from vpm.errors import DiagnosisError, VpmError
 from vpm.experiment import Experiment
 from vpm.model import Model
+from vpm.observer import measured_outputs
+from vpm.simulate import judging_mode, simulate
 
-#: Change of a position that is rounding, in steps from one number of its size to the next.
+#: Change of a reading that is rounding, in steps from one number of its size to the next.
 ROUNDING = 8.0
+#: Steps in which the coarsest converters in use divide a range, those of 8 bits.
+STEPS = 256
+
+
+def is_moving(record: Experiment, channel: str) -> bool:
+    """Whether a channel changes by more than rounding."""
+    return _changes(record[channel])
 
 
 def check_moving(model: Model, records: Sequence[Experiment]) -> None:
-    """Complain where no joint moves in any record: any effect would explain that as well as any other.
+    """Complain where records do not show the motion: any effect would explain that as well as any other.
 
     Raises
     ------
     DiagnosisError
-        All positions that are measured are constant.
+        All positions that are measured are constant, or a channel is that the model itself moves.
     """
     shown = [f"{joint}.position" for joint in model.joints]
     measured = [(record, channel) for record in records for channel in shown if channel in record]
-    if not measured or any(_moves(record, channel) for record, channel in measured):
+    if measured and not any(is_moving(record, channel) for record, channel in measured):
+        names = ", ".join(dict.fromkeys(record.name for record, _ in measured))
+        raise DiagnosisError(
+            f"no joint moves in {names}: {_standing(*measured[0])}, and any effect explains that; "
+            "check that its column is the right one, or record a motion"
+        )
+    check_stuck(model, records)
+
+
+def check_stuck(model: Model, records: Sequence[Experiment]) -> None:
+    """Complain about a channel that stands while the model, driven as the machine was, moves it by what a sensor shows.
+
+    Raises
+    ------
+    DiagnosisError
+        There is one.
+    """
+    for record in records:
+        _check_record(model, record)
+
+
+def _check_record(model: Model, record: Experiment) -> None:
+    read = (*measured_outputs(model, record), *model.input_channels)
+    still = [channel for channel in read if channel in record and not is_moving(record, channel)]
+    if not still:
         return
-    record, channel = measured[0]
-    names = ", ".join(dict.fromkeys(record.name for record, _ in measured))
-    value, unit = f"{record[channel][0]:.6g}", record.unit(channel)
-    raise DiagnosisError(
-        f"no joint moves in {names}: {channel} is {value} {unit} all the time, and any effect explains that; "
-        "check that its column is the right one, or record a motion"
-    )
+    try:
+        run = simulate(model, record, judging_mode(model, [record]))
+    except VpmError:
+        return  # whoever has to simulate the record says why that cannot be
+    for channel in (name for name in still if name in run.channels):
+        way = float(np.ptp(run[channel]))
+        if np.isfinite(way) and way > _step(record, channel) and _changes(run[channel]):
+            held = "describe its joint as fixed" if channel.endswith(".position") else "leave that channel out"
+            raise DiagnosisError(
+                f"{record.name}: {_standing(record, channel)}, and the model moves it by "
+                f"{_told(record, channel, way, 3)}; check that its column is the right one, or {held}"
+            )
 
 
-def _moves(record: Experiment, channel: str) -> bool:
-    values = record[channel]
+def _step(record: Experiment, channel: str) -> float:
+    """Largest step that a sensor may have, by what it and those of its unit show; zeros of positions mean nothing."""
+    unit, own = record.unit(channel), 0.0 if channel.endswith(".position") else abs(float(record[channel][0]))
+    alike = (float(np.ptp(record[name])) for name in record.channels if record.unit(name) == unit)
+    return max(own, *alike) / STEPS
+
+
+def _standing(record: Experiment, channel: str) -> str:
+    return f"{channel} is {_told(record, channel, float(record[channel][0]), 6)} all the time"
+
+
+def _told(record: Experiment, channel: str, value: float, digits: int) -> str:
+    unit = record.unit(channel)
+    return f"{value + 0.0:.{digits}g}" + ("" if unit == "1" else f" {unit}")
+
+
+def _changes(values: NDArray[np.float64]) -> bool:
     return float(np.ptp(values)) > ROUNDING * float(np.spacing(np.max(np.abs(values))))

@@ -36,8 +36,8 @@ def is_negligible(gap: Mapping[str, ChannelGap]) -> bool:
 
 
 def _is_nothing(gap: ChannelGap) -> bool:
-    """Whether what is left of one channel is nothing beside its signal."""
-    return gap.after <= NEGLIGIBLE * gap.signal or gap.signal == 0.0
+    """Whether what is left of one channel is nothing beside its signal; of drives that are off, beside its noise."""
+    return gap.after <= (NEGLIGIBLE * gap.signal or FLOOR_FACTOR * gap.noise_floor)
 
 
 def _above(main: list[ChannelGap]) -> float:

@@ -299,7 +299,8 @@ class InverseDynamicsProblem:
     def _sizes(self, model: Model) -> tuple[list[Array], list[Array]]:
         """For each record the size of each channel, and (n, channels) which samples count.
 
-        Efforts are as large as what the drives deliver; of other channels, such as pressures, it is the spread.
+        Efforts are as large as what the drives deliver, and of a joint that coasts as what its inertia takes; of other
+        channels, such as pressures, it is the spread.
         """
         counted = Counted(self.experiments, self.motions, self.joints, self._joints)
         sizes, moving = [], counted.moving(model)
@@ -310,13 +311,23 @@ class InverseDynamicsProblem:
                     f"{experiment.name}: only {len(applied)} samples are left after filtering at "
                     f"{m.cutoff:.3g} Hz; record longer or pass a higher cutoff"
                 )
-            efforts = np.sqrt(np.average(applied**2, axis=0, weights=moving[record]))
+            # Of a joint that rests all the time, and may stick, no sample counts.
+            counts = np.maximum(np.sum(moving[record], axis=0), 1.0)
+            efforts = np.sqrt(np.sum(applied**2 * moving[record], axis=0) / counts)
+            if not efforts.all():
+                efforts = np.where(efforts > 0.0, efforts, self._inertial(model, record))
             spread = np.std(self._compared[record], axis=0)
             sizes.append(np.concatenate([efforts, spread]))
             ends = settled(len(applied), m.decimation)
             columns = [counted.of_channel(model, channel, record, ends) for channel in self.shown]
             moving[record] = np.column_stack([moving[record], *columns])
         return sizes, moving
+
+    def _inertial(self, model: Model, record: int) -> Array:
+        """Root mean square of what the inertia at each joint takes by itself, all joints at zero."""
+        places = [model.joints.index(joint) for joint in self.joints]
+        inertia = np.diag(model.mass_matrix(np.zeros(len(model.coordinates))))[places]
+        return np.asarray(inertia * np.sqrt(np.mean(self.state(record)[2] ** 2, axis=0)))
 
     def _stack(self, records: list[Array]) -> Array:
         """Concatenate (n, channels, ...) arrays block by block and apply the weights."""

@@ -260,11 +260,19 @@ def _linear_step(counter: _Counter, start: Array, low: Array, high: Array) -> Ar
     """The bounded minimiser of the linearised problem, if it is indeed better than the start."""
     residual, jacobian = counter(start)
     lengths = column_lengths(jacobian)
+    if not (np.all(np.isfinite(residual)) and np.all(np.isfinite(lengths))):
+        return start
     orthogonal, square = np.linalg.qr(jacobian / lengths)
+    left, values, directions = np.linalg.svd(square, full_matrices=False)
+    # Along what nothing shows there is no reason to move, but to make way at a bound: a quotient of two roundings would
+    # lead to 1e14.
+    least = RANK_TOLERANCE * values[0]
+    blind = values < least
+    square = np.maximum(values, least)[:, None] * directions
     bounds = ((low - start) * lengths, (high - start) * lengths)
-    # By active sets, which end: where columns are multiples of each other, steps of 1e14 are all rounding, and the
-    # reflective method halves them for ever.
-    step = lsq_linear(square, -orthogonal.T @ residual, bounds, method="bvls", tol=1e-14)
+    # By active sets, which end: the reflective method may halve its steps for ever.
+    target = np.where(blind, 0.0, -left.T @ (orthogonal.T @ residual))
+    step = lsq_linear(square, target, bounds, method="bvls", tol=1e-14)
     candidate = np.clip(start + step.x / lengths, low, high)
     better = np.sum(counter.residual(candidate) ** 2) <= np.sum(residual**2)
     return candidate if better else start
@@ -294,6 +302,8 @@ def _nearest(counter: _Counter, found: Array, start: Array, low: Array, high: Ar
 
 def _refine(counter: _Counter, start: Array, low: Array, high: Array, tolerance: float, most: int) -> Array:
     residual, jacobian = counter(start)
+    if not np.all(np.isfinite(residual)):
+        return start
     lengths = column_lengths(jacobian)
     if not np.all(np.isfinite(lengths)):  # a motion that parts from its way ever faster leads nowhere
         return start

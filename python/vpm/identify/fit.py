@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri, stdtrit
 
-from vpm.errors import IdentificationError
+from vpm.errors import IdentificationError, VpmError
 from vpm.experiment import Experiment, as_records, joints_from_shafts
 from vpm.identify.balance import InverseDynamicsProblem
 from vpm.identify.beginning import BegunAnywhere, first_state_derivative, matters
@@ -330,7 +330,10 @@ def _with_noise(fit: Fit, data: AnyProblem, jacobian: Array, noise: Noise) -> Fi
     if not isinstance(plain, InverseDynamicsProblem):
         return fit
     how, lengths = OwnSimulation(), column_lengths(jacobian)
-    drawn = left(fit.model, plain, noise, np.random.default_rng(0), how.draws)
+    try:
+        drawn = left(fit.model, plain, noise, np.random.default_rng(0), how.draws)
+    except (VpmError, ArithmeticError, np.linalg.LinAlgError):
+        return fit  # with noise the model does not stay by its records
     errors = drawn @ np.linalg.pinv(jacobian / lengths).T / lengths
     variance, decided = pooled(fit.std**2, np.asarray(fit.freedom), errors, how.contradicted)
     return replace(fit, std=np.sqrt(variance), freedom=decided)

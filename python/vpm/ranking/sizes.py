@@ -7,6 +7,8 @@ from numpy.typing import NDArray
 
 from vpm.catalogue import EffectParameter
 from vpm.discrepancy.candidates import Candidate, joint_at, shares_at, slow_speeds
+from vpm.discrepancy.moving import is_moving
+from vpm.discrepancy.structural import moved
 from vpm.identify import InverseDynamicsProblem
 from vpm.model import Model
 from vpm.weighing.priors import FACTOR, NATURAL, NEAR, SHARE, Prior, natural_sizes
@@ -26,15 +28,21 @@ class Sizes:
         self.model = model
         records = range(len(data.motions))
         efforts = np.concatenate([data.effort(model, model.theta, record)[1] for record in records])
-        positions, velocities = (np.concatenate([data.state(r)[which] for r in records]) for which in (0, 1))
+        positions, velocities, accelerations = map(np.concatenate, zip(*map(data.state, records), strict=True))
         self.joints: dict[str, tuple[float, float, float]] = {}
         self.ways: dict[str, tuple[float, float]] = {}
+        moving = [any(is_moving(log, f"{joint}.position") for log in data.experiments) for joint in data.joints]
+        self.moving: set[str] = set()
         for site in (*data.joints, *model.transmissions):
             shares = shares_at(model, site, data.joints)
             way = positions @ shares
+            if np.any(shares[moving]):
+                self.moving.add(site)
             self.ways[site] = float(way.min()), float(way.max())
             effort = efforts @ (shares / max(float(shares @ shares), 1e-300))
-            self.joints[site] = _strength(effort), _strength(velocities @ shares), 0.5 * float(np.ptp(way))
+            # Where no drive does anything, it is inertia that forces are as large as.
+            size = _strength(effort) or moved(model, site) * _strength(accelerations @ shares)
+            self.joints[site] = size, _strength(velocities @ shares), 0.5 * float(np.ptp(way))
         self.commands = {
             name: _strength(np.concatenate([motion.inputs[:, place] for motion in data.motions]))
             for place, name in enumerate(model.actuators)
@@ -42,8 +50,7 @@ class Sizes:
 
     def moves(self, site: str) -> bool:
         """Whether a joint or a transmission is seen to move."""
-        low, high = self.ways.get(site, (0.0, 0.0))
-        return high - low > LEAST
+        return site in self.moving
 
     def prior(self, candidate: Candidate, parameter: EffectParameter, value: float) -> Prior:
         """Prior of a parameter of an effect that begins at ``value``."""

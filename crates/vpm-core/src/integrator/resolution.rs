@@ -21,6 +21,8 @@ const BRAKING: f64 = 10.0;
 const WAITING: usize = 60;
 /// Speeds at which the braking begins, evenly over what friction takes off in a step: one alone could end at rest by luck.
 const PHASES: u32 = 8;
+/// Loads that friction has to hold on trial, evenly up to the friction itself, under which nothing rests.
+const LOADS: u32 = 8;
 /// Largest product of angular frequency and step that is looked at, and how finely.
 const REACH: f64 = 10.0;
 const GRID: f64 = 0.05;
@@ -180,8 +182,9 @@ pub enum Taken {
 /// Whether steps bring a joint to rest that dry friction brakes, and keep it there. `turn` is the slope of the friction at rest, times the
 /// step, over the inertia that it moves: the steps in which friction at that slope stops the joint.
 ///
-/// Law: `v' = -turn tanh(v)` in steps of 1, v over the width in which friction turns around, from speeds that friction takes ten steps to
-/// stop. The method itself makes the steps. What does not stay below 1 creeps or chatters, by a share of what friction brakes in a step.
+/// Law: `v' = -turn (tanh(v) - load)` in steps of 1, v over the width in which friction turns around, from speeds that friction takes ten
+/// steps to stop, under loads up to 7/8 of the friction. The method itself makes the steps. What does not stay within 1 of `atanh(load)`,
+/// where friction holds the load, creeps or chatters, by a share of what friction brakes in a step.
 /// Steps of controlled error follow friction: they always do, and so does [`Method::Additive`] where it takes it implicitly. Guarded steps
 /// are those of the Rosenbrock method, for they let such errors pass.
 /// Checked: runs of a slider with each method.
@@ -194,7 +197,10 @@ pub fn sticks(method: Method, turn: f64, taken: Taken) -> bool {
         return true;
     }
     let method = if method == Method::Guarded { Method::Rosenbrock } else { method };
-    rests::<2>(method, &mut Braked { turn }, turn, 1.0)
+    (0..LOADS).all(|place| {
+        let load = f64::from(place) / f64::from(LOADS);
+        rests::<2>(method, &mut Braked { turn, load }, turn * (1.0 - load), 1.0 + load.atanh())
+    })
 }
 
 /// Whether steps bring a joint to rest that friction brakes which bends before it slides. `stiffness` is that of the bending, times the
@@ -222,9 +228,10 @@ fn rests<const STATES: usize>(method: Method, joint: &mut impl Ode<f64>, braked:
     })
 }
 
-/// `q'' = -turn tanh(q')`.
+/// `q'' = -turn (tanh(q') - load)`.
 struct Braked {
     turn: f64,
+    load: f64,
 }
 
 impl Braked {
@@ -243,7 +250,7 @@ impl Ode<f64> for Braked {
     }
 
     fn rhs(&mut self, x: &[f64], dxdt: &mut [f64]) {
-        dxdt.copy_from_slice(&[x[1], -self.turn * x[1].tanh()]);
+        dxdt.copy_from_slice(&[x[1], -self.turn * (x[1].tanh() - self.load)]);
     }
 
     fn jacobian(&mut self, x: &[f64], jacobian: &mut [f64]) {

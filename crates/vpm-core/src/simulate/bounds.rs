@@ -46,7 +46,7 @@ impl Why {
 ///   At a given `q_i` no beam stores less than `q_i^2 / (2 (K^-1)_ii)`, so that `|q_i| <= sqrt(EA L (K^-1)_ii)`.
 /// - oil of bulk modulus beta in a chamber whose volume goes from `line + A stroke` to `line` changes its pressure by
 ///   `beta ln(1 + A stroke / line)`; the supply adds its own pressure. Another beta covers stops that yield and logged pressures. A supply
-///   that sags is pressed no further than by its source and by what its cylinders send back.
+///   that sags is pressed no further than by its source and by what its cylinders send back, and its lines lose or gain no more than that.
 /// - every other state stays below its natural size (of [`crate::ode::Ode::scales`]) over the rounding error of a number: beyond, two
 ///   numbers that follow each other differ by more than that size.
 ///
@@ -88,8 +88,9 @@ impl Bounds {
             place += actuator.n_states();
         }
         for (supply, pressed) in dynamics.supplies.iter().zip(pressures) {
-            if supply.is_sagging() {
-                bounds.limit(place, pressed.max(supply.pressure), Why::Oil);
+            // No line loses more than all of its pressure, nor gains more than its cylinders send back.
+            for state in place..place + supply.states().count() {
+                bounds.limit(state, pressed.max(supply.pressure), Why::Oil);
             }
             place += supply.states().count();
         }

@@ -79,19 +79,21 @@ fn explicit_steps_that_move_a_frequency_or_let_it_grow_are_told() {
 
 #[test]
 fn friction_that_does_not_stick_is_told() {
-    // A slider of 1 kg that 1 N brakes, from 0.01 m/s, in 300 steps of 1 ms.
+    // A slider of 1 kg that 1 N brakes, from 0.01 m/s, in 300 steps of 1 ms, under loads that it holds where it creeps by the law itself.
     for method in Method::ALL {
-        for turn in [0.5_f64, 1.5, 2.0, 50.0, 5e3] {
+        for turn in [0.5_f64, 1.5, 2.0, 8.0, 50.0, 5e3] {
             let width = 1e-3 / turn;
             let mut machine = Machine::new(&slider(1.0));
             machine.effect("coulomb_friction", 0, &[("coulomb", 1.0), ("transition_velocity", width)]);
             machine.actuator(0, &[("gain", 1.0)]);
             let bench = Bench::new(&machine, 1e-3, 1, method);
-            let largest = |from: f64| {
-                let run = bench.free(&[0.0, from], &[0.0; 300]);
+            let largest = |from: f64, load: f64| {
+                let run = bench.free(&[0.0, from], &[load; 300]);
                 run.states.chunks_exact(2).rev().take(20).map(|state| state[1].abs()).fold(0.0, f64::max)
             };
-            let rests = (0..8).all(|k| largest(1e-2 + f64::from(k) * 1.25e-4) <= width);
+            let rests = [0.0_f64, 0.3, 0.5, 0.62, 0.8].into_iter().all(|load| {
+                (0..8).all(|k| largest(1e-2 + f64::from(k) * 1.25e-4, load) <= width * (1.0 + load.atanh()))
+            });
             let found = unstuck(&bench.description, &bench.theta, &[0.0, 0.01], &[0.0], bench.stepping).unwrap();
             assert_eq!(found.is_empty(), rests, "{} {turn}: {found:?}", method.name());
             assert_eq!(sticks(method, turn, Taken::Implicitly), rests, "{} {turn}", method.name());
