@@ -20,7 +20,7 @@ from vpm.identify.estimation import Estimate, Progress, blinded, estimate, limit
 from vpm.identify.identifiability import Combination, column_lengths
 from vpm.identify.missing import missing_effects, whiteness
 from vpm.identify.moments import on_the_border
-from vpm.identify.noise_left import Noise, left
+from vpm.identify.noise_left import Noise, noisy
 from vpm.identify.objective import AnyProblem
 from vpm.identify.output_error import OutputErrorProblem
 from vpm.identify.own_simulation import Own, own_residual
@@ -267,11 +267,12 @@ def identify(
         fit = _with_details(fit_of(model, data, result, before, [e.name for e in records], ties or {}), data, found)
     judged = whiteness(fit.model, records, data, result.residual, result.jacobian, checks or Checks())
     fit = replace(fit, setup=setup, fitting=fitting, ties=dict(ties or {}), whiteness=judged)
-    unscaled = result.jacobian[: data.blocks[-1].samples.stop]
-    decided = freedom(unscaled / column_lengths(unscaled), data.blocks, len(names) + len(fit.states))[: len(names)]
+    slopes = result.jacobian[: data.blocks[-1].samples.stop]
+    lengths = column_lengths(slopes)
+    decided = freedom(slopes / lengths, data.blocks, len(names) + len(fit.states))[: len(names)]
     fit = replace(fit, freedom=decided)
     if own is not None:
-        fit = _with_noise(fit, data, unscaled, own.noise)
+        fit = _with_noise(fit, data, slopes / lengths, lengths, own.noise)
     return replace(fit, warnings=_told(model, records, data, fit, checks or Checks()))
 
 
@@ -322,14 +323,18 @@ def _beside_own(
     return data, best, last
 
 
-def _with_noise(fit: Fit, data: AnyProblem, jacobian: Array, noise: Noise) -> Fit:
-    """The same with deviations that know how far the noise of the records moves the estimates."""
+def _with_noise(fit: Fit, data: AnyProblem, jacobian: Array, lengths: Array, noise: Noise) -> Fit:
+    """The same with deviations that know how far the noise of the records moves the estimates.
+
+    Columns of the jacobian are divided by their ``lengths``.
+    """
     plain = data.untied if isinstance(data, TiedProblem) else data
     if not isinstance(plain, InverseDynamicsProblem):
         return fit
-    how, lengths = OwnSimulation(), column_lengths(jacobian)
-    drawn = left(fit.model, plain, noise, np.random.default_rng(0), how.draws)
-    errors = drawn @ np.linalg.pinv(jacobian / lengths).T / lengths
+    how, fitted = OwnSimulation(), fit.model
+    without = plain.on(plain.experiments).evaluate(fitted, fitted.theta)[0]
+    drawn = noisy(fitted, plain, noise, np.random.default_rng(0), how.draws) - without
+    errors = drawn @ np.linalg.pinv(jacobian).T / lengths
     variance, decided = pooled(fit.std**2, np.asarray(fit.freedom), errors, how.contradicted)
     return replace(fit, std=np.sqrt(variance), freedom=decided)
 

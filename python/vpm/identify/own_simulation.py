@@ -21,7 +21,7 @@ from vpm.errors import VpmError
 from vpm.experiment import Experiment, Motion
 from vpm.identify.along import bends, has_own_drives
 from vpm.identify.balance import InverseDynamicsProblem
-from vpm.identify.noise_left import Noise, compared, noise_of
+from vpm.identify.noise_left import Noise, compared, mirrored, noise_of
 from vpm.identify.settings import OwnSimulation
 from vpm.initial import measured_states
 from vpm.model import Model
@@ -75,15 +75,14 @@ def _own(model: Model, data: InverseDynamicsProblem, how: OwnSimulation, random:
     guided = [one for one in found if one is not None]
     if len(guided) < len(logs):
         return None
-    noise, written = noise_of(model, data, [quiet for _, quiet in guided], random), []
-    for _ in range(how.pairs):
-        both = noise.drawn(data.experiments, random)
-        for sign in (1.0, -1.0):
-            noisy = []
-            for (log, m), (band, quiet), (seen, told) in zip(logs, guided, both, strict=True):
-                made = _drawn(model, log, m, channels, how, band, sign * told) if np.any(told) else quiet
-                noisy.append(replace(made, data=made.data + sign * seen))
-            written.append(noisy)
+    noise = noise_of(model, data, [quiet for _, quiet in guided], random)
+    draws = [one for _ in range(how.pairs) for one in mirrored(noise.drawn(data.experiments, random))]
+    columns = []
+    for record, ((log, m), (band, quiet)) in enumerate(zip(logs, guided, strict=True)):
+        seen, told = (np.array([draw[record][side] for draw in draws]) for side in (0, 1))
+        made = _drawn(model, log, m, channels, how, band, told) if np.any(told) else [quiet] * len(draws)
+        columns.append([replace(one, data=one.data + read) for one, read in zip(made, seen, strict=True)])
+    written = list(zip(*columns, strict=True))
     # What is relative to the delivered effort is made so afterwards, with what is expected taken off.
     left = [InverseDynamicsProblem.evaluate(data.on(made), model, model.theta)[0] for made in written]
     of_log = InverseDynamicsProblem.evaluate(data, model, model.theta)[0]
@@ -103,7 +102,7 @@ def _beside(
     """Bandwidth that keeps the model by a log, and the log as it would have been without noise; None without any."""
     joints = [f"{joint}.position" for joint in model.joints]
     for band in how.bands:
-        made = _drawn(model, log, m, channels, how, band, np.zeros_like(log.data))
+        (made,) = _drawn(model, log, m, channels, how, band, np.zeros((1, *log.data.shape)))
         if all(np.std(made[channel] - log[channel]) <= how.away * np.std(log[channel]) for channel in joints):
             return band, made
     return None
@@ -111,28 +110,34 @@ def _beside(
 
 def _drawn(
     model: Model, log: Experiment, m: Motion, channels: Sequence[str], how: OwnSimulation, band: float, told: Array
-) -> Experiment:
-    """A simulation on the commands of a log, to which a slow controller adds what keeps it by the motion of the log.
+) -> list[Experiment]:
+    """Simulations on the commands of a log, to which a slow controller adds what keeps them by the motion of the log.
 
-    Drives deliver beside their commands what is ``told`` in the columns of these, and the log does not tell.
+    Drives deliver beside their commands what is ``told`` (runs, N, channels) in the columns of these, and no log tells.
+    All runs go side by side: most of the time of one would be that of asking and telling, sample by sample.
     """
-    omega, joints = 2.0 * np.pi * band, len(model.joints)
-    by_position, by_velocity = _gains(model, m, omega, how.damping)
+    by_position, by_velocity = _gains(model, m, 2.0 * np.pi * band, how.damping)
     start = measured_states(model, log, model.theta, np.zeros(1, dtype=np.int64), m.cutoff, m)[0]
-    sim = Simulation(model, m.dt, integrator=how.method, state=start, compiled=True)
-    read = [sim.channels.index(channel) for channel in channels]
-    speeds = slice(len(model.coordinates), len(model.coordinates) + joints)
-    outputs, commands = np.empty((len(m.time), len(read))), np.empty_like(m.inputs)
-    untold = np.zeros_like(m.inputs)
+    runs = [Simulation(model, m.dt, integrator=how.method, state=start, compiled=True) for _ in told]
+    columns, moved = runs[0].channels, [[f"{joint}.{of}" for joint in model.joints] for of in ("position", "velocity")]
+    read, places, speeds = ([columns.index(name) for name in names] for names in (channels, *moved))
+    outputs, commands = np.empty((len(told), len(m.time), len(read))), np.empty((len(told), *m.inputs.shape))
+    untold = np.zeros_like(commands)
     for column, channel in enumerate(m.drivers):
         if channel in log:
-            untold[:, column] = told[:, log.channels.index(channel)]
-    for k, (position, velocity, command) in enumerate(zip(m.position, m.velocity, m.inputs, strict=True)):
-        outputs[k] = sim.outputs[read]
-        commands[k] = command + by_position @ (position - outputs[k, :joints])
-        if by_velocity is not None:
-            commands[k] += by_velocity @ (velocity - sim.state[speeds])
-        sim.step(commands[k] + untold[k])
+            untold[:, :, column] = told[:, :, log.channels.index(channel)]
+    wanted = m.inputs + m.position @ by_position.T + m.velocity @ by_velocity.T
+    for k, ahead in enumerate(wanted):
+        now = np.array([run.outputs for run in runs])
+        outputs[:, k] = now[:, read]
+        commands[:, k] = ahead - now[:, places] @ by_position.T - now[:, speeds] @ by_velocity.T
+        for run, command in zip(runs, commands[:, k] + untold[:, k], strict=True):
+            run.step(command)
+    return [_written(log, m, channels, one, held) for one, held in zip(outputs, commands, strict=True)]
+
+
+def _written(log: Experiment, m: Motion, channels: Sequence[str], outputs: Array, commands: Array) -> Experiment:
+    """A log with other readings (N, channels) and other commands (N, nu)."""
     data = np.array(log.data)
     for values, names in ((outputs, channels), (commands, m.drivers)):
         for column, channel in enumerate(names):
@@ -141,10 +146,11 @@ def _drawn(
     return replace(log, data=data)
 
 
-def _gains(model: Model, m: Motion, omega: float, damping: float) -> tuple[Array, Array | None]:
+def _gains(model: Model, m: Motion, omega: float, damping: float) -> tuple[Array, Array]:
     """Commands per missing position and velocity (nu, n) that draw joints to a log at a bandwidth, rad/s."""
     if has_own_drives(model):
-        return omega * _commands_per_velocity(model, m), None
+        slow = omega * _commands_per_velocity(model, m)
+        return slow, np.zeros_like(slow)
     pushing = _commands_per_effort(model, m) @ _mass_matrix(model, m)
     return omega**2 * pushing, 2.0 * damping * omega * pushing
 
