@@ -25,7 +25,7 @@ from vpm.identify.noise_left import Noise, compared, mirrored, noise_of
 from vpm.identify.settings import OwnSimulation
 from vpm.initial import measured_states
 from vpm.model import Model
-from vpm.simulate import HOLDS
+from vpm.simulate import HOLDS, Setup
 from vpm.stepping import Simulation
 
 Array = NDArray[np.float64]
@@ -56,11 +56,11 @@ def own_residual(
     -------
     Own or None
         None where the model does not stay by its records or lacks something, where nobody measured a joint, or where
-        drives have states of other kinds than cylinders.
+        cylinders stand beside other drives.
     """
     how = settings or OwnSimulation()
     whole = all(tuple(model.joints) == tuple(m.joints) for m in data.motions)
-    if data.hold != HOLDS[0] or not whole or not _drawn_by_commands(model):
+    if data.hold != HOLDS[0] or not whole or _pushes(model) is None:
         return None
     try:
         return _own(model, data, how, np.random.default_rng(seed))
@@ -91,9 +91,10 @@ def _own(model: Model, data: InverseDynamicsProblem, how: OwnSimulation, random:
     return Own(np.asarray(np.mean(left, axis=0)), noise)
 
 
-def _drawn_by_commands(model: Model) -> bool:
-    """Whether all drives are ideal, whose commands push, or all are cylinders behind valves, whose commands move."""
-    return not has_own_drives(model) or all(model.actuator_type(name) == "hydraulic" for name in model.actuators)
+def _pushes(model: Model) -> bool | None:
+    """Whether commands push, or move as those of valves of cylinders do; None where there are drives of both kinds."""
+    kinds = {model.actuator_type(name) != "hydraulic" for name in model.actuators}
+    return kinds.pop() if len(kinds) == 1 else None
 
 
 def _beside(
@@ -116,7 +117,7 @@ def _drawn(
     Drives deliver beside their commands what is ``told`` (runs, N, channels) in the columns of these, and no log tells.
     All runs go side by side: most of the time of one would be that of asking and telling, sample by sample.
     """
-    by_position, by_velocity = _gains(model, m, 2.0 * np.pi * band, how.damping)
+    by_position, by_velocity = commands_to_draw(model, m, 2.0 * np.pi * band, how.damping)
     start = measured_states(model, log, model.theta, np.zeros(1, dtype=np.int64), m.cutoff, m)[0]
     runs = [Simulation(model, m.dt, integrator=how.method, state=start, compiled=True) for _ in told]
     columns, moved = runs[0].channels, [[f"{joint}.{of}" for joint in model.joints] for of in ("position", "velocity")]
@@ -146,13 +147,13 @@ def _written(log: Experiment, m: Motion, channels: Sequence[str], outputs: Array
     return replace(log, data=data)
 
 
-def _gains(model: Model, m: Motion, omega: float, damping: float) -> tuple[Array, Array]:
+def commands_to_draw(model: Model, m: Motion, omega: float, damping: float) -> tuple[Array, Array]:
     """Commands per missing position and velocity (nu, n) that draw joints to a log at a bandwidth, rad/s."""
-    if has_own_drives(model):
-        slow = omega * _commands_per_velocity(model, m)
-        return slow, np.zeros_like(slow)
-    pushing = _commands_per_effort(model, m) @ _mass_matrix(model, m)
-    return omega**2 * pushing, 2.0 * damping * omega * pushing
+    if _pushes(model):
+        pushing = _commands_per_effort(model, m, 1.0 / omega) @ _mass_matrix(model, m)
+        return omega**2 * pushing, 2.0 * damping * omega * pushing
+    slow = omega * _commands_per_velocity(model, m)
+    return slow, np.zeros_like(slow)
 
 
 def _mass_matrix(model: Model, m: Motion) -> Array:
@@ -173,15 +174,25 @@ def _commands_per_velocity(model: Model, m: Motion) -> Array:
     return np.asarray(np.linalg.pinv(moved))
 
 
-def _commands_per_effort(model: Model, m: Motion) -> Array:
-    """By how much commands have to change for an effort at each joint (nu, n), at the sizes that they have."""
-    rest, sizes = np.zeros((3, len(model.joints))), np.max(np.abs(m.inputs), axis=0, initial=0.0)
+def _commands_per_effort(model: Model, m: Motion, after: float) -> Array:
+    """By how much commands have to change for an effort at each joint (nu, n), at the sizes that they have.
+
+    What drives deliver is that ``after`` a while, s: by then windings and delays have passed on what they were told.
+    """
+    samples, sizes = max(3, round(after / m.dt)), np.max(np.abs(m.inputs), axis=0, initial=0.0)
+    still, middle = np.zeros((samples, len(model.joints))), np.mean(m.position, axis=0)
 
     def delivered(inputs: Array) -> Array:
-        held = np.tile(inputs, (len(rest), 1))
+        held = np.tile(inputs, (samples, 1))
         if bends(model):
             return np.asarray(model.core.delivered(model.theta, held, m.dt)[0][-1])
-        return np.asarray(model.core.inverse_dynamics(model.theta, rest, rest, rest, held, m.dt, [])[1][-1])
+        if not has_own_drives(model):
+            return np.asarray(model.core.inverse_dynamics(model.theta, still, still, still, held, m.dt, [])[1][-1])
+        motion, first = (still + middle, still, still), model.core.internal_state(model.theta, middle)
+        run = model.core.simulate_drives(
+            model.theta, *motion, held, first, [], np.zeros((samples, 0)), m.dt, 1, Setup().method(model), []
+        )
+        return np.asarray(run[0][-1, -len(model.joints) :])
 
     columns = [(delivered(step) - delivered(-step)) / (2.0 * max(np.sum(step), 1e-300)) for step in np.diag(sizes)]
     return np.asarray(np.linalg.pinv(np.column_stack(columns)))
