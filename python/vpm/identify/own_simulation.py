@@ -23,7 +23,7 @@ from vpm.identify.along import bends, has_own_drives
 from vpm.identify.balance import InverseDynamicsProblem
 from vpm.identify.noise_left import Noise, compared, mirrored, noise_of
 from vpm.identify.settings import OwnSimulation
-from vpm.initial import measured_states
+from vpm.initial import initial_state, measured_states
 from vpm.model import Model
 from vpm.simulate import HOLDS, Setup
 from vpm.stepping import Simulation
@@ -55,12 +55,12 @@ def own_residual(
     Returns
     -------
     Own or None
-        None where the model does not stay by its records or lacks something, where nobody measured a joint, or where
-        cylinders stand beside other drives.
+        None where the model does not stay by its records or lacks something, where cylinders stand beside other drives,
+        or drives with states of their own beside joints that nobody measured.
     """
     how = settings or OwnSimulation()
-    whole = all(tuple(model.joints) == tuple(m.joints) for m in data.motions)
-    if data.hold != HOLDS[0] or not whole or _pushes(model) is None:
+    hidden = any(tuple(model.joints) != tuple(m.joints) for m in data.motions)
+    if data.hold != HOLDS[0] or _pushes(model) is None or (hidden and has_own_drives(model)):
         return None
     try:
         return _own(model, data, how, np.random.default_rng(seed))
@@ -101,7 +101,7 @@ def _beside(
     model: Model, log: Experiment, m: Motion, channels: Sequence[str], how: OwnSimulation
 ) -> tuple[float, Experiment] | None:
     """Bandwidth that keeps the model by a log, and the log as it would have been without noise; None without any."""
-    joints = [f"{joint}.position" for joint in model.joints]
+    joints = [f"{joint}.position" for joint in m.joints]
     for band in how.bands:
         (made,) = _drawn(model, log, m, channels, how, band, np.zeros((1, *log.data.shape)))
         if all(np.std(made[channel] - log[channel]) <= how.away * np.std(log[channel]) for channel in joints):
@@ -118,9 +118,9 @@ def _drawn(
     All runs go side by side: most of the time of one would be that of asking and telling, sample by sample.
     """
     by_position, by_velocity = commands_to_draw(model, m, 2.0 * np.pi * band, how.damping)
-    start = measured_states(model, log, model.theta, np.zeros(1, dtype=np.int64), m.cutoff, m)[0]
+    start = _start(model, log, m)
     runs = [Simulation(model, m.dt, integrator=how.method, state=start, compiled=True) for _ in told]
-    columns, moved = runs[0].channels, [[f"{joint}.{of}" for joint in model.joints] for of in ("position", "velocity")]
+    columns, moved = runs[0].channels, [[f"{joint}.{of}" for joint in m.joints] for of in ("position", "velocity")]
     read, places, speeds = ([columns.index(name) for name in names] for names in (channels, *moved))
     outputs, commands = np.empty((len(told), len(m.time), len(read))), np.empty((len(told), *m.inputs.shape))
     untold = np.zeros_like(commands)
@@ -135,6 +135,13 @@ def _drawn(
         for run, command in zip(runs, commands[:, k] + untold[:, k], strict=True):
             run.step(command)
     return [_written(log, m, channels, one, held) for one, held in zip(outputs, commands, strict=True)]
+
+
+def _start(model: Model, log: Experiment, m: Motion) -> Array:
+    """The state at the first sample; joints that nobody measured are where the balance has them, at rest."""
+    if tuple(m.joints) == tuple(model.joints):
+        return np.asarray(measured_states(model, log, model.theta, np.zeros(1, dtype=np.int64), m.cutoff, m)[0])
+    return initial_state(model, log, model.theta)
 
 
 def _written(log: Experiment, m: Motion, channels: Sequence[str], outputs: Array, commands: Array) -> Experiment:
@@ -157,10 +164,17 @@ def commands_to_draw(model: Model, m: Motion, omega: float, damping: float) -> t
 
 
 def _mass_matrix(model: Model, m: Motion) -> Array:
-    """Inertia of the joints (n, n) in the middle of the motion, links held as they hang there."""
-    position, joints = np.mean(m.position, axis=0), len(model.joints)
+    """Inertia of the measured joints (n, n) in the middle of the motion, links held as they hang there."""
+    places, position = _middle(model, m)
     coordinates = model.core.equilibrium(model.theta, position)[0] if bends(model) else position
-    return np.asarray(model.core.mass_matrix(model.theta, coordinates))[:joints, :joints]
+    return np.asarray(model.core.mass_matrix(model.theta, coordinates))[np.ix_(places, places)]
+
+
+def _middle(model: Model, m: Motion) -> tuple[list[int], Array]:
+    """Which of the joints were measured, and the middle of the motion of all; others stand at zero."""
+    places, position = [model.joints.index(joint) for joint in m.joints], np.zeros(len(model.joints))
+    position[places] = np.mean(m.position, axis=0)
+    return places, position
 
 
 def _commands_per_velocity(model: Model, m: Motion) -> Array:
@@ -180,19 +194,20 @@ def _commands_per_effort(model: Model, m: Motion, after: float) -> Array:
     What drives deliver is that ``after`` a while, s: by then windings and delays have passed on what they were told.
     """
     samples, sizes = max(3, round(after / m.dt)), np.max(np.abs(m.inputs), axis=0, initial=0.0)
-    still, middle = np.zeros((samples, len(model.joints))), np.mean(m.position, axis=0)
+    still, (places, middle) = np.zeros((samples, len(model.joints))), _middle(model, m)
 
     def delivered(inputs: Array) -> Array:
         held = np.tile(inputs, (samples, 1))
         if bends(model):
-            return np.asarray(model.core.delivered(model.theta, held, m.dt)[0][-1])
+            return np.asarray(model.core.delivered(model.theta, held, m.dt)[0][-1])[places]
         if not has_own_drives(model):
-            return np.asarray(model.core.inverse_dynamics(model.theta, still, still, still, held, m.dt, [])[1][-1])
+            effort = model.core.inverse_dynamics(model.theta, still, still, still, held, m.dt, [])[1]
+            return np.asarray(effort[-1])[places]
         motion, first = (still + middle, still, still), model.core.internal_state(model.theta, middle)
         run = model.core.simulate_drives(
             model.theta, *motion, held, first, [], np.zeros((samples, 0)), m.dt, 1, Setup().method(model), []
         )
-        return np.asarray(run[0][-1, -len(model.joints) :])
+        return np.asarray(run[0][-1, -len(model.joints) :])[places]
 
     columns = [(delivered(step) - delivered(-step)) / (2.0 * max(np.sum(step), 1e-300)) for step in np.diag(sizes)]
     return np.asarray(np.linalg.pinv(np.column_stack(columns)))
