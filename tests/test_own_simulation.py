@@ -104,9 +104,27 @@ def test_dry_friction_that_turns_round_biases_no_interval(some: list[Experiment]
     assert np.sqrt(np.mean(np.square(errors))) < 1e-3  # 4e-3 by the plain balance
 
 
-@pytest.mark.parametrize(
-    "fitting", [Fitting(noise="estimated"), Fitting(loss="huber", starts=2)], ids=["noise", "huber"]
-)
+def test_inertias_that_nothing_shows_keep_nothing_from_being_compared(some: list[Experiment]) -> None:
+    """They stay where they were, and the others come out as without them."""
+    fit = identify(MODEL, some[0], (*FREE, "pendulum.inertia.xx", "pendulum.inertia.zz"))
+    alone = identify(MODEL, some[0], FREE)
+    np.testing.assert_allclose(fit.values, [*alone.values, 0.01, 0.01], rtol=1e-4)
+    np.testing.assert_allclose(fit.std, [*alone.std, np.inf, np.inf], rtol=0.05)
+
+
+def test_the_torque_constant_of_a_motor_does_not_collapse() -> None:
+    """All forces are free with it: a balance of nothing with nothing would have no residual, and no motor."""
+    (log,) = logs(1, seed=75, motor=True)
+    fit = identify(WITH_MOTOR, log, ("drive.torque_constant", "pendulum.mass", *FREE))
+    assert fit["drive.torque_constant"] == pytest.approx(0.1 * TORQUE, rel=0.05)
+    assert np.isinf(fit.std[0])
+    assert any("drive.torque_constant" in w and w.startswith("not identifiable") for w in fit.warnings)
+
+
+SETTINGS = {"noise": Fitting(noise="estimated"), "loss": Fitting(loss="huber", starts=2)}
+
+
+@pytest.mark.parametrize("fitting", SETTINGS.values(), ids=SETTINGS)
 def test_nor_does_it_where_settings_of_the_fit_are_given(some: list[Experiment], fitting: Fitting) -> None:
     """Of 15 intervals fewer than 11 hold the truth with a chance of 6e-4; of the inertia the plain balance has 2."""
     fits = [identify(MODEL, log, FREE, fitting=fitting) for log in some[:15]]

@@ -18,7 +18,7 @@ from vpm.identify.beginning import BegunAnywhere, first_state_derivative, matter
 from vpm.identify.comparison import comparison
 from vpm.identify.engine import Found, fit_problem
 from vpm.identify.estimation import Estimate, Progress, blinded, estimate, limits
-from vpm.identify.identifiability import Combination, column_lengths
+from vpm.identify.identifiability import RANK_TOLERANCE, Combination, column_lengths
 from vpm.identify.missing import missing_effects, whiteness
 from vpm.identify.moments import on_the_border
 from vpm.identify.noise_left import Noise, noisy
@@ -352,7 +352,7 @@ def _beside_own(
     """
     plain = data.untied if isinstance(data, TiedProblem) else data
     last: Own | None = None
-    if best.interrupted or best.unseen or not isinstance(plain, InverseDynamicsProblem):
+    if best.interrupted or not isinstance(plain, InverseDynamicsProblem):
         return data, best, None
     for _ in range(OwnSimulation().rounds):
         fitted = _moved(model, best, ties)
@@ -379,7 +379,7 @@ def _with_noise(fit: Fit, data: AnyProblem, jacobian: Array, lengths: Array, noi
     how, fitted = OwnSimulation(), fit.model
     without = plain.on(plain.experiments).evaluate(fitted, fitted.theta)[0]
     drawn = noisy(fitted, plain, noise, np.random.default_rng(0), how.draws) - without
-    errors = (weights * drawn) @ np.linalg.pinv(weights[:, None] * jacobian).T / lengths
+    errors = (weights * drawn) @ np.linalg.pinv(weights[:, None] * jacobian, RANK_TOLERANCE).T / lengths
     variance, decided = pooled(fit.std**2, np.asarray(fit.freedom), errors, how.contradicted)
     return replace(fit, std=np.sqrt(variance), freedom=decided)
 

@@ -83,9 +83,8 @@ def _own(model: Model, data: InverseDynamicsProblem, how: OwnSimulation, random:
         made = _drawn(model, log, m, channels, how, band, told) if np.any(told) else [quiet] * len(draws)
         columns.append([replace(one, data=one.data + read) for one, read in zip(made, seen, strict=True)])
     written = list(zip(*columns, strict=True))
-    # What is relative to the delivered effort is made so afterwards, with what is expected taken off.
-    left = [InverseDynamicsProblem.evaluate(data.on(made), model, model.theta)[0] for made in written]
-    of_log = InverseDynamicsProblem.evaluate(data, model, model.theta)[0]
+    left = [data.on(made).evaluate(model, model.theta)[0] for made in written]
+    of_log = data.evaluate(model, model.theta)[0]
     if not np.linalg.norm(of_log) <= how.alike * np.linalg.norm(left) / np.sqrt(len(left)):
         return None
     return Own(np.asarray(np.mean(left, axis=0)), noise)
