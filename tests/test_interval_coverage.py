@@ -18,7 +18,7 @@ from vpm.identify.own_simulation import own_residual
 from vpm.identify.problem import Block
 from vpm.identify.sandwich import freedom, white_sandwich
 from vpm.identify.settings import OwnSimulation
-from vpm.identify.whiteness import explained_by, powers, waves
+from vpm.identify.whiteness import explained_by, heard, powers, shifted, waves
 
 BENCHES = Path(__file__).parents[1] / "benches"
 MACHINES = ("axis", "flexible_arm", "leg")
@@ -123,6 +123,31 @@ def test_ripple_of_any_period_is_found_among_waves() -> None:
     chances = [explained_by(residual, np.ones((n, 1)), group, counts)[1] for group in groups]
     assert min(chances) < 1e-4
     assert int(np.argmin(chances)) == 6
+
+
+def driven(noise: NDArray[np.float64], late: float) -> float:
+    """Chance of a residual in which a mass under a controller, 7 s at 17 Hz, hears its drive so many samples late.
+
+    Mass and friction are fitted: what the drive is told is their forces, and less than these by what it does untold.
+    """
+    time = np.arange(noise.size)
+    turns = np.outer(time, np.array([0.13, 0.21, 0.34, 0.5])) + np.arange(4.0)
+    slopes = np.column_stack([np.sum(np.cos(turns), axis=1), np.sum(np.sin(turns), axis=1)])
+    force = slopes @ np.array([1.0, 0.3])
+    told = force - noise + late * np.gradient(force)
+    residual = told - force
+    residual -= slopes @ np.linalg.lstsq(slopes, residual, rcond=None)[0]
+    counts = np.ones(noise.size, dtype=bool)
+    clear = Checks().clear / float(np.sqrt(np.mean(force**2)))
+    found = heard(shifted(told), residual, slopes, counts, clear)
+    return explained_by(residual, slopes, found, counts)[1] if found.size else 1.0
+
+
+def test_an_effort_that_is_all_fitted_explains_no_residual() -> None:
+    """What is left of it beside the fitted forces is the residual itself; beside those of a late drive it is not."""
+    noises = 0.006 * np.random.default_rng(6).standard_normal((100, 120))
+    assert min(driven(noise, 0.0) for noise in noises) > Checks().level
+    assert max(driven(noise, 0.05) for noise in noises) < Checks().level
 
 
 # ---- the model's own simulation --------------------------------------------------------------------------------------

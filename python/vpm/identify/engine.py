@@ -35,13 +35,16 @@ FARTHEST = float(np.log(30.0))
 
 @dataclass(frozen=True)
 class Found:
-    """Result of the engine, as arrays over the free parameters and the first states behind them."""
+    """Result of the engine, as arrays over the free parameters and the first states behind them.
+
+    Rows of the residual went into the fit with their ``weights``.
+    """
 
     values: Array
     covariance: Array
     residual: Array
     jacobian: Array
-    weighted: Point
+    weights: Array
     unseen: tuple[Combination, ...]
     states: Array
     states_std: Array
@@ -61,6 +64,7 @@ def fit_problem(
     *,
     tolerance: float,
     progress: Progress | None = None,
+    begin: Array | None = None,
 ) -> Found:
     """Fit free parameters, and first states if the problem has them.
 
@@ -75,6 +79,8 @@ def fit_problem(
     tolerance : float
         Relative change of parameters or cost at which to stop.
     progress : callable, optional
+    begin : ndarray, shape (p,), optional
+        Parameters to begin with, in place of the starts of ``fitting``.
 
     Raises
     ------
@@ -86,7 +92,7 @@ def fit_problem(
     objective = Objective(model, data, free, bounds, fitting, progress)
     # Starts are compared under weights that are the same for all; losses and noise are found from the best.
     search = Objective(model, data, free, bounds, _plain(fitting), progress) if _weighs_later(fitting) else objective
-    begun = starts(model, free, search, fitting)
+    begun = starts(model, free, search, fitting) if begin is None else [search.coordinates(begin)]
     descents, interrupted = _search(search, begun, fitting, 1e2 * tolerance if _weighs_later(fitting) else tolerance)
     best = min(descents, key=lambda d: d.point.cost)
     if not np.isfinite(best.point.cost):
@@ -244,7 +250,7 @@ def _found(objective: Objective, point: Point, free: Sequence[str], costs: Array
         covariance[:p, :p],
         residual,
         jacobian[:, :p] / slopes[:p],
-        point,
+        _weights(point),
         unseen,
         point.x[p:] * objective.sizes,
         std[p:],
@@ -254,6 +260,13 @@ def _found(objective: Objective, point: Point, free: Sequence[str], costs: Array
         objective.count,
         ended,
     )
+
+
+def _weights(point: Point) -> Array:
+    """What each row of a residual was multiplied with, by loss and noise; 1 where it moves with nothing."""
+    before = np.linalg.norm(point.raw[1], axis=1)
+    after = np.linalg.norm(point.jacobian[: len(before)], axis=1)
+    return np.where(before > 0.0, after / np.where(before > 0.0, before, 1.0), 1.0)
 
 
 def _covariance(objective: Objective, point: Point, labels: Sequence[str], unseen: Sequence[Combination]) -> Array:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from functools import partial
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,10 +18,10 @@ from vpm.identify.beginning import BegunAnywhere, first_state_derivative, matter
 from vpm.identify.comparison import comparison
 from vpm.identify.engine import Found, fit_problem
 from vpm.identify.estimation import Estimate, Progress, blinded, estimate, limits
-from vpm.identify.identifiability import Combination, column_lengths
+from vpm.identify.identifiability import RANK_TOLERANCE, Combination, column_lengths
 from vpm.identify.missing import missing_effects, whiteness
 from vpm.identify.moments import on_the_border
-from vpm.identify.noise_left import Noise, left
+from vpm.identify.noise_left import Noise, noisy
 from vpm.identify.objective import AnyProblem
 from vpm.identify.output_error import OutputErrorProblem
 from vpm.identify.own_simulation import Own, own_residual
@@ -41,6 +42,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
+
+AnyEstimate = TypeVar("AnyEstimate", bound=Estimate)
 
 #: Modes in which the model follows the measured motion of its joints.
 FOLLOWING = frozenset({"inverse_dynamics", "prescribed_motion", "input_error"})
@@ -96,6 +99,9 @@ class Fit(Result):
     first_states : str
         ``"unknown"`` where the first states that the log suggests contradict the rest of it: the fit leaves them open,
         to first order. Empty where they hold or are fitted.
+    expected : ndarray, shape (n,)
+        What a balance of effort leaves of the model's own simulation, which was taken off. Empty where no simulation
+        stays by the records: intervals then know nothing of what filters do where friction turns round.
     setup, fitting, ties
         How it was done, for `profile_intervals` and `bootstrap`.
     """
@@ -124,6 +130,7 @@ class Fit(Result):
     evaluations: int = 0
     ended: str = ""
     first_states: str = ""
+    expected: Array = field(default_factory=lambda: np.zeros(0))
     setup: Setup | None = None
     fitting: Fitting | None = None
     ties: dict[str, str] = field(default_factory=dict)
@@ -246,35 +253,69 @@ def identify(
     if fitting is None:
         best = estimate(model, data, names, tolerance=tolerance, progress=progress, feasible=True)
         data, best, begun = _from_anywhere(model, data, best, tolerance, checks or Checks(), ties or {})
-        data, best, own = _beside_own(model, data, best, tolerance, ties or {})
+
+        def onward(fitted: Model, less: AnyProblem, _: Estimate) -> Estimate:
+            return estimate(fitted, less, names, tolerance=tolerance, feasible=True)
+
+        data, best, own = _beside_own(model, data, best, onward, ties or {})
         result = _with_intervals(data, best)
+        weights = np.ones(len(result.residual))
         whole = replace(result, residual=result.residual + _expected(data))
         fit = fit_of(model, data, whole, before, [e.name for e in records], ties or {})
         fit = replace(fit, evaluations=result.evaluations, ended="interrupted" if result.interrupted else "")
         fit = replace(fit, first_states=UNKNOWN if begun else "")
     else:
         check_bounds(names, fitting)
-        box = limits(model, names, fitting.bounds)
-        found = fit_problem(model, data, names, box, fitting, tolerance=tolerance, progress=progress)
-        result = Estimate(
-            names,
-            found.values,
-            found.residual,
-            found.jacobian,
-            found.covariance,
-            found.unseen,
-            touching(names, found.values, *box),
-            found.evaluations,
-        )
-        fit = _with_details(fit_of(model, data, result, before, [e.name for e in records], ties or {}), data, found)
+        engine = partial(_by_engine, model, names, limits(model, names, fitting.bounds), fitting, tolerance)
+        first = engine(data, progress=progress)
+
+        def again(_: Model, less: AnyProblem, near: _Engineered) -> _Engineered:
+            return engine(less, near=near)
+
+        data, found, own = _beside_own(model, data, first, again, ties or {})
+        result, weights = found, found.found.weights
+        whole = replace(result, residual=result.residual + _expected(data))
+        fit = fit_of(model, data, whole, before, [e.name for e in records], ties or {})
+        fit = _with_details(fit, data, found.found)
+    expected = _expected(data)
+    fit = replace(fit, expected=expected if isinstance(expected, np.ndarray) else np.zeros(0))
     judged = whiteness(fit.model, records, data, result.residual, result.jacobian, checks or Checks())
     fit = replace(fit, setup=setup, fitting=fitting, ties=dict(ties or {}), whiteness=judged)
-    unscaled = result.jacobian[: data.blocks[-1].samples.stop]
-    decided = freedom(unscaled / column_lengths(unscaled), data.blocks, len(names) + len(fit.states))[: len(names)]
+    slopes = result.jacobian[: data.blocks[-1].samples.stop]
+    lengths = column_lengths(slopes)
+    decided = freedom(slopes / lengths, data.blocks, len(names) + len(fit.states))[: len(names)]
     fit = replace(fit, freedom=decided)
-    if own is not None:
-        fit = _with_noise(fit, data, unscaled, own.noise)
+    if own is not None and not (fitting and fitting.priors):  # what is known beforehand no noise of records moves
+        fit = _with_noise(fit, data, slopes / lengths, lengths, own.noise, weights[: len(slopes)])
     return replace(fit, warnings=_told(model, records, data, fit, checks or Checks()))
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Engineered(Estimate):
+    """An estimate of the engine, with all that this found."""
+
+    found: Found
+
+
+def _by_engine(
+    model: Model,
+    names: tuple[str, ...],
+    box: tuple[Array, Array],
+    fitting: Fitting,
+    tolerance: float,
+    data: AnyProblem,
+    progress: Progress | None = None,
+    near: _Engineered | None = None,
+) -> _Engineered:
+    """A fit by the engine, from all its starts or from ``near``; of these it then knows what their fits reached."""
+    begin = near.values if near else None
+    found = fit_problem(model, data, names, box, fitting, tolerance=tolerance, progress=progress, begin=begin)
+    if near:
+        evaluations = near.evaluations + found.evaluations
+        found = replace(found, costs=near.found.costs, agreeing=near.found.agreeing, evaluations=evaluations)
+    interrupted, at = found.ended == "interrupted", touching(names, found.values, *box)
+    what = (found.residual, found.jacobian, found.covariance, found.unseen, at, found.evaluations, interrupted)
+    return _Engineered(names, found.values, *what, found=found)
 
 
 def _from_anywhere(
@@ -300,15 +341,20 @@ def _from_anywhere(
 
 
 def _beside_own(
-    model: Model, data: AnyProblem, best: Estimate, tolerance: float, ties: Mapping[str, str]
-) -> tuple[AnyProblem, Estimate, Own | None]:
+    model: Model,
+    data: AnyProblem,
+    best: AnyEstimate,
+    onward: Callable[[Model, AnyProblem, AnyEstimate], AnyEstimate],
+    ties: Mapping[str, str],
+) -> tuple[AnyProblem, AnyEstimate, Own | None]:
     """The fit of a balance of effort less what it leaves of the model's own simulation, where that can be told.
 
+    It goes ``onward`` from the fitted model and its estimate.
     What the records do not show a correction would move without end. With it comes the last simulation.
     """
     plain = data.untied if isinstance(data, TiedProblem) else data
     last: Own | None = None
-    if best.interrupted or best.unseen or not isinstance(plain, InverseDynamicsProblem):
+    if best.interrupted or not isinstance(plain, InverseDynamicsProblem):
         return data, best, None
     for _ in range(OwnSimulation().rounds):
         fitted = _moved(model, best, ties)
@@ -317,24 +363,28 @@ def _beside_own(
             break
         last, before, less = own, best.values, plain.less(own.expected)
         data = TiedProblem(less, ties) if ties else less
-        best = estimate(fitted, data, best.names, tolerance=tolerance, feasible=True)
+        best = onward(fitted, data, best)
         seen = np.isfinite(best.std)
         if best.interrupted or np.all(np.abs(best.values - before)[seen] <= best.std[seen]):
             break
     return data, best, last
 
 
-def _with_noise(fit: Fit, data: AnyProblem, jacobian: Array, noise: Noise) -> Fit:
-    """The same with deviations that know how far the noise of the records moves the estimates."""
+def _with_noise(fit: Fit, data: AnyProblem, jacobian: Array, lengths: Array, noise: Noise, weights: Array) -> Fit:
+    """The same with deviations that know how far the noise of the records moves the estimates.
+
+    Columns of the jacobian are divided by their ``lengths``; rows went into the fit with their ``weights``.
+    """
     plain = data.untied if isinstance(data, TiedProblem) else data
     if not isinstance(plain, InverseDynamicsProblem):
         return fit
-    how, lengths = OwnSimulation(), column_lengths(jacobian)
+    how, fitted = OwnSimulation(), fit.model
     try:
-        drawn = left(fit.model, plain, noise, np.random.default_rng(0), how.draws)
+        without = plain.on(plain.experiments).evaluate(fitted, fitted.theta)[0]
+        drawn = noisy(fitted, plain, noise, np.random.default_rng(0), how.draws) - without
     except (VpmError, ArithmeticError, np.linalg.LinAlgError):
         return fit  # with noise the model does not stay by its records
-    errors = drawn @ np.linalg.pinv(jacobian / lengths).T / lengths
+    errors = (weights * drawn) @ np.linalg.pinv(weights[:, None] * jacobian, RANK_TOLERANCE).T / lengths
     variance, decided = pooled(fit.std**2, np.asarray(fit.freedom), errors, how.contradicted)
     return replace(fit, std=np.sqrt(variance), freedom=decided)
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from vpm.errors import IdentificationError
 from vpm.experiment import Experiment, as_records
+from vpm.identify.balance import InverseDynamicsProblem
 from vpm.identify.engine import onward
 from vpm.identify.estimation import limits
 from vpm.identify.objective import Objective
@@ -20,6 +21,7 @@ from vpm.identify.problem import Block
 from vpm.identify.settings import Fitting
 from vpm.identify.solver import Point
 from vpm.identify.statistics import NORMAL_95, correlation_length
+from vpm.identify.ties import TiedProblem
 from vpm.results import Result
 
 if TYPE_CHECKING:
@@ -296,6 +298,9 @@ def _again(fit: Fit, experiments: Experiment | Sequence[Experiment], cutoff: flo
     data = comparison(
         begun, records, fit.mode, cutoff=cutoff, setup=fit.setup, ties=fit.ties, fitting=one, free=fit.names
     )
+    plain = data.untied if isinstance(data, TiedProblem) else data
+    if fit.expected.size and isinstance(plain, InverseDynamicsProblem):
+        plain.expected = fit.expected
     objective = Objective(begun, data, fit.names, limits(begun, fit.names, fitting.bounds), fitting)
     objective.noise = dict(fit.noise)
     states = np.array(list(fit.states.values())) / objective.sizes if fit.states else None

@@ -7,7 +7,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import svd
 
 from vpm.errors import VpmError
 from vpm.experiment import Experiment
@@ -19,10 +18,10 @@ from vpm.identify.ties import TiedProblem
 from vpm.identify.whiteness import (
     SHARPNESS,
     Whiteness,
-    basis,
     default_lags,
     explained_by,
     explained_size,
+    heard,
     ljung_box,
     powers,
     shifted,
@@ -94,7 +93,7 @@ def _judge(
     def explained(law: _Law) -> tuple[float, float]:
         columns = law.columns
         if law.late:
-            columns = tuple(_heard(each, residual, slopes, counts, size, checks.clear) for each in columns)
+            columns = tuple(heard(each, residual, slopes, counts, checks.clear / size) for each in columns)
         return max((explained_by(residual, slopes, each, counts) for each in columns), key=lambda test: test[1])
 
     tests = [explained(law) for law in added]
@@ -162,20 +161,6 @@ def _laws(motion: Sequence[Array], efforts: Sequence[Array], checks: Checks) -> 
     late = [tuple(shifted(effort) for effort in each) for each in (efforts, sharp) if each]
     steady = [*(powers(part) for part in motion), *waves(motion[0], checks.waves, checks.waves_each)]
     return [*(_Law((columns,), False) for columns in steady), *(_Law(columns, True) for columns in late)]
-
-
-def _heard(late: Array, residual: Array, slopes: Array, counts: NDArray[np.bool_], size: float, clear: float) -> Array:
-    """Directions (n, k) of a signal at other times in which it stands clear of the noise.
-
-    An effort has in it what the residual is made of: noise of encoders, and all that a drive did without being told.
-    Where the rest of it is quiet, a few shifts of it would leave just that, and explain any residual by itself.
-    """
-    columns = late * counts[:, None]
-    known = basis(np.column_stack([slopes, late]) * counts[:, None])
-    left = (residual - known @ (known.T @ residual)) * counts
-    directions, sizes, _ = svd(columns, full_matrices=False)
-    least = clear * np.linalg.norm(left) / size * np.linalg.norm(columns) / np.sqrt(columns.shape[1] * counts.sum())
-    return np.asarray(directions[:, sizes > least])
 
 
 def missing_effects(judged: Sequence[Whiteness], checks: Checks) -> list[str]:

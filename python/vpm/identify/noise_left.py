@@ -49,6 +49,11 @@ class Noise:
         ]
 
 
+def mirrored(draw: Sequence[tuple[Array, Array]]) -> tuple[Sequence[tuple[Array, Array]], ...]:
+    """A draw, and the same turned round: what a balance is linear in cancels from the mean of both."""
+    return draw, [(-seen, -told) for seen, told in draw]
+
+
 def noise_of(
     model: Model, data: InverseDynamicsProblem, quiet: Sequence[Experiment], random: np.random.Generator
 ) -> Noise:
@@ -70,14 +75,13 @@ def noise_of(
     if not told:
         return Noise(instruments, silent)
 
-    def powers(of: InverseDynamicsProblem, noise: Noise, beside: Array | float = 0.0) -> Array:
-        added = left(model, of, noise, random, TRIALS)
-        return np.asarray(np.mean([_powers(data, beside + one) for one in added], axis=0))
+    def powers(residuals: Array) -> Array:
+        return np.asarray(np.mean([_powers(data, one) for one in residuals], axis=0))
 
-    alike = data.on(quiet)
-    of_quiet = powers(alike, Noise(instruments, silent), alike.evaluate(model, model.theta)[0])
-    of_log = _powers(data, same.evaluate(model, model.theta)[0])
-    by_drive = [powers(same, each) for each in told]
+    residual = same.evaluate(model, model.theta)[0]
+    of_log = _powers(data, residual)
+    of_quiet = powers(noisy(model, data.on(quiet), Noise(instruments, silent), random, TRIALS))
+    by_drive = [powers(noisy(model, same, each, random, TRIALS) - residual) for each in told]
     scale = 1.0 / np.where(of_log > 0.0, of_log, 1.0)
     shares, _ = nnls((np.array(by_drive) * scale).T, np.maximum(of_log - of_quiet, 0.0) * scale)
     drives = np.sum([np.sqrt(share) * each.drives for share, each in zip(shares, told, strict=True)], axis=0)
@@ -89,13 +93,13 @@ def compared(data: InverseDynamicsProblem) -> tuple[str, ...]:
     return (*(f"{joint}.position" for joint in data.motions[0].joints), *data.shown)
 
 
-def left(model: Model, data: InverseDynamicsProblem, noise: Noise, random: np.random.Generator, draws: int) -> Array:
-    """What draws of noise add to the residual of a fitted model, shape (draws, n)."""
-    without, found = data.on(data.experiments).evaluate(model, model.theta)[0], []
+def noisy(model: Model, data: InverseDynamicsProblem, noise: Noise, random: np.random.Generator, draws: int) -> Array:
+    """The residual of a fitted model with draws of noise added to its records, shape (draws, n)."""
+    found = []
     for _ in range(draws):
         both = noise.drawn(data.experiments, random)
-        noisy = [replace(e, data=e.data + seen - told) for e, (seen, told) in zip(data.experiments, both, strict=True)]
-        found.append(data.on(noisy).evaluate(model, model.theta)[0] - without)
+        added = [replace(e, data=e.data + seen - told) for e, (seen, told) in zip(data.experiments, both, strict=True)]
+        found.append(data.on(added).evaluate(model, model.theta)[0])
     return np.array(found)
 
 

@@ -21,11 +21,11 @@ from vpm.errors import VpmError
 from vpm.experiment import Experiment, Motion
 from vpm.identify.along import bends, has_own_drives
 from vpm.identify.balance import InverseDynamicsProblem
-from vpm.identify.noise_left import Noise, compared, noise_of
+from vpm.identify.noise_left import Noise, compared, mirrored, noise_of
 from vpm.identify.settings import OwnSimulation
-from vpm.initial import measured_states
+from vpm.initial import initial_state, measured_states
 from vpm.model import Model
-from vpm.simulate import HOLDS
+from vpm.simulate import HOLDS, Setup
 from vpm.stepping import Simulation
 
 Array = NDArray[np.float64]
@@ -55,12 +55,12 @@ def own_residual(
     Returns
     -------
     Own or None
-        None where the model does not stay by its records or lacks something, where nobody measured a joint, or where
-        drives have states of other kinds than cylinders.
+        None where the model does not stay by its records or lacks something, where cylinders stand beside other drives,
+        or drives with states of their own beside joints that nobody measured.
     """
     how = settings or OwnSimulation()
-    whole = all(tuple(model.joints) == tuple(m.joints) for m in data.motions)
-    if data.hold != HOLDS[0] or not whole or not _drawn_by_commands(model):
+    hidden = any(tuple(model.joints) != tuple(m.joints) for m in data.motions)
+    if data.hold != HOLDS[0] or _pushes(model) is None or (hidden and has_own_drives(model)):
         return None
     try:
         return _own(model, data, how, np.random.default_rng(seed))
@@ -75,35 +75,34 @@ def _own(model: Model, data: InverseDynamicsProblem, how: OwnSimulation, random:
     guided = [one for one in found if one is not None]
     if len(guided) < len(logs):
         return None
-    noise, written = noise_of(model, data, [quiet for _, quiet in guided], random), []
-    for _ in range(how.pairs):
-        both = noise.drawn(data.experiments, random)
-        for sign in (1.0, -1.0):
-            noisy = []
-            for (log, m), (band, quiet), (seen, told) in zip(logs, guided, both, strict=True):
-                made = _drawn(model, log, m, channels, how, band, sign * told) if np.any(told) else quiet
-                noisy.append(replace(made, data=made.data + sign * seen))
-            written.append(noisy)
-    # What is relative to the delivered effort is made so afterwards, with what is expected taken off.
-    left = [InverseDynamicsProblem.evaluate(data.on(made), model, model.theta)[0] for made in written]
-    of_log = InverseDynamicsProblem.evaluate(data, model, model.theta)[0]
+    noise = noise_of(model, data, [quiet for _, quiet in guided], random)
+    draws = [one for _ in range(how.pairs) for one in mirrored(noise.drawn(data.experiments, random))]
+    columns = []
+    for record, ((log, m), (band, quiet)) in enumerate(zip(logs, guided, strict=True)):
+        seen, told = (np.array([draw[record][side] for draw in draws]) for side in (0, 1))
+        made = _drawn(model, log, m, channels, how, band, told) if np.any(told) else [quiet] * len(draws)
+        columns.append([replace(one, data=one.data + read) for one, read in zip(made, seen, strict=True)])
+    written = list(zip(*columns, strict=True))
+    left = [data.on(made).evaluate(model, model.theta)[0] for made in written]
+    of_log = data.evaluate(model, model.theta)[0]
     if not np.linalg.norm(of_log) <= how.alike * np.linalg.norm(left) / np.sqrt(len(left)):
         return None
     return Own(np.asarray(np.mean(left, axis=0)), noise)
 
 
-def _drawn_by_commands(model: Model) -> bool:
-    """Whether all drives are ideal, whose commands push, or all are cylinders behind valves, whose commands move."""
-    return not has_own_drives(model) or all(model.actuator_type(name) == "hydraulic" for name in model.actuators)
+def _pushes(model: Model) -> bool | None:
+    """Whether commands push, or move as those of valves of cylinders do; None where there are drives of both kinds."""
+    kinds = {model.actuator_type(name) != "hydraulic" for name in model.actuators}
+    return kinds.pop() if len(kinds) == 1 else None
 
 
 def _beside(
     model: Model, log: Experiment, m: Motion, channels: Sequence[str], how: OwnSimulation
 ) -> tuple[float, Experiment] | None:
     """Bandwidth that keeps the model by a log, and the log as it would have been without noise; None without any."""
-    joints = [f"{joint}.position" for joint in model.joints]
+    joints = [f"{joint}.position" for joint in m.joints]
     for band in how.bands:
-        made = _drawn(model, log, m, channels, how, band, np.zeros_like(log.data))
+        (made,) = _drawn(model, log, m, channels, how, band, np.zeros((1, *log.data.shape)))
         if all(np.std(made[channel] - log[channel]) <= how.away * np.std(log[channel]) for channel in joints):
             return band, made
     return None
@@ -111,28 +110,41 @@ def _beside(
 
 def _drawn(
     model: Model, log: Experiment, m: Motion, channels: Sequence[str], how: OwnSimulation, band: float, told: Array
-) -> Experiment:
-    """A simulation on the commands of a log, to which a slow controller adds what keeps it by the motion of the log.
+) -> list[Experiment]:
+    """Simulations on the commands of a log, to which a slow controller adds what keeps them by the motion of the log.
 
-    Drives deliver beside their commands what is ``told`` in the columns of these, and the log does not tell.
+    Drives deliver beside their commands what is ``told`` (runs, N, channels) in the columns of these, and no log tells.
+    All runs go side by side: most of the time of one would be that of asking and telling, sample by sample.
     """
-    omega, joints = 2.0 * np.pi * band, len(model.joints)
-    by_position, by_velocity = _gains(model, m, omega, how.damping)
-    start = measured_states(model, log, model.theta, np.zeros(1, dtype=np.int64), m.cutoff, m)[0]
-    sim = Simulation(model, m.dt, integrator=how.method, state=start, compiled=True)
-    read = [sim.channels.index(channel) for channel in channels]
-    speeds = slice(len(model.coordinates), len(model.coordinates) + joints)
-    outputs, commands = np.empty((len(m.time), len(read))), np.empty_like(m.inputs)
-    untold = np.zeros_like(m.inputs)
+    by_position, by_velocity = commands_to_draw(model, m, 2.0 * np.pi * band, how.damping)
+    start = _start(model, log, m)
+    runs = [Simulation(model, m.dt, integrator=how.method, state=start, compiled=True) for _ in told]
+    columns, moved = runs[0].channels, [[f"{joint}.{of}" for joint in m.joints] for of in ("position", "velocity")]
+    read, places, speeds = ([columns.index(name) for name in names] for names in (channels, *moved))
+    outputs, commands = np.empty((len(told), len(m.time), len(read))), np.empty((len(told), *m.inputs.shape))
+    untold = np.zeros_like(commands)
     for column, channel in enumerate(m.drivers):
         if channel in log:
-            untold[:, column] = told[:, log.channels.index(channel)]
-    for k, (position, velocity, command) in enumerate(zip(m.position, m.velocity, m.inputs, strict=True)):
-        outputs[k] = sim.outputs[read]
-        commands[k] = command + by_position @ (position - outputs[k, :joints])
-        if by_velocity is not None:
-            commands[k] += by_velocity @ (velocity - sim.state[speeds])
-        sim.step(commands[k] + untold[k])
+            untold[:, :, column] = told[:, :, log.channels.index(channel)]
+    wanted = m.inputs + m.position @ by_position.T + m.velocity @ by_velocity.T
+    for k, ahead in enumerate(wanted):
+        now = np.array([run.outputs for run in runs])
+        outputs[:, k] = now[:, read]
+        commands[:, k] = ahead - now[:, places] @ by_position.T - now[:, speeds] @ by_velocity.T
+        for run, command in zip(runs, commands[:, k] + untold[:, k], strict=True):
+            run.step(command)
+    return [_written(log, m, channels, one, held) for one, held in zip(outputs, commands, strict=True)]
+
+
+def _start(model: Model, log: Experiment, m: Motion) -> Array:
+    """The state at the first sample; joints that nobody measured are where the balance has them, at rest."""
+    if tuple(m.joints) == tuple(model.joints):
+        return np.asarray(measured_states(model, log, model.theta, np.zeros(1, dtype=np.int64), m.cutoff, m)[0])
+    return initial_state(model, log, model.theta)
+
+
+def _written(log: Experiment, m: Motion, channels: Sequence[str], outputs: Array, commands: Array) -> Experiment:
+    """A log with other readings (N, channels) and other commands (N, nu)."""
     data = np.array(log.data)
     for values, names in ((outputs, channels), (commands, m.drivers)):
         for column, channel in enumerate(names):
@@ -141,19 +153,27 @@ def _drawn(
     return replace(log, data=data)
 
 
-def _gains(model: Model, m: Motion, omega: float, damping: float) -> tuple[Array, Array | None]:
+def commands_to_draw(model: Model, m: Motion, omega: float, damping: float) -> tuple[Array, Array]:
     """Commands per missing position and velocity (nu, n) that draw joints to a log at a bandwidth, rad/s."""
-    if has_own_drives(model):
-        return omega * _commands_per_velocity(model, m), None
-    pushing = _commands_per_effort(model, m) @ _mass_matrix(model, m)
-    return omega**2 * pushing, 2.0 * damping * omega * pushing
+    if _pushes(model):
+        pushing = _commands_per_effort(model, m, 1.0 / omega) @ _mass_matrix(model, m)
+        return omega**2 * pushing, 2.0 * damping * omega * pushing
+    slow = omega * _commands_per_velocity(model, m)
+    return slow, np.zeros_like(slow)
 
 
 def _mass_matrix(model: Model, m: Motion) -> Array:
-    """Inertia of the joints (n, n) in the middle of the motion, links held as they hang there."""
-    position, joints = np.mean(m.position, axis=0), len(model.joints)
+    """Inertia of the measured joints (n, n) in the middle of the motion, links held as they hang there."""
+    places, position = _middle(model, m)
     coordinates = model.core.equilibrium(model.theta, position)[0] if bends(model) else position
-    return np.asarray(model.core.mass_matrix(model.theta, coordinates))[:joints, :joints]
+    return np.asarray(model.core.mass_matrix(model.theta, coordinates))[np.ix_(places, places)]
+
+
+def _middle(model: Model, m: Motion) -> tuple[list[int], Array]:
+    """Which of the joints were measured, and the middle of the motion of all; others stand at zero."""
+    places, position = [model.joints.index(joint) for joint in m.joints], np.zeros(len(model.joints))
+    position[places] = np.mean(m.position, axis=0)
+    return places, position
 
 
 def _commands_per_velocity(model: Model, m: Motion) -> Array:
@@ -167,15 +187,26 @@ def _commands_per_velocity(model: Model, m: Motion) -> Array:
     return np.asarray(np.linalg.pinv(moved))
 
 
-def _commands_per_effort(model: Model, m: Motion) -> Array:
-    """By how much commands have to change for an effort at each joint (nu, n), at the sizes that they have."""
-    rest, sizes = np.zeros((3, len(model.joints))), np.max(np.abs(m.inputs), axis=0, initial=0.0)
+def _commands_per_effort(model: Model, m: Motion, after: float) -> Array:
+    """By how much commands have to change for an effort at each joint (nu, n), at the sizes that they have.
+
+    What drives deliver is that ``after`` a while, s: by then windings and delays have passed on what they were told.
+    """
+    samples, sizes = max(3, round(after / m.dt)), np.max(np.abs(m.inputs), axis=0, initial=0.0)
+    still, (places, middle) = np.zeros((samples, len(model.joints))), _middle(model, m)
 
     def delivered(inputs: Array) -> Array:
-        held = np.tile(inputs, (len(rest), 1))
+        held = np.tile(inputs, (samples, 1))
         if bends(model):
-            return np.asarray(model.core.delivered(model.theta, held, m.dt)[0][-1])
-        return np.asarray(model.core.inverse_dynamics(model.theta, rest, rest, rest, held, m.dt, [])[1][-1])
+            return np.asarray(model.core.delivered(model.theta, held, m.dt)[0][-1])[places]
+        if not has_own_drives(model):
+            effort = model.core.inverse_dynamics(model.theta, still, still, still, held, m.dt, [])[1]
+            return np.asarray(effort[-1])[places]
+        motion, first = (still + middle, still, still), model.core.internal_state(model.theta, middle)
+        run = model.core.simulate_drives(
+            model.theta, *motion, held, first, [], np.zeros((samples, 0)), m.dt, 1, Setup().method(model), []
+        )
+        return np.asarray(run[0][-1, -len(model.joints) :])[places]
 
     columns = [(delivered(step) - delivered(-step)) / (2.0 * max(np.sum(step), 1e-300)) for step in np.diag(sizes)]
     return np.asarray(np.linalg.pinv(np.column_stack(columns)))

@@ -41,8 +41,12 @@ class RelativeProblem(InverseDynamicsProblem):
     def evaluate(
         self, model: Model, theta: Array, columns: Sequence[int] = (), origin: Array | None = None
     ) -> tuple[Array, Array]:
-        """Residual and its derivative, relative to the delivered effort; see :class:`Problem`."""
+        """Residual and its derivative, relative to the delivered effort; see :class:`Problem`.
+
+        So is what is expected: where all forces are larger, that is as well.
+        """
         residual, jacobian = super().evaluate(model, theta, columns, origin)
+        residual = residual + self.expected
         strengths = self._strengths(model, theta)
         slopes = {
             place: self._slope(model, theta, column) / strengths
@@ -56,7 +60,7 @@ class RelativeProblem(InverseDynamicsProblem):
                 jacobian[rows] *= ratio
                 for place, slope in slopes.items():
                     jacobian[rows, place] -= residual[rows] * slope[joint]
-        return residual, jacobian
+        return residual - self.expected, jacobian
 
     def _strengths(self, model: Model, theta: Array) -> Array:
         """Size of what drives deliver at each joint; 1 where that is nothing, as at joints without a drive."""
@@ -76,11 +80,12 @@ class RelativeProblem(InverseDynamicsProblem):
 def relative_to_drives(
     model: Model, data: InverseDynamicsProblem, free: Sequence[str], ties: Mapping[str, str]
 ) -> InverseDynamicsProblem:
-    """The balance relative to what drives deliver, if a parameter of a drive without states of its own is free.
+    """The balance relative to what drives deliver, if a parameter of a drive is free that nothing logged holds.
 
-    Drives with states show more than their effort, such as pressures and currents: these hold their parameters.
+    Pressures of a cylinder hold its areas and valves. A current holds no torque constant.
     """
     moved = {*free, *(follower for follower, leader in ties.items() if leader in free)}
-    drives = [name for name in model.actuators if model.follows_command(name)]
+    held = {channel.partition(".pressure")[0] for channel in data.shown if ".pressure" in channel}
+    drives = [name for name in model.actuators if name not in held]
     mine = [name for name in sorted(moved) if name.partition(".")[0] in drives]
     return RelativeProblem(data, mine) if mine else data

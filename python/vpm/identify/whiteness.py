@@ -20,7 +20,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import qr
+from scipy.linalg import qr, svd
 from scipy.special import chdtrc, fdtrc
 
 from vpm.identify.identifiability import column_lengths
@@ -174,3 +174,35 @@ def shifted(signal: Array) -> Array:
     """A signal (n,) up to `REACH` samples earlier and later, its ends held: (n, 2 REACH + 1)."""
     padded = np.pad(signal, REACH, mode="edge")
     return np.column_stack([padded[k : k + signal.size] for k in range(2 * REACH + 1)])
+
+
+def heard(late: Array, residual: Array, fitted: Array, counts: NDArray[np.bool_], clear: float) -> Array:
+    """Directions of a signal at other times in which it stands clear of the noise, beside what was fitted.
+
+    An effort has in it what the residual is made of: noise of encoders, and all that a drive did without being told,
+    to which its controller answers. It is the sum of forces that were fitted and of that. Where the rest of it is
+    quiet, a few shifts of it would leave just that, and explain any residual by themselves.
+
+    Parameters
+    ----------
+    late : ndarray, shape (n, shifts)
+    residual : ndarray, shape (n,)
+    fitted : ndarray, shape (n, p)
+        Derivative of the residual by what was fitted.
+    counts : ndarray of bool, shape (n,)
+    clear : float
+        How many times larger a direction has to be than what those that are leave, per size of the residual's channel.
+
+    Returns
+    -------
+    ndarray, shape (n, k)
+        Without what was fitted.
+    """
+    old, columns = basis(fitted * counts[:, None]), late * counts[:, None]
+    directions, sizes, _ = svd(columns - old @ (old.T @ columns), full_matrices=False)
+    least = clear * np.linalg.norm(columns) / np.sqrt(columns.shape[1] * counts.sum())
+    left, known = (residual - old @ (old.T @ residual)) * counts, 0
+    while (stand := int(np.sum(sizes > least * np.linalg.norm(left)))) > known:
+        fresh, known = directions[:, known:stand], stand
+        left = left - fresh @ (fresh.T @ left)
+    return np.asarray(directions[:, :known])

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from vpm.catalogue import EFFECTS
 from vpm.experiment import Experiment
+from vpm.initial import initial_state
 from vpm.log_check.correction import Correction
 from vpm.log_check.late import Late, with_delay, without_delay
 from vpm.log_check.settings import Settings
@@ -236,6 +237,8 @@ class Judge:
         ):
             return None
         corrected = correction.applied(record)
+        if not self._begins_alike(corrected, record):
+            return None
         rows, shares = rows_of(corrected, record), dict(before.by_channel)
         kept = np.isin(rows, before.seen)
         for place, name in enumerate(before.by_channel):
@@ -244,6 +247,11 @@ class Judge:
                 free = float(np.sum((reading - np.mean(reading)) ** 2))
                 shares[name] = _share(float(np.sum((reading - shown) ** 2)), free)
         return replace(before, by_channel=shares)
+
+    def _begins_alike(self, corrected: Experiment, record: Experiment) -> bool:
+        """Whether the first state stays: the pressures of a closed chamber are never far from where they began."""
+        first, then = (initial_state(self.model, one, self.model.theta) for one in (record, corrected))
+        return bool(np.array_equal(first, then))
 
     def _structure(self, record: Experiment, forces: Collection[str] = FRICTION) -> Structure:
         """The model with forces at each joint that begin at nothing."""
