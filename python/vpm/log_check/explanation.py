@@ -237,8 +237,12 @@ class Explainer:
             promised = partial(self._promised, part=part, tangent=near)
             few = self._few(self.each("trying", promised, corrections, self._words), left, known)
             settle = partial(self._settled, part=part, tangent=near, left=left)
-            settled = self.each("refining", settle, few, self._words)
-            found += [one for one in settled if not isinstance(one, Failure) and abs(one.correction.delay) > least]
+            settled = [one for one in self.each("refining", settle, few, self._words) if not isinstance(one, Failure)]
+            found += [one for one in settled if abs(one.correction.delay) > least]
+            # A fit beside a delay that came to nothing is one without, and may have gone on to a better end.
+            without = [one.after for one in settled if abs(one.correction.delay) <= least]
+            left = min([left, *without], key=lambda shares: shares.cost)
+            found = [one._replace(before=left) for one in found]
             if self._known(found) < math.inf or known < math.inf or not left.above(self.settings.harmless):
                 break
         return found
