@@ -58,22 +58,24 @@ class Stall:
     ----------
     looks : int
         In how many looks in a row it may do nothing.
+    waiting : float
+        Processor time that is nothing, in all these looks, s.
     """
 
-    def __init__(self, looks: int = LOOKS) -> None:
-        self._looks, self._quiet, self._spent = looks, 0, 0.0
+    def __init__(self, looks: int = LOOKS, waiting: float = WAITING) -> None:
+        self._looks, self._waiting, self._quiet, self._spent = looks, waiting, 0, 0.0
 
     def is_there(self, spent: float) -> bool:
         """Whether it has stood still for so long that has spent this processor time by now, s; one look."""
         # What was waited for by another process takes its time along.
-        worked = abs(spent - self._spent) > WAITING
+        worked = abs(spent - self._spent) > self._waiting
         self._quiet, self._spent = (0, spent) if worked else (self._quiet + 1, self._spent)
         return self._quiet >= self._looks
 
 
-def watched(command: list[str], looks: int = LOOKS, period: float = PERIOD) -> int:
+def watched(command: list[str], looks: int = LOOKS, period: float = PERIOD, waiting: float = WAITING) -> int:
     """Exit code of a command, 124 of one that stood still and was ended."""
-    stall = Stall(looks)
+    stall = Stall(looks, waiting)
     with subprocess.Popen(command) as process:
         while True:
             try:
