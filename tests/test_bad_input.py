@@ -149,6 +149,14 @@ def test_a_filter_that_leaves_nothing_is_refused(arm: Model, log: Experiment, cu
         vpm.simulate(arm, log, "inverse_dynamics", cutoff=cutoff)
 
 
+@pytest.mark.parametrize("cutoff", [1e-9, math.nan, 1e4])
+def test_a_diagnosis_refuses_a_filter_before_it_works(arm: Model, log: Experiment, cutoff: float) -> None:
+    said: list[str] = []
+    with pytest.raises(ExperimentError, match="a cut-off frequency of"):
+        vpm.diagnose(arm, log, cutoff=cutoff, tell=said.append)
+    assert not said
+
+
 @pytest.mark.parametrize("settings", [{"horizon": math.inf}, {"settling": math.inf}, {"substeps": 1.5}])
 def test_steps_without_end_are_refused(settings: dict[str, float]) -> None:
     with pytest.raises(SimulationError, match=f"{next(iter(settings))} is "):

@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
+from itertools import chain
 from typing import Literal, TypeVar, get_args
 
 import numpy as np
@@ -48,6 +49,7 @@ from vpm.discrepancy.told_apart import told_apart
 from vpm.discrepancy.verdict import is_negligible, verdict
 from vpm.errors import DiagnosisError, DivergedError, VpmError
 from vpm.experiment import Experiment, as_records, joints_from_shafts
+from vpm.experiment.signal import check_cutoff
 from vpm.identify import InverseDynamicsProblem, OutputErrorProblem, gaps
 from vpm.identify.fit import fit_of
 from vpm.identify.parallel import worker_count
@@ -165,6 +167,9 @@ def diagnose(
         raise DiagnosisError(f'names come from a "search" or a "ranking", not from "{names}"')
     worker_count(workers)
     records = _records(model, experiments, validate)
+    if cutoff is not None:
+        for record in chain(*records[:2]):
+            check_cutoff(cutoff, record.rate, len(record.time))
     each = SideBySide(workers, progress)
     odd: list[str] = []
     if check:

@@ -55,23 +55,40 @@ def lowpass(values: Array, rate: float, cutoff: float, order: int = MOTION_FILTE
         The cut-off frequency is not between zero and half of the rate, or far too low for the record, the order is
         none that can be computed, or there are fewer than four samples.
     """
+    if not 1 <= order <= HIGHEST_ORDER:
+        raise ExperimentError(f"a filter of order {order} cannot be had; choose an order from 1 to {HIGHEST_ORDER}")
+    _need_samples(values, 4, "filtering")
+    check_cutoff(cutoff, rate, len(values))
+    from scipy.signal import butter
+
+    sections = butter(order, cutoff / (0.5 * rate), output="sos")
+    return _forward_backward(sections, values, 2 * settling_samples(rate, cutoff))
+
+
+def check_cutoff(cutoff: float, rate: float, samples: int) -> None:
+    """Complain about a cut-off frequency that a record cannot have.
+
+    Parameters
+    ----------
+    cutoff, rate : float
+        Hz, and samples per second.
+    samples : int
+
+    Raises
+    ------
+    ExperimentError
+        It is not between zero and half of the rate, or far too low for the record.
+    """
     if not 0.0 < cutoff < 0.5 * rate:
         raise ExperimentError(
             f"a cut-off frequency of {cutoff:g} Hz cannot be had at {rate:g} samples per second; "
             f"choose one between 0 and {0.5 * rate:g} Hz"
         )
-    if not 1 <= order <= HIGHEST_ORDER:
-        raise ExperimentError(f"a filter of order {order} cannot be had; choose an order from 1 to {HIGHEST_ORDER}")
-    _need_samples(values, 4, "filtering")
-    if cutoff * len(values) < SHORTEST * rate:
+    if cutoff * samples < SHORTEST * rate:
         raise ExperimentError(
-            f"a cut-off frequency of {cutoff:g} Hz is too low for {len(values) / rate:g} s of record, which hold less "
-            f"than {SHORTEST:g} of its period; choose at least {SHORTEST * rate / len(values):.3g} Hz"
+            f"a cut-off frequency of {cutoff:g} Hz is too low for {samples / rate:g} s of record, which hold less "
+            f"than {SHORTEST:g} of its period; choose at least {SHORTEST * rate / samples:.3g} Hz"
         )
-    from scipy.signal import butter
-
-    sections = butter(order, cutoff / (0.5 * rate), output="sos")
-    return _forward_backward(sections, values, 2 * settling_samples(rate, cutoff))
 
 
 def settling_samples(rate: float, cutoff: float) -> int:
