@@ -209,7 +209,7 @@ def load_small(path: Path) -> Experiment:
         (changed(5, "15,3,1"), "t,q,u", r"line 5: the time goes from 0.02 s to 0.015 s.*sort the rows"),
         (changed(5, "31,3,1"), "t,q,u", r"line 5: the step at t = 0.02 s is 0.011 s, 10.00% off the median of 0.01 s"),
         ([f"5,{k},0" for k in range(12)], "t,q,u", r"the time is 0.005 s in all 12 samples"),
-        (["0,0,0", "10,1,1"], "t,q,u", r"has 2 samples, and at least 10 are needed"),
+        (["0,0,0", "10,1,1"], "t,q,u", r"has 2 of at least 10 samples that are needed"),
     ],
 )
 def test_what_is_wrong_with_a_file(tmp_path: Path, rows: list[str] | None, header: str, words: str) -> None:

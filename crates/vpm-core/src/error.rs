@@ -22,6 +22,21 @@ pub enum Error {
         /// The value found.
         value: f64,
     },
+    /// A machine has no derivative where it was asked for.
+    #[error(
+        "row {row} and column {column} of {matrix}, counted from 0, is {value}: a law has no derivative at this state, \
+         such as a line of no length, or a flow without a difference of pressure; name another state"
+    )]
+    NoDerivative {
+        /// Name of the matrix.
+        matrix: &'static str,
+        /// Row of the entry, from 0.
+        row: usize,
+        /// Column of the entry, from 0.
+        column: usize,
+        /// What the entry is.
+        value: f64,
+    },
     /// A body's mass, with its payloads, is zero or negative.
     #[error(
         "`{body}.mass` must be positive with all payloads included, got {mass} kg; give every body the mass it moves with"

@@ -58,7 +58,7 @@ pub fn linearize(description: &Description, theta: &[f64], state: &[f64], inputs
     for first in (0..nx + nu).step_by(LANES) {
         result.take(first, (nx, nu), tangent.evaluate(state, inputs, first));
     }
-    result.checked()
+    result.checked((nx, nu))
 }
 
 /// What the machine shows in numbers that carry derivatives.
@@ -105,11 +105,12 @@ impl Linearization {
         values(&mut self.reading, reading);
     }
 
-    fn checked(self) -> Result<Self> {
-        let parts = [("A", &self.state), ("B", &self.input), ("C", &self.output), ("D", &self.feedthrough)];
-        for (name, matrix) in parts {
-            if let Some(&value) = matrix.iter().find(|entry| !entry.is_finite()) {
-                return Err(Error::NonFinite { path: format!("an entry of {name} at this state"), value });
+    fn checked(self, (nx, nu): (usize, usize)) -> Result<Self> {
+        let parts =
+            [("A", &self.state, nx), ("B", &self.input, nu), ("C", &self.output, nx), ("D", &self.feedthrough, nu)];
+        for (matrix, entries, width) in parts {
+            if let Some((place, &value)) = entries.iter().enumerate().find(|(_, entry)| !entry.is_finite()) {
+                return Err(Error::NoDerivative { matrix, row: place / width, column: place % width, value });
             }
         }
         Ok(self)

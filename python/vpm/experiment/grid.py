@@ -94,7 +94,7 @@ def check_increasing(time: Array, source: Source) -> None:
     """
     if time.size < FEWEST_SAMPLES:
         raise source.error(
-            f"{source.name} has {time.size} samples, and at least {FEWEST_SAMPLES} are needed; record longer"
+            f"{source.name} has {time.size} of at least {FEWEST_SAMPLES} samples that are needed; record longer"
         )
     if np.ptp(time) == 0.0:
         raise source.error(
