@@ -171,7 +171,7 @@ def test_steps_without_end_are_refused(settings: dict[str, float]) -> None:
         (TIME**2 + TIME, 0.0, "off the median"),
         (TIME, math.nan, 'the channel "x" is nan at t = 0 s'),
         (TIME, 1e155, r'the channel "x" is 1e\+155'),
-        (TIME[:3], 0.0, "has 3 samples"),
+        (TIME[:3], 0.0, "has 3 of at least"),
     ],
 )
 def test_records_are_checked_as_files_are_however_they_are_made(
