@@ -237,7 +237,7 @@ def moved(model: Model, site: str) -> float:
     """Inertia that hangs on a joint, a body or a beam when all joints stand at zero."""
     joint = model.joint_before(site)
     place = model.joints.index(joint)
-    whole = float(model.mass_matrix(np.zeros(len(model.coordinates)))[place, place])
+    whole = float(model.masses_at_zero[place])
     rotor = sum(
         model.parameters[name].value
         for name in (f"{joint}.rotor_inertia", f"{joint}.rotor.inertia")

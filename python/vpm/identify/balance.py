@@ -326,8 +326,7 @@ class InverseDynamicsProblem:
     def _inertial(self, model: Model, record: int) -> Array:
         """Root mean square of what the inertia at each joint takes by itself, all joints at zero."""
         places = [model.joints.index(joint) for joint in self.joints]
-        inertia = np.diag(model.mass_matrix(np.zeros(len(model.coordinates))))[places]
-        return np.asarray(inertia * np.sqrt(np.mean(self.state(record)[2] ** 2, axis=0)))
+        return np.asarray(model.masses_at_zero[places] * np.sqrt(np.mean(self.state(record)[2] ** 2, axis=0)))
 
     def _stack(self, records: list[Array]) -> Array:
         """Concatenate (n, channels, ...) arrays block by block and apply the weights."""

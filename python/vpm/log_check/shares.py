@@ -277,16 +277,15 @@ class Judge:
             return natural_sizes(1.0, 1.0, 1.0), {"speed": TRANSITION, "coordinate": 0.0}
         ends = np.linspace(0, len(record) - 1, min(PIECES, len(record))).astype(int)
         way, speed = np.std(record[channel]), np.std(np.diff(record[channel][ends]) / np.diff(record.time[ends])) + 1e-9
-        masses, weights = self._at_rest
-        effort = float(masses[place] * speed**2 / way + weights[place]) + 1e-9
+        effort = float(self.model.masses_at_zero[place] * speed**2 / way + self._weights[place]) + 1e-9
         middle = float(np.mean(record[channel]))
         return natural_sizes(effort, float(speed), float(way)), {"speed": TRANSITION * speed, "coordinate": middle}
 
     @cached_property
-    def _at_rest(self) -> tuple[Array, Array]:
-        """Mass and weight that each coordinate moves where all are zero: one machine serves all records."""
+    def _weights(self) -> Array:
+        """Effort that holds each coordinate where all are zero: one machine serves all records."""
         rest = np.zeros(len(self.model.coordinates))
-        return np.diag(self.model.mass_matrix(rest)), np.abs(self.model.inverse_dynamics(rest, rest, rest))
+        return np.abs(self.model.inverse_dynamics(rest, rest, rest))
 
     def _is_added(self, parameter: str) -> bool:
         return any(parameter in self.model.effect(*key).parameter_names.values() for key in self.added)

@@ -80,6 +80,11 @@ class Evaluations(Components):
         """
         return self.dynamics.mass_matrix(q)
 
+    @cached_property
+    def masses_at_zero(self) -> Array:
+        """What each coordinate moves where all are zero, shape (n,), kg or kg m^2: the diagonal of the mass matrix."""
+        return np.diag(self.mass_matrix(np.zeros(len(self.coordinates))))
+
     def inverse_dynamics(self, q: ArrayLike, v: ArrayLike, a: ArrayLike) -> Array:
         """Efforts that the actuators have to give for accelerations ``a``: ``M(q) a + h(q, v) - effects(q, v)``.
 

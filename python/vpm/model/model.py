@@ -294,7 +294,7 @@ class Model(Evaluations, Storable):
         if any(name in self.parameters for name in known):
             return 0.0
         place = self.joints.index(joint)
-        return MOTOR_SHARE * float(self.mass_matrix(np.zeros(len(self.coordinates)))[place, place])
+        return MOTOR_SHARE * float(self.masses_at_zero[place])
 
     def _is_driven(self, joint: str) -> bool:
         return any(self._drives(name, joint) for name in self.actuators)
