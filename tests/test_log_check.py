@@ -23,13 +23,14 @@ Array = NDArray[np.float64]
 Columns = dict[str, Array]
 
 MODEL = vpm.Model.from_toml(textbook_arm.FILE)
-SLIDE = vpm.Model.from_toml("""
+SLIDE_FILE = """
     name = "slide"
     gravity = [0.1, 0.0, -9.81]
     bodies.table = { mass = { value = 2.0, uncertainty = 0.2 } }
     joints.slide = { type = "prismatic", parent = "world", child = "table", axis = [1.0, 0.0, 0.0] }
     actuators.drive = { joint = "slide", gain = 1.0, command_unit = "N" }
-""")
+"""
+SLIDE = vpm.Model.from_toml(SLIDE_FILE)
 PLAIN = textbook_arm.Arm()
 #: Faults of the machine itself, none of which is a mistake of the log.
 FAULTS = {
@@ -163,6 +164,55 @@ def test_a_pressure_ten_times_too_large_is_named_although_the_first_state_was_dr
     (one,) = vpm.check_log(case.model(), wrong, workers=1).mistakes
     assert one.channels == ("servo.pressure_b",)
     assert one.factor == pytest.approx(0.1)
+
+
+def held_slide(late: float = 0.02) -> tuple[vpm.Model, Columns]:
+    """A slide whose controller is drawn behind its reference, by Newton's law, with its own acceleration."""
+    loop = (
+        'type = "cascade", actuator = "drive", measures = "slide.position", position_gain = 10.0, velocity_gain = 5.0'
+    )
+    ruler = 'sensors.ruler = { measures = "slide.position" }'
+    model = vpm.Model.from_toml(f"{SLIDE_FILE}{ruler}\ncontrollers.servo = {{ {loop} }}")
+    time = np.arange(0.0, 8.0, 0.002)
+    sines = [(0.1, 0.8 * np.pi), (0.04, 2.2 * np.pi)]
+    place, asked = (sum(a * np.sin(w * (time + shift)) for a, w in sines) for shift in (0.0, late))
+    acceleration = sum(-a * w**2 * np.sin(w * time) for a, w in sines)
+    columns = {
+        "slide.position": place,
+        "drive.command": 2.0 * (acceleration - 0.1),
+        "drive.reference": asked,
+        "slide.acceleration": acceleration,
+    }
+    return model, {"time": time, **columns}
+
+
+def mistakes_of(model: vpm.Model, columns: Columns) -> list[tuple[str, tuple[str, ...], float]]:
+    values = {name: column for name, column in columns.items() if name != "time"}
+    log = vpm.Experiment.from_arrays(columns["time"], values, {}, model=model)
+    return [(one.kind, one.channels, one.factor) for one in vpm.check_log(model, log).mistakes]
+
+
+@pytest.mark.parametrize(
+    ("channel", "factor", "kind"),
+    [
+        ("drive.reference", 1e3, "unit"),
+        ("drive.reference", -1.0, "sign"),
+        ("slide.acceleration", 1.0 / 9.80665, "unit"),
+        ("slide.acceleration", -1.0, "sign"),
+    ],
+)
+def test_a_channel_that_no_observer_compares_is_judged_by_what_tells_it(channel: str, factor: float, kind: str) -> None:
+    model, columns = held_slide()
+    assert not mistakes_of(model, columns)
+    ((found, channels, repair),) = mistakes_of(model, scaled(channel, factor)(columns))
+    assert (found, channels) == (kind, (channel,))
+    assert repair == pytest.approx(1.0 / factor)
+
+
+def test_a_reference_that_is_hardly_followed_has_no_scale() -> None:
+    model, columns = held_slide()
+    assert not mistakes_of(model, scaled("drive.reference", 3.0)(columns))
+    assert not mistakes_of(model, {**columns, "drive.reference": 0.1 * np.sign(np.sin(9.0 * columns["time"]))})
 
 
 @pytest.mark.parametrize("samples", [25, 220, 500])

@@ -130,6 +130,7 @@ _SYMBOLS: Mapping[str, _Symbol] = {
     "N": _symbol(1.0, (1, 1, -2, 0, 0), "N", "uµμmckM"),
     "lbf": _symbol(_POUND * _STANDARD_GRAVITY, (1, 1, -2, 0, 0), "N"),
     "kgf": _symbol(_STANDARD_GRAVITY, (1, 1, -2, 0, 0), "N"),
+    "gn": _symbol(_STANDARD_GRAVITY, (1, 0, -2, 0, 0), "m s^-2"),  # of accelerometers; "g" is the gram
     "J": _symbol(1.0, (2, 1, -2, 0, 0), "J", "mkM"),
     "W": _symbol(1.0, (2, 1, -3, 0, 0), "W", "umkM"),
     "Pa": _symbol(1.0, (-1, 1, -2, 0, 0), "Pa", "hkMG"),

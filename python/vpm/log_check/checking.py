@@ -10,9 +10,10 @@ import numpy as np
 from vpm.discrepancy.side_by_side import Progress, SideBySide
 from vpm.errors import ExperimentError, VpmError
 from vpm.experiment import Experiment, as_records, joints_from_shafts
-from vpm.log_check.correction import TIME
+from vpm.log_check.correction import TIME, Correction
 from vpm.log_check.explanation import Explainer, Explanation
 from vpm.log_check.finding import Finding, LogCheck
+from vpm.log_check.related import Related, wrong_scales
 from vpm.log_check.settings import Settings
 from vpm.log_check.shares import Judge, Shares
 from vpm.log_check.stretches import odd_stretches
@@ -124,8 +125,7 @@ class _Check:
         part = _beginning(record, outputs, self.settings)
         left, found = self.judge.fitted(part), list[Finding]()
         for _ in range(self.settings.rounds if len(part) >= self.settings.judged else 0):
-            units = {TIME: "s", **{name: model.channel_unit(name) for name in (*outputs, *inputs)}}
-            units |= {name: entry.unit for name, entry in table.items()}
+            units = _units(model, record, table)
             explanations = Explainer(self.judge, units, self.each).explained(part, (*outputs, *inputs), left)
             for one in explanations:
                 changed = one.correction.entries(table)
@@ -134,6 +134,9 @@ class _Check:
                 part, left = one.correction.applied(part), one.after
             if not explanations:
                 break
+        units = _units(model, record, table)
+        for correction, related in wrong_scales(model, part, units, self.settings):
+            found.append(_of_related(correction, related, units, correction.entries(table), record.name))
         tangent = self.judge.tangent(part, left)
         if tangent is not None and (unseen := self.judge.unseen(tangent)):
             stretches.append(_of_parameters(unseen, record.name))
@@ -182,6 +185,32 @@ def _finding(
         (before[place], after[place]),
         lines,
     )
+
+
+def _of_related(
+    correction: Correction, related: Related, units: Mapping[str, str], changed: Mapping[str, ChannelEntry], record: str
+) -> Finding:
+    """What is said of a channel that contradicts the one that tells it."""
+    lines = {channel: line_of(channel, entry) for channel, entry in changed.items()}
+    before, after = related.error(), related.error(correction.factor)
+    return Finding(
+        correction.kind,
+        correction.channels,
+        (record,),
+        f"{correction.sentence(units)}; {related.teller} differs from it by {_percent(before)} of its power as it is, "
+        f"and by {_percent(after)} with that corrected",
+        f"write {' and '.join(lines.values())}" if lines else correction.repair,
+        True,
+        correction.factor,
+        share=(before, after),
+        lines=lines,
+    )
+
+
+def _units(model: Model, record: Experiment, table: Mapping[str, ChannelEntry]) -> dict[str, str]:
+    """Units in which the time and the channels of a record were read that the model has."""
+    own = {name: model.channel_unit(name) for name in record.channels if name in model.channels}
+    return {TIME: "s", **own, **{name: entry.unit for name, entry in table.items()}}
 
 
 def _evidence(found: Explanation, place: str) -> str:

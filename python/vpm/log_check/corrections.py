@@ -17,6 +17,8 @@ CUSTOMARY: Mapping[str, tuple[str, ...]] = {
     "rad": ("deg", "rev"),
     "m/s": ("mm/s", "cm/s", "m/min"),
     "rad/s": ("deg/s", "rpm", "rev/s"),
+    "m/s^2": ("mm/s^2", "cm/s^2", "gn"),
+    "rad/s^2": ("deg/s^2", "rpm/s", "rev/s^2"),
     "N": ("kN", "kgf", "lbf"),
     "N m": ("N mm", "kN m", "kgf m"),
     "A": ("mA",),

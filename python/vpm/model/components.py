@@ -218,15 +218,15 @@ class Components(DriveComponents):
             There is no such actuator, or no controller commands it.
         """
         name = self._known(actuator, self.controlled_actuators, "actuator with a controller")
-        return self._controlled[name]
+        return self.held_channels[name]
 
     @cached_property
     def controlled_actuators(self) -> tuple[str, ...]:
         """Actuators that a controller commands, in the order of `actuators`."""
-        return tuple(name for name in self.actuators if name in self._controlled)
+        return tuple(name for name in self.actuators if name in self.held_channels)
 
     @property
-    def _controlled(self) -> Mapping[str, str]:
+    def held_channels(self) -> Mapping[str, str]:
         """Channel that is held for each actuator with a controller."""
         return dict(pair for controller in self._checked.document.controllers.values() for pair in controller.pairs)
 

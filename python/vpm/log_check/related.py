@@ -1,0 +1,98 @@
+"""Channels that another one tells: references by what follows them, accelerations by the motion."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vpm.experiment import Experiment, choose_cutoff
+from vpm.experiment.signal import differentiate, lowpass, settling_samples
+from vpm.log_check.correction import Correction
+from vpm.log_check.corrections import scales
+from vpm.log_check.settings import Settings
+from vpm.model import Model
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Related:
+    """A channel beside what tells it.
+
+    Attributes
+    ----------
+    channel, teller : str
+    values, told : ndarray, shape (N,)
+        What the channel holds, and what it should.
+    """
+
+    channel: str
+    teller: str
+    values: Array
+    told: Array
+
+    def error(self, factor: float = 1.0) -> float:
+        """Mean square of what ``factor`` times the channel is off, as a share of the variance of what tells it."""
+        moved = float(np.var(self.told))
+        return float(np.mean((factor * self.values - self.told) ** 2)) / moved if moved > 0.0 else 0.0
+
+    @property
+    def least(self) -> float:
+        """What the best of all factors leaves, see `error`."""
+        power = float(np.mean(self.values**2))
+        return self.error(float(np.mean(self.values * self.told)) / power) if power > 0.0 else self.error()
+
+
+def wrong_scales(
+    model: Model, record: Experiment, units: Mapping[str, str], settings: Settings
+) -> Iterator[tuple[Correction, Related]]:
+    """Units and signs of channels that no observer compares, where one of them explains why another contradicts them.
+
+    A machine follows the references of its controllers more or less; derivatives of a position are its acceleration.
+
+    Parameters
+    ----------
+    model : Model
+    record : Experiment
+        Its other mistakes corrected.
+    units : mapping of str to str
+        Units in which the channels, and the time, were read.
+    settings : Settings
+    """
+    for related in (*_references(model, record), *_accelerations(model, record)):
+        before = related.error()
+        if before <= settings.doubtful:
+            continue
+        tried = [one for one in scales(model, (related.channel,), units, settings) if not one.is_clock]
+        best, *others = sorted(tried, key=lambda one: related.error(one.factor))
+        after = related.error(best.factor)
+        rivals = [related.error(one.factor) for one in others if one.factor != -best.factor]
+        # Where a factor of no unit does better, or another one as well, none of them is the scale.
+        is_scale = settings.alike * after <= related.least and after < settings.alike * min(rivals)
+        if after <= settings.better * before and is_scale:
+            yield best, related
+
+
+def _references(model: Model, record: Experiment) -> Iterator[Related]:
+    for actuator, held in model.held_channels.items():
+        reference = f"{actuator}.reference"
+        if reference in record and held in record:
+            yield Related(reference, held, record[reference], record[held])
+
+
+def _accelerations(model: Model, record: Experiment) -> Iterator[Related]:
+    """Through the filter of the position, without what it needs to settle."""
+    for joint in model.joints:
+        position, acceleration = f"{joint}.position", f"{joint}.acceleration"
+        if position not in record or acceleration not in record:
+            continue
+        cutoff = choose_cutoff(record[position][:, None], record.rate).cutoff
+        inside = slice((edge := settling_samples(record.rate, cutoff)), len(record) - edge)
+        if len(record) <= 4 * edge:
+            continue
+        rate = differentiate(lowpass(record[position], record.rate, cutoff), record.dt)
+        told, values = differentiate(rate, record.dt), lowpass(record[acceleration], record.rate, cutoff)
+        yield Related(acceleration, f"the second derivative of {position}", values[inside], told[inside])
