@@ -174,9 +174,9 @@ def held_slide(late: float = 0.02) -> tuple[vpm.Model, Columns]:
     ruler = 'sensors.ruler = { measures = "slide.position" }'
     model = vpm.Model.from_toml(f"{SLIDE_FILE}{ruler}\ncontrollers.servo = {{ {loop} }}")
     time = np.arange(0.0, 8.0, 0.002)
-    sines = [(0.1, 0.8 * np.pi), (0.04, 2.2 * np.pi)]
-    place, asked = (sum(a * np.sin(w * (time + shift)) for a, w in sines) for shift in (0.0, late))
-    acceleration = sum(-a * w**2 * np.sin(w * time) for a, w in sines)
+    way, rate = np.array([[0.1], [0.04]]), np.pi * np.array([[0.8], [2.2]])
+    place, asked = (np.sum(way * np.sin(rate * (time + shift)), axis=0) for shift in (0.0, late))
+    acceleration = np.sum(-way * rate**2 * np.sin(rate * time), axis=0)
     columns = {
         "slide.position": place,
         "drive.command": 2.0 * (acceleration - 0.1),
