@@ -95,6 +95,54 @@ def test_delimiters_and_line_ends(tmp_path: Path, delimiter: str, newline: str) 
     np.testing.assert_allclose(exp["drive.command"], -np.arange(12))
 
 
+ROWS = [(10 * k, 0.5 * k, -k) for k in range(12)]
+
+
+@pytest.mark.parametrize(
+    ("above", "separator"),
+    [
+        ("# made by a logger\n#\n\nt,q,u\n", ","),
+        ("# t,q,u\n", ","),
+        ("% made by a logger\n% t q u\n", " "),
+        ("t q  u\n", "  "),
+        ("t|q|u\n", "|"),
+        ("// a log\nt;q;u\n[ms];(mm);V\n", ";"),
+        ("t\tq\tu\n\nms\tmm\t-\n\n", "\t"),
+    ],
+)
+@pytest.mark.parametrize("comma", [False, True])
+def test_dialects(tmp_path: Path, above: str, separator: str, comma: bool) -> None:
+    body = "\n".join(separator.join(map(str, row)) for row in ROWS)
+    if comma and separator != ",":
+        body = body.replace(".", ",")
+    exp = Experiment.load(write(tmp_path / "log.csv", above + body + "\n"), TABLE)
+    np.testing.assert_allclose(exp["axis.position"], 0.5e-3 * np.arange(12))
+    np.testing.assert_allclose(exp["drive.command"], -np.arange(12))
+
+
+def test_numpys_own_text_is_read(tmp_path: Path) -> None:
+    np.savetxt(tmp_path / "log.txt", ROWS, header="t q u")
+    np.testing.assert_allclose(Experiment.load(tmp_path / "log.txt", TABLE)["axis.position"], 0.5e-3 * np.arange(12))
+
+
+def test_a_row_of_units_is_that_of_a_log_without_a_table(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    rows = ["time;angle;Strom", "ms;°;mA", *(f"{10 * k};{k},5;{k}" for k in range(12))]
+    path.write_bytes("\r\n".join(rows).encode("latin-1"))
+    exp = Experiment.load(path)
+    assert exp.units == ("rad", "A")
+    np.testing.assert_allclose(exp["angle"], np.deg2rad(np.arange(12) + 0.5))
+    assert exp.rate == pytest.approx(100.0)
+
+
+def test_lines_are_those_of_the_file_in_every_dialect(tmp_path: Path) -> None:
+    rows = [f"{10 * k} {k},5 0" for k in range(12)]
+    rows[4] = "40 4,x 0"
+    path = write(tmp_path / "log.txt", "# a\n\n# t q u\n\n" + "\n".join(rows))
+    with pytest.raises(ExperimentError, match=r'line 9: "4,x" in column "q" is no number'):
+        Experiment.load(path, TABLE)
+
+
 def test_without_a_table_columns_are_channels(tmp_path: Path) -> None:
     rows = [f"{10 * k},{k},{0.5 * k}" for k in range(12)]
     exp = Experiment.load(log(tmp_path, rows, "time [ms],q [deg],u"))
@@ -260,7 +308,7 @@ def test_lines_are_counted_with_the_blank_ones(tmp_path: Path) -> None:
         (b"t,q,u\n\xff\xfe\x00", r"is not a t\w+"),
         (b"\x80\x81\x82", "is not a text file in UTF-8"),
         (
-            b"t;q;u\n" + b"".join(b"%d;%d,5;0\n" % (k, k) for k in range(12)),
+            b"t;q;u\n" + b"".join(b"%d.0;%d,5;0\n" % (k, k) for k in range(12)),
             r'"0,5" in column "q" is no number; write dec',
         ),
         (b"t,q,u\n" + b"".join(b"%d,%d,5,0\n" % (k, k) for k in range(12)), r"line 2: there are 4 cells"),

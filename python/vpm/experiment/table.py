@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from itertools import islice
 from os import PathLike
 from pathlib import Path
 
@@ -13,13 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.errors import ExperimentError, near_match
+from vpm.experiment.dialect import Dialect, is_number, read_dialect
 
 Array = NDArray[np.float64]
-
-#: Separators that are looked for in the header.
-DELIMITERS = (",", ";", "\t")
-
-_ENCODING = "utf-8-sig"
 
 
 @dataclass(frozen=True)
@@ -50,46 +45,39 @@ class Table:
     notes: tuple[str, ...] = ()
 
 
-def read_header(path: str | PathLike[str]) -> tuple[tuple[str, ...], str]:
-    """Column names and delimiter of a file.
+def read_header(path: str | PathLike[str]) -> Dialect:
+    """Names of the columns of a file, and how it writes its table.
 
     Raises
     ------
     ExperimentError
-        The file does not exist, is no text, is empty, has no header, or names a column twice.
+        See `vpm.experiment.dialect.read_dialect`, or a column has no name, or that of another.
     """
-    shown = str(path)
-    lines = _first_lines(path, 1)
-    if not lines or not lines[0].strip():
-        raise _error(path, f"{shown} is empty; a log starts with a line of column names")
-    delimiter = max(DELIMITERS, key=lines[0].count)
-    header = tuple(cell.strip() for cell in next(csv.reader(lines, delimiter=delimiter)))
-    if all(_is_number(cell) for cell in header):
-        raise _error(
-            path, f'{shown}, line 1 holds numbers ("{lines[0].strip()[:40]}"); put a line of column names above them'
-        )
+    dialect = read_dialect(path)
+    header, where = dialect.header, f"{path}, line {dialect.named}"
     for at, cell in enumerate(header):
         if not cell:
-            raise _error(path, f"{shown}, line 1: column {at + 1} of {len(header)} has no name; give it one")
+            raise _error(path, f"{where}: column {at + 1} of {len(header)} has no name; give it one")
         if cell in header[:at]:
             raise _error(
                 path,
-                f'{shown}, line 1: the name "{cell}" stands over columns {header.index(cell) + 1} and {at + 1}; '
+                f'{where}: the name "{cell}" stands over columns {header.index(cell) + 1} and {at + 1}; '
                 "rename one of them",
             )
-    return header, delimiter
+    return dialect
 
 
-def read_table(path: str | PathLike[str], wanted: Sequence[str] | None = None) -> Table:
+def read_table(path: str | PathLike[str], dialect: Dialect, wanted: Sequence[str]) -> Table:
     """Read columns of numbers.
 
     Parameters
     ----------
     path : path-like
-        Text in UTF-8: a line of column names, then numbers with decimal points, separated by commas, semicolons or
-        tabulators. Blank lines do not count.
-    wanted : sequence of str, optional
-        Columns to read; others may hold anything. All by default.
+        Text: a line of column names, then numbers. Blank lines do not count.
+    dialect : Dialect
+        How the file writes them.
+    wanted : sequence of str
+        Columns to read; others may hold anything.
 
     Returns
     -------
@@ -98,32 +86,40 @@ def read_table(path: str | PathLike[str], wanted: Sequence[str] | None = None) -
     Raises
     ------
     ExperimentError
-        As `read_header`, a column is missing, or a cell is no number (with its line, column and text).
+        A column is missing, or a cell is no number (with its line, column and text).
     """
-    header, delimiter = read_header(path)
-    names = list(header if wanted is None else wanted)
-    for name in names:
+    header = dialect.header
+    for name in wanted:
         if name not in header:
             raise missing_column(path, name, header)
-    if not any(line.strip() for line in islice(_first_lines(path, 1000), 1, None)):
+    if next(dialect.rows(path), None) is None:
         raise _error(path, f"{path} has a line of column names but no rows; record at least ten samples")
-    places = [header.index(name) for name in names]
+    places = [header.index(name) for name in wanted]
     try:
-        values = np.loadtxt(
-            path,
-            delimiter=delimiter,
-            skiprows=1,
-            usecols=places,
-            ndmin=2,
-            comments=None,
-            quotechar='"',
-            encoding=_ENCODING,
-        )
+        values = _numbers(path, dialect, places)
     except (ValueError, UnicodeDecodeError) as error:
-        problem = _diagnose(path, header, delimiter, places)
+        problem = _diagnose(path, dialect, places)
         raise problem or _error(path, f"{path} cannot be read as a table of numbers ({error})") from error
-    lines = _line_numbers(path, header, delimiter, len(values))
-    return Table(header, {name: values[:, at] for at, name in enumerate(names)}, lines)
+    lines = _line_numbers(path, dialect, len(values))
+    return Table(header, {name: values[:, at] for at, name in enumerate(wanted)}, lines)
+
+
+def _numbers(path: str | PathLike[str], dialect: Dialect, places: Sequence[int]) -> Array:
+    """Columns of numbers; a file with decimal commas is read through a text with points."""
+    source: str | PathLike[str] | Iterable[str] = path
+    if dialect.comma:
+        lines = Path(path).read_text(encoding=dialect.encoding).splitlines()
+        source = map(dialect.number, lines)
+    return np.loadtxt(
+        source,
+        delimiter=dialect.delimiter,
+        skiprows=dialect.skipped,
+        usecols=places,
+        ndmin=2,
+        comments=None,
+        quotechar='"',
+        encoding=dialect.encoding,
+    )
 
 
 def missing_column(path: str | PathLike[str], name: str, header: Sequence[str], channel: str = "") -> ExperimentError:
@@ -136,74 +132,49 @@ def missing_column(path: str | PathLike[str], name: str, header: Sequence[str], 
     )
 
 
-def _first_lines(path: str | PathLike[str], count: int) -> list[str]:
-    try:
-        with Path(path).open(encoding=_ENCODING, newline="") as file:
-            return list(islice(file, count))
-    except FileNotFoundError as error:
-        raise _error(path, f"{path} does not exist; check the name and the folder") from error
-    except UnicodeDecodeError as error:
-        raise _error(path, f"{path} is not a text file in UTF-8 (byte {error.start}); export the log as CSV") from error
-    except OSError as error:
-        raise _error(path, f"{path} cannot be read ({error.strerror}); give the path of a CSV file") from error
-
-
-def _line_numbers(path: str | PathLike[str], header: Sequence[str], delimiter: str, rows: int) -> NDArray[np.int64]:
+def _line_numbers(path: str | PathLike[str], dialect: Dialect, rows: int) -> NDArray[np.int64]:
     """Line of each row, once every line is known to have as many cells as the header.
 
     Counting delimiters takes no time; only where the counts differ, as in a table with quoted cells, is every row read.
     """
-    text = Path(path).read_bytes()
+    text, first = Path(path).read_bytes(), dialect.skipped
     letters = np.frombuffer(text if text.endswith(b"\n") else text + b"\n", dtype=np.uint8)
     ends = np.flatnonzero(letters == ord("\n"))
-    seen = np.cumsum(letters == ord(delimiter))[ends]
-    if ends.size == rows + 1 and np.all(np.diff(seen, prepend=0) == len(header) - 1):
-        return np.arange(2, rows + 2, dtype=np.int64)
-    problem = _diagnose(path, header, delimiter, ())
+    marks = np.flatnonzero(letters == ord(dialect.delimiter or " "))
+    seen = np.diff(np.searchsorted(marks, ends), prepend=0)
+    if dialect.delimiter and ends.size == rows + first and np.all(seen[first:] == len(dialect.header) - 1):
+        return np.arange(first + 1, rows + first + 1, dtype=np.int64)
+    problem = _diagnose(path, dialect, ())
     if problem is not None:
         raise problem
-    full = [at for at, line in enumerate(text.splitlines(), 1) if line.strip()]
-    return np.array(full[1 : rows + 1], dtype=np.int64)
+    return np.fromiter((number for number, _ in dialect.rows(path)), dtype=np.int64)[:rows]
 
 
-def _diagnose(
-    path: str | PathLike[str], header: Sequence[str], delimiter: str, places: Sequence[int]
-) -> ExperimentError | None:
+def _diagnose(path: str | PathLike[str], dialect: Dialect, places: Sequence[int]) -> ExperimentError | None:
     """Find the first row of the wrong length, or the first cell at `places` that is no number."""
     try:
-        with Path(path).open(encoding=_ENCODING, newline="") as file:
-            rows = csv.reader(file, delimiter=delimiter)
-            for row in rows:
-                if rows.line_num == 1 or not any(cell.strip() for cell in row):
-                    continue
-                problem = _row_problem(row, header, places)
-                if problem:
-                    return _error(path, f"{path}, line {rows.line_num}: {problem}")
+        for number, row in dialect.rows(path):
+            problem = _row_problem(row, dialect, places)
+            if problem:
+                return _error(path, f"{path}, line {number}: {problem}")
     except (UnicodeDecodeError, csv.Error) as error:
-        return _error(path, f"{path} is not a table in UTF-8 ({error}); export the log as CSV")
+        return _error(path, f"{path} is not a table ({error}); export the log as CSV")
     return None
 
 
-def _row_problem(row: Sequence[str], header: Sequence[str], places: Sequence[int]) -> str:
+def _row_problem(row: Sequence[str], dialect: Dialect, places: Sequence[int]) -> str:
+    header = dialect.header
     if len(row) != len(header):
         return f"there are {len(row)} cells where the header names {len(header)} columns; repair or delete the row"
     for place in places:
         cell = row[place].strip()
         if not cell:
             return f'the cell of column "{header[place]}" is empty; fill it or delete the row'
-        if not _is_number(cell):
-            comma = _is_number(cell.replace(",", ".", 1))
+        if not is_number(dialect.number(cell)):
+            comma = is_number(cell.replace(",", ".", 1))
             repair = "write decimal points" if comma else "write a number, or do not map this column"
             return f'"{cell}" in column "{header[place]}" is no number; {repair}'
     return ""
-
-
-def _is_number(cell: str) -> bool:
-    try:
-        float(cell)
-    except ValueError:
-        return False
-    return "_" not in cell  # Python reads 1_000, tables do not
 
 
 def _error(path: str | PathLike[str], message: str, *, channel: str | None = None) -> ExperimentError:

@@ -10,16 +10,17 @@ from vpm.experiment.table import Table, read_header, read_table
 
 
 class TextLog(Log):
-    """A line of column names, then numbers; see `vpm.experiment.table`."""
+    """A line of column names, then numbers; see `vpm.experiment.dialect`."""
 
     bracketed_units = True
 
     def __init__(self, path: str | PathLike[str]) -> None:
         self.path = path
-        self.header, _ = read_header(path)
+        self.dialect = read_header(path)
+        self.header = self.dialect.header
         self.refused: dict[str, str] = {}
-        self.units: dict[str, str] = {}
+        self.units = dict(zip(self.header, self.dialect.units, strict=False))
 
     def _read(self, columns: Sequence[str], clock: str) -> Table:  # noqa: ARG002
         """Columns by name; see `Log.read`."""
-        return read_table(self.path, columns)
+        return read_table(self.path, self.dialect, columns)
