@@ -186,6 +186,35 @@ def test_parquet_stamps_structures_and_missing_values(tmp_path: Path) -> None:
         Experiment.load(hole, table("stamp", "state.q"))
 
 
+@needs("pandas")
+def test_frames() -> None:
+    import pandas as pd
+
+    frame = pd.DataFrame({"t": TIME, "q": Q, "note": ["x"] * COUNT, "few": pd.array([1, None] * (COUNT // 2))})
+    check(Experiment.from_frame(frame, table("t", "q")))
+    clock = pd.Index(pd.Timestamp("2026-01-01 12:00") + pd.to_timedelta(TIME, unit="s"), name="clock")
+    dated = pd.DataFrame({("arm", "q"): Q, ("arm", "spare"): Q}, index=clock)
+    record = Experiment.from_frame(dated, table("clock", "arm.q"), name="day")
+    check(record)
+    assert (record.name, record.unused_columns) == ("day", ("arm.spare",))
+    plain = Experiment.from_frame(pd.DataFrame({"time": TIME, "q [mm]": Q}))
+    np.testing.assert_allclose(plain["q"], 1e-3 * Q)
+    for wrong, words in (
+        (table("t", "note"), '"note" for the channel "axis.position" holds .*, which is no number'),
+        (table("t", "few"), r'column "few" \(axis.position\) is nan at t = 0.01 s, the first of 30'),
+        (table("t", "Q"), 'frame has no column "Q" for the channel "axis.position"'),
+    ):
+        with pytest.raises(ExperimentError, match=words):
+            Experiment.from_frame(frame, wrong)
+    with pytest.raises(ExperimentError, match='two columns named "q"'):
+        Experiment.from_frame(pd.concat([frame, frame[["q"]]], axis=1), table("t", "q"))
+
+
+def test_what_is_no_frame_is_refused() -> None:
+    with pytest.raises(ExperimentError, match="frame is a list without columns; give a data frame with named ones"):
+        Experiment.from_frame([TIME, Q])  # type: ignore[arg-type]
+
+
 def test_mat_up_to_version_7_2(tmp_path: Path) -> None:
     path = tmp_path / "log.mat"
     savemat(

@@ -43,9 +43,9 @@ class Draft:
     unused: tuple[str, ...] = ()
 
 
-def mapped_draft(path: str | PathLike[str], table: Mapping[str, ChannelEntry], model: Model | None) -> Draft:
+def mapped_draft(log: Log, table: Mapping[str, ChannelEntry], model: Model | None) -> Draft:
     """Columns that a channel table names."""
-    log = open_log(path)
+    path = log.path
     present = _present_columns(path, table, log)
     content = log.read(list(present.values()), present["time"])
     source = Source(str(path), content.lines, str(path))
@@ -124,9 +124,9 @@ def _map_channel(
         draft.delays[channel] = entry.delay
 
 
-def plain_draft(path: str | PathLike[str]) -> Draft:
+def plain_draft(log: Log) -> Draft:
     """Every column a channel of its own name; a unit may stand in brackets behind it."""
-    log, names, clock = _plain_columns(path)
+    path, (names, clock) = log.path, _plain_columns(log)
     content = log.read(log.header, clock)
     source = Source(str(path), content.lines, str(path))
     factor, _ = to_si(names[clock][1] or "s", "time", None, str(path), expected="s")
@@ -155,7 +155,7 @@ def plain_table(path: str | PathLike[str], model: Model) -> dict[str, ChannelEnt
     """
     from vpm.model import ChannelEntry
 
-    _, names, clock = _plain_columns(path)
+    names, clock = _plain_columns(open_log(path))
     known = {
         name: (column, unit or model.channel_unit(name))
         for column, (name, unit) in names.items()
@@ -165,11 +165,10 @@ def plain_table(path: str | PathLike[str], model: Model) -> dict[str, ChannelEnt
     return {name: ChannelEntry(column=column, unit=unit) for name, (column, unit) in told.items()}
 
 
-def _plain_columns(path: str | PathLike[str]) -> tuple[Log, dict[str, tuple[str, str]], str]:
-    """A log without a channel table, name and unit of each of its columns, and which of these is the clock."""
-    log = open_log(path)
+def _plain_columns(log: Log) -> tuple[dict[str, tuple[str, str]], str]:
+    """Of a log without a channel table, name and unit of each column, and which of these is the clock."""
     names = {column: _stated(column, log) for column in log.header}
-    return log, names, _clock_column(path, names)
+    return names, _clock_column(log.path, names)
 
 
 def _clock_column(path: str | PathLike[str], names: Mapping[str, tuple[str, str]]) -> str:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from os import PathLike
-from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -18,6 +17,7 @@ from vpm.experiment.record import Experiment
 from vpm.numbers import array_of
 
 if TYPE_CHECKING:
+    from vpm.experiment.readers.base import Log
     from vpm.model import ChannelEntry, Model
 
 Array = NDArray[np.float64]
@@ -36,18 +36,18 @@ class Parts(NamedTuple):
 
 
 def load_parts(
-    path: str | PathLike[str],
+    log: Log,
     channels: Mapping[str, ChannelEntry] | str | PathLike[str] | None,
     model: Model | None,
     *,
     irregular: str,
     resample: float | None,
-    name: str | None,
+    name: str,
 ) -> Parts:
-    """Parts of the record in a file; see `Experiment.load`."""
+    """Parts of the record in a log; see `Experiment.load`."""
     table = _channel_table(channels, model)
-    draft = plain_draft(path) if table is None else mapped_draft(path, table, model)
-    return _finish(draft, name or Path(path).stem, irregular, resample)
+    draft = plain_draft(log) if table is None else mapped_draft(log, table, model)
+    return _finish(draft, name, irregular, resample)
 
 
 def array_parts(

@@ -32,6 +32,7 @@ from vpm.units import parse_unit
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from vpm.experiment.readers.frame import Frame
     from vpm.model import ChannelEntry, Model
 
 Array = NDArray[np.float64]
@@ -159,14 +160,51 @@ class Experiment(Result):
         if str(path).endswith(".npz"):
             return _read_from(path, super().load(path))
         from vpm.experiment.loading import load_parts
+        from vpm.experiment.readers import open_log
 
-        parts = load_parts(path, channels, model, irregular=irregular, resample=resample, name=name)
+        called = name or Path(path).stem
+        parts = load_parts(open_log(path), channels, model, irregular=irregular, resample=resample, name=called)
         return _read_from(path, cls(*parts))
 
     @cached_property
     def path(self) -> str | None:
         """File that the record was read from; None if it came another way or was changed since."""
         return None
+
+    @classmethod
+    def from_frame(
+        cls,
+        frame: Frame,
+        channels: Mapping[str, ChannelEntry] | str | PathLike[str] | None = None,
+        model: Model | None = None,
+        *,
+        name: str = "frame",
+        irregular: Literal["error", "interpolate"] = "error",
+        resample: float | None = None,
+    ) -> Self:
+        """Record from a data frame of pandas or polars, by a channel table and checked as a file is.
+
+        Parameters
+        ----------
+        frame : data frame
+            One row per sample; an index with a name is a column as well.
+        name : str
+        channels, model, irregular, resample
+            As in `load`.
+
+        Returns
+        -------
+        Experiment
+
+        Raises
+        ------
+        ExperimentError, UnitError
+        """
+        from vpm.experiment.loading import load_parts
+        from vpm.experiment.readers.frame import FrameLog
+
+        log = FrameLog(frame, name)
+        return cls(*load_parts(log, channels, model, irregular=irregular, resample=resample, name=name))
 
     @classmethod
     def from_arrays(
