@@ -14,6 +14,7 @@ import pytest
 from command_line import vpm
 from interrupting import running, spent, work
 from sledge import SLEDGE, pushed
+from vpm import __version__
 from vpm.demo import MODEL, TRAIN, VALIDATION
 from vpm.model import Model
 
@@ -29,6 +30,13 @@ def test_every_command_has_help_with_an_example(command: str) -> None:
     done = vpm(command, "--help")
     assert done.returncode == 0
     assert "Example:" in done.stdout
+
+
+def test_says_its_version_and_completes_words() -> None:
+    done = vpm("--version")
+    assert (done.returncode, done.stdout) == (0, f"vpm {__version__}\n")
+    command = [sys.executable, "-m", "vpm", "--show-completion", "bash"]
+    assert "complete" in subprocess.run(command, capture_output=True, text=True, check=True).stdout
 
 
 def test_info_lists_parameters_with_units() -> None:

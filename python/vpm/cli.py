@@ -93,9 +93,7 @@ def _with_picture(words: list[str]) -> list[str]:
 app = typer.Typer(
     cls=_Commands,
     name="vpm",
-    help="Virtual prototype models: simulate a robot, compare it with logs, identify it, and name what is missing.",
     no_args_is_help=True,
-    add_completion=False,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
@@ -106,6 +104,21 @@ app.command(epilog=diagnose_command.EXAMPLES)(diagnose_command.diagnose)
 app.command(epilog=rank_command.EXAMPLES)(rank_command.rank)
 app.command(epilog=prove_command.EXAMPLES)(prove_command.prove)
 detail_command.add_to(app)
+
+
+def _version(asked: bool) -> None:
+    if asked:
+        console.print(f"vpm {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    version: Annotated[
+        bool, typer.Option("--version", is_eager=True, callback=_version, help="Say which version this is.")
+    ] = False,
+) -> None:
+    """Virtual prototype models: simulate a robot, compare it with logs, identify it, and name what is missing."""
 
 
 def main() -> None:
