@@ -166,14 +166,14 @@ def test_a_pressure_ten_times_too_large_is_named_although_the_first_state_was_dr
     assert one.factor == pytest.approx(0.1)
 
 
-def held_slide(late: float = 0.02) -> tuple[vpm.Model, Columns]:
+def held_slide(duration: float = 8.0, late: float = 0.02) -> tuple[vpm.Model, Columns]:
     """A slide whose controller is drawn behind its reference, by Newton's law, with its own acceleration."""
     loop = (
         'type = "cascade", actuator = "drive", measures = "slide.position", position_gain = 10.0, velocity_gain = 5.0'
     )
     ruler = 'sensors.ruler = { measures = "slide.position" }'
     model = vpm.Model.from_toml(f"{SLIDE_FILE}{ruler}\ncontrollers.servo = {{ {loop} }}")
-    time = np.arange(0.0, 8.0, 0.002)
+    time = np.arange(0.0, duration, 0.002)
     way, rate = np.array([[0.1], [0.04]]), np.pi * np.array([[0.8], [2.2]])
     place, asked = (np.sum(way * np.sin(rate * (time + shift)), axis=0) for shift in (0.0, late))
     acceleration = np.sum(-way * rate**2 * np.sin(rate * time), axis=0)
@@ -207,6 +207,14 @@ def test_a_channel_that_no_observer_compares_is_judged_by_what_tells_it(channel:
     ((found, channels, repair),) = mistakes_of(model, scaled(channel, factor)(columns))
     assert (found, channels) == (kind, (channel,))
     assert repair == pytest.approx(1.0 / factor)
+
+
+def test_a_reference_is_judged_by_all_of_a_record() -> None:
+    model, columns = held_slide(20.0)
+    columns["drive.reference"][columns["time"] < 6.0] = 0.0  # the controller takes over late
+    assert not mistakes_of(model, columns)
+    (found,) = mistakes_of(model, scaled("drive.reference", 1e3)(columns))
+    assert found == ("unit", ("drive.reference",), pytest.approx(1e-3))
 
 
 def test_a_reference_that_is_hardly_followed_has_no_scale() -> None:

@@ -123,7 +123,7 @@ class _Check:
         inputs = tuple(name for name in model.input_channels if name in record)
         stretches = list(odd_stretches(record, outputs, inputs, self.settings))
         part = _beginning(record, outputs, self.settings)
-        left, found = self.judge.fitted(part), list[Finding]()
+        left, found, whole = self.judge.fitted(part), list[Finding](), record
         for _ in range(self.settings.rounds if len(part) >= self.settings.judged else 0):
             units = _units(model, record, table)
             explanations = Explainer(self.judge, units, self.each).explained(part, (*outputs, *inputs), left)
@@ -131,11 +131,11 @@ class _Check:
                 changed = one.correction.entries(table)
                 table = {**table, **changed}
                 found.append(_finding(one, units, changed, record.name, self.settings))
-                part, left = one.correction.applied(part), one.after
+                part, whole, left = one.correction.applied(part), one.correction.applied(whole), one.after
             if not explanations:
                 break
         units = _units(model, record, table)
-        for correction, related in wrong_scales(model, part, units, self.settings):
+        for correction, related in wrong_scales(model, whole, units, self.settings):
             found.append(_of_related(correction, related, units, correction.entries(table), record.name))
         tangent = self.judge.tangent(part, left)
         if tangent is not None and (unseen := self.judge.unseen(tangent)):
