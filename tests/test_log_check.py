@@ -213,8 +213,9 @@ def test_a_reference_is_judged_by_all_of_a_record() -> None:
     model, columns = held_slide(20.0)
     columns["drive.reference"][columns["time"] < 6.0] = 0.0  # the controller takes over late
     assert not mistakes_of(model, columns)
-    (found,) = mistakes_of(model, scaled("drive.reference", 1e3)(columns))
-    assert found == ("unit", ("drive.reference",), pytest.approx(1e-3))
+    ((kind, channels, factor),) = mistakes_of(model, scaled("drive.reference", 1e3)(columns))
+    assert (kind, channels) == ("unit", ("drive.reference",))
+    assert factor == pytest.approx(1e-3)
 
 
 def test_a_reference_that_is_hardly_followed_has_no_scale() -> None:
