@@ -58,6 +58,7 @@ def files(folder: Path) -> dict[str, bytes]:
                 file[name] = column
     if importlib.util.find_spec("rosbags"):
         _write_bags(folder)
+    _write_recorders(folder)
     return {path.suffix: path.read_bytes() for path in folder.glob("good.*")}
 
 
@@ -79,6 +80,22 @@ def _write_bags(folder: Path) -> None:
             for t, q in zip(columns()["time"], columns()["q"], strict=True):
                 new.write(sent, int(1e9 + 1e9 * t), two.serialize_cdr(two.types[kind](data=float(q)), kind))
         next(whole.glob(f"*.{ending}")).rename(folder / f"good.{ending}")
+
+
+def _write_recorders(folder: Path) -> None:
+    written = columns()
+    if importlib.util.find_spec("asammdf"):
+        from asammdf import MDF, Signal
+
+        with MDF(version="3.30") as mdf:  # in one of version 4, a chain of blocks that bites its tail never ends
+            mdf.append([Signal(written[name], written["time"], name=name) for name in ("q", "u")])
+            mdf.save(folder / "good")
+    if importlib.util.find_spec("nptdms"):
+        from nptdms import ChannelObject, TdmsWriter
+
+        with TdmsWriter(folder / "good.tdms") as tdms:
+            wave = {"wf_increment": 0.002, "wf_start_offset": 0.0}
+            tdms.write_segment([ChannelObject("run", name, written[name], wave) for name in ("q", "u")])
 
 
 def _irregular(dice: Random) -> Any:

@@ -61,7 +61,7 @@ def merge_clocks(
         raise ExperimentError(
             f'{source.name}: "{others[0]}" has {first.size} samples on a clock of its own and the clock of the record '
             f'{time.size}; load with irregular="interpolate", which brings all channels to one grid, or map channels '
-            "of one topic only",
+            "of one topic or group only",
             path=source.path,
             channel=others[0],
         )

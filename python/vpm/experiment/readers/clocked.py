@@ -1,0 +1,131 @@
+"""Files of channels in groups, each group with a clock of its own."""
+
+from __future__ import annotations
+
+import logging
+from abc import abstractmethod
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from os import PathLike
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vpm.errors import ExperimentError, UnitError
+from vpm.experiment.readers.base import Log
+from vpm.experiment.table import Table
+from vpm.units import parse_unit
+
+Array = NDArray[np.float64]
+
+#: The clock of whichever group is read.
+TIME = "time"
+
+
+class ClockedLog(Log):
+    """A file of groups with clocks.
+
+    A clock is one of `clocks`, or ``time``: that of the group with the most samples among those that are read.
+
+    Attributes
+    ----------
+    groups : mapping of str to str
+        Group of each column.
+    sizes : mapping of str to int
+        Number of samples of each group that has a clock.
+    clocks : mapping of str to str
+        Names of clocks, and the group of each; they are no channels.
+    remarks : tuple of str
+        Sentences about the whole file, for the history of the record.
+    """
+
+    groups: Mapping[str, str]
+    sizes: Mapping[str, int]
+    clocks: Mapping[str, str]
+    remarks: tuple[str, ...] = ()
+
+    def find(self, column: str) -> str | None:
+        """Name of a column or clock; see `Log.find`."""
+        return column if column in self.clocks else super().find(column)
+
+    def _read(self, columns: Sequence[str], clock: str) -> Table:
+        """Columns by name, each with the times of its own group; see `Log.read`."""
+        wanted = [column for column in columns if column != clock]
+        for column in wanted:
+            if column == TIME or column in self.clocks:
+                raise self.error(f'{self.path}: "{column}" is a clock and no channel; map it to time only')
+        base = self._base(wanted, clock)
+        times = {group: self.times(group) for group in dict.fromkeys([base, *(self.groups[c] for c in wanted)])}
+        found = {column: self.values(column) for column in wanted}
+        own = {column: times[self.groups[column]] for column in wanted}
+        for column in wanted:
+            promised, there = self.sizes[self.groups[column]], min(found[column].size, own[column].size)
+            if there != promised:
+                raise self.error(
+                    f'{self.path}: "{column}" should have {promised} samples, of which {there} are there; '
+                    "check that the file was closed when it was written, and copied whole"
+                )
+        notes = (f'The clock is that of "{base}".', *self.remarks)
+        return Table(self.header, {clock: times[base], **found}, None, frozenset({clock}), own, notes)
+
+    def _base(self, wanted: Sequence[str], clock: str) -> str:
+        """Group whose clock is that of the record."""
+        if clock in self.clocks:
+            return self.clocks[clock]
+        if clock != TIME:
+            some = ", ".join([TIME, *self.clocks][:4])
+            raise self.error(f'{self.path}: "{clock}" is a channel and no clock; map time to a clock: {some}')
+        names = dict.fromkeys(self.groups[column] for column in wanted) or self.sizes
+        return max(names, key=lambda group: self.sizes.get(group, 0))
+
+    @abstractmethod
+    def times(self, group: str) -> Array:
+        """Times of a group, s, counted from an instant that is the same for all groups."""
+
+    @abstractmethod
+    def values(self, column: str) -> Array:
+        """Numbers of a column."""
+
+
+def readable_unit(unit: str) -> bool:
+    """Whether a unit that a file states can be converted."""
+    try:
+        parse_unit(unit)
+    except UnitError:
+        return False
+    return bool(unit.strip())
+
+
+def broken(path: str | PathLike[str], kind: str, error: Exception | str) -> ExperimentError:
+    """Error for a file that its parser does not take.
+
+    Parameters
+    ----------
+    path : path-like
+    kind : str
+        As ``"an MDF file"``.
+    error : Exception or str
+        What the parser says.
+    """
+    told = str(error).strip().splitlines()
+    reason = (told[0] if told else type(error).__name__)[:200]
+    return ExperimentError(
+        f"{path} cannot be read as {kind} ({reason}); check that it was closed when it was written, and that its "
+        "ending says what it is",
+        path=str(path),
+    )
+
+
+@contextmanager
+def silent(library: str) -> Iterator[None]:
+    """Keep what a library writes to its loggers from the terminal; what matters is in an error or in the history."""
+    names = [name for name in logging.root.manager.loggerDict if name.partition(".")[0] == library]
+    loggers = [logging.getLogger(name) for name in names]
+    before = [logger.disabled for logger in loggers]
+    for logger in loggers:
+        logger.disabled = True
+    try:
+        yield
+    finally:
+        for logger, disabled in zip(loggers, before, strict=True):
+            logger.disabled = disabled
