@@ -1,4 +1,4 @@
-"""Logs of measurement systems: MDF, TDMS and ULog give the numbers that were written, or one sentence."""
+"""Logs of measurement systems: TDMS and ULog give the numbers that were written, or one sentence."""
 
 from __future__ import annotations
 
@@ -53,132 +53,6 @@ def check_merged(path: Path, mapped: dict[str, ChannelEntry], after: float = 0.0
     np.testing.assert_allclose(time[0], FAST[0], atol=1e-12)
     np.testing.assert_allclose(record["axis.position"], 1e-3 * np.sin(3.0 * time), atol=1e-3 * SPLINE)
     np.testing.assert_allclose(record["drive.command"], 2.0 * time, atol=1e-12)
-
-
-# ---- MDF -------------------------------------------------------------------------------------------------------------
-
-
-def write_mdf(path: Path, version: str = "4.10") -> Path:
-    from asammdf import MDF, Signal
-
-    states = {"val_0": 0, "text_0": "off", "val_1": 1, "text_1": "on"}
-    bit = (np.arange(COUNT) % 2).astype(np.uint8)
-    with MDF(version=version) as file:
-        file.append([
-            Signal(Q, TIME, name="q", unit="mm"),
-            Signal(bit, TIME, name="ramp", unit="-", conversion={"a": 2.0, "b": 1.0}),
-            Signal(bit, TIME, name="state", conversion=states),
-            Signal(np.array([b"slow"] * COUNT), TIME, name="note", encoding="utf-8"),
-        ])  # fmt: skip
-        file.append([Signal(U, FAST, name="u", unit="V"), Signal(U, FAST, name="twice")])
-        file.append([Signal(Q, TIME, name="twice")])
-        file.append([Signal(np.zeros(0), np.zeros(0), name="never")])
-        return Path(file.save(path)).rename(path)  # which ending it takes depends on the version
-
-
-@needs("asammdf")
-@pytest.mark.parametrize(("version", "ending"), [("4.10", "mf4"), ("4.10", "mdf"), ("3.30", "mdf"), ("2.14", "mdf")])
-def test_mdf(tmp_path: Path, version: str, ending: str) -> None:
-    path = write_mdf(tmp_path / f"log.{ending}", version)
-    for clock in ("time", "0.time"):
-        record = Experiment.load(path, table(clock, "q"))
-        check(record)
-    assert 'The clock is that of "0".' in record.history
-    assert "Read 60 rows" in record.history[0]
-    log = open_log(path)
-    assert log.header == ("time", "q", "ramp", "u", "1.twice", "2.twice")
-    assert log.units == {"q": "mm", "u": "V"}
-    ramp = Experiment.load(path, table("time", "q", ramp="ramp"))
-    np.testing.assert_array_equal(ramp["ramp"], 1.0 + 2.0 * (np.arange(COUNT) % 2))
-    check_merged(path, table("time", "q", **{"drive.command": "u"}))
-    for column, words in {
-        "state": r'"state" for the channel "axis\.position" holds text; map a channel of numbers',
-        "note": "holds text; map a channel of numbers",
-        "never": "has no samples; record it, or do not map it",
-        "twice": r'has no column "twice".*did you mean "[12]\.twice"',
-        "1.time": r'"1\.time" is a clock and no channel; map it to time only',
-    }.items():
-        with pytest.raises(ExperimentError, match=words):
-            Experiment.load(path, table("time", column))
-    with pytest.raises(ExperimentError, match=r'"u" is a channel and no clock; map time to a clock: time, 0\.time'):
-        Experiment.load(path, table("u", "q"))
-
-
-@needs("asammdf")
-def test_mdf_without_a_table_takes_units_from_the_file(tmp_path: Path) -> None:
-    from asammdf import MDF, Signal
-
-    with MDF() as file:
-        signals = [Signal(Q, TIME, name="q", unit="mm"), Signal(Q, TIME, name="speed", unit="furlong")]
-        file.append(signals)
-        file.append([Signal(Q, TIME, name="r", unit="deg")])
-        file.save(tmp_path / "log.mf4")
-    record = Experiment.load(tmp_path / "log.mf4")
-    assert (record.channels, record.units) == (("q", "speed", "r"), ("m", "1", "rad"))
-    np.testing.assert_allclose(record["q"], 1e-3 * Q, rtol=1e-12)
-    assert 'speed is column "speed", as it is, its unit is not stated.' in record.history
-
-
-@needs("asammdf")
-def test_mdf_samples_that_are_invalid_arrays_and_names_of_groups(tmp_path: Path) -> None:
-    from asammdf import MDF, Signal
-
-    path = tmp_path / "log.mf4"
-    invalid = np.arange(COUNT) == 7
-    matrix = np.rec.fromarrays([np.column_stack([Q, Q])], dtype=[("matrix", "(2,)<f8")])
-    with MDF() as file:
-        file.append([Signal(Q, TIME, name="q", invalidation_bits=invalid), Signal(Q, TIME, name="good")])
-        file.append([Signal(matrix, TIME, name="matrix")])
-        file.append([Signal(Q, TIME, name="good")], acq_name="arm")
-        file.save(path)
-    check(Experiment.load(path, table("time", "0.good")))
-    check(Experiment.load(path, table("time", "arm.good")))
-    with pytest.raises(ExperimentError, match=r'column "q" \(axis\.position\) is nan at t = 0\.07 s'):
-        Experiment.load(path, table("time", "q"))
-    with pytest.raises(ExperimentError, match=r'"matrix" .* is an array or a structure; record its elements'):
-        Experiment.load(path, table("time", "matrix"))
-
-
-@needs("asammdf")
-@pytest.mark.parametrize("version", ["4.10", "3.30"])
-def test_mdf_that_was_cut(tmp_path: Path, version: str) -> None:
-    whole = write_mdf(tmp_path / "log.mdf", version).read_bytes()
-    for share in (0.02, 0.3, 0.6, 0.95):
-        (tmp_path / "cut.mdf").write_bytes(whole[: int(share * len(whole))])
-        with pytest.raises(ExperimentError, match=r"cut\.mdf cannot be read as an MDF file") as caught:
-            Experiment.load(tmp_path / "cut.mdf", table("time", "q"))
-        assert "\n" not in str(caught.value)
-
-
-@needs("asammdf")
-@pytest.mark.parametrize(("version", "count"), [("4.10", (80, "<Q")), ("3.30", (22, "<I"))])
-def test_mdf_with_fewer_samples_than_it_promises(tmp_path: Path, version: str, count: tuple[int, str]) -> None:
-    """As when a file that is written from its front is cut: the count of a channel group is made larger."""
-    from asammdf import MDF, Signal
-
-    with MDF(version=version) as file:
-        file.append([Signal(Q, TIME, name="q")])
-        path = Path(file.save(tmp_path / "log")).rename(tmp_path / "log.mdf")
-    raw = bytearray(path.read_bytes())
-    with path.open("rb") as stream, MDF(stream) as file:
-        place = file.groups[0].channel_group.address + count[0]
-    assert struct.unpack_from(count[1], raw, place) == (COUNT,)
-    struct.pack_into(count[1], raw, place, 100_000)
-    path.write_bytes(raw)
-    with pytest.raises(ExperimentError, match=r'"q" should have 100000 samples, of which \d+ are there; check that'):
-        Experiment.load(path, table("time", "q"))
-
-
-@needs("asammdf")
-def test_mdf_whose_recorder_was_stopped(tmp_path: Path) -> None:
-    """Marked as unfinished, with the length of its last block of data to be completed (ASAM MDF 4.1, block ID)."""
-    path = write_mdf(tmp_path / "log.mf4")
-    raw = bytearray(path.read_bytes())
-    raw[:8] = b"UnFinMF "
-    struct.pack_into("<H", raw, 60, 1 << 2)
-    path.write_bytes(raw)
-    check(Experiment.load(path, table("time", "q")))
-    assert path.read_bytes() == raw
 
 
 # ---- TDMS ------------------------------------------------------------------------------------------------------------
@@ -347,8 +221,6 @@ def test_ulog_that_is_cut_or_damaged(tmp_path: Path, capsys: pytest.CaptureFixtu
 # ---- files that are not what they say --------------------------------------------------------------------------------
 
 FILES = [
-    ("x.mf4", "asammdf", "mdf"),
-    ("x.mdf", "asammdf", "mdf"),
     ("x.tdms", "nptdms", "tdms"),
     ("x.ulg", "pyulog", "ulog"),
 ]
@@ -362,7 +234,7 @@ def test_a_file_that_is_not_what_its_ending_says(tmp_path: Path, name: str, pack
     with pytest.raises(ExperimentError, match="does not exist; check the name"):
         Experiment.load(path)
     path.write_bytes(content)
-    with pytest.raises(ExperimentError, match=rf"{name} cannot be read as an? (MDF|TDMS|ULog) file.*; ") as caught:
+    with pytest.raises(ExperimentError, match=rf"{name} cannot be read as a (TDMS|ULog) file.*; ") as caught:
         Experiment.load(path)
     assert caught.value.path == str(path)
     assert "\n" not in str(caught.value)

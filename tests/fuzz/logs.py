@@ -84,12 +84,6 @@ def _write_bags(folder: Path) -> None:
 
 def _write_recorders(folder: Path) -> None:
     written = columns()
-    if importlib.util.find_spec("asammdf"):
-        from asammdf import MDF, Signal
-
-        with MDF(version="3.30") as mdf:  # in one of version 4, a chain of blocks that bites its tail never ends
-            mdf.append([Signal(written[name], written["time"], name=name) for name in ("q", "u")])
-            mdf.save(folder / "good")
     if importlib.util.find_spec("nptdms"):
         from nptdms import ChannelObject, TdmsWriter
 

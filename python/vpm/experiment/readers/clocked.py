@@ -103,7 +103,7 @@ def broken(path: str | PathLike[str], kind: str, error: Exception | str) -> Expe
     ----------
     path : path-like
     kind : str
-        As ``"an MDF file"``.
+        As ``"a TDMS file"``.
     error : Exception or str
         What the parser says.
     """
