@@ -118,7 +118,9 @@ def recorded(machine: Machine, true: vpm.Model, random: Generator, name: str) ->
     step, lead = machine.time_step, round(BEFORE / machine.time_step)
     samples = lead + round(machine.seconds / step)
     wanted = machine.start[:, None] + machine.way[:, None] * _motion(random, samples, step, len(machine.way))
-    start = dict(zip([f"{joint}.position" for joint in true.joints], machine.start.tolist(), strict=True))
+    driven = [joint for joint in true.joints if joint not in machine.swing]
+    start = dict(zip([f"{joint}.position" for joint in driven], machine.start.tolist(), strict=True))
+    start |= {f"{joint}.position": size * random.standard_normal() for joint, size in machine.swing.items()}
     sim = vpm.Simulation(true, step, integrator=EXACT, state=machine.first_state(true, start), compiled=True)
     channels = list(machine.noise)
     places, levels = [sim.channels.index(c) for c in channels], np.array(list(machine.noise.values()))

@@ -1,4 +1,4 @@
-"""Machines of the study of intervals: an axis, an arm that bends, a leg moved by a cylinder, and their effects."""
+"""Machines of the study of intervals: an axis, an arm that bends, a leg moved by a cylinder, a cart with a pendulum."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class Machine:
         The model file as a dictionary.
     effects : tuple of Effect
     start, way : ndarray, shape (joints,)
-        Middle and deviation of the motion, m or rad.
+        Middle and deviation of the motion of the joints that are driven, m or rad.
     command : callable
         Commands from errors and speeds of the joints (joints,).
     noise : mapping
@@ -61,6 +61,8 @@ class Machine:
         Deviation of what drives are not told but deliver, in units of the command.
     seconds, time_step : float
         Of the log, s.
+    swing : mapping
+        Deviation of the place at which joints begin that nobody measures, m or rad.
     """
 
     content: Callable[[], Content]
@@ -72,6 +74,7 @@ class Machine:
     command_noise: float
     seconds: float
     time_step: float
+    swing: Mapping[str, float] = field(default_factory=dict)
 
     def first_state(self, model: vpm.Model, start: Mapping[str, float]) -> Array:
         """At rest at the start."""
@@ -255,4 +258,56 @@ LEG = Machine(
     0.002,
 )
 
-MACHINES = {"axis": AXIS, "flexible_arm": FLEXIBLE_ARM, "leg": LEG}
+# ---- a cart under a motor with a pendulum of 0.9 Hz whose angle nobody measures --------------------------------------
+
+
+def cart() -> Content:
+    """A cart on a rail, and a pendulum that hangs from it."""
+    return {
+        "name": "cart",
+        "gravity": [0.0, 0.0, -9.81],
+        "bodies": {
+            "slide": {"mass": {"value": 4.0, "unit": "kg", "uncertainty": 0.4}},
+            "bob": {
+                "mass": {"value": 1.0, "unit": "kg", "uncertainty": 0.1},
+                "center_of_mass": [0.0, 0.0, -0.28],
+                "inertia": [0.008, 0.008, 0.001, 0.0, 0.0, 0.0],
+            },
+        },
+        "joints": {
+            "axis": {"type": "prismatic", "parent": "world", "child": "slide", "axis": [1.0, 0.0, 0.0]},
+            "pivot": {"type": "revolute", "parent": "slide", "child": "bob", "axis": [0.0, 1.0, 0.0]},
+        },
+        "actuators": {"drive": {"joint": "axis", "gain": 4.0, "command_unit": "A"}},
+        "sensors": {"encoder": {"measures": "axis.position"}},
+        "effects": [
+            {"type": "viscous_friction", "at": "axis", "viscous": {"value": 12.0, "uncertainty": 2.0}},
+            {"type": "coulomb_friction", "at": "axis", "coulomb": {"value": 4.0, "uncertainty": 0.5}},
+            {"type": "viscous_friction", "at": "pivot", "viscous": {"value": 0.02, "uncertainty": 0.004}},
+        ],
+    }
+
+
+CART = Machine(
+    cart,
+    (
+        Effect("bias_force", "axis", {"force": (1.0, 3.0)}),
+        Effect("spring", "axis", {"stiffness": (15.0, 60.0)}),
+        Effect("quadratic_drag", "axis", {"drag": (15.0, 40.0)}),
+        Effect("coulomb_friction", "pivot", {"coulomb": (0.02, 0.06)}, group="bearing"),
+        Effect("quadratic_drag", "pivot", {"drag": (0.01, 0.03)}, group="bearing"),
+        Effect("spring", "pivot", {"stiffness": (0.3, 1.0)}),
+        Effect("input_delay", "drive", {"time": (0.005, 0.015)}),
+        Effect("dead_zone", "drive", {"width": (0.2, 0.5)}),
+    ),
+    np.array([0.0]),
+    np.array([0.08]),
+    lambda error, speed: 300.0 * error - 12.0 * speed,
+    {"axis.position": 5e-6},
+    0.02,
+    8.0,
+    0.004,
+    {"pivot": 0.3},
+)
+
+MACHINES = {"axis": AXIS, "flexible_arm": FLEXIBLE_ARM, "leg": LEG, "cart": CART}

@@ -470,12 +470,14 @@ class System:
         strain_rate: ArrayLike | None = ...,
         strain_gain: ArrayLike | None = ...,
         first: int = ...,
+        departure: ArrayLike | None = ...,
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """Joints follow a measured motion (N, n), beams respond from rest; position sensors are undone.
 
         Joints in ``passive`` move freely with their effects, from rest; their columns of the motion mean nothing.
         A damper of ``strain_gain`` (gauges,), J s, between each gauge and its measured ``strain_rate`` (N, gauges),
         1/s, holds the beams; 0 for gauges that were not logged. Messages count samples from ``first`` on.
+        With a ``departure`` (2 n_coordinates,), coordinates then rates, what is free begins away from rest by that.
 
         Returns
         -------

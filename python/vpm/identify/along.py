@@ -19,7 +19,6 @@ from vpm.errors import CoreError, DivergedError, SimulationError
 from vpm.experiment import Experiment, Motion
 from vpm.identify.drive_answers import apart, driven, first_drives, needed, picked, together
 from vpm.identify.drive_memory import DriveMemory, Filter
-from vpm.identify.gauges import Hold
 from vpm.identify.hidden_motion import with_hidden
 from vpm.identify.reuse import Kept
 from vpm.initial import whole_motion
@@ -171,6 +170,7 @@ def respond(
     """
     from vpm._core import Diverged
 
+    near = kept or Kept()
     try:
         if has_own_drives(model) and not has_hidden(model, m.joints):
             remembered = memory or DriveMemory(lambda values: values[m.kept])
@@ -179,12 +179,11 @@ def respond(
             bare = _unsplit(Shape(model), m.joints)
             if bare is not None and shows_drives_alone(model, channels):
                 remembered = memory or DriveMemory(lambda values: values[m.kept])
-                return _with_known_drives(model, bare, theta, m, experiment, (columns, channels), remembered)
-            answer = _with_both(model, theta, m, experiment, columns, channels)
+                return _with_known_drives(model, bare, theta, m, experiment, (columns, channels), (remembered, near))
+            answer = _with_both(model, theta, m, experiment, (columns, channels), near)
         elif has_hidden(model, m.joints):
             remembered = memory or DriveMemory(lambda values: values[m.kept])
-            near = kept or Kept()
-            swing = partial(_swung, m=m, hold=near.hold)
+            swing = partial(_swung, m=m, known=near)
             return Response(*with_hidden(model, theta, m, (columns, channels), (remembered, near, origin), swing))
         else:
             answer = _rigid(model, theta, m, columns, channels)
@@ -272,16 +271,16 @@ def _with_known_drives(
     m: Motion,
     experiment: Experiment,
     wanted: tuple[Sequence[int], Sequence[str]],
-    memory: DriveMemory,
+    known: tuple[DriveMemory, Kept],
 ) -> Response:
     """Drives with states of their own on measured joints, behind which hang others that effects have split off."""
-    (bare, places), (columns, channels) = unsplit, wanted
+    (bare, places), (columns, channels), (memory, near) = unsplit, wanted, known
     own = {int(place): number for number, place in enumerate(places)}
     felt = [number for number, column in enumerate(columns) if column in own]
     asked = [own[columns[number]] for number in felt]
     outputs, by_drives = apart(bare, theta[places], m, experiment, (asked, channels), memory)
     effort = [model.output_channels.index(f"{joint}.effort") for joint in m.joints]
-    values, slopes = _hidden(model, theta, m, columns)
+    values, slopes = _hidden(model, theta, m, columns, near)
     required = memory.keep(values[:, effort])
     balance = np.zeros((*required.shape, len(columns)))
     if columns:
@@ -293,13 +292,19 @@ def _with_known_drives(
 
 
 def _with_both(
-    model: Model, theta: Array, m: Motion, experiment: Experiment, columns: Sequence[int], channels: Sequence[str]
+    model: Model,
+    theta: Array,
+    m: Motion,
+    experiment: Experiment,
+    wanted: tuple[Sequence[int], Sequence[str]],
+    known: Kept,
 ) -> Response:
     """Drives with states of their own on measured joints, behind which others hang that nobody measures.
 
     Such drives feel the measured motion alone: what they deliver does not depend on the hidden one.
     """
-    required, slopes = _hidden(model, theta, m, columns)
+    columns, channels = wanted
+    required, slopes = _hidden(model, theta, m, columns, known)
     whole = whole_motion(model, experiment, theta, m.cutoff)
     internal = first_drives(model, theta, m, experiment)
     outputs, jacobian = driven(model, theta, whole, experiment, columns, internal)
@@ -314,28 +319,32 @@ def _with_both(
     )
 
 
-def _swung(model: Model, theta: Array, columns: Sequence[int], m: Motion, hold: Hold | None) -> tuple[Array, Array]:
+def _swung(model: Model, theta: Array, columns: Sequence[int], m: Motion, known: Kept) -> tuple[Array, Array]:
     """As `_hidden`, with derivatives on fewer samples where gauges hold links: each costs as much as the outputs.
 
     What rings freely would lose its phase by that.
     """
-    every = int(1.0 / (SLOPE_SAMPLES * m.cutoff * m.dt))
+    every, hold = int(1.0 / (SLOPE_SAMPLES * m.cutoff * m.dt)), known.hold
     if not columns or hold is None or every < 2:
-        return _hidden(model, theta, m, columns, hold)
+        return _hidden(model, theta, m, columns, known)
     from scipy.interpolate import CubicSpline
 
-    outputs, _ = _hidden(model, theta, m, (), hold)
+    outputs, _ = _hidden(model, theta, m, (), known)
     quantities = ("position", "velocity", "acceleration", "time")
     few = replace(m, **{name: getattr(m, name)[::every] for name in quantities}, dt=every * m.dt)
-    _, slopes = _hidden(model, theta, few, columns, replace(hold, rate=hold.rate[::every]))
+    _, slopes = _hidden(model, theta, few, columns, Kept(replace(hold, rate=hold.rate[::every]), known.departure))
     grid, places = every * np.arange(len(few.time)), np.arange(len(m.time))
     return outputs, np.asarray(CubicSpline(grid, slopes)(np.minimum(places, grid[-1])))
 
 
-def _hidden(
-    model: Model, theta: Array, m: Motion, columns: Sequence[int], hold: Hold | None = None
-) -> tuple[Array, Array]:
-    """Outputs along the motion of the measured joints, all else free or held by gauges, and their derivative."""
+def _hidden(model: Model, theta: Array, m: Motion, columns: Sequence[int], known: Kept) -> tuple[Array, Array]:
+    outputs, _, jacobian = guided(model, theta, m, columns, known)
+    return outputs, jacobian
+
+
+def guided(model: Model, theta: Array, m: Motion, columns: Sequence[int], known: Kept) -> tuple[Array, Array, Array]:
+    """Outputs along the motion of the measured joints, all else free or held by gauges, states, and derivative."""
+    hold, coordinates = known.hold, len(model.coordinates)
     setup = Setup()
     measured = [place for place, joint in enumerate(model.joints) if joint in m.joints]
     passive = [place for place in range(len(model.joints)) if place not in measured]
@@ -345,6 +354,7 @@ def _hidden(
     method = "linearly_implicit" if has_own_drives(model) else setup.method(model, guided=True)
     plays = any(effect.type.has_play for effect in model.effects)
     substeps = max(setup.substeps, math.ceil(m.dt / IN_PLAY - 1e-6)) if plays else setup.substeps
-    stepping = (m.dt, substeps, method, list(columns), passive, *(hold.arguments(model) if hold else ()))
-    outputs, _, jacobian = model.core.simulate_prescribed(theta, motion[0], motion[1], motion[2], *stepping)
-    return outputs, jacobian
+    strains = hold.arguments(model) if hold else (None, None)
+    stepping = (m.dt, substeps, method, list(columns), passive, *strains, 0, known.departure)
+    outputs, states, jacobian = model.core.simulate_prescribed(theta, motion[0], motion[1], motion[2], *stepping)
+    return outputs, states[:, : 2 * coordinates], jacobian

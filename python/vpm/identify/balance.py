@@ -6,13 +6,15 @@ from collections.abc import Sequence
 from copy import copy
 from dataclasses import replace
 from functools import partial
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vpm.errors import DivergedError, IdentificationError
 from vpm.experiment import Experiment, Motion
-from vpm.identify.along import Response, bends, check_along, has_own_drives, respond, shown_channels
+from vpm.identify.along import Response, bends, check_along, guided, has_own_drives, respond, shown_channels
+from vpm.identify.beginning import BegunAnywhere
 from vpm.identify.counted import Counted, settled
 from vpm.identify.drive_memory import DriveMemory
 from vpm.identify.gauges import gauge_gains, hold_of
@@ -31,7 +33,7 @@ Array = NDArray[np.float64]
 LONG_STEPS, ROUGH = "linearly_implicit", 1e-3
 
 
-class InverseDynamicsProblem:
+class InverseDynamicsProblem(BegunAnywhere):
     """Balance of effort at each joint: what the actuators deliver minus what the measured motion needs.
 
     Both sides, and so the regressor's columns, pass the same zero-phase low-pass and decimation: the parallel
@@ -92,7 +94,7 @@ class InverseDynamicsProblem:
         self._memories = tuple(DriveMemory(m.parallel, integrator) for m in self.motions)
         self._compared = tuple(self._measured(m, e) for m, e in zip(self.motions, self.experiments, strict=True))
         self._gains = self._hold_gains(model)
-        self._kept = self._held(self.experiments, self.motions)
+        self._kept = self._held(self.experiments, self.motions, None)
         self.workers = 1
         self.blocks = self._lay_out(model)
         #: What is left at the true values, as far as that is known; see `vpm.identify.own_simulation`.
@@ -117,7 +119,7 @@ class InverseDynamicsProblem:
             _whole=tuple(replace(m, edge=0) for m in motions),
             _memories=tuple(memories),
             _compared=tuple(self._measured(m, e) for m, e in pairs),
-            _kept=self._held(experiments, motions),
+            _kept=self._held(experiments, motions, self.departures),
         )
         return same
 
@@ -172,7 +174,7 @@ class InverseDynamicsProblem:
         for measured, answer in zip(self._compared, in_order(jobs, self.workers), strict=True):
             residuals.append(np.hstack([(answer.applied - answer.required)[:, self._joints], measured - answer.seen]))
             jacobians.append(-np.concatenate([answer.balance[:, self._joints], answer.slopes], axis=1))
-        return self._stack(residuals) - self.expected, self._stack(jacobians)
+        return self._left(self._stack(residuals)) - self.expected, self._left(self._stack(jacobians))
 
     def _hold_gains(self, model: Model) -> dict[str, float]:
         """How firmly gauges hold links, the same for all records and for all models that are compared."""
@@ -182,8 +184,33 @@ class InverseDynamicsProblem:
         middle = np.array([m.position[:, names.index(j)].mean() if j in names else 0.0 for j in model.joints])
         return gauge_gains(model, self.experiments, middle)
 
-    def _held(self, experiments: Sequence[Experiment], motions: Sequence[Motion]) -> tuple[Kept, ...]:
-        return tuple(Kept(hold_of(self._gains, e, m)) for e, m in zip(experiments, motions, strict=True))
+    def _held(
+        self, experiments: Sequence[Experiment], motions: Sequence[Motion], departures: Array | None
+    ) -> tuple[Kept, ...]:
+        holds = (hold_of(self._gains, e, m) for e, m in zip(experiments, motions, strict=True))
+        begun = [None] * len(motions) if departures is None else departures
+        return tuple(Kept(hold, departure) for hold, departure in zip(holds, begun, strict=True))
+
+    def begun(self, departures: Array | None) -> Self:
+        """See :class:`BegunAnywhere`; by coordinates, then rates."""
+        same = super().begun(departures)
+        vars(same).update(_kept=self._held(self.experiments, self.motions, departures))
+        return same
+
+    def open_states(self, model: Model) -> tuple[Array, int]:
+        """Of joints that nobody measures, and of links that no gauge holds; see :class:`BegunAnywhere`."""
+        coordinates, joints = len(model.coordinates), self.motions[0].joints
+        free = np.array([joint not in joints for joint in model.joints] + [not self._gains] * model.core.n_elastic)
+        sizes = np.zeros(2 * coordinates)
+        if np.any(free):
+            for record in range(len(self.motions)):
+                sizes = np.maximum(sizes, np.std(self.hidden_states(model, record), axis=0))
+            sizes = np.where(np.tile(free, 2), np.where(sizes > 0.0, sizes, 1.0), 0.0)
+        return sizes, len(self.motions)
+
+    def hidden_states(self, model: Model, record: int) -> Array:
+        """Coordinates, then rates (N, 2 coordinates), along one record."""
+        return guided(model, model.theta, self._whole[record], (), self._kept[record])[1]
 
     def share(self, whole: Model, others: Sequence[tuple[Model, Sequence[str]]]) -> None:
         """Let ``others`` take how links bend from ``whole``, which moves as they do; see `vpm.identify.reuse.Kept`.

@@ -1,56 +1,88 @@
 """First states that nobody measured well enough, beside the parameters of a fit.
 
 A simulation begins where a log suggests: at the first samples, which are noisy, with links, oil and loads at rest,
-which they need not be. What first states can do to the outputs is a linear space, to first order. Projected off it, the
-residual says of the parameters what it says whatever the first states are (variable projection: G. Golub and V.
-Pereyra, *SIAM J. Numerical Analysis* 10, 1973), and the covariance of the parameters is that beside unknown first
-states.
+which they need not be. So does what is worked out along a measured motion, such as a joint without an encoder. What
+first states can do to a residual is a linear space, to first order. Projected off it, the residual says of the
+parameters what it says whatever the first states are (variable projection: G. Golub and V. Pereyra, *SIAM J. Numerical
+Analysis* 10, 1973), and the covariance of the parameters is that beside unknown first states. So that first order is
+enough, the records begin where the first states are likeliest (L. Kaufman, *BIT* 15, 1975).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
+from typing import Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vpm.identify.objective import AnyProblem
-from vpm.identify.output_error import WHOLE, OutputErrorProblem
+from vpm.errors import DivergedError
+from vpm.identify.problem import Block
 from vpm.identify.settings import Checks
-from vpm.identify.shooting import ShootingProblem
-from vpm.identify.whiteness import basis, explained_by, explained_size
+from vpm.identify.whiteness import DEPENDENT, basis, explained_by, explained_size
 from vpm.model import Model
 
 Array = NDArray[np.float64]
 
+#: Share of a state's size by which it is moved to find the derivative; errors of the difference are its square.
+DIFFERENCE = 1e-5
+#: Steps towards the likeliest first states, and shares of each that are tried.
+STEPS, SHARES = 8, (1.0, 0.5, 0.25, 0.125)
+#: Shares of the records from which first states are sought one after the other: what begins far from where it is taken
+#: to be soon runs out of step.
+HORIZONS = (0.125, 0.25, 0.5, 1.0)
+#: A step that lowers the sum of squares by less than this share is the last.
+SETTLED = 1e-3
 
-class BegunAnywhere(OutputErrorProblem):
-    """Output errors of whole records, less what any first states would explain of them.
 
-    Parameters
-    ----------
-    data : OutputErrorProblem
-    slopes : ndarray, shape (n, k)
-        Derivative of the residual by first states.
-    """
+class BegunAnywhere:
+    """A problem whose records may begin elsewhere than their logs suggest."""
 
-    def __init__(self, data: OutputErrorProblem, slopes: Array) -> None:
-        vars(self).update(vars(data))
-        self._space = basis(slopes)
+    mode: str
+    blocks: tuple[Block, ...]
+    #: By how much first states differ from those that the logs suggest (records, states), if they do.
+    departures: Array | None = None
+    #: Orthonormal basis (n, k) of what unknown first states can do to the residual.
+    _space: Array | None = None
 
     def evaluate(self, model: Model, theta: Array, columns: Sequence[int] = ()) -> tuple[Array, Array]:
-        """Residual and its derivative beside unknown first states; see :class:`Problem`."""
-        residual, jacobian = super().evaluate(model, theta, columns)
-        if not np.all(np.isfinite(residual)):
-            return residual, jacobian
-        return self._left(residual), self._left(jacobian)
+        """See `vpm.identify.problem.Problem`."""
+        raise NotImplementedError
+
+    def open_states(self, model: Model) -> tuple[Array, int]:
+        """Sizes of the first states (states,) that no log tells, 0 for those that one does; number of records."""
+        raise NotImplementedError
+
+    def begun(self, departures: Array | None) -> Self:
+        """The same from other first states, which are taken for known."""
+        same = copy(self)
+        vars(same).update(departures=departures, _space=None)
+        return same
+
+    def beside(self, slopes: Array) -> Self:
+        """The same beside unknown first states, by which the residual has these slopes (n, k)."""
+        same = copy(self)
+        vars(same).update(_space=basis(slopes) if slopes.shape[1] else None)
+        return same
+
+    @property
+    def unknown(self) -> int:
+        """Unknown first states that show."""
+        return 0 if self._space is None else self._space.shape[1]
 
     def _left(self, values: Array) -> Array:
-        return values - self._space @ (self._space.T @ values)
+        """What no first states explain of a residual (n,) or its derivative (n, columns)."""
+        if self._space is None or not np.all(np.isfinite(values)):
+            return values
+        return np.asarray(values - self._space @ (self._space.T @ values))
 
 
-def first_state_derivative(model: Model, data: AnyProblem) -> Array:
-    """Derivative of the residual by all first states of all records, (n, k); no columns in other modes.
+AnyBegun = TypeVar("AnyBegun", bound=BegunAnywhere)
+
+
+def first_state_derivative(model: Model, data: BegunAnywhere) -> Array:
+    """Derivative of the residual by all open first states of all records, (n, records * k).
 
     Parameters
     ----------
@@ -58,36 +90,108 @@ def first_state_derivative(model: Model, data: AnyProblem) -> Array:
         At which values.
     data : problem
     """
-    if type(data) is not OutputErrorProblem or data.mode not in WHOLE:
-        return np.zeros((data.blocks[-1].samples.stop, 0))
-    channels = tuple(dict.fromkeys(block.channel for block in data.blocks))
-    begun = ShootingProblem(
-        model,
-        data.experiments,
-        data.mode,
-        states=model.state_names,
-        channels=channels,
-        setup=data.setup,
-        workers=data.workers,
-    )
-    slopes = begun.evaluate(model, model.theta)[1]
-    return slopes if np.all(np.isfinite(slopes)) else slopes[:, :0]
+    sizes, records = data.open_states(model)
+    places = np.flatnonzero(sizes)
+    known = _departures(data, sizes, records)
+    slopes = np.zeros((data.blocks[-1].samples.stop, records, places.size))
+    for column, place in enumerate(places):
+        sides = []
+        for sign in (1.0, -1.0):
+            moved = known.copy()
+            moved[:, place] += sign * DIFFERENCE * sizes[place]
+            sides.append(_residual(model, data.begun(moved)))
+        slope = (sides[0] - sides[1]) / (2.0 * DIFFERENCE * sizes[place])
+        if not np.all(np.isfinite(slope)):
+            return slopes[:, 0, :0]
+        for number, block in enumerate(data.blocks):  # the blocks of one record after those of another
+            slopes[block.samples, number * records // len(data.blocks), column] = slope[block.samples]
+    return slopes.reshape(len(slopes), records * places.size)
 
 
-def matters(data: AnyProblem, residual: Array, jacobian: Array, slopes: Array, checks: Checks) -> bool:
+def begun_likeliest(model: Model, data: AnyBegun) -> AnyBegun:
+    """The problem beside unknown first states, begun where these leave least at a model's values.
+
+    Parameters
+    ----------
+    model : Model
+    data : problem
+    """
+    horizons = HORIZONS if data.departures is None else HORIZONS[-1:]
+    data = data.begun(_departures(data, *data.open_states(model)))
+    for share in horizons:
+        data = _nearer(model, data, _early(data, share))
+    return data.beside(first_state_derivative(model, data))
+
+
+def begun_again(model: Model, data: AnyBegun) -> AnyBegun:
+    """The same for other records, if it is beside unknown first states: what filters do to the ends is in these."""
+    return begun_likeliest(model, data) if data.unknown else data
+
+
+def _nearer(model: Model, data: AnyBegun, early: Array) -> AnyBegun:
+    """The problem begun where this leaves least of its early rows (n,), by the method of Gauss and Newton."""
+    (sizes, records), residual = data.open_states(model), early * _residual(model, data.begun(data.departures))
+    places = np.flatnonzero(sizes)
+    for _ in range(STEPS if np.all(np.isfinite(residual)) else 0):
+        step = np.zeros((records, sizes.size))
+        slopes = early[:, None] * first_state_derivative(model, data)
+        if not slopes.shape[1]:
+            break
+        step[:, places] = -_solved(slopes, residual).reshape(records, places.size)
+        for share in SHARES:
+            tried = data.begun(_departures(data, sizes, records) + share * step)
+            left = early * _residual(model, tried)
+            if left @ left < residual @ residual:
+                break
+        else:
+            break
+        near = left @ left > (1.0 - SETTLED) * (residual @ residual)
+        data, residual = tried, left
+        if near:
+            break
+    return data
+
+
+def _early(data: BegunAnywhere, share: float) -> Array:
+    """1 for the first of the rows (n,) that count of each record, until these are a share of them."""
+    counted = [np.cumsum(block.moving > 0.0) for block in data.blocks]
+    return np.concatenate([number <= share * number[-1] for number in counted]).astype(np.float64)
+
+
+def _solved(slopes: Array, residual: Array) -> Array:
+    """Least squares along directions that show."""
+    lengths = np.linalg.norm(slopes, axis=0)
+    lengths[lengths == 0.0] = 1.0
+    return np.asarray(np.linalg.lstsq(slopes / lengths, residual, rcond=DEPENDENT)[0] / lengths)
+
+
+def _departures(data: BegunAnywhere, sizes: Array, records: int) -> Array:
+    return np.zeros((records, sizes.size)) if data.departures is None else data.departures
+
+
+def _residual(model: Model, data: BegunAnywhere) -> Array:
+    """Infinite where the machine leaves the finite numbers."""
+    try:
+        return data.evaluate(model, model.theta)[0]
+    except (DivergedError, ValueError):
+        return np.full(data.blocks[-1].samples.stop, np.inf)
+
+
+def matters(model: Model, data: BegunAnywhere, residual: Array, jacobian: Array, checks: Checks) -> bool:
     """Whether first states other than the supposed ones explain what no parameter does, and enough of it to be seen.
 
     Parameters
     ----------
+    model : Model
+        As fitted.
     data : problem
     residual : ndarray, shape (n,)
     jacobian : ndarray, shape (n, p)
         By the parameters.
-    slopes : ndarray, shape (n, k)
-        By the first states.
     checks : Checks
         ``begun`` is the probability of a yes where the supposed ones are right.
     """
+    slopes = first_state_derivative(model, data)
     if not slopes.shape[1] or not np.all(np.isfinite(residual)):
         return False
     chances, seen = [], []

@@ -14,7 +14,7 @@ from scipy.special import ndtri, stdtrit
 from vpm.errors import IdentificationError, VpmError
 from vpm.experiment import Experiment, as_records, joints_from_shafts
 from vpm.identify.balance import InverseDynamicsProblem
-from vpm.identify.beginning import BegunAnywhere, first_state_derivative, matters
+from vpm.identify.beginning import BegunAnywhere, begun_likeliest, matters
 from vpm.identify.comparison import comparison
 from vpm.identify.engine import Found, fit_problem
 from vpm.identify.estimation import Estimate, Progress, blinded, estimate, limits
@@ -23,7 +23,6 @@ from vpm.identify.missing import missing_effects, whiteness
 from vpm.identify.moments import on_the_border
 from vpm.identify.noise_left import Noise, noisy
 from vpm.identify.objective import AnyProblem
-from vpm.identify.output_error import OutputErrorProblem
 from vpm.identify.own_simulation import Own, own_residual
 from vpm.identify.prediction_error import PredictionErrorProblem
 from vpm.identify.problem import gaps
@@ -31,7 +30,7 @@ from vpm.identify.remarks import constant_channels, contradictions, lost_channel
 from vpm.identify.sandwich import freedom, pooled, record_groups, sandwich
 from vpm.identify.settings import Checks, Fitting, OwnSimulation
 from vpm.identify.shooting import ShootingProblem
-from vpm.identify.ties import TiedProblem, check_ties
+from vpm.identify.ties import TiedProblem, Untied, check_ties
 from vpm.identify.whiteness import Whiteness
 from vpm.model import Model
 from vpm.one_thread import in_one_thread
@@ -51,8 +50,8 @@ FOLLOWING = frozenset({"inverse_dynamics", "prescribed_motion", "input_error"})
 RENEWALS, SETTLED = 4, 0.1
 #: Times that a fit beside unknown first states is begun again with what these do at its values, unless it has settled.
 ROUNDS = 8
-#: What `Fit.first_states` says where no log says them.
-UNKNOWN = "unknown"
+#: What `Fit.first_states` says where no log says them, and where they still moved in the last round.
+UNKNOWN, UNSETTLED = "unknown", "unsettled"
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -97,8 +96,12 @@ class Fit(Result):
     ended : str
         ``"converged"``, ``"evaluations"`` or ``"interrupted"``; empty for a fit without `Fitting`.
     first_states : str
-        ``"unknown"`` where the first states that the log suggests contradict the rest of it: the fit leaves them open,
-        to first order. Empty where they hold or are fitted.
+        ``"unknown"`` where nobody measured them, as those of joints without an encoder in a balance of effort, or where
+        those that the log suggests contradict the rest of it: the fit leaves them open. ``"unsettled"`` where it did
+        not find them. Empty where they hold or are fitted.
+    departures : ndarray, shape (records, states)
+        By how much unknown first states are likeliest to differ from those that the log suggests; in a balance of
+        effort those of coordinates, then rates, from a rest. Empty where none are unknown.
     expected : ndarray, shape (n,)
         What a balance of effort leaves of the model's own simulation, which was taken off. Empty where no simulation
         stays by the records: intervals then know nothing of what filters do where friction turns round.
@@ -130,6 +133,7 @@ class Fit(Result):
     evaluations: int = 0
     ended: str = ""
     first_states: str = ""
+    departures: Array = field(default_factory=lambda: np.zeros((0, 0)))
     expected: Array = field(default_factory=lambda: np.zeros(0))
     setup: Setup | None = None
     fitting: Fitting | None = None
@@ -249,21 +253,20 @@ def identify(
     check_ties(model, ties or {}, names)
     data = _with_own_gains(model, data, names, tolerance)
     before, _ = data.evaluate(model, model.theta)
-    own: Own | None = None
+    data = beside_first_states(model, data, ties or {})
     if fitting is None:
         best = estimate(model, data, names, tolerance=tolerance, progress=progress, feasible=True)
-        data, best, begun = _from_anywhere(model, data, best, tolerance, checks or Checks(), ties or {})
 
         def onward(fitted: Model, less: AnyProblem, _: Estimate) -> Estimate:
             return estimate(fitted, less, names, tolerance=tolerance, feasible=True)
 
+        data, best, settled = _from_anywhere(model, data, best, onward, ties or {}, checks or Checks())
         data, best, own = _beside_own(model, data, best, onward, ties or {})
         result = _with_intervals(data, best)
         weights = np.ones(len(result.residual))
         whole = replace(result, residual=result.residual + _expected(data))
         fit = fit_of(model, data, whole, before, [e.name for e in records], ties or {})
         fit = replace(fit, evaluations=result.evaluations, ended="interrupted" if result.interrupted else "")
-        fit = replace(fit, first_states=UNKNOWN if begun else "")
     else:
         check_bounds(names, fitting)
         engine = partial(_by_engine, model, names, limits(model, names, fitting.bounds), fitting, tolerance)
@@ -272,7 +275,8 @@ def identify(
         def again(_: Model, less: AnyProblem, near: _Engineered) -> _Engineered:
             return engine(less, near=near)
 
-        data, found, own = _beside_own(model, data, first, again, ties or {})
+        data, found, settled = _from_anywhere(model, data, first, again, ties or {})
+        data, found, own = _beside_own(model, data, found, again, ties or {})
         result, weights = found, found.found.weights
         whole = replace(result, residual=result.residual + _expected(data))
         fit = fit_of(model, data, whole, before, [e.name for e in records], ties or {})
@@ -283,9 +287,12 @@ def identify(
     fit = replace(fit, setup=setup, fitting=fitting, ties=dict(ties or {}), whiteness=judged)
     slopes = result.jacobian[: data.blocks[-1].samples.stop]
     lengths = column_lengths(slopes)
-    decided = freedom(slopes / lengths, data.blocks, len(names) + len(fit.states))[: len(names)]
-    fit = replace(fit, freedom=decided)
-    if own is not None and not (fitting and fitting.priors):  # what is known beforehand no noise of records moves
+    decided = freedom(slopes / lengths, data.blocks, len(names) + len(fit.states) + _unknown(data))[: len(names)]
+    alike = own is None or own.alike
+    fit = replace(_with_first_states(fit, data, settled and alike), freedom=decided)
+    if (
+        own is not None and alike and not (fitting and fitting.priors)
+    ):  # what is known beforehand no noise of records moves
         fit = _with_noise(fit, data, slopes / lengths, lengths, own.noise, weights[: len(slopes)])
     return replace(fit, warnings=_told(model, records, data, fit, checks or Checks()))
 
@@ -318,26 +325,67 @@ def _by_engine(
     return _Engineered(names, found.values, *what, found=found)
 
 
+def _untied(data: AnyProblem) -> Untied:
+    """The problem behind ties."""
+    return data.untied if isinstance(data, TiedProblem) else data
+
+
+def beside_first_states(model: Model, data: AnyProblem, ties: Mapping[str, str]) -> AnyProblem:
+    """A balance beside the first states of what moves along the motion that nobody measured; others as they are.
+
+    Parameters
+    ----------
+    model : Model
+        At whose values these are the likeliest.
+    data : problem
+    ties : mapping of str to str
+    """
+    plain = _untied(data)
+    if not isinstance(plain, InverseDynamicsProblem) or not np.any(plain.open_states(model)[0]):
+        return data
+    begun = begun_likeliest(model, plain)
+    return TiedProblem(begun, ties) if ties else begun
+
+
+def _unknown(data: AnyProblem) -> int:
+    """How many unknown first states a fit is beside."""
+    plain = _untied(data)
+    return plain.unknown if isinstance(plain, BegunAnywhere) else 0
+
+
+def _with_first_states(fit: Fit, data: AnyProblem, settled: bool) -> Fit:
+    """The same with what it knows of unknown first states."""
+    plain = _untied(data)
+    if not isinstance(plain, BegunAnywhere) or plain.departures is None:
+        return fit
+    return replace(fit, first_states=UNKNOWN if settled else UNSETTLED, departures=plain.departures)
+
+
 def _from_anywhere(
-    model: Model, data: AnyProblem, best: Estimate, tolerance: float, checks: Checks, ties: Mapping[str, str]
-) -> tuple[AnyProblem, Estimate, bool]:
-    """The fit beside unknown first states, where those that the log suggests are wrong; and whether they are."""
-    plain = data.untied if isinstance(data, TiedProblem) else data
-    if best.interrupted or not isinstance(plain, OutputErrorProblem):
-        return data, best, False
-    fitted = _moved(model, best, ties)
-    slopes = first_state_derivative(fitted, plain)
-    if not matters(data, best.residual, best.jacobian, slopes, checks):
-        return data, best, False
+    model: Model,
+    data: AnyProblem,
+    best: AnyEstimate,
+    onward: Callable[[Model, AnyProblem, AnyEstimate], AnyEstimate],
+    ties: Mapping[str, str],
+    checks: Checks | None = None,
+) -> tuple[AnyProblem, AnyEstimate, bool]:
+    """The fit beside unknown first states, begun again where they are likeliest at its values, and whether it settled.
+
+    Where logs suggest them, they are unknown if ``checks`` find them wrong.
+    """
+    plain, fitted = _untied(data), _moved(model, best, ties)
+    if best.interrupted or not isinstance(plain, BegunAnywhere):
+        return data, best, True
+    if not plain.unknown and not (checks and matters(fitted, plain, best.residual, best.jacobian, checks)):
+        return data, best, True
     for _ in range(ROUNDS):
-        before, begun = best.values, BegunAnywhere(plain, slopes)
-        data = TiedProblem(begun, ties) if ties else begun
-        best = estimate(fitted, data, best.names, tolerance=tolerance, feasible=True)
+        before, plain = best.values, begun_likeliest(fitted, plain)
+        data = TiedProblem(plain, ties) if ties else plain
+        best = onward(fitted, data, best)
         fitted, seen = _moved(model, best, ties), np.isfinite(best.std)
         if best.interrupted or np.all(np.abs(best.values - before)[seen] <= SETTLED * best.std[seen]):
-            break
-        slopes = first_state_derivative(fitted, plain)
-    return data, best, True
+            return data, best, True
+    return data, best, False
 
 
 def _beside_own(
@@ -350,16 +398,18 @@ def _beside_own(
     """The fit of a balance of effort less what it leaves of the model's own simulation, where that can be told.
 
     It goes ``onward`` from the fitted model and its estimate.
-    What the records do not show a correction would move without end. With it comes the last simulation.
+    What the records do not show a correction would move without end. With it comes the last simulation, or one that is
+    not like the records.
     """
-    plain = data.untied if isinstance(data, TiedProblem) else data
+    plain = _untied(data)
     last: Own | None = None
     if best.interrupted or not isinstance(plain, InverseDynamicsProblem):
         return data, best, None
     for _ in range(OwnSimulation().rounds):
         fitted = _moved(model, best, ties)
         own = own_residual(fitted, plain)
-        if own is None:
+        if own is None or not own.alike:
+            last = last or own
             break
         last, before, less = own, best.values, plain.less(own.expected)
         data = TiedProblem(less, ties) if ties else less
@@ -375,7 +425,7 @@ def _with_noise(fit: Fit, data: AnyProblem, jacobian: Array, lengths: Array, noi
 
     Columns of the jacobian are divided by their ``lengths``; rows went into the fit with their ``weights``.
     """
-    plain = data.untied if isinstance(data, TiedProblem) else data
+    plain = _untied(data)
     if not isinstance(plain, InverseDynamicsProblem):
         return fit
     how, fitted = OwnSimulation(), fit.model
@@ -391,7 +441,7 @@ def _with_noise(fit: Fit, data: AnyProblem, jacobian: Array, lengths: Array, noi
 
 def _expected(data: AnyProblem) -> Array | float:
     """What was taken off the residual."""
-    plain = data.untied if isinstance(data, TiedProblem) else data
+    plain = _untied(data)
     return plain.expected if isinstance(plain, InverseDynamicsProblem) else 0.0
 
 
@@ -477,6 +527,12 @@ def _told(model: Model, records: Sequence[Experiment], data: AnyProblem, fit: Fi
     told += [sentence for _, sentence in border]
     told += constant_channels(model, records, data.blocks)
     told += lost_channels(fit.mode, fit.names, fit.after)
+    if fit.first_states == UNSETTLED:
+        told.insert(
+            0,
+            "first states that nobody measured were not found, or an effect is missing: begin with better values, give "
+            "shorter records, or run `vpm diagnose`",
+        )
     if fit.ended == "interrupted":
         told.insert(0, f"stopped by Ctrl-C after {fit.evaluations} evaluations: the values are the best until then")
     elif fit.ended == "evaluations":

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from vpm.errors import IdentificationError
 from vpm.experiment import Experiment, as_records
 from vpm.identify.balance import InverseDynamicsProblem
+from vpm.identify.beginning import BegunAnywhere, first_state_derivative
 from vpm.identify.engine import onward
 from vpm.identify.estimation import limits
 from vpm.identify.objective import Objective
@@ -299,6 +300,10 @@ def _again(fit: Fit, experiments: Experiment | Sequence[Experiment], cutoff: flo
         begun, records, fit.mode, cutoff=cutoff, setup=fit.setup, ties=fit.ties, fitting=one, free=fit.names
     )
     plain = data.untied if isinstance(data, TiedProblem) else data
+    if fit.departures.size and isinstance(plain, BegunAnywhere):
+        plain = plain.begun(fit.departures)
+        plain = plain.beside(first_state_derivative(fit.model, plain))
+        data = TiedProblem(plain, fit.ties) if fit.ties else plain
     if fit.expected.size and isinstance(plain, InverseDynamicsProblem):
         plain.expected = fit.expected
     objective = Objective(begun, data, fit.names, limits(begun, fit.names, fitting.bounds), fitting)

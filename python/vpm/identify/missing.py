@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vpm.catalogue import effects_for_site
 from vpm.errors import VpmError
 from vpm.experiment import Experiment
 from vpm.identify.balance import InverseDynamicsProblem
@@ -63,8 +65,9 @@ def whiteness(
     checks : Checks
     """
     untied = data.untied if isinstance(data, TiedProblem) else data
+    unseen = _of_unseen(model, untied) if isinstance(untied, InverseDynamicsProblem) else []
     groups = {
-        record.name: _of_balance(model, untied, number, checks)
+        record.name: _of_balance(model, untied, number, checks, unseen)
         if isinstance(untied, InverseDynamicsProblem)
         else _of_log(model, record, checks)
         for number, record in enumerate(records)
@@ -113,7 +116,9 @@ def _joints(model: Model, channel: str) -> tuple[str, ...]:
     return tuple(model.joints)
 
 
-def _of_balance(model: Model, problem: InverseDynamicsProblem, record: int, checks: Checks) -> Groups:
+def _of_balance(
+    model: Model, problem: InverseDynamicsProblem, record: int, checks: Checks, unseen: Sequence[Array]
+) -> Groups:
     """Laws of the motion of joints, of the effort that it needs and of that which drives deliver, as they are compared.
 
     What a drive did without being told is in the one, and what its controller heard of noise in the other.
@@ -122,15 +127,31 @@ def _of_balance(model: Model, problem: InverseDynamicsProblem, record: int, chec
     _, applied, required = problem.effort(model, model.theta, record)
     efforts = [[of[:, k] for of in (required, applied) if np.any(of[:, k])] for k in range(len(problem.joints))]
 
-    def groups(joints: Sequence[str], _: Block) -> list[_Law]:
+    def groups(joints: Sequence[str], block: Block) -> list[_Law]:
         places = [problem.joints.index(joint) for joint in joints if joint in problem.joints]
         return [
             law
             for place in places or range(len(problem.joints))
             for law in _laws([part[:, place] for part in motion], efforts[place], checks)
-        ]
+        ] + [_Law((columns[block.samples],), False) for columns in unseen]
 
     return groups
+
+
+def _of_unseen(model: Model, problem: InverseDynamicsProblem) -> list[Array]:
+    """What each effect would add (n, sizes) at joints that nobody measures: how these move, no channel tells."""
+    sites = [joint for joint in model.joints if joint not in (*problem.motions[0].joints, *model.added_joints)]
+    found = []
+    for site, law in product(sites, effects_for_site("joint")):
+        if not law.screened or law.motion or law.memory or law.requires:
+            continue
+        try:
+            more = model.with_effect(law.name, site)
+            sizes = [more.index(name) for name in more.adjustable if name not in model.parameters]
+            found.append(problem.evaluate(more, more.theta, sizes)[1])
+        except (VpmError, ValueError):  # it is there, or asks for what this joint has not
+            continue
+    return [columns for columns in found if columns.shape[1] and np.all(np.isfinite(columns))]
 
 
 def _of_log(model: Model, record: Experiment, checks: Checks) -> Groups:

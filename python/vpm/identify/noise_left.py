@@ -18,6 +18,7 @@ from scipy.optimize import nnls
 
 from vpm.experiment import Experiment, noise_std
 from vpm.identify.balance import InverseDynamicsProblem
+from vpm.identify.beginning import begun_again
 from vpm.model import Model
 
 Array = NDArray[np.float64]
@@ -80,7 +81,7 @@ def noise_of(
 
     residual = same.evaluate(model, model.theta)[0]
     of_log = _powers(data, residual)
-    of_quiet = powers(noisy(model, data.on(quiet), Noise(instruments, silent), random, TRIALS))
+    of_quiet = powers(noisy(model, begun_again(model, data.on(quiet)), Noise(instruments, silent), random, TRIALS))
     by_drive = [powers(noisy(model, same, each, random, TRIALS) - residual) for each in told]
     scale = 1.0 / np.where(of_log > 0.0, of_log, 1.0)
     shares, _ = nnls((np.array(by_drive) * scale).T, np.maximum(of_log - of_quiet, 0.0) * scale)

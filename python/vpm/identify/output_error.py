@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from vpm.errors import IdentificationError, near_match
 from vpm.experiment import Experiment, Motion
+from vpm.identify.beginning import BegunAnywhere
 from vpm.identify.first_state import add_first_state, first_state_slopes
 from vpm.identify.parallel import in_order
 from vpm.identify.problem import FEWEST_SAMPLES, Block
@@ -23,7 +24,7 @@ Array = NDArray[np.float64]
 WHOLE = ("free_run", "closed_loop")
 
 
-class OutputErrorProblem:
+class OutputErrorProblem(BegunAnywhere):
     """Measured minus simulated outputs in free run, restarts, closed loop or on a prescribed motion.
 
     Parameters
@@ -72,8 +73,8 @@ class OutputErrorProblem:
         index = [model.output_channels.index(channel) for channel in self._channels]
         blocks = iter(self.blocks)
         jobs = [
-            partial(self._simulated, model, e, theta, list(columns), followed)
-            for e, followed in zip(self.experiments, self._followed, strict=True)
+            partial(self._simulated, model, e, theta, list(columns), followed, record)
+            for record, (e, followed) in enumerate(zip(self.experiments, self._followed, strict=True))
         ]
         results = in_order(jobs, self.workers)
         for experiment, result in zip(self.experiments, results, strict=True):
@@ -82,16 +83,33 @@ class OutputErrorProblem:
                 weight = block.weight * block.moving
                 residuals.append((experiment[channel][result.rows] - result.outputs[:, column]) * weight)
                 jacobians.append(-result.jacobian[:, column, :] * weight[:, None])
-        return np.concatenate(residuals), np.concatenate(jacobians)
+        return self._left(np.concatenate(residuals)), self._left(np.concatenate(jacobians))
+
+    def open_states(self, model: Model) -> tuple[Array, int]:
+        """All states where whole records are simulated, as large as they get; see :class:`BegunAnywhere`."""
+        spread = np.zeros(len(model.state_names))
+        for record, experiment in enumerate(self.experiments if self.mode in WHOLE else ()):
+            states = self._simulated(model, experiment, model.theta, [], None, record).states
+            if states is not None and len(states):
+                spread = np.maximum(spread, np.where(np.ptp(states, axis=0) > 0.0, np.std(states, axis=0), 1.0))
+        return spread, len(self.experiments)
 
     def _simulated(
-        self, model: Model, experiment: Experiment, theta: Array, columns: list[int], followed: Motion | None
+        self,
+        model: Model,
+        experiment: Experiment,
+        theta: Array,
+        columns: list[int],
+        followed: Motion | None,
+        record: int,
     ) -> SimulatedArrays:
         """Simulation of one record; its derivative knows what parameters do to the first state of a whole record."""
         run = partial(simulate_arrays, model, experiment, self.mode, theta=theta, setup=self._setup)
-        if not columns or self.mode not in WHOLE:
+        if self.mode not in WHOLE:
             return run(columns=columns, followed=followed)
         state = initial_state(model, experiment, theta)
+        if self.departures is not None:
+            state += self.departures[record]
         result = run(columns=columns, initial_state=state)
         slopes = first_state_slopes(partial(initial_state, model, experiment), theta, columns)
         add_first_state(result.jacobian, lambda x: run(initial_state=x).outputs, state, slopes, theta[columns])

@@ -19,8 +19,9 @@ from numpy.typing import NDArray
 
 from vpm.errors import VpmError
 from vpm.experiment import Experiment, Motion
-from vpm.identify.along import bends, has_own_drives
+from vpm.identify.along import bends, has_hidden, has_own_drives
 from vpm.identify.balance import InverseDynamicsProblem
+from vpm.identify.beginning import begun_again
 from vpm.identify.noise_left import Noise, compared, mirrored, noise_of
 from vpm.identify.settings import OwnSimulation
 from vpm.initial import initial_state, measured_states
@@ -32,10 +33,14 @@ Array = NDArray[np.float64]
 
 
 class Own(NamedTuple):
-    """What a balance leaves of simulations of its own model, shape (n,), and their noise."""
+    """What a balance leaves of simulations of its own model, shape (n,), and their noise.
+
+    Where these are not alike, it leaves too much more of the records: something is missing, or far from where it is.
+    """
 
     expected: Array
     noise: Noise
+    alike: bool
 
 
 def own_residual(
@@ -55,8 +60,8 @@ def own_residual(
     Returns
     -------
     Own or None
-        None where the model does not stay by its records or lacks something, where cylinders stand beside other drives,
-        or drives with states of their own beside joints that nobody measured.
+        None where the model does not stay by its records, where cylinders stand beside other drives, or drives with
+        states of their own beside joints that nobody measured.
     """
     how = settings or OwnSimulation()
     hidden = any(tuple(model.joints) != tuple(m.joints) for m in data.motions)
@@ -71,7 +76,8 @@ def own_residual(
 def _own(model: Model, data: InverseDynamicsProblem, how: OwnSimulation, random: np.random.Generator) -> Own | None:
     channels = tuple(name for name in compared(data) if name in model.output_channels)
     logs = list(zip(data.experiments, data.motions, strict=True))
-    found = [_beside(model, log, m, channels, how) for log, m in logs]
+    starts = [_start(model, data, record) for record in range(len(logs))]
+    found = [_beside(model, log, m, channels, how, start) for (log, m), start in zip(logs, starts, strict=True)]
     guided = [one for one in found if one is not None]
     if len(guided) < len(logs):
         return None
@@ -79,15 +85,15 @@ def _own(model: Model, data: InverseDynamicsProblem, how: OwnSimulation, random:
     draws = [one for _ in range(how.pairs) for one in mirrored(noise.drawn(data.experiments, random))]
     columns = []
     for record, ((log, m), (band, quiet)) in enumerate(zip(logs, guided, strict=True)):
+        start = starts[record]
         seen, told = (np.array([draw[record][side] for draw in draws]) for side in (0, 1))
-        made = _drawn(model, log, m, channels, how, band, told) if np.any(told) else [quiet] * len(draws)
+        made = _drawn(model, log, m, channels, how, band, told, start) if np.any(told) else [quiet] * len(draws)
         columns.append([replace(one, data=one.data + read) for one, read in zip(made, seen, strict=True)])
     written = list(zip(*columns, strict=True))
-    left = [data.on(made).evaluate(model, model.theta)[0] for made in written]
+    left = [begun_again(model, data.on(made)).evaluate(model, model.theta)[0] for made in written]
     of_log = data.evaluate(model, model.theta)[0]
-    if not np.linalg.norm(of_log) <= how.alike * np.linalg.norm(left) / np.sqrt(len(left)):
-        return None
-    return Own(np.asarray(np.mean(left, axis=0)), noise)
+    alike = bool(np.linalg.norm(of_log) <= how.alike * np.linalg.norm(left) / np.sqrt(len(left)))
+    return Own(np.asarray(np.mean(left, axis=0)), noise, alike)
 
 
 def _pushes(model: Model) -> bool | None:
@@ -97,19 +103,26 @@ def _pushes(model: Model) -> bool | None:
 
 
 def _beside(
-    model: Model, log: Experiment, m: Motion, channels: Sequence[str], how: OwnSimulation
+    model: Model, log: Experiment, m: Motion, channels: Sequence[str], how: OwnSimulation, start: Array
 ) -> tuple[float, Experiment] | None:
     """Bandwidth that keeps the model by a log, and the log as it would have been without noise; None without any."""
     joints = [f"{joint}.position" for joint in m.joints]
     for band in how.bands:
-        (made,) = _drawn(model, log, m, channels, how, band, np.zeros((1, *log.data.shape)))
+        (made,) = _drawn(model, log, m, channels, how, band, np.zeros((1, *log.data.shape)), start)
         if all(np.std(made[channel] - log[channel]) <= how.away * np.std(log[channel]) for channel in joints):
             return band, made
     return None
 
 
 def _drawn(
-    model: Model, log: Experiment, m: Motion, channels: Sequence[str], how: OwnSimulation, band: float, told: Array
+    model: Model,
+    log: Experiment,
+    m: Motion,
+    channels: Sequence[str],
+    how: OwnSimulation,
+    band: float,
+    told: Array,
+    start: Array,
 ) -> list[Experiment]:
     """Simulations on the commands of a log, to which a slow controller adds what keeps them by the motion of the log.
 
@@ -117,7 +130,6 @@ def _drawn(
     All runs go side by side: most of the time of one would be that of asking and telling, sample by sample.
     """
     by_position, by_velocity = commands_to_draw(model, m, 2.0 * np.pi * band, how.damping)
-    start = _start(model, log, m)
     runs = [Simulation(model, m.dt, integrator=how.method, state=start, compiled=True) for _ in told]
     columns, moved = runs[0].channels, [[f"{joint}.{of}" for joint in m.joints] for of in ("position", "velocity")]
     read, places, speeds = ([columns.index(name) for name in names] for names in (channels, *moved))
@@ -136,11 +148,16 @@ def _drawn(
     return [_written(log, m, channels, one, held) for one, held in zip(outputs, commands, strict=True)]
 
 
-def _start(model: Model, log: Experiment, m: Motion) -> Array:
-    """The state at the first sample; joints that nobody measured are where the balance has them, at rest."""
+def _start(model: Model, data: InverseDynamicsProblem, record: int) -> Array:
+    """The state at the first sample; what nobody measured is where the balance has it."""
+    log, m = data.experiments[record], data.motions[record]
     if tuple(m.joints) == tuple(model.joints):
-        return np.asarray(measured_states(model, log, model.theta, np.zeros(1, dtype=np.int64), m.cutoff, m)[0])
-    return initial_state(model, log, model.theta)
+        start = np.array(measured_states(model, log, model.theta, np.zeros(1, dtype=np.int64), m.cutoff, m)[0])
+    else:
+        start = initial_state(model, log, model.theta)
+    if has_hidden(model, m.joints):
+        start[: 2 * len(model.coordinates)] = data.hidden_states(model, record)[0]
+    return start
 
 
 def _written(log: Experiment, m: Motion, channels: Sequence[str], outputs: Array, commands: Array) -> Experiment:

@@ -141,9 +141,9 @@ Work = Callable[[Model, Array, Sequence[int]], tuple[Array, Array]]
 class Kept:
     """Answers of bare machines along one record, by structure and parameter values; safe on several threads."""
 
-    def __init__(self, hold: Hold | None = None) -> None:
-        #: Gauges that hold the links along the record.
-        self.hold = hold
+    def __init__(self, hold: Hold | None = None, departure: Array | None = None) -> None:
+        #: Gauges that hold the links along the record, and by how much what is free begins away from rest.
+        self.hold, self.departure = hold, departure
         self._answers: OrderedDict[tuple[str, bytes], Answer] = OrderedDict()
         self._shared: dict[str, tuple[Array, dict[str, Array]]] = {}
         self._lock = Lock()

@@ -139,6 +139,10 @@ class ShootingProblem(OutputErrorProblem):
         """Number of gaps at the end of the residual."""
         return sum(len(p.starts) - 1 for p in self.pieces) * len(self._gap_columns)
 
+    def open_states(self, model: Model) -> tuple[Array, int]:
+        """None beside those that are fitted."""
+        return np.zeros(len(model.state_names)), len(self.experiments)
+
     def evaluate(
         self, model: Model, theta: Array, columns: Sequence[int] = (), unknown: Array | None = None
     ) -> tuple[Array, Array]:

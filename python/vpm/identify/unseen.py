@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from vpm.experiment import Experiment, as_records
 from vpm.identify.comparison import comparison
-from vpm.identify.fit import Fit
+from vpm.identify.fit import Fit, beside_first_states
 from vpm.identify.problem import gaps
 from vpm.model import Model
 
@@ -20,7 +20,7 @@ def judged_on(
     """How far model and unseen records are apart before and after a fit, in the fit's own mode.
 
     First states that the fit found belong to its own records; here they begin as for any simulation of a log, but for
-    those that are known.
+    those that are known, and for those that nobody measures along a motion: a balance is beside these.
 
     Parameters
     ----------
@@ -46,5 +46,6 @@ def judged_on(
     result = []
     for machine in (model, fit.model):
         data = comparison(machine, records, fit.mode, cutoff=cutoff, setup=fit.setup, fitting=fitting)
+        data = beside_first_states(machine, data, {})
         result.append(gaps(data, data.evaluate(machine, machine.theta)[0]))
     return result[0], result[1]

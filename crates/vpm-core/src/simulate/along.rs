@@ -60,6 +60,6 @@ pub fn drives_along(
     }
     let drives = Drives { inputs, internal, places, seen };
     let Run { outputs, states, jacobian } =
-        Guide { setting, motion, first: 0, passive: &[], strains: None, drives: Some(drives) }.run()?;
+        Guide { setting, motion, first: 0, passive: &[], strains: None, departure: &[], drives: Some(drives) }.run()?;
     Ok(Along { outputs, states, jacobian })
 }

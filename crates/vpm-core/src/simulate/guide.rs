@@ -23,6 +23,8 @@ pub(super) struct Guide<'a> {
     /// Joints that do not follow, ascending.
     pub(super) passive: &'a [usize],
     pub(super) strains: Option<StrainRates<'a>>,
+    /// How far from rest free coordinates begin: coordinates, then rates, of all; nothing for a beginning at rest.
+    pub(super) departure: &'a [f64],
     /// Without them drives and supplies do nothing.
     pub(super) drives: Option<Drives<'a>>,
 }
@@ -133,7 +135,7 @@ impl<'a, S: Scalar> Way<'a, S> {
         Ok(way)
     }
 
-    /// Puts the free coordinates to rest where the motion begins, and drives into their first states.
+    /// Puts the free coordinates to rest where the motion begins, or away from it, and drives into their first states.
     fn begin(&mut self, theta: &[S]) -> Result<()> {
         let (description, count) = (self.guide.setting.description, self.machine.free().len());
         let mut joints = vec![S::zero(); description.n_joints()];
@@ -141,6 +143,10 @@ impl<'a, S: Scalar> Way<'a, S> {
         if count > 0 {
             let q = settled(description, theta, &joints, self.guide.passive)?;
             self.state.iter_mut().zip(self.machine.free()).for_each(|(entry, &place)| *entry = q[place]);
+        }
+        for (half, away) in self.guide.departure.chunks_exact(description.n_coordinates().max(1)).enumerate() {
+            let begun = self.state[half * count..].iter_mut().zip(self.machine.free());
+            begun.for_each(|(entry, &place)| *entry += S::from_f64(away[place]));
         }
         if let Some(Drives { internal, .. }) = self.guide.drives {
             let own = self.state[2 * count..].iter_mut().zip(internal);

@@ -15,7 +15,7 @@ use crate::table::Table;
 /// gravity. The outputs `effort` of the joints are the efforts that the motion needs, with those of the effects taken off; the actuators
 /// do nothing. Checked: a motion simulated from efforts gives those efforts back, with all joints or some of them following.
 pub fn prescribed(setting: Setting<'_>, motion: JointMotion<'_>, passive: &[usize]) -> Result<Run> {
-    observed(setting, (motion, 0), passive, None)
+    observed(setting, (motion, 0), passive, None, &[])
 }
 
 /// As [`prescribed`], of a motion that begins at the sample `first` of its record, with beams held to what their gauges showed.
@@ -24,17 +24,23 @@ pub fn prescribed(setting: Setting<'_>, motion: JointMotion<'_>, passive: &[usiz
 /// `c` its gain: a damper between the beam and the measured one, which takes the energy out of whatever they differ by and nothing where
 /// they agree (a natural observer: M. Demetriou, *Systems & Control Letters* 51, 2004). A damped error no longer rings with the noise
 /// of the motion. Checked: a free motion gives its own efforts back, with gauges that hold.
+///
+/// The free coordinates begin away from rest by what `departure` has for them, coordinates then rates of all; empty, they begin at rest.
 pub fn observed(
     setting: Setting<'_>,
     (motion, first): (JointMotion<'_>, usize),
     passive: &[usize],
     strains: Option<StrainRates<'_>>,
+    departure: &[f64],
 ) -> Result<Run> {
     let (rows, joints) = (motion.position.rows(), setting.description.n_joints());
     motion.expect(joints)?;
     if let Some(StrainRates { rate, gain }) = strains {
         rate.expect("strain_rate", rows, setting.description.gauges.len())?;
         Table::new("strain_gain", gain, 1, gain.len())?.expect("strain_gain", 1, setting.description.gauges.len())?;
+    }
+    if !departure.is_empty() {
+        Table::vector("departure", departure, 2 * setting.description.n_coordinates(), "coordinate and rate")?;
     }
     if let Some(seat) = setting.description.remembering().next() {
         return Err(Error::Memory { site: site(setting.description, seat) });
@@ -52,5 +58,5 @@ pub fn observed(
         let driven: Vec<usize> = (0..joints).filter(|joint| !passive.contains(joint)).collect();
         check_structure(setting.description, setting.theta, setting.stepping, &state, &driven)?;
     }
-    Guide { setting, motion, first, passive: &passive, strains, drives: None }.run()
+    Guide { setting, motion, first, passive: &passive, strains, departure, drives: None }.run()
 }

@@ -208,9 +208,10 @@ impl System {
         ))
     }
 
-    /// Joints but for `passive` ones follow a motion (N, n_joints), these and beams respond from rest: outputs, states and derivatives
-    /// as in `simulate`. Beams are held to the rates of strain (N, gauges) that gauges of some gain showed.
-    #[pyo3(signature = (theta, position, velocity, acceleration, time_step, substeps, integrator, sensitivities=vec![], passive=vec![], strain_rate=None, strain_gain=None, first=0))]
+    /// Joints but for `passive` ones follow a motion (N, n_joints), these and beams respond: outputs, states and derivatives
+    /// as in `simulate`. Beams are held to the rates of strain (N, gauges) that gauges of some gain showed. What is free begins at rest,
+    /// or away from it by `departure` (2 n_coordinates,), coordinates then rates.
+    #[pyo3(signature = (theta, position, velocity, acceleration, time_step, substeps, integrator, sensitivities=vec![], passive=vec![], strain_rate=None, strain_gain=None, first=0, departure=None))]
     #[expect(clippy::too_many_arguments, reason = "the arguments of the Python function")]
     fn simulate_prescribed<'py>(
         &self,
@@ -227,6 +228,7 @@ impl System {
         strain_rate: Option<&Any<'py>>,
         strain_gain: Option<&Any<'py>>,
         first: i64,
+        departure: Option<&Any<'py>>,
     ) -> PyResult<(Table<'py>, Table<'py>, Cube<'py>)> {
         let request = Request::new(self, theta, (time_step, substeps, integrator), &sensitivities)?;
         let position = Numbers::table("position", position)?;
@@ -236,6 +238,7 @@ impl System {
         let first = arrays::place("first", first)?;
         let rate = strain_rate.map(|array| Numbers::table("strain_rate", array)).transpose()?;
         let gain = strain_gain.map(|array| Numbers::vector("strain_gain", array)).transpose()?;
+        let departure = departure.map(|array| Numbers::vector("departure", array)).transpose()?;
         let run = self.compute(py, |interrupt| {
             let motion = JointMotion {
                 position: position.as_table()?,
@@ -246,7 +249,8 @@ impl System {
                 (Some(rate), Some(gain)) => Some(StrainRates { rate: rate.as_table()?, gain: gain.values() }),
                 _ => None,
             };
-            observed(request.setting(&self.description, interrupt), (motion, first), &passive, strains)
+            let away = departure.as_ref().map_or(&[][..], Numbers::values);
+            observed(request.setting(&self.description, interrupt), (motion, first), &passive, strains, away)
         })?;
         self.run(py, run, [self.description.n_outputs(), sensitivities.len()])
     }

@@ -90,6 +90,32 @@ fn passive_joints_move_as_in_the_free_machine() -> Result<()> {
 }
 
 #[test]
+fn passive_joints_begin_away_from_rest_as_in_the_free_machine() -> Result<()> {
+    // The hand swings already where the motion begins; without its departure it would hang still.
+    let d = geared(0.02);
+    let (n, stepping) = (d.n_coordinates(), Stepping::new(0.002, 4, Method::Rosenbrock)?);
+    let rest = guided(&d, stepping, &[vec![0.3, 0.0, 0.0], vec![0.0; 3], vec![0.0; 3]], &[PLAY, 2], &[])?;
+    let setting = Setting { description: &d, theta: &d.parameters, stepping, sensitivities: &[], interrupt: &|| false };
+    let (mut start, mut departure) = (rest.states, vec![0.0; 2 * n]);
+    (departure[2], departure[n + 2]) = (0.3, -2.0);
+    start.iter_mut().zip(&departure).for_each(|(state, away)| *state += away);
+    let run = free_run(setting, &start, Table::new("inputs", &[], 301, 0)?)?;
+    let columns = [0, 1, 2].map(|offset| -> Vec<f64> {
+        run.outputs.chunks(d.n_outputs()).flat_map(|row| [row[offset], 7.0, -3.0]).collect()
+    });
+    let table = |k: usize| Table::new("motion", &columns[k], 301, 3);
+    let moving = JointMotion { position: table(0)?, velocity: table(1)?, acceleration: table(2)? };
+    let apart = |away: &[f64]| -> Result<f64> {
+        let followed = observed(setting, (moving, 0), &[2, PLAY], None, away)?;
+        Ok(followed.states.iter().zip(&run.states).fold(0.0_f64, |most, (a, b)| most.max((a - b).abs())))
+    };
+    let (begun, still) = (apart(&departure)?, apart(&[])?);
+    assert!(begun < 2e-3 && still > 0.1, "{begun}, from rest {still}");
+    assert!(apart(&[0.0]).is_err(), "a departure has the coordinates and rates of the machine");
+    Ok(())
+}
+
+#[test]
 fn sensitivities_of_partly_prescribed_motion_are_slopes() -> Result<()> {
     let d = geared(0.01);
     let stepping = Stepping::new(0.005, 8, Method::LinearlyImplicit)?;
@@ -130,7 +156,7 @@ fn gauges_that_hold_agree_with_and_without_derivatives() -> Result<()> {
                 Setting { description: &d, theta: &d.parameters, stepping, sensitivities: by, interrupt: &|| false };
             let moving = JointMotion { position: table(0)?, velocity: table(1)?, acceleration: table(2)? };
             let strains = StrainRates { rate: Table::new("rate", &rate, rows, 1)?, gain: &[gain] };
-            observed(setting, (moving, 0), &[PLAY, 2], Some(strains))
+            observed(setting, (moving, 0), &[PLAY, 2], Some(strains), &[])
         };
         let (plain, lifted) = (run(&[], 50.0, 20)?, run(&[d.beams[0].material.young], 50.0, 20)?);
         let apart =
