@@ -26,7 +26,7 @@ from vpm.ranking.structure import Structure
 Array = NDArray[np.float64]
 
 #: Derivatives that a pass works out at a time.
-AT_ONCE = 4
+AT_ONCE = 16
 
 
 @dataclass(frozen=True, eq=False)
