@@ -56,7 +56,7 @@ def test_one_core_and_four_find_the_same(diagnosis: vpm.Diagnosis) -> None:
     screened = [each for each in told if each[0] == "screening"]
     count = screened[0][3]
     assert [each[2] for each in screened[:count]] == list(range(1, count + 1))
-    assert len({each[1] for each in screened[:count]}) > 5
+    assert len({each[1] for each in screened[:count]}) > 1
 
 
 def test_each_finding_has_its_evidence_on_unseen_data(diagnosis: vpm.Diagnosis) -> None:

@@ -24,6 +24,7 @@ from vpm.identify.whiteness import DEPENDENT, basis, explained_by, explained_siz
 from vpm.model import Model
 
 Array = NDArray[np.float64]
+Rows = NDArray[np.bool_]
 
 #: Share of a state's size by which it is moved to find the derivative; errors of the difference are its square.
 DIFFERENCE = 1e-5
@@ -128,19 +129,19 @@ def begun_again(model: Model, data: AnyBegun) -> AnyBegun:
     return begun_likeliest(model, data) if data.unknown else data
 
 
-def _nearer(model: Model, data: AnyBegun, early: Array) -> AnyBegun:
+def _nearer(model: Model, data: AnyBegun, early: Rows) -> AnyBegun:
     """The problem begun where this leaves least of its early rows (n,), by the method of Gauss and Newton."""
-    (sizes, records), residual = data.open_states(model), early * _residual(model, data.begun(data.departures))
+    (sizes, records), residual = data.open_states(model), _residual(model, data.begun(data.departures), early)
     places = np.flatnonzero(sizes)
     for _ in range(STEPS if np.all(np.isfinite(residual)) else 0):
         step = np.zeros((records, sizes.size))
-        slopes = early[:, None] * first_state_derivative(model, data)
+        slopes = np.where(early[:, None], first_state_derivative(model, data), 0.0)
         if not slopes.shape[1]:
             break
         step[:, places] = -_solved(slopes, residual).reshape(records, places.size)
         for share in SHARES:
             tried = data.begun(_departures(data, sizes, records) + share * step)
-            left = early * _residual(model, tried)
+            left = _residual(model, tried, early)
             if left @ left < residual @ residual:
                 break
         else:
@@ -152,10 +153,10 @@ def _nearer(model: Model, data: AnyBegun, early: Array) -> AnyBegun:
     return data
 
 
-def _early(data: BegunAnywhere, share: float) -> Array:
-    """1 for the first of the rows (n,) that count of each record, until these are a share of them."""
+def _early(data: BegunAnywhere, share: float) -> Rows:
+    """True for the first of the rows (n,) that count of each record, until these are a share of them."""
     counted = [np.cumsum(block.moving > 0.0) for block in data.blocks]
-    return np.concatenate([number <= share * number[-1] for number in counted]).astype(np.float64)
+    return np.concatenate([number <= share * number[-1] for number in counted])
 
 
 def _solved(slopes: Array, residual: Array) -> Array:
@@ -169,12 +170,13 @@ def _departures(data: BegunAnywhere, sizes: Array, records: int) -> Array:
     return np.zeros((records, sizes.size)) if data.departures is None else data.departures
 
 
-def _residual(model: Model, data: BegunAnywhere) -> Array:
-    """Infinite where the machine leaves the finite numbers."""
+def _residual(model: Model, data: BegunAnywhere, rows: Rows | bool = True) -> Array:
+    """Residual (n,), 0 but for some rows; infinite in these where the machine leaves the finite numbers."""
     try:
-        return data.evaluate(model, model.theta)[0]
+        residual = data.evaluate(model, model.theta)[0]
     except (DivergedError, ValueError):
-        return np.full(data.blocks[-1].samples.stop, np.inf)
+        residual = np.full(data.blocks[-1].samples.stop, np.inf)
+    return np.where(rows, residual, 0.0)
 
 
 def matters(model: Model, data: BegunAnywhere, residual: Array, jacobian: Array, checks: Checks) -> bool:

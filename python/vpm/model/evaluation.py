@@ -80,7 +80,7 @@ class Evaluations(Components):
         """
         return self.dynamics.mass_matrix(q)
 
-    @cached_property
+    @property
     def masses_at_zero(self) -> Array:
         """What each coordinate moves where all are zero, shape (n,), kg or kg m^2: the diagonal of the mass matrix."""
         return np.diag(self.mass_matrix(np.zeros(len(self.coordinates))))
