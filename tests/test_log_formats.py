@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import re
 import sys
 from collections.abc import Callable, Sequence
@@ -21,28 +20,12 @@ from vpm.errors import ExperimentError, MissingExtraError
 from vpm.experiment import Experiment
 from vpm.experiment.readers import open_log
 from vpm.model import ChannelEntry, Model
+from written_logs import COUNT, TIME, Q, check, needs, table
 
 Array = NDArray[np.float64]
 RUNNER = CliRunner()
 
-COUNT = 60
-TIME = 0.01 * np.arange(COUNT)
-Q = np.sin(3.0 * TIME)
 MATRIX = np.column_stack([np.cos(TIME), Q, TIME**2])
-
-
-def needs(package: str) -> pytest.MarkDecorator:
-    return pytest.mark.skipif(importlib.util.find_spec(package) is None, reason=f"{package} is not installed")
-
-
-def table(time: str, q: str, **extra: str) -> dict[str, ChannelEntry]:
-    named = {"time": (time, "s"), "axis.position": (q, "mm"), **{key: (value, "V") for key, value in extra.items()}}
-    return {channel: ChannelEntry(column=column, unit=unit) for channel, (column, unit) in named.items()}
-
-
-def check(record: Experiment, q: Array = Q) -> None:
-    np.testing.assert_allclose(record.time - record.time[0], TIME, atol=1e-12)
-    np.testing.assert_allclose(record["axis.position"], 1e-3 * q, rtol=1e-12)
 
 
 # ---- writers ---------------------------------------------------------------------------------------------------------

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import struct
 import sys
 from pathlib import Path
@@ -16,31 +15,15 @@ from vpm.errors import ExperimentError, MissingExtraError
 from vpm.experiment import Experiment
 from vpm.experiment.readers import open_log
 from vpm.model import ChannelEntry
+from written_logs import COUNT, TIME, Q, check, needs, table
 
 Array = NDArray[np.float64]
 
-COUNT = 60
-TIME = 0.01 * np.arange(COUNT)
-Q = np.sin(3.0 * TIME)
 FAST = 0.001 + 0.0025 * np.arange(4 * COUNT)
 U = 2.0 * FAST
 #: A cubic spline through samples h apart misses by at most 5/384 h^4 max|q''''| (Hall and Meyer, 1976), besides its
 #: ends, where the error is that of the not-a-knot rule: within ten times as much.
 SPLINE = 10.0 * 5.0 / 384.0 * 0.01**4 * 81.0
-
-
-def needs(package: str) -> pytest.MarkDecorator:
-    return pytest.mark.skipif(importlib.util.find_spec(package) is None, reason=f"{package} is not installed")
-
-
-def table(time: str, q: str, **extra: str) -> dict[str, ChannelEntry]:
-    named = {"time": (time, "s"), "axis.position": (q, "mm"), **{key: (value, "V") for key, value in extra.items()}}
-    return {channel: ChannelEntry(column=column, unit=unit) for channel, (column, unit) in named.items()}
-
-
-def check(record: Experiment, q: Array = Q) -> None:
-    np.testing.assert_allclose(record.time - record.time[0], TIME, atol=1e-12)
-    np.testing.assert_allclose(record["axis.position"], 1e-3 * q, rtol=1e-12)
 
 
 def check_merged(path: Path, mapped: dict[str, ChannelEntry], after: float = 0.0) -> None:

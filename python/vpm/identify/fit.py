@@ -30,7 +30,7 @@ from vpm.identify.remarks import constant_channels, contradictions, lost_channel
 from vpm.identify.sandwich import freedom, pooled, record_groups, sandwich
 from vpm.identify.settings import Checks, Fitting, OwnSimulation
 from vpm.identify.shooting import ShootingProblem
-from vpm.identify.ties import TiedProblem, Untied, check_ties
+from vpm.identify.ties import check_ties, tied, untied
 from vpm.identify.whiteness import Whiteness
 from vpm.model import Model
 from vpm.one_thread import in_one_thread
@@ -290,9 +290,8 @@ def identify(
     decided = freedom(slopes / lengths, data.blocks, len(names) + len(fit.states) + _unknown(data))[: len(names)]
     alike = own is None or own.alike
     fit = replace(_with_first_states(fit, data, settled and alike), freedom=decided)
-    if (
-        own is not None and alike and not (fitting and fitting.priors)
-    ):  # what is known beforehand no noise of records moves
+    # What is known beforehand no noise of records moves.
+    if own is not None and own.alike and not (fitting and fitting.priors):
         fit = _with_noise(fit, data, slopes / lengths, lengths, own.noise, weights[: len(slopes)])
     return replace(fit, warnings=_told(model, records, data, fit, checks or Checks()))
 
@@ -325,11 +324,6 @@ def _by_engine(
     return _Engineered(names, found.values, *what, found=found)
 
 
-def _untied(data: AnyProblem) -> Untied:
-    """The problem behind ties."""
-    return data.untied if isinstance(data, TiedProblem) else data
-
-
 def beside_first_states(model: Model, data: AnyProblem, ties: Mapping[str, str]) -> AnyProblem:
     """A balance beside the first states of what moves along the motion that nobody measured; others as they are.
 
@@ -340,22 +334,21 @@ def beside_first_states(model: Model, data: AnyProblem, ties: Mapping[str, str])
     data : problem
     ties : mapping of str to str
     """
-    plain = _untied(data)
+    plain = untied(data)
     if not isinstance(plain, InverseDynamicsProblem) or not np.any(plain.open_states(model)[0]):
         return data
-    begun = begun_likeliest(model, plain)
-    return TiedProblem(begun, ties) if ties else begun
+    return tied(begun_likeliest(model, plain), ties)
 
 
 def _unknown(data: AnyProblem) -> int:
     """How many unknown first states a fit is beside."""
-    plain = _untied(data)
+    plain = untied(data)
     return plain.unknown if isinstance(plain, BegunAnywhere) else 0
 
 
 def _with_first_states(fit: Fit, data: AnyProblem, settled: bool) -> Fit:
     """The same with what it knows of unknown first states."""
-    plain = _untied(data)
+    plain = untied(data)
     if not isinstance(plain, BegunAnywhere) or plain.departures is None:
         return fit
     return replace(fit, first_states=UNKNOWN if settled else UNSETTLED, departures=plain.departures)
@@ -373,14 +366,14 @@ def _from_anywhere(
 
     Where logs suggest them, they are unknown if ``checks`` find them wrong.
     """
-    plain, fitted = _untied(data), _moved(model, best, ties)
+    plain, fitted = untied(data), _moved(model, best, ties)
     if best.interrupted or not isinstance(plain, BegunAnywhere):
         return data, best, True
     if not plain.unknown and not (checks and matters(fitted, plain, best.residual, best.jacobian, checks)):
         return data, best, True
     for _ in range(ROUNDS):
         before, plain = best.values, begun_likeliest(fitted, plain)
-        data = TiedProblem(plain, ties) if ties else plain
+        data = tied(plain, ties)
         best = onward(fitted, data, best)
         fitted, seen = _moved(model, best, ties), np.isfinite(best.std)
         if best.interrupted or np.all(np.abs(best.values - before)[seen] <= SETTLED * best.std[seen]):
@@ -401,7 +394,7 @@ def _beside_own(
     What the records do not show a correction would move without end. With it comes the last simulation, or one that is
     not like the records.
     """
-    plain = _untied(data)
+    plain = untied(data)
     last: Own | None = None
     if best.interrupted or not isinstance(plain, InverseDynamicsProblem):
         return data, best, None
@@ -411,8 +404,8 @@ def _beside_own(
         if own is None or not own.alike:
             last = last or own
             break
-        last, before, less = own, best.values, plain.less(own.expected)
-        data = TiedProblem(less, ties) if ties else less
+        last, before = own, best.values
+        data = tied(plain.less(own.expected), ties)
         best = onward(fitted, data, best)
         seen = np.isfinite(best.std)
         if best.interrupted or np.all(np.abs(best.values - before)[seen] <= best.std[seen]):
@@ -425,7 +418,7 @@ def _with_noise(fit: Fit, data: AnyProblem, jacobian: Array, lengths: Array, noi
 
     Columns of the jacobian are divided by their ``lengths``; rows went into the fit with their ``weights``.
     """
-    plain = _untied(data)
+    plain = untied(data)
     if not isinstance(plain, InverseDynamicsProblem):
         return fit
     how, fitted = OwnSimulation(), fit.model
@@ -441,7 +434,7 @@ def _with_noise(fit: Fit, data: AnyProblem, jacobian: Array, lengths: Array, noi
 
 def _expected(data: AnyProblem) -> Array | float:
     """What was taken off the residual."""
-    plain = _untied(data)
+    plain = untied(data)
     return plain.expected if isinstance(plain, InverseDynamicsProblem) else 0.0
 
 
@@ -491,7 +484,7 @@ def check_bounds(free: Sequence[str], fitting: Fitting) -> None:
 
 
 def _with_details(fit: Fit, data: AnyProblem, found: Found) -> Fit:
-    shooting = data.untied if isinstance(data, TiedProblem) else data
+    shooting = untied(data)
     labels = shooting.labels if isinstance(shooting, ShootingProblem) else ()
     return replace(
         fit,

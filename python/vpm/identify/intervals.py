@@ -22,7 +22,7 @@ from vpm.identify.problem import Block
 from vpm.identify.settings import Fitting
 from vpm.identify.solver import Point
 from vpm.identify.statistics import NORMAL_95, correlation_length
-from vpm.identify.ties import TiedProblem
+from vpm.identify.ties import tied, untied
 from vpm.results import Result
 
 if TYPE_CHECKING:
@@ -299,11 +299,11 @@ def _again(fit: Fit, experiments: Experiment | Sequence[Experiment], cutoff: flo
     data = comparison(
         begun, records, fit.mode, cutoff=cutoff, setup=fit.setup, ties=fit.ties, fitting=one, free=fit.names
     )
-    plain = data.untied if isinstance(data, TiedProblem) else data
+    plain = untied(data)
     if fit.departures.size and isinstance(plain, BegunAnywhere):
         plain = plain.begun(fit.departures)
         plain = plain.beside(first_state_derivative(fit.model, plain))
-        data = TiedProblem(plain, fit.ties) if fit.ties else plain
+        data = tied(plain, fit.ties)
     if fit.expected.size and isinstance(plain, InverseDynamicsProblem):
         plain.expected = fit.expected
     objective = Objective(begun, data, fit.names, limits(begun, fit.names, fitting.bounds), fitting)

@@ -16,7 +16,7 @@ from vpm.identify.balance import InverseDynamicsProblem
 from vpm.identify.objective import AnyProblem
 from vpm.identify.problem import FEWEST_SAMPLES, Block
 from vpm.identify.settings import Checks
-from vpm.identify.ties import TiedProblem
+from vpm.identify.ties import untied
 from vpm.identify.whiteness import (
     SHARPNESS,
     Whiteness,
@@ -64,11 +64,11 @@ def whiteness(
     jacobian : ndarray, shape (n, p)
     checks : Checks
     """
-    untied = data.untied if isinstance(data, TiedProblem) else data
-    unseen = _of_unseen(model, untied) if isinstance(untied, InverseDynamicsProblem) else []
+    plain = untied(data)
+    unseen = _of_unseen(model, plain) if isinstance(plain, InverseDynamicsProblem) else []
     groups = {
-        record.name: _of_balance(model, untied, number, checks, unseen)
-        if isinstance(untied, InverseDynamicsProblem)
+        record.name: _of_balance(model, plain, number, checks, unseen)
+        if isinstance(plain, InverseDynamicsProblem)
         else _of_log(model, record, checks)
         for number, record in enumerate(records)
     }

@@ -12,7 +12,7 @@ from vpm.identify.problem import Block
 from vpm.identify.settings import Fitting
 from vpm.identify.shooting import ShootingProblem
 from vpm.identify.solver import Point
-from vpm.identify.ties import TiedProblem, Untied
+from vpm.identify.ties import TiedProblem, Untied, untied
 from vpm.model import Model
 
 Array = NDArray[np.float64]
@@ -57,7 +57,7 @@ class Objective:
         self.count = 0
         values, (low, high) = model.theta[self.columns], bounds
         self.log = (values > 0.0) & (low >= 0.0) & fitting.log
-        shooting = data.untied if isinstance(data, TiedProblem) else data
+        shooting = untied(data)
         self.shooting = shooting if isinstance(shooting, ShootingProblem) else None
         first = self.shooting.first_states if self.shooting else np.zeros(0)
         self.sizes = self.shooting.state_sizes if self.shooting else np.zeros(0)

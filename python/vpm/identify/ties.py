@@ -58,6 +58,16 @@ class TiedProblem:
         return residual, whole
 
 
+def untied(data: Untied | TiedProblem) -> Untied:
+    """The problem behind ties, if there are any."""
+    return data.untied if isinstance(data, TiedProblem) else data
+
+
+def tied(data: Untied, ties: Mapping[str, str]) -> Untied | TiedProblem:
+    """The problem with ties, if there are any."""
+    return TiedProblem(data, ties) if ties else data
+
+
 def check_ties(model: Model, ties: Mapping[str, str], free: Sequence[str]) -> None:
     """Complain about ties that have no single meaning.
 

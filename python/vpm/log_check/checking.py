@@ -172,13 +172,13 @@ def _finding(
         said += " (a clock of the log, or a delay of the machine or of its sensors)"
     harms = not correction.delay or max(before[name] for name in found.affected) > settings.harmless
     place = min(found.affected, key=lambda name: after[name] / max(before[name], 1e-300))
-    lines = {channel: line_of(channel, entry) for channel, entry in changed.items()}
+    lines, repair = _written(correction, changed)
     return Finding(
         correction.kind,
         correction.channels,
         (record,),
         f"{said}; {_evidence(found, place)}",
-        f"write {' and '.join(lines.values())}" if lines else correction.repair,
+        repair,
         harms and not found.is_possible,
         correction.factor,
         correction.delay,
@@ -187,11 +187,17 @@ def _finding(
     )
 
 
+def _written(correction: Correction, changed: Mapping[str, ChannelEntry]) -> tuple[dict[str, str], str]:
+    """Lines of the channel table as they should be, and the repair in words."""
+    lines = {channel: line_of(channel, entry) for channel, entry in changed.items()}
+    return lines, f"write {' and '.join(lines.values())}" if lines else correction.repair
+
+
 def _of_related(
     correction: Correction, related: Related, units: Mapping[str, str], changed: Mapping[str, ChannelEntry], record: str
 ) -> Finding:
     """What is said of a channel that contradicts the one that tells it."""
-    lines = {channel: line_of(channel, entry) for channel, entry in changed.items()}
+    lines, repair = _written(correction, changed)
     before, after = related.error(), related.error(correction.factor)
     return Finding(
         correction.kind,
@@ -199,7 +205,7 @@ def _of_related(
         (record,),
         f"{correction.sentence(units)}; {related.teller} differs from it by {_percent(before)} of its power as it is, "
         f"and by {_percent(after)} with that corrected",
-        f"write {' and '.join(lines.values())}" if lines else correction.repair,
+        repair,
         True,
         correction.factor,
         share=(before, after),
