@@ -249,6 +249,15 @@ def test_pieces_find_an_unstable_machine_that_a_whole_record_loses() -> None:
     assert fit.after["foot.position"][0] == pytest.approx(2e-4, rel=0.1)
 
 
+def test_pieces_take_the_steps_that_suit_the_model() -> None:
+    record, free = balanced(2.0), ("foot.friction.viscous",)
+    chosen, named = (
+        identify(inverted(), record, free, mode="free_run", setup=setup, fitting=Fitting(piece=0.5))
+        for setup in (None, Setup("linearly_implicit"))
+    )
+    assert np.array_equal(chosen.values, named.values)
+
+
 # ---- intervals -------------------------------------------------------------------------------------------------------
 
 

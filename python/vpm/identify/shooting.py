@@ -264,7 +264,7 @@ class ShootingProblem(OutputErrorProblem):
             return run.outputs[None], run.jacobian[None]
         setup = self._setup
         inputs = simulation_inputs(model, experiment)
-        stepping = (experiment.dt, setup.substeps, setup.integrator, columns, setup.course)
+        stepping = (experiment.dt, setup.substeps, setup.method(model), columns, setup.course)
         return model.core.restart(theta, states, pieces.starts, pieces.length, inputs, *stepping)
 
     def _state_sizes(self, model: Model) -> Array:
