@@ -3,16 +3,18 @@
 # Settings, as in `make test PYTEST_ARGS="-k friction"`:
 #   PYTHON       the interpreter that makes .venv            (python3)
 #   DEMO_OUT     the folder that the demo's report goes to   (demo-report)
+#   DATA         the folder of public benchmarks            (data)
 #   CASES FIRST  count and first seed of `make fuzz`        (20000, 1)
 #   PYTEST_ARGS  CARGO_ARGS                                  passed on
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .SUFFIXES:
-.PHONY: help demo test test-rust test-python test-nightly fuzz fuzz-files fuzz-c fuzz-rust reference validation lint lint-rust lint-python bench peers chirp narx-peers bench-counts c-library bench-diagnosis bench-lisdd docs docs-rust figures package clean
+.PHONY: help demo test test-rust test-python test-nightly fuzz fuzz-files fuzz-c fuzz-rust reference validation lint lint-rust lint-python bench peers chirp narx-peers bench-counts c-library bench-diagnosis benchmarks bench-lisdd docs docs-rust figures package clean
 
 PYTHON ?= python3
 DEMO_OUT ?= demo-report
+DATA ?= data
 CASES ?= 20000
 FIRST ?= 1
 PYTEST_ARGS ?=
@@ -107,6 +109,9 @@ narx-peers: $(VENV)/.installed ## time a NARX model beside what is installed (C,
 
 bench-diagnosis: $(VENV)/.installed ## time whole diagnoses of an axis and of a flexible arm; writes into docs/performance.md
 	$(BIN)/python benches/diagnosis/diagnosis.py --write
+
+benchmarks: $(VENV)/.installed ## score models on public benchmarks in the folder DATA; writes docs/benchmarks.md
+	OMP_NUM_THREADS=1 $(BIN)/python benches/public/public_scores.py --data "$(DATA)" --page docs/benchmarks.md
 
 bench-lisdd: $(VENV)/.installed ## put the diagnosis beside LISDD, a baseline, on blind cases of an axis, for a quarter of an hour
 	OMP_NUM_THREADS=1 $(BIN)/python benches/diagnosis/side_by_side.py --seeds 9100-9102
