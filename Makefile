@@ -10,7 +10,7 @@
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .SUFFIXES:
-.PHONY: help demo test test-rust test-python test-nightly fuzz fuzz-files fuzz-c fuzz-rust reference validation lint lint-rust lint-python bench peers chirp narx-peers bench-counts c-library bench-diagnosis benchmarks bench-lisdd docs docs-rust figures package clean
+.PHONY: help demo test test-rust test-python test-nightly fuzz fuzz-files fuzz-c fuzz-rust reference validation lint lint-rust lint-python bench peers chirp narx-peers bench-counts c-library bench-diagnosis benchmarks bench-lisdd docs docs-rust figures site package clean
 
 PYTHON ?= python3
 DEMO_OUT ?= demo-report
@@ -135,6 +135,13 @@ docs: $(VENV)/.installed docs-rust ## run every snippet of the documents; build 
 docs-rust: $(VENV)/.installed ## build the Rust documentation
 	RUSTDOCFLAGS='-D warnings' cargo doc --workspace --no-deps $(CARGO_ARGS)
 
+site: $(VENV)/.installed ## build the site of the documents into build/site, with pictures that the examples draw; checks links
+	$(BIN)/python -m pip install --quiet 'mkdocs-material>=9.5,<10' 'mkdocstrings[python]>=0.27' 'latex2mathml>=3.77'
+	rm -rf build
+	OMP_NUM_THREADS=1 $(BIN)/python docs/site/pages.py build/pages
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet
+	@echo 'open build/site/index.html'
+
 package: $(VENV)/.installed ## build the wheel and the source distribution into dist/
 	rm -rf dist
 	$(BIN)/python -m maturin sdist --out dist
@@ -147,7 +154,7 @@ package: $(VENV)/.installed ## build the wheel and the source distribution into 
 	@ls -l dist
 
 clean: ## remove everything that the commands made
-	rm -rf $(VENV) target dist demo-report .hypothesis .mypy_cache .pytest_cache .ruff_cache .import_linter_cache
+	rm -rf $(VENV) target dist build demo-report .hypothesis .mypy_cache .pytest_cache .ruff_cache .import_linter_cache
 	find python tests -name '__pycache__' -type d -prune -exec rm -rf {} +
 	find python -name '_core*.so' -delete
 

@@ -148,8 +148,6 @@ def diagnose(
     progress : callable, optional
         Called after every candidate with what is being done, its name, how many are done, and how many there are.
 
-    Ctrl-C during the search ends it with what is known so far, see `Diagnosis.interrupted`.
-
     Returns
     -------
     Diagnosis
