@@ -104,9 +104,9 @@ def _write(figure: Figure, scene: Scene, sample: int, *, dark: bool) -> None:
     def text(x: float, y: float, words: str, size: float, tone: tuple[float, float, float]) -> Text:
         return figure.text(x / width, 1.0 - y / height, words, size=size, color=tone, va="center", parse_math=False)
 
-    text(22, 30, scene.title, 15, ink).set_weight("bold")
+    text(22, 30, scene.title, 15, ink).set_fontweight("bold")
     text(22, 56, scene.subtitle, 10.5, soft)
-    text(width - 22, height - 28, f"{scene.time[sample]:.3f} s", 13, ink).set_ha("right")
+    text(width - 22, height - 28, f"{scene.time[sample]:.3f} s", 13, ink).set_horizontalalignment("right")
     for row, role in enumerate(role for role in LOOKS if role in scene.roles):
         scale = scene.scales.get(role, f"one square is {scene.grid:g} m" if role in {"floor", "plane"} else "")
         y = 92 + 21 * row

@@ -75,6 +75,10 @@ class Stage:
         elif mesh is not None:
             mesh.visible = False
 
+    def corners(self, role: str) -> Array:
+        """Corners of the mesh of a role (C, 3)."""
+        return np.array(self._meshes[role].vertices, dtype=np.float64)
+
 
 class Page:
     """A page in the browser.
@@ -199,6 +203,10 @@ class Page:
         if self._stale:
             self._stale = False
             self._draw_now()
+
+    def drawn(self, role: str) -> Array:
+        """Corners of what the browser was told of a role last, shape (C, 3), m."""
+        return self._stage.corners(role)
 
     def close(self) -> None:
         """End the server."""

@@ -211,7 +211,7 @@
 
   // ---- words and controls
   get("title").textContent = scene.title;
-  get("subtitle").textContent = scene.subtitle;
+  get("subtitle").textContent = `${scene.subtitle} · one square is ${scene.grid} m`;
   const legend = () => {
     const theme = dark ? "dark" : "light";
     get("roles").replaceChildren(...Object.entries(scene.looks).flatMap(([role, look]) => {
