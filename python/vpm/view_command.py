@@ -39,7 +39,7 @@ def view(
     model: ModelPath,
     moved: Annotated[
         Path | None,
-        typer.Argument(metavar="[RUN|LOG]", help=f"Saved run (NPZ), or measured record ({FORMATS}), simulated first."),
+        typer.Argument(metavar="RUN|LOG", help=f"Saved run (NPZ), or measured record ({FORMATS}), simulated first."),
     ] = None,
     run: Annotated[
         str | None,
@@ -47,7 +47,9 @@ def view(
     ] = None,
     mode: Annotated[
         str | None,
-        typer.Option(metavar="MODE", help="How a log is simulated; free_run, or prescribed_motion by default."),
+        typer.Option(
+            metavar="MODE", help="How a log is simulated; by default as its commands, references or motion allow."
+        ),
     ] = None,
     page: Annotated[
         Path | None, typer.Option(callback=writable, help="Write one static page (HTML) that needs no network.")

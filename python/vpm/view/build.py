@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from vpm.errors import SimulationError
 from vpm.model import Model
 from vpm.view.course import Course
 from vpm.view.scene import Arrow, Scene, Shape
@@ -16,6 +17,8 @@ Array = NDArray[np.float64]
 
 #: Length of the longest arrow of its kind, as a share of the size of the machine.
 LONGEST = 0.45
+#: Beyond this size (m) nothing is a machine.
+LARGEST = 1e6
 #: How far the eye is raised over a side view (rad), and turned about the vertical in a view from a corner.
 RAISED, TURNED = 0.30, 0.75
 
@@ -30,6 +33,10 @@ def scene_of(model: Model, course: Course) -> Scene:
     """
     skeleton = Skeleton(model)
     pose = skeleton.pose(course.coordinates)
+    if not pose.size < LARGEST:
+        raise SimulationError(
+            f"{model.name} spreads over {pose.size:.3g} m in this motion, more than {LARGEST:g} m; the run has diverged"
+        )
     shapes = [*skeleton.shapes(pose)]
     if course.measured is not None:
         shapes += skeleton.ghost(skeleton.pose(course.measured, pose.size))
@@ -66,7 +73,7 @@ def _front(skeleton: Skeleton, pose: Pose, up: Array) -> Array:
     parallel = all(abs(axis @ axes[0]) > 1.0 - 1e-9 for axis in axes)
     points = (pose.origins - pose.origins[:1, :1]).reshape(-1, 3)
     flat = np.linalg.svd(points, full_matrices=False)[2][-1] if len(points) > 2 else np.zeros(3)
-    thin = float(np.max(np.abs(points @ flat))) < 1e-6 * pose.size
+    thin = bool(flat.any()) and float(np.max(np.abs(points @ flat))) < 1e-6 * pose.size
     # The way across the plane is that of hinges, where there are any: a straight machine has no plane of its own.
     across = None
     if axes and parallel and abs(axes[0] @ up) < 0.1:

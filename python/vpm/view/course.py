@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 #: Channels whose numbers are drawn as arrows.
-LOADS = (".fx", ".fy", ".fz", ".tension", ".force", ".effort")
+LOADS = (".fx", ".fy", ".fz", ".tension", ".effort")
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +60,8 @@ def course_of(model: Model, source: Run | ScenarioRun | Experiment | None, mode:
     source : Run, ScenarioRun, Experiment or None
         Of a scenario the first run whose model it is.
     mode : str, optional
-        How a log is simulated: by default ``free_run`` on its commands, or ``prescribed_motion`` without any.
+        How a log is simulated: by default ``free_run`` on its commands, ``closed_loop`` on references,
+        or ``prescribed_motion`` with neither.
 
     Raises
     ------
@@ -94,9 +95,9 @@ def _of_scenario(model: Model, source: ScenarioRun) -> Run:
 
 
 def _fits(model: Model, run: Run) -> bool:
-    known = set(model.channels) | {"time"}
+    whole = (run.time.size, len(run.channels))
     same = run.coordinates is None or run.coordinates.shape == (run.time.size, len(model.coordinates))
-    return same and set(run.channels) <= known
+    return same and whole == run.values.shape == run.measured.shape and set(run.channels) <= set(model.channels)
 
 
 def _of_run(model: Model, run: Run) -> Course:
@@ -111,7 +112,9 @@ def _of_run(model: Model, run: Run) -> Course:
     coordinates = _coordinates(model, run)
     measured = _measured(model, run, coordinates, notes)
     loads = {name: run[name] for name in run.channels if name.endswith(LOADS)}
-    shown = np.flatnonzero(np.all(np.isfinite(coordinates), axis=1))
+    shown = np.flatnonzero(np.all(np.isfinite(coordinates), axis=1) & np.isfinite(run.time))
+    if shown.size == 0:
+        raise SimulationError("no sample of the run has finite positions, so nothing can be shown; simulate it anew")
     if shown.size < run.time.size:
         notes.append(f"{run.time.size - shown.size} samples without finite positions are left out.")
     return replace(
@@ -166,7 +169,8 @@ def _told(model: Model, seen: list[str]) -> Iterator[str]:
 
 
 def _of_log(model: Model, log: Experiment, mode: str | None) -> Course:
-    driven = any(f"{name}.command" in log or f"{name}.reference" in log for name in model.actuators)
+    told_by = {"command": "free_run", "reference": "closed_loop"}
+    driven = [mode for kind, mode in told_by.items() if any(f"{name}.{kind}" in log for name in model.actuators)]
     told = joints_from_shafts(log, model, model.theta) if model.transmissions else log
     there = [name for name in model.joints if f"{name}.position" in told]
     if not there and not driven:
@@ -175,7 +179,7 @@ def _of_log(model: Model, log: Experiment, mode: str | None) -> Course:
             near_match(f"{model.joints[0]}.position", log.channels, what="its channels are") if model.joints else ""
         )
         raise ExperimentError(f"{log.name} has neither joint positions ({wanted}) nor commands to show; {repair}")
-    course = _of_run(model, simulate(model, log, mode or ("free_run" if driven else "prescribed_motion")))
+    course = _of_run(model, simulate(model, log, mode or (*driven, "prescribed_motion")[0]))
     if not there:
         return replace(
             course, notes=(*course.notes, f"{log.name} has no joint positions: nothing is measured to show.")

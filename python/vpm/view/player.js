@@ -211,7 +211,7 @@
 
   // ---- words and controls
   get("title").textContent = scene.title;
-  get("subtitle").textContent = `${scene.subtitle} · one square is ${scene.grid} m`;
+  get("subtitle").textContent = [scene.subtitle, `one square is ${scene.grid} m`].filter(Boolean).join(" · ");
   const legend = () => {
     const theme = dark ? "dark" : "light";
     get("roles").replaceChildren(...Object.entries(scene.looks).flatMap(([role, look]) => {

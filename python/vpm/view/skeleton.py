@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from vpm.errors import SimulationError
 from vpm.model import Model
 from vpm.view.bodies import box_of, sphere_radius
 from vpm.view.frames import Content, Frames
@@ -56,14 +57,20 @@ class Skeleton:
         self.lines: dict[str, tuple[int, int]] = {}
         #: Joints whose effort is a torque.
         self.turning: set[str] = set()
+        #: A machine is no smaller than its largest mass, were it a ball (m).
+        self._least = 1e-3
         self._add_all()
 
     def pose(self, coordinates: Array, size: float | None = None) -> Pose:
         """Places along a motion, coordinates of shape (N, n); the size of the machine (m) is its largest in it."""
         origins, axes = self.frames.poses(coordinates)
+        if size is None and not origins.shape[1]:
+            raise SimulationError(
+                "the machine has no bodies, so there is nothing to draw; describe them under [bodies]"
+            )
         if size is None:
             spans = origins.max(axis=1) - origins.min(axis=1)
-            size = max(float(np.max(np.linalg.norm(spans, axis=1))), 1e-3)
+            size = max(float(np.max(np.linalg.norm(spans, axis=1))), self._least)
         return Pose(origins, axes, coordinates, size)
 
     def shapes(self, pose: Pose) -> tuple[Shape, ...]:
@@ -138,6 +145,7 @@ class Skeleton:
         radius = sphere_radius(mass)
         if mass <= 0.0:
             return
+        self._least = max(self._least, 2.0 * radius)
         if np.any(centre):
             self._reached.setdefault(own, [])
 

@@ -39,7 +39,7 @@ def view(
     film : path-like, optional
         Write a film (MP4, MKV, WebM or GIF). Needs the extra ``film``.
     mode : str, optional
-        Of the simulation of a log; by default ``free_run``, or ``prescribed_motion`` without commands.
+        Of the simulation of a log; by default as its commands, references or motion allow; see `course_of`.
     speed : float, optional
         Of the film: seconds of the machine in a second.
     dark : bool
