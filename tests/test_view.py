@@ -14,22 +14,18 @@ from numpy.typing import NDArray
 import vpm
 from command_line import vpm as command
 from textbook_arm import FILE, LENGTHS
+from view_scenes import AHEAD, ROOT, arm_scene, hits, tubes
 from vpm.errors import ExperimentError, SimulationError, VpmError
 from vpm.experiment import Experiment
 from vpm.scenario import Scenario, ScenarioRun
-from vpm.view import Arrow, Box, Course, Scene, Sphere, Tube, course_of, scene_of
+from vpm.view import Arrow, Box, Course, Sphere, Tube, course_of, scene_of
 from vpm.view.bodies import DENSITY, box_of, sphere_radius
 from vpm.view.film import draw, film_samples, picture, write_film
 from vpm.view.frames import Frames
-from vpm.view.looks import LOOKS, colour
 from vpm.view.mesh import mesh_of
-from vpm.view.page import STAGE, page_of
+from vpm.view.page import page_of
 
 Array = NDArray[np.float64]
-ROOT = Path(__file__).resolve().parent.parent
-
-#: How far the measured arm is ahead of the simulated one (rad).
-AHEAD = np.array([0.25, 0.1])
 
 #: One joint, and one link whose strain is constant along it: its axis is an arc.
 ARC = """
@@ -47,14 +43,6 @@ section = { shape = "circle", diameter = 0.006 }
 """
 
 
-def arm_scene() -> tuple[Array, Scene]:
-    """The textbook arm along some motion, measured a little ahead."""
-    t = np.linspace(0.0, 2.0, 41)
-    q = np.column_stack([0.4 + np.sin(t), -0.7 + 0.5 * np.cos(2.0 * t)])
-    model = vpm.Model.from_toml(FILE)
-    return q, scene_of(model, Course("swings", t, q, q + AHEAD))
-
-
 def ends(q: Array) -> tuple[Array, Array]:
     """Elbow and tip (N, 3) of the textbook arm by its formulas."""
     (l1, l2), both = LENGTHS, q[:, 0] + q[:, 1]
@@ -66,15 +54,6 @@ def ends(q: Array) -> tuple[Array, Array]:
 def landing() -> tuple[vpm.Model, ScenarioRun]:
     runs = Scenario.load(ROOT / "examples/hyl/hydraulic_drop.toml").run()
     return vpm.Model.load(ROOT / "examples/hyl/hydraulic.toml"), runs
-
-
-def strip_scene() -> Scene:
-    model = vpm.Model.load(ROOT / "examples/flexible_pendulum/flexible_pendulum.toml")
-    return scene_of(model, course_of(model, Scenario.load(ROOT / "examples/flexible_pendulum/release.toml").run()))
-
-
-def tubes(scene: Scene, role: str) -> list[Tube]:
-    return [shape for shape in scene.shapes if isinstance(shape, Tube) and shape.role == role]
 
 
 # ---- places ----------------------------------------------------------------------------------------------------------
@@ -218,6 +197,16 @@ def test_what_cannot_be_shown_is_refused_in_a_sentence(landing: tuple[vpm.Model,
         assert said in " ".join(done.stderr.split()), done.stderr
 
 
+def test_a_slider_at_zero_is_as_large_as_its_mass_and_what_has_diverged_is_told() -> None:
+    model = vpm.Model.load(ROOT / "examples/emps/model.toml")
+    scene = scene_of(model, course_of(model, None))
+    (ball,) = [shape for shape in scene.shapes if isinstance(shape, Sphere)]
+    assert ball.radius == pytest.approx(0.07 * 2.0 * sphere_radius(model.parameters["carriage.mass"].value))
+    assert np.all(np.isfinite(scene.front))
+    with pytest.raises(SimulationError, match=r"spreads over .* m in this motion"):
+        scene_of(model, Course("", np.arange(2.0), np.array([[0.0], [1e9]])))
+
+
 def test_a_log_is_simulated_and_shown_beside_itself() -> None:
     model = vpm.Model.from_toml(FILE)
     t = np.arange(0.0, 1.0, 0.01)
@@ -286,27 +275,6 @@ def test_a_page_of_a_long_record_stays_small_and_names_run_no_code() -> None:
     assert text.count("</script>") == 2
 
 
-def hits(pixels: NDArray[np.uint8], scene: Scene, role: str, sample: int, stage: float, *, dark: bool) -> float:
-    """Share of places along the tubes of a role at which its hue is, where the scene says that they are."""
-    height, width = pixels.shape[:2]
-    camera = scene.camera(width / height, room=stage)
-    share = np.linspace(0.15, 0.85, 40)
-    paths = [tube.at(sample) for tube in tubes(scene, role)]
-    along = [np.column_stack([np.interp(share, np.linspace(0, 1, len(p)), p[:, i]) for i in range(3)]) for p in paths]
-    seen = camera.project(np.concatenate(along))
-    columns = np.rint(0.5 * (seen[:, 0] + 1.0) * width - 0.5).astype(int)
-    rows = np.rint(0.5 * (1.0 - seen[:, 1]) * height - 0.5).astype(int)
-    assert columns.min() >= 0
-    assert columns.max() < width
-    wanted = np.array(colour(LOOKS[role], dark=dark))
-    found = pixels[rows, columns] / 255.0
-    # Light changes how bright a part is; of its hue it leaves the direction.
-    found, wanted = (np.asarray(c) - np.mean(c, axis=-1, keepdims=True) for c in (found, wanted))
-    strength, full = np.linalg.norm(found, axis=-1), float(np.linalg.norm(wanted))
-    alike = np.einsum("ni,i->n", found, wanted) > 0.9 * strength * full
-    return float(np.mean(alike & (strength > 0.4 * full)))  # the ground has a little of a hue, too
-
-
 @pytest.mark.parametrize("dark", [False, True])
 def test_a_picture_of_the_film_shows_the_links_where_they_are(*, dark: bool) -> None:
     _, scene = arm_scene()
@@ -328,6 +296,3 @@ def test_a_film_is_written(tmp_path: Path) -> None:
         assert film.get_data(0).shape == (720, 1280, 3)
     with pytest.raises(VpmError, match="would take 2000 s"):
         film_samples(scene, 1e-3)
-
-
-__all__ = ["STAGE", "arm_scene", "hits", "landing", "strip_scene"]

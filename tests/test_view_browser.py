@@ -17,21 +17,16 @@ from numpy.typing import NDArray
 
 import vpm
 from command_line import vpm as command
-from test_view import ROOT, STAGE, arm_scene, hits, strip_scene
+from view_scenes import ROOT, arm_scene, hits, leg_scene, strip_scene
 from vpm.errors import VpmError
 from vpm.scenario import Scenario
-from vpm.view import Scene, course_of, scene_of
-from vpm.view.page import write_page
+from vpm.view import Scene, course_of
+from vpm.view.page import STAGE, write_page
 
 CHROMIUM = next(
     (found for name in ("chromium", "chromium-browser", "google-chrome") if (found := shutil.which(name))), None
 )
 OPTIONS = ("--headless=new", "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
-
-
-def leg_scene() -> Scene:
-    model = vpm.Model.load(ROOT / "examples/hyl/hydraulic.toml")
-    return scene_of(model, course_of(model, Scenario.load(ROOT / "examples/hyl/hydraulic_drop.toml").run()))
 
 
 def photo(page: Path, asked: str, size: tuple[int, int]) -> NDArray[np.uint8]:
@@ -72,6 +67,13 @@ def test_a_page_shows_the_parts_where_they_are(
     assert (ground.mean() < 60) == (theme == "dark")
 
 
+def quiet_port() -> int:
+    """A port from where other tests look for none."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
 def test_a_port_in_use_is_told() -> None:
     pytest.importorskip("viser", reason="viser is not installed")
     with socket.socket() as other:
@@ -89,7 +91,7 @@ def test_the_browser_is_served_with_sliders_and_with_a_time_line() -> None:
 
     model = vpm.Model.load(ROOT / "examples/flexible_pendulum/flexible_pendulum.toml")
     for source in (None, Scenario.load(ROOT / "examples/flexible_pendulum/release.toml").run()):
-        page = Page(model, course_of(model, source))
+        page = Page(model, course_of(model, source), port=quiet_port())
         page.advance(0.0)
         assert page.drawn("beam").shape[1] == 3
         with urllib.request.urlopen(page.address, timeout=10) as answer:
