@@ -294,5 +294,8 @@ def test_a_film_is_written(tmp_path: Path) -> None:
     with imageio.get_reader(path) as film:
         assert film.count_frames() == len(samples)
         assert film.get_data(0).shape == (720, 1280, 3)
+    with imageio.get_reader(write_film(scene, tmp_path / "arm.gif", speed=50.0)) as film:
+        assert film.get_length() == 2
+        assert film.get_meta_data()["duration"] == pytest.approx(40.0)
     with pytest.raises(VpmError, match="would take 2000 s"):
         film_samples(scene, 1e-3)

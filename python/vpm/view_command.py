@@ -55,7 +55,7 @@ def view(
         Path | None, typer.Option(callback=writable, help="Write one static page (HTML) that needs no network.")
     ] = None,
     film: Annotated[
-        Path | None, typer.Option(callback=writable, help="Write a film (MP4, MKV, WebM or GIF); extra film.")
+        Path | None, typer.Option(callback=writable, help="Write a film (MP4, MKV or GIF); extra film.")
     ] = None,
     speed: Annotated[float | None, typer.Option(help="Seconds of the machine in a second of film.")] = None,
     dark: Annotated[bool, typer.Option("--dark", help="On dark ground.")] = False,

@@ -31,7 +31,7 @@ Array = NDArray[np.float64]
 #: Size of a film in pixels, its pictures per second, and how long it may be (s).
 WIDTH, HEIGHT, RATE, LONGEST = 1280, 720, 25, 120.0
 #: Formats that players know.
-ENDINGS = (".mp4", ".gif", ".mkv", ".webm")
+ENDINGS = (".mp4", ".mkv", ".gif")
 #: Shares of the picture's height for the machine.
 STAGE = 0.80
 #: Time that a film of a short motion takes, s.
@@ -128,7 +128,7 @@ def write_film(
     ----------
     scene : Scene
     path : path-like
-        MP4, MKV, WebM or GIF, by its ending.
+        MP4, MKV or GIF, by its ending.
     speed : float, optional
         Seconds of the machine in a second of film; by default 1, or as slow that a short motion takes `SHORT` seconds.
     dark : bool
@@ -152,8 +152,9 @@ def write_film(
         import_module("imageio_ffmpeg")
     except ImportError as error:
         raise MissingExtraError("imageio-ffmpeg", "film") from error
-    how: dict[str, Any] = {"loop": 0} if target.suffix.lower() == ".gif" else {"macro_block_size": 2, "quality": 8}
-    with replacing(path) as beside, imageio.get_writer(beside, fps=RATE, **how) as writer:
+    gif: dict[str, Any] = {"duration": 1000.0 / RATE, "loop": 0}
+    how = gif if target.suffix.lower() == ".gif" else {"fps": RATE, "macro_block_size": 2, "quality": 8}
+    with replacing(path) as beside, imageio.get_writer(beside, **how) as writer:
         for number, sample in enumerate(samples):
             writer.append_data(picture(draw(scene, int(sample), dark=dark)))
             if progress is not None:

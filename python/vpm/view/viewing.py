@@ -37,7 +37,7 @@ def view(
     page : path-like, optional
         Write one static page (HTML), which opens without a network.
     film : path-like, optional
-        Write a film (MP4, MKV, WebM or GIF). Needs the extra ``film``.
+        Write a film (MP4, MKV or GIF). Needs the extra ``film``.
     mode : str, optional
         Of the simulation of a log; by default as its commands, references or motion allow; see `course_of`.
     speed : float, optional
