@@ -128,6 +128,7 @@ figures: $(VENV)/.installed ## draw the pictures of docs/ anew, from the package
 	$(BIN)/python docs/figures/hyl.py
 	$(BIN)/python docs/figures/oil.py
 	$(BIN)/python docs/figures/effects.py
+	$(BIN)/python docs/figures/view.py
 
 docs: $(VENV)/.installed docs-rust ## run every snippet of the documents; build the Rust documentation
 	$(BIN)/python -m pytest tests/test_docs.py $(PYTEST_ARGS)

@@ -45,6 +45,7 @@ if TYPE_CHECKING:
     from vpm.simplify import Ladder, simplify
     from vpm.simulate import Run, Setup, simulate
     from vpm.stepping import Simulation
+    from vpm.view import view
     from vpm.weighing import Weighing, weigh
 
     __version__: str
@@ -99,6 +100,7 @@ __all__ = [
     "simplify",
     "simulate",
     "simulate_batch",
+    "view",
     "weigh",
     "write_report",
 ]
@@ -148,6 +150,7 @@ _HOMES = {
     "Setup": "vpm.simulate",
     "simulate": "vpm.simulate",
     "Simulation": "vpm.stepping",
+    "view": "vpm.view",
     "Weighing": "vpm.weighing",
     "weigh": "vpm.weighing",
 }

@@ -534,6 +534,8 @@ class System:
         """Slope in rad up to which the kinematics of small slopes are right within 1 %."""
     def jacobian(self, theta: ArrayLike, position: ArrayLike, marker: int) -> NDArray[np.float64]:
         """Jacobian (6, n_coordinates) of a marker by number: angular velocity, then velocity, in world axes."""
+    def marker_poses(self, theta: ArrayLike, positions: ArrayLike) -> NDArray[np.float64]:
+        """Poses (N, markers, 12) along ``positions`` (N, n_coordinates): origin in the world, then axes by rows."""
     def time_steps(
         self,
         theta: ArrayLike,

@@ -25,6 +25,7 @@ from vpm import (
     identify_command,
     prove_command,
     rank_command,
+    view_command,
 )
 from vpm.command import (
     BESIDE,
@@ -103,6 +104,7 @@ app.command(epilog=identify_command.EXAMPLES)(identify_command.identify)
 app.command(epilog=diagnose_command.EXAMPLES)(diagnose_command.diagnose)
 app.command(epilog=rank_command.EXAMPLES)(rank_command.rank)
 app.command(epilog=prove_command.EXAMPLES)(prove_command.prove)
+app.command(epilog=view_command.EXAMPLES)(view_command.view)
 detail_command.add_to(app)
 
 

@@ -234,7 +234,11 @@ class Simulation:
             settings={"integrator": self._setup.integrator, "substeps": self._setup.substeps},
             resolution=steps,
         )
-        return judged(self._model, run, np.array(self._passed)) if self._passed else run
+        if not self._passed:
+            return run
+        states = np.array(self._passed)
+        run = replace(run, coordinates=states[:, : len(self._model.coordinates)])
+        return judged(self._model, run, states)
 
     def reset(self, state: Mapping[str, float] | ArrayLike | None = None) -> None:
         """Begin again at time zero, with nothing remembered.

@@ -110,6 +110,19 @@ pub fn marker_jacobian(description: &Description, theta: &[f64], position: &[f64
     Ok(jacobian)
 }
 
+/// Poses of all markers along a motion of all coordinates (N x coordinates), row by row: of each marker its origin in the world (m), then
+/// its axes there, row by row.
+pub fn marker_poses(description: &Description, theta: &[f64], positions: Table<'_>) -> Result<Vec<f64>> {
+    positions.expect("positions", positions.rows(), description.n_coordinates())?;
+    let mut dynamics = prepare(description, theta, [])?;
+    let width = 12 * description.markers.len();
+    let mut values = vec![0.0; positions.rows() * width];
+    for (k, row) in values.chunks_exact_mut(width.max(1)).enumerate() {
+        dynamics.marker_poses(&positions.numbers()[k * positions.columns()..][..positions.columns()], row);
+    }
+    Ok(values)
+}
+
 fn held(description: &Description, theta: &[f64], position: &[f64]) -> Result<Statics> {
     Table::vector("position", position, description.n_joints(), "joint")?;
     description.check_values(theta)?;

@@ -48,6 +48,9 @@ class Run(Result):
     resolution : Resolution or None
         What the steps do not resolve, worked out when somebody looks; None where no run goes
         through (restarts, inverse dynamics, prescribed motion, what diverged).
+    coordinates : ndarray, shape (N, n), or None
+        Positions of the joints, then coordinates of the flexible links, as in ``model.coordinates``; None where no run
+        goes through (restarts, inverse dynamics, what diverged).
     """
 
     model_name: str
@@ -62,6 +65,7 @@ class Run(Result):
     settings: dict[str, float | int | str] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     resolution: Resolution | None = None
+    coordinates: Array | None = None
 
     def __getitem__(self, channel: str) -> Array:
         """Simulated values of one channel, shape (N,)."""
@@ -162,6 +166,7 @@ def run_of(model: Model, experiment: Experiment, mode: str, arrays: SimulatedArr
         np.arange(len(arrays.starts), dtype=np.int64) * length,
         settings,
         model.beyond_tables(experiment.time[arrays.rows], dict(zip(channels, values.T, strict=True))),
+        coordinates=None if arrays.states is None else np.array(arrays.states[:, : len(model.coordinates)]),
     )
 
 

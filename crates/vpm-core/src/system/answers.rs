@@ -194,4 +194,21 @@ impl<S: Scalar> Dynamics<S> {
             }
         });
     }
+
+    /// Poses of all markers at `q`, twelve numbers each: the origin in the world, then the rotation `R_WM` row by row.
+    ///
+    /// Checked: against the markers' outputs, and in Python against the chain of textbooks.
+    pub fn marker_poses(&mut self, q: &[S], values: &mut [S]) {
+        let Self { model, data, loads, .. } = self;
+        loads.fill(S::zero());
+        frames(model, data, q, loads);
+        poses(model, data);
+        for (numbers, place) in values.chunks_exact_mut(12).zip(model.markers()) {
+            let pose = data.composite.frames[place.frame].pose * Pose::from_f64(place.pose);
+            numbers[..3].copy_from_slice(&pose.translation.to_array());
+            for (row, numbers) in numbers[3..].chunks_exact_mut(3).enumerate() {
+                numbers.copy_from_slice(&pose.rotation.columns.map(|column| column.to_array()[row]));
+            }
+        }
+    }
 }

@@ -237,4 +237,12 @@ impl System {
         let result = unbroken(|| evaluate::marker_jacobian(self.description(), theta.values(), q.values(), number))?;
         matrix(py, self.checked(py, result)?, [6, self.description().n_coordinates()])
     }
+
+    /// Poses (N, markers, 12) along a motion of all coordinates: origin in the world, then the axes there, row by row.
+    fn marker_poses<'py>(&self, py: Python<'py>, theta: &Any<'py>, positions: &Any<'py>) -> PyResult<Cube<'py>> {
+        let (theta, positions) = (Numbers::vector("theta", theta)?, Numbers::table("positions", positions)?);
+        let poses =
+            self.compute(py, |_| evaluate::marker_poses(self.description(), theta.values(), positions.as_table()?))?;
+        cube(py, poses, [positions.rows(), self.description().markers.len(), 12])
+    }
 }

@@ -13,6 +13,7 @@ use vpm_core::mount::{Gauge, Marker, Mount};
 use vpm_core::ode::Ode;
 use vpm_core::samples::Random;
 use vpm_core::simulate::{Run, Setting, Stepping, free_run, prescribed};
+use vpm_core::spatial::Matrix3;
 use vpm_core::system::Build;
 use vpm_core::table::Table;
 use vpm_core::{Dual, Error, Result};
@@ -124,6 +125,28 @@ fn markers_move_as_their_jacobian_says() -> Result<()> {
             for k in 0..N {
                 let (found, expected) = (jacobian[(3 + axis) * N + k], outputs[first + axis].gradient[k]);
                 assert!((found - expected).abs() < 1e-12, "{marker} {axis} {k}: {found} {expected}");
+            }
+        }
+    }
+    Ok(())
+}
+
+#[test]
+fn poses_of_markers_are_their_outputs() -> Result<()> {
+    let d = description(&everything(8), |_| ());
+    let n = d.n_coordinates();
+    let q = Random::new(4).numbers(2 * n, 0.3);
+    let poses = evaluate::marker_poses(&d, &d.parameters, Table::new("positions", &q, 2, n)?)?;
+    let mut dynamics = Build::dynamics(&&d, &d.parameters)?;
+    assert!(!d.markers.is_empty());
+    for (q, row) in q.chunks_exact(n).zip(poses.chunks_exact(12 * d.markers.len())) {
+        let mut outputs = vec![0.0; d.n_outputs()];
+        dynamics.observe_motion(&[q, &vec![0.0; n]].concat(), &mut outputs);
+        for (pose, seen) in row.chunks_exact(12).zip(outputs[d.layout().markers()..].chunks_exact(6)) {
+            let angles =
+                Matrix3::from_rows_f64(pose[3..].try_into().expect("nine numbers")).rotation_vector().to_array();
+            for (found, expected) in pose[..3].iter().chain(&angles).zip(seen) {
+                assert!((found - expected).abs() < 1e-12, "{found} {expected}");
             }
         }
     }

@@ -1,0 +1,197 @@
+"""A machine in motion as plain shapes in the world, for whoever draws them: numbers alone, no drawing library.
+
+Every shape has its places at every sample: of N samples, or of one where it never moves. All lengths are in m.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vpm.view.camera import Camera
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """What is drawn.
+
+    Attributes
+    ----------
+    name : str
+        Of the component of the model.
+    role : str
+        What it is, by which its colour and its word in the legend go; see `vpm.view.looks`.
+    """
+
+    name: str
+    role: str
+
+    @property
+    def points(self) -> Array:
+        """Points that it is made of, shape (N or 1, K, 3)."""
+        raise NotImplementedError
+
+    def at(self, sample: int) -> Array:
+        """The points of a sample, shape (K, 3)."""
+        points = self.points
+        return np.asarray(points[min(sample, len(points) - 1)])
+
+
+@dataclass(frozen=True, eq=False)
+class Tube(Shape):
+    """A round bar along a curve.
+
+    Attributes
+    ----------
+    path : ndarray, shape (N or 1, K, 3)
+        Its centreline.
+    radius : ndarray, shape (K,)
+        At each point of it.
+    """
+
+    path: Array
+    radius: Array
+
+    @property
+    def points(self) -> Array:
+        """Its centreline."""
+        return self.path
+
+
+@dataclass(frozen=True, eq=False)
+class Sphere(Shape):
+    """A sphere.
+
+    Attributes
+    ----------
+    centre : ndarray, shape (N or 1, 3)
+    radius : float
+    """
+
+    centre: Array
+    radius: float
+
+    @property
+    def points(self) -> Array:
+        """Its centre."""
+        return self.centre[:, None, :]
+
+
+@dataclass(frozen=True, eq=False)
+class Box(Shape):
+    """A box.
+
+    Attributes
+    ----------
+    centre : ndarray, shape (N or 1, 3)
+    axes : ndarray, shape (N or 1, 3, 3)
+        Row i is the direction of side i in the world.
+    size : ndarray, shape (3,)
+        Lengths of its sides.
+    """
+
+    centre: Array
+    axes: Array
+    size: Array
+
+    @property
+    def points(self) -> Array:
+        """Its centre, and the middle of a face of each side."""
+        faces = self.centre[:, None, :] + 0.5 * self.size[:, None] * self.axes
+        return np.concatenate([self.centre[:, None, :], faces], axis=1)
+
+
+@dataclass(frozen=True, eq=False)
+class Arrow(Shape):
+    """An arrow, such as a force in the scale of the scene.
+
+    Attributes
+    ----------
+    start, end : ndarray, shape (N or 1, 3)
+        Where it begins, and where its head ends.
+    radius : float
+        Of its shaft.
+    """
+
+    start: Array
+    end: Array
+    radius: float
+
+    @property
+    def points(self) -> Array:
+        """Start and end."""
+        return np.stack([self.start, self.end], axis=1)
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """A machine in motion.
+
+    Attributes
+    ----------
+    title, subtitle : str
+        What is shown: the machine, and the run or log.
+    time : ndarray, shape (N,)
+        s.
+    shapes : tuple of Shape
+    up : ndarray, shape (3,)
+        Unit vector against gravity.
+    front : ndarray, shape (3,)
+        Unit vector from the machine to who looks at it.
+    scales : mapping of str to str
+        What lengths mean, by role: ``{"contact force": "0.1 m is 200 N"}``.
+    grid : float
+        Width of a square of the floor (m); zero without a floor.
+    notes : tuple of str
+        What to know before the picture is trusted, one sentence each.
+    """
+
+    title: str
+    subtitle: str
+    time: Array
+    shapes: tuple[Shape, ...]
+    up: Array
+    front: Array
+    scales: Mapping[str, str]
+    grid: float
+    notes: tuple[str, ...] = ()
+
+    def __getitem__(self, name: str) -> tuple[Shape, ...]:
+        """Shapes of a component of the model."""
+        return tuple(shape for shape in self.shapes if shape.name == name)
+
+    @property
+    def roles(self) -> tuple[str, ...]:
+        """Roles of its shapes, each once."""
+        return tuple(dict.fromkeys(shape.role for shape in self.shapes))
+
+    @cached_property
+    def bounds(self) -> tuple[Array, float]:
+        """Centre (3,) and radius (m) of a sphere about all that is no floor, at all samples."""
+        clouds = [shape.points.reshape(-1, 3) for shape in self.shapes if shape.role not in {"floor", "plane"}]
+        points = np.concatenate(clouds) if clouds else np.zeros((1, 3))
+        centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
+        return centre, max(float(np.max(np.linalg.norm(points - centre, axis=1))), 1e-3)
+
+    def camera(self, aspect: float, *, room: float = 1.0) -> Camera:
+        """The view of who looks at it first.
+
+        Parameters
+        ----------
+        aspect : float
+            Width of the picture over its height.
+        room : float
+            Share of the picture's height that the machine may fill, the rest being for words.
+        """
+        centre, radius = self.bounds
+        return Camera.about(centre, radius, self.front, self.up, aspect, room)
+
+    def frames(self, most: int) -> Iterator[int]:
+        """At most so many samples, evenly apart, the first one among them."""
+        yield from range(0, self.time.size, max(1, -(-self.time.size // most)))
