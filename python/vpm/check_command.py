@@ -8,9 +8,21 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from vpm.command import Channels, Hold, Integrator, Interpolate, Logs, ModelPath, Workers, console, load_all, searching
+from vpm.command import (
+    Channels,
+    Hold,
+    Integrator,
+    Interpolate,
+    Logs,
+    ModelPath,
+    Workers,
+    console,
+    load_all,
+    searching,
+)
 from vpm.errors import ModelError
 from vpm.files import probe_file, write_text
+from vpm.manner import give, wrote
 
 if TYPE_CHECKING:
     from vpm.log_check import LogCheck
@@ -53,12 +65,13 @@ def check(
             workers=workers or None,
             progress=each,
         )
+    give(check=found)
     for line in str(found).splitlines():
         console.print(line, markup=False)
     if found.mistakes and fix:
         path = channels or model
         _write(found, len(records), table, path, given=channels is not None or bool(machine.channel_table))
-        console.print(f"wrote {path}", markup=False)
+        wrote(path)
     elif found.mistakes:
         raise typer.Exit(1)
 

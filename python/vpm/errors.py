@@ -196,6 +196,10 @@ class ValidityWarning(UserWarning):
         self.time = time
 
 
+class PluginWarning(UserWarning):
+    """Another package offers something to vpm that cannot be used; all else works without it."""
+
+
 class MissingExtraError(VpmError, ImportError):
     """A feature needs a package that is an optional extra of vpm.
 

@@ -50,6 +50,8 @@ class Run(Result):
         through (restarts, inverse dynamics, prescribed motion, what diverged).
     """
 
+    _samples = ("time", "values", "measured", "starts")
+
     model_name: str
     experiment_name: str
     mode: str
