@@ -179,7 +179,7 @@ def test_quiet_says_results_only_and_verbose_says_when(folder: Path) -> None:
 
 
 def test_flags_stand_before_a_command_too_and_end_with_it(folder: Path) -> None:
-    assert strict(command("--json", "info").stdout)["result"] == {"version": vpm.__version__}
+    assert strict(command("--json", "info").stdout)["result"] == {"version": vpm.__version__, "plugins": []}
     assert command("info").stdout == f"vpm {vpm.__version__}\n"
     assert strict(command("--json", "simulate", MODEL, LOG, "--plot", "-q", cwd=folder).stdout)["files"] == [
         "short.png"

@@ -50,9 +50,12 @@ def check(
     Ends with exit code 1 where there is a mistake that was not corrected.
     """
     from vpm.log_check import check_log
+    from vpm.model.messages import importer_of
     from vpm.simulate import Setup
 
     if fix:
+        if channels is None and (importer := importer_of(model)) is not None:
+            raise ModelError(f"{model} is read by {importer}, so no table can be put into it; name one with --channels")
         probe_file(channels or model)
     machine, records = load_all(model, logs, channels, interpolate)
     table = _table(machine, channels, logs[0])
