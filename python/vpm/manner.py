@@ -20,13 +20,13 @@ from typing import Annotated, Any
 import typer
 from rich.console import Console
 
-from vpm.errors import PluginWarning, ValidityWarning, VpmError
+from vpm.errors import MissingExtraWarning, PluginWarning, ValidityWarning, VpmError
 
 #: Changes when a key of the document is renamed or removed; new keys may come at any time.
 SCHEMA = 1
 #: What stands in the document as an error after Ctrl-C.
 STOPPED = "stopped by Ctrl-C"
-TOLD = (ValidityWarning, PluginWarning)
+TOLD = (ValidityWarning, PluginWarning, MissingExtraWarning)
 
 
 class Output(Console):
