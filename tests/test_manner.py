@@ -147,6 +147,22 @@ def test_errors_are_data_with_the_same_exit_code(
     assert plainly.stdout == ""
 
 
+def test_ctrl_c_is_an_error_in_the_document() -> None:
+    with patch.object(info_command, "load_model", side_effect=KeyboardInterrupt):
+        done = command("info", MODEL, "--json")
+    assert strict(done.stdout)["error"] == {"kind": "Interrupted", "message": "stopped by Ctrl-C"}
+    assert (done.returncode, done.stderr) == (130, "stopped by Ctrl-C\n")
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device that is full")
+def test_a_document_that_cannot_be_written_is_one_sentence() -> None:
+    with Path("/dev/full").open("w", encoding="utf-8") as full:
+        words = [sys.executable, "-m", "vpm", "info", "--json"]
+        done = subprocess.run(words, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert done.returncode == 1
+    assert re.fullmatch(r"error: standard output cannot be written \(.*\); send it elsewhere\n", done.stderr)
+
+
 def test_what_libraries_print_stays_out_of_the_document(tmp_path: Path) -> None:
     with patch.object(info_command, "load_model", side_effect=lambda _: print("chatter")):
         done = command("info", MODEL, "--json", cwd=tmp_path)

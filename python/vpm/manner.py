@@ -20,7 +20,7 @@ from typing import Annotated, Any
 import typer
 from rich.console import Console
 
-from vpm.errors import MissingExtraWarning, PluginWarning, ValidityWarning, VpmError
+from vpm.errors import INTERRUPTED, MissingExtraWarning, PluginWarning, ValidityWarning, VpmError
 
 #: Changes when a key of the document is renamed or removed; new keys may come at any time.
 SCHEMA = 1
@@ -162,13 +162,15 @@ def _documented(run: Callable[[bool], object]) -> object:
     """Run a command whose output is one document, also where it fails."""
     trouble: BaseException | None = None
     code: object = 0
-    with console.capture() as said, redirect_stdout(sys.stderr):  # libraries print too
+    with redirect_stdout(sys.stderr), console.capture() as said:  # libraries print too
         try:
             code = run(False)
         except SystemExit as end:
             code = end.code
         except BaseException as error:  # noqa: BLE001  # told in the document, and raised again
             trouble = error
+    if code == INTERRUPTED:  # as typer tells of Ctrl-C
+        trouble = KeyboardInterrupt()
     console.print(_document(said.get().splitlines(), trouble), markup=False, emoji=False)
     if trouble is None:
         sys.exit(code if isinstance(code, int) else 0)
