@@ -10,7 +10,7 @@
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .SUFFIXES:
-.PHONY: help demo test test-rust test-python test-nightly fuzz fuzz-files fuzz-c fuzz-rust reference validation lint lint-rust lint-python bench peers chirp narx-peers bench-counts c-library bench-diagnosis benchmarks bench-lisdd docs docs-rust figures site package clean
+.PHONY: help demo test test-rust test-python test-nightly fuzz fuzz-files fuzz-c fuzz-rust reference validation lint lint-rust lint-python bench peers chirp narx-peers bench-counts c-library bench-diagnosis benchmarks bench-lisdd docs docs-rust figures site package wheels clean
 
 PYTHON ?= python3
 DEMO_OUT ?= demo-report
@@ -29,6 +29,12 @@ export PYO3_PYTHON = $(CURDIR)/$(BIN)/python
 # Processor time of one program of Rust tests, s: an endless loop ends with SIGXCPU.
 RUST_SECONDS := 3600
 
+# A virtual environment in a folder, by what this Python has for it.
+make-venv = if "$(PYTHON)" -c 'import ensurepip, venv' 2>/dev/null; then "$(PYTHON)" -m venv $(1); \
+	elif "$(PYTHON)" -m virtualenv --version >/dev/null 2>&1; then "$(PYTHON)" -m virtualenv $(1); \
+	elif command -v virtualenv >/dev/null; then virtualenv --python "$(PYTHON)" $(1); \
+	else echo "vpm keeps its tools in $(1), but this '$(PYTHON)' can make none (no venv, no virtualenv); install your system's python3-venv package and try again" >&2; false; fi
+
 RUST_SOURCES := Cargo.toml $(wildcard Cargo.lock) \
 	$(shell find crates -path '*/src/*' -name '*.rs' -o -name 'Cargo.toml')
 
@@ -36,8 +42,14 @@ help: ## this list
 	@echo 'vpm: the commands (each does all of its own set-up)'
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-15s %s\n", $$1, $$2 }' Makefile
 
-demo: $(VENV)/.installed ## find the hidden effect in a recorded log; the report goes to demo-report/
-	$(BIN)/vpm demo --out "$(DEMO_OUT)"
+# A wheel in dist/ that was made from these very sources spares the compiler, unless the core has been compiled already.
+demo: ## find the hidden effect in a recorded log; the report goes to demo-report/
+	@if ! $(MAKE) --question --no-print-directory $(VENV)/.installed >/dev/null 2>&1 && \
+	    wheel=$$("$(PYTHON)" release/sources.py dist) && $(call make-venv,dist/venv) && \
+	    dist/venv/bin/python -m pip install --quiet --force-reinstall --no-deps "$$wheel" && \
+	    dist/venv/bin/python -m pip install --quiet "$$wheel[report]"; then \
+	  echo "using $$wheel"; dist/venv/bin/vpm demo --out "$(DEMO_OUT)"; \
+	else $(MAKE) --no-print-directory $(VENV)/.installed && $(BIN)/vpm demo --out "$(DEMO_OUT)"; fi
 
 test: test-rust test-python ## all tests, Rust and Python
 
@@ -146,12 +158,18 @@ site: $(VENV)/.installed ## build the site of the documents into build/site, wit
 package: $(VENV)/.installed ## build the wheel and the source distribution into dist/
 	rm -rf dist
 	$(BIN)/python -m maturin sdist --out dist
-	$(BIN)/python -m maturin build --release --out dist
+	$(BIN)/python -m pip install --quiet 'twine>=6'
+	$(BIN)/python release/wheels.py --native
 	@# The core is checked from the source distribution alone, so that nothing it is compiled from is left out.
 	mkdir dist/unpacked
 	tar -xzf dist/*.tar.gz -C dist/unpacked --strip-components 1
 	CARGO_TARGET_DIR='$(CURDIR)/target' cargo check --manifest-path dist/unpacked/Cargo.toml --package vpm-py --quiet
 	rm -rf dist/unpacked
+	@ls -l dist
+
+wheels: $(VENV)/.tools ## build wheels for Linux on x86-64 and aarch64 into dist/, and check them
+	$(BIN)/python -m pip install --quiet 'auditwheel>=6.2' 'twine>=6' 'ziglang>=0.13'
+	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/python release/wheels.py
 	@ls -l dist
 
 clean: ## remove everything that the commands made
@@ -172,10 +190,7 @@ $(VENV)/.tools-found:
 	@touch $@
 
 $(VENV)/.made: | $(VENV)/.tools-found
-	@if "$(PYTHON)" -c 'import ensurepip, venv' 2>/dev/null; then "$(PYTHON)" -m venv $(VENV); \
-	elif "$(PYTHON)" -m virtualenv --version >/dev/null 2>&1; then "$(PYTHON)" -m virtualenv $(VENV); \
-	elif command -v virtualenv >/dev/null; then virtualenv --python "$(PYTHON)" $(VENV); \
-	else echo "vpm keeps its tools in .venv, but this '$(PYTHON)' can make none (no venv, no virtualenv); install your system's python3-venv package and try again" >&2; exit 1; fi
+	@$(call make-venv,$(VENV))
 	@touch $@
 
 # Third-party packages: again only when pyproject.toml changes.

@@ -8,9 +8,21 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from vpm.command import Channels, Hold, Integrator, Interpolate, Logs, ModelPath, Workers, console, load_all, searching
+from vpm.command import (
+    Channels,
+    Hold,
+    Integrator,
+    Interpolate,
+    Logs,
+    ModelPath,
+    Workers,
+    console,
+    load_all,
+    searching,
+)
 from vpm.errors import ModelError
 from vpm.files import probe_file, write_text
+from vpm.manner import give, wrote
 
 if TYPE_CHECKING:
     from vpm.log_check import LogCheck
@@ -38,9 +50,12 @@ def check(
     Ends with exit code 1 where there is a mistake that was not corrected.
     """
     from vpm.log_check import check_log
+    from vpm.model.messages import importer_of
     from vpm.simulate import Setup
 
     if fix:
+        if channels is None and (importer := importer_of(model)) is not None:
+            raise ModelError(f"{model} is read by {importer}, so no table can be put into it; name one with --channels")
         probe_file(channels or model)
     machine, records = load_all(model, logs, channels, interpolate)
     table = _table(machine, channels, logs[0])
@@ -53,12 +68,13 @@ def check(
             workers=workers or None,
             progress=each,
         )
+    give(check=found)
     for line in str(found).splitlines():
         console.print(line, markup=False)
     if found.mistakes and fix:
         path = channels or model
         _write(found, len(records), table, path, given=channels is not None or bool(machine.channel_table))
-        console.print(f"wrote {path}", markup=False)
+        wrote(path)
     elif found.mistakes:
         raise typer.Exit(1)
 

@@ -10,9 +10,9 @@ from collections.abc import Sequence
 from io import TextIOWrapper
 from pathlib import Path
 from threading import Event
-from time import perf_counter
+from traceback import format_exception
 from types import FrameType
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, TextIO
 
 import typer
 from typer.core import TyperGroup
@@ -23,6 +23,7 @@ from vpm import (
     detail_command,
     diagnose_command,
     identify_command,
+    info_command,
     prove_command,
     rank_command,
     view_command,
@@ -46,22 +47,20 @@ from vpm.command import (
     load_pair,
     progress,
     save_plot,
-    warnings_told,
     writable,
 )
 from vpm.errors import INTERRUPTED, ValidityWarning, VpmError
 from vpm.excite_command import app as excite_app
 from vpm.files import exists
-from vpm.simulate import HOLDS, INTEGRATORS, Setup
+from vpm.manner import STOPPED, add_flags, asked, give, notes, speak, unexpected, wrote
 
 if TYPE_CHECKING:
     from vpm.experiment import Experiment
-    from vpm.model import Model
     from vpm.simulate import Run
 
 
 class _Commands(TyperGroup):
-    """The commands; ``--plot`` of ``simulate`` may stand alone, also before the files that the command works on."""
+    """The commands, run by `speak`; ``--plot`` of ``simulate`` may stand alone, also before its files."""
 
     def main(
         self,
@@ -74,12 +73,26 @@ class _Commands(TyperGroup):
     ) -> object:
         """Run the command of a command line."""
         words = _with_picture(sys.argv[1:] if args is None else list(args))
-        return super().main(words, prog_name, complete_var, standalone_mode, windows_expand_args, **extra)
+        run = super().main
+
+        def one(alone: bool) -> object:
+            return run(words, prog_name, complete_var, standalone_mode and alone, windows_expand_args, **extra)
+
+        return speak(one, asked(words, self._command(words)))
+
+    def _command(self, words: list[str]) -> str:
+        """Which command it is, in words."""
+        path, known = [], self.commands
+        for word in words:
+            if word in known:
+                path.append(word)
+                known = getattr(known[word], "commands", {})
+        return " ".join(path)
 
 
 def _with_picture(words: list[str]) -> list[str]:
     """Give ``--plot`` the value `BESIDE` where an option, a file or nothing follows it."""
-    if words[:1] != ["simulate"]:
+    if next((word for word in words if not word.startswith("-")), "") != "simulate":
         return words
     full: list[str] = []
     for word, following in zip(words, [*words[1:], ""], strict=True):
@@ -99,6 +112,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 app.add_typer(excite_app, name="excite")
+app.command(epilog=info_command.EXAMPLES)(info_command.info)
 app.command(epilog=check_command.EXAMPLES)(check_command.check)
 app.command(epilog=identify_command.EXAMPLES)(identify_command.identify)
 app.command(epilog=diagnose_command.EXAMPLES)(diagnose_command.diagnose)
@@ -110,6 +124,7 @@ detail_command.add_to(app)
 
 def _version(asked: bool) -> None:
     if asked:
+        give(version=__version__)
         console.print(f"vpm {__version__}")
         raise typer.Exit
 
@@ -151,57 +166,43 @@ def main() -> None:
         code = 1
     except KeyboardInterrupt:
         pressed.set()
-    except Exception:  # a library that was being loaded may make one of Ctrl-C
+    except BrokenPipeError:
+        _let_go(sys.stdout)
+        code = 1
+    except Exception as error:  # noqa: BLE001  # a library that was being loaded may make one of Ctrl-C
+        code = 1
         if not pressed.is_set():
-            raise
+            _tell_unexpected(error)
     finally:
         signal.signal(signal.SIGINT, before)
     if pressed.is_set():
-        errors.print("stopped by Ctrl-C")
+        errors.print(STOPPED)
         code = INTERRUPTED
-    if console.trouble or errors.trouble:
+    if console.trouble or errors.trouble or notes.trouble:
         _tell_unwritten()
         code = code or 1
     sys.exit(code)
 
 
+def _tell_unexpected(error: Exception) -> None:
+    if asked(sys.argv[1:]).verbose:
+        errors.print("".join(format_exception(error)), markup=False)
+    errors.print(f"error: {unexpected(error)}", markup=False)
+
+
 def _tell_unwritten() -> None:
     """Say that the output could not be written, and let it go."""
-    for one, stream in ((console, sys.stdout), (errors, sys.stderr)):
+    for one, stream in ((console, sys.stdout), (errors, sys.stderr), (notes, sys.stderr)):
         if one.trouble:
-            # What is left in it would be tried again at the end, with a traceback.
-            os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
+            _let_go(stream)
     if reason := console.trouble:
         what = reason.strerror or str(reason)
         errors.print(f"error: standard output cannot be written ({what[:1].lower()}{what[1:]}); send it elsewhere")
 
 
-@app.command(epilog="Example:  vpm info examples/emps/model.toml")
-def info(model: Annotated[Path | None, typer.Argument(metavar="[MODEL]", help="Model file to list.")] = None) -> None:
-    """Version, or a model's flexible links, how its steps run, and its parameters with units and bounds."""
-    if model is None:
-        console.print(f"vpm {__version__}")
-        return
-    from vpm.model import Model
-
-    loaded = Model.load(model)
-    console.print(repr(loaded), markup=False)
-    for sentence in loaded.beam_summary:
-        console.print(f"  {sentence}", markup=False)
-    console.print(f"  {_way(loaded)}", markup=False)
-    for p in loaded.parameters.values():
-        spread = "known" if p.uncertainty is None else f"± {p.uncertainty:g}"
-        console.print(
-            f"  {p.name:40s} {p.value:14.6g} {p.unit:10s} {spread:12s} [{p.minimum:g}, {p.maximum:g}]", markup=False
-        )
-
-
-def _way(model: Model) -> str:
-    """How steps of a model run."""
-    begin = perf_counter()
-    reason = model.core.compile(model.theta, Setup().method(model))
-    spent = 1e3 * (perf_counter() - begin)
-    return f"no machine code: {reason}" if reason else f"long runs are machine code, made in {spent:.0f} ms"
+def _let_go(stream: TextIO) -> None:
+    """Send what is left in a stream nowhere: it would be tried again at the end, with a traceback."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
 @app.command(
@@ -222,10 +223,14 @@ def simulate(
     ] = None,
     integrator: Annotated[
         str | None,
-        typer.Option(help=f"{', '.join(INTEGRATORS)}; auto by default, or what the scenario says."),
+        typer.Option(
+            help="auto, linearly_implicit, additive, rosenbrock, rk4, semi_implicit, guarded or adaptive; by default "
+            "auto, or what the scenario says."
+        ),
     ] = None,
     hold: Annotated[
-        str | None, typer.Option(help=f"What commands do between samples: {', '.join(HOLDS)}; the first by default.")
+        str | None,
+        typer.Option(help="What commands do between samples: zero_order, first_order, cubic; the first by default."),
     ] = None,
     channels: Channels = None,
     interpolate: Interpolate = False,
@@ -264,7 +269,7 @@ def simulate(
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", ValidityWarning)  # they stand in the messages of the run
             run = simulate_log(
-                machine, record, mode or "free_run", integrator=integrator or "auto", hold=hold or HOLDS[0]
+                machine, record, mode or "free_run", integrator=integrator or "auto", hold=hold or "zero_order"
             )
         _tell_run(run, record, out)
         save_plot(run.plot, plot, log)
@@ -283,9 +288,10 @@ def _simulate_scenario(path: Path, out: Path | None, plot: Path | None) -> None:
             if not interrupt.result.runs:
                 raise
             result, stopped = interrupt.result, True
+    give(scenario=result)
     console.print(str(result), markup=False)
     if out is not None:
-        result.save(out)
+        wrote(result.save(out))
     save_plot(result.plot, plot, path)
     if stopped:
         raise KeyboardInterrupt
@@ -298,15 +304,18 @@ def _simulate_scenario(path: Path, out: Path | None, plot: Path | None) -> None:
 def _tell_run(run: Run, record: Experiment, out: Path | None) -> None:
     from vpm.compare import compare as compare_run
 
+    give(run=run)
     console.print(repr(run), markup=False)
     for message in run.messages:
         console.print(f"warning: {message}", markup=False)
     try:
-        console.print(str(compare_run(run, record)), markup=False)
+        comparison = compare_run(run, record)
+        give(comparison=comparison)
+        console.print(str(comparison), markup=False)
     except VpmError as error:  # commands alone are enough to simulate
         console.print(f"not compared: {error}", markup=False)
     if out is not None:
-        run.save(out)
+        wrote(run.save(out))
 
 
 @app.command(epilog="Example:  vpm compare examples/emps/model.toml log.csv --mode inverse_dynamics")
@@ -324,9 +333,8 @@ def compare(
     from vpm.simulate import simulate as simulate_log
 
     machine, record = load_pair(model, log, channels, interpolate)
-    with warnings_told():
-        run = simulate_log(machine, record, mode, cutoff=cutoff)
-    comparison = compare_run(run, record)
+    comparison = compare_run(simulate_log(machine, record, mode, cutoff=cutoff), record)
+    give(comparison=comparison)
     console.print(str(comparison), markup=False)
     for channel in comparison.channels:
         for sentence in channel.where.sentences:
@@ -344,9 +352,9 @@ def report(
     from vpm.report import print_story, write_report
 
     earlier = Diagnosis.load(diagnosis)
+    give(diagnosis=earlier)
     print_story(earlier, console)
-    for path in write_report(earlier, out):
-        console.print(f"wrote {path}", markup=False)
+    wrote(*write_report(earlier, out))
 
 
 @app.command(epilog="Example:  vpm linkage examples/karl/karl.toml --plot karl.png")
@@ -358,6 +366,7 @@ def linkage(
     from vpm.linkages import load
 
     found = load(path)
+    give(name=found.name, kind=type(found).__name__, summary=found.summary)
     console.print(repr(found), markup=False)
     for sentence in found.summary:
         console.print(f"  {sentence}", markup=False)
@@ -378,8 +387,11 @@ def demo(
     from vpm.demo import print_list, run_demo
 
     if listing:
-        print_list(console)
+        give(effects=print_list(console))
         return
     fillable(out)
     with progress() as tell:
-        run_demo(out, console, tell, hide)
+        give(diagnosis=run_demo(out, console, tell, hide, wrote))
+
+
+add_flags(app)

@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 import re
-import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from threading import Event, Lock, Thread
 from time import perf_counter
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-from vpm.errors import ValidityWarning, VpmError
+from vpm.errors import VpmError
 from vpm.files import probe_file, probe_folder, replacing
+from vpm.manner import console as console  # noqa: PLC0414  # commands say their results by these two
+from vpm.manner import detail, in_lines, notes, progressed, wrote
+from vpm.manner import errors as errors  # noqa: PLC0414
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -31,31 +32,6 @@ PICTURES = (".png", ".svg", ".pdf")
 USUAL_EVALUATIONS = 15
 #: Longest silence of a long command whose output goes to a file, s.
 PERIOD = 10.0
-
-
-class Output(Console):
-    """A console that falls silent where its file or its disk takes no more: what a command writes elsewhere counts.
-
-    Attributes
-    ----------
-    trouble : OSError or None
-        Why it fell silent.
-    """
-
-    trouble: OSError | None = None
-
-    def print(self, *objects: Any, **options: Any) -> None:  # noqa: ANN401
-        """As of any console."""
-        try:
-            super().print(*objects, **options)
-        except BrokenPipeError:  # whoever read it has seen enough
-            raise
-        except OSError as error:
-            self.trouble, self.quiet = error, True
-
-
-console = Output(highlight=False, soft_wrap=True)
-errors = Output(stderr=True, highlight=False, soft_wrap=True)
 
 ModelPath = Annotated[Path, typer.Argument(metavar="MODEL", help="Model file (TOML).")]
 FORMATS = "CSV, Parquet, MAT, HDF5, ROS bag, MCAP, TDMS, ULog"
@@ -137,14 +113,18 @@ def load_model(path: Path) -> Model:
     """Model of a file."""
     from vpm.model import Model
 
-    return Model.load(path)
+    model = Model.load(path)
+    detail(f"read {path}: {model.name}, {len(model.parameters)} parameters")
+    return model
 
 
 def load_record(path: Path, model: Model, channels: Path | None, interpolate: bool) -> Experiment:
     """Record of a file, with its channels as the model names them."""
     from vpm.experiment import Experiment
 
-    return Experiment.load(path, channels, model, irregular="interpolate" if interpolate else "error")
+    record = Experiment.load(path, channels, model, irregular="interpolate" if interpolate else "error")
+    detail(f"read {path}: {record.time.size} samples of {len(record.channels)} channels")
+    return record
 
 
 def load_pair(model: Path, log: Path, channels: Path | None, interpolate: bool) -> tuple[Model, Experiment]:
@@ -174,20 +154,20 @@ class _Lines:
             new = (words := re.sub(r"[\d.]+", "#", text)) != self._words
             self._text, self._words = text, words
             if new:
-                errors.print(text, markup=False)
+                progressed(text)
 
     def each(self, what: str, name: str, done: int, total: int) -> None:
         with self._lock:
             new, self._words = what != self._words, what
             self._text = f"{what} {done} of {total}: {name}"
             if new:
-                errors.print(self._text, markup=False)
+                progressed(self._text)
 
     def _repeat(self) -> None:
         begin = perf_counter()
         while not self._over.wait(PERIOD):
             with self._lock:
-                errors.print(f"{self._text or 'at work'} (after {perf_counter() - begin:.0f} s)", markup=False)
+                progressed(f"{self._text or 'at work'} (after {perf_counter() - begin:.0f} s)")
 
     def __enter__(self) -> _Lines:
         self._thread = Thread(target=self._repeat, name="progress", daemon=True)
@@ -202,23 +182,23 @@ class _Lines:
 @contextmanager
 def progress() -> Iterator[Callable[[str], None]]:
     """A line on the terminal that says what is being done; some lines where the output goes to a file."""
-    if not errors.is_terminal:
+    if in_lines():
         with _Lines() as lines:
             yield lines.tell
         return
-    with errors.status("starting") as status:
+    with notes.status("starting") as status:
         yield status.update
 
 
 @contextmanager
 def searching() -> Iterator[tuple[Tell, Each]]:
     """A bar of the candidates of each round; some lines where the output goes to a file."""
-    if not errors.is_terminal:
+    if in_lines():
         with _Lines() as lines:
             yield lines.tell, lines.each
         return
     words = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[name]}"))
-    with Progress(*words, TimeElapsedColumn(), console=errors, transient=True) as bar:
+    with Progress(*words, TimeElapsedColumn(), console=notes, transient=True) as bar:
         task = bar.add_task("starting", total=None, name="")
 
         def tell(text: str) -> None:
@@ -233,26 +213,14 @@ def searching() -> Iterator[tuple[Tell, Each]]:
 @contextmanager
 def fitting(starts: int) -> Iterator[Callable[[int, float], None]]:
     """A bar of the evaluations of a fit with its residual; some lines where the output goes to a file."""
-    if not errors.is_terminal:
+    if in_lines():
         with _Lines() as lines:
             yield lambda n, r: lines.tell(f"evaluation {n}: residual {r:.5g}")
         return
     words = TextColumn("evaluation {task.completed}: residual {task.fields[residual]:.5g}")
-    with Progress(TextColumn("fitting"), BarColumn(), words, TimeElapsedColumn(), console=errors) as bar:
+    with Progress(TextColumn("fitting"), BarColumn(), words, TimeElapsedColumn(), console=notes) as bar:
         task = bar.add_task("fitting", total=USUAL_EVALUATIONS * starts, residual=float("nan"))
         yield lambda n, r: bar.update(task, completed=n, total=max(n, USUAL_EVALUATIONS * starts), residual=r)
-
-
-@contextmanager
-def warnings_told() -> Iterator[None]:
-    """Warnings as one sentence each, without the line of the program that they come from."""
-    with warnings.catch_warnings(record=True) as told:
-        warnings.simplefilter("always", ValidityWarning)
-        try:
-            yield
-        finally:
-            for warning in told:
-                errors.print(f"warning: {warning.message}", markup=False)
 
 
 def save_plot(draw: Callable[[], Figure], path: Path | None, named: Path | None = None) -> None:
@@ -261,4 +229,4 @@ def save_plot(draw: Callable[[], Figure], path: Path | None, named: Path | None 
         path = Path(f"{named.stem}.png") if named is not None and str(path) == BESIDE else path
         with replacing(path) as beside:
             draw().savefig(beside)
-        console.print(f"wrote {path}", markup=False)
+        wrote(path)

@@ -23,6 +23,7 @@ from vpm.command import (
     save_plot,
     writable,
 )
+from vpm.manner import give, wrote
 
 Share = Annotated[float, typer.Option(help="Share of the period that a step may take at its 99.9 % quantile.")]
 
@@ -68,10 +69,11 @@ def climb(
             setup=Setup(integrator, settling=settling),
             tell=tell,
         )
+    give(climb=found)
     console.print(str(found), markup=False)
     save_plot(found.plot, plot)
     if out is not None:
-        found.model.save(out)
+        wrote(found.model.save(out))
 
 
 def simplify(
@@ -111,11 +113,12 @@ def simplify(
             channels=compare,
             tell=tell,
         )
+    give(ladder=ladder)
     console.print(str(ladder), markup=False)
     console.print(str(ladder.budget), markup=False)
     save_plot(ladder.plot, plot)
     if out is not None:
-        ladder.model.save(out)
+        wrote(ladder.model.save(out))
     if not ladder.holds:
         raise typer.Exit(1)
 
@@ -163,6 +166,7 @@ def budget(
             compiled=not direct,
             tell=tell,
         )
+    give(budget=report)
     console.print(str(report), markup=False)
     save_plot(report.plot, plot)
     if not report.holds:
@@ -191,12 +195,13 @@ def compile_(
 
     if c is not None:
         written = c_source(load_model(model), name=name, parameters=parameter or ())
-        header, source = written.save(c)
-        console.print(
-            f"wrote {header} and {source}: free are {', '.join(written.parameters) or 'no parameters'}", markup=False
-        )
+        wrote(*written.save(c))
+        give(name=written.name, parameters=written.parameters)
+        console.print(f"free are {', '.join(written.parameters) or 'no parameters'}", markup=False)
         return
     writable(out)
     compiled = compile_model(load_model(model), rate, integrator=integrator, substeps=substeps)
     compiled.save(out)
-    console.print(f"wrote {out}: takes {', '.join(compiled.inputs)}; shows {', '.join(compiled.outputs)}", markup=False)
+    wrote(out)
+    give(name=compiled.name, inputs=compiled.inputs, outputs=compiled.outputs)
+    console.print(f"takes {', '.join(compiled.inputs)}; shows {', '.join(compiled.outputs)}", markup=False)

@@ -26,6 +26,7 @@ from vpm.command import (
     load_record,
     searching,
 )
+from vpm.manner import give, wrote
 
 EXAMPLES = (
     "Example:  vpm diagnose model.toml train.csv --validate test.csv --out report/\n\n"
@@ -98,9 +99,9 @@ def diagnose(
     if diagnosis.provenance is not None:
         command = shlex.join(["vpm", *sys.argv[1:]])
         diagnosis = replace(diagnosis, provenance=replace(diagnosis.provenance, command=command))
+    give(diagnosis=diagnosis)
     print_story(diagnosis, console)
-    for path in write_report(diagnosis, out):
-        console.print(f"wrote {path}", markup=False)
+    wrote(*write_report(diagnosis, out))
 
 
 def _tried(only: list[str] | None, without: list[str] | None) -> list[str] | None:

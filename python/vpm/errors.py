@@ -196,6 +196,14 @@ class ValidityWarning(UserWarning):
         self.time = time
 
 
+class MissingExtraWarning(UserWarning):
+    """A part of what was asked for is left out, because it needs an optional extra of vpm; the rest is there."""
+
+
+class PluginWarning(UserWarning):
+    """Another package offers something to vpm that cannot be used; all else works without it."""
+
+
 class MissingExtraError(VpmError, ImportError):
     """A feature needs a package that is an optional extra of vpm.
 

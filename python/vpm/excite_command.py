@@ -9,8 +9,15 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from vpm.command import Plot, console, progress, save_plot, writable
+from vpm.command import (
+    Plot,
+    console,
+    progress,
+    save_plot,
+    writable,
+)
 from vpm.errors import ExcitationError
+from vpm.manner import give, wrote
 
 if TYPE_CHECKING:
     from vpm.excitation import Excitation, JointLimits
@@ -174,10 +181,11 @@ def _limits(path: Path) -> dict[str, JointLimits]:
 
 
 def _finish(result: Excitation, out: Path, plot: Path | None) -> None:
+    give(excitation=result)
     console.print(repr(result), markup=False)
     for note in result.notes:
         console.print(f"  {note}", markup=False)
-    console.print(f"wrote {result.to_csv(out)}", markup=False)
+    wrote(result.to_csv(out))
     save_plot(result.plot, plot)
 
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from vpm import identify_options as options
 from vpm.command import (
     Channels,
     Check,
@@ -26,7 +27,7 @@ from vpm.command import (
     writable,
 )
 from vpm.errors import IdentificationError, near_match
-from vpm.identify import options
+from vpm.manner import give, wrote
 
 if TYPE_CHECKING:
     from vpm.identify import Fit
@@ -96,7 +97,7 @@ def identify(
     from vpm.discrepancy.moving import check_stuck
     from vpm.identify import Fitting, judged_on
     from vpm.identify import identify as fit_logs
-    from vpm.identify.words import names, numbers, ranges, told, told_intervals, told_unseen
+    from vpm.identify.words import intervals, names, numbers, ranges, told, told_intervals, told_unseen
     from vpm.log_check import refuse_mistakes
     from vpm.simulate import Setup
 
@@ -138,21 +139,25 @@ def identify(
             progress=tell,
             fitting=settings if asked else None,
         )
+    give(fit=fit)
     lines = told(fit)
     if unseen:
-        lines += told_unseen(judged_on(fit, machine, unseen, cutoff=cutoff))
+        judged = judged_on(fit, machine, unseen, cutoff=cutoff)
+        give(unseen=dict(zip(("before", "after"), judged, strict=True)))
+        lines += told_unseen(judged)
     for line in lines:  # at once: intervals may take long, and Ctrl-C then still leaves the values
         console.print(f"  {line}", markup=False)
-    intervals: list[str] = []
     try:
-        intervals = told_intervals(fit, records, profile or [], replicates, seed, cutoff)
+        found = intervals(fit, records, profile or [], replicates, seed, cutoff)
+        give(intervals=found)
+        more = told_intervals(found)
     except KeyboardInterrupt:
-        intervals = ["stopped by Ctrl-C: no intervals by profile or bootstrap"]
-    for line in intervals:
+        more = ["stopped by Ctrl-C: no intervals by profile or bootstrap"]
+    for line in more:
         console.print(f"  {line}", markup=False)
     save_plot(fit.plot, plot)
     if out is not None:
-        _write(fit, out, lines + intervals)
+        _write(fit, out, lines + more)
 
 
 def _without(model: Model, free: list[str] | None, fixed: list[str] | None) -> list[str] | None:
@@ -181,5 +186,4 @@ def _write(fit: Fit, out: Path, lines: list[str]) -> None:
         written = [out]
     else:
         written = write_fit(fit, out, lines)
-    for path in written:
-        console.print(f"wrote {path}", markup=False)
+    wrote(*written)

@@ -11,9 +11,10 @@ from typing import Annotated, Any
 
 import typer
 
-from vpm.command import console, errors, writable
+from vpm.command import console, writable
 from vpm.errors import DiagnosisError
 from vpm.files import exists, write_text
+from vpm.manner import give, note, progressed, wrote
 
 EXAMPLES = (
     "Example:  vpm prove --machine axis_linear --effect coulomb_friction --seeds 0-4 --each 5\n\n"
@@ -63,9 +64,10 @@ def prove(
         found = _asked(proving, todo, (workers, limit), kept)
         if len(found) < len(todo):
             where = "" if kept is None else f"; what was answered is in {kept}, for vpm prove --answers {kept}"
-            errors.print(f"interrupted: {len(found)} of {len(todo)} cases are done{where}", markup=False)
+            note(f"interrupted: {len(found)} of {len(todo)} cases are done{where}")
             out = calibrate = None
     found.sort(key=lambda a: (list(proving.KINDS).index(a.kind), a.machine, a.request, a.seed))
+    give(answers=found)
     text = table.tables(found)
     console.print(text, markup=False)
     if out is not None:
@@ -75,17 +77,18 @@ def prove(
         written = [out, out.with_suffix(".json")]
         if reliability.stated(found):
             written.append(reliability.draw(found, out.with_suffix(".svg")))
-        console.print(f"wrote {', '.join(map(str, written))}", markup=False)
+        wrote(*written)
     if calibrate is not None:
         fitted, told = reliability.report(found)
-        console.print(f"{told}\nwrote {fitted.save(calibrate)}", markup=False)
+        console.print(told, markup=False)
+        wrote(fitted.save(calibrate))
 
 
 def _asked(proving: ModuleType, todo: Sequence[Any], how: tuple[int, float], kept: Path | None) -> list[Any]:
     """Answers to cases, told and kept as they come."""
     console.print(f"{len(todo)} cases", markup=False)
     found = []
-    for answer in proving.answers(todo, *how, lambda line: errors.print(line, markup=False)):
+    for answer in proving.answers(todo, *how, progressed):
         found.append(answer)
         if kept is not None:
             proving.save_json(found, kept)

@@ -22,6 +22,7 @@ from vpm.command import (
     searching,
     writable,
 )
+from vpm.manner import give, wrote
 
 if TYPE_CHECKING:
     from vpm.model import Model
@@ -76,10 +77,11 @@ def rank(
             tell=tell,
             progress=each,
         )
+    give(ranking=ranking)
     for line in lines_of(ranking):
         console.print(line, markup=False)
     if out is not None:
-        console.print(f"wrote {ranking.model.save(out)}", markup=False)
+        wrote(ranking.model.save(out))
 
 
 def lines_of(ranking: Ranking) -> Iterator[str]:

@@ -38,13 +38,14 @@ from importlib import import_module
 from os import PathLike
 from pathlib import Path
 from tokenize import TokenError
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
 from vpm.errors import MissingExtraError, VpmError
 from vpm.fields import misfit
 from vpm.files import replacing, unreadable
+from vpm.plain import plain
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -152,6 +153,9 @@ def _class_name(cls: type) -> str:
 class Storable:
     """Something that can stand in a result's file: by default a dataclass, field by field."""
 
+    #: Fields with a number for every sample, which `to_dict` leaves out and files have.
+    _samples: ClassVar[tuple[str, ...]] = ()
+
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()
         _STORED_CLASSES[_class_name(cls)] = cls
@@ -159,6 +163,11 @@ class Storable:
     def to_stored(self) -> Mapping[str, object]:
         """Content as a mapping of names to storable values."""
         return {name: getattr(self, name) for name in _field_names(self)}
+
+    def to_dict(self) -> dict[str, Any]:
+        """Attributes by name as JSON has them, but for samples of signals: SI; what is not known is None."""
+        shown = self.to_stored().items()
+        return {name: plain(value) for name, value in shown if not name.startswith("_") and name not in self._samples}
 
     @classmethod
     def from_stored(cls, content: Mapping[str, Any]) -> Self:

@@ -12,9 +12,8 @@ sensor reads.
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from types import MappingProxyType
 
-from vpm.catalogue.effects import BUILT_IN
+from vpm.catalogue.entries import OWN, Catalogue
 from vpm.catalogue.kinds import POSITIVE, SITE_KINDS, EffectParameter, EffectType, JointKind, Scale, Side, SiteKind
 from vpm.catalogue.own import entry_of
 from vpm.catalogue.signature import ANYWHERE, Signature
@@ -33,14 +32,15 @@ __all__ = [
     "effect_type",
     "effects_for_site",
     "register",
+    "repair_of",
     "signature_of",
     "unregister",
     "without_law",
 ]
 
-_ENTRIES = {effect.name: effect for effect in BUILT_IN}
-#: Every effect by name, in the order in which a page should list them; `register` adds to it.
-EFFECTS: Mapping[str, EffectType] = MappingProxyType(_ENTRIES)
+_CATALOGUE = Catalogue()
+#: Every effect by name, in the order in which a page should list them; `register` and other packages add to it.
+EFFECTS: Mapping[str, EffectType] = _CATALOGUE
 
 
 def effect_type(name: str) -> EffectType:
@@ -59,8 +59,13 @@ def effect_type(name: str) -> EffectType:
     try:
         return EFFECTS[name]
     except KeyError:
-        repair = near_match(name, EFFECTS, what="the catalogue has")
-        raise ModelError(f'there is no effect "{name}"; {repair}', where=name) from None
+        raise ModelError(f'there is no effect "{name}"; {repair_of(name)}', where=name) from None
+
+
+def repair_of(name: str) -> str:
+    """What to do about an effect that is not in the catalogue: why that of another package is not, or near names."""
+    near = near_match(name, EFFECTS, what="the catalogue has")
+    return _CATALOGUE.troubles.get(name, near)
 
 
 def signature_of(name: str) -> Signature:
@@ -92,7 +97,9 @@ def effects_for_site(kind: str) -> tuple[EffectType, ...]:
     """
     if kind not in SITE_KINDS:
         raise ModelError(f'effects do not sit at a "{kind}"; {near_match(kind, SITE_KINDS)}', where=kind)
-    return tuple(effect for effect in EFFECTS.values() if effect.site == kind)
+    # Other packages have effects of joints only: elsewhere nobody has to ask them.
+    there = EFFECTS if kind == "joint" else _CATALOGUE.entries
+    return tuple(effect for effect in there.values() if effect.site == kind)
 
 
 def register(
@@ -153,14 +160,21 @@ def register(
     'quintic spring'
     >>> unregister("quintic_spring")
     """
-    if name in _ENTRIES and _ENTRIES[name].formula is None:
+    if name in OWN:
         raise ModelError(f'the catalogue has an effect "{name}" already; choose another name', where=name)
     for other in confused_with or {}:
         effect_type(other)
     effect = entry_of(
-        name, law, sizes, shapes or {}, sentence, impossible, frozenset(not_negative), confused_with or {}
+        name,
+        law=law,
+        sizes=sizes,
+        shapes=shapes,
+        sentence=sentence,
+        impossible=impossible,
+        not_negative=not_negative,
+        confused_with=confused_with,
     )
-    _ENTRIES[name] = effect
+    _CATALOGUE.entries[name] = effect
     return effect
 
 
@@ -172,6 +186,7 @@ def unregister(name: str) -> None:
     ModelError
         There is none of this name, or it is one of vpm.
     """
-    if effect_type(name).formula is None:
+    effect_type(name)
+    if name in OWN:
         raise ModelError(f'"{name}" belongs to vpm and stays in the catalogue', where=name)
-    del _ENTRIES[name]
+    del _CATALOGUE.entries[name]

@@ -21,13 +21,14 @@ _SIZES = (0.83, 1.9)
 
 def entry_of(
     name: str,
+    *,
     law: str,
     sizes: Mapping[str, str],
-    shapes: Mapping[str, tuple[str, float]],
     sentence: str,
-    impossible: str,
-    not_negative: Collection[str],
-    confused_with: Mapping[str, str],
+    shapes: Mapping[str, tuple[str, float]] | None = None,
+    impossible: str = "",
+    not_negative: Collection[str] = (),
+    confused_with: Mapping[str, str] | None = None,
 ) -> EffectType:
     """Entry of a law; see `vpm.catalogue.register`.
 
@@ -36,6 +37,7 @@ def entry_of(
     ModelError
         A name, a unit, the law or the sentence cannot be used.
     """
+    shapes = shapes or {}
     names = (*sizes, *shapes)
     _check_names(name, sizes, names)
     formula = compile_formula(law, names)
@@ -62,7 +64,7 @@ def entry_of(
         law=f"tau = {law}",
         sentence=sentence,
         impossible=impossible or "either sign is possible",
-        confused_with=dict(confused_with),
+        confused_with=dict(confused_with or {}),
         formula=formula,
     )
 

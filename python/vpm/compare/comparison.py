@@ -50,6 +50,8 @@ class ChannelComparison(Storable):
         When, at which frequencies and in which states the residual is large.
     """
 
+    _samples = ("time", "measured", "simulated")
+
     channel: str
     unit: str
     time: Array
@@ -100,6 +102,8 @@ class Comparison(Result):
     skipped : tuple of str
         One sentence for each simulated channel that is not compared.
     """
+
+    _samples = ("state",)
 
     model_name: str
     experiment_name: str

@@ -38,6 +38,8 @@ class Correlation(Storable):
         to find.
     """
 
+    _samples = ("lags", "values")
+
     of: str
     lags: Array
     values: Array

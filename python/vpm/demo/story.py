@@ -21,7 +21,13 @@ from vpm.report import print_story, write_report
 from vpm.simulate import simulate
 
 
-def run_demo(out: Path, console: Console, tell: Callable[[str], None], hide: str | None = None) -> Diagnosis:
+def run_demo(
+    out: Path,
+    console: Console,
+    tell: Callable[[str], None],
+    hide: str | None = None,
+    wrote: Callable[..., None] | None = None,
+) -> Diagnosis:
     """Diagnose the demo's log, tell the story, write the report, and only then show what was hidden.
 
     Parameters
@@ -33,6 +39,8 @@ def run_demo(out: Path, console: Console, tell: Callable[[str], None], hide: str
         Called with a sentence at every step.
     hide : str, optional
         Another effect to hide, of `vpm.demo.hidden.LISTED`; its log is made first, into the folder ``log`` in ``out``.
+    wrote : callable, optional
+        Called with the files of the report.
 
     Raises
     ------
@@ -66,8 +74,9 @@ def run_demo(out: Path, console: Console, tell: Callable[[str], None], hide: str
     print_story(diagnosis, console)
     say()
     _reveal(diagnosis, folder / TRUTH.name, say)
-    for path in write_report(diagnosis, out):
-        say(f"wrote {path}")
+    written = write_report(diagnosis, out)
+    if wrote is not None:
+        wrote(*written)
     return diagnosis
 
 
@@ -85,16 +94,24 @@ def check_hidden(name: str) -> None:
     raise DiagnosisError(f'the demo cannot hide "{name}"; {near_match(name, LISTED)}')
 
 
-def print_list(console: Console) -> None:
+def print_list(console: Console) -> list[dict[str, str]]:
     """Print what can be hidden, a line each, with site and law.
 
     Parameters
     ----------
     console : rich.console.Console
+
+    Returns
+    -------
+    list of dict
+        Name, site and law of each.
     """
+    rows = []
     for name in LISTED:
         law = EFFECTS[name].law if name in EFFECTS else "nothing is missing; three values of the model are wrong"
         console.print(f"{name:22s}{HIDDEN[name].site:10s}{law}", markup=False)
+        rows.append({"name": name, "site": HIDDEN[name].site, "law": law})
+    return rows
 
 
 def _reveal(diagnosis: Diagnosis, path: Path, say: Callable[[str], None]) -> None:

@@ -16,6 +16,7 @@ from vpm.discrepancy.provenance import Provenance
 from vpm.files import write_text
 from vpm.identify import Fit
 from vpm.model import Model
+from vpm.plain import plain
 from vpm.results import Result, Storable
 
 if TYPE_CHECKING:
@@ -242,7 +243,7 @@ class ProposedExperiment(Storable):
 
     def to_dict(self) -> dict[str, object]:
         """Plain numbers and text, without the samples."""
-        content = {name: value for name, value in _fields(self).items() if name != "excitation"}
+        content = {name: value for name, value in super().to_dict().items() if name != "excitation"}
         return {**content, "signal": self.excitation.name, "ratio": self.ratio}
 
 
@@ -430,16 +431,16 @@ class Diagnosis(Result):
             "effects": effects,
             "gap": {channel: _gap(gap) for channel, gap in self.gap.items()},
             "refused": [{"name": r.name, "site": r.site, "reason": r.reason} for r in self.refused],
-            "candidates": [_fields(c) for c in self.candidates],
+            "candidates": [c.to_dict() for c in self.candidates],
             "ambiguous_with": [
                 {"name": a.name, "site": a.site, "with": list(a.others), "reason": a.reason}
                 for a in self.ambiguous_with
             ],
             "classes": [list(members) for members in self.classes],
             "where": {channel: list(sentences) for channel, sentences in self.where.items()},
-            "steps": [_fields(step) for step in self.steps],
+            "steps": [step.to_dict() for step in self.steps],
             "notes": list(self.notes),
-            "empirical": None if self.empirical is None else _stored(self.empirical),
+            "empirical": None if self.empirical is None else self.empirical.to_dict(),
             "experiments": [e.to_dict() for e in self.experiments],
             "seconds": self.seconds,
             "interrupted": self.interrupted,
@@ -449,7 +450,7 @@ class Diagnosis(Result):
 
     def save_json(self, path: Path) -> Path:
         """Write ``report.json``."""
-        return write_text(path, json.dumps(_finite(self.to_dict()), indent=2, allow_nan=False) + "\n")
+        return write_text(path, json.dumps(plain(self.to_dict()), indent=2, allow_nan=False) + "\n")
 
     def _headline(self) -> Mapping[str, object]:
         names = ", ".join(f"{e.name} at {e.site}" for e in self.effects) or "no effect"
@@ -471,23 +472,4 @@ def _gap(gap: ChannelGap) -> dict[str, object]:
         f"{stage}_relative": getattr(gap, stage) / gap.signal if gap.signal > 0.0 else None
         for stage in ("before", "recalibrated", "after")
     }
-    return {**_fields(gap), **relative}
-
-
-def _fields(value: Storable) -> dict[str, object]:
-    return dict(value.to_stored())
-
-
-def _stored(found: Empirical) -> dict[str, object]:
-    return {**_fields(found), "terms": [_fields(term) for term in found.terms]}
-
-
-def _finite(value: object) -> object:
-    """JSON has no word for NaN and infinity: null stands for what is not known."""
-    if isinstance(value, Mapping):
-        return {key: _finite(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(item) for item in value]
-    if isinstance(value, float) and not np.isfinite(value):
-        return None
-    return value
+    return {**gap.to_dict(), **relative}

@@ -56,10 +56,6 @@ class Provenance(Storable):
     sources: tuple[Source, ...]
     settings: dict[str, str]
 
-    def to_dict(self) -> dict[str, object]:
-        """Plain text."""
-        return {**self.to_stored(), "sources": [dict(source.to_stored()) for source in self.sources]}
-
 
 def provenance(
     model: Model,

@@ -42,6 +42,8 @@ class Excitation(Result):
         What was designed and what came out, one sentence each.
     """
 
+    _samples = ("time", "data")
+
     name: str
     time: Array
     data: Array

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -82,6 +82,8 @@ class Bootstrap(Result):
         What was drawn: whole records, or pieces of so many samples.
     """
 
+    _samples = ("values",)
+
     names: tuple[str, ...]
     units: tuple[str, ...]
     values: Array
@@ -96,6 +98,10 @@ class Bootstrap(Result):
     def intervals(self) -> Array:
         """95 % intervals, shape (p, 2): quantiles."""
         return np.asarray(np.quantile(self.values, [0.025, 0.975], axis=0).T)
+
+    def to_dict(self) -> dict[str, Any]:
+        """As of any result; intervals in the place of the replicates."""
+        return {**super().to_dict(), "replicates": len(self.values), "intervals": self.intervals.tolist()}
 
     def _headline(self) -> Mapping[str, object]:
         return {"replicates": len(self.values), "drawn": self.drawn, "names": ", ".join(self.names)}

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from vpm.errors import IdentificationError
 from vpm.experiment import Experiment
 from vpm.identify.fit import Fit
-from vpm.identify.intervals import bootstrap, profile_intervals
+from vpm.identify.intervals import Bootstrap, Profile, bootstrap, profile_intervals
 from vpm.identify.unseen import Gaps
 
 
@@ -48,22 +48,29 @@ def _of_the_signal(share: float) -> str:
     return f"{100 * share:.2f} % of the signal" if math.isfinite(share) else "of a signal that does not change"
 
 
-def told_intervals(
+def intervals(
     fit: Fit, records: Sequence[Experiment], profile: Sequence[str], replicates: int, seed: int, cutoff: float | None
-) -> list[str]:
-    """Intervals by profile of some parameters, and by bootstrap if ``replicates`` are asked for, a line each."""
-    lines = []
+) -> list[Profile | Bootstrap]:
+    """Intervals by profile of some parameters, and by bootstrap if ``replicates`` are asked for."""
+    found: list[Profile | Bootstrap] = []
     if profile:
-        lines += [
-            f"{found.name}, profile: {found.low:.6g} to {found.high:.6g} {found.unit}"
-            for found in profile_intervals(fit, records, profile, cutoff=cutoff)
-        ]
+        found += profile_intervals(fit, records, profile, cutoff=cutoff)
     if replicates:
-        drawn = bootstrap(fit, records, replicates=replicates, seed=seed, cutoff=cutoff)
-        lines.append(f"bootstrap, {replicates} times {drawn.drawn}:")
+        found.append(bootstrap(fit, records, replicates=replicates, seed=seed, cutoff=cutoff))
+    return found
+
+
+def told_intervals(found: Sequence[Profile | Bootstrap]) -> list[str]:
+    """Intervals, a line each."""
+    lines = []
+    for one in found:
+        if isinstance(one, Profile):
+            lines.append(f"{one.name}, profile: {one.low:.6g} to {one.high:.6g} {one.unit}")
+            continue
+        lines.append(f"bootstrap, {len(one.values)} times {one.drawn}:")
         lines += [
             f"{name}, bootstrap: {low:.6g} to {high:.6g} {unit}"
-            for name, (low, high), unit in zip(drawn.names, drawn.intervals, drawn.units, strict=True)
+            for name, (low, high), unit in zip(one.names, one.intervals, one.units, strict=True)
         ]
     return lines
 

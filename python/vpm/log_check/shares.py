@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.catalogue import EFFECTS
+from vpm.catalogue.effects import BUILT_IN
 from vpm.experiment import Experiment
 from vpm.initial import initial_state
 from vpm.log_check.correction import Correction
@@ -29,9 +30,9 @@ from vpm.weighing.priors import Prior, natural_sizes
 
 Array = NDArray[np.float64]
 #: Friction that a joint may have without being described: nothing of it passes for a mistake of a log.
-FRICTION = tuple(name for name, effect in EFFECTS.items() if effect.usual == "friction")
+FRICTION = tuple(effect.name for effect in BUILT_IN if effect.usual == "friction")
 #: Nor do these, unless a sign is in doubt: where a machine is heavy, a constant force is its mirror image.
-FORCES = tuple(name for name, effect in EFFECTS.items() if effect.usual)
+FORCES = tuple(effect.name for effect in BUILT_IN if effect.usual)
 #: Speed at which dry friction turns round, as a share of the usual speed of the joint.
 TRANSITION = 0.02
 #: How often derivatives are worked out in a fit of all forces.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from vpm.catalogue import EFFECTS, EffectParameter, EffectType, Side
+from vpm.catalogue import EFFECTS, EffectParameter, EffectType, Side, repair_of
 from vpm.catalogue.kinds import in_words
 from vpm.errors import near_match
 from vpm.model.entry import Quantity
@@ -59,7 +59,7 @@ def effect_problems(document: Document, structure: Structure) -> Iterator[Proble
     for position, entry in enumerate(document.effects):
         keys = ("effects", position)
         if entry.type not in EFFECTS:
-            repair = near_match(entry.type, EFFECTS, what="the catalogue has")
+            repair = repair_of(entry.type)
             yield Problem(place(*keys, "type"), f'is "{entry.type}", which is no effect; {repair}')
             continue
         effect = EFFECTS[entry.type]

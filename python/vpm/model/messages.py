@@ -11,10 +11,13 @@ from os import PathLike
 from pathlib import Path
 from typing import Any, NoReturn
 
-from vpm.errors import ModelError
+from vpm.errors import ModelError, VpmError
 from vpm.files import unreadable
 from vpm.numbers import LARGEST
+from vpm.plugins import Plugin, told, usable
 
+#: Ending of files that nobody else imports.
+OWN = ("", "toml")
 #: Deepest nesting of a file; a model file needs seven.
 DEEPEST = 32
 
@@ -74,6 +77,8 @@ def read_toml(path: str | PathLike[str]) -> dict[str, Any]:
     """
     if reason := unreadable(path):
         raise ModelError(reason, path=str(path))
+    if (plugin := importer_of(path)) is not None:
+        return _imported(plugin, path)
     try:
         text = Path(path).read_text(encoding="utf-8-sig")  # editors of Windows write a mark before the text
     except FileNotFoundError:
@@ -83,6 +88,26 @@ def read_toml(path: str | PathLike[str]) -> dict[str, Any]:
     except OSError as error:
         raise ModelError(f"{path} cannot be read: {error.strerror or error}", path=str(path)) from error
     return parse_toml(text, str(path))
+
+
+def importer_of(path: str | PathLike[str]) -> Plugin | None:
+    """Who imports a file that is no TOML, by its ending."""
+    ending = Path(path).suffix.lower()[1:]
+    return None if ending in OWN else usable("importers", OWN).get(ending)
+
+
+def _imported(plugin: Plugin, path: str | PathLike[str]) -> dict[str, Any]:
+    """Content by an importer of another package: what it names is called with the path."""
+    importer = plugin.load()
+    try:
+        found = importer(path)  # type: ignore[operator]  # an error says so
+        return dict(found.to_dict() if hasattr(found, "to_dict") else found)
+    except VpmError:
+        raise
+    except Exception as error:
+        raise ModelError(
+            f"{path} cannot be imported by {plugin} ({told(error)}); check the file", path=str(path)
+        ) from error
 
 
 def check_plain(content: Mapping[str, object], path: str | None = None) -> None:

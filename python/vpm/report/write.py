@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 
 from vpm.discrepancy import Diagnosis
+from vpm.errors import MissingExtraError, MissingExtraWarning
 from vpm.files import make_folder
 from vpm.report.html import report
 
@@ -22,17 +24,16 @@ def write_report(diagnosis: Diagnosis, folder: Path) -> tuple[Path, ...]:
     Returns
     -------
     tuple of Path
-        What was written.
-
-    Raises
-    ------
-    MissingExtraError
-        The packages of the extra ``report`` are not installed; ``report.json`` and the model are there all the same.
+        What was written: without the packages of the extra ``report`` no ``report.html``, and a warning says so.
     """
     make_folder(folder)
     document = diagnosis.save_json(folder / "report.json")
     repaired = folder / "model.toml"
     diagnosis.model.save(repaired)
     everything = diagnosis.save(folder / "diagnosis.npz")
-    page = report(diagnosis).save(folder / "report.html")
+    try:
+        page = report(diagnosis).save(folder / "report.html")
+    except MissingExtraError as error:
+        warnings.warn(f"report.html was left out: {error}", MissingExtraWarning, stacklevel=2)
+        return document, repaired, everything
     return document, page, repaired, everything

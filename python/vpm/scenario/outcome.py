@@ -52,6 +52,8 @@ class ScenarioRun(Result):
         Names of the runs of each column of the picture, by its heading; empty where all runs share one.
     """
 
+    _samples = ("time", "inputs")
+
     name: str
     time: Array
     runs: dict[str, Run]

@@ -53,6 +53,8 @@ class Run(Result):
         goes through (restarts, inverse dynamics, what diverged).
     """
 
+    _samples = ("time", "values", "measured", "starts")
+
     model_name: str
     experiment_name: str
     mode: str

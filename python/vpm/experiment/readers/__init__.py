@@ -8,6 +8,7 @@ from pathlib import Path
 from vpm.errors import ExperimentError
 from vpm.experiment.readers.base import Log, reading
 from vpm.files import unreadable
+from vpm.plugins import Plugin, usable
 
 #: Endings of the formats beside text.
 PARQUET = (".parquet", ".pq")
@@ -17,6 +18,8 @@ BAGS = (".bag", ".db3", ".mcap")
 TDMS = (".tdms",)
 ULOG = (".ulg",)
 ENDINGS = (".csv", ".tsv", ".txt", *PARQUET, *MATLAB, *HDF5, *BAGS, *TDMS, *ULOG)
+
+OWN = frozenset(ending[1:] for ending in ENDINGS)
 
 
 def open_log(path: str | PathLike[str]) -> Log:
@@ -28,7 +31,7 @@ def open_log(path: str | PathLike[str]) -> Log:
         ``.csv`` and every ending that is not named here is text; ``.parquet`` and ``.pq`` need the extra ``parquet``;
         ``.mat`` of MATLAB up to 7.2 needs none, of 7.3 the extra ``hdf5``, as do ``.h5``, ``.hdf5``, ``.hdf`` and
         ``.he5``; ``.bag`` (ROS 1), ``.db3`` and ``.mcap`` and folders with a ``metadata.yaml`` (ROS 2) need the extra
-        ``ros``; ``.tdms`` of LabVIEW the extra ``tdms``, ``.ulg`` of PX4 ``ulog``.
+        ``ros``; ``.tdms`` of LabVIEW the extra ``tdms``, ``.ulg`` of PX4 ``ulog``. Other packages may bring more.
 
     Returns
     -------
@@ -76,6 +79,8 @@ def _opened(path: str | PathLike[str]) -> Log:
         from vpm.experiment.readers.ulog import UlogLog
 
         return UlogLog(path)
+    if plugin := usable("readers", OWN).get(ending[1:]):
+        return _by_plugin(plugin, path)
     if file.is_dir():
         raise ExperimentError(
             f"{path} cannot be read: it is a folder without a metadata.yaml, so no ROS 2 bag; give the path of a file",
@@ -84,3 +89,13 @@ def _opened(path: str | PathLike[str]) -> Log:
     from vpm.experiment.readers.text import TextLog
 
     return TextLog(path)
+
+
+def _by_plugin(plugin: Plugin, path: str | PathLike[str]) -> Log:
+    """Log by a reader of another package: what it names is called with the path."""
+    if not Path(path).exists():
+        raise ExperimentError(f"{path} does not exist; check the name and the folder", path=str(path))
+    log = reader(path) if callable(reader := plugin.load()) else reader
+    if not isinstance(log, Log):
+        raise plugin.error(f"gave a {type(log).__name__} for {path}; it has to give a vpm.experiment.readers.Log")
+    return log
