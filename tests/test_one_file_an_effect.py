@@ -22,7 +22,7 @@ NAMES = frozenset(effect.name for effect in BUILT_IN)
 #: What a file may say of other effects: relations.
 RELATIONS = frozenset({"requires", "contains", "confused_with"})
 #: Folders in which a word may be a field of a component of the model file, as ``rotor_inertia`` of a joint is.
-MODEL_FILE = frozenset({"model", "scenario"})
+MODEL_FILE = frozenset({"model", "robots", "scenario"})
 #: Folders in which a dotted name may be that of an effect's parameter: where the model file becomes the description
 #: that the core reads, and where the demo says by which parameters a model would know its machine.
 PARAMETERS = frozenset({"model", "scenario", "demo"})

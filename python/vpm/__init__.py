@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from vpm.observer import Noise, Observation, observe
     from vpm.ranking import Ranking, rank
     from vpm.report import Report, report, write_report
+    from vpm.robots import ExportedRobot, ImportedRobot, export_robot, import_robot
     from vpm.scenario import Scenario, ScenarioRun
     from vpm.simplify import Ladder, simplify
     from vpm.simulate import Run, Setup, simulate
@@ -60,8 +61,10 @@ __all__ = [
     "Diagnosis",
     "Dynamics",
     "Experiment",
+    "ExportedRobot",
     "Fit",
     "Fitting",
+    "ImportedRobot",
     "InertialFit",
     "InertialRegression",
     "Ladder",
@@ -87,10 +90,12 @@ __all__ = [
     "climb",
     "compare",
     "diagnose",
+    "export_robot",
     "identify",
     "identify_inertial",
     "identify_oil",
     "impedance",
+    "import_robot",
     "linkages",
     "narx",
     "observe",
@@ -142,6 +147,10 @@ _HOMES = {
     "Report": "vpm.report",
     "report": "vpm.report",
     "write_report": "vpm.report",
+    "ExportedRobot": "vpm.robots",
+    "ImportedRobot": "vpm.robots",
+    "export_robot": "vpm.robots",
+    "import_robot": "vpm.robots",
     "Scenario": "vpm.scenario",
     "ScenarioRun": "vpm.scenario",
     "Ladder": "vpm.simplify",

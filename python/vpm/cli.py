@@ -22,7 +22,9 @@ from vpm import (
     check_command,
     detail_command,
     diagnose_command,
+    export_command,
     identify_command,
+    import_command,
     info_command,
     prove_command,
     rank_command,
@@ -119,6 +121,8 @@ app.command(epilog=diagnose_command.EXAMPLES)(diagnose_command.diagnose)
 app.command(epilog=rank_command.EXAMPLES)(rank_command.rank)
 app.command(epilog=prove_command.EXAMPLES)(prove_command.prove)
 app.command(epilog=view_command.EXAMPLES)(view_command.view)
+app.command("import", epilog=import_command.EXAMPLES)(import_command.import_)
+app.command(epilog=export_command.EXAMPLES)(export_command.export)
 detail_command.add_to(app)
 
 

@@ -11,6 +11,8 @@ Motion = Literal["", "deflection", "bending"]
 Usual = Literal["", "friction", "force"]
 #: Whole and unchanged; gradually, as a system of first order; as a valve's spool, a system of second order.
 Late = Literal["", "delay", "lag", "spool"]
+#: Numbers of a joint that all descriptions of robots have: effort per speed, dry effort, effort per way.
+Plain = Literal["", "damping", "friction", "stiffness"]
 #: What the data show, in which a start value is measured: largest speed, half travel, half travel about the middle of
 #: the way, sampling interval, largest command, longest record; "one" for numbers that no data scale.
 Seen = Literal["speed", "travel", "way", "interval", "command", "record", "one"]
@@ -48,6 +50,8 @@ class Traits:
     """Whether it acts while a joint lets go, which filtered records hardly show and runs of the model do."""
     usual: Usual = ""
     """What joints have of themselves, so that no log is blamed for it; a force may look like a wrong sign."""
+    plain: Plain = ""
+    """What its first parameter is in other descriptions of robots, where it stands for a joint as a number alone."""
     late: Late = ""
     """How what it passes on comes late."""
     scales: bool = False

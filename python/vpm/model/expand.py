@@ -26,7 +26,8 @@ from vpm.model.schema import Joint, JointType
 
 Direction = tuple[float, float, float]
 
-_SUFFIXES: Mapping[JointType, tuple[str, ...]] = {
+#: What the names of its coordinates add to that of a joint.
+SUFFIXES: Mapping[JointType, tuple[str, ...]] = {
     "prismatic": ("",),
     "revolute": ("",),
     "helical": ("",),
@@ -66,7 +67,7 @@ class Coordinate:
 
 def coordinate_names(name: str, joint: Joint) -> tuple[str, ...]:
     """Names of the coordinates of a joint."""
-    return tuple(f"{name}{suffix}" for suffix in _SUFFIXES[joint.type])
+    return tuple(f"{name}{suffix}" for suffix in SUFFIXES[joint.type])
 
 
 def coordinates(name: str, joint: Joint) -> tuple[Coordinate, ...]:

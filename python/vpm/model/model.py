@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from os import PathLike
@@ -110,9 +110,17 @@ class Model(Evaluations, Storable):
         """Content that `from_dict` reads back; a copy."""
         return content_of(self._checked.document)
 
-    def to_toml(self) -> str:
-        """Text of a model file that reads back as an equal model; comments of the original are not kept."""
-        return toml_of(self._checked.document)
+    def to_toml(self, remarks: Mapping[tuple[str, ...], str] = MappingProxyType({}), head: Sequence[str] = ()) -> str:
+        """Text of a model file that reads back as an equal model; comments of the original are not kept.
+
+        Parameters
+        ----------
+        remarks : mapping of tuple of str to str
+            Comments by place: ``("bodies", "arm")`` above a table, ``("bodies", "arm", "mass")`` behind a line.
+        head : sequence of str
+            Lines of a comment above all.
+        """
+        return toml_of(self._checked.document, remarks, head)
 
     def save(self, path: str | PathLike[str]) -> Path:
         """Write a model file.

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from types import MappingProxyType
 from typing import Any
 
 import tomli_w
@@ -51,14 +52,31 @@ def _table(entry: BaseModel, complete: bool) -> dict[str, Any]:
     return table
 
 
-def toml_of(document: Document) -> str:
-    """Text of a model file: one table per component, one line per key, as a person would write it."""
-    return "\n".join(_lines(content_of(document))) + "\n"
+#: What stands in a file beside its content, by place: ``("bodies", "arm")`` above a table, with a key behind its line.
+Remarks = Mapping[tuple[str, ...], str]
+
+#: Lines longer than this are written as one line for each item of their list.
+WIDEST = 120
 
 
-def _lines(content: Mapping[str, Any]) -> Iterator[str]:
+def toml_of(document: Document, remarks: Remarks = MappingProxyType({}), head: Iterable[str] = ()) -> str:
+    """Text of a model file: one table per component, one line per key, as a person would write it.
+
+    Parameters
+    ----------
+    document : Document
+    remarks : mapping of tuple of str to str
+        One line each, by place.
+    head : iterable of str
+        Lines that stand above all, as comments.
+    """
+    lines = [f"# {line}".rstrip() for line in head]
+    return "\n".join([*lines, *_lines(content_of(document), remarks)]) + "\n"
+
+
+def _lines(content: Mapping[str, Any], remarks: Remarks) -> Iterator[str]:
     sections = {key: value for key, value in content.items() if isinstance(value, dict) or key == "effects"}
-    yield from (_pair(key, value) for key, value in content.items() if key not in sections)
+    yield from (_pair(key, value, remarks.get((key,))) for key, value in content.items() if key not in sections)
     for section, components in sections.items():
         if section == "channels":
             yield from ("", "[channels]", *(_pair(name, table) for name, table in components.items()))
@@ -67,11 +85,19 @@ def _lines(content: Mapping[str, Any]) -> Iterator[str]:
                 yield from ("", "[[effects]]", *(_pair(key, value) for key, value in effect.items()))
         else:
             for name, table in components.items():
-                yield from ("", f"[{section}.{_key(name)}]", *(_pair(key, value) for key, value in table.items()))
+                if (section, name) in remarks:
+                    yield from ("", f"# {remarks[section, name]}", f"[{section}.{_key(name)}]")
+                else:
+                    yield from ("", f"[{section}.{_key(name)}]")
+                yield from (_pair(key, value, remarks.get((section, name, key))) for key, value in table.items())
 
 
-def _pair(key: str, value: object) -> str:
-    return f"{_key(key)} = {_value(value)}"
+def _pair(key: str, value: object, remark: str | None = None) -> str:
+    line, behind = f"{_key(key)} = {_value(value)}", f"  # {remark}" if remark else ""
+    if len(line) > WIDEST and isinstance(value, list) and any(isinstance(item, Mapping) for item in value):
+        items = "\n".join(f"    {_value(item)}," for item in value)
+        return f"{_key(key)} = [{behind}\n{items}\n]"
+    return line + behind
 
 
 def _value(value: object) -> str:

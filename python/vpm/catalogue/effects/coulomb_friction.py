@@ -32,6 +32,7 @@ EFFECT = EffectType(
     },
     sticks=True,
     usual="friction",
+    plain="friction",
     tried=(Tried("transition_velocity", "speed", (0.002, 0.01, 0.04), SLOW),),
     signature=Signature(
         ("velocity",), "Two levels of opposite sign, one for each direction, with a step at rest", SLOW_AND_FAST

@@ -41,6 +41,7 @@ EFFECT = EffectType(
     tried=(Tried("rest", "way", (0.0,), (-10.0, 10.0)),),
     link_side_alone=True,
     usual="force",
+    plain="stiffness",
     signature=Signature(
         ("position",), "A straight line that crosses zero at the place of rest", "Slow motion over the whole way"
     ),

@@ -30,5 +30,6 @@ EFFECT = EffectType(
         "sensor_gain": "both scale the effort that a speed needs; a reference length parts them",
     },
     usual="friction",
+    plain="damping",
     signature=Signature(("velocity",), "A straight line through zero", "Motion at several constant speeds"),
 )
