@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from vpm.model import Dynamics, Model
     from vpm.observer import Noise, Observation, observe
     from vpm.ranking import Ranking, rank
+    from vpm.realtime import write_fmu
     from vpm.report import Report, report, write_report
     from vpm.scenario import Scenario, ScenarioRun
     from vpm.simplify import Ladder, simplify
@@ -100,6 +101,7 @@ __all__ = [
     "simulate",
     "simulate_batch",
     "weigh",
+    "write_fmu",
     "write_report",
 ]
 
@@ -137,6 +139,7 @@ _HOMES = {
     "observe": "vpm.observer",
     "Ranking": "vpm.ranking",
     "rank": "vpm.ranking",
+    "write_fmu": "vpm.realtime",
     "Report": "vpm.report",
     "report": "vpm.report",
     "write_report": "vpm.report",
