@@ -5,4 +5,15 @@ from vpm.realtime.fmu import Fmu, write_fmu
 from vpm.realtime.loop import QUANTILES, Loop, LoopReport, Tick
 from vpm.realtime.source import CSource, c_source
 
-__all__ = ["QUANTILES", "CSource", "CompiledModel", "Fmu", "Loop", "LoopReport", "Tick", "c_source", "compile_model", "write_fmu"]
+__all__ = [
+    "QUANTILES",
+    "CSource",
+    "CompiledModel",
+    "Fmu",
+    "Loop",
+    "LoopReport",
+    "Tick",
+    "c_source",
+    "compile_model",
+    "write_fmu",
+]

@@ -62,5 +62,7 @@ def shared_library(sources: dict[str, str], files: list[str]) -> bytes:
             raise SimulationError(f"the C compiler {command} does not start ({error}); install another") from error
         if done.returncode != 0:
             first = next((line for line in done.stderr.splitlines() if "error" in line), "it says nothing")
-            raise SimulationError(f"the C compiler {command} fails ({first.strip()[:200]}); install another, or leave it out")
+            raise SimulationError(
+                f"the C compiler {command} fails ({first.strip()[:200]}); install another, or leave it out"
+            )
         return (folder / "library").read_bytes()

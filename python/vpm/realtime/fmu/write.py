@@ -147,9 +147,7 @@ def write_fmu(
     names = ([one.name for one in kind] for kind in (found.inputs, found.states, found.outputs, found.parameters))
     inputs, states, outputs, free = map(tuple, names)
     runs_on = platform[0] if wanted and platform is not None else None
-    return Fmu(
-        Path(path), identifier, token, inputs, states, outputs, free, step, method, runs_on, tuple(notes)
-    )
+    return Fmu(Path(path), identifier, token, inputs, states, outputs, free, step, method, runs_on, tuple(notes))
 
 
 def _steps(rate: float, integrator: str, substeps: int) -> tuple[str, float]:
@@ -186,7 +184,10 @@ def _settings(name: str, found: Variables, method: str, step: float) -> str:
         f"#define FMU_STEP_BY {name}_step_{method}",
     ]
     # C knows no table without entries.
-    lines += [f"static const double FMU_{what}[] = {{{', '.join(map(repr, [*values, 0.0]))}}};" for what, values in tables.items()]
+    lines += [
+        f"static const double FMU_{what}[] = {{{', '.join(map(repr, [*values, 0.0]))}}};"
+        for what, values in tables.items()
+    ]
     return "\n".join(lines) + "\n"
 
 
