@@ -1,4 +1,4 @@
-"""Models in the loop: a runner at a fixed rate, compiled models for controllers in C and C++, models as C99 and as FMUs."""
+"""Models in the loop: a runner at a fixed rate, compiled models for C and C++, models as C99 and FMUs."""
 
 from vpm.realtime.compiled import CompiledModel, compile_model
 from vpm.realtime.fmu import Fmu, write_fmu

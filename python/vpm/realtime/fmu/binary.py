@@ -15,8 +15,8 @@ from vpm.errors import SimulationError
 _SYSTEMS = {"linux": ("linux", ".so"), "darwin": ("darwin", ".dylib"), "win32": ("windows", ".dll")}
 _PROCESSORS = {"amd64": "x86_64", "x86_64": "x86_64", "arm64": "aarch64", "aarch64": "aarch64"}
 #: In C99 mode compilers contract no operations, so that all machines round alike.
-_OPTIONS = ("-std=c99", "-O2", "-fPIC", "-shared", "-fvisibility=hidden", "-DFMI3_OVERRIDE_FUNCTION_PREFIX=1")
-#: Characters of a source that are optimised in seconds; of larger ones, of links with many coordinates, in many minutes.
+_OPTIONS = ("-std=c99", "-fPIC", "-shared", "-fvisibility=hidden", "-DFMI3_OVERRIDE_FUNCTION_PREFIX=1")
+#: Characters of a source that are optimised in seconds; larger ones, of links with many coordinates, take minutes.
 _LARGE = 500_000
 
 
@@ -26,7 +26,7 @@ def compiler() -> str | None:
 
 
 def platform_name() -> tuple[str, str] | None:
-    """How FMI calls this platform, such as ``"x86_64-linux"``, and how its libraries end; None where it is none of them."""
+    """How FMI calls this platform, such as ``"x86_64-linux"``, and how its libraries end; None where it has no name."""
     system = _SYSTEMS.get(sys.platform)
     processor = _PROCESSORS.get(platform.machine().lower())
     return None if system is None or processor is None else (f"{processor}-{system[0]}", system[1])
@@ -50,14 +50,16 @@ def shared_library(sources: dict[str, str], files: list[str]) -> bytes:
     command = compiler()
     if command is None:
         raise SimulationError("there is no C compiler `cc` here for the FMU's library; install one, or leave it out")
-    options = [word if word != "-O2" or sum(map(len, sources.values())) <= _LARGE else "-O1" for word in _OPTIONS]
+    optimise = "-O2" if sum(map(len, sources.values())) <= _LARGE else "-O1"
     with TemporaryDirectory() as place:
         folder = Path(place)
         for name, text in sources.items():
             (folder / name).write_text(text, encoding="utf-8", newline="\n")
-        words = [command, *options, *files, "-o", "library", "-lm"]
+        words = [command, *_OPTIONS, optimise, *files, "-o", "library", "-lm"]
         try:
-            done = subprocess.run(words, cwd=folder, capture_output=True, text=True, errors="replace", check=False)
+            done = subprocess.run(  # noqa: S603 - the compiler that the user has
+                words, cwd=folder, capture_output=True, text=True, errors="replace", check=False
+            )
         except OSError as error:
             raise SimulationError(f"the C compiler {command} does not start ({error}); install another") from error
         if done.returncode != 0:

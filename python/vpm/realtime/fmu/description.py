@@ -39,9 +39,10 @@ def model_description(
         generationTool=tool,
         variableNamingConvention="flat",
     )
-    ET.SubElement(root, "ModelExchange", modelIdentifier=identifier, **_ABLE)
+    able = {"modelIdentifier": identifier, **_ABLE}
+    ET.SubElement(root, "ModelExchange", able)
     steps = {"canHandleVariableCommunicationStepSize": "true", "fixedInternalStepSize": repr(step)}
-    ET.SubElement(root, "CoSimulation", modelIdentifier=identifier, **_ABLE, **steps)
+    ET.SubElement(root, "CoSimulation", able | steps)
     _units(root, {variable.unit for variable in found.all} - {"1"})
     categories = ET.SubElement(root, "LogCategories")
     for category, says in (
