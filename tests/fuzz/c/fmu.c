@@ -1,5 +1,5 @@
-/* An FMU called as an importer calls it, rightly and with hostile numbers. Compiled with -DTOKEN=... and the FMU's sources;
-   with -DCOUNTED allocations are counted, by the GNU library. */
+/* An FMU called as an importer calls it, rightly and with hostile numbers. Compiled with the FMU's sources, with
+   -DTOKEN=... and -DRATE=..., the reference of its first rate. With -DCOUNTED allocations are counted, by the GNU library. */
 #include "fmi3.h"
 
 #include <math.h>
@@ -29,12 +29,12 @@ static void log_message(fmi3InstanceEnvironment environment, fmi3Status status, 
 static void steps(fmi3Instance instance, int count, int hostile)
 {
     fmi3ValueReference reference;
-    const fmi3ValueReference state = 2, rate = 4; /* of an axis with one drive */
+    const fmi3ValueReference state = THE_RATE - 1, rate = THE_RATE;
     fmi3Boolean event, terminate, early;
     double value, time = 0.0, one = 1.0;
     int k;
     for (k = 0; k < count; ++k) {
-        for (reference = 0; reference < (hostile ? 30u : 8u); ++reference) {
+        for (reference = 0; reference < (hostile ? 2u * THE_RATE : THE_RATE); ++reference) {
             (void)fmi3GetFloat64(instance, &reference, 1, &value, 1);
             if (hostile) value = number(), (void)fmi3SetFloat64(instance, &reference, 1, &value, 1);
         }
