@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from vpm.model import Dynamics, Model
     from vpm.observer import Noise, Observation, observe
     from vpm.ranking import Ranking, rank
+    from vpm.realtime import write_fmu
     from vpm.report import Report, report, write_report
     from vpm.robots import ExportedRobot, ImportedRobot, export_robot, import_robot
     from vpm.scenario import Scenario, ScenarioRun
@@ -107,6 +108,7 @@ __all__ = [
     "simulate_batch",
     "view",
     "weigh",
+    "write_fmu",
     "write_report",
 ]
 
@@ -144,6 +146,7 @@ _HOMES = {
     "observe": "vpm.observer",
     "Ranking": "vpm.ranking",
     "rank": "vpm.ranking",
+    "write_fmu": "vpm.realtime",
     "Report": "vpm.report",
     "report": "vpm.report",
     "write_report": "vpm.report",

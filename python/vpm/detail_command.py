@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -23,7 +23,11 @@ from vpm.command import (
     save_plot,
     writable,
 )
-from vpm.manner import give, wrote
+from vpm.errors import VpmError
+from vpm.manner import give, note, wrote
+
+if TYPE_CHECKING:
+    from vpm.realtime import Fmu
 
 Share = Annotated[float, typer.Option(help="Share of the period that a step may take at its 99.9 % quantile.")]
 
@@ -185,14 +189,33 @@ def compile_(
             "--c", callback=fillable, help="Write the equations as C99 into this folder instead, for any rate."
         ),
     ] = None,
-    name: Annotated[str | None, typer.Option(help="With --c: what every name in C begins with.")] = None,
+    fmu: Annotated[
+        Path | None, typer.Option(callback=writable, help="Write an FMU of FMI 3.0 to this file instead.")
+    ] = None,
+    name: Annotated[str | None, typer.Option(help="With --c or --fmu: what files, and names in C, begin with.")] = None,
     parameter: Annotated[
-        list[str] | None, typer.Option(help="With --c: parameter that stays an argument, as *.mass; repeatable.")
+        list[str] | None,
+        typer.Option(help="With --c or --fmu: parameter that can be given other values, as *.mass; repeatable."),
     ] = None,
 ) -> None:
-    """Compile a model into one file with all that a step needs, for controllers in C and C++; or into C99."""
-    from vpm.realtime import c_source, compile_model
+    """Compile a model into one file with all that a step needs, for controllers in C and C++; into C99; or an FMU."""
+    from vpm.realtime import c_source, compile_model, write_fmu
 
+    if c is not None and fmu is not None:
+        raise VpmError("--c and --fmu write different files; give one of them at a time")
+    if fmu is not None:
+        _tell_fmu(
+            write_fmu(
+                load_model(model),
+                fmu,
+                rate=rate,
+                integrator=integrator,
+                substeps=substeps,
+                parameters=parameter or (),
+                name=name,
+            )
+        )
+        return
     if c is not None:
         written = c_source(load_model(model), name=name, parameters=parameter or ())
         wrote(*written.save(c))
@@ -205,3 +228,15 @@ def compile_(
     wrote(out)
     give(name=compiled.name, inputs=compiled.inputs, outputs=compiled.outputs)
     console.print(f"takes {', '.join(compiled.inputs)}; shows {', '.join(compiled.outputs)}", markup=False)
+
+
+def _tell_fmu(written: Fmu) -> None:
+    """Say what an FMU takes and shows, and what it does otherwise than a simulation."""
+    wrote(written.path)
+    give(name=written.identifier, inputs=written.inputs, outputs=written.outputs, parameters=written.parameters)
+    library = f"sources and a library for {written.platform}" if written.platform else "sources"
+    console.print(f"{library}, steps of {written.step:g} s by {written.integrator}", markup=False)
+    for what, names in (("takes", written.inputs), ("shows", written.outputs), ("free are", written.parameters)):
+        console.print(f"  {what} {', '.join(names) or 'nothing'}", markup=False)
+    for text in written.notes:
+        note(text)

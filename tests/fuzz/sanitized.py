@@ -8,10 +8,11 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import zipfile
 from pathlib import Path
 
 from fuzz.doors import EXAMPLES, MODELS
-from vpm import Model
+from vpm import Model, write_fmu
 from vpm.errors import VpmError
 from vpm.realtime import c_source, compile_model
 
@@ -24,6 +25,8 @@ STRICT = (*WATCHED, "-fno-sanitize-recover=all", "-fno-omit-frame-pointer")
 LARGE = 500_000
 #: Levels of flexible links whose source is not so large.
 COARSE = {"tudor/tudor": "bezier(3)", "flexible_pendulum/flexible_pendulum": "bezier(3)"}
+#: What is small: the functions of an FMU are the same for all machines.
+FMUS = ("emps/model", "wrist/wrist", "hyl/rcm")
 VALGRIND = (
     "valgrind",
     "--quiet",
@@ -60,6 +63,24 @@ def source(name: str, folder: Path) -> bool:
     return built and run(f"{name}, called", ["./source", "200"], folder)
 
 
+def fmu(name: str, folder: Path) -> bool:
+    """The FMU of a machine, called as an importer does, with hostile numbers too."""
+    written = write_fmu(Model.load(EXAMPLES / f"{name}.toml"), folder / "machine.fmu", name="machine", library=False)
+    with zipfile.ZipFile(written.path) as archive:
+        archive.extractall(folder)
+    rate = 1 + len(written.inputs) + len(written.states)
+    files = [str(HERE / "fmu.c"), "sources/machine.c", "sources/fmu.c", "-lm"]
+    words = [
+        "-DFMI3_OVERRIDE_FUNCTION_PREFIX=1",
+        f'-DTOKEN="{written.token}"',
+        f"-DTHE_RATE={rate}",
+        "-Isources",
+        *files,
+    ]
+    built = run(f"{name} as FMU, compiled", ["cc", "-std=c99", *STRICT, *words, "-o", "fmu"], folder)
+    return built and run(f"{name} as FMU, called", ["./fmu"], folder)
+
+
 def interface(library: Path, folder: Path) -> bool:
     """The library, called from C."""
     paths = []
@@ -84,5 +105,6 @@ def interface(library: Path, folder: Path) -> bool:
 if __name__ == "__main__":
     with tempfile.TemporaryDirectory() as place:
         ended = [source(name, Path(place)) for name in MODELS]
+        ended += [fmu(name, Path(place)) for name in FMUS]
         ended.append(interface(Path(sys.argv[1]).resolve(), Path(place)))
     sys.exit(0 if all(ended) else 1)

@@ -33,6 +33,21 @@ class CSource:
     source: str
     parameters: tuple[str, ...]
 
+    def entries(self, what: str, by: str) -> list[tuple[int, int]]:
+        """Rows and columns of the entries of a derivative that are not zero, column by column.
+
+        Parameters
+        ----------
+        what : {"rates", "outputs"}
+        by : {"x", "u", "p"}
+        """
+        # The tables are CasADi's: rows, columns, where each column begins and the last ends, the row of each entry.
+        table = re.search(rf"{self.name}_{what}_by_{by}\[\] = \{{([^}}]*)\}};", self.source)
+        numbers = [int(number) for number in table[1].split(",")] if table else [0, 0, 0]
+        columns = numbers[1]
+        first, rows = numbers[2 : 3 + columns], numbers[3 + columns :]
+        return [(row, column) for column in range(columns) for row in rows[first[column] : first[column + 1]]]
+
     def save(self, folder: str | PathLike[str]) -> tuple[Path, Path]:
         """Write ``NAME.h`` and ``NAME.c`` into a folder, which is made if it is not there."""
         target = make_folder(folder)
