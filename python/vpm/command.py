@@ -58,7 +58,7 @@ console = Output(highlight=False, soft_wrap=True)
 errors = Output(stderr=True, highlight=False, soft_wrap=True)
 
 ModelPath = Annotated[Path, typer.Argument(metavar="MODEL", help="Model file (TOML).")]
-FORMATS = "CSV, Parquet, MAT, HDF5, ROS bag, MCAP, TDMS, ULog"
+FORMATS = "CSV, Parquet, MAT, HDF5, ROS bag, MCAP, MDF, TDMS, ULog"
 Logs = Annotated[list[Path], typer.Argument(metavar="LOG...", help=f"Measured records ({FORMATS}).")]
 OneLog = Annotated[Path, typer.Argument(metavar="LOG", help=f"Measured record ({FORMATS}).")]
 Interpolate = Annotated[bool, typer.Option("--interpolate", help="Bring uneven steps and clocks to one grid.")]

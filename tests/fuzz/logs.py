@@ -92,6 +92,20 @@ def _write_recorders(folder: Path) -> None:
             tdms.write_segment([ChannelObject("run", name, written[name], wave) for name in ("q", "u")])
 
 
+@cache
+def mdf(folder: Path) -> dict[str, bytes]:
+    """An MDF file of each version: two groups with clocks of their own, units and conversions."""
+    from asammdf import MDF, Signal
+
+    written = columns()
+    for version in ("4.10", "3.30"):
+        with MDF(version=version) as file:
+            file.append([Signal(written["q"], written["time"], name="q", unit="deg", conversion={"a": 2.0, "b": 1.0})])
+            file.append([Signal(written["u"], written["time"], name="u", conversion={"formula": "2 * X"})])
+            file.save(folder / f"mdf_{version[0]}", compression=2 if version == "4.10" else 0)
+    return {path.suffix: path.read_bytes() for path in folder.glob("mdf_*")}
+
+
 def _irregular(dice: Random) -> Any:
     return dice.choice(("error", "interpolate"))
 
@@ -109,6 +123,16 @@ def table(dice: Random, folder: Path) -> None:
 def octets(dice: Random, folder: Path) -> None:
     """A file of any format."""
     known = files(folder)
+    ending = dice.choice(sorted(known))
+    path = folder / f"log{ending}"
+    path.write_bytes(damage.octets(known[ending], dice))
+    record = Experiment.load(path, irregular=_irregular(dice))
+    finite("record", record.time, record.data)
+
+
+def guarded(dice: Random, folder: Path) -> None:
+    """An MDF file, whose reader is a process of its own: one of these costs as much as hundreds of other cases."""
+    known = mdf(folder)
     ending = dice.choice(sorted(known))
     path = folder / f"log{ending}"
     path.write_bytes(damage.octets(known[ending], dice))

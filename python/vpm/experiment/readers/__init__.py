@@ -14,9 +14,10 @@ PARQUET = (".parquet", ".pq")
 MATLAB = (".mat",)
 HDF5 = (".h5", ".hdf5", ".hdf", ".he5")
 BAGS = (".bag", ".db3", ".mcap")
+MDF = (".mf4", ".mdf")
 TDMS = (".tdms",)
 ULOG = (".ulg",)
-ENDINGS = (".csv", ".tsv", ".txt", *PARQUET, *MATLAB, *HDF5, *BAGS, *TDMS, *ULOG)
+ENDINGS = (".csv", ".tsv", ".txt", *PARQUET, *MATLAB, *HDF5, *BAGS, *MDF, *TDMS, *ULOG)
 
 
 def open_log(path: str | PathLike[str]) -> Log:
@@ -28,7 +29,7 @@ def open_log(path: str | PathLike[str]) -> Log:
         ``.csv`` and every ending that is not named here is text; ``.parquet`` and ``.pq`` need the extra ``parquet``;
         ``.mat`` of MATLAB up to 7.2 needs none, of 7.3 the extra ``hdf5``, as do ``.h5``, ``.hdf5``, ``.hdf`` and
         ``.he5``; ``.bag`` (ROS 1), ``.db3`` and ``.mcap`` and folders with a ``metadata.yaml`` (ROS 2) need the extra
-        ``ros``; ``.tdms`` of LabVIEW the extra ``tdms``, ``.ulg`` of PX4 ``ulog``.
+        ``ros``; ``.mf4`` and ``.mdf`` the extra ``mdf``, ``.tdms`` of LabVIEW ``tdms``, ``.ulg`` of PX4 ``ulog``.
 
     Returns
     -------
@@ -50,7 +51,7 @@ def open_log(path: str | PathLike[str]) -> Log:
 def _opened(path: str | PathLike[str]) -> Log:
     file = Path(path)
     ending = file.suffix.lower()
-    if ending in (*PARQUET, *MATLAB, *HDF5, *BAGS, *TDMS, *ULOG) and not file.exists():
+    if ending in (*PARQUET, *MATLAB, *HDF5, *BAGS, *MDF, *TDMS, *ULOG) and not file.exists():
         raise ExperimentError(f"{path} does not exist; check the name and the folder", path=str(path))
     if ending in PARQUET:
         from vpm.experiment.readers.parquet import ParquetLog
@@ -68,6 +69,11 @@ def _opened(path: str | PathLike[str]) -> Log:
         from vpm.experiment.readers.ros import BagLog
 
         return BagLog(path)
+    if ending in MDF:
+        from vpm.experiment.readers.guarded import GuardedLog
+        from vpm.experiment.readers.mdf import MdfLog
+
+        return GuardedLog(path, MdfLog)
     if ending in TDMS:
         from vpm.experiment.readers.tdms import TdmsLog
 
