@@ -19,6 +19,7 @@ DOORS: dict[str, tuple[Callable[[Random, Path], None], int]] = {
     "channel table": (logs.channels, 6),
     "log check": (logs.checked, 1),
     "result": (stored.result, 5),
+    "recorder": (logs.recorders, 0),
     "guarded log": (logs.guarded, 0),
 }
 
