@@ -29,7 +29,8 @@ def open_log(path: str | PathLike[str]) -> Log:
         ``.csv`` and every ending that is not named here is text; ``.parquet`` and ``.pq`` need the extra ``parquet``;
         ``.mat`` of MATLAB up to 7.2 needs none, of 7.3 the extra ``hdf5``, as do ``.h5``, ``.hdf5``, ``.hdf`` and
         ``.he5``; ``.bag`` (ROS 1), ``.db3`` and ``.mcap`` and folders with a ``metadata.yaml`` (ROS 2) need the extra
-        ``ros``; ``.mf4`` and ``.mdf`` the extra ``mdf``, ``.tdms`` of LabVIEW ``tdms``, ``.ulg`` of PX4 ``ulog``.
+        ``ros``; ``.mf4`` and ``.mdf`` the extra ``mdf``, ``.tdms`` of LabVIEW ``tdms``, ``.ulg`` of PX4 ``ulog``;
+        folders of LeRobot, and ``FOLDER/episode_000003`` in them, ``parquet``.
 
     Returns
     -------
@@ -82,9 +83,14 @@ def _opened(path: str | PathLike[str]) -> Log:
         from vpm.experiment.readers.ulog import UlogLog
 
         return UlogLog(path)
+    from vpm.experiment.readers.lerobot import EpisodeLog, is_data_set, is_episode
+
+    if is_data_set(file) or (not file.exists() and is_episode(file)):
+        return EpisodeLog(path)
     if file.is_dir():
         raise ExperimentError(
-            f"{path} cannot be read: it is a folder without a metadata.yaml, so no ROS 2 bag; give the path of a file",
+            f"{path} cannot be read: it is a folder without a metadata.yaml, so no ROS 2 bag, and without a "
+            "meta/info.json, so no data set of LeRobot; give the path of a file",
             path=str(path),
         )
     from vpm.experiment.readers.text import TextLog
