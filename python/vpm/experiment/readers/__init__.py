@@ -66,6 +66,11 @@ def _opened(path: str | PathLike[str]) -> Log:
         from vpm.experiment.readers.hdf5 import Hdf5Log
 
         return Hdf5Log(path)
+    if ending == ".mcap":
+        from vpm.experiment.readers.mcap_json import JsonLog, is_json
+
+        if is_json(path):
+            return JsonLog(path)
     if ending in BAGS or (file / "metadata.yaml").is_file():
         from vpm.experiment.readers.ros import BagLog
 
