@@ -115,7 +115,8 @@ class GuardedLog(Log):
     def _end(self, code: int) -> str:
         """Why a reader ended."""
         if code in {-getattr(signal, "SIGXCPU", 0), -getattr(signal, "SIGKILL", 0)}:
-            return f"reading took more than {self._seconds:.0f} s of processor time"
+            by_clock = PATIENCE * self._seconds
+            return f"reading took more than {self._seconds:.0f} s of processor time, or {by_clock:.0f} s by the clock"
         name = signal.Signals(-code).name if code < 0 else f"code {code}"
         return f"its library ended with {name}"
 
